@@ -1,0 +1,164 @@
+"""Robots by name: own small URDFs beside this file, and example-robot-data's; their fingertips."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.errors import MissingExtra, NameNotFound, SphshellError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from sphshell_pin import Sphere
+
+URDF_FOLDER = Path(__file__).parent / "urdf"
+
+# Own robots, and whether their root floats freely.
+OWN: dict[str, bool] = {
+    "ball": True,
+    "gear_pair": False,
+    "three_link_finger": False,
+    "turntable": False,
+}
+
+# Fingertips of robots whose collision geometry has no spheres: frame, radius [m], offset [m].
+TIPS: dict[str, tuple[tuple[str, float, tuple[float, float, float]], ...]] = {
+    "panda": (("panda_hand_tcp", 0.012, (0.0, 0.0, 0.0)),),
+    "finger_edu": (("finger_tip_link", 0.016, (0.0, 0.0, 0.0)),),
+    "ur3": (("tool0", 0.012, (0.0, 0.0, 0.012)),),
+    "ur5": (("tool0", 0.012, (0.0, 0.0, 0.012)),),
+    "ur10": (("tool0", 0.012, (0.0, 0.0, 0.012)),),
+}
+
+
+class RobotError(SphshellError, ValueError):
+    """A robot description that cannot be loaded."""
+
+
+@dataclass(frozen=True)
+class LoadedRobot:
+    """A robot ready for a Scene: its model, its geometry, a posture to start from."""
+
+    name: str
+    model: Any
+    """pinocchio.Model."""
+    collision_model: Any
+    """pinocchio.GeometryModel."""
+    visual_model: Any
+    """pinocchio.GeometryModel."""
+    q0: npt.NDArray[np.float64]
+    """A posture (nq,): the robot's reference posture where it has one, else neutral."""
+
+
+def names() -> list[str]:
+    """Return the names `load` knows on this machine: own robots, then example-robot-data's."""
+    return [*OWN, *(name for name in _library() if name not in OWN)]
+
+
+def load(name: str) -> LoadedRobot:
+    """Return the robot called `name`.
+
+    Raises
+    ------
+    MissingExtra
+        No own robot has that name, and example-robot-data is not installed.
+    NameNotFound
+        Nobody has that name.
+    RobotError
+        Its description cannot be read on this machine (an SDF file, for one).
+    """
+    if name in OWN:
+        return load_urdf(URDF_FOLDER / f"{name}.urdf", free_flyer=OWN[name], name=name)
+    try:
+        import example_robot_data
+    except ImportError:
+        raise MissingExtra("example-robot-data-loaders", "robots", f"the robot '{name}'") from None
+    if name not in _library():
+        raise NameNotFound("robot", name, "sphshell_pin.robots", names())
+    try:
+        robot = example_robot_data.load(name)
+    except Exception as error:
+        raise RobotError(f"the robot '{name}' cannot be loaded: {error}") from error
+    # A reference posture may state a free-flyer's quaternion with a few digits only.
+    q0 = pin.normalize(robot.model, np.asarray(robot.q0, dtype=float))
+    return LoadedRobot(name, robot.model, robot.collision_model, robot.visual_model, q0)
+
+
+def load_urdf(
+    path: str | PathLike[str],
+    package_dirs: Iterable[str | PathLike[str]] = (),
+    *,
+    free_flyer: bool = False,
+    name: str | None = None,
+) -> LoadedRobot:
+    """Return the robot of one's own URDF file.
+
+    `package_dirs` are the folders that hold the packages of `package://` mesh names; the file's own
+    folder is always searched. With `free_flyer` the root link floats (nq 7, nv 6).
+
+    Raises
+    ------
+    RobotError
+        The file or one of its meshes is missing or cannot be read.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise RobotError(f"{file}: no such URDF file")
+    dirs = [str(one) for one in package_dirs] + [str(file.parent)]
+    for folder in dirs:
+        if not Path(folder).is_dir():
+            raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
+    root = [pin.JointModelFreeFlyer()] if free_flyer else []
+    try:
+        model = pin.buildModelFromUrdf(str(file), *root)
+    except (ValueError, RuntimeError) as error:
+        raise RobotError(f"{file}: not a URDF that pinocchio can read: {error}") from None
+    geometry = []
+    for kind in (pin.GeometryType.COLLISION, pin.GeometryType.VISUAL):
+        try:
+            geometry.append(pin.buildGeomFromUrdf(model, str(file), kind, package_dirs=dirs))
+        except (ValueError, RuntimeError) as error:
+            searched = ", ".join(dirs)
+            raise RobotError(
+                f"{file}: a mesh cannot be loaded ({error}); searched in {searched}: "
+                "give the folder above the package in package_dirs"
+            ) from None
+    return LoadedRobot(name or model.name, model, *geometry, pin.neutral(model))
+
+
+def fingertips(name: str) -> list[Sphere]:
+    """Return the spheres at the ends of the robot's limbs: fingertips, feet.
+
+    They are the sphere collision geometries of links that carry no further joint, else those of a
+    small table of well-known robots; an empty list where neither is known.
+    """
+    from sphshell_pin import Sphere
+
+    if name in TIPS:
+        return [Sphere(radius, frame, np.array(offset)) for frame, radius, offset in TIPS[name]]
+    robot = load(name)
+    parents = {int(parent) for parent in robot.model.parents}
+    tips = []
+    for geometry in robot.collision_model.geometryObjects:
+        if type(geometry.geometry).__name__ != "Sphere" or geometry.parentJoint in parents - {0}:
+            continue
+        frame = robot.model.frames[geometry.parentFrame]
+        offset = frame.placement.actInv(geometry.placement).translation
+        tips.append(Sphere(float(geometry.geometry.radius), frame.name, offset))
+    return tips
+
+
+def _library() -> list[str]:
+    """Return the names of example-robot-data, or nothing where it is not installed."""
+    try:
+        from example_robot_data.robots_loader import ROBOTS
+    except ImportError:
+        return []
+    return sorted(ROBOTS)

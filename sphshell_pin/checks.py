@@ -1,0 +1,77 @@
+"""Argument checks shared by the package's public face."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.errors import InvalidParameter
+
+Array = NDArray[np.float64]
+
+
+def check_positive(name: str, value: float, unit: str = "") -> float:
+    """Return `value` as a float; raise InvalidParameter unless it is finite and > 0."""
+    number = check_finite(name, value)
+    if number <= 0:
+        raise InvalidParameter(name, value, f"must be positive{_in(unit)}")
+    return number
+
+
+def check_not_negative(name: str, value: float, unit: str = "") -> float:
+    """Return `value` as a float; raise InvalidParameter unless it is finite and >= 0."""
+    number = check_finite(name, value)
+    if number < 0:
+        raise InvalidParameter(name, value, f"must not be negative{_in(unit)}")
+    return number
+
+
+def check_finite(name: str, value: float) -> float:
+    """Return `value` as a float; raise InvalidParameter unless it is one finite number."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InvalidParameter(name, value, "must be a number") from None
+    if not math.isfinite(number):
+        raise InvalidParameter(name, value, "must be finite")
+    return number
+
+
+def check_vector(name: str, value: Any, size: int, what: str = "") -> Array:
+    """Return a copy of `value` as an array (size,); raise InvalidParameter otherwise."""
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidParameter(name, value, f"must hold {size} numbers{what}") from None
+    if array.shape != (size,):
+        raise InvalidParameter(name, array.shape, f"must have shape ({size},){what}")
+    if not np.isfinite(array).all():
+        raise InvalidParameter(name, value, "must be finite")
+    return array
+
+
+def check_points(name: str, value: Any) -> Array:
+    """Return a copy of `value` as an array (n, 3); raise InvalidParameter otherwise."""
+    try:
+        array = np.array(value, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InvalidParameter(name, value, "must be an array of shape (n, 3)") from None
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InvalidParameter(name, array.shape, "must have shape (n, 3)")
+    if not np.isfinite(array).all():
+        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise InvalidParameter(f"{name}[{row}]", array[row].tolist(), "must be finite")
+    return array
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Return `array` with writing switched off."""
+    array.setflags(write=False)
+    return array
+
+
+def _in(unit: str) -> str:
+    return f" [{unit}]" if unit else ""

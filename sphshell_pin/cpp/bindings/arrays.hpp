@@ -1,0 +1,46 @@
+// Conversions between C++ rows and NumPy arrays that own their memory.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <initializer_list>
+#include <utility>
+#include <vector>
+
+namespace sphshell {
+
+namespace nb = nanobind;
+
+template <class T>
+using Array = nb::ndarray<nb::numpy, T>;
+using Points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Doubles = nb::ndarray<const double, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+using IntTriples = nb::ndarray<const int, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Ints = nb::ndarray<const int, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+
+// Moves a vector's memory into an array of the given shape.
+template <class T>
+Array<T> to_array(std::vector<T> values, std::initializer_list<std::size_t> shape) {
+  auto* kept = new std::vector<T>(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  return Array<T>(kept->data(), shape, owner);
+}
+
+template <class T>
+Array<T> to_array(std::vector<T> values) {
+  const std::size_t n = values.size();
+  return to_array(std::move(values), {n});
+}
+
+inline void append(std::vector<double>& out, const Eigen::Vector3d& x) {
+  out.insert(out.end(), x.data(), x.data() + 3);
+}
+
+inline Eigen::Vector3d row(const Points& points, std::size_t i) {
+  return Eigen::Vector3d(points(i, 0), points(i, 1), points(i, 2));
+}
+
+}  // namespace sphshell

@@ -1,0 +1,242 @@
+#include "bindings/interop.hpp"
+
+#include <memory>
+
+#include "bindings/arrays.hpp"
+#include "dynamics/simulation.hpp"
+
+#include <nanobind/eigen/dense.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+namespace sphshell {
+namespace {
+
+using RowPoints = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
+SE3 to_se3(const Eigen::Matrix4d& m) {
+  return SE3(Eigen::Matrix3d(m.topLeftCorner<3, 3>()), Vec3(m.topRightCorner<3, 1>()));
+}
+
+Array<double> rows_to_array(std::vector<ContactRow> rows) {
+  const std::size_t n = rows.size();
+  auto* kept = new std::vector<ContactRow>(std::move(rows));
+  nb::capsule owner(kept,
+                    [](void* p) noexcept { delete static_cast<std::vector<ContactRow>*>(p); });
+  return Array<double>(reinterpret_cast<double*>(kept->data()),
+                       {n, std::size_t(ContactRow::kColumns)}, owner);
+}
+
+// The callable returns points, normals and depths, checked and converted by its Python wrapper.
+ContactSource make_source(nb::object find) {
+  auto shared = std::shared_ptr<nb::object>(new nb::object(std::move(find)), [](nb::object* p) {
+    nb::gil_scoped_acquire acquire;
+    delete p;
+  });
+  return [shared](const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& out) {
+    nb::gil_scoped_acquire acquire;
+    const nb::object result = (*shared)(to_python(pose_i), to_python(pose_j));
+    const auto points = nb::cast<RowPoints>(result[0]);
+    const auto normals = nb::cast<RowPoints>(result[1]);
+    const auto depths = nb::cast<VectorX>(result[2]);
+    for (Eigen::Index i = 0; i < depths.size(); ++i)
+      if (depths[i] > 0)
+        out.push_back({points.row(i).transpose(), normals.row(i).transpose(), depths[i],
+                       static_cast<int>(i), Feature::Face});
+  };
+}
+
+std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matrix4d& placement_i,
+                                int joint_j, const Eigen::Matrix4d& placement_j, double radius,
+                                std::shared_ptr<Shell> shell, nb::object source, int method,
+                                const NormalLaw& law, const CoulombLaw* friction) {
+  auto pair = std::make_unique<Pair>();
+  pair->name = std::move(name);
+  pair->joint_i = joint_i;
+  pair->joint_j = joint_j;
+  pair->placement_i = to_se3(placement_i);
+  pair->placement_j = to_se3(placement_j);
+  pair->radius = radius;
+  pair->shell = std::move(shell);
+  if (!source.is_none()) pair->source = make_source(std::move(source));
+  pair->method = static_cast<Method>(method);
+  pair->law = law;
+  if (friction) pair->friction = *friction;
+  return pair;
+}
+
+std::vector<Pair> copies(const std::vector<const Pair*>& pairs) {
+  std::vector<Pair> out;
+  for (const Pair* pair : pairs) out.push_back(*pair);
+  return out;
+}
+
+// A Python callable tau(t, q, v, contacts): contacts as rows, its Python wrapper gives them names.
+class PythonController : public Controller {
+ public:
+  explicit PythonController(nb::object callable) : callable_(std::move(callable)) {}
+  ~PythonController() override {
+    nb::gil_scoped_acquire acquire;
+    callable_.reset();
+  }
+  void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override {
+    std::vector<ContactRow> rows;
+    scene.evaluate(q, v, true, &rows);
+    nb::gil_scoped_acquire acquire;
+    tau = nb::cast<VectorX>(callable_(t, q, v, rows_to_array(std::move(rows))));
+  }
+
+ private:
+  nb::object callable_;
+};
+
+std::vector<Vec3> to_points(const RowPoints& rows) {
+  std::vector<Vec3> out;
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) out.push_back(rows.row(i).transpose());
+  return out;
+}
+
+nb::dict to_dict(Record record, int nq, int nv) {
+  nb::dict out;
+  const std::size_t n = record.t.size();
+  std::vector<double> event_t;
+  std::vector<int> event_pair, event_kind;
+  for (const Event& e : record.events) {
+    event_t.push_back(e.t);
+    event_pair.push_back(e.pair);
+    event_kind.push_back(static_cast<int>(e.kind));
+  }
+  out["t"] = to_array(std::move(record.t));
+  out["q"] = to_array(std::move(record.q), {n, std::size_t(nq)});
+  out["v"] = to_array(std::move(record.v), {n, std::size_t(nv)});
+  out["energy"] = to_array(std::move(record.energy), {n, std::size_t(Record::kEnergies)});
+  out["contact_row"] = to_array(std::move(record.contact_row));
+  out["contacts"] = rows_to_array(std::move(record.contacts));
+  out["event_t"] = to_array(std::move(event_t));
+  out["event_pair"] = to_array(std::move(event_pair));
+  out["event_kind"] = to_array(std::move(event_kind));
+  return out;
+}
+
+nb::list summaries(const Simulation& simulation) {
+  nb::list out;
+  for (const PairSummary& s : simulation.summaries()) {
+    nb::dict d;
+    d["contact_time"] = s.contact_time;
+    d["impulse"] = s.impulse;
+    d["peak_force"] = s.peak_force;
+    d["peak_force_time"] = s.peak_force_time;
+    d["max_depth"] = s.max_depth;
+    d["max_depth_time"] = s.max_depth_time;
+    d["touches"] = s.touches;
+    out.append(d);
+  }
+  return out;
+}
+
+}  // namespace
+}  // namespace sphshell
+
+void bind_dynamics(nanobind::module_& m) {
+  using namespace sphshell;
+  nb::class_<Pair>(m, "Pair").def(
+      nb::new_(&make_pair), nb::arg("name"), nb::arg("joint_i"), nb::arg("placement_i"),
+      nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("shell").none(),
+      nb::arg("source").none(), nb::arg("method"), nb::arg("law"), nb::arg("friction").none());
+
+  nb::class_<Scene>(m, "Scene")
+      .def(
+          "__init__",
+          [](Scene* scene, nb::handle model, const std::vector<const Pair*>& pairs) {
+            new (scene) Scene(model_of(model), copies(pairs));
+          },
+          nb::arg("model"), nb::arg("pairs"))
+      .def("external_forces",
+           [](Scene& scene, const VectorX& q, const VectorX& v) {
+             scene.evaluate(q, v, false, nullptr);
+             const Forces none(scene.touching() ? 0 : scene.external().size(),
+                               pinocchio::Force::Zero());
+             return to_python(scene.touching() ? scene.external() : none);
+           })
+      .def("contacts", [](Scene& scene, const VectorX& q, const VectorX& v) {
+        std::vector<ContactRow> rows;
+        scene.evaluate(q, v, true, &rows);
+        return rows_to_array(std::move(rows));
+      });
+
+  nb::class_<Controller>(m, "Controller");
+  nb::class_<GravityCompensation, Controller>(m, "GravityCompensation")
+      .def(nb::init<VectorX>(), nb::arg("actuated"));
+  nb::class_<JointPd, Controller>(m, "JointPd")
+      .def(nb::init<VectorX, VectorX, VectorX, bool, VectorX>(), nb::arg("kp"), nb::arg("kd"),
+           nb::arg("q_ref"), nb::arg("gravity"), nb::arg("actuated"));
+  nb::class_<PythonController, Controller>(m, "PythonController")
+      .def(nb::init<nb::object>(), nb::arg("callable"));
+  nb::class_<CartesianImpedance, Controller>(m, "CartesianImpedance")
+      .def(
+          "__init__",
+          [](CartesianImpedance* self, int num_joints, int joint, const Eigen::Matrix4d& frame,
+             int path_joint, const Eigen::Matrix4d& path_placement, std::vector<double> times,
+             const RowPoints& points, const RowPoints& normals, double stiffness, double damping,
+             double normal_force, double rotational_stiffness, double rotational_damping,
+             VectorX posture_stiffness, VectorX joint_damping, VectorX q_ref, VectorX actuated) {
+            ImpedanceSettings s;
+            s.joint = joint;
+            s.frame = to_se3(frame);
+            s.path_joint = path_joint;
+            s.path_placement = to_se3(path_placement);
+            s.times = std::move(times);
+            s.points = to_points(points);
+            s.normals = to_points(normals);
+            s.stiffness = stiffness;
+            s.damping = damping;
+            s.normal_force = normal_force;
+            s.rotational_stiffness = rotational_stiffness;
+            s.rotational_damping = rotational_damping;
+            s.posture_stiffness = std::move(posture_stiffness);
+            s.joint_damping = std::move(joint_damping);
+            s.q_ref = std::move(q_ref);
+            s.actuated = std::move(actuated);
+            new (self) CartesianImpedance(std::move(s), num_joints);
+          },
+          nb::arg("num_joints"), nb::arg("joint"), nb::arg("frame"), nb::arg("path_joint"),
+          nb::arg("path_placement"), nb::arg("times"), nb::arg("points"), nb::arg("normals"),
+          nb::arg("stiffness"), nb::arg("damping"), nb::arg("normal_force"),
+          nb::arg("rotational_stiffness"), nb::arg("rotational_damping"),
+          nb::arg("posture_stiffness"), nb::arg("joint_damping"), nb::arg("q_ref"),
+          nb::arg("actuated"));
+
+  nb::class_<Simulation>(m, "Simulation")
+      .def(
+          "__init__",
+          [](Simulation* self, nb::handle model, const std::vector<const Pair*>& pairs,
+             std::shared_ptr<Controller> controller, VectorX q0, VectorX v0, bool runge_kutta,
+             double dt, double duration, double start_time, double control_dt, int record_every) {
+            new (self) Simulation(
+                model_of(model), copies(pairs),
+                {dt, duration, start_time, control_dt, record_every, runge_kutta},
+                std::move(controller), std::move(q0), std::move(v0));
+          },
+          nb::arg("model"), nb::arg("pairs"), nb::arg("controller").none(), nb::arg("q0"),
+          nb::arg("v0"), nb::kw_only(), nb::arg("runge_kutta"), nb::arg("dt"),
+          nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"),
+          nb::arg("record_every"))
+      .def("advance",
+           [](Simulation& self, double wall_seconds) {
+             nb::gil_scoped_release release;
+             return static_cast<int>(self.advance(wall_seconds));
+           })
+      .def("take",
+           [](Simulation& self) {
+             const auto& model = self.model();
+             return to_dict(self.take(), model.nq, model.nv);
+           })
+      .def_prop_ro("progress", &Simulation::progress)
+      .def_prop_ro("time", &Simulation::time)
+      .def_prop_ro("q", &Simulation::q)
+      .def_prop_ro("v", &Simulation::v)
+      .def_prop_ro("steps", &Simulation::steps)
+      .def_prop_ro("wall_time", &Simulation::wall_time)
+      .def_prop_ro("summaries", &summaries);
+}

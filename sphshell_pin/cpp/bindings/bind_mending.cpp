@@ -1,0 +1,157 @@
+// Python face of the surface cleaning loops. Arrays go in as they are, come out as new arrays.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <utility>
+#include <vector>
+
+#include "../shell/mending.hpp"
+
+namespace nb = nanobind;
+
+namespace {
+
+template <typename T>
+using In = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+template <typename T, int Columns>
+using InRows = nb::ndarray<const T, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
+
+// Hands a vector over to NumPy without copying; rows of `columns` if that is not 0.
+template <typename T>
+nb::object give(std::vector<T>&& values, std::size_t columns = 0) {
+  auto* kept = new std::vector<T>(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  const std::size_t size = kept->size();
+  // NumPy wants an address even for nothing.
+  static T nothing{};
+  T* data = size > 0 ? kept->data() : &nothing;
+  if (columns == 0) return nb::cast(nb::ndarray<nb::numpy, T>(data, {size}, owner));
+  return nb::cast(nb::ndarray<nb::numpy, T>(data, {size / columns, columns}, owner));
+}
+
+sphshell::PolygonView view(const In<std::int64_t>& offsets, const In<std::int32_t>& corners) {
+  return {offsets.data(), corners.data(), offsets.shape(0) - 1};
+}
+
+template <typename T>
+std::vector<T> copy(const In<T>& values) {
+  return {values.data(), values.data() + values.shape(0)};
+}
+
+}  // namespace
+
+void bind_mending(nb::module_& module) {
+  using namespace nb::literals;
+
+  module.def(
+      "mend_weld",
+      [](InRows<double, 3> points, double tolerance) {
+        sphshell::Weld result;
+        {
+          nb::gil_scoped_release released;
+          result = sphshell::weld(points.data(), points.shape(0), tolerance);
+        }
+        return nb::make_tuple(give(std::move(result.representative)), result.largest_distance);
+      },
+      "points"_a, "tolerance"_a,
+      "(representative (n,), largest distance [m]) of points (n,3) merged transitively.");
+
+  module.def(
+      "mend_edges",
+      [](In<std::int64_t> offsets, In<std::int32_t> corners, std::size_t vertex_count) {
+        sphshell::EdgeTable table;
+        {
+          nb::gil_scoped_release released;
+          table = sphshell::edge_table(view(offsets, corners), vertex_count);
+        }
+        return nb::make_tuple(give(std::move(table.slot_edge)), give(std::move(table.ends), 2),
+                              give(std::move(table.users)));
+      },
+      "offsets"_a, "corners"_a, "vertex_count"_a,
+      "(edge of each slot, ends (E,2), users (E,)) of polygons.");
+
+  module.def(
+      "mend_duplicates",
+      [](In<std::int64_t> offsets, In<std::int32_t> corners) {
+        sphshell::Duplicates result;
+        {
+          nb::gil_scoped_release released;
+          result = sphshell::duplicate_polygons(view(offsets, corners));
+        }
+        return nb::make_tuple(give(std::move(result.first)), give(std::move(result.opposite)));
+      },
+      "offsets"_a, "corners"_a,
+      "(first polygon with the same corners (m,), wound the other way (m,)).");
+
+  module.def(
+      "mend_clip_ears",
+      [](In<std::int64_t> offsets, In<std::int32_t> corners, InRows<double, 3> points,
+         double tolerance) {
+        sphshell::EarClips result;
+        {
+          nb::gil_scoped_release released;
+          result = sphshell::clip_ears(view(offsets, corners), points.data(), tolerance);
+        }
+        return nb::make_tuple(give(std::move(result.triangle_slots), 3),
+                              give(std::move(result.triangle_polygon)),
+                              give(std::move(result.tangled)));
+      },
+      "offsets"_a, "corners"_a, "points"_a, "tolerance"_a,
+      "(slots of the triangles (t,3), their polygon (t,), tangled (m,)).");
+
+  module.def(
+      "mend_t_junctions",
+      [](In<std::int64_t> offsets, In<std::int32_t> corners, InRows<double, 3> points,
+         In<std::int64_t> open_slots, In<std::int32_t> open_polygons, In<std::int32_t> candidates,
+         double tolerance) {
+        sphshell::Insertions result;
+        {
+          nb::gil_scoped_release released;
+          result = sphshell::find_t_junctions(view(offsets, corners), points.data(),
+                                              copy(open_slots), copy(open_polygons),
+                                              copy(candidates), tolerance);
+        }
+        return nb::make_tuple(give(std::move(result.slot)), give(std::move(result.vertex)),
+                              give(std::move(result.parameter)));
+      },
+      "offsets"_a, "corners"_a, "points"_a, "open_slots"_a, "open_polygons"_a, "candidates"_a,
+      "tolerance"_a, "(slot, vertex, parameter) of vertices inside open edges, in order along them.");
+
+  module.def(
+      "mend_flood_fill",
+      [](In<std::int64_t> offsets, In<std::int32_t> corners, std::size_t vertex_count) {
+        sphshell::Orientation result;
+        {
+          nb::gil_scoped_release released;
+          const auto polygons = view(offsets, corners);
+          result = sphshell::flood_fill(polygons, sphshell::edge_table(polygons, vertex_count));
+        }
+        return nb::make_tuple(give(std::move(result.component)), give(std::move(result.flip)),
+                              give(std::move(result.one_sided)));
+      },
+      "offsets"_a, "corners"_a, "vertex_count"_a,
+      "(component (m,), flip (m,), one-sided (components,)) across edges of two polygons.");
+
+  module.def(
+      "mend_components",
+      [](std::size_t nodes, InRows<std::int32_t, 2> pairs) {
+        return give(sphshell::connected_components(nodes, pairs.data(), pairs.shape(0)));
+      },
+      "nodes"_a, "pairs"_a, "Component (nodes,) of an undirected graph.");
+
+  module.def(
+      "mend_nesting",
+      [](InRows<double, 3> points, InRows<std::int32_t, 3> triangles,
+         In<std::int32_t> triangle_component, InRows<double, 3> queries, In<std::uint8_t> closed) {
+        std::vector<std::int32_t> depth;
+        {
+          nb::gil_scoped_release released;
+          depth = sphshell::nesting_depth(points.data(), triangles.data(),
+                                          triangle_component.data(), triangles.shape(0),
+                                          queries.data(), closed.data(), closed.shape(0));
+        }
+        return give(std::move(depth));
+      },
+      "points"_a, "triangles"_a, "triangle_component"_a, "queries"_a, "closed"_a,
+      "How many closed components enclose the query point (c,3) of each component.");
+}

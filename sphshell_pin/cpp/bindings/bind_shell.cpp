@@ -1,0 +1,160 @@
+#include <algorithm>
+#include <memory>
+#include <thread>
+
+#include "bindings/arrays.hpp"
+#include "contact/query.hpp"
+#include "shell/shell.hpp"
+
+#include <nanobind/eigen/dense.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/tuple.h>
+
+namespace sphshell {
+namespace {
+
+std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& triangles,
+                                  const Ints& element, double crease_angle, int side) {
+  std::vector<Vec3> points(vertices.shape(0));
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = row(vertices, i);
+  std::vector<Triangle> corners(triangles.shape(0));
+  for (std::size_t t = 0; t < corners.size(); ++t)
+    corners[t] = {triangles(t, 0), triangles(t, 1), triangles(t, 2)};
+  std::vector<int> owner(element.data(), element.data() + element.shape(0));
+  nb::gil_scoped_release release;
+  return std::make_shared<Shell>(std::move(points), std::move(corners), std::move(owner),
+                                 crease_angle, static_cast<Side>(side));
+}
+
+auto contacts(const Shell& shell, const Vec3& centre, double radius, int method) {
+  Query query;
+  query.find(shell, centre, radius, static_cast<Method>(method));
+  const std::size_t k = query.contacts.size();
+  std::vector<double> point, normal, depth;
+  std::vector<int> element;
+  std::vector<std::uint8_t> feature;
+  for (const Contact& c : query.contacts) {
+    append(point, c.point);
+    append(normal, c.normal);
+    depth.push_back(c.depth);
+    element.push_back(c.element);
+    feature.push_back(static_cast<std::uint8_t>(c.feature));
+  }
+  return nb::make_tuple(to_array(std::move(point), {k, 3}), to_array(std::move(normal), {k, 3}),
+                        to_array(std::move(depth)), to_array(std::move(element)),
+                        to_array(std::move(feature)));
+}
+
+// Splits 0..n over threads; each writes only to its own rows, so results do not depend on threads.
+template <class Work>
+void in_parallel(std::size_t n, int threads, Work&& work) {
+  const std::size_t workers =
+      std::clamp<std::size_t>(static_cast<std::size_t>(std::max(threads, 1)), 1, n / 64 + 1);
+  std::vector<std::thread> pool;
+  for (std::size_t w = 1; w < workers; ++w)
+    pool.emplace_back([&, w] { work(n * w / workers, n * (w + 1) / workers); });
+  work(0, n / workers);
+  for (std::thread& thread : pool) thread.join();
+}
+
+auto contacts_batch(const Shell& shell, const Points& centres, const Doubles& radii, int method,
+                    int threads) {
+  const std::size_t n = centres.shape(0);
+  std::vector<double> depth(n, 0.0);
+  std::vector<int> count(n, 0);
+  {
+    nb::gil_scoped_release release;
+    in_parallel(n, threads, [&](std::size_t begin, std::size_t end) {
+      Query query;
+      for (std::size_t i = begin; i < end; ++i) {
+        for (const Contact& c :
+             query.find(shell, row(centres, i), radii(i), static_cast<Method>(method)))
+          depth[i] = std::max(depth[i], c.depth);
+        count[i] = static_cast<int>(query.contacts.size());
+      }
+    });
+  }
+  return nb::make_tuple(to_array(std::move(depth)), to_array(std::move(count)));
+}
+
+auto closest_points(const Shell& shell, const Points& points, int threads) {
+  const std::size_t n = points.shape(0);
+  std::vector<double> point(3 * n), normal(3 * n), distance(n);
+  std::vector<int> element(n);
+  {
+    nb::gil_scoped_release release;
+    in_parallel(n, threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const SurfacePoint at = shell.closest_point(row(points, i));
+        std::copy_n(at.point.data(), 3, &point[3 * i]);
+        std::copy_n(at.normal.data(), 3, &normal[3 * i]);
+        distance[i] = at.distance;
+        element[i] = at.element;
+      }
+    });
+  }
+  return nb::make_tuple(to_array(std::move(point), {n, 3}), to_array(std::move(normal), {n, 3}),
+                        to_array(std::move(distance)), to_array(std::move(element)));
+}
+
+template <class T, class Get>
+auto per_edge(const Shell& shell, std::size_t columns, Get&& get) {
+  std::vector<T> out;
+  std::size_t n = 0;
+  for (const Edge& edge : shell.topology().edges) {
+    if (edge.inner) continue;
+    get(edge, out);
+    ++n;
+  }
+  return columns == 1 ? to_array(std::move(out)) : to_array(std::move(out), {n, columns});
+}
+
+}  // namespace
+}  // namespace sphshell
+
+void bind_shell(nanobind::module_& m) {
+  using namespace sphshell;
+  nb::class_<Shell>(m, "Shell")
+      .def(nb::new_(&make_shell), nb::arg("vertices"), nb::arg("triangles"),
+           nb::arg("triangle_element"), nb::arg("crease_angle"), nb::arg("side"))
+      .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"))
+      .def("contacts_batch", &contacts_batch, nb::arg("centers"), nb::arg("radii"),
+           nb::arg("method"), nb::arg("threads"))
+      .def("closest_points", &closest_points, nb::arg("points"), nb::arg("threads") = 1)
+      .def_prop_ro("num_elements", &Shell::num_elements)
+      .def_prop_ro("num_patches", [](const Shell& s) { return s.topology().num_patches; })
+      .def_prop_ro("bytes", &Shell::bytes)
+      .def_prop_ro("element_patch", [](const Shell& s) { return to_array(s.topology().patch); })
+      .def_prop_ro("num_edges",
+                   [](const Shell& s) {
+                     return std::count_if(s.topology().edges.begin(), s.topology().edges.end(),
+                                          [](const Edge& e) { return !e.inner; });
+                   })
+      .def_prop_ro("edge_vertices",
+                   [](const Shell& s) {
+                     return per_edge<int>(s, 2, [](const Edge& e, std::vector<int>& out) {
+                       out.push_back(e.first_vertex);
+                       out.push_back(e.last_vertex);
+                     });
+                   })
+      .def_prop_ro("edge_class",
+                   [](const Shell& s) {
+                     return per_edge<std::uint8_t>(
+                         s, 1, [](const Edge& e, std::vector<std::uint8_t>& out) {
+                           out.push_back(static_cast<std::uint8_t>(e.kind));
+                         });
+                   })
+      .def_prop_ro("edge_angle",
+                   [](const Shell& s) {
+                     return per_edge<double>(s, 1, [](const Edge& e, std::vector<double>& out) {
+                       out.push_back(e.angle);
+                     });
+                   })
+      .def_prop_ro("triangle_normals", [](const Shell& s) {
+        std::vector<double> out;
+        for (const Vec3& n : s.topology().face_normal) append(out, n);
+        const std::size_t t = s.topology().face_normal.size();
+        return to_array(std::move(out), {t, 3});
+      });
+}

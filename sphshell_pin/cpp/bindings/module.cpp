@@ -1,0 +1,18 @@
+#include <nanobind/nanobind.h>
+
+namespace nb = nanobind;
+
+void bind_mending(nb::module_& m);
+void bind_shell(nb::module_& m);
+void bind_contact(nb::module_& m);
+void bind_dynamics(nb::module_& m);
+void bind_reference(nb::module_& m);
+
+NB_MODULE(_core, m) {
+  m.doc() = "C++ core of sphshell_pin; its Python face checks and converts, this trusts and runs.";
+  bind_mending(m);
+  bind_shell(m);
+  bind_contact(m);
+  bind_dynamics(m);
+  bind_reference(m);
+}

@@ -1,0 +1,325 @@
+#include "contact/query.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "shell/triangle.hpp"
+
+namespace sphshell {
+namespace {
+
+// Round-off of a coordinate test, as a share of shell size + radius. Regions overlap by this much,
+// so that no position falls between two of them; what is claimed twice is then told apart.
+constexpr double kTolerance = 1e-14;
+// Two minima of the distance closer than this share of the radius are one.
+constexpr double kSamePoint = 1e-10;
+
+// Position of the sphere's centre against side k of a facet, in the facet's plane.
+struct SideTest {
+  bool beyond;      // outside the side by more than round-off
+  bool not_within;  // outside it, round-off included
+  bool before, after;  // past the side's first, second end (round-off included)
+  bool past_first, past_second;  // ... by more than round-off
+  double t;  // foot along the side, 0 to 1
+};
+
+inline SideTest test_side(const Facet& facet, int k, const Vec3& centre, double tolerance2) {
+  const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
+  const Vec3 from = centre - facet.corner[k];
+  const double length2 = edge.squaredNorm();
+  const double slack2 = tolerance2 * length2;
+  const double inward = facet.normal.dot(edge.cross(from));
+  const double along = from.dot(edge), left = length2 - along;
+  SideTest out;
+  const bool near_line = inward * inward <= slack2;
+  out.beyond = inward < 0 && !near_line;
+  out.not_within = inward <= 0 || near_line;
+  out.past_first = along < 0 && along * along > slack2;
+  out.past_second = left < 0 && left * left > slack2;
+  out.before = along <= 0 || along * along <= slack2;
+  out.after = left <= 0 || left * left <= slack2;
+  out.t = std::clamp(along / length2, 0.0, 1.0);
+  return out;
+}
+
+// True where the distance to the facet does not fall when one leaves its side k inward.
+inline bool side_holds(const Facet& facet, int k, const Vec3& centre, double tolerance2) {
+  const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
+  const double inward = facet.normal.dot(edge.cross(centre - facet.corner[k]));
+  return inward <= 0 || inward * inward <= tolerance2 * edge.squaredNorm();
+}
+
+bool edge_is_minimum(const Shell& shell, int code, const Vec3& centre, double tolerance2) {
+  if (code == kBoundary) return true;
+  const auto holds = [&](int h) {
+    return side_holds(shell.facets()[triangle_of(h)], side_of(h), centre, tolerance2);
+  };
+  if (code >= 0) return holds(code);
+  const std::vector<int>& all = shell.half_edges_of(kManifold - code);
+  return std::all_of(all.begin(), all.end(), holds);
+}
+
+bool vertex_is_minimum(const Shell& shell, int vertex, const Vec3& centre, double tolerance) {
+  const std::vector<Vec3>& p = shell.vertices();
+  const Topology& topology = shell.topology();
+  const Vec3 from = centre - p[vertex];
+  for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i) {
+    const Vec3 edge = p[topology.neighbours[i]] - p[vertex];
+    const double along = from.dot(edge);
+    if (along > 0 && along * along > tolerance * tolerance * edge.squaredNorm()) return false;
+  }
+  return true;
+}
+
+inline bool has_vertex(const Triangle& t, int v) { return t[0] == v || t[1] == v || t[2] == v; }
+
+Vec3 direction(const Vec3& point, const Vec3& centre, const Vec3& if_equal) {
+  const Vec3 d = centre - point;
+  const double length = d.norm();
+  return length > 0 ? Vec3(d / length) : if_equal;
+}
+
+}  // namespace
+
+Query::Query() {
+  near_.reserve(1024);
+  contacts.reserve(64);
+  faces_.reserve(64);
+  edges_.reserve(64);
+  vertices_.reserve(64);
+  carriers_.reserve(64);
+}
+
+const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& centre, double radius,
+                                        Method method) {
+  contacts.clear();
+  if (method == Method::Facets)
+    find_facets(shell, centre, radius);
+  else
+    find_elements(shell, centre, radius);
+  return contacts;
+}
+
+// The exact polyhedron: one contact at every local minimum of the distance over the surface.
+// A face, an edge or a vertex holds one when the centre lies in its normal cone with respect to
+// every triangle that meets there (the triangles are convex, so this is exact).
+void Query::find_facets(const Shell& shell, const Vec3& centre, double radius) {
+  faces_.clear(), edges_.clear(), vertices_.clear();
+  const double tolerance = kTolerance * (shell.size() + radius);
+  collect_claims(shell, centre, radius, tolerance);
+  if (faces_.empty() && edges_.empty() && vertices_.empty()) return;
+  drop_claims_of_neighbours(shell);
+  claims_to_contacts(shell, centre, radius);
+  if (contacts.size() > 1) merge_equal_points(kSamePoint * radius + 16 * tolerance);
+  if (shell.side() != Side::Both && !contacts.empty()) keep_one_side(shell, centre, radius);
+  // Deepest first: the order must not depend on the numbering of the elements.
+  if (contacts.size() > 1)
+    std::sort(contacts.begin(), contacts.end(), [](const Contact& a, const Contact& b) {
+      return a.depth != b.depth ? a.depth > b.depth : a.element < b.element;
+    });
+}
+
+void Query::walk(const Shell& shell, const Vec3& centre, double radius) {
+  near_.clear();
+  const Facet* facets = shell.facets().data();
+  shell.bvh().near(centre, radius, near_, [facets](int f) {
+    prefetch(&facets[f]);
+    prefetch(reinterpret_cast<const char*>(&facets[f]) + 64);
+  });
+}
+
+void Query::collect_claims(const Shell& shell, const Vec3& centre, double radius,
+                           double tolerance) {
+  const double tolerance2 = tolerance * tolerance;
+  const double reach2 = radius * radius;
+  const double wide_reach2 = reach2 * (1 + 1e-12);
+  walk(shell, centre, radius);
+  for (int f : near_) {
+    const Facet& facet = shell.facets()[f];
+    const double height = facet.normal.dot(centre - facet.corner[0]);
+    if (height * height >= wide_reach2) continue;
+    SideTest side[3];
+    bool inside = true;
+    for (int k = 0; k < 3; ++k) {
+      side[k] = test_side(facet, k, centre, tolerance2);
+      inside = inside && !side[k].beyond;
+    }
+    if (inside) faces_.push_back({f});
+    for (int k = 0; k < 3; ++k) {
+      if (facet.twin[k] != kNotMine && side[k].not_within && !side[k].past_first &&
+          !side[k].past_second) {
+        const Vec3& a = facet.corner[k];
+        const Vec3 foot = a + side[k].t * (facet.corner[next_corner(k)] - a);
+        if ((centre - foot).squaredNorm() < reach2 &&
+            edge_is_minimum(shell, facet.twin[k], centre, tolerance2)) {
+          const Triangle& t = shell.triangles()[shell.triangle_of_facet(f)];
+          edges_.push_back({f, k, t[k], t[next_corner(k)]});
+        }
+      }
+      if (facet.vertex[k] >= 0 && side[k].before && side[previous_corner(k)].after &&
+          (centre - facet.corner[k]).squaredNorm() < reach2 &&
+          vertex_is_minimum(shell, facet.vertex[k], centre, tolerance))
+        vertices_.push_back({f, facet.vertex[k]});
+    }
+  }
+}
+
+// A facet is convex: where its face holds the nearest point, its own edges and corners cannot, and
+// likewise an edge and its ends. Both claim only within round-off of their common border.
+void Query::drop_claims_of_neighbours(const Shell& shell) {
+  const auto corners = [&](const FaceClaim& face) -> const Triangle& {
+    return shell.triangles()[shell.triangle_of_facet(face.facet)];
+  };
+  const auto taken_by_face = [&](const EdgeClaim& e) {
+    return std::any_of(faces_.begin(), faces_.end(), [&](const FaceClaim& face) {
+      return has_vertex(corners(face), e.from) && has_vertex(corners(face), e.to);
+    });
+  };
+  if (!edges_.empty() && !faces_.empty())
+    edges_.erase(std::remove_if(edges_.begin(), edges_.end(), taken_by_face), edges_.end());
+  if (vertices_.empty()) return;
+  const auto taken = [&](const VertexClaim& v) {
+    return std::any_of(
+               faces_.begin(), faces_.end(),
+               [&](const FaceClaim& face) { return has_vertex(corners(face), v.vertex); }) ||
+           std::any_of(edges_.begin(), edges_.end(), [&](const EdgeClaim& e) {
+             return e.from == v.vertex || e.to == v.vertex;
+           });
+  };
+  vertices_.erase(std::remove_if(vertices_.begin(), vertices_.end(), taken), vertices_.end());
+}
+
+void Query::claims_to_contacts(const Shell& shell, const Vec3& centre, double radius) {
+  const Topology& topology = shell.topology();
+  const bool one_sided = shell.side() != Side::Both;
+  carriers_.clear();
+  for (std::size_t i = 0; i < faces_.size(); ++i) {
+    const Facet& facet = shell.facets()[faces_[i].facet];
+    // A planar face has one foot point, whichever of its facets claim it.
+    bool first = true;
+    int element = facet.element;
+    for (std::size_t j = 0; j < faces_.size(); ++j) {
+      const Facet& other = shell.facets()[faces_[j].facet];
+      if (j == i || other.planar_face != facet.planar_face) continue;
+      first = first && i < j;
+      element = std::min(element, other.element);
+    }
+    const double height = facet.normal.dot(centre - facet.corner[0]);
+    if (!first || std::abs(height) >= radius) continue;
+    const Vec3 normal = height < 0 ? Vec3(-facet.normal) : facet.normal;
+    contacts.push_back({centre - height * facet.normal, normal, radius - std::abs(height), element,
+                        Feature::Face});
+    if (one_sided) carriers_.push_back({facet.normal, false});
+  }
+  for (const EdgeClaim& claim : edges_) {
+    const Facet& facet = shell.facets()[claim.facet];
+    const Vec3& a = facet.corner[claim.side];
+    const Vec3 along = facet.corner[next_corner(claim.side)] - a;
+    const double t = std::clamp((centre - a).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    const Vec3 point = a + t * along;
+    const int h = 3 * shell.triangle_of_facet(claim.facet) + claim.side;
+    const Edge& edge = topology.edges[topology.edge_of[h]];
+    contacts.push_back({point, direction(point, centre, facet.normal),
+                        radius - (centre - point).norm(), facet.element, Feature::Edge});
+    if (one_sided) {
+      Vec3 outward = Vec3::Zero();
+      for (int i = 0; i < edge.count; ++i)
+        outward += topology.face_normal[triangle_of(topology.incidence[edge.begin + i])];
+      const bool rim = edge.kind == EdgeClass::Boundary || edge.kind == EdgeClass::NonManifold;
+      carriers_.push_back({outward, rim});
+    }
+  }
+  for (const VertexClaim& claim : vertices_) {
+    const Vec3& point = shell.vertices()[claim.vertex];
+    const Facet& facet = shell.facets()[claim.facet];
+    contacts.push_back({point, direction(point, centre, facet.normal),
+                        radius - (centre - point).norm(), facet.element, Feature::Vertex});
+    if (one_sided)
+      carriers_.push_back(
+          {topology.vertex_normal[claim.vertex], bool(topology.vertex_on_rim[claim.vertex])});
+  }
+}
+
+void Query::remove(std::size_t i) {
+  contacts.erase(contacts.begin() + static_cast<std::ptrdiff_t>(i));
+  if (!carriers_.empty()) carriers_.erase(carriers_.begin() + static_cast<std::ptrdiff_t>(i));
+}
+
+// The simplest feature wins (face, edge, vertex: the order in which contacts were made).
+void Query::merge_equal_points(double tolerance) {
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    for (std::size_t j = contacts.size() - 1; j > i; --j)
+      if ((contacts[i].point - contacts[j].point).squaredNorm() <= tolerance * tolerance) {
+        contacts[i].element = std::min(contacts[i].element, contacts[j].element);
+        remove(j);
+      }
+}
+
+// side = outside | inside: the nearest contact tells on which side the centre is. On the right side
+// count the contacts whose feature faces the centre; on the wrong side the sphere is pushed back
+// out through the nearest point.
+void Query::keep_one_side(const Shell& shell, const Vec3& centre, double radius) {
+  const double sign = shell.side() == Side::Outside ? 1.0 : -1.0;
+  const auto faces_centre = [&](std::size_t i) {
+    return carriers_[i].rim || sign * carriers_[i].outward.dot(centre - contacts[i].point) >= 0;
+  };
+  std::size_t nearest = 0;
+  for (std::size_t i = 1; i < contacts.size(); ++i)
+    if (contacts[i].depth > contacts[nearest].depth) nearest = i;
+  if (faces_centre(nearest)) {
+    for (std::size_t i = contacts.size(); i-- > 0;)
+      if (!faces_centre(i)) remove(i);
+    for (std::size_t i = 0; i < contacts.size(); ++i)
+      if (contacts[i].depth == radius) contacts[i].normal = sign * carriers_[i].outward.normalized();
+    return;
+  }
+  Contact out = contacts[nearest];
+  out.normal = -out.normal;
+  out.depth = 2 * radius - out.depth;
+  contacts.assign(1, out);
+}
+
+// The paper's sum: every element within reach counts, at its closest point.
+void Query::find_elements(const Shell& shell, const Vec3& centre, double radius) {
+  const double reach2 = radius * radius;
+  const std::vector<int>& element = shell.element();
+  const auto closest = [&](int t) {
+    const Vec3 corner[3] = {shell.vertices()[shell.triangles()[t][0]],
+                            shell.vertices()[shell.triangles()[t][1]],
+                            shell.vertices()[shell.triangles()[t][2]]};
+    return closest_on_triangle(centre, corner, shell.topology().face_normal[t]);
+  };
+  const int last = static_cast<int>(element.size()) - 1;
+  const auto speaks = [&](int t, double d2) {
+    // The other triangle of a quad speaks for the element where it is nearer.
+    for (int u : {t - 1, t + 1}) {
+      if (u < 0 || u > last || element[u] != element[t]) continue;
+      const double other2 = (centre - closest(u).point).squaredNorm();
+      if (other2 < d2 || (other2 == d2 && u < t)) return false;
+    }
+    return true;
+  };
+  walk(shell, centre, radius);
+  for (int f : near_) {
+    const int t = shell.triangle_of_facet(f);
+    const ClosestPoint at = closest(t);
+    const double d2 = (centre - at.point).squaredNorm();
+    if (d2 >= reach2 || !speaks(t, d2)) continue;
+    Feature feature = at.feature >= 4   ? Feature::Vertex
+                      : at.feature >= 1 ? Feature::Edge
+                                        : Feature::Face;
+    const Topology& topology = shell.topology();
+    if (feature == Feature::Edge && topology.edges[topology.edge_of[3 * t + at.feature - 1]].inner)
+      feature = Feature::Face;
+    const Vec3& normal = topology.face_normal[t];
+    const double height = normal.dot(centre - at.point);
+    if (shell.side() == Side::Outside && height < 0) continue;
+    if (shell.side() == Side::Inside && height > 0) continue;
+    contacts.push_back({at.point, direction(at.point, centre, normal), radius - std::sqrt(d2),
+                        element[t], feature});
+  }
+  std::sort(contacts.begin(), contacts.end(),
+            [](const Contact& a, const Contact& b) { return a.element < b.element; });
+}
+
+}  // namespace sphshell

@@ -1,0 +1,66 @@
+// Where a sphere touches a shell.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "shell/shell.hpp"
+
+namespace sphshell {
+
+enum class Method : int { Facets = 0, Elements = 1 };
+enum class Feature : std::uint8_t { Face = 0, Edge = 1, Vertex = 2 };
+
+struct Contact {
+  Vec3 point;    // on the shell
+  Vec3 normal;   // unit, from the shell to the sphere's centre: a push along it
+  double depth;  // radius - distance > 0 [m]
+  int element;
+  Feature feature;
+};
+
+// Scratch of one query; keep one per thread and pair, and queries use no heap once it has grown.
+class Query {
+ public:
+  Query();
+
+  // The contacts of the sphere (centre in the shell's frame [m]); valid until the next call.
+  const std::vector<Contact>& find(const Shell& shell, const Vec3& centre, double radius,
+                                   Method method);
+
+  std::vector<Contact> contacts;
+
+ private:
+  // A facet whose plane the centre projects into, an edge or a vertex the centre stands over.
+  struct FaceClaim {
+    int facet;
+  };
+  struct EdgeClaim {
+    int facet, side, from, to;  // from, to: its vertices
+  };
+  struct VertexClaim {
+    int facet, vertex;
+  };
+  struct Carrier {
+    Vec3 outward;  // pseudo-normal of the feature that carries a contact
+    bool rim;      // on the border of an open sheet: no inside there
+  };
+
+  void find_facets(const Shell& shell, const Vec3& centre, double radius);
+  void find_elements(const Shell& shell, const Vec3& centre, double radius);
+  void walk(const Shell& shell, const Vec3& centre, double radius);
+  void collect_claims(const Shell& shell, const Vec3& centre, double radius, double tolerance);
+  void drop_claims_of_neighbours(const Shell& shell);
+  void claims_to_contacts(const Shell& shell, const Vec3& centre, double radius);
+  void merge_equal_points(double tolerance);
+  void keep_one_side(const Shell& shell, const Vec3& centre, double radius);
+  void remove(std::size_t i);
+
+  std::vector<int> near_;  // facets whose box the sphere meets
+  std::vector<FaceClaim> faces_;
+  std::vector<EdgeClaim> edges_;
+  std::vector<VertexClaim> vertices_;
+  std::vector<Carrier> carriers_;  // beside `contacts`, for one-sided shells only
+};
+
+}  // namespace sphshell

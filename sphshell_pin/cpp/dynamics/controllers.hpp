@@ -1,0 +1,73 @@
+// Joint torques from the state.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "dynamics/scene.hpp"
+
+namespace sphshell {
+
+class Controller {
+ public:
+  virtual ~Controller() = default;
+  // Called once before a run, to ask for the placements that torque() reads.
+  virtual void prepare(Scene&) {}
+  // Writes the torques; the scene's contacts have been evaluated at (q, v).
+  virtual void torque(Scene& scene, double t, const VectorX& q, const VectorX& v,
+                      VectorX& tau) = 0;
+};
+
+// `actuated` is 1 where a joint's velocity is driven, else 0 (a free-floating base or object).
+class GravityCompensation : public Controller {
+ public:
+  explicit GravityCompensation(VectorX actuated);
+  void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override;
+
+ private:
+  VectorX actuated_;
+};
+
+// kp (q_ref - q) - kd v, and the gravity torque where asked for.
+class JointPd : public Controller {
+ public:
+  JointPd(VectorX kp, VectorX kd, VectorX q_ref, bool gravity, VectorX actuated);
+  void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override;
+
+ private:
+  VectorX kp_, kd_, q_ref_, actuated_, error_;
+  bool gravity_;
+};
+
+struct ImpedanceSettings {
+  int joint = 0;              // that carries the controlled frame
+  SE3 frame = SE3::Identity();  // in that joint
+  int path_joint = 0;         // that carries the path
+  SE3 path_placement = SE3::Identity();
+  std::vector<double> times;        // [s], increasing
+  std::vector<Vec3> points, normals;  // in the path's frame; normals zero where there is no surface
+  double stiffness = 0, damping = 0;  // [N/m], [N s/m]
+  double normal_force = 0;            // pressed against the normal [N]
+  double rotational_stiffness = 0, rotational_damping = 0;  // [N m], [N m s]
+  VectorX posture_stiffness, joint_damping, q_ref, actuated;
+};
+
+// Cartesian impedance (Hogan 1985): J^T F plus the bias torques, with
+// F = K (x_d - x) + D (xdot_d - xdot); with a normal force, the spring acts in the tangent plane of
+// the path's normal only and the frame is pressed against that normal.
+class CartesianImpedance : public Controller {
+ public:
+  explicit CartesianImpedance(ImpedanceSettings settings, int num_joints);
+  void prepare(Scene& scene) override;
+  void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override;
+
+ private:
+  ImpedanceSettings s_;
+  std::size_t segment_ = 0;
+  bool started_ = false;
+  Eigen::Matrix3d hold_;  // orientation at the start
+  Forces opposed_;
+  VectorX error_;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,129 @@
+// Bounding-box tree over the triangles of a shell. Coal builds it; the walk is ours: Coal's own
+// collision traversal costs an order of magnitude more and reports every triangle as a contact.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "shell/topology.hpp"
+
+namespace sphshell {
+
+inline void prefetch(const void* address) {
+#if defined(__GNUC__) || defined(__clang__)
+  __builtin_prefetch(address);
+#else
+  (void)address;
+#endif
+}
+
+class Bvh {
+ public:
+  // `order` receives the triangles in the order of the tree's leaves: store them so, and what the
+  // walk visits together lies together in memory.
+  Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+      std::vector<int>& order);
+
+  // Appends the positions in `order` of all triangles whose box meets the ball. Never misses one;
+  // may add one that lies outside by single-precision round-off. `touch(position)` is called as
+  // soon as a triangle is known, so that its memory can be on its way while the walk goes on.
+  template <class Touch>
+  void near(const Vec3& centre, double radius, std::vector<int>& out, Touch&& touch) const {
+    const Vec3 local = centre - origin_;
+    const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
+    const float reach = float(radius) * 1.000001f;
+    const float limit = reach * reach;
+    if (!(distance2(root_, 0, c) <= limit)) return;
+    if (nodes_.empty()) return out.push_back(0);
+    int stack[kMaxDepth], top = 0, node = 0;
+    for (;;) {
+      const Node& n = nodes_[node];
+      int next = -1;
+      for (int side = 0; side < 2; ++side) {
+        if (!(distance2(n, side, c) <= limit)) continue;
+        const int child = n.child[side];
+        if (child < 0) {
+          touch(~child);
+          out.push_back(~child);
+        } else if (next < 0) {
+          next = child;
+        } else {
+          prefetch(&nodes_[child]);
+          stack[top++] = child;
+        }
+      }
+      if (next >= 0)
+        node = next;
+      else if (top > 0)
+        node = stack[--top];
+      else
+        return;
+    }
+  }
+
+  // Calls visit(position) -> squared distance, nearest boxes first; returns when no box can hold
+  // anything nearer than the least squared distance returned so far.
+  template <class Visit>
+  void nearest(const Vec3& point, Visit&& visit) const {
+    const Vec3 local = point - origin_;
+    const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
+    if (nodes_.empty()) return void(visit(0));
+    // Boxes are widened by the round-off at the surface, the point's own is added here.
+    const double slack = 1e-6 * local.norm();
+    double best = 1e300;
+    struct Entry {
+      int node;
+      double bound;
+    };
+    Entry stack[kMaxDepth];
+    int top = 0;
+    stack[top++] = {0, 0.0};
+    while (top > 0) {
+      const Entry entry = stack[--top];
+      if (entry.bound > best) continue;
+      const Node& n = nodes_[entry.node];
+      double bound[2];
+      for (int side = 0; side < 2; ++side) {
+        const double d = std::max(0.0, std::sqrt(double(distance2(n, side, c))) - slack);
+        bound[side] = d * d;
+      }
+      const int near = bound[0] <= bound[1] ? 0 : 1;
+      if (bound[near] <= best && n.child[near] < 0) best = std::min(best, visit(~n.child[near]));
+      if (bound[1 - near] <= best) {
+        if (n.child[1 - near] < 0)
+          best = std::min(best, visit(~n.child[1 - near]));
+        else
+          stack[top++] = {n.child[1 - near], bound[1 - near]};
+      }
+      if (bound[near] <= best && n.child[near] >= 0) stack[top++] = {n.child[near], bound[near]};
+    }
+  }
+
+  std::size_t bytes() const { return nodes_.size() * sizeof(Node); }
+
+ private:
+  static constexpr int kMaxDepth = 1024;  // checked when the tree is built
+
+  // One cache line: the boxes of both children relative to origin_, rounded outward.
+  struct alignas(64) Node {
+    float low[2][3], high[2][3];
+    int child[2];  // >= 0 a node, < 0 the complement of a triangle's position
+  };
+
+  static float distance2(const Node& n, int side, const float c[3]) {
+    float sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      const float d = std::max(std::max(n.low[side][k] - c[k], c[k] - n.high[side][k]), 0.0f);
+      sum += d * d;
+    }
+    return sum;
+  }
+
+  Vec3 origin_;
+  Node root_;  // side 0 holds the box of everything: a far sphere costs this one test
+  std::vector<Node> nodes_;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,94 @@
+// Loops of the surface cleaning that NumPy cannot do fast: welding, adjacency, ear clipping,
+// T-junctions, orientation, nesting. Plain data in, plain data out; the Python side checks.
+//
+// Polygons come as `offsets` (m + 1) and `corners` (offsets[m] vertex indices). A place in
+// `corners` is called a slot; the edge of slot s runs from its corner to the next one of the
+// same polygon (cyclic).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace sphshell {
+
+struct PolygonView {
+  const std::int64_t* offsets;
+  const std::int32_t* corners;
+  std::size_t count;
+
+  std::int64_t next(std::size_t polygon, std::int64_t slot) const {
+    return slot + 1 == offsets[polygon + 1] ? offsets[polygon] : slot + 1;
+  }
+};
+
+struct Weld {
+  std::vector<std::int32_t> representative;  // lowest index of each group of merged points
+  double largest_distance = 0.0;             // from a merged point to its representative [m]
+};
+
+// Merges points nearer than `tolerance` to each other, transitively: the groups do not depend on
+// the order of the points. points (n, 3).
+Weld weld(const double* points, std::size_t count, double tolerance);
+
+struct EdgeTable {
+  std::vector<std::int32_t> slot_edge;  // edge of each slot; -1 where both ends are one vertex
+  std::vector<std::int32_t> ends;       // (E, 2) vertex pairs, low first, in ascending order
+  std::vector<std::int32_t> users;      // how many slots use the edge
+};
+
+EdgeTable edge_table(const PolygonView& polygons, std::size_t vertex_count);
+
+struct Duplicates {
+  std::vector<std::int32_t> first;     // first polygon with the same cycle of corners
+  std::vector<std::uint8_t> opposite;  // 1 if it is wound the other way than that first one
+};
+
+// Polygons with equal corner cycles, of either winding.
+Duplicates duplicate_polygons(const PolygonView& polygons);
+
+struct EarClips {
+  std::vector<std::int64_t> triangle_slots;  // (t, 3) slots, not vertices: normals can follow
+  std::vector<std::int32_t> triangle_polygon;
+  std::vector<std::uint8_t> tangled;  // per polygon: 1 if it had to be cut without a proper ear
+};
+
+// Triangulates polygons of any shape, keeping every corner, also collinear ones; the best-shaped
+// ear goes first, so the result does not depend on which corner is listed first. Corners nearer
+// than `tolerance` [m] to a diagonal count as lying on it.
+EarClips clip_ears(const PolygonView& polygons, const double* points, double tolerance);
+
+struct Insertions {
+  std::vector<std::int64_t> slot;    // the vertex belongs into the edge of this slot
+  std::vector<std::int32_t> vertex;  // ordered along the edge
+  std::vector<double> parameter;     // 0 at the slot's corner, 1 at the next
+};
+
+// Vertices among `candidates` within `tolerance` of the interior of an open edge (given by its
+// slot and polygon) of a polygon that does not have them as corners.
+Insertions find_t_junctions(const PolygonView& polygons, const double* points,
+                            const std::vector<std::int64_t>& open_slots,
+                            const std::vector<std::int32_t>& open_polygons,
+                            const std::vector<std::int32_t>& candidates, double tolerance);
+
+struct Orientation {
+  std::vector<std::int32_t> component;    // per polygon, numbered in order of first polygon
+  std::vector<std::uint8_t> flip;         // relative to the first polygon of the component
+  std::vector<std::uint8_t> one_sided;    // per component: 1 if no consistent winding exists
+};
+
+// Flood fill across the edges that exactly two different polygons use.
+Orientation flood_fill(const PolygonView& polygons, const EdgeTable& edges);
+
+// Labels the connected components of an undirected graph, numbered by their first node.
+std::vector<std::int32_t> connected_components(std::size_t nodes, const std::int32_t* pairs,
+                                               std::size_t pair_count);
+
+// How many closed components other than its own enclose each query point. Triangles (t, 3) and
+// the component of each; queries (c, 3), one per component; `closed` (c) tells which take part.
+std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t* triangles,
+                                        const std::int32_t* triangle_component,
+                                        std::size_t triangle_count, const double* queries,
+                                        const std::uint8_t* closed, std::size_t component_count);
+
+}  // namespace sphshell

@@ -1,0 +1,76 @@
+// A clean surface, ready to be asked for contacts: geometry in the order of its tree.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "shell/bvh.hpp"
+#include "shell/topology.hpp"
+
+namespace sphshell {
+
+enum class Side : int { Both = 0, Outside = 1, Inside = 2 };
+
+// What a query reads of one triangle: two cache lines.
+struct alignas(64) Facet {
+  Vec3 corner[3];
+  Vec3 normal;      // unit, that of the planar face it belongs to
+  int twin[3];      // across side k: a half-edge (3 facet + side) to test, or one of the codes below
+  int vertex[3];    // the vertex at corner k where this facet decides for it, else kNotMine
+  int planar_face;  // facets of one planar face touch once
+  int element;
+};
+static_assert(sizeof(Facet) == 128);
+
+// Codes in Facet::twin and Facet::vertex.
+constexpr int kNotMine = -1;   // another facet decides about this edge or vertex, or it is flat
+constexpr int kBoundary = -2;  // an edge with no other facet
+constexpr int kManifold = -3;  // kManifold - e: edge e with more than two facets (or ill-wound)
+
+struct SurfacePoint {
+  Vec3 point;
+  Vec3 normal;      // unit pseudo-normal of the feature that carries the point
+  double distance;  // signed by that normal [m]
+  int element;
+};
+
+class Shell {
+ public:
+  // element: per triangle, non-decreasing from 0; crease_angle [rad].
+  Shell(std::vector<Vec3> vertices, std::vector<Triangle> triangles, std::vector<int> element,
+        double crease_angle, Side side);
+
+  SurfacePoint closest_point(const Vec3& point) const;
+
+  const std::vector<Vec3>& vertices() const { return vertices_; }
+  const std::vector<Triangle>& triangles() const { return triangles_; }
+  const std::vector<int>& element() const { return element_; }
+  const Topology& topology() const { return topology_; }
+  const Bvh& bvh() const { return bvh_; }
+  const std::vector<Facet>& facets() const { return facets_; }
+  Side side() const { return side_; }
+  int num_elements() const { return element_.empty() ? 0 : element_.back() + 1; }
+  double size() const { return size_; }  // box diagonal [m]
+
+  // For the rare edge with more than two facets: its half-edges in facet numbering.
+  const std::vector<int>& half_edges_of(int edge) const { return manifold_[edge]; }
+  int triangle_of_facet(int facet) const { return order_[facet]; }
+  std::size_t bytes() const;
+
+ private:
+  void build_facets(const std::vector<int>& order);
+
+  std::vector<Vec3> vertices_;
+  std::vector<Triangle> triangles_;
+  std::vector<int> element_;
+  Side side_;
+  Topology topology_;
+  std::vector<int> order_;  // facet -> triangle
+  std::vector<int> facet_of_;
+  std::vector<std::vector<int>> manifold_;  // see half_edges_of
+  Bvh bvh_;
+  std::vector<Facet> facets_;
+  double size_;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,192 @@
+#include "shell/topology.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "shell/disjoint_sets.hpp"
+
+namespace sphshell {
+namespace {
+
+// Two triangles are one planar face when each lies in the other's plane to this share of the box.
+constexpr double kPlanarTolerance = 1e-10;
+
+// Consecutive labels of the sets, in the order of first appearance.
+std::vector<int> labels(DisjointSets& sets, std::size_t size, int& count) {
+  std::vector<int> label(size, -1), out(size);
+  count = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    int& l = label[sets.find(static_cast<int>(i))];
+    if (l < 0) l = count++;
+    out[i] = l;
+  }
+  return out;
+}
+
+double box_diagonal(const std::vector<Vec3>& vertices) {
+  Vec3 low = vertices.front(), high = low;
+  for (const Vec3& v : vertices) low = low.cwiseMin(v), high = high.cwiseMax(v);
+  return (high - low).norm();
+}
+
+Vec3 area_vector(const std::vector<Vec3>& v, const Triangle& t) {
+  return (v[t[1]] - v[t[0]]).cross(v[t[2]] - v[t[0]]);
+}
+
+void build_edges(const std::vector<Triangle>& triangles, Topology& out) {
+  struct Key {
+    int a, b, half_edge;
+  };
+  std::vector<Key> keys;
+  keys.reserve(3 * triangles.size());
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const int a = triangles[t][k], b = triangles[t][next_corner(k)];
+      keys.push_back({std::min(a, b), std::max(a, b), static_cast<int>(3 * t + k)});
+    }
+  std::sort(keys.begin(), keys.end(), [](const Key& x, const Key& y) {
+    return x.a != y.a ? x.a < y.a : x.b != y.b ? x.b < y.b : x.half_edge < y.half_edge;
+  });
+  out.edge_of.resize(keys.size());
+  out.incidence.resize(keys.size());
+  for (std::size_t i = 0; i < keys.size();) {
+    std::size_t j = i;
+    for (; j < keys.size() && keys[j].a == keys[i].a && keys[j].b == keys[i].b; ++j) {
+      out.incidence[j] = keys[j].half_edge;
+      out.edge_of[keys[j].half_edge] = static_cast<int>(out.edges.size());
+    }
+    out.edges.push_back({keys[i].a, keys[i].b, static_cast<int>(i), static_cast<int>(j - i),
+                         EdgeClass::Boundary, false, 0.0});
+    i = j;
+  }
+}
+
+// Coplanar neighbours become one face with one normal: that of their summed areas, so that a
+// sliver's own, ill-defined normal does no harm. A union that drifts off its plane (a long chain of
+// nearly flat steps) is taken apart again.
+void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+                        const std::vector<int>& element, double tolerance, Topology& out) {
+  const int n = static_cast<int>(triangles.size());
+  std::vector<Vec3> area(n);
+  for (int t = 0; t < n; ++t) area[t] = area_vector(vertices, triangles[t]);
+  DisjointSets sets(triangles.size());
+  for (Edge& edge : out.edges) {
+    if (edge.count != 2) continue;
+    const int h = out.incidence[edge.begin], g = out.incidence[edge.begin + 1];
+    const int t = triangle_of(h), u = triangle_of(g);
+    edge.inner = element[t] == element[u];
+    const bool same_direction =
+        triangles[t][side_of(h)] == triangles[u][side_of(g)];  // windings disagree
+    const Vec3 normal = (same_direction ? Vec3(area[t] - area[u]) : Vec3(area[t] + area[u]));
+    const double length = normal.norm();
+    if (!(length > 0) || area[t].dot(normal) <= 0) continue;
+    const Vec3& p = vertices[edge.first_vertex];
+    const Vec3& q = vertices[edge.last_vertex];
+    const Vec3& a = vertices[triangles[t][previous_corner(side_of(h))]];
+    const Vec3& b = vertices[triangles[u][previous_corner(side_of(g))]];
+    const auto off = [&](const Vec3& x) { return std::abs((x - p).dot(normal)) / length; };
+    const bool flat = std::max({off(a), off(b), off(q)}) <= tolerance;
+    if (edge.inner || (flat && !same_direction)) sets.join(t, u);
+  }
+  int count = 0;
+  std::vector<int> label = labels(sets, triangles.size(), count);
+  std::vector<Vec3> normal(count, Vec3::Zero()), origin(count);
+  std::vector<char> seen(count, 0), warped(count, 0);
+  for (int t = 0; t < n; ++t) {
+    normal[label[t]] += area[t];
+    if (!seen[label[t]]) origin[label[t]] = vertices[triangles[t][0]], seen[label[t]] = 1;
+  }
+  for (Vec3& m : normal) m.normalize();
+  for (int t = 0; t < n; ++t)
+    for (int v : triangles[t])
+      if (std::abs((vertices[v] - origin[label[t]]).dot(normal[label[t]])) > 10 * tolerance)
+        warped[label[t]] = 1;
+  out.planar_face.resize(n);
+  out.face_normal.resize(n);
+  for (int t = 0; t < n; ++t) {
+    const bool alone = warped[label[t]];
+    out.planar_face[t] = alone ? count++ : label[t];
+    out.face_normal[t] = alone ? area[t].normalized() : normal[label[t]];
+  }
+}
+
+void classify_edges(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+                    double crease_angle, Topology& out) {
+  for (Edge& edge : out.edges) {
+    if (edge.count == 1) continue;  // boundary already
+    if (edge.count > 2) {
+      edge.kind = EdgeClass::NonManifold;
+      continue;
+    }
+    const int h = out.incidence[edge.begin], g = out.incidence[edge.begin + 1];
+    const int t = triangle_of(h), u = triangle_of(g);
+    if (triangles[t][side_of(h)] == triangles[u][side_of(g)]) {
+      edge.kind = EdgeClass::NonManifold;  // no common orientation (a Moebius strip's seam)
+      continue;
+    }
+    const Vec3& m = out.face_normal[t];
+    const Vec3& n = out.face_normal[u];
+    const Vec3& far = vertices[triangles[u][previous_corner(side_of(g))]];
+    const double angle = std::atan2(m.cross(n).norm(), m.dot(n));
+    const bool convex = (far - vertices[edge.first_vertex]).dot(m) <= 0;
+    edge.angle = convex ? angle : -angle;
+    const bool smooth = out.planar_face[t] == out.planar_face[u] || angle < crease_angle;
+    edge.kind = smooth ? EdgeClass::Smooth : EdgeClass::Crease;
+  }
+}
+
+void build_patches(const std::vector<int>& element, Topology& out) {
+  const std::size_t count = element.empty() ? 0 : static_cast<std::size_t>(element.back()) + 1;
+  DisjointSets sets(count);
+  for (const Edge& edge : out.edges)
+    if (edge.inner || edge.kind == EdgeClass::Smooth)
+      sets.join(element[triangle_of(out.incidence[edge.begin])],
+                 element[triangle_of(out.incidence[edge.begin + 1])]);
+  out.patch = labels(sets, count, out.num_patches);
+}
+
+void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+                    Topology& out) {
+  const std::size_t n = vertices.size();
+  out.neighbour_begin.assign(n + 1, 0);
+  out.vertex_on_rim.assign(n, 0);
+  for (const Edge& e : out.edges) {
+    ++out.neighbour_begin[e.first_vertex + 1];
+    ++out.neighbour_begin[e.last_vertex + 1];
+    if (e.kind == EdgeClass::Boundary || e.kind == EdgeClass::NonManifold)
+      out.vertex_on_rim[e.first_vertex] = out.vertex_on_rim[e.last_vertex] = 1;
+  }
+  std::partial_sum(out.neighbour_begin.begin(), out.neighbour_begin.end(),
+                   out.neighbour_begin.begin());
+  out.neighbours.resize(out.neighbour_begin.back());
+  std::vector<int> fill(out.neighbour_begin.begin(), out.neighbour_begin.end() - 1);
+  for (const Edge& e : out.edges) {
+    out.neighbours[fill[e.first_vertex]++] = e.last_vertex;
+    out.neighbours[fill[e.last_vertex]++] = e.first_vertex;
+  }
+  out.vertex_normal.assign(n, Vec3::Zero());
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const Vec3& p = vertices[triangles[t][k]];
+      const Vec3 a = vertices[triangles[t][next_corner(k)]] - p;
+      const Vec3 b = vertices[triangles[t][previous_corner(k)]] - p;
+      out.vertex_normal[triangles[t][k]] +=
+          std::atan2(a.cross(b).norm(), a.dot(b)) * out.face_normal[t];
+    }
+}
+
+}  // namespace
+
+Topology::Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+                   const std::vector<int>& element, double crease_angle) {
+  build_edges(triangles, *this);
+  build_planar_faces(vertices, triangles, element, kPlanarTolerance * box_diagonal(vertices),
+                     *this);
+  classify_edges(vertices, triangles, crease_angle, *this);
+  build_patches(element, *this);
+  build_vertices(vertices, triangles, *this);
+}
+
+}  // namespace sphshell

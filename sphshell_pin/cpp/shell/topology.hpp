@@ -1,0 +1,49 @@
+// Edges, planar faces and smooth patches of a clean triangulated surface.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace sphshell {
+
+using Vec3 = Eigen::Vector3d;
+using Triangle = std::array<int, 3>;
+
+enum class EdgeClass : std::uint8_t { Smooth = 0, Crease = 1, Boundary = 2, NonManifold = 3 };
+
+// A half-edge is one side k (corner k to corner k+1) of a triangle t, numbered 3 t + k.
+inline int triangle_of(int half_edge) { return half_edge / 3; }
+inline int side_of(int half_edge) { return half_edge % 3; }
+inline int next_corner(int k) { return k == 2 ? 0 : k + 1; }
+inline int previous_corner(int k) { return k == 0 ? 2 : k - 1; }
+
+struct Edge {
+  int first_vertex, last_vertex;  // first < last
+  int begin, count;               // its half-edges: incidence[begin .. begin + count)
+  EdgeClass kind;
+  bool inner;    // the diagonal inside one element: no edge of the surface
+  double angle;  // between the two normals [rad], > 0 convex, < 0 concave, 0 where not manifold
+};
+
+// Everything about the surface that follows from vertices, triangles and the crease angle alone.
+struct Topology {
+  std::vector<Edge> edges;
+  std::vector<int> incidence;        // half-edges, grouped by edge
+  std::vector<int> edge_of;          // half-edge -> edge
+  std::vector<Vec3> face_normal;     // unit, per triangle: that of its whole planar face
+  std::vector<int> planar_face;      // per triangle: coplanar, edge-connected triangles share one
+  std::vector<int> patch;            // per element: connected through smooth edges
+  std::vector<int> neighbour_begin;  // per vertex, into `neighbours` (size: vertices + 1)
+  std::vector<int> neighbours;       // vertices joined to a vertex by an edge
+  std::vector<Vec3> vertex_normal;   // angle-weighted pseudo-normal (Baerentzen and Aanaes 2005)
+  std::vector<char> vertex_on_rim;   // touches a boundary or non-manifold edge
+  int num_patches = 0;
+
+  // crease_angle [rad]; triangles of one element are contiguous in `element`.
+  Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+           const std::vector<int>& element, double crease_angle);
+};
+
+}  // namespace sphshell

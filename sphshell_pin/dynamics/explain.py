@@ -1,0 +1,282 @@
+"""What a scene models, on which time scales, and what to expect of it before it runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.contact import HuntCrossleyLaw, ImpactLaw, NormalLaw
+from sphshell_pin.dynamics.scene import ContactPair, Scene
+from sphshell_pin.units import size_warning
+
+Array = NDArray[np.float64]
+
+# Speed of approach to judge by, where neither v nor a fall tells one [m/s].
+DEFAULT_SPEED = 0.1
+# Steps in the shortest time scale: enough for a few percent with either stepper.
+STEPS_PER_SCALE = 30
+
+
+@dataclass(frozen=True)
+class PairExplanation:
+    """Time scales and depths of one pair; nan where the pair cannot move along the normal.
+
+    `gap` [m] at q (negative in overlap; nan for a source); `effective_mass` [kg] along the normal;
+    `approach_speed` [m/s] the figures below are for; `contact_time` [s] of an undamped impact at
+    that speed, `impact_depth` [m] its largest depth; `resting_depth` [m] under the effective
+    mass's own weight; `depth_limit_speed` [m/s] at which the depth would reach the radius;
+    `shortest_time` [s] of all time scales, damping and friction included.
+    """
+
+    name: str
+    modelled: tuple[str, ...]
+    gap: float
+    effective_mass: float
+    approach_speed: float
+    contact_time: float
+    impact_depth: float
+    resting_depth: float
+    depth_limit_speed: float
+    shortest_time: float
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """The answer of Scene.explain; str() gives it as text."""
+
+    modelled: tuple[str, ...]
+    not_modelled: tuple[str, ...]
+    pairs: tuple[PairExplanation, ...]
+    recommended_dt: float
+    warnings: tuple[str, ...] = field(default=())
+
+    def __str__(self) -> str:
+        """Return the explanation as text."""
+        lines = ["Modelled:", *(f"  {line}" for line in self.modelled)]
+        lines += ["Not modelled:", *(f"  {line}" for line in self.not_modelled)]
+        for pair in self.pairs:
+            lines += [f"Contact '{pair.name}':", *(f"  {line}" for line in pair.modelled)]
+            for label, value, unit in (
+                ("gap at q", pair.gap * 1e3, "mm"),
+                ("effective mass along the normal", pair.effective_mass, "kg"),
+                ("speed of approach", pair.approach_speed, "m/s"),
+                ("contact time at that speed", pair.contact_time * 1e3, "ms"),
+                ("depth at that speed", pair.impact_depth * 1e3, "mm"),
+                ("resting depth under its own weight", pair.resting_depth * 1e3, "mm"),
+                ("speed at which the depth reaches the radius", pair.depth_limit_speed, "m/s"),
+            ):
+                if math.isfinite(value):
+                    lines.append(f"  {label}: {value:.4g} {unit}")
+        lines.append(f"Recommended dt: {self.recommended_dt:.3g} s")
+        lines += [f"Warning: {w}" for w in self.warnings]
+        return "\n".join(lines)
+
+
+def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explanation:
+    """Work out the explanation of `scene` at q (nq,), v (nv,), for a step of `dt` [s]."""
+    model = scene.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, q, v)
+    pin.computeJointJacobians(model, data, q)
+    pin.crba(model, data, q)
+    mass_matrix = np.triu(data.M) + np.triu(data.M, 1).T
+    gravity = float(np.linalg.norm(model.gravity.linear))
+    pairs = []
+    warnings: list[str] = []
+    for pair in scene.pairs:
+        pairs.append(_explain_pair(scene, pair, data, mass_matrix, v, gravity))
+        warnings += _warnings_of(scene, pair, pairs[-1])
+    scales = [p.shortest_time for p in pairs if math.isfinite(p.shortest_time)]
+    recommended = _round_down(min(scales) / STEPS_PER_SCALE) if scales else 1e-3
+    if dt is not None and dt > 1.0001 * recommended:
+        warnings.append(
+            f"dt = {dt:.3g} s is larger than the recommended {recommended:.3g} s: the shortest "
+            f"time scale {min(scales):.3g} s would get {min(scales) / dt:.2g} steps"
+        )
+    free = sum(1 for j in model.joints[1:] if j.nv)
+    modelled = [
+        f"{free} joints with {model.nv} degrees of freedom",
+        f"gravity {gravity:.4g} m/s^2" if gravity else "no gravity",
+        f"{len(pairs)} contact pairs",
+    ]
+    absent = ["joint limits, joint friction and contact between other pairs of bodies"]
+    if scene.lock:
+        absent.append(f"motion of the locked joints {', '.join(scene.lock)}")
+    absent.append("passage through a shell within one step: keep dt below radius / speed")
+    return Explanation(tuple(modelled), tuple(absent), tuple(pairs), recommended, tuple(warnings))
+
+
+def _explain_pair(
+    scene: Scene, pair: ContactPair, data: pin.Data, mass_matrix: Array, v: Array, gravity: float
+) -> PairExplanation:
+    nan = math.nan
+    gap, point, normal = nan, None, None
+    if pair.sphere is not None and pair.shell is not None:
+        centre = (data.oMi[pair.joint_i] * pair.sphere_placement).translation
+        shell_pose = data.oMi[pair.joint_j] * pair.shell_placement
+        at = pair.shell.closest_points(shell_pose.actInv(centre)[None])
+        distance = float(at.distances[0])
+        signed = {"both": abs(distance), "outside": distance, "inside": -distance}[pair.shell.side]
+        gap = signed - pair.sphere.radius
+        point = shell_pose.act(at.points[0])
+        away = centre - point
+        length = float(np.linalg.norm(away))
+        normal = away / length if length > 0 else shell_pose.rotation @ at.normals[0]
+    mass, speed = nan, nan
+    if point is not None and normal is not None:
+        row = normal @ (
+            _point_jacobian(scene, data, pair.joint_i, point)
+            - _point_jacobian(scene, data, pair.joint_j, point)
+        )
+        mobility = float(row @ np.linalg.solve(mass_matrix, row)) if len(row) else 0.0
+        mass = 1 / mobility if mobility > 1e-12 else nan
+        fall = math.sqrt(2 * gravity * max(gap, 0.0))
+        speed = max(abs(float(row @ v)), fall) or DEFAULT_SPEED
+    law = pair.law
+    k, e = law.stiffness, law.exponent
+    weight = mass * gravity
+    depth = (0.5 * (e + 1) * mass * speed**2 / k) ** (1 / (e + 1))
+    radius = pair.sphere.radius if pair.sphere is not None else nan
+    return PairExplanation(
+        name=pair.name,
+        modelled=_ingredients(pair),
+        gap=gap,
+        effective_mass=mass,
+        approach_speed=speed,
+        contact_time=2 * depth / speed * _duration_integral(e),
+        impact_depth=depth,
+        resting_depth=law.depth_at(weight) if math.isfinite(weight) else nan,
+        depth_limit_speed=math.sqrt(2 * k * radius ** (e + 1) / ((e + 1) * mass)),
+        shortest_time=_shortest_time(pair, mass, speed, depth, weight),
+    )
+
+
+def _duration_integral(e: float) -> float:
+    """Integral of du / sqrt(1 - u^(e+1)) from 0 to 1: half the contact time in depth / speed."""
+    return math.sqrt(math.pi) * math.gamma(1 + 1 / (e + 1)) / math.gamma(0.5 + 1 / (e + 1))
+
+
+def _shortest_time(
+    pair: ContactPair, mass: float, speed: float, depth: float, weight: float
+) -> float:
+    """Smallest of: contact time, oscillation at rest, decay by damping, decay by friction."""
+    if not math.isfinite(mass):
+        return math.nan
+    law = pair.law
+    k, e = law.stiffness, law.exponent
+    times = [2 * depth / speed * _duration_integral(e)]
+    if weight > 0:
+        times.append(math.pi * math.sqrt(mass / (k * e * law.depth_at(weight) ** (e - 1))))
+    if isinstance(law, ImpactLaw) and law.damping:
+        share = min(depth / law.full_damping_depth, 1.0)
+        times.append(20 * mass / (law.damping * share * share * (3 - 2 * share)))
+    if isinstance(law, HuntCrossleyLaw) and law.dissipation:
+        times.append(20 * mass / (k * depth**e * law.dissipation))
+    if pair.friction is not None and pair.friction.mu_static and weight > 0:
+        slope = 1.5 * pair.friction.mu_static * weight / pair.friction.v_static
+        # A sphere's own spin makes it react 7/2 as fast as its mass alone.
+        times.append(20 * mass * (2 / 7) / slope)
+    return min(times)
+
+
+def _point_jacobian(scene: Scene, data: pin.Data, joint: int, point: Array) -> Array:
+    """Jacobian (3, nv) of the velocity of the world point `point` as fixed to `joint`."""
+    if joint == 0:
+        return np.zeros((3, scene.model.nv))
+    jacobian = pin.getJointJacobian(scene.model, data, joint, pin.WORLD)
+    return jacobian[:3] - pin.skew(point) @ jacobian[3:]
+
+
+def _ingredients(pair: ContactPair) -> tuple[str, ...]:
+    lines = []
+    if pair.sphere is not None and pair.shell is not None:
+        shell = pair.shell
+        lines.append(
+            f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}' against "
+            f"shell '{shell.name}' on frame '{pair.frame}'"
+        )
+        moving = "moves with its frame" if pair.joint_j else "stands still: no wrench on its side"
+        lines.append(
+            f"{len(shell.elements)} elements, box diagonal {shell.size * 1e3:.4g} mm, "
+            f"side '{shell.side}', method '{pair.method}'; the shell {moving}"
+        )
+    else:
+        lines.append(
+            f"contact points of the user's own routine between frames '{pair.frame_i}' and "
+            f"'{pair.frame}'"
+        )
+    lines.append(f"normal force: {_law_text(pair.law)}")
+    if pair.friction is None:
+        lines.append("no friction: no tangential force is computed")
+    else:
+        f = pair.friction
+        lines.append(
+            f"friction: coefficient {f.mu_static:g} at {f.v_static:g} m/s, {f.mu_dynamic:g} from "
+            f"{f.v_dynamic:g} m/s; creeps under load"
+        )
+    return tuple(lines)
+
+
+def _law_text(law: NormalLaw) -> str:
+    k = f"{law.stiffness:.4g} N/m^{law.exponent:g}"
+    if isinstance(law, ImpactLaw):
+        if not law.damping:
+            return f"IMPACT, stiffness {k}, undamped"
+        return (
+            f"IMPACT, stiffness {k}, damping {law.damping:.4g} N s/m from "
+            f"{law.full_damping_depth * 1e3:.4g} mm"
+        )
+    if isinstance(law, HuntCrossleyLaw):
+        return f"Hunt-Crossley, stiffness {k}, dissipation {law.dissipation:.4g} s/m"
+    return f"{type(law).__name__}, stiffness {k}"
+
+
+def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> list[str]:
+    out = []
+    where = f"contact '{pair.name}'"
+    if pair.sphere is None or pair.shell is None:
+        return out
+    radius, shell = pair.sphere.radius, pair.shell
+    reach = _reach(scene.model)
+    for reference, what in ((radius, "sphere"), (reach, "robot")):
+        sentence = size_warning(shell.size, reference, what) if reference > 0 else None
+        if sentence:
+            out.append(f"{where}: {sentence}")
+            break
+    out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
+    if figures.impact_depth >= radius:
+        out.append(
+            f"{where}: at {figures.approach_speed:.3g} m/s the depth would reach the radius: the "
+            "law cannot stop the sphere, make it stiffer"
+        )
+    elif figures.resting_depth > 0.1 * radius:
+        out.append(
+            f"{where}: at rest the depth is {figures.resting_depth / radius:.0%} of the radius: "
+            "the law is soft for this mass"
+        )
+    if figures.gap < -0.5 * radius:
+        out.append(f"{where}: starts at depth {-figures.gap * 1e3:.4g} mm, deep inside")
+    if not math.isfinite(figures.effective_mass):
+        out.append(f"{where}: neither body can move along the normal at this q")
+    if pair.method == "elements":
+        out.append(f"{where}: method 'elements' counts a place of touch once per touched element")
+    return out
+
+
+def _reach(model: pin.Model) -> float:
+    """Length [m] of the longest chain of joint placements: the robot's size."""
+    reach = np.zeros(model.njoints)
+    for j in range(1, model.njoints):
+        step = float(np.linalg.norm(model.jointPlacements[j].translation))
+        reach[j] = reach[model.parents[j]] + step
+    return float(reach.max())
+
+
+def _round_down(x: float) -> float:
+    """Round to the next lower 1, 2 or 5 times a power of ten."""
+    scale = 10.0 ** math.floor(math.log10(x))
+    return max(f for f in (1, 2, 5) if f * scale <= x * (1 + 1e-12)) * scale

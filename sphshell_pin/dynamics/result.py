@@ -1,0 +1,238 @@
+"""What a run leaves behind: motion, contact log, events and the energy audit."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from dataclasses import dataclass, fields
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.checks import read_only
+from sphshell_pin.dynamics.scene import Scene, SceneContacts
+from sphshell_pin.errors import MissingExtra, ResultError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+EVENT_KINDS = ("touch", "lift_off", "deep")
+
+
+@dataclass(frozen=True)
+class ContactLog(SceneContacts):
+    """Every contact of every recorded row: the columns of SceneContacts, and when.
+
+    With m logged contacts: `t` (m,) [s], `row` (m,) index into the result's rows.
+    """
+
+    t: Array
+    row: NDArray[np.int64]
+
+    def of_pair(self, pair: int) -> ContactLog:
+        """Return the entries of one pair."""
+        keep = self.pair == pair
+        return ContactLog(**{f.name: getattr(self, f.name)[keep] for f in fields(self)})
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at time `t` [s] to the pair called `pair`.
+
+    `kind`: "touch", "lift_off", or "deep" (the depth passed half the sphere's radius).
+    """
+
+    t: float
+    pair: str
+    kind: str
+
+
+@dataclass(frozen=True)
+class EnergyAudit:
+    """Where the energy is and where it went, (n,) [J] at the result's rows.
+
+    `kinetic` and `potential` (gravity) of the model, `elastic` of the contacts; since the start:
+    `damping_loss` and `friction_loss` of the contacts, `control_work` of the controller.
+    """
+
+    kinetic: Array
+    potential: Array
+    elastic: Array
+    damping_loss: Array
+    friction_loss: Array
+    control_work: Array
+
+    @property
+    def residual(self) -> Array:
+        """Energy that appeared from nowhere since the start (n,) [J]: the integration's error."""
+        total = (
+            self.kinetic
+            + self.potential
+            + self.elastic
+            + self.damping_loss
+            + self.friction_loss
+            - self.control_work
+        )
+        return total - total[:1]
+
+    @property
+    def exchanged(self) -> float:
+        """Energy that changed form [J]: the scale on which to judge the residual.
+
+        Sum over kinetic, potential and elastic energy of what each moved up and down in total
+        between rows, halved, plus losses and the work of the controller.
+        """
+        moved = sum(
+            float(np.abs(np.diff(e)).sum()) for e in (self.kinetic, self.potential, self.elastic)
+        )
+        spent = sum(
+            float(np.abs(np.diff(e)).sum())
+            for e in (self.damping_loss, self.friction_loss, self.control_work)
+        )
+        return 0.5 * (moved + spent)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A finished run.
+
+    `t` (n,) [s], `q` (n, nq), `v` (n, nv) at the recorded rows; `pairs` the names of the contact
+    pairs; `contacts` the contact log; `events` in order of time; `energy` the audit; `stats`
+    steps, wall time and figures of each pair over all steps, recorded or not; `scene` that ran
+    (None after load).
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    pairs: tuple[str, ...]
+    contacts: ContactLog
+    events: tuple[Event, ...]
+    energy: EnergyAudit
+    stats: dict[str, Any]
+    scene: Scene | None = None
+
+    @classmethod
+    def from_blocks(
+        cls,
+        blocks: list[dict[str, NDArray[Any]]],
+        pairs: tuple[str, ...],
+        stats: dict[str, Any],
+        scene: Scene,
+    ) -> Result:
+        """Join the core's blocks of recorded rows."""
+        whole = {k: np.concatenate([b[k] for b in blocks]) for k in blocks[0]}
+        row = whole["contact_row"].astype(np.int64)
+        columns = SceneContacts.columns_from_rows(whole["contacts"])
+        log = {**columns, "t": whole["t"][row], "row": row}
+        energy = {
+            f.name: read_only(whole["energy"][:, i]) for i, f in enumerate(fields(EnergyAudit))
+        }
+        events = tuple(
+            Event(float(t), pairs[pair], EVENT_KINDS[kind])
+            for t, pair, kind in zip(
+                whole["event_t"], whole["event_pair"], whole["event_kind"], strict=True
+            )
+        )
+        return cls(
+            t=read_only(whole["t"]),
+            q=read_only(whole["q"]),
+            v=read_only(whole["v"]),
+            pairs=pairs,
+            contacts=ContactLog(**{k: read_only(c) for k, c in log.items()}),
+            events=events,
+            energy=EnergyAudit(**energy),
+            stats=stats,
+            scene=scene,
+        )
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write everything but the scene to a compressed .npz file, whole or not at all."""
+        target = Path(path)
+        arrays: dict[str, NDArray[Any]] = {"t": self.t, "q": self.q, "v": self.v}
+        for part in ("contacts", "energy"):
+            value = getattr(self, part)
+            arrays |= {f"{part}.{f.name}": getattr(value, f.name) for f in fields(value)}
+        header = {
+            "format": 1,
+            "pairs": self.pairs,
+            "stats": self.stats,
+            "events": [[e.t, e.pair, e.kind] for e in self.events],
+        }
+        arrays["header"] = np.array(json.dumps(header))
+        part_file = None
+        try:
+            handle, part_file = tempfile.mkstemp(suffix=".part", dir=target.parent)
+            with os.fdopen(handle, "wb") as stream:
+                np.savez_compressed(stream, allow_pickle=False, **arrays)
+            os.chmod(part_file, 0o644)
+            os.replace(part_file, target)
+        except OSError as error:
+            if part_file is not None and os.path.exists(part_file):
+                os.unlink(part_file)
+            raise ResultError(path, f"cannot write the results: {error.strerror}") from error
+        return target
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Result:
+        """Read what save() wrote; ResultError for anything else."""
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                header = json.loads(str(file["header"]))
+                arrays = {k: read_only(file[k]) for k in file.files if k != "header"}
+            log = {f.name: arrays[f"contacts.{f.name}"] for f in fields(ContactLog)}
+            energy = {f.name: arrays[f"energy.{f.name}"] for f in fields(EnergyAudit)}
+            return cls(
+                t=arrays["t"],
+                q=arrays["q"],
+                v=arrays["v"],
+                pairs=tuple(header["pairs"]),
+                contacts=ContactLog(**log),
+                events=tuple(Event(*e) for e in header["events"]),
+                energy=EnergyAudit(**energy),
+                stats=header["stats"],
+            )
+        except OSError as error:
+            raise ResultError(
+                path, f"cannot read the results: {error.strerror or error}"
+            ) from error
+        except Exception as error:
+            raise ResultError(path, "is not a file that Result.save wrote") from error
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the contact log as a pandas DataFrame, one row a contact, units in the names."""
+        try:
+            import pandas
+        except ImportError:
+            raise MissingExtra("pandas", "view", "Result.to_dataframe") from None
+        return pandas.DataFrame(self.contact_columns())
+
+    def contact_columns(self) -> dict[str, Any]:
+        """Return the contact log as named scalar columns, units in the names (for CSV, tables)."""
+        log = self.contacts
+        columns: dict[str, Any] = {"t [s]": log.t, "pair": [self.pairs[i] for i in log.pair]}
+        for label, unit, vectors in (
+            ("point", "m", log.point_world),
+            ("normal", "1", log.normal_world),
+        ):
+            columns |= {f"{label}_{a} [{unit}]": vectors[:, i] for i, a in enumerate("xyz")}
+        columns |= {"depth [m]": log.depth, "normal_force [N]": log.normal_force}
+        for label, unit, vectors in (
+            ("friction_force", "N", log.friction_force_world),
+            ("slip_velocity", "m/s", log.slip_velocity_world),
+        ):
+            columns |= {f"{label}_{a} [{unit}]": vectors[:, i] for i, a in enumerate("xyz")}
+        return columns | {"element": log.element, "feature": log.feature}
+
+    def plot(self) -> Figure:
+        """Return an overview figure: forces, depth and energy over time."""
+        from sphshell_pin.plot import plot_result
+
+        return plot_result(self)

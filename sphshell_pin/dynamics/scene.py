@@ -1,0 +1,371 @@
+"""A scene: a Pinocchio model and its contact pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin import _core
+from sphshell_pin.checks import check_positive, check_vector, read_only
+from sphshell_pin.contact import CoulombFriction, Method, NormalLaw, Sphere
+from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
+from sphshell_pin.shell import Shell
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.explain import Explanation
+
+Array = NDArray[np.float64]
+Find = Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]
+
+
+@dataclass(frozen=True)
+class ContactPair:
+    """One pair of bodies that may touch; body i carries the sphere, body j the shell.
+
+    `kind` is "sphere-shell" or "source". `frame_i`, `frame` name the frames of body i and j,
+    `joint_i`, `joint_j` their joints; `sphere_placement` is the sphere's centre in joint_i,
+    `placement` the shell in `frame`, `shell_placement` the shell in joint_j (with a source: the
+    two frames in their joints).
+    """
+
+    name: str
+    kind: str
+    frame_i: str
+    frame: str
+    joint_i: int
+    joint_j: int
+    sphere_placement: pin.SE3
+    placement: pin.SE3
+    shell_placement: pin.SE3
+    law: NormalLaw
+    friction: CoulombFriction | None
+    method: str
+    sphere: Sphere | None = None
+    shell: Shell | None = None
+    find: Find | None = None
+
+    def to_core(self) -> _core.Pair:
+        """Build the C++ twin of this pair."""
+        return _core.Pair(
+            name=self.name,
+            joint_i=self.joint_i,
+            placement_i=self.sphere_placement.homogeneous,
+            joint_j=self.joint_j,
+            placement_j=self.shell_placement.homogeneous,
+            radius=0.0 if self.sphere is None else self.sphere.radius,
+            shell=None if self.shell is None else self.shell.core,
+            source=None if self.find is None else _checked_source(self.find, self.name),
+            method=int(Method.from_name(self.method)),
+            law=self.law.core,
+            friction=None if self.friction is None else self.friction.core,
+        )
+
+
+@dataclass(frozen=True)
+class SceneContacts:
+    """Contacts of a scene at one state, as columns; vectors and points in the world.
+
+    With k contacts: `pair` (k,) index into scene.pairs; `point_world`, `normal_world` (k, 3) from
+    the shell to the sphere; `depth` (k,) [m]; `normal_force` (k,) [N]; `friction_force_world`
+    (k, 3) on the sphere [N]; `slip_velocity_world` (k, 3) of the sphere's surface against the
+    shell [m/s]; `element` (k,), `feature` (k,) as in ContactSet.
+    """
+
+    pair: NDArray[np.int32]
+    point_world: Array
+    normal_world: Array
+    depth: Array
+    normal_force: Array
+    friction_force_world: Array
+    slip_velocity_world: Array
+    element: NDArray[np.int32]
+    feature: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        """Return the number of contacts."""
+        return len(self.depth)
+
+    @property
+    def force_world(self) -> Array:
+        """Total force on the sphere of each contact, (k, 3) [N]."""
+        return self.normal_force[:, None] * self.normal_world + self.friction_force_world
+
+    @classmethod
+    def columns_from_rows(cls, rows: Array) -> dict[str, NDArray[Any]]:
+        """Split the core's rows (k, 17) into this class's columns."""
+        return {
+            "pair": rows[:, 0].astype(np.int32),
+            "point_world": rows[:, 1:4],
+            "normal_world": rows[:, 4:7],
+            "depth": rows[:, 7],
+            "normal_force": rows[:, 8],
+            "friction_force_world": rows[:, 9:12],
+            "slip_velocity_world": rows[:, 12:15],
+            "element": rows[:, 15].astype(np.int32),
+            "feature": rows[:, 16].astype(np.uint8),
+        }
+
+    @classmethod
+    def from_rows(cls, rows: Array) -> SceneContacts:
+        """Build from the core's rows (k, 17)."""
+        return cls(**{k: read_only(c) for k, c in cls.columns_from_rows(rows).items()})
+
+
+class Scene:
+    """A copy of a Pinocchio model with the contact pairs that act on it.
+
+    `lock` names joints to hold at their values in `q_lock` (nq of the given model, default
+    neutral): they drop out of the scene's model and cost nothing. FrameNotFound and NameNotFound
+    list what the model has.
+    """
+
+    def __init__(self, model: pin.Model, lock: Iterable[str] = (), q_lock: Any = None) -> None:
+        if not isinstance(model, pin.Model):
+            raise InvalidParameter("model", type(model).__name__, "must be a pinocchio.Model")
+        lock = tuple(lock)
+        known = list(model.names)[1:]
+        for name in lock:
+            if name not in known:
+                raise NameNotFound("joint", name, "the model", known)
+        if lock:
+            q = pin.neutral(model) if q_lock is None else check_vector("q_lock", q_lock, model.nq)
+            self._model = pin.buildReducedModel(model, [model.getJointId(n) for n in lock], q)
+        else:
+            self._model = pin.Model(model)
+        self.lock = lock
+        self._pairs: tuple[ContactPair, ...] = ()
+        self._core: _core.Scene | None = None
+
+    @property
+    def model(self) -> pin.Model:
+        """The scene's own model, without the locked joints."""
+        return self._model
+
+    @property
+    def pairs(self) -> tuple[ContactPair, ...]:
+        """The contact pairs, in the order in which they were added."""
+        return self._pairs
+
+    def add_contact(
+        self,
+        sphere: Sphere,
+        shell: Shell,
+        frame: str = "universe",
+        placement: pin.SE3 | None = None,
+        law: NormalLaw | None = None,
+        friction: CoulombFriction | None = None,
+        method: str | None = None,
+        name: str | None = None,
+    ) -> ContactPair:
+        """Let `sphere` touch `shell`, which is placed at `placement` in `frame`.
+
+        Without `law` the contact has ADAMS's default IMPACT law, without `friction` none; `method`
+        is "facets" (default) or "elements". Returns the pair.
+        """
+        method = "facets" if method is None else method
+        Method.from_name(method)
+        joint_i, in_i = self._frame(sphere.frame)
+        placement = pin.SE3.Identity() if placement is None else pin.SE3(placement)
+        joint_j, in_j = self._frame(frame)
+        centre = in_i * pin.SE3(np.eye(3), np.array(sphere.offset))
+        return self._add(
+            ContactPair(
+                name=self._pair_name(name, f"{sphere.frame}-{shell.name}"),
+                kind="sphere-shell",
+                frame_i=sphere.frame,
+                frame=frame,
+                joint_i=joint_i,
+                joint_j=joint_j,
+                sphere_placement=centre,
+                placement=placement,
+                shell_placement=in_j * placement,
+                law=_default_law() if law is None else law,
+                friction=friction,
+                method=method,
+                sphere=sphere,
+                shell=shell,
+            )
+        )
+
+    def add_contact_source(
+        self,
+        find: Find,
+        frame_i: str,
+        frame_j: str,
+        law: NormalLaw | None = None,
+        friction: CoulombFriction | None = None,
+        name: str | None = None,
+    ) -> ContactPair:
+        """Let the user's own routine say where two bodies touch (gears, cams, ...).
+
+        find(pose_i, pose_j), with the world placements (pinocchio.SE3) of both frames, returns
+        points_world (k, 3) [m], normals_world (k, 3) (unit, from j to i), depths (k,) [m]; entries
+        with depth <= 0 are no contacts. It is called in every evaluation of the forces.
+        """
+        if not callable(find):
+            raise InvalidParameter("find", find, "must be callable: find(pose_i, pose_j)")
+        joint_i, in_i = self._frame(frame_i)
+        joint_j, in_j = self._frame(frame_j)
+        return self._add(
+            ContactPair(
+                name=self._pair_name(name, f"{frame_i}-{frame_j}"),
+                kind="source",
+                frame_i=frame_i,
+                frame=frame_j,
+                joint_i=joint_i,
+                joint_j=joint_j,
+                sphere_placement=in_i,
+                placement=pin.SE3.Identity(),
+                shell_placement=in_j,
+                law=_default_law() if law is None else law,
+                friction=friction,
+                method="facets",
+                find=find,
+            )
+        )
+
+    @classmethod
+    def from_geometry(
+        cls,
+        model: pin.Model,
+        geometry_model: pin.GeometryModel,
+        law: NormalLaw | None = None,
+        friction: CoulombFriction | None = None,
+    ) -> Scene:
+        """Build a scene from the active collision pairs of a geometry model.
+
+        Of each pair one side must be a sphere; the other becomes a shell (meshes as they are,
+        primitives tessellated with their exact normals). Pairs of other kinds are left out; a
+        geometry model without any sphere pair raises InvalidParameter.
+        """
+        from sphshell_pin.dynamics.from_geometry import add_pairs
+
+        scene = cls(model)
+        add_pairs(scene, geometry_model, law, friction)
+        return scene
+
+    def external_forces(self, q: Any, v: Any = None) -> pin.StdVec_Force:
+        """Return the contact wrenches for pin.aba(model, data, q, v, tau, fext).
+
+        One pinocchio.Force per joint, in the joint's frame about its origin; q (nq,), v (nv,)
+        (default: at rest).
+        """
+        q, v = self.check_state(q, v)
+        return self.core.external_forces(q, v)
+
+    def contacts(self, q: Any, v: Any = None) -> SceneContacts:
+        """Return all contacts with their forces at q (nq,), v (nv,) (default: at rest)."""
+        q, v = self.check_state(q, v)
+        return SceneContacts.from_rows(self.core.contacts(q, v))
+
+    def explain(self, q: Any = None, v: Any = None, dt: float | None = None) -> Explanation:
+        """Say what is modelled and what not, time scales, expected depths, and warnings.
+
+        q (nq,) (default neutral), v (nv,) the speed of approach to judge by, `dt` [s] a step to
+        judge.
+        """
+        from sphshell_pin.dynamics.explain import explain_scene
+
+        q = pin.neutral(self._model) if q is None else q
+        q, v = self.check_state(q, v)
+        return explain_scene(self, q, v, None if dt is None else check_positive("dt", dt, "s"))
+
+    def check_state(self, q: Any, v: Any = None) -> tuple[Array, Array]:
+        """Return copies of q (nq,) and v (nv,); InvalidParameter for other sizes or no numbers."""
+        model = self._model
+        what = f": this model has nq = {model.nq}, nv = {model.nv}"
+        if self.lock:
+            what += f" after locking {', '.join(self.lock)}"
+        q = check_vector("q", q, model.nq, what)
+        if not pin.isNormalized(model, q, 1e-3):
+            raise InvalidParameter(
+                "q", q.tolist(), "has a quaternion or a (cos, sin) pair that is not of unit length"
+            )
+        v = np.zeros(model.nv) if v is None else check_vector("v", v, model.nv, what)
+        return q, v
+
+    def pair(self, name: str) -> ContactPair:
+        """Return the pair called `name`; NameNotFound lists them."""
+        for pair in self._pairs:
+            if pair.name == name:
+                return pair
+        raise NameNotFound("contact", name, "the scene", [p.name for p in self._pairs])
+
+    def replace_pair(self, name: str, **changes: Any) -> None:
+        """Change the law, friction or method of the pair called `name`."""
+        unknown = set(changes) - {"law", "friction", "method"}
+        if unknown:
+            raise NameNotFound("setting", unknown.pop(), "a pair", ("law", "friction", "method"))
+        old = self.pair(name)
+        self._pairs = tuple(replace(p, **changes) if p is old else p for p in self._pairs)
+        self._core = None
+
+    @property
+    def core(self) -> _core.Scene:
+        """The C++ twin, built when first needed."""
+        if self._core is None:
+            self._core = _core.Scene(self._model, [p.to_core() for p in self._pairs])
+        return self._core
+
+    def _add(self, pair: ContactPair) -> ContactPair:
+        self._pairs = (*self._pairs, pair)
+        self._core = None
+        return pair
+
+    def _pair_name(self, name: str | None, default: str) -> str:
+        taken = {p.name for p in self._pairs}
+        if name is not None:
+            if name in taken:
+                raise InvalidParameter("name", name, "is taken by another contact of this scene")
+            return name
+        wanted, k = default, 2
+        while wanted in taken:
+            wanted, k = f"{default}-{k}", k + 1
+        return wanted
+
+    def _frame(self, name: str) -> tuple[int, pin.SE3]:
+        if not self._model.existFrame(name):
+            raise FrameNotFound(name, [f.name for f in self._model.frames])
+        frame = self._model.frames[self._model.getFrameId(name)]
+        return int(frame.parentJoint), pin.SE3(frame.placement)
+
+
+def _default_law() -> NormalLaw:
+    from sphshell_pin.contact import ImpactLaw
+
+    return ImpactLaw.from_adams()
+
+
+def _checked_source(find: Find, name: str) -> Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]:
+    """Wrap a user's routine so that what reaches the core has the right shapes and unit normals."""
+
+    def checked(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[Array, Array, Array]:
+        where = f"contact source '{name}'"
+        try:
+            points, normals, depths = find(pose_i, pose_j)
+        except (TypeError, ValueError) as error:
+            raise InvalidParameter(
+                where, str(error), "must return points (k, 3), normals (k, 3), depths (k,)"
+            ) from error
+        depth = np.asarray(depths, dtype=np.float64).reshape(-1)
+        shape = (len(depth), 3)
+        point = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        normal = np.asarray(normals, dtype=np.float64).reshape(-1, 3)
+        if point.shape != shape or normal.shape != shape:
+            raise InvalidParameter(
+                where,
+                (point.shape, normal.shape, depth.shape),
+                "must return points (k, 3), normals (k, 3), depths (k,)",
+            )
+        if not (np.isfinite(point).all() and np.isfinite(depth).all()):
+            raise InvalidParameter(where, point.tolist(), "must return finite points and depths")
+        if len(normal) and not np.allclose(np.linalg.norm(normal, axis=1), 1, atol=1e-6):
+            raise InvalidParameter(where, normal.tolist(), "must return unit normals")
+        return np.ascontiguousarray(point), np.ascontiguousarray(normal), depth
+
+    return checked

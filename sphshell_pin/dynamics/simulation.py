@@ -1,0 +1,172 @@
+"""Runs a scene: checks, starts the compiled loop, gathers what it records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin import _core
+from sphshell_pin.checks import check_finite, check_not_negative, check_positive
+from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callable
+from sphshell_pin.dynamics.integrators import Integrator, RungeKutta4, SemiImplicitEuler
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.errors import DeepStart, Interrupted, InvalidParameter, SimulationDiverged
+
+Array = NDArray[np.float64]
+
+_FINISHED, _DIVERGED = 1, 2
+# Python looks up this often [s] while the compiled loop runs: progress, Ctrl-C.
+_GLANCE = 0.05
+
+
+class Simulation:
+    """Moves `scene` in time with `integrator`."""
+
+    def __init__(self, scene: Scene, integrator: Integrator | None = None) -> None:
+        if not isinstance(scene, Scene):
+            raise InvalidParameter("scene", type(scene).__name__, "must be a sphshell_pin.Scene")
+        integrator = SemiImplicitEuler() if integrator is None else integrator
+        if not isinstance(integrator, SemiImplicitEuler | RungeKutta4):
+            raise InvalidParameter(
+                "integrator", integrator, "must be SemiImplicitEuler(dt) or RungeKutta4(dt)"
+            )
+        self.scene = scene
+        self.integrator = integrator
+
+    def run(
+        self,
+        q0: Any,
+        v0: Any = None,
+        duration: float = 1.0,
+        controller: Controller | Callback | None = None,
+        control_dt: float | None = None,
+        *,
+        record_dt: float | None = None,
+        progress: Callable[[float], object] | None = None,
+        t0: float = 0.0,
+    ) -> Result:
+        """Run from q0 (nq,), v0 (nv,) for `duration` [s] and return the Result.
+
+        `controller`: None, a controller of this package, or a callable
+        tau(t, q, v, contacts) -> (nv,). Torques are held for `control_dt` [s]; by default a
+        callable is asked once a step, a controller of this package at every stage of the step.
+        Rows are recorded every `record_dt` [s] (default: every step); `progress` is called a few
+        times a second with the share done. The same input gives the same bits.
+
+        Raises InvalidParameter for wrong sizes and values, DeepStart for a sphere that starts
+        deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.
+        """
+        dt = self.integrator.dt
+        q0, v0 = self.scene.check_state(q0, v0)
+        duration = check_not_negative("duration", duration, "s")
+        self._check_start(q0)
+        core_controller, hold = self._bind(controller, control_dt, q0)
+        every = 1
+        if record_dt is not None:
+            every = max(1, round(check_positive("record_dt", record_dt, "s") / dt))
+        core = _core.Simulation(
+            self.scene.model,
+            [pair.to_core() for pair in self.scene.pairs],
+            core_controller,
+            q0,
+            v0,
+            runge_kutta=isinstance(self.integrator, RungeKutta4),
+            dt=dt,
+            duration=duration,
+            start_time=check_finite("t0", t0),
+            control_dt=hold,
+            record_every=every,
+        )
+        blocks: list[dict[str, NDArray[Any]]] = []
+        status = 0
+        try:
+            while not status:
+                status = core.advance(_GLANCE)
+                blocks.append(core.take())
+                if progress is not None:
+                    progress(core.progress)
+        except KeyboardInterrupt:
+            blocks.append(core.take())
+            raise Interrupted(core.time, self._gather(core, blocks)) from None
+        result = self._gather(core, blocks)
+        if status == _DIVERGED:
+            raise SimulationDiverged(core.time, _why(core, self.scene), result)
+        return result
+
+    def _bind(
+        self, controller: Controller | Callback | None, control_dt: float | None, q0: Array
+    ) -> tuple[_core.Controller | None, float]:
+        dt = self.integrator.dt
+        if control_dt is not None and check_positive("control_dt", control_dt, "s") < dt:
+            raise InvalidParameter("control_dt", control_dt, f"must not be below dt = {dt!r} s")
+        if controller is None:
+            return None, 0.0
+        if isinstance(controller, Controller):
+            return controller.to_core(self.scene, q0), control_dt or 0.0
+        if callable(controller):
+            return wrap_callable(controller, self.scene.model), control_dt or dt
+        raise InvalidParameter(
+            "controller", controller, "must be None, a controller or tau(t, q, v, contacts)"
+        )
+
+    def _check_start(self, q0: Array) -> None:
+        pairs = self.scene.pairs
+        contacts = self.scene.contacts(q0) if pairs else None
+        for k, pair in enumerate(pairs):
+            if pair.sphere is None or pair.shell is None or contacts is None:
+                continue
+            radius = pair.sphere.radius
+            depth = float(np.max(contacts.depth[contacts.pair == k], initial=0.0))
+            if pair.shell.side != "both" and pair.shell.is_closed:
+                depth = max(depth, self._depth_in_solid(k, q0))
+            if depth > 0.5 * radius:
+                raise DeepStart(pair.name, depth, radius)
+
+    def _depth_in_solid(self, index: int, q0: Array) -> float:
+        """Signed depth [m] of a sphere's start in a one-sided shell, however deep."""
+        import pinocchio as pin
+
+        pair = self.scene.pairs[index]
+        if pair.shell is None or pair.sphere is None:
+            return -math.inf
+        data = self.scene.model.createData()
+        pin.forwardKinematics(self.scene.model, data, q0)
+        centre = (data.oMi[pair.joint_i] * pair.sphere_placement).translation
+        local = (data.oMi[pair.joint_j] * pair.shell_placement).actInv(centre)
+        distance = float(pair.shell.closest_points(local[None]).distances[0])
+        return pair.sphere.radius - (distance if pair.shell.side == "outside" else -distance)
+
+    def _gather(self, core: _core.Simulation, blocks: list[dict[str, NDArray[Any]]]) -> Result:
+        names = tuple(pair.name for pair in self.scene.pairs)
+        figures = {}
+        for name, summary in zip(names, core.summaries, strict=True):
+            time = summary["contact_time"]
+            figures[name] = {**summary, "mean_force": summary["impulse"] / time if time else 0.0}
+        first = blocks[0]["t"][0] if len(blocks[0]["t"]) else core.time
+        simulated = core.time - float(first)
+        stats = {
+            "steps": core.steps,
+            "wall_time": core.wall_time,
+            "real_time_factor": simulated / core.wall_time if core.wall_time > 0 else math.inf,
+            "duration": simulated,
+            "dt": self.integrator.dt,
+            "integrator": type(self.integrator).__name__,
+            "pairs": figures,
+        }
+        return Result.from_blocks(blocks, names, stats, self.scene)
+
+
+def _why(core: _core.Simulation, scene: Scene) -> str:
+    """Say which joint ran away first."""
+    v = np.abs(np.asarray(core.v))
+    v = np.where(np.isfinite(v), v, np.inf)
+    worst = int(np.argmax(v))
+    for name, joint in zip(scene.model.names, scene.model.joints, strict=True):
+        if joint.idx_v <= worst < joint.idx_v + joint.nv:
+            return f"the speed of joint '{name}' grew to {v[worst]:.3g}"
+    return "the state is no longer finite"

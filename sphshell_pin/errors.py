@@ -1,0 +1,132 @@
+"""Every fault the package raises on purpose, below one root; each carries the data it speaks of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from os import PathLike
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.result import Result
+
+
+class SphshellError(Exception):
+    """Root of all faults of this package; its text is one sentence a user can act on."""
+
+
+class InvalidParameter(SphshellError, ValueError):
+    """A value outside its limits: `name` and `value` say which."""
+
+    def __init__(self, name: str, value: object, must: str) -> None:
+        """Say that parameter `name` has `value` but `must` (e.g. "must be positive [m]")."""
+        super().__init__(f"{name} = {value!r} {must}")
+        self.name = name
+        self.value = value
+
+
+class InvalidShell(SphshellError, ValueError):
+    """Vertices or elements from which no surface can be made."""
+
+
+class ShellFileError(SphshellError, ValueError):
+    """A surface file that cannot be read: `path`, and `line` (1-based) where one is to blame."""
+
+    def __init__(self, path: str | PathLike[str], reason: str, line: int | None = None) -> None:
+        """Say what is wrong with the file at `path`."""
+        where = f"{path}, line {line}" if line is not None else f"{path}"
+        super().__init__(f"{where}: {reason}")
+        self.path = path
+        self.reason = reason
+        self.line = line
+
+
+class NameNotFound(SphshellError, LookupError):
+    """A name nothing carries: `kind`, `name`, and the `valid` ones."""
+
+    def __init__(self, kind: str, name: str, owner: str, valid: Iterable[str]) -> None:
+        """Say that `owner` has no `kind` called `name`, and list what it has."""
+        self.kind = kind
+        self.name = name
+        self.valid = tuple(valid)
+        listed = ", ".join(self.valid) if self.valid else "none"
+        super().__init__(f"no {kind} '{name}'; {owner} has: {listed}")
+
+
+class FrameNotFound(NameNotFound):
+    """A frame the model does not have."""
+
+    def __init__(self, name: str, valid: Iterable[str]) -> None:
+        """List the `valid` frames of the model."""
+        super().__init__("frame", name, "the model", valid)
+
+
+class MissingExtra(SphshellError, ImportError):
+    """An optional package is not installed: `package`, and the `extra` that brings it."""
+
+    def __init__(self, package: str, extra: str, purpose: str) -> None:
+        """Say what `purpose` needs `package`, and how to install it."""
+        super().__init__(
+            f"{purpose} needs {package}: install it with pip install 'sphshell-pin[{extra}]'"
+        )
+        self.package = package
+        self.extra = extra
+
+
+class DeepStart(SphshellError, ValueError):
+    """A sphere that starts deep inside its shell: `pair`, `depth` and `radius` [m]."""
+
+    def __init__(self, pair: str, depth: float, radius: float) -> None:
+        """Say how deep the sphere of `pair` starts."""
+        super().__init__(
+            f"contact '{pair}' starts at depth {depth:.6g} m, more than half of its sphere's radius "
+            f"{radius:.6g} m: move the start configuration, or turn the shell's side"
+        )
+        self.pair = pair
+        self.depth = depth
+        self.radius = radius
+
+
+class ScenarioError(SphshellError, ValueError):
+    """A scenario file that cannot be built: `path` of the file, dotted `key`, offending `value`."""
+
+    def __init__(
+        self, path: str | PathLike[str], key: str, reason: str, value: object = None
+    ) -> None:
+        """Say which `key` of the scenario at `path` is wrong and why."""
+        given = f" (given: {value!r})" if value is not None else ""
+        super().__init__(f"{path}: {key}: {reason}{given}" if key else f"{path}: {reason}{given}")
+        self.path = path
+        self.key = key
+        self.value = value
+
+
+class ResultError(SphshellError, OSError):
+    """Results that cannot be written or read back: `path`."""
+
+    def __init__(self, path: str | PathLike[str], reason: str) -> None:
+        """Say what is wrong with the results at `path`."""
+        super().__init__(f"{path}: {reason}")
+        self.path = path
+
+
+class SimulationDiverged(SphshellError, ArithmeticError):
+    """The state stopped being finite at time `t` [s]; `result` holds all that came before."""
+
+    def __init__(self, t: float, why: str, result: Result) -> None:
+        """Say when and why the run had to stop."""
+        super().__init__(
+            f"the simulation diverged at t = {t:.6g} s: {why}; what was computed until then is kept in "
+            "the error's .result; reduce dt, or the stiffness and damping (see Scene.explain)"
+        )
+        self.t = t
+        self.result = result
+
+
+class Interrupted(SphshellError, KeyboardInterrupt):
+    """Ctrl-C during a run at time `t` [s]; `result` holds all that came before."""
+
+    def __init__(self, t: float, result: Result) -> None:
+        """Say when the run was interrupted."""
+        super().__init__(f"interrupted at t = {t:.6g} s; what was computed is kept in .result")
+        self.t = t
+        self.result = result

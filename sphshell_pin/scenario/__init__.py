@@ -1,0 +1,23 @@
+"""Scenarios: TOML files that build a scene, a controller and a run."""
+
+from __future__ import annotations
+
+from sphshell_pin.scenario.build import Built, build
+from sphshell_pin.scenario.figures import Verdict, judge
+from sphshell_pin.scenario.reading import find_scenario, read_scenario, shipped_scenarios
+from sphshell_pin.scenario.run import RunReport, run_built, run_scenario
+from sphshell_pin.scenario.schema import Scenario
+
+__all__ = [
+    "Built",
+    "RunReport",
+    "Scenario",
+    "Verdict",
+    "build",
+    "find_scenario",
+    "judge",
+    "read_scenario",
+    "run_built",
+    "run_scenario",
+    "shipped_scenarios",
+]

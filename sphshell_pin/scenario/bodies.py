@@ -1,0 +1,236 @@
+"""The robots of a scenario, put together into one pinocchio model with its start state."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.errors import MissingExtra, NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.scenario.schema import Placement, RobotSection, Scenario
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """All robots as one model, before any joint is locked."""
+
+    model: Any
+    """pinocchio.Model; names carry `label/` as soon as there are several robots."""
+    visual_model: Any
+    """pinocchio.GeometryModel to look at."""
+    q0: Array
+    """Start configuration (nq,)."""
+    v0: Array
+    """Start velocity (nv,)."""
+    lock: tuple[str, ...]
+    """Joints to lock at their place in q0."""
+
+
+@contextmanager
+def blamed_on(path: Path, key: str) -> Iterator[None]:
+    """Name the scenario's file and `key` in any fault of the package that happens inside."""
+    try:
+        yield
+    except (ScenarioError, MissingExtra):
+        raise
+    except SphshellError as error:
+        raise ScenarioError(path, key, str(error)) from error
+
+
+def to_se3(placement: Placement) -> Any:
+    """Return the pinocchio.SE3 of a placement table."""
+    return pin.SE3(pin.rpy.rpyToMatrix(*np.deg2rad(placement.rpy_deg)), np.array(placement.xyz))
+
+
+def assemble(scenario: Scenario, path: Path) -> Assembly:
+    """Load all robots of `scenario` and append them into one model under its gravity.
+
+    Raises
+    ------
+    ScenarioError
+        A robot cannot be loaded, two share a label, or a start value does not fit its joint.
+    MissingExtra
+        A robot comes from a package that is not installed.
+    """
+    # The folder stands at the top of the repository and is installed inside the package.
+    robots = importlib.import_module("sphshell_pin.robots")
+
+    several = len(scenario.robot) > 1
+    base, visual = pin.Model(), pin.GeometryModel()
+    starts: list[tuple[str, Array, Array]] = []
+    lock: list[str] = []
+    labels: set[str] = set()
+    for i, section in enumerate(scenario.robot):
+        key = f"robot[{i}]"
+        with blamed_on(path, key):
+            robot = _load(robots, section, path)
+        model, geometry = robot.model.copy(), robot.visual_model.copy()
+        q, v = _start(model, robot.q0, section, path, key)
+        for j, joint in enumerate(section.lock):
+            if joint not in list(model.names)[1:]:
+                _refuse_joint(model, joint, path, f"{key}.lock[{j}]")
+        prefix = ""
+        if several:
+            label = section.label or robot.name
+            if label in labels:
+                raise ScenarioError(path, f"{key}.label", "two robots share this label", label)
+            labels.add(label)
+            prefix = f"{label}/"
+            _rename(model, geometry, prefix)
+        lock += [prefix + joint for joint in section.lock]
+        starts += [
+            (name, q[_span_q(model, j)], v[_span_v(model, j)])
+            for j, name in enumerate(model.names)
+            if j > 0
+        ]
+        stand = to_se3(section.placement)
+        if not several and stand.isIdentity():
+            base, visual = model, geometry
+        else:
+            base, visual = pin.appendModel(base, model, visual, geometry, 0, stand)
+    base.gravity.linear = np.array(scenario.gravity)
+    q0, v0 = pin.neutral(base), np.zeros(base.nv)
+    for name, q_joint, v_joint in starts:
+        j = base.getJointId(name)
+        q0[_span_q(base, j)], v0[_span_v(base, j)] = q_joint, v_joint
+    return Assembly(base, visual, q0, v0, tuple(lock))
+
+
+def reduce_visual(assembly: Assembly) -> Any:
+    """Return the visual geometry for the model with `assembly.lock` locked."""
+    if not assembly.lock:
+        return assembly.visual_model
+    ids = [assembly.model.getJointId(name) for name in assembly.lock]
+    _, geometry = pin.buildReducedModel(assembly.model, assembly.visual_model, ids, assembly.q0)
+    return geometry
+
+
+def restrict(model: Any, reduced: Any, q: Array, v: Array) -> tuple[Array, Array]:
+    """Return the state (q, v) of `model` for the joints that `reduced` still has."""
+    q_reduced, v_reduced = pin.neutral(reduced), np.zeros(reduced.nv)
+    for j, name in enumerate(reduced.names):
+        if j > 0:
+            k = model.getJointId(name)
+            q_reduced[_span_q(reduced, j)] = q[_span_q(model, k)]
+            v_reduced[_span_v(reduced, j)] = v[_span_v(model, k)]
+    return q_reduced, v_reduced
+
+
+def set_joint(model: Any, q: Array, name: str, value: float | list[float]) -> None:
+    """Write the position of one joint into `q` [m, rad; a free-flyer's x y z and quaternion].
+
+    Raises
+    ------
+    NameNotFound
+        The model has no such joint.
+    SphshellError
+        `value` has not as many numbers as the joint.
+    """
+    names = list(model.names)[1:]
+    if name not in names:
+        raise NameNotFound("joint", name, "the model", names)
+    joint = model.joints[model.getJointId(name)]
+    span = slice(joint.idx_q, joint.idx_q + joint.nq)
+    if not isinstance(value, list):
+        if joint.nv != 1:
+            raise SphshellError(f"joint '{name}' takes a list of {joint.nq} numbers")
+        # A continuous joint is stored as the cosine and the sine of its angle.
+        q[span] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+        return
+    if len(value) != joint.nq:
+        raise SphshellError(f"joint '{name}' takes {joint.nq} numbers, not {len(value)}")
+    q[span] = value
+
+
+def _load(robots: Any, section: RobotSection, path: Path) -> Any:
+    if section.name is not None:
+        return robots.load(section.name)
+    folder = path.parent
+    return robots.load_urdf(
+        folder / (section.urdf or ""),
+        [folder / one for one in section.package_dirs],
+        free_flyer=section.free_flyer,
+        name=Path(section.urdf or "").stem,
+    )
+
+
+def _start(
+    model: Any, q_default: Array, section: RobotSection, path: Path, key: str
+) -> tuple[Array, Array]:
+    q, v = np.array(q_default, dtype=float), np.zeros(model.nv)
+    if section.q is not None:
+        if len(section.q) != model.nq:
+            raise ScenarioError(
+                path, f"{key}.q", f"the robot has {model.nq} coordinates, not {len(section.q)}"
+            )
+        q = np.array(section.q)
+    for name, value in section.start.items():
+        with blamed_on(path, f'{key}.start."{name}"'):
+            set_joint(model, q, name, value)
+    for name, value in section.speed.items():
+        if name not in list(model.names)[1:]:
+            _refuse_joint(model, name, path, f'{key}.speed."{name}"')
+        span = _span_v(model, model.getJointId(name))
+        values = np.atleast_1d(np.array(value, dtype=float))
+        if len(values) != span.stop - span.start:
+            n = span.stop - span.start
+            raise ScenarioError(
+                path, f'{key}.speed."{name}"', f"the joint takes {n} numbers", value
+            )
+        v[span] = values
+    unit = pin.normalize(model, q)
+    # Rounded quaternions and cosines are set right; a wrong one (not of unit length) is a mistake.
+    if not np.allclose(unit, q, rtol=0, atol=1e-2):
+        raise ScenarioError(path, key, "a quaternion of the start configuration is not of length 1")
+    return unit, v
+
+
+def _refuse_joint(model: Any, name: str, path: Path, key: str) -> None:
+    with blamed_on(path, key):
+        raise NameNotFound("joint", name, "the robot", list(model.names)[1:])
+
+
+def _rename(model: Any, geometry: Any, prefix: str) -> None:
+    for j in range(1, model.njoints):
+        model.names[j] = prefix + model.names[j]
+    for f in range(1, model.nframes):
+        model.frames[f].name = prefix + model.frames[f].name
+    for one in geometry.geometryObjects:
+        one.name = prefix + one.name
+
+
+def _span_q(model: Any, joint: int) -> slice:
+    return slice(model.joints[joint].idx_q, model.joints[joint].idx_q + model.joints[joint].nq)
+
+
+def _span_v(model: Any, joint: int) -> slice:
+    return slice(model.joints[joint].idx_v, model.joints[joint].idx_v + model.joints[joint].nv)
+
+
+def by_joint(model: Any, values: Mapping[str, float], size: str, start: Array | float) -> Array:
+    """Return a vector of length nq (`size` "q") or nv ("v") with `values` put in by joint name.
+
+    Raises
+    ------
+    NameNotFound
+        The model has no such joint.
+    """
+    vector = np.array(start, dtype=float) * np.ones(model.nq if size == "q" else model.nv)
+    for name, value in values.items():
+        if size == "q":
+            set_joint(model, vector, name, value)
+            continue
+        names = list(model.names)[1:]
+        if name not in names:
+            raise NameNotFound("joint", name, "the model", names)
+        vector[_span_v(model, model.getJointId(name))] = value
+    return vector

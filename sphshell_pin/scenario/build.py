@@ -1,0 +1,326 @@
+"""From a scenario file to what runs: the scene, its start state, its controller, its simulation."""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import numpy.typing as npt
+
+import sphshell_pin as sp
+from sphshell_pin.dynamics.controllers import Controller
+from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.scenario import schema
+from sphshell_pin.scenario.bodies import (
+    assemble,
+    blamed_on,
+    by_joint,
+    reduce_visual,
+    restrict,
+    to_se3,
+)
+from sphshell_pin.scenario.reading import find_scenario, read_scenario
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Built:
+    """A scenario ready to run."""
+
+    name: str
+    path: Path
+    scenario: schema.Scenario
+    scene: sp.Scene
+    q0: Array
+    v0: Array
+    controller: Any
+    simulation: sp.Simulation
+    visual_model: Any
+    """pinocchio.GeometryModel of the scene's model."""
+    figures: Mapping[str, Callable[[Any, Any], float]]
+    """The scenario's own figures: functions of (result, scene)."""
+
+
+def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -> Built:
+    """Build the scenario called `name` (shipped, or a path), with `changes` by dotted key.
+
+    Raises
+    ------
+    ScenarioError
+        The file, a key, or a value is wrong; the text names them and what would be valid.
+    NameNotFound
+        No such scenario.
+    MissingExtra
+        The scenario needs an optional package that is not installed.
+    """
+    path = find_scenario(name)
+    scenario = read_scenario(path, changes)
+    assembly = assemble(scenario, path)
+    with blamed_on(path, "robot"):
+        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=assembly.q0)
+    shells = {
+        section.name: (_build_shell(section, path, f"shell[{i}]"), section)
+        for i, section in enumerate(scenario.shell)
+    }
+    if len(shells) < len(scenario.shell):
+        raise ScenarioError(path, "shell", "two shells share a name")
+    for i, contact in enumerate(scenario.contact):
+        _add_contact(scene, contact, shells, path, f"contact[{i}]")
+    for i, source in enumerate(scenario.source):
+        key = f"source[{i}]"
+        find = load_function(source.find, path, f"{key}.find")
+        with blamed_on(path, key):
+            scene.add_contact_source(
+                find,
+                source.frame_i,
+                source.frame_j,
+                _build_law(source.law),
+                _build_friction(source.friction),
+                name=source.name,
+            )
+    q0, v0 = restrict(assembly.model, scene.model, assembly.q0, assembly.v0)
+    controller = _build_controller(scenario.controller, scene, q0, shells, path)
+    if isinstance(controller, Controller):
+        with blamed_on(path, "controller"):
+            # A wrong frame or joint is told now, not when the run starts.
+            controller.to_core(scene, q0)
+    run = scenario.run
+    with blamed_on(path, "run"):
+        euler = run.integrator == "semi-implicit-euler"
+        stepper = sp.SemiImplicitEuler(dt=run.dt) if euler else sp.RungeKutta4(dt=run.dt)
+        simulation = sp.Simulation(scene, integrator=stepper)
+    figures = {
+        figure: load_function(where, path, f"figures.{figure}")
+        for figure, where in scenario.figures.items()
+    }
+    return Built(
+        path.stem,
+        path,
+        scenario,
+        scene,
+        q0,
+        v0,
+        controller,
+        simulation,
+        reduce_visual(assembly),
+        figures,
+    )
+
+
+def load_function(where: str, path: Path, key: str) -> Callable[..., Any]:
+    """Return the function that "file.py:function" names, the file relative to the scenario's.
+
+    Raises
+    ------
+    ScenarioError
+        No such file or function, or the file cannot be run.
+    """
+    file_name, colon, function = where.rpartition(":")
+    if not colon or not file_name.endswith(".py") or not function:
+        raise ScenarioError(path, key, 'must be "file.py:function"', where)
+    file = path.parent / file_name
+    if not file.is_file():
+        raise ScenarioError(path, key, f"no such file: {file}", where)
+    spec = importlib.util.spec_from_file_location(f"sphshell_pin_scenario_{file.stem}", file)
+    if spec is None or spec.loader is None:
+        raise ScenarioError(path, key, f"python cannot load {file}", where)
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ScenarioError(path, key, f"{file} fails: {type(error).__name__}: {error}") from error
+    found = getattr(module, function, None)
+    if not callable(found):
+        valid = [
+            name
+            for name, one in inspect.getmembers(module, inspect.isfunction)
+            if one.__module__ == module.__name__ and not name.startswith("_")
+        ]
+        with blamed_on(path, key):
+            raise NameNotFound("function", function, str(file), valid)
+    return found  # type: ignore[no-any-return]
+
+
+def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
+    options: dict[str, Any] = {
+        "side": section.side,
+        "crease_angle": np.deg2rad(section.crease_angle_deg),
+        "name": section.name,
+    }
+    with blamed_on(path, key):
+        if section.file is not None:
+            file = path.parent / section.file
+            if not file.is_file():
+                raise SphshellError(f"no such surface file: {file}")
+            shell = sp.Shell.from_file(file, unit=section.unit, scale=section.scale, **options)
+        else:
+            if section.chord_error is not None:
+                options["chord_error"] = section.chord_error
+            if section.segments is not None:
+                options["segments"] = section.segments
+            if isinstance(section.primitive, schema.HalfSpace):
+                options["extent"] = section.primitive.extent
+            shell = sp.Shell.from_geometry(_to_coal(section.primitive), **options)
+        return shell if section.magnify == 1.0 else shell.transformed(scale=section.magnify)
+
+
+def _to_coal(primitive: Any) -> Any:
+    match primitive:
+        case schema.Box():
+            return coal.Box(*primitive.size)
+        case schema.SphereSurface():
+            return coal.Sphere(primitive.radius)
+        case schema.Cylinder():
+            return coal.Cylinder(primitive.radius, primitive.length)
+        case schema.Capsule():
+            return coal.Capsule(primitive.radius, primitive.length)
+        case schema.Cone():
+            return coal.Cone(primitive.radius, primitive.length)
+        case schema.Ellipsoid():
+            return coal.Ellipsoid(*primitive.radii)
+        case _:
+            return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+
+
+def _add_contact(
+    scene: sp.Scene,
+    contact: schema.ContactSection,
+    shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
+    path: Path,
+    key: str,
+) -> None:
+    with blamed_on(path, f"{key}.shell"):
+        if contact.shell not in shells:
+            raise NameNotFound("shell", contact.shell, "the scenario", shells)
+    shell, section = shells[contact.shell]
+    with blamed_on(path, key):
+        sphere = contact.sphere
+        x, y, z = sphere.offset
+        scene.add_contact(
+            sphere=sp.Sphere(sphere.radius, frame=sphere.frame, offset=(x, y, z)),
+            shell=shell,
+            frame=section.frame,
+            placement=to_se3(section.placement),
+            law=_build_law(contact.law),
+            friction=_build_friction(contact.friction),
+            method=contact.method,
+            name=contact.name,
+        )
+
+
+def _build_law(law: schema.Law) -> Any:
+    values = law.model_dump(exclude={"type"})
+    match law:
+        case schema.Impact():
+            return sp.ImpactLaw(**values)
+        case schema.Adams():
+            return sp.ImpactLaw.from_adams(**values)
+        case schema.Hertz():
+            return sp.ImpactLaw.hertz(**values)
+        case _:
+            return sp.HuntCrossleyLaw(**values)
+
+
+def _build_friction(friction: schema.Friction) -> Any:
+    if isinstance(friction, schema.NoFriction):
+        return None
+    return sp.CoulombFriction(**friction.model_dump(exclude={"type"}))
+
+
+def _build_controller(
+    section: schema.Controller,
+    scene: sp.Scene,
+    q0: Array,
+    shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
+    path: Path,
+) -> Any:
+    with blamed_on(path, "controller"):
+        match section:
+            case schema.GravityCompensationSection():
+                return sp.GravityCompensation()
+            case schema.PythonSection():
+                return load_function(section.function, path, "controller.function")
+            case schema.JointPDSection():
+                return sp.JointPD(
+                    _gain(scene.model, section.kp, path, "controller.kp"),
+                    _gain(scene.model, section.kd, path, "controller.kd"),
+                    _reference(scene.model, section.q_ref, q0, path),
+                    gravity_compensation=section.gravity_compensation,
+                )
+            case schema.CartesianImpedanceSection():
+                return _build_impedance(section, scene, q0, shells, path)
+            case _:
+                return None
+
+
+def _build_impedance(
+    section: schema.CartesianImpedanceSection,
+    scene: sp.Scene,
+    q0: Array,
+    shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
+    path: Path,
+) -> Any:
+    options: dict[str, Any] = {}
+    if section.shell is not None:
+        with blamed_on(path, "controller.shell"):
+            if section.shell not in shells:
+                raise NameNotFound("shell", section.shell, "the scenario", shells)
+        shell, stands = shells[section.shell]
+        options = {
+            "shell": shell,
+            "shell_frame": stands.frame,
+            "placement": to_se3(stands.placement),
+        }
+    return sp.CartesianImpedance(
+        section.frame,
+        np.array(section.path),
+        section.stiffness,
+        section.damping,
+        section.normal_force,
+        speed=section.speed,
+        lead_in=section.lead_in,
+        rotational_stiffness=section.rotational_stiffness,
+        rotational_damping=section.rotational_damping,
+        posture_stiffness=_gain(
+            scene.model, section.posture_stiffness, path, "controller.posture_stiffness"
+        ),
+        joint_damping=_gain(scene.model, section.joint_damping, path, "controller.joint_damping"),
+        q_ref=_reference(scene.model, section.q_ref, q0, path),
+        **options,
+    )
+
+
+def _gain(model: Any, gain: schema.Gain, path: Path, key: str) -> Array:
+    """Return a gain per velocity coordinate (nv,); free-flying bodies have no motor."""
+    if isinstance(gain, dict):
+        with blamed_on(path, key):
+            return by_joint(model, gain, "v", 0.0)
+    if isinstance(gain, list):
+        if len(gain) != model.nv:
+            raise ScenarioError(path, key, f"takes {model.nv} numbers (nv), not {len(gain)}")
+        return np.array(gain)
+    motors = {name: gain for j, name in enumerate(model.names) if j and model.joints[j].nv < 6}
+    return by_joint(model, motors, "v", 0.0)
+
+
+def _reference(
+    model: Any, given: list[float] | dict[str, float] | None, q0: Array, path: Path
+) -> Array:
+    if given is None:
+        return q0.copy()
+    if isinstance(given, list):
+        if len(given) != model.nq:
+            raise ScenarioError(
+                path, "controller.q_ref", f"takes {model.nq} numbers (nq), not {len(given)}"
+            )
+        return np.array(given)
+    with blamed_on(path, "controller.q_ref"):
+        return by_joint(model, given, "q", q0)

@@ -1,0 +1,237 @@
+"""A scenario file on its way to a Scenario: find it, read it, change values, say what is wrong."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import sys
+import types
+import typing
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from sphshell_pin.errors import NameNotFound, ScenarioError
+from sphshell_pin.scenario.schema import Scenario
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    tomllib = None
+
+
+def shipped_scenarios() -> dict[str, Path]:
+    """Return the files of the shipped scenarios by name."""
+    # The folder stands at the top of the repository and is installed inside the package.
+    folder = Path(str(importlib.import_module("sphshell_pin.scenarios").__file__)).parent
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def find_scenario(name: str | PathLike[str]) -> Path:
+    """Return the file of a shipped scenario's name or of a path.
+
+    Raises
+    ------
+    NameNotFound
+        Neither a file nor a shipped scenario.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    shipped = shipped_scenarios()
+    if str(name) in shipped:
+        return shipped[str(name)]
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        raise ScenarioError(path, "", "no such file")
+    raise NameNotFound("scenario", str(name), "sphshell-pin", shipped)
+
+
+def read_scenario(path: str | PathLike[str], changes: Mapping[str, str] | None = None) -> Scenario:
+    """Read and check the scenario at `path`, with values changed by dotted key.
+
+    `changes` maps keys such as "run.dt" or "contact.tip-blade.law.stiffness" (list items by their
+    name, their label, or their index) to values as TOML writes them; anything else is text.
+
+    Raises
+    ------
+    ScenarioError
+        Unreadable file, wrong TOML, or a key or value that no scenario may have.
+    """
+    data = _read_toml(path)
+    for key, text in (changes or {}).items():
+        _change(data, key, _parse_value(text), path)
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise _explain(error, path) from None
+
+
+def _read_toml(path: str | PathLike[str]) -> dict[str, Any]:
+    if tomllib is None:
+        raise ScenarioError(path, "", "reading TOML needs Python 3.11 or newer")
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScenarioError(path, "", f"cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise ScenarioError(path, "", "is not a text file in UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(path, "", f"is not valid TOML: {error}") from None
+
+
+def _parse_value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _change(data: dict[str, Any], key: str, value: Any, path: str | PathLike[str]) -> None:
+    """Put `value` in place of the one at the dotted `key`; names of list items may hold dots."""
+    rest, node = key, data
+    while True:
+        if isinstance(node, list):
+            heads = {_item_name(item): item for item in node if isinstance(item, dict)}
+            heads |= {str(i): item for i, item in enumerate(node)}
+        else:
+            heads = node
+        head = next((h for h in heads if rest.startswith(f"{h}.")), None)
+        if head is None:
+            break
+        if not isinstance(heads[head], dict | list):
+            raise ScenarioError(path, key, f"'{head}' is a value, it holds no further keys", value)
+        rest, node = rest[len(head) + 1 :], heads[head]
+    if isinstance(node, list):
+        if rest.isdecimal() and int(rest) < len(node):
+            node[int(rest)] = value
+            return
+        names = [_item_name(item) for item in node if isinstance(item, dict)]
+        raise ScenarioError(path, key, f"no item '{rest}'; there are: {_listed(names)}")
+    # A table that the file does not have yet (it stands at its defaults) is made.
+    *tables, last = rest.split(".")
+    for table in tables:
+        node = node.setdefault(table, {})
+        if not isinstance(node, dict):
+            raise ScenarioError(path, key, f"'{table}' holds no further keys", value)
+    node[last] = value
+
+
+def _item_name(item: Mapping[str, Any]) -> str:
+    return str(item.get("label") or item.get("name") or item.get("urdf") or "")
+
+
+def _explain(error: ValidationError, path: str | PathLike[str]) -> ScenarioError:
+    """Turn the first of pydantic's complaints into one sentence with the valid choices."""
+    # An unknown key often hides a missing one ("stifness" for "stiffness"): it is told first.
+    details = sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+    first = details[0]
+    key, section = _locate(first["loc"])
+    reason, value = _reason(first, section)
+    if len(details) > 1:
+        reason += f" (and {len(details) - 1} more: first repair this one)"
+    return ScenarioError(path, key, reason, value)
+
+
+def _reason(detail: ErrorDetails, section: type[BaseModel] | None) -> tuple[str, object]:
+    kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
+    if kind == "extra_forbidden" and section is not None:
+        valid = list(section.model_fields)
+        near = difflib.get_close_matches(str(detail["loc"][-1]), valid, n=1)
+        hint = f"did you mean '{near[0]}'? " if near else ""
+        return f"unknown key; {hint}valid keys: {_listed(valid)}", value
+    if kind == "union_tag_invalid":
+        return f"unknown type '{context['tag']}'; valid types: {context['expected_tags']}", None
+    if kind == "union_tag_not_found":
+        return f"type is missing; valid types: {_listed(_tags(detail['loc']))}", None
+    if kind == "missing":
+        return "is missing", None
+    if kind == "model_type":
+        return "must be a table { key = value, ... }", value
+    message = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    plain = value if isinstance(value, str | int | float | bool) else None
+    return message[:1].lower() + message[1:], plain
+
+
+def _locate(loc: Iterable[int | str]) -> tuple[str, type[BaseModel] | None]:
+    """Return the dotted key of a pydantic location, and the section that holds its last part."""
+    key, section, annotation = "", None, Scenario
+    here: Any = annotation
+    for part in loc:
+        tagged = _by_tag(here)
+        if isinstance(part, str) and part in tagged:
+            here = tagged[part]
+            continue
+        if isinstance(part, int):
+            key += f"[{part}]"
+            here = next(iter(_arguments(here)), None)
+            continue
+        models = [one for one in _members(here) if _is_section(one)]
+        if models:
+            section = models[0]
+            field = section.model_fields.get(part)
+            key += f".{part}" if key else part
+            here = None if field is None else field.rebuild_annotation()
+            continue
+        members = [one for one in _members(here) if one is not type(None)]
+        if len(members) > 1:
+            # Pydantic's own name for a branch of a union is no key of the file.
+            branch = str(part).split("[", maxsplit=1)[0]
+            here = next((m for m in members if m.__name__ == branch), None)
+            continue
+        tables = [one for one in _members(here) if typing.get_origin(one) is dict]
+        if tables:
+            key += f'."{part}"' if "." in part else f".{part}"
+            here = typing.get_args(tables[0])[1]
+            section = None
+    return key, section
+
+
+def _tags(loc: Iterable[int | str]) -> list[str]:
+    """Return the valid types at a location that gave none."""
+    here: Any = Scenario
+    for part in loc:
+        if isinstance(part, int):
+            here = next(iter(_arguments(here)), None)
+        elif _by_tag(here).get(str(part)) is not None:
+            here = _by_tag(here)[str(part)]
+        else:
+            section = next((one for one in _members(here) if _is_section(one)), None)
+            field = None if section is None else section.model_fields.get(str(part))
+            here = None if field is None else field.rebuild_annotation()
+    return list(_by_tag(here))
+
+
+def _by_tag(annotation: Any) -> dict[str, type[BaseModel]]:
+    found: dict[str, type[BaseModel]] = {}
+    for one in _members(annotation):
+        if _is_section(one) and "type" in one.model_fields:
+            for tag in typing.get_args(one.model_fields["type"].annotation):
+                found[str(tag)] = one
+    return found
+
+
+def _is_section(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def _members(annotation: Any) -> list[Any]:
+    """Return what a union may be, whatever it is wrapped in."""
+    origin = typing.get_origin(annotation)
+    if origin is typing.Annotated:
+        return _members(typing.get_args(annotation)[0])
+    if origin in (typing.Union, types.UnionType):
+        return [inner for one in typing.get_args(annotation) for inner in _members(one)]
+    return [annotation]
+
+
+def _arguments(annotation: Any) -> list[Any]:
+    lists = [one for one in _members(annotation) if typing.get_origin(one) is list]
+    return [typing.get_args(one)[0] for one in lists]
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(name for name in names if name) or "none"

@@ -1,0 +1,372 @@
+"""From raw polygons to a surface fit for contact: nothing valid lost, nothing repaired in silence.
+
+The order of the steps matters: welding makes edges meet, dropping what has no area or stands twice
+opens the edges that T-junctions lie on, splitting those makes polygons, and only triangles and
+planar quads can be wound alike. Dropping the slivers a triangulation may leave opens cracks again,
+so these steps run until none changes anything.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sphshell_pin import _core
+from sphshell_pin.errors import InvalidShell
+from sphshell_pin.shell.corner_normals import NormalFindings, settle_normals, unit_normals
+from sphshell_pin.shell.health import Place, ShellHealth
+from sphshell_pin.shell.orientation import Borders, Oriented, find_borders, orient, split_elements
+from sphshell_pin.shell.polygons import Polygons, examine_quads, triangle_shapes, without_area
+from sphshell_pin.shell.raw import Floats, Ints, Mask, RawSurface, raw_surface
+
+WELD_TOLERANCE = 1e-7
+"""Vertices nearer than this share of the box diagonal are one."""
+
+PLANAR_TOLERANCE = 1e-10
+"""A quad whose corners leave their mean plane by at most this share of the diagonal is planar."""
+
+MOST_PASSES = 20
+"""Two passes settle what files hold; elements tangled within the tolerance might go on for ever."""
+
+SMALL_HOLE_EDGES = 4
+SMALL_HOLE_AREA = 0.3
+"""A boundary loop of so few edges that spans less than this share of its component is a hole."""
+
+TINY_HOLE_AREA = 0.02
+"""A boundary loop of any number of edges is a hole if it spans less than this share."""
+
+
+@dataclass(frozen=True)
+class CleanedSurface:
+    """A surface of planar elements with three or four corners.
+
+    Attributes
+    ----------
+    vertices : (n, 3) [m]
+    elements : (m, 4) vertex indices; triangles end in -1
+    triangles : (t, 3) vertex indices; those of one element side by side
+    triangle_element : (t,) element of each triangle, not decreasing
+    normals : (t, 3, 3) unit normal per triangle corner, or None
+    source_element : (m,) index of the input element each came from
+    health : what was found and done
+    """
+
+    vertices: Floats
+    elements: Ints
+    triangles: Ints
+    triangle_element: Ints
+    normals: Floats | None
+    source_element: Ints
+    health: ShellHealth
+
+
+def clean(vertices: object, polygons: object, normals: object = None) -> CleanedSurface:
+    """Clean a surface given as arrays; see `raw_surface` for their shapes and the errors."""
+    return clean_surface(raw_surface(vertices, polygons, normals))
+
+
+def clean_surface(raw: RawSurface) -> CleanedSurface:
+    """Weld, drop, split, triangulate and orient; keep a record of it all.
+
+    Raises
+    ------
+    InvalidShell
+        If no element with an area is left.
+    """
+    found: dict[str, Any] = {
+        "input_vertices": len(raw.vertices),
+        "input_elements": raw.num_polygons,
+        "notes": raw.notes,
+    }
+    table, normal_findings = unit_normals(raw)
+    used, compact = _used_vertices(raw.corners, len(raw.vertices))
+    vertices = np.ascontiguousarray(raw.vertices[used])
+    size = box_diagonal(vertices)
+    if size == 0.0:
+        raise InvalidShell("all vertices of the surface lie in one place: there is no element")
+    tolerance = WELD_TOLERANCE * size
+    representative, distance = _core.mend_weld(vertices, tolerance)
+    found["weld_tolerance"] = tolerance
+    found["welded_vertices"] = int((representative != np.arange(len(vertices))).sum())
+    found["weld_distance"] = float(distance)
+    polygons = Polygons.from_raw(raw).with_corners(representative[compact])
+    polygons, table = _mend(polygons, vertices, table, tolerance, size, found)
+    oriented = orient(polygons, vertices)
+    used, compact = _used_vertices(oriented.polygons.corners, len(vertices))
+    # Those merged into another vertex are counted there.
+    found["unused_vertices"] = len(raw.vertices) - found["welded_vertices"] - len(used)
+    oriented = replace(oriented, polygons=oriented.polygons.with_corners(compact))
+    return _assemble(oriented, vertices[used], table, normal_findings, found)
+
+
+def take_surface(raw: RawSurface) -> CleanedSurface:
+    """Take elements as they come (`clean=False`), without a check of anything but their area.
+
+    Raises
+    ------
+    InvalidShell
+        If an element has more than four corners or no area.
+    """
+    polygons = Polygons.from_raw(raw)
+    if polygons.counts.max() > 4:
+        element = int(np.argmax(polygons.counts))
+        raise InvalidShell(
+            f"element {element} has {int(polygons.counts[element])} corners: with clean=False an "
+            "element has three or four; leave clean=True to have it triangulated"
+        )
+    flat = np.flatnonzero(without_area(polygons, raw.vertices))
+    if flat.size:
+        raise InvalidShell(
+            f"element {int(flat[0])} has no area ({flat.size} such elements): leave clean=True to "
+            "have it dropped"
+        )
+    table, normal_findings = unit_normals(raw)
+    as_given = orient(polygons, raw.vertices, keep_winding=True)
+    found = {
+        "input_vertices": len(raw.vertices),
+        "input_elements": raw.num_polygons,
+        "notes": raw.notes,
+        "cleaned": False,
+    }
+    return _assemble(as_given, raw.vertices, table, normal_findings, found, turn_normals=False)
+
+
+def box_diagonal(points: Floats) -> float:
+    """Diagonal of the box round points (n, 3) [m]."""
+    return float(np.linalg.norm([np.ptp(np.ascontiguousarray(points[:, k])) for k in range(3)]))
+
+
+def _used_vertices(corners: Ints, count: int) -> tuple[Ints, Ints]:
+    """Return the vertices in use, ascending, and the corners renumbered over them."""
+    in_use = np.zeros(count, np.bool_)
+    in_use[corners] = True
+    place = np.cumsum(in_use, dtype=np.int32) - np.int32(1)
+    return np.flatnonzero(in_use).astype(np.int32), place[corners]
+
+
+def _mend(
+    polygons: Polygons,
+    vertices: Floats,
+    table: Floats | None,
+    tolerance: float,
+    size: float,
+    found: dict[str, Any],
+) -> tuple[Polygons, Floats | None]:
+    """Polygons of three or four corners, each with area and none twice, edge to edge."""
+    counts = polygons.counts
+    found["polygons"] = int((counts > 4).sum())
+    found["largest_polygon"] = int(counts.max())
+    for name in ("degenerate_elements", "duplicate_elements", "opposite_duplicates"):
+        found[name] = 0
+    for name in ("t_junctions", "warped_quads", "concave_quads", "tangled_polygons"):
+        found[name] = 0
+    found["largest_warp"] = 0.0
+    given = np.ones(len(polygons), np.bool_)  # input elements of which something is left
+    for _ in range(MOST_PASSES):
+        before = len(polygons)
+        polygons = _drop_flat(polygons, vertices, given, found)
+        polygons = _drop_duplicates(polygons, given, found)
+        polygons, table, inserted = _split_t_junctions(polygons, vertices, table, tolerance)
+        found["t_junctions"] += inserted
+        polygons = _triangulate(polygons, vertices, tolerance, size, found)
+        if len(polygons) == before and inserted == 0:
+            return polygons, table
+    return _drop_flat(polygons, vertices, given, found), table
+
+
+def _drop_flat(
+    polygons: Polygons, vertices: Floats, given: Mask, found: dict[str, Any]
+) -> Polygons:
+    """Without repeated corners and without elements that have no area."""
+    while True:
+        repeated = polygons.corners == polygons.corners[polygons.next_slot]
+        if not repeated.any():
+            # A corner whose two neighbours are one vertex is the tip of a spike.
+            repeated = (
+                polygons.corners[polygons.previous_slot] == polygons.corners[polygons.next_slot]
+            )
+            if not repeated.any():
+                break
+        polygons = polygons.drop_slots(repeated)
+        polygons = polygons.keep(polygons.counts >= 3)
+        if len(polygons) == 0:
+            break
+    if len(polygons):
+        polygons = polygons.keep(~without_area(polygons, vertices))
+    if len(polygons) == 0:
+        raise InvalidShell(
+            f"no element is left: none of the {len(given)} given has an area (their corners lie on "
+            "one line or in one place); check the vertex indices"
+        )
+    # An input element counts once, and only if nothing at all is left of it.
+    left = np.zeros(len(given), np.bool_)
+    left[polygons.source] = True
+    found["degenerate_elements"] += int((given & ~left).sum())
+    given[:] = left
+    return polygons
+
+
+def _drop_duplicates(polygons: Polygons, given: Mask, found: dict[str, Any]) -> Polygons:
+    first, opposite = _core.mend_duplicates(polygons.offsets, polygons.corners)
+    single = first == np.arange(len(polygons))
+    found["duplicate_elements"] += int((~single).sum())
+    found["opposite_duplicates"] += int(opposite.sum())
+    polygons = polygons.keep(single)
+    given[:] = False
+    given[polygons.source] = True
+    return polygons
+
+
+def _split_t_junctions(
+    polygons: Polygons, vertices: Floats, table: Floats | None, tolerance: float
+) -> tuple[Polygons, Floats | None, int]:
+    """With the vertices that lie on open edges made corners there; and how many."""
+    slot_edge, ends, users = _core.mend_edges(polygons.offsets, polygons.corners, len(vertices))
+    open_edge = users == 1
+    if not open_edge.any():
+        return polygons, table, 0
+    slots = np.flatnonzero(open_edge[slot_edge])
+    # Both sides of a crack are open: only ends of open edges can be T-junctions.
+    candidates = np.unique(ends[open_edge])
+    at, vertex, parameter = _core.mend_t_junctions(
+        polygons.offsets,
+        polygons.corners,
+        vertices,
+        slots,
+        np.ascontiguousarray(polygons.polygon_of_slot[slots]),
+        candidates,
+        tolerance,
+    )
+    if len(at) == 0:
+        return polygons, table, 0
+    rows = None
+    if table is not None and polygons.normal_row is not None:
+        # What the normal along the straight edge would be.
+        start = table[polygons.normal_row[at]]
+        stop = table[polygons.normal_row[polygons.next_slot[at]]]
+        between = start + parameter[:, None] * (stop - start)
+        length = np.linalg.norm(between, axis=1, keepdims=True)
+        rows = np.arange(len(table), len(table) + len(at))
+        table = np.concatenate([table, between / np.where(length > 0.0, length, 1.0)])
+    return polygons.insert(at, vertex, rows), table, len(at)
+
+
+def _triangulate(
+    polygons: Polygons, vertices: Floats, tolerance: float, size: float, found: dict[str, Any]
+) -> Polygons:
+    """With everything but triangles and planar, convex quads cut into triangles."""
+    cut = polygons.counts > 4
+    quads = np.flatnonzero(polygons.counts == 4)
+    if quads.size:
+        slots = polygons.offsets[quads][:, None] + np.arange(4)
+        judged = examine_quads(vertices[polygons.corners[slots]])
+        warped = judged.warp > PLANAR_TOLERANCE * size
+        found["warped_quads"] += int(warped.sum())
+        found["concave_quads"] += int((~judged.convex & ~warped).sum())
+        cut[quads] = warped | ~judged.convex
+    if not cut.any():
+        return polygons
+    some = polygons.take(np.flatnonzero(cut))
+    found["largest_warp"] = max(found["largest_warp"], _largest_warp(some, vertices, size))
+    slots, polygon, tangled = _core.mend_clip_ears(some.offsets, some.corners, vertices, tolerance)
+    found["tangled_polygons"] += int(tangled.sum())
+    which = np.flatnonzero(cut)
+    starts = polygons.offsets[which] - some.offsets[:-1]
+    slots = slots + starts[polygon][:, None]
+    return polygons.replace_by_triangles(cut, slots, which[polygon].astype(np.int32))
+
+
+def _largest_warp(polygons: Polygons, vertices: Floats, size: float) -> float:
+    """Farthest distance of a corner from the mean plane of its polygon [m]; 0 if all planar."""
+    starts = polygons.offsets[:-1]
+    points = vertices[polygons.corners]
+    middle = np.add.reduceat(points, starts) / polygons.counts[:, None]
+    spokes = points - np.repeat(middle, polygons.counts, axis=0)
+    normal = np.add.reduceat(np.cross(spokes, spokes[polygons.next_slot]), starts)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal /= np.where(length > 0.0, length, 1.0)
+    height = np.einsum("cx,cx->c", spokes, np.repeat(normal, polygons.counts, axis=0))
+    largest = float(np.abs(height).max())
+    return largest if largest > PLANAR_TOLERANCE * size else 0.0
+
+
+def _assemble(
+    oriented: Oriented,
+    vertices: Floats,
+    table: Floats | None,
+    normal_findings: NormalFindings,
+    found: dict[str, Any],
+    turn_normals: bool = True,
+) -> CleanedSurface:
+    polygons = oriented.polygons
+    split = split_elements(polygons, vertices)
+    triangles = np.ascontiguousarray(polygons.corners[split.slots], np.int32)
+    corners = vertices[triangles]
+    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = 0.5 * np.linalg.norm(spans, axis=1)
+    normals = None
+    if table is not None and polygons.normal_row is not None:
+        normals, normal_findings = settle_normals(
+            table, polygons, split, spans, normal_findings, turn_normals
+        )
+    elements = np.full((len(polygons), 4), -1, np.int32)
+    place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
+    elements[polygons.polygon_of_slot, place] = polygons.corners
+    in_use = np.bincount(polygons.corners, minlength=len(vertices)) > 0
+    borders = find_borders(polygons, vertices, oriented.component)
+    number = len(oriented.closed)
+    component_area = np.bincount(oriented.component[split.element], areas, number).astype(
+        np.float64
+    )
+    health = ShellHealth(
+        **found,
+        **normal_findings.counts(),
+        **_holes(borders, component_area),
+        vertices=len(vertices),
+        elements=len(polygons),
+        triangles=len(triangles),
+        quads=int((polygons.counts == 4).sum()),
+        size=box_diagonal(vertices[in_use]),
+        area=float(areas.sum()),
+        volume=oriented.volume,
+        flipped_elements=int(oriented.flipped.sum()),
+        reversed_components=oriented.reversed_components,
+        components=number,
+        closed_components=int(oriented.closed.sum()),
+        cavities=oriented.cavities,
+        one_sided_components=int(oriented.one_sided.sum()),
+        edges=borders.edges,
+        boundary_edges=borders.boundary,
+        boundary_loops=len(borders.loop_edges),
+        non_manifold_edges=borders.non_manifold,
+        non_manifold_at=_place(borders.non_manifold_at),
+        euler_number=int(in_use.sum()) - borders.edges + len(polygons),
+        worst_shape=float(triangle_shapes(*(corners[:, k] for k in range(3))).min()),
+    )
+    return CleanedSurface(
+        vertices, elements, triangles, split.element, normals, polygons.source, health
+    )
+
+
+def _holes(borders: Borders, component_area: Floats) -> dict[str, Any]:
+    """Boundary loops that look like a lost element rather than the rim of a sheet."""
+    share = borders.loop_area / component_area[borders.loop_component]
+    few = borders.loop_edges <= SMALL_HOLE_EDGES
+    small = (few & (share < SMALL_HOLE_AREA)) | (share < TINY_HOLE_AREA)
+    # One or two open edges enclose nothing: they bound a fin between non-manifold edges.
+    holes = np.flatnonzero(small & (borders.loop_edges >= 3))
+    if holes.size == 0:
+        return {}
+    largest = holes[np.argmax(borders.loop_area[holes])]
+    return {
+        "holes": int(holes.size),
+        "hole_edges": int(borders.loop_edges[largest]),
+        "largest_hole_area": float(borders.loop_area[largest]),
+        "hole_at": _place(borders.loop_centre[largest]),
+    }
+
+
+def _place(point: Floats | None) -> Place | None:
+    return None if point is None else (float(point[0]), float(point[1]), float(point[2]))

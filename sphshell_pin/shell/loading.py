@@ -1,0 +1,86 @@
+"""A surface file in metres: its reader, its unit, and the SCALE of .shl files."""
+
+from __future__ import annotations
+
+import math
+import os
+
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.shell.cleaning import box_diagonal
+from sphshell_pin.shell.raw import RawSurface
+from sphshell_pin.shell.readers import READERS, read_shl, reader_for
+from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
+
+Scale = str | float | None
+
+
+def load_surface(
+    path: str | os.PathLike[str], unit: str | None, scale: Scale
+) -> tuple[RawSurface, str, float]:
+    """Read a surface file: the surface in metres, the unit taken, metres per file unit.
+
+    Raises
+    ------
+    InvalidParameter
+        If `unit` is missing where the format has none, or unit, scale or suffix is unknown.
+    ShellFileError
+        If the file is missing, empty, truncated or damaged.
+    """
+    if unit is not None:
+        metres_per_unit(unit)  # an unknown unit is said before a long file is read
+    number = _check_scale(scale)
+    file, suffix = reader_for(path)
+    if suffix == ".shl":
+        return _load_shl(file, unit, scale, number)
+    if isinstance(scale, str):
+        raise InvalidParameter("scale", scale, f"must be a number for {suffix} files (no SCALE)")
+    raw = READERS[suffix](file)
+    if unit is None:
+        size = box_diagonal(raw.vertices[raw.corners.ravel()])
+        raise InvalidParameter(
+            "unit",
+            None,
+            f"must be stated, as {suffix} files carry none: one of {', '.join(METRES_PER_UNIT)}; "
+            f"{file.name} measures {size:.4g} units: say unit='mm' if that is {size * 1e-3:.4g} m, "
+            f"unit='m' if it is {size:.4g} m",
+        )
+    factor = metres_per_unit(unit) * number
+    notes = [] if number == 1.0 else [f"scaled by {number:.6g} as asked"]
+    return raw.scaled(factor).noting(*notes), unit, factor
+
+
+def _load_shl(
+    file: os.PathLike[str], unit: str | None, scale: Scale, number: float
+) -> tuple[RawSurface, str, float]:
+    found = read_shl(file)  # type: ignore[arg-type]
+    written = found.scale
+    if scale is None:
+        scale = "apply" if unit is None else "ignore"
+    length = metres_per_unit(unit) if unit is not None else 1.0
+    said = f"unit '{unit}'" if unit is not None else "metres"
+    if scale == "apply":
+        factor = length * written
+        note = f"SCALE {written:.9g} of the file applied to its numbers, as {said} per file unit"
+        if unit is not None:
+            note = f"SCALE {written:.9g} of the file applied to its numbers, then taken in {said}"
+    elif scale == "ignore":
+        factor = length
+        note = f"SCALE {written:.9g} of the file ignored, its numbers taken in {said}"
+    else:
+        factor = length * number
+        note = f"scale {number:.9g} used in place of SCALE {written:.9g}, result taken in {said}"
+    version = f".shl version {found.version}"
+    return found.raw.scaled(factor).noting(version, note), unit or "m", factor
+
+
+def _check_scale(scale: Scale) -> float:
+    """Return the number a `scale` stands for, 1 for its words."""
+    if scale is None or scale in ("apply", "ignore"):
+        return 1.0
+    try:
+        number = math.nan if isinstance(scale, (str, bool)) else float(scale)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not (math.isfinite(number) and number > 0.0):
+        raise InvalidParameter("scale", scale, 'must be "apply", "ignore" or a positive number')
+    return number

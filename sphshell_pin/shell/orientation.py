@@ -1,0 +1,224 @@
+"""Which way elements are wound: consistent in a component, outward where it is closed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sphshell_pin import _core
+from sphshell_pin.shell.polygons import Polygons, examine_quads
+from sphshell_pin.shell.raw import Bytes, Floats, Ints, Longs, Mask
+
+
+@dataclass(frozen=True)
+class Split:
+    """Elements as triangles, those of one element side by side.
+
+    Attributes
+    ----------
+    slots : (t, 3) corner slots of the polygons
+    element : (t,) polygon of each triangle
+    """
+
+    slots: Longs
+    element: Ints
+
+
+def split_elements(polygons: Polygons, vertices: Floats) -> Split:
+    """Triangles of polygons with three or four corners."""
+    counts = polygons.counts
+    starts = np.cumsum(counts - 2) - (counts - 2)
+    slots = np.empty((int((counts - 2).sum()), 3), np.int64)
+    three = counts == 3
+    slots[starts[three]] = polygons.offsets[:-1][three, None] + np.arange(3)
+    quads = np.flatnonzero(~three)
+    if quads.size:
+        first = polygons.offsets[quads]
+        corners = vertices[polygons.corners[first[:, None] + np.arange(4)]]
+        other = examine_quads(corners).other_diagonal[:, None]
+        one = np.where(other, [0, 1, 3], [0, 1, 2])
+        two = np.where(other, [1, 2, 3], [0, 2, 3])
+        slots[starts[quads]] = first[:, None] + one
+        slots[starts[quads] + 1] = first[:, None] + two
+    element = np.repeat(np.arange(len(polygons), dtype=np.int32), counts - 2)
+    return Split(slots, element)
+
+
+@dataclass(frozen=True)
+class Oriented:
+    """The outcome of `orient`.
+
+    Attributes
+    ----------
+    polygons : wound consistently
+    component : (m,) of each polygon, connected across edges of exactly two polygons
+    closed : (components,) each edge is run through as often one way as the other
+    one_sided : (components,) no consistent winding exists (a Moebius strip)
+    flipped : (m,) wound the other way than in the input
+    reversed_components : components turned as a whole
+    cavities : closed components inside another one, wound inward (away from the material)
+    volume : enclosed by the closed components [m^3]
+    """
+
+    polygons: Polygons
+    component: Ints
+    closed: Mask
+    one_sided: Mask
+    flipped: Mask
+    reversed_components: int
+    cavities: int
+    volume: float
+
+
+def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> Oriented:
+    """Wind polygons of three and four corners alike within each component.
+
+    A closed component is wound outward; inside another closed one it is a cavity, wound towards
+    its inside, and so on by turns. An open one keeps the winding most of its area has. With
+    `keep_winding` nothing is turned, and a component counts as closed only if it need not be.
+    """
+    component, flip, one_sided = _core.mend_flood_fill(
+        polygons.offsets, polygons.corners, len(vertices)
+    )
+    flip = flip.astype(np.bool_)
+    number = len(one_sided)
+    split = split_elements(polygons, vertices)
+    corners = vertices[polygons.corners[split.slots]]
+    vector_area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.sqrt(np.einsum("tx,tx->t", vector_area, vector_area))
+    owner = component[split.element]
+    turn = flip[split.element]
+
+    closed = _closed_components(polygons, vertices, component, flip, number)
+    closed &= one_sided == 0
+    if keep_winding:
+        odd_ones = np.bincount(component, flip, number)
+        closed &= (odd_ones == 0) | (odd_ones == np.bincount(component, minlength=number))
+    # The volume about a point near the surface loses the least to rounding.
+    centre = vertices.mean(axis=0)
+    share = np.einsum("tx,tx->t", corners[:, 0] - centre, vector_area) / 3.0
+    volume = np.bincount(owner, np.where(turn, -share, share), number)
+    depth = _nesting(polygons, vertices, split, area, component, closed)
+    inward = depth % 2 == 1
+    turned_area = np.bincount(owner, np.where(turn, area, -area), number)
+    total_area = np.bincount(owner, area, number)
+    reverse = np.where(
+        closed, (volume < 0.0) != inward, turned_area > 1e-9 * np.maximum(total_area, 1e-300)
+    )
+    flip ^= reverse[component]
+    if keep_winding:
+        flip[:] = False
+    whole = np.bincount(component, flip, number) == np.bincount(component, minlength=number)
+    sign = np.where(inward, -1.0, 1.0)
+    return Oriented(
+        polygons=polygons.reverse(flip),
+        component=component,
+        closed=closed,
+        one_sided=one_sided.astype(np.bool_),
+        flipped=flip,
+        reversed_components=int(whole.sum()),
+        cavities=0 if keep_winding else int((closed & inward).sum()),
+        volume=float((np.abs(volume) * sign)[closed].sum()),
+    )
+
+
+def _closed_components(
+    polygons: Polygons, vertices: Floats, component: Ints, flip: Mask, number: int
+) -> Mask:
+    """(components,) True where the directed edges of a component cancel."""
+    slot_edge, _, users = _core.mend_edges(polygons.offsets, polygons.corners, len(vertices))
+    closed = np.ones(number, np.bool_)
+    slot_users = users[slot_edge]
+    # Edges of two polygons cancel by construction; only the others need to be added up.
+    odd = np.flatnonzero(slot_users != 2)
+    owner = component[polygons.polygon_of_slot[odd]]
+    following = polygons.corners[polygons.next_slot[odd]]
+    sign = np.where(polygons.corners[odd] < following, 1, -1)
+    sign = np.where(flip[polygons.polygon_of_slot[odd]], -sign, sign)
+    key = slot_edge[odd].astype(np.int64) * number + owner
+    place, group = np.unique(key, return_inverse=True)
+    left = np.bincount(group, sign, len(place)) != 0
+    closed[(place[left] % number).astype(np.int64)] = False
+    return closed
+
+
+def _nesting(
+    polygons: Polygons,
+    vertices: Floats,
+    split: Split,
+    area: Floats,
+    component: Ints,
+    closed: Mask,
+) -> Ints:
+    """(components,) how many other closed components enclose each closed one."""
+    owner = component[split.element]
+    if int(closed.sum()) < 2:
+        return np.zeros(len(closed), np.int32)
+    # The middle of the largest triangle: the place least likely to lie on another component.
+    order = np.lexsort((area, owner))
+    last = np.flatnonzero(np.diff(owner[order], append=len(closed)))
+    queries = vertices[polygons.corners[split.slots[order[last]]]].mean(axis=1)
+    triangles = np.ascontiguousarray(polygons.corners[split.slots], np.int32)
+    depth: Ints = _core.mend_nesting(
+        vertices, triangles, np.ascontiguousarray(owner), queries, closed.astype(np.uint8)
+    )
+    return depth
+
+
+@dataclass(frozen=True)
+class Borders:
+    """Open edges of oriented polygons, and the loops they form.
+
+    Attributes
+    ----------
+    edges : number of edges
+    boundary : edges of one element
+    non_manifold : edges of three or more
+    loop_edges : (loops,) edges of each boundary loop
+    loop_area : (loops,) size of the area vector each loop spans [m^2]
+    loop_centre : (loops, 3) mean corner [m]
+    loop_component : (loops,) component of one of its elements
+    non_manifold_at : (3,) middle of the first non-manifold edge [m], or None
+    """
+
+    edges: int
+    boundary: int
+    non_manifold: int
+    loop_edges: Longs
+    loop_area: Floats
+    loop_centre: Floats
+    loop_component: Ints
+    non_manifold_at: Floats | None
+
+
+def find_borders(polygons: Polygons, vertices: Floats, component: Ints) -> Borders:
+    """Count the edges of oriented polygons and follow the open ones."""
+    slot_edge, ends, users = _core.mend_edges(polygons.offsets, polygons.corners, len(vertices))
+    single: Bytes = users == 1
+    slots = np.flatnonzero(single[slot_edge])
+    start = polygons.corners[slots]
+    stop = polygons.corners[polygons.next_slot[slots]]
+    used, compact = np.unique(np.concatenate([start, stop]), return_inverse=True)
+    pairs = compact.reshape(2, -1).T.astype(np.int32)
+    loop = _core.mend_components(len(used), np.ascontiguousarray(pairs))
+    loops = int(loop.max()) + 1 if loop.size else 0
+    sums = np.stack([np.bincount(loop, vertices[used, k], loops) for k in range(3)], axis=1)
+    centre = sums / np.maximum(np.bincount(loop, minlength=loops), 1)[:, None]
+    edge_loop = loop[pairs[:, 0]]
+    middle = centre[edge_loop]
+    spanned = 0.5 * np.cross(vertices[start] - middle, vertices[stop] - middle)
+    area = np.stack([np.bincount(edge_loop, spanned[:, k], loops) for k in range(3)], axis=1)
+    owner = np.zeros(loops, np.int32)
+    owner[edge_loop] = component[polygons.polygon_of_slot[slots]]
+    many = np.flatnonzero(users > 2)
+    return Borders(
+        edges=len(users),
+        boundary=len(slots),
+        non_manifold=len(many),
+        loop_edges=np.bincount(edge_loop, minlength=loops),
+        loop_area=np.sqrt((area**2).sum(axis=1)),
+        loop_centre=centre,
+        loop_component=owner,
+        non_manifold_at=vertices[ends[many[0]]].mean(axis=0) if many.size else None,
+    )

@@ -1,0 +1,223 @@
+"""Surfaces of Coal's geometries: meshes as they are, solids tessellated with exact normals.
+
+The shell is in the geometry's own frame: the placement of a pinocchio.GeometryObject is not
+applied, as it is where the shell is mounted. Nor is its `meshScale`: Pinocchio applies it when it
+loads a mesh, and it tells viewers about the file, not about the geometry.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import coal
+import numpy as np
+import numpy.typing as npt
+
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.shell.raw import Floats, RawSurface, raw_surface
+from sphshell_pin.shell.revolution import Revolution, arc
+
+DEFAULT_CHORD_ERROR = 1e-3
+"""Largest distance between tessellation and solid, as a share of the solid's round diameter."""
+
+DEFAULT_EXTENT = 10.0
+"""Side of the square that stands for a half-space or a plane [m]."""
+
+FEWEST_SEGMENTS = 16
+
+
+def geometry_surface(
+    geometry: Any,
+    chord_error: float | None = None,
+    segments: int | None = None,
+    extent: float | None = None,
+) -> RawSurface:
+    """Polygons of a coal geometry or a pinocchio.GeometryObject, in its own frame.
+
+    Parameters
+    ----------
+    geometry : a mesh (BVHModel), Convex, Box, Sphere, Cylinder, Capsule, Cone, Ellipsoid,
+        Halfspace, Plane or TriangleP; or a pinocchio.GeometryObject that holds one
+    chord_error : largest distance between the elements and a round solid [m]; 1e-3 of its diameter
+        unless given
+    segments : elements round a full circle, instead of `chord_error`
+    extent : side [m] of the square that stands for a half-space or a plane; 10 m unless given
+
+    Raises
+    ------
+    InvalidParameter
+        If the geometry is of another kind, or an option is out of range.
+    """
+    shape = getattr(geometry, "geometry", geometry)
+    if segments is not None and (int(segments) != segments or segments < 3):
+        raise InvalidParameter("segments", segments, "must be a whole number of at least 3")
+    for name, value in (("chord_error", chord_error), ("extent", extent)):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise InvalidParameter(name, value, "must be positive [m]")
+    if isinstance(shape, coal.BVHModelBase):
+        return _mesh(shape)
+    if isinstance(shape, coal.ShapeBase) and shape.getSweptSphereRadius() > 0.0:
+        raise InvalidParameter(
+            "geometry",
+            shape,
+            "must have no swept-sphere radius (it rounds the shape; give the sphere that radius)",
+        )
+    if isinstance(shape, coal.Convex):
+        triangles = [shape.polygons(k) for k in range(shape.num_polygons)]
+        return raw_surface(np.array(shape.points()), [[t[0], t[1], t[2]] for t in triangles])
+    if isinstance(shape, (coal.Halfspace, coal.Plane)):
+        return _square(shape, DEFAULT_EXTENT if extent is None else extent)
+    for kind, build in _BUILDERS.items():
+        if isinstance(shape, kind):
+            return raw_surface(*build(shape, chord_error, segments))
+    known = ["mesh (BVHModel)", "Convex", "Halfspace", "Plane", *(k.__name__ for k in _BUILDERS)]
+    raise InvalidParameter("geometry", type(shape).__name__, f"must be one of: {', '.join(known)}")
+
+
+Arrays = tuple[Floats, list[list[int]], Floats]
+
+
+def _mesh(mesh: Any) -> RawSurface:
+    if mesh.getModelType() != coal.BVH_MODEL_TRIANGLES or mesh.num_tris == 0:
+        raise InvalidParameter("geometry", mesh, "must be a mesh of triangles, not a point cloud")
+    triangles = [mesh.tri_indices(k) for k in range(mesh.num_tris)]
+    indices: npt.NDArray[np.int64] = np.array([(t[0], t[1], t[2]) for t in triangles], np.int64)
+    return raw_surface(np.array(mesh.vertices()), indices)
+
+
+def _round(
+    radius: float, error_of: Callable[[int], float], chord_error: float | None, segments: int | None
+) -> int:
+    """Fewest segments, a multiple of four, that keep `error_of` within the chord error."""
+    if segments is not None:
+        return int(segments)
+    wanted = chord_error if chord_error is not None else DEFAULT_CHORD_ERROR * 2.0 * radius
+    # 1 - cos(pi/n) falls as n^-2: a start close below, then upwards in fours.
+    count = max(4.0, math.pi * math.sqrt(error_of(1) / (4.0 * wanted)))
+    n = max(FEWEST_SEGMENTS, 4 * math.floor(count / 4.0))
+    while error_of(n) > wanted:
+        n += 4
+    return n
+
+
+def _sagitta(radius: float) -> Callable[[int], float]:
+    # 1 - cos(x) = 2 sin(x/2)^2 keeps its digits for small x.
+    return lambda n: radius * 2.0 * math.sin(math.pi / (2.0 * n)) ** 2
+
+
+def _ball(radius: float) -> Callable[[int], float]:
+    # The middle of an element is off by the sagitta along the meridian and that across it.
+    return lambda n: 2.0 * _sagitta(radius)(n)
+
+
+def _box(shape: Any, _: float | None, __: int | None) -> Arrays:
+    half = np.array(shape.halfSide, np.float64)
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    elements = [
+        [0, 1, 3, 2],
+        [4, 6, 7, 5],
+        [0, 4, 5, 1],
+        [2, 3, 7, 6],
+        [0, 2, 6, 4],
+        [1, 5, 7, 3],
+    ]
+    faces = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], float)
+    return signs * half, elements, np.repeat(faces[:, None, :], 4, axis=1)
+
+
+def _unit_sphere(segments: int) -> Arrays:
+    body = Revolution(segments)
+    profile = arc(-0.5 * math.pi, 0.5 * math.pi, max(2, math.ceil(segments / 2)))
+    rings = [body.ring(c, s) for c, s in profile]
+    for k in range(len(profile) - 1):
+        body.strip(rings[k], rings[k + 1], profile[k], profile[k + 1])
+    return body.arrays()
+
+
+def _sphere(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
+    r = float(shape.radius)
+    points, elements, normals = _unit_sphere(_round(r, _ball(r), chord_error, segments))
+    return r * points, elements, normals
+
+
+def _ellipsoid(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
+    radii = np.array(shape.radii, np.float64)
+    longest = float(radii.max())
+    n = _round(longest, _ball(longest), chord_error, segments)
+    points, elements, normals = _unit_sphere(n)
+    # Normals go with the inverse transpose of the stretching; unused fourth corners stay zero.
+    stretched = normals / radii
+    length = np.linalg.norm(stretched, axis=2, keepdims=True)
+    return radii * points, elements, stretched / np.where(length > 0.0, length, 1.0)
+
+
+def _cylinder(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
+    r, h = float(shape.radius), float(shape.halfLength)
+    body = Revolution(_round(r, _sagitta(r), chord_error, segments))
+    bottom, top = body.ring(r, -h), body.ring(r, h)
+    body.strip(bottom, top, (1.0, 0.0), (1.0, 0.0))
+    body.disc(bottom, up=False)
+    body.disc(top, up=True)
+    return body.arrays()
+
+
+def _cone(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
+    r, h = float(shape.radius), float(shape.halfLength)
+    body = Revolution(_round(r, _sagitta(r), chord_error, segments))
+    bottom, tip = body.ring(r, -h), body.ring(0.0, h)
+    slant = math.hypot(r, 2.0 * h)
+    normal = (2.0 * h / slant, r / slant)
+    body.strip(bottom, tip, normal, normal)
+    body.disc(bottom, up=False)
+    return body.arrays()
+
+
+def _capsule(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
+    r, h = float(shape.radius), float(shape.halfLength)
+    body = Revolution(_round(r, _ball(r), chord_error, segments))
+    steps = max(1, math.ceil(body.segments / 4))
+    south = arc(-0.5 * math.pi, 0.0, steps)
+    north = arc(0.0, 0.5 * math.pi, steps)
+    profile = [(c, s, -h) for c, s in south] + [(c, s, h) for c, s in north]
+    if h == 0.0:
+        profile = profile[: len(south)] + profile[len(south) + 1 :]
+    rings = [body.ring(r * c, r * s + middle) for c, s, middle in profile]
+    for k in range(len(profile) - 1):
+        body.strip(rings[k], rings[k + 1], profile[k][:2], profile[k + 1][:2])
+    return body.arrays()
+
+
+def _triangle(shape: Any, _: float | None, __: int | None) -> Arrays:
+    points = np.array([shape.a, shape.b, shape.c], np.float64)
+    normal = np.cross(points[1] - points[0], points[2] - points[0])
+    length = float(np.linalg.norm(normal))
+    normals = np.broadcast_to(normal / (length if length > 0.0 else 1.0), (1, 3, 3)).copy()
+    return points, [[0, 1, 2]], normals
+
+
+def _square(shape: Any, extent: float) -> RawSurface:
+    """Return a square round the point nearest to the origin, wound along the shape's normal."""
+    normal = np.array(shape.n, np.float64)
+    least = np.zeros(3)
+    least[int(np.argmin(np.abs(normal)))] = 1.0
+    across = np.cross(normal, least)
+    across /= np.linalg.norm(across)
+    other = np.cross(normal, across)
+    half = 0.5 * extent
+    corners = np.array([[-half, -half], [half, -half], [half, half], [-half, half]])
+    points = float(shape.d) * normal + corners @ np.array([across, other])
+    raw = raw_surface(points, [[0, 1, 2, 3]], np.broadcast_to(normal, (4, 3)))
+    return raw.noting(f"a square of {extent:.6g} m stands for the endless {type(shape).__name__}")
+
+
+_BUILDERS: dict[type, Callable[[Any, float | None, int | None], Arrays]] = {
+    coal.Box: _box,
+    coal.Sphere: _sphere,
+    coal.Cylinder: _cylinder,
+    coal.Capsule: _capsule,
+    coal.Cone: _cone,
+    coal.Ellipsoid: _ellipsoid,
+    coal.TriangleP: _triangle,
+}

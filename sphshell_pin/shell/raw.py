@@ -1,0 +1,180 @@
+"""Surfaces as they come in: vertices and polygons of any size, checked but not yet cleaned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from sphshell_pin.errors import InvalidShell
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int32]
+Longs = npt.NDArray[np.int64]
+Bytes = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.bool_]
+
+LARGEST_COUNT = np.iinfo(np.int32).max
+
+
+@dataclass(frozen=True)
+class RawSurface:
+    """Polygons before cleaning.
+
+    Attributes
+    ----------
+    vertices : (n, 3) [m]
+    offsets : (m + 1,) where the corners of each polygon start in `corners`
+    corners : (c,) vertex index of every corner
+    normals : (c, 3) one per corner, or None
+    notes : sentences a reader has to say about the file
+    """
+
+    vertices: Floats
+    offsets: Longs
+    corners: Ints
+    normals: Floats | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def num_polygons(self) -> int:
+        """Number of polygons."""
+        return len(self.offsets) - 1
+
+    def scaled(self, factor: float) -> RawSurface:
+        """Return the same surface, `factor` times larger."""
+        return replace(self, vertices=self.vertices * factor)
+
+    def noting(self, *sentences: str) -> RawSurface:
+        """Return the same surface with more `notes`."""
+        return replace(self, notes=(*self.notes, *sentences))
+
+
+def raw_surface(vertices: object, elements: object, normals: object = None) -> RawSurface:
+    """Check arrays and copy them into a `RawSurface`.
+
+    Parameters
+    ----------
+    vertices : (n, 3) [m], finite
+    elements : (m, k) integers, rows of fewer corners end in -1; or a sequence of m sequences
+    normals : per vertex (n, 3) or per corner (m, k, 3), or None
+
+    Raises
+    ------
+    InvalidShell
+        On a wrong shape, a value that is not finite, an index out of range, an element with fewer
+        than three corners; the message says which.
+    """
+    points = _vertices(vertices)
+    offsets, corners = _polygons(elements)
+    check_indices(offsets, corners, len(points))
+    return RawSurface(points, offsets, corners, _corner_normals(normals, points, offsets, corners))
+
+
+def check_indices(offsets: Longs, corners: Ints, num_vertices: int) -> None:
+    """Raise InvalidShell if a polygon names a vertex that does not exist."""
+    wrong = np.flatnonzero((corners < 0) | (corners >= num_vertices))
+    if wrong.size:
+        slot = int(wrong[0])
+        element = int(np.searchsorted(offsets, slot, side="right")) - 1
+        raise InvalidShell(
+            f"element {element} uses vertex {int(corners[slot])}, but the {num_vertices} vertices "
+            f"are numbered 0 to {num_vertices - 1}: correct the index"
+        )
+
+
+def _vertices(vertices: object) -> Floats:
+    try:
+        points = np.array(vertices, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidShell(f"vertices must be an (n, 3) array of numbers [m]: {error}") from error
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InvalidShell(
+            f"vertices must be an (n, 3) array [m]; the one given has shape {points.shape}"
+        )
+    if not 3 <= len(points) <= LARGEST_COUNT:
+        raise InvalidShell(f"a surface needs at least 3 vertices; {len(points)} given")
+    wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if wrong.size:
+        raise InvalidShell(
+            f"vertex {int(wrong[0])} is not finite: {points[wrong[0]].tolist()}"
+            + (f" ({wrong.size} such vertices)" if wrong.size > 1 else "")
+        )
+    return points
+
+
+def _polygons(elements: object) -> tuple[Longs, Ints]:
+    rows = elements if isinstance(elements, np.ndarray) else _as_table(elements)
+    if not isinstance(rows, np.ndarray):
+        return _ragged(rows)
+    if rows.ndim != 2 or rows.shape[1] < 3:
+        raise InvalidShell(
+            f"elements must be an (m, 3) or (m, 4) array of vertex indices, or a list of lists; "
+            f"the one given has shape {rows.shape}"
+        )
+    if len(rows) == 0:
+        raise InvalidShell("a surface needs at least one element; none given")
+    if not np.issubdtype(rows.dtype, np.integer):
+        raise InvalidShell(f"elements must hold integer vertex indices; they are {rows.dtype}")
+    if rows.min() < -1 or rows.max() > LARGEST_COUNT:
+        element, place = np.argwhere((rows < -1) | (rows > LARGEST_COUNT))[0]
+        raise InvalidShell(f"element {element} uses vertex {rows[element, place]}: no such vertex")
+    used = rows >= 0
+    counts = used.sum(axis=1)
+    ragged = np.flatnonzero((counts < 3) | (used[:, 1:] & ~used[:, :-1]).any(axis=1))
+    if ragged.size:
+        raise InvalidShell(
+            f"element {int(ragged[0])} is {rows[ragged[0]].tolist()}: it needs at least three "
+            "corners, and -1 may stand only at the end of its row"
+        )
+    offsets = np.zeros(len(rows) + 1, np.int64)
+    np.cumsum(counts, out=offsets[1:])
+    return offsets, rows[used].astype(np.int32)
+
+
+def _as_table(elements: object) -> npt.NDArray[np.int64] | Sequence[Sequence[int]]:
+    if not isinstance(elements, Sequence):
+        raise InvalidShell(f"elements must be an array or a list of lists, not {type(elements)}")
+    lengths = {len(row) for row in elements if hasattr(row, "__len__")}
+    if len(lengths) == 1:
+        return np.array(elements)
+    return elements
+
+
+def _ragged(rows: Sequence[Sequence[int]]) -> tuple[Longs, Ints]:
+    if len(rows) == 0:
+        raise InvalidShell("a surface needs at least one element; none given")
+    kept: list[list[int]] = []
+    for k, row in enumerate(rows):
+        corners = [c for c in row if c != -1] if hasattr(row, "__iter__") else []
+        if len(corners) < 3 or not all(isinstance(c, (int, np.integer)) for c in corners):
+            raise InvalidShell(f"element {k} is {row!r}: it needs at least three vertex indices")
+        kept.append(corners)
+    offsets = np.zeros(len(kept) + 1, np.int64)
+    np.cumsum([len(row) for row in kept], out=offsets[1:])
+    flat = np.concatenate([np.asarray(row, np.int64) for row in kept])
+    return offsets, np.clip(flat, -LARGEST_COUNT, LARGEST_COUNT).astype(np.int32)
+
+
+def _corner_normals(
+    normals: object, points: Floats, offsets: Longs, corners: Ints
+) -> Floats | None:
+    if normals is None:
+        return None
+    try:
+        given = np.array(normals, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidShell(f"normals must be an array of numbers: {error}") from error
+    if given.shape == points.shape:
+        return np.asarray(given[corners], np.float64)
+    counts = np.diff(offsets)
+    fits = given.ndim == 3 and given.shape[2] == 3 and len(given) == len(counts)
+    if fits and given.shape[1] >= counts.max():
+        used = np.arange(given.shape[1]) < counts[:, None]
+        return np.asarray(given[used], np.float64)
+    raise InvalidShell(
+        f"normals must be one per vertex {points.shape} or one per corner of each element "
+        f"({len(counts)}, {int(counts.max())}, 3); the array given has shape {given.shape}"
+    )

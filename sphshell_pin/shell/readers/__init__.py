@@ -1,0 +1,53 @@
+"""Surface files: which reader takes which suffix."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from sphshell_pin.errors import InvalidParameter, ShellFileError
+from sphshell_pin.shell.raw import RawSurface
+from sphshell_pin.shell.readers.mesh import read_obj, read_off, read_ply, read_stl
+from sphshell_pin.shell.readers.shl import read_shl
+
+__all__ = ["READERS", "read_obj", "read_off", "read_ply", "read_shl", "read_stl", "reader_for"]
+
+READERS: dict[str, Callable[[Path], RawSurface]] = {
+    ".stl": read_stl,
+    ".obj": read_obj,
+    ".ply": read_ply,
+    ".off": read_off,
+}
+"""Readers of formats that carry no unit; .shl carries one and has a reader of its own."""
+
+SUFFIXES = (*READERS, ".shl")
+
+
+def reader_for(path: str | os.PathLike[str]) -> tuple[Path, str]:
+    """Return the path and its suffix in lower case, after a check that such a file can be read.
+
+    Raises
+    ------
+    InvalidParameter
+        Of an unknown suffix; the message lists the known ones.
+    ShellFileError
+        If the file is missing, empty or not a file.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InvalidParameter(
+            "path", str(path), f"must end in one of: {', '.join(SUFFIXES)}, not '{path.suffix}'"
+        )
+    if not path.exists():
+        raise ShellFileError(path, "there is no such file")
+    if not path.is_file():
+        raise ShellFileError(path, "is not a file")
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
+    if size == 0:
+        raise ShellFileError(path, "is empty")
+    return path, suffix

@@ -1,0 +1,272 @@
+"""Mesh files without a unit: stl and ply through trimesh, obj and off by readers of our own.
+
+trimesh triangulates the quads and larger polygons of obj files and drops the normals of their
+corners, and it loses the quads of off files altogether; here elements must stay what they are.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sphshell_pin.errors import MissingExtra, ShellFileError
+from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface
+from sphshell_pin.shell.readers.text import finish, pack_polygons, read_text
+
+
+def read_stl(path: Path) -> RawSurface:
+    """Read a binary or text .stl file: a soup of triangles."""
+    mesh = _load_with_trimesh(path, "stl")
+    triangles = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
+    offsets, corners = pack_polygons(np.full(len(triangles), 3), triangles.ravel())
+    return finish(path, np.asarray(mesh.vertices, np.float64), offsets, corners)
+
+
+def read_ply(path: Path) -> RawSurface:
+    """Read a text or binary .ply file: polygons of any size, and vertex normals if it has them."""
+    mesh = _load_with_trimesh(path, "ply")
+    # trimesh hands out triangles, but keeps what the file said beside them.
+    kept = mesh.metadata.get("_ply_raw", {})
+    faces = kept.get("face", {}).get("data", {})
+    notes: tuple[str, ...] = ()
+    rows = next((faces[name] for name in ("vertex_indices", "vertex_index") if name in faces), None)
+    if rows is None:
+        triangles = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
+        offsets, corners = pack_polygons(np.full(len(triangles), 3), triangles.ravel())
+        notes = ("larger elements of the file were triangulated on reading",)
+    else:
+        offsets, corners = _flatten(rows)
+    vertices = np.asarray(mesh.vertices, np.float64)
+    data = kept.get("vertex", {}).get("data", {})
+    normals = None
+    try:
+        columns = [np.asarray(data[name], np.float64).ravel() for name in ("nx", "ny", "nz")]
+    except (KeyError, IndexError, ValueError):
+        columns = []
+    raw = finish(path, vertices, offsets, corners, None, notes)
+    if columns and len(columns[0]) == len(vertices):
+        normals = np.stack(columns, axis=1)[corners]
+    return RawSurface(raw.vertices, raw.offsets, raw.corners, normals, raw.notes)
+
+
+def _flatten(rows: Any) -> tuple[Longs, Ints]:
+    table = np.asarray(rows)
+    if table.dtype == object:
+        counts = [len(row) for row in rows]
+        flat = np.array([index for row in rows for index in row], np.int64)
+        return pack_polygons(counts, flat)
+    if table.dtype.names:
+        table = table[table.dtype.names[-1]]
+    return pack_polygons(np.full(len(table), table.shape[1]), table.astype(np.int64).ravel())
+
+
+def _load_with_trimesh(path: Path, kind: str) -> Any:
+    try:
+        import trimesh
+    except ImportError as error:
+        raise MissingExtra("trimesh", "all", f"reading {path.name}") from error
+    try:
+        # From memory: a file that cannot be opened is then told from one that cannot be parsed.
+        data = io.BytesIO(path.read_bytes())
+    except OSError as error:
+        raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
+    try:
+        mesh: Any = trimesh.load(data, file_type=kind, process=False, force="mesh")
+        if len(mesh.faces) == 0:
+            raise ValueError("it holds no elements")
+    except Exception as error:  # whatever a damaged file makes the parser raise
+        raise ShellFileError(path, f"is not a readable .{kind} file ({error})") from error
+    return mesh
+
+
+def read_obj(path: Path) -> RawSurface:
+    """Read the vertices, faces and corner normals of a Wavefront .obj file.
+
+    Indices count from 1, or back from the latest if negative; `v`, `v/vt`, `v//vn` and `v/vt/vn`
+    are understood, and lines continued by a backslash.
+    """
+    points: list[str] = []
+    normals: list[str] = []
+    counts: list[int] = []
+    corners: list[int] = []
+    corner_normals: list[int] = []
+    pending = ""
+    for number, row in enumerate(read_text(path).splitlines(), start=1):
+        if row.endswith("\\"):
+            pending += row[:-1] + " "
+            continue
+        words = (pending + row).split()
+        pending = ""
+        if not words:
+            continue
+        if words[0] == "v":
+            _check_reals(path, number, words)
+            points += words[1:4]
+        elif words[0] == "vn":
+            _check_reals(path, number, words)
+            normals += words[1:4]
+        elif words[0] == "f":
+            at, along = len(points) // 3, len(normals) // 3
+            named = [word for word in words[1:] if not word.startswith("#")]
+            if len(named) < 3:
+                raise ShellFileError(path, f"a face of {len(named)} corners needs three", number)
+            for word in named:
+                parts = word.split("/")
+                corners.append(_obj_index(path, number, parts[0], at, "vertex"))
+                third = parts[2] if len(parts) > 2 else ""
+                corner_normals.append(
+                    _obj_index(path, number, third, along, "normal") if third else -1
+                )
+            counts.append(len(named))
+    vertices = _reals(path, points)
+    offsets, flat = pack_polygons(counts, corners)
+    # Forward references are legal: whether a vertex exists is known only now.
+    raw = finish(path, vertices, offsets, flat)
+    which = np.array(corner_normals, np.int64)
+    if not (which >= 0).any():
+        return raw
+    # A last row of zeros stands for corners without a normal.
+    table = np.concatenate([_reals(path, normals), np.zeros((1, 3))])
+    if which.max() >= len(table) - 1:
+        raise ShellFileError(
+            path, f"a face uses normal {which.max() + 1}, but the file has {len(table) - 1} normals"
+        )
+    return RawSurface(raw.vertices, raw.offsets, raw.corners, table[which])
+
+
+def _obj_index(path: Path, line: int, word: str, latest: int, what: str) -> int:
+    try:
+        index = int(word)
+    except ValueError:
+        raise ShellFileError(path, f"'{word}' is not the index of a {what}", line) from None
+    if index == 0 or index < -latest:
+        raise ShellFileError(
+            path, f"a face uses {what} {index}; {latest} came before, counted from 1", line
+        )
+    return index - 1 if index > 0 else latest + index
+
+
+def _check_reals(path: Path, line: int, words: list[str]) -> None:
+    try:
+        if len(words) < 4:
+            raise ValueError("three numbers are needed")
+        for word in words[1:4]:
+            float(word)
+    except ValueError as error:
+        raise ShellFileError(path, f"'{' '.join(words)}': {error}", line) from None
+
+
+def _reals(path: Path, words: list[str]) -> Floats:
+    try:
+        return np.array(words, np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise ShellFileError(path, f"holds a coordinate that is not a number ({error})") from None
+
+
+def read_off(path: Path) -> RawSurface:
+    """Read an .off file (also COFF, NOFF, STOFF): polygons of any size.
+
+    Line ends do not matter in the format, except that colours may follow the corners of a face up
+    to the end of its line: they are tried where the plain reading does not come out even.
+    """
+    rows = [row.split("#", 1)[0].split() for row in read_text(path).splitlines()]
+    numbers = [k + 1 for k, row in enumerate(rows) if row]
+    rows = [row for row in rows if row]
+    if not rows or not rows[0][0].upper().endswith("OFF"):
+        raise ShellFileError(path, "does not begin with 'OFF'", 1)
+    kind = rows[0][0].upper()
+    if "4" in kind or "n" in rows[0][0].replace("off", ""):
+        raise ShellFileError(path, f"{kind} is not three-dimensional: not readable", numbers[0])
+    if len(rows[0]) > 1 and rows[0][1].upper() == "BINARY":
+        raise ShellFileError(path, "binary .off files cannot be read: save it as text", numbers[0])
+    rows[0] = rows[0][1:]
+    words = [word for row in rows for word in row]
+    try:
+        num_vertices, num_faces = int(words[0]), int(words[1])
+    except (ValueError, IndexError):
+        reason = "must count vertices, faces and edges first"
+        raise ShellFileError(path, reason, numbers[0]) from None
+    head = 2 if len(rows[0]) == 2 or (not rows[0] and len(rows[1]) == 2) else 3
+    width = _off_width(kind, rows, num_vertices)
+    last = head + num_vertices * width
+    if num_vertices < 3 or num_faces < 1 or last > len(words):
+        raise ShellFileError(
+            path,
+            f"ends too early or is no surface: it promises {num_vertices} vertices and "
+            f"{num_faces} faces",
+        )
+    table = _reals(path, words[head:last]) if width == 3 else _wide(path, words[head:last], width)
+    faces = _off_faces(words, last, num_faces) or _off_faces_by_line(rows, last, num_faces)
+    if faces is None:
+        raise ShellFileError(
+            path, f"ends too early or holds a damaged face: {num_faces} faces were promised"
+        )
+    offsets, corners = pack_polygons(*faces)
+    raw = finish(path, np.ascontiguousarray(table[:, :3]), offsets, corners)
+    if "N" not in kind.replace("OFF", ""):
+        return raw
+    return RawSurface(raw.vertices, raw.offsets, raw.corners, table[corners, 3:6])
+
+
+def _off_width(kind: str, rows: list[list[str]], num_vertices: int) -> int:
+    """Numbers per vertex: 3, and more with normals (N), colours (C) or texture (ST)."""
+    prefix = kind.replace("OFF", "")
+    if not prefix:
+        return 3
+    # Colours come with three or four numbers: the first line of the vertices tells.
+    data = [row for row in rows if row]
+    first = data[1] if len(data) > 1 else []
+    return max(len(first), 3) if num_vertices else 3
+
+
+def _wide(path: Path, words: list[str], width: int) -> Floats:
+    try:
+        return np.array(words, np.float64).reshape(-1, width)
+    except ValueError as error:
+        raise ShellFileError(path, f"holds a coordinate that is not a number ({error})") from None
+
+
+def _off_faces(words: list[str], at: int, count: int) -> tuple[list[int], list[int]] | None:
+    """Return counts and corners if the words run out exactly with the last face, else None."""
+    counts: list[int] = []
+    corners: list[int] = []
+    try:
+        for _ in range(count):
+            size = int(words[at])
+            part = words[at + 1 : at + 1 + size]
+            if size < 1 or len(part) < size:
+                return None
+            corners += [int(word) for word in part]
+            counts.append(size)
+            at += 1 + size
+    except (ValueError, IndexError):
+        return None
+    return (counts, corners) if at == len(words) else None
+
+
+def _off_faces_by_line(
+    rows: list[list[str]], skip: int, count: int
+) -> tuple[list[int], list[int]] | None:
+    """One face per line; what follows its corners on the line is its colour."""
+    passed = 0
+    start = 0
+    while start < len(rows) and passed < skip:
+        passed += len(rows[start])
+        start += 1
+    if passed != skip or len(rows) - start < count:
+        return None
+    counts: list[int] = []
+    corners: list[int] = []
+    try:
+        for row in rows[start : start + count]:
+            size = int(row[0])
+            if size < 1 or len(row) < 1 + size:
+                return None
+            corners += [int(word) for word in row[1 : 1 + size]]
+            counts.append(size)
+    except ValueError:
+        return None
+    return counts, corners

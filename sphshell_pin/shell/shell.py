@@ -1,0 +1,405 @@
+"""The shell: a surface of three- and four-sided elements that spheres can touch."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sphshell_pin import _core
+from sphshell_pin.checks import check_points, check_positive, check_vector, read_only
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.shell.cleaning import CleanedSurface, clean_surface, take_surface
+from sphshell_pin.shell.health import ShellHealth
+from sphshell_pin.shell.loading import load_surface
+from sphshell_pin.shell.primitives import geometry_surface
+from sphshell_pin.shell.raw import Floats, Ints, raw_surface
+from sphshell_pin.shell.topology import Topology
+from sphshell_pin.shell.writers import Written, corners_of_elements, write_surface
+from sphshell_pin.units import metres_per_unit
+
+if TYPE_CHECKING:
+    from sphshell_pin.contact.contact_set import ContactSet
+
+CREASE_ANGLE = float(np.deg2rad(30.0))
+"""Edges that turn by less are smooth [rad]."""
+
+SIDES = ("both", "outside", "inside")
+
+
+@dataclass(frozen=True)
+class ClosestPoints:
+    """Where the surface is nearest to each of n points, in the shell's frame.
+
+    Attributes
+    ----------
+    points : (n, 3) on the surface [m]
+    normals : (n, 3) unit, of the element, or the mean one of the edge or vertex; on the side the
+        winding makes the outer one
+    distances : (n,) [m], negative behind the surface
+    elements : (n,) row of shell.elements
+    """
+
+    points: Floats
+    normals: Floats
+    distances: Floats
+    elements: Ints
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.distances)
+
+
+class Shell(Topology):
+    """A surface of three- and four-sided elements, open or closed, in its own frame [m].
+
+    The surface is cleaned when it is made; `health` says what was found and repaired. All arrays
+    are read-only.
+
+    Parameters
+    ----------
+    vertices : (n, 3) [m]
+    elements : (m, 3) or (m, 4) vertex indices, triangles among four columns ending in -1; or a list
+        of lists for polygons of any size
+    normals : unit normals per vertex (n, 3) or per element corner (m, 3 or 4, 3), or None
+    crease_angle : edges that turn by less are smooth [rad]; 0 makes every element flat and exact
+    side : where spheres may be: "both", "outside" (where the winding's normals point), "inside"
+    name : how messages call it
+    clean : False takes the elements as they are: no welding, no repair, no reorientation
+
+    Attributes
+    ----------
+    vertices : (n, 3) [m]; elements : (m, 4), triangles ending in -1
+    triangles : (t, 3); triangle_element : (t,) element of each
+    normals : (t, 3, 3) per triangle corner, or None
+    source_element : (m,) index of the input element each came from
+    box : (2, 3) lowest and highest corner [m]; size : its diagonal [m]
+    health : ShellHealth; source : path of the file, or None; unit : its unit, or None
+    core : the compiled surface that queries run on
+
+    Raises
+    ------
+    InvalidShell
+        If no surface can be made of the arrays; the message names the element or vertex.
+    InvalidParameter
+        If side or crease_angle is out of range.
+    """
+
+    vertices: Floats
+    elements: Ints
+    triangles: Ints
+    triangle_element: Ints
+    normals: Floats | None
+    source_element: Ints
+    box: Floats
+
+    def __init__(
+        self,
+        vertices: npt.ArrayLike,
+        elements: Any,
+        normals: npt.ArrayLike | None = None,
+        crease_angle: float = CREASE_ANGLE,
+        side: str = "both",
+        *,
+        name: str = "shell",
+        clean: bool = True,
+    ) -> None:
+        check_options(crease_angle, side)
+        raw = raw_surface(vertices, elements, normals)
+        surface = clean_surface(raw) if clean else take_surface(raw)
+        self._set(surface, crease_angle, side, name, None, None)
+
+    @classmethod
+    def from_file(
+        cls,
+        path: str | os.PathLike[str],
+        unit: str | None = None,
+        scale: str | float | None = None,
+        *,
+        side: str = "both",
+        crease_angle: float = CREASE_ANGLE,
+        name: str | None = None,
+    ) -> Shell:
+        """Load a surface file: .stl, .obj, .ply, .off or ADAMS's .shl.
+
+        Parameters
+        ----------
+        path : the file; its suffix names the format
+        unit : unit of length of its numbers ("m", "mm", "cm", "in", "ft", ...). It must be stated,
+            except for .shl files, which carry metres per file unit (SCALE)
+        scale : of a .shl file: "apply" its SCALE (default where no unit is stated), "ignore" it
+            (default otherwise), or a number to use instead; of other files a number by which the
+            surface is made larger. `health` says which was used
+        side, crease_angle, name : as of Shell; the name is the file's unless given
+
+        Raises
+        ------
+        ShellFileError
+            If the file is missing, empty, truncated or damaged.
+        InvalidParameter
+            If the unit is missing or unknown, or suffix, scale, side or crease_angle is.
+        InvalidShell
+            If the file holds no element with an area.
+        """
+        check_options(crease_angle, side)
+        raw, taken_unit, factor = load_surface(path, unit, scale)
+        surface = clean_surface(raw)
+        found = surface.health.labelled(source=str(path), unit=taken_unit, scale=factor)
+        called = Path(path).stem if name is None else name
+        shell = cls.__new__(cls)
+        surface = replace(surface, health=found)
+        shell._set(surface, crease_angle, side, called, str(path), taken_unit)
+        return shell
+
+    @classmethod
+    def from_geometry(
+        cls,
+        geometry: Any,
+        *,
+        chord_error: float | None = None,
+        segments: int | None = None,
+        extent: float | None = None,
+        side: str = "both",
+        crease_angle: float = CREASE_ANGLE,
+        name: str | None = None,
+    ) -> Shell:
+        """Turn a pinocchio.GeometryObject or a coal geometry into a shell, in its own frame.
+
+        Meshes are taken as they are, in metres; Box, Sphere, Cylinder, Capsule, Cone, Ellipsoid and
+        Convex become closed shells with exact normals; Halfspace and Plane a square sheet. The
+        placement of a GeometryObject is not applied: it is where the shell is to be mounted.
+
+        Parameters
+        ----------
+        geometry : the geometry
+        chord_error : largest distance between the elements and a round solid [m], 1e-3 of its
+            diameter unless given
+        segments : elements round a full circle, instead of chord_error
+        extent : side of the square that stands for a half-space [m], 10 m unless given
+        side, crease_angle, name : as of Shell; the name is the object's unless given
+
+        Raises
+        ------
+        InvalidParameter
+            If the geometry is of another kind, or an option is out of range.
+        """
+        check_options(crease_angle, side)
+        surface = clean_surface(geometry_surface(geometry, chord_error, segments, extent))
+        shell = cls.__new__(cls)
+        own = getattr(geometry, "name", None)
+        called = name if name is not None else own if isinstance(own, str) else "shell"
+        shell._set(surface, crease_angle, side, called or "shell", None, None)
+        return shell
+
+    def _set(
+        self,
+        surface: CleanedSurface,
+        crease_angle: float,
+        side: str,
+        name: str,
+        source: str | None,
+        unit: str | None,
+    ) -> None:
+        self.name = str(name)
+        self.side = side
+        self.crease_angle = float(crease_angle)
+        self.source = source
+        self.unit = unit
+        self.vertices = read_only(np.array(surface.vertices, np.float64, order="C"))
+        self.elements = read_only(np.array(surface.elements, np.int32, order="C"))
+        self.triangles = read_only(np.array(surface.triangles, np.int32, order="C"))
+        self.triangle_element = read_only(np.array(surface.triangle_element, np.int32))
+        self.source_element = read_only(np.array(surface.source_element, np.int32))
+        self.normals = None if surface.normals is None else read_only(surface.normals.copy())
+        corners = self.vertices[np.unique(self.triangles)]
+        self.box = read_only(np.stack([corners.min(axis=0), corners.max(axis=0)]))
+        self.size = float(np.linalg.norm(self.box[1] - self.box[0]))
+        self.health: ShellHealth = surface.health.labelled(name=self.name, size=self.size)
+        self.core = _core.Shell(
+            self.vertices, self.triangles, self.triangle_element, crease_angle, SIDES.index(side)
+        )
+
+    def contacts(self, center: npt.ArrayLike, radius: float, method: str = "facets") -> ContactSet:
+        """Find every place where a sphere touches, deepest first.
+
+        Parameters
+        ----------
+        center : (3,) of the sphere, in the shell's frame [m]
+        radius : of the sphere [m]
+        method : "facets" (each true feature of the polyhedron once) or "elements" (every touched
+            element by itself, as ADAMS's SPHSHL3 has it: counts shared edges twice)
+
+        Raises
+        ------
+        InvalidParameter, NameNotFound
+            If center or radius is out of range, or the method unknown.
+        """
+        from sphshell_pin.contact.contact_set import ContactSet, Method
+
+        centre = check_vector("center", center, 3, " [m]")
+        radius = check_positive("radius", radius, "m")
+        found = self.core.contacts(centre, radius, int(Method.from_name(method)))
+        point, normal, depth, element, feature = found
+        patch = self.element_patch[element]
+        columns = (read_only(c) for c in (point, normal, depth, element, patch, feature))
+        return ContactSet(*columns)
+
+    def contacts_batch(
+        self,
+        centers: npt.ArrayLike,
+        radii: npt.ArrayLike | float,
+        method: str = "facets",
+        threads: int | None = None,
+    ) -> tuple[Floats, Ints]:
+        """Find the contacts of many spheres at once.
+
+        Parameters
+        ----------
+        centers : (n, 3) in the shell's frame [m]
+        radii : (n,) or one number [m]
+        method : as of `contacts`
+        threads : how many to use; all processors unless given. The results do not depend on it
+
+        Returns
+        -------
+        depth (n,) : the largest of each sphere [m], 0 if it does not touch
+        count (n,) : how many contacts it has
+
+        Raises
+        ------
+        InvalidParameter, NameNotFound
+            If centers or radii are out of range, or the method unknown.
+        """
+        from sphshell_pin.contact.contact_set import Method
+
+        places = check_points("centers", centers)
+        try:
+            sizes = np.array(np.broadcast_to(np.asarray(radii, np.float64), (len(places),)))
+        except (TypeError, ValueError):
+            raise InvalidParameter(
+                "radii", np.shape(radii), f"must be one number or have shape ({len(places)},)"
+            ) from None
+        wrong = np.flatnonzero(~(np.isfinite(sizes) & (sizes > 0.0)))
+        if wrong.size:
+            k = int(wrong[0])
+            raise InvalidParameter(f"radii[{k}]", float(sizes[k]), "must be positive [m]")
+        workers = _threads(threads)
+        depth, count = self.core.contacts_batch(
+            places, sizes, int(Method.from_name(method)), workers
+        )
+        return depth, count
+
+    def closest_points(self, points: npt.ArrayLike, threads: int | None = 1) -> ClosestPoints:
+        """Project points (n, 3) [m] of the shell's frame on the surface.
+
+        Raises InvalidParameter if the points are out of range.
+        """
+        found = self.core.closest_points(check_points("points", points), _threads(threads))
+        return ClosestPoints(*(read_only(column) for column in found))
+
+    def transformed(self, placement: Any = None, scale: float = 1.0) -> Shell:
+        """Return the shell moved by a pinocchio.SE3 and made `scale` times larger first.
+
+        A number in place of `placement` is the scale alone.
+
+        Raises InvalidParameter unless the scale is positive and the placement an SE3.
+        """
+        if isinstance(placement, (int, float, np.number)):
+            placement, scale = None, float(placement)
+        scale = check_positive("scale", scale)
+        rotation, translation = np.eye(3), np.zeros(3)
+        if placement is not None:
+            try:
+                rotation = np.array(placement.rotation, np.float64)
+                translation = np.array(placement.translation, np.float64)
+            except AttributeError:
+                raise InvalidParameter(
+                    "placement", placement, "must be a pinocchio.SE3 or a scale"
+                ) from None
+        surface = CleanedSurface(
+            vertices=(self.vertices * scale) @ rotation.T + translation,
+            elements=self.elements,
+            triangles=self.triangles,
+            triangle_element=self.triangle_element,
+            normals=None if self.normals is None else self.normals @ rotation.T,
+            source_element=self.source_element,
+            health=self.health.moved(scale, rotation, translation),
+        )
+        shell = type(self).__new__(type(self))
+        shell._set(surface, self.crease_angle, self.side, self.name, self.source, self.unit)
+        return shell
+
+    def to_file(self, path: str | os.PathLike[str], unit: str = "m") -> None:
+        """Write the shell in the format its suffix names: .shl, .stl, .obj, .ply, .off.
+
+        The numbers are in `unit`; .shl files also carry it, as SCALE, and are of version 2 if the
+        shell has normals. Quads stay quads, except in .stl. A file that was there before is
+        replaced only when the new one is complete.
+
+        Raises
+        ------
+        InvalidParameter
+            If the suffix or the unit is unknown.
+        ShellFileError
+            If the file cannot be written.
+        """
+        scale = metres_per_unit(unit)
+        written = Written(
+            vertices=self.vertices / scale,
+            elements=self.elements,
+            triangles=self.triangles,
+            normals=corners_of_elements(
+                self.normals, self.elements, self.triangles, self.triangle_element
+            ),
+            scale=scale,
+            name=self.name,
+        )
+        write_surface(path, written)
+
+    @property
+    def is_closed(self) -> bool:
+        """True if every component is closed."""
+        return self.health.is_closed
+
+    def __repr__(self) -> str:
+        """Name, elements, size and state in one line."""
+        state = "closed" if self.is_closed else "open"
+        return (
+            f"<Shell '{self.name}': {len(self.elements)} elements, {len(self.vertices)} vertices, "
+            f"{state}, size {self.size:.4g} m, side {self.side}>"
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the compiled surface, which is made again."""
+        return {k: v for k, v in self.__dict__.items() if k not in ("core", "_arrays")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Rebuild from arrays that are clean already."""
+        names = [field.name for field in fields(CleanedSurface)]
+        surface = CleanedSurface(**{name: state[name] for name in names})
+        rest = (state[name] for name in ("crease_angle", "side", "name", "source", "unit"))
+        self._set(surface, *rest)
+
+
+def check_options(crease_angle: float, side: str) -> None:
+    """Raise InvalidParameter unless crease_angle [rad] is in 0..pi and side a known one."""
+    if side not in SIDES:
+        raise InvalidParameter("side", side, f"must be one of: {', '.join(SIDES)}")
+    try:
+        fits = 0.0 <= float(crease_angle) <= np.pi
+    except (TypeError, ValueError):
+        fits = False
+    if not fits:
+        raise InvalidParameter("crease_angle", crease_angle, "must lie between 0 and pi [rad]")
+
+
+def _threads(threads: int | None) -> int:
+    if threads is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    if isinstance(threads, bool) or int(threads) != threads or threads < 1:
+        raise InvalidParameter("threads", threads, "must be a whole number of at least 1")
+    return int(threads)

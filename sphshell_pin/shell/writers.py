@@ -1,0 +1,189 @@
+"""Writing surfaces: .shl versions 1 and 2, .stl, .obj, .ply, .off.
+
+A file appears whole or not at all: it is written beside its place and then moved there.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sphshell_pin.errors import InvalidParameter, ShellFileError
+from sphshell_pin.shell.raw import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Written:
+    """What the writers need of a surface.
+
+    vertices (n, 3) in file units, elements (m, 4) with -1 ending triangles, triangles (t, 3),
+    normals per element corner (m, 4, 3) or None, scale [m per file unit].
+    """
+
+    vertices: Floats
+    elements: Ints
+    triangles: Ints
+    normals: Floats | None
+    scale: float
+    name: str
+
+    @property
+    def used(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        """(m, 4) which corners exist."""
+        return self.elements >= 0
+
+    def rows(self, first: int) -> list[str]:
+        """Corners of each element, its number in front, counted from `first`."""
+        return [
+            " ".join([str(len(row)), *(str(v + first) for v in row)])
+            for row in ([v for v in line if v >= 0] for line in self.elements.tolist())
+        ]
+
+
+def write_surface(path: str | os.PathLike[str], surface: Written) -> None:
+    """Write `surface` in the format its suffix names.
+
+    Raises
+    ------
+    InvalidParameter
+        Of an unknown suffix; the message lists the known ones.
+    ShellFileError
+        If the file cannot be written; a file that was there before is left as it was.
+    """
+    path = Path(path)
+    try:
+        form = WRITERS[path.suffix.lower()]
+    except KeyError:
+        raise InvalidParameter(
+            "path", str(path), f"must end in one of: {', '.join(WRITERS)}"
+        ) from None
+    data = form(surface)
+    temporary = ""
+    try:
+        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        # mkstemp makes files only their owner can read; use what a plain open() would give.
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(temporary, 0o666 & ~mask)
+        os.replace(temporary, path)
+    except OSError as error:
+        if temporary and os.path.exists(temporary):
+            os.unlink(temporary)
+        raise ShellFileError(path, f"cannot be written ({error.strerror})") from error
+
+
+def corners_of_elements(
+    normals: Floats | None, elements: Ints, triangles: Ints, triangle_element: Ints
+) -> Floats | None:
+    """Return normals by element corner (m, 4, 3) from those by triangle corner (t, 3, 3)."""
+    if normals is None:
+        return None
+    out = np.zeros((len(elements), 4, 3))
+    owner = elements[triangle_element]
+    for k in range(3):
+        place = np.argmax(owner == triangles[:, k, None], axis=1)
+        out[triangle_element, place] = normals[:, k]
+    return out
+
+
+def _points(vertices: Floats, start: str = "") -> list[str]:
+    # repr gives the shortest text that reads back as the same number.
+    return [f"{start}{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+
+
+def _split_by_normal(surface: Written, normals: Floats) -> tuple[Floats, Ints, Floats]:
+    """Points repeated where normals differ: points, elements over them, and a normal for each."""
+    used = surface.used
+    corner = surface.elements[used]
+    normal = normals[used]
+    # Normals that agree to single precision are one, as far as a file is concerned.
+    key = np.column_stack([corner.astype(np.float64), np.round(normal, 7) + 0.0])
+    _, first, place = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    elements = np.full_like(surface.elements, -1)
+    elements[used] = place.ravel()
+    return surface.vertices[corner[first]], elements, normal[first]
+
+
+def _shl(surface: Written) -> bytes:
+    if surface.normals is None:
+        header = [f"{len(surface.vertices)} {len(surface.elements)} {surface.scale!r}"]
+        lines = header + _points(surface.vertices) + surface.rows(1)
+    else:
+        points, elements, normals = _split_by_normal(surface, surface.normals)
+        split = Written(points, elements, surface.triangles, None, surface.scale, surface.name)
+        counts = f"{len(points)} {len(elements)} {len(normals)} {surface.scale!r}"
+        lines = ["Version: 2", counts, *_points(points), *split.rows(1), *_points(normals)]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _stl(surface: Written) -> bytes:
+    corners = surface.vertices[surface.triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
+    table = np.zeros(len(corners), kind)
+    table["normal"] = normal / np.where(length > 0.0, length, 1.0)
+    table["corners"] = corners
+    head = f"binary stl of {surface.name}"[:80].encode("ascii", "replace").ljust(80)
+    return head + struct.pack("<I", len(corners)) + table.tobytes()
+
+
+def _obj(surface: Written) -> bytes:
+    lines = [f"o {surface.name.replace(' ', '_')}", *_points(surface.vertices, "v ")]
+    if surface.normals is None:
+        faces = ["f " + row.split(" ", 1)[1] for row in surface.rows(1)]
+        return ("\n".join(lines + faces) + "\n").encode()
+    flat = surface.normals[surface.used]
+    table, place = np.unique(np.round(flat, 15) + 0.0, axis=0, return_inverse=True)
+    lines += _points(table, "vn ")
+    which = np.full(surface.elements.shape, -1)
+    which[surface.used] = place.ravel()
+    for corners, normals in zip(surface.elements.tolist(), which.tolist(), strict=True):
+        pairs = zip(corners, normals, strict=True)
+        lines.append("f " + " ".join(f"{v + 1}//{n + 1}" for v, n in pairs if v >= 0))
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _off(surface: Written) -> bytes:
+    header = ["OFF", f"{len(surface.vertices)} {len(surface.elements)} 0"]
+    return ("\n".join([*header, *_points(surface.vertices), *surface.rows(0)]) + "\n").encode()
+
+
+def _ply(surface: Written) -> bytes:
+    points, elements = surface.vertices, surface.elements
+    columns = ["x", "y", "z"]
+    data = points
+    if surface.normals is not None:
+        points, elements, normals = _split_by_normal(surface, surface.normals)
+        columns += ["nx", "ny", "nz"]
+        data = np.column_stack([points, normals])
+    head = [
+        "ply",
+        "format ascii 1.0",
+        f"element vertex {len(points)}",
+        *(f"property double {column}" for column in columns),
+        f"element face {len(elements)}",
+        "property list uchar int vertex_indices",
+        "end_header",
+    ]
+    body = [" ".join(repr(x) for x in row) for row in data.tolist()]
+    split = Written(points, elements, surface.triangles, None, surface.scale, surface.name)
+    return ("\n".join(head + body + split.rows(0)) + "\n").encode()
+
+
+WRITERS: dict[str, Callable[[Written], bytes]] = {
+    ".shl": _shl,
+    ".stl": _stl,
+    ".obj": _obj,
+    ".ply": _ply,
+    ".off": _off,
+}
+"""Writers by suffix."""

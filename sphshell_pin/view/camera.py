@@ -1,0 +1,117 @@
+"""Where to look from: close enough to read the contact, far enough to know the robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sphshell_pin.view.nodes import Command, FloatArray, set_camera
+
+FIELD_OF_VIEW = 40.0  # vertical [deg]
+ASPECT = 1.2  # of the part of the window that legend and controls leave free
+MARGIN = 1.12  # joints are points, links have some width
+
+_CORNERS = np.array(np.meshgrid(*3 * [(-1.0, 1.0)])).reshape(3, -1).T
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera at `eye` (3,) that looks at `target` (3,), world frame [m]."""
+
+    eye: FloatArray
+    target: FloatArray
+
+    @property
+    def distance(self) -> float:
+        """From eye to target [m]."""
+        return float(np.linalg.norm(self.eye - self.target))
+
+    @classmethod
+    def of(cls, action: FloatArray, around: FloatArray, normal: FloatArray, radius: float) -> View:
+        """Choose a view of the points `action` (k, 3) where the contact happens.
+
+        `around` (m, 3) are points of robot and shell worth having in the picture; those farther
+        away than a few times the size of the action are let go. `normal` (3,) is the mean contact
+        normal (zero if there is none): the eye stands on its side. `radius` [m] is the smallest
+        sphere's. All in the world [m].
+        """
+        low, high = action.min(axis=0), action.max(axis=0)
+        middle = 0.5 * (low + high)
+        half = max(0.5 * float(np.linalg.norm(high - low)), 4.0 * radius)
+        kept = around[np.linalg.norm(around - middle, axis=1) <= 8.0 * half]
+        subject = np.vstack((kept, middle + half * _CORNERS / np.sqrt(3.0)))
+        direction = _direction(middle, subject, normal)
+        # Fit the subject into the picture, upright, as seen along this direction.
+        right = np.cross(np.array([0.0, 0.0, 1.0]), direction)
+        right /= np.linalg.norm(right)
+        axes = np.stack((right, np.cross(direction, right), direction))
+        seen = (subject - middle) @ axes.T
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        slope = np.tan(np.deg2rad(0.5 * FIELD_OF_VIEW))
+        width, height = 0.5 * (high - low)[:2]
+        distance = MARGIN * max(height / slope, width / (ASPECT * slope))
+        target = middle + 0.5 * (low + high) @ axes
+        return cls(target + (distance + 0.3 * (high[2] - low[2])) * direction, target)
+
+
+def _direction(target: FloatArray, subject: FloatArray, normal: FloatArray) -> FloatArray:
+    """Return the unit vector (3,) from the target to the eye: from where the surface is seen."""
+    reach = np.linalg.norm(subject - target, axis=1).max()
+    outward = np.array([target[0], target[1], 0.0])
+    if np.linalg.norm(outward) < 0.3 * reach:
+        outward = np.array([0.9, -0.45, 0.0])
+    outward /= np.linalg.norm(outward)
+    # Well to the side of straight ahead, so that neither arm nor arrows hide the contact.
+    turn = np.deg2rad(-50.0)
+    cosine, sine = np.cos(turn), np.sin(turn)
+    sideways = np.array(
+        [
+            outward[0] * cosine - outward[1] * sine,
+            outward[0] * sine + outward[1] * cosine,
+            0.0,
+        ]
+    )
+    direction = sideways + 0.35 * normal + np.array([0.0, 0.0, 0.3])
+    if direction @ normal < 0.25:
+        direction = direction + 0.8 * normal
+    # Straight from above or below there is no upright.
+    direction[2] = np.clip(direction[2], -1.5, 1.5)
+    if np.hypot(direction[0], direction[1]) < 0.3:
+        direction[:2] += 0.5 * outward[:2]
+    return np.asarray(direction / np.linalg.norm(direction))
+
+
+def look(visualizer: Any, view: View) -> None:
+    """Point the page's camera; the mouse then orbits about the target.
+
+    meshcat 0.3.2's own live page does not know the target yet, and looks at the world's origin.
+    """
+    set_camera(
+        visualizer,
+        {
+            "type": "PerspectiveCamera",
+            "fov": FIELD_OF_VIEW,
+            "aspect": ASPECT,
+            "near": 0.005 * view.distance,
+            "far": 200.0 * view.distance,
+            "zoom": 1.0,
+        },
+    )
+    visualizer["/Cameras/default/rotated/<object>"].set_property("position", _y_up(view.eye))
+    target = {"type": "set_target", "path": "", "value": _y_up(view.target)}
+    visualizer.window.send(Command(target))
+
+
+def _y_up(point: FloatArray) -> list[float]:
+    """Return `point` (3,) as the page's camera has it, with y up."""
+    x, y, z = (float(value) for value in point)
+    return [x, z, -y]
+
+
+def set_surroundings(visualizer: Any) -> None:
+    """Give the page a light background and drop the axes at the world's origin."""
+    visualizer["/Background"].set_property("top_color", [1.0, 1.0, 1.0])
+    visualizer["/Background"].set_property("bottom_color", [0.80, 0.84, 0.88])
+    visualizer["/Axes"].set_property("visible", False)

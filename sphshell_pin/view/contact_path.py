@@ -1,0 +1,133 @@
+"""Where on its shell each pair touched, from a Result's contact log: for trails and figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.scene import ContactPair, Scene
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class ContactRows:
+    """Some rows of a contact log, world frame [m], [N]; `pair` (k,) indexes the scene's pairs."""
+
+    row: IndexArray
+    pair: IndexArray
+    point_world: FloatArray
+    normal_world: FloatArray
+    normal_force: FloatArray
+    friction_force_world: FloatArray
+
+    @classmethod
+    def of(cls, log: Any) -> ContactRows:
+        """Take the columns of a Result's contact log, ordered by row."""
+        order = np.argsort(np.asarray(log.row), kind="stable")
+        return cls(
+            np.asarray(log.row, dtype=np.int64)[order],
+            np.asarray(log.pair, dtype=np.int64)[order],
+            *(
+                np.asarray(column, dtype=float)[order]
+                for column in (
+                    log.point_world,
+                    log.normal_world,
+                    log.normal_force,
+                    log.friction_force_world,
+                )
+            ),
+        )
+
+    def select(self, chosen: Any) -> ContactRows:
+        """Return the entries that `chosen`, a slice, mask or indices, picks."""
+        return ContactRows(
+            self.row[chosen],
+            self.pair[chosen],
+            self.point_world[chosen],
+            self.normal_world[chosen],
+            self.normal_force[chosen],
+            self.friction_force_world[chosen],
+        )
+
+    def at(self, row: int) -> ContactRows:
+        """Return the contacts of the recorded `row`."""
+        first, last = np.searchsorted(self.row, (row, row + 1))
+        return self.select(slice(int(first), int(last)))
+
+
+@dataclass(frozen=True)
+class ContactPath:
+    """The way of one pair's contact: `points` and `normals` (k, 3) [m] at recorded rows `row` (k,).
+
+    They are in the shell's frame if `on_shell`, else in the world; `force` (k,) is the normal force
+    [N]. `runs` are index arrays into them: within a run the contact neither let go nor jumped.
+    """
+
+    pair: int
+    on_shell: bool
+    row: IndexArray
+    points: FloatArray
+    normals: FloatArray
+    force: FloatArray
+    runs: tuple[IndexArray, ...]
+
+
+def contact_paths(result: Result, scene: Scene | None) -> list[ContactPath]:
+    """Return the path of each pair that ever touched.
+
+    Without `scene`, and for pairs without a shell, it is the path in the world. Of several contacts
+    at one instant the hardest one marks the path.
+    """
+    contacts = ContactRows.of(result.contacts)
+    paths = []
+    for index in np.unique(contacts.pair):
+        own = contacts.select(contacts.pair == index)
+        order = np.lexsort((-own.normal_force, own.row))
+        own = own.select(order[np.unique(own.row[order], return_index=True)[1]])
+        pair = None if scene is None else scene.pairs[index]
+        points, normals = own.point_world, own.normal_world
+        on_shell = scene is not None and pair is not None and pair.shell is not None
+        if scene is not None and pair is not None and pair.shell is not None:
+            points, normals = _in_shell(scene, pair, result, own)
+        jump = np.zeros(max(0, len(points) - 1), dtype=bool)
+        if pair is not None and pair.sphere is not None:
+            steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+            jump = steps > 0.5 * pair.sphere.radius
+        breaks = np.flatnonzero((np.diff(own.row) > 1) | jump) + 1
+        runs = tuple(np.split(np.arange(len(points)), breaks))
+        paths.append(
+            ContactPath(int(index), on_shell, own.row, points, normals, own.normal_force, runs)
+        )
+    return paths
+
+
+def spaced(points: FloatArray, step: float) -> IndexArray:
+    """Return indices into `points` (k, 3) that thin them to one or two per `step` [m] of length."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    along = np.concatenate(([0.0], np.cumsum(steps)))
+    first = np.unique(np.floor(along / step), return_index=True)[1]
+    return np.unique(np.append(first, len(points) - 1)).astype(np.int64)
+
+
+def _in_shell(
+    scene: Scene, pair: ContactPair, result: Result, contacts: ContactRows
+) -> tuple[FloatArray, FloatArray]:
+    """Return points and normals of `contacts` (k, 3) in the frame of `pair`'s shell."""
+    model, data = scene.model, scene.model.createData()
+    points, normals = np.empty_like(contacts.point_world), np.empty_like(contacts.normal_world)
+    shell: pin.SE3 | None = None
+    for place, row in enumerate(contacts.row):
+        if shell is None or pair.joint_j != 0:
+            pin.forwardKinematics(model, data, np.asarray(result.q[row], dtype=float))
+            shell = data.oMi[pair.joint_j] * pair.shell_placement
+        points[place] = shell.actInv(contacts.point_world[place])
+        normals[place] = shell.rotation.T @ contacts.normal_world[place]
+    return points, normals

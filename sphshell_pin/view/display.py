@@ -1,0 +1,216 @@
+"""A Scene in a meshcat page: robot, shells, spheres, contact points and force arrows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, ContactColumns
+from sphshell_pin.view.camera import View, look, set_surroundings
+from sphshell_pin.view.nodes import (
+    FloatArray,
+    line_segments,
+    material,
+    node_name,
+    on_top,
+    require_meshcat,
+    set_object,
+    sphere,
+    triangle_mesh,
+)
+from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot
+from sphshell_pin.view.surface import draw_shell, great_circles, tube
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from sphshell_pin.dynamics.scene import Scene
+
+SPHERE_COLOR = 0x2F6FDE
+TRAIL_COLOR = 0x8E1B8E
+
+
+class _Placed:
+    """A node that hangs on a joint: `offset` in the joint's frame."""
+
+    def __init__(self, node: Any, joint: int, offset: pin.SE3) -> None:
+        self.node = node
+        self.joint = joint
+        self.offset = offset
+
+
+class Display:
+    """Draws `scene` once, then moves it: `update(q, contacts)`.
+
+    `visual_model` is any geometry model of `scene.model`, visual or collision; without one the
+    joints are drawn as a skeleton. `visualizer` is an existing `meshcat.Visualizer`; without one
+    a page is served as `meshcat.Visualizer()` does. `view` places the camera and sets the sizes of
+    arrows and points; without one it is chosen for the neutral configuration. `arrows` shows
+    normal and friction force apart ("components") or their sum ("total"); at most `pool` contacts
+    at a time. `arrow_scale` may be set at any time.
+
+    Raises MissingExtra without meshcat, InvalidParameter for a geometry model that does not fit.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        visual_model: pin.GeometryModel | None = None,
+        visualizer: Any = None,
+        *,
+        view: View | None = None,
+        arrows: ArrowKind = "components",
+        arrow_scale: ArrowScale | None = None,
+        pool: int = 8,
+    ) -> None:
+        meshcat = require_meshcat()
+        if arrows not in ("components", "total"):
+            raise InvalidParameter("arrows", arrows, 'must be "components" or "total"')
+        self.scene = scene
+        self.visualizer = meshcat.Visualizer() if visualizer is None else visualizer
+        self._model = scene.model
+        self._data = self._model.createData()
+        neutral = pin.neutral(self._model)
+        self.view = choose_view(scene, neutral[None, :]) if view is None else view
+        self.arrow_scale = ArrowScale() if arrow_scale is None else arrow_scale
+        self._placed: list[_Placed] = []
+        self._shell_nodes: dict[int, Any] = {}
+        self._draw_shells()
+        self._draw_spheres()
+        self._robot = self._make_robot(visual_model)
+        self._arrows = ArrowPool(
+            self.visualizer["contacts"], pool, 0.0026 * self.view.distance, arrows
+        )
+        set_surroundings(self.visualizer)
+        look(self.visualizer, self.view)
+        self.update(neutral)
+
+    def update(self, q: ArrayLike, contacts: ContactColumns | None = None) -> None:
+        """Show configuration `q` (nq,) and `contacts` (of `scene.contacts`, or None for none)."""
+        configuration = np.asarray(q, dtype=float)
+        if configuration.shape != (self._model.nq,):
+            raise InvalidParameter(
+                "q", configuration.shape, f"must have the shape ({self._model.nq},)"
+            )
+        pin.forwardKinematics(self._model, self._data, configuration)
+        self._robot.update(self._data, configuration)
+        for placed in self._placed:
+            where = self._data.oMi[placed.joint] * placed.offset
+            placed.node.set_transform(where.homogeneous)
+        self._arrows.update(contacts, self.arrow_scale)
+
+    @property
+    def trail_width(self) -> float:
+        """Radius of the lines that `draw_trail` draws [m]."""
+        return 0.0014 * self.view.distance
+
+    def draw_trail(self, name: str, points: ArrayLike, pair: int | None = None) -> Any:
+        """Draw a line along `points` (k, 3) [m]; return its node, None if there is no length.
+
+        With `pair`, the index of a contact pair, the points are in its shell's frame and move with
+        the shell; else they are in the world.
+        """
+        path = np.asarray(points, dtype=float).reshape(-1, 3)
+        steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+        path = path[np.append(True, steps > 1e-3 * self.trail_width)]
+        if len(path) < 2:
+            return None
+        parent = self.visualizer if pair is None else self._shell_nodes[pair]
+        node = parent["trail"][node_name(name)]
+        vertices, triangles = tube(path, self.trail_width)
+        set_object(node, triangle_mesh(vertices, triangles), material("MeshBasic", TRAIL_COLOR))
+        return node
+
+    def _draw_shells(self) -> None:
+        drawn: dict[tuple[int, int, bytes], Any] = {}
+        for index, pair in enumerate(self.scene.pairs):
+            if pair.shell is None:
+                continue
+            key = (id(pair.shell), pair.joint_j, pair.shell_placement.homogeneous.tobytes())
+            if key not in drawn:
+                node = self.visualizer["shells"][f"{len(drawn)}_{node_name(pair.shell.name)}"]
+                draw_shell(node, pair.shell, len(drawn))
+                self._placed.append(_Placed(node, pair.joint_j, pair.shell_placement))
+                drawn[key] = node
+            self._shell_nodes[index] = drawn[key]
+
+    def _draw_spheres(self) -> None:
+        drawn: set[tuple[int, bytes, float]] = set()
+        for pair in self.scene.pairs:
+            if pair.sphere is None:
+                continue
+            radius = pair.sphere.radius
+            key = (pair.joint_i, pair.sphere_placement.homogeneous.tobytes(), radius)
+            if key in drawn:
+                continue
+            node = self.visualizer["spheres"][f"{len(drawn)}_{node_name(pair.name)}"]
+            set_object(
+                node["ball"],
+                sphere(radius, 48),
+                material("MeshPhong", SPHERE_COLOR, 0.6, side=0, depthWrite=False, shininess=60),
+                order=5,
+            )
+            # A faint disc through whatever hides the sphere: it often sits inside a hand.
+            set_object(node["ghost"], sphere(radius, 24), on_top(SPHERE_COLOR, 0.25), order=4)
+            # Three great circles, so that one sees a ball spin.
+            set_object(
+                node["circles"],
+                line_segments(*great_circles(1.003 * radius)),
+                material("LineBasic", 0x0D2C66, 0.8),
+                "LineSegments",
+                order=6,
+            )
+            self._placed.append(_Placed(node, pair.joint_i, pair.sphere_placement))
+            drawn.add(key)
+
+    def _make_robot(self, visual_model: pin.GeometryModel | None) -> GeometryRobot | SkeletonRobot:
+        if visual_model is not None and len(visual_model.geometryObjects):
+            return GeometryRobot(self.visualizer, self._model, visual_model)
+        tips = [
+            (pair.joint_i, pair.sphere_placement.translation)
+            for pair in self.scene.pairs
+            if pair.sphere is not None
+        ]
+        drawn = {placed.joint for placed in self._placed}
+        return SkeletonRobot(self.visualizer, self._model, 0.5 * self.view.distance, tips, drawn)
+
+
+def choose_view(
+    scene: Scene,
+    configurations: FloatArray,
+    points_world: FloatArray | None = None,
+    normals_world: FloatArray | None = None,
+) -> View:
+    """Choose a camera for the `configurations` (n, nq) and the contacts seen in them, world [m].
+
+    Without contacts the spheres are where things happen; without spheres, the joints.
+    """
+    model, data = scene.model, scene.model.createData()
+    centres: list[FloatArray] = []
+    around: list[FloatArray] = []
+    radii: list[float] = []
+    for row in np.unique(np.linspace(0, len(configurations) - 1, 60).astype(int)):
+        pin.forwardKinematics(model, data, configurations[row])
+        for joint in range(1, model.njoints):
+            around.append(np.array(data.oMi[joint].translation))
+        for pair in scene.pairs:
+            if pair.sphere is not None:
+                centres.append(data.oMi[pair.joint_i].act(pair.sphere_placement.translation))
+                radii.append(pair.sphere.radius)
+            if pair.shell is not None and row == 0:
+                where = data.oMi[pair.joint_j] * pair.shell_placement
+                low, high = np.asarray(pair.shell.box)
+                corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+                around.extend(where.act(corner) for corner in corners)
+    touched = points_world is not None and len(points_world)
+    action = np.array(centres) if centres else np.array(around or [np.zeros(3)])
+    if touched and points_world is not None:
+        action = points_world if not centres else np.vstack((action, points_world))
+    normal = np.zeros(3)
+    if touched and normals_world is not None:
+        mean = normals_world.mean(axis=0)
+        normal = mean / max(float(np.linalg.norm(mean)), 1e-9)
+    return View.of(action, np.array(around).reshape(-1, 3), normal, min(radii, default=0.02))

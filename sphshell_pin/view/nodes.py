@@ -1,0 +1,173 @@
+"""What meshcat's page can draw but its Python package cannot say: typed lines, draw order, depth.
+
+Every object is a three.js JSON description, sent to any `meshcat.Visualizer` as one command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.errors import MissingExtra
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.integer[Any]]
+Json = dict[str, Any]
+
+# Never zero: a transform with a zero scale cannot be decomposed, and its node is lost for good.
+HIDDEN_SCALE = 1e-6
+
+
+class Command:
+    """A meshcat command given as the dictionary that goes over the wire."""
+
+    def __init__(self, data: Json) -> None:
+        self._data = data
+
+    def lower(self) -> Json:
+        """Return the dictionary; meshcat calls this before it packs a command."""
+        return self._data
+
+
+def require_meshcat() -> Any:
+    """Return the `meshcat` package; raise MissingExtra where it is not installed."""
+    try:
+        import meshcat
+    except ImportError as missing:
+        raise MissingExtra("meshcat", "view", "the picture of a scene") from missing
+    return meshcat
+
+
+def typed_array(values: FloatArray | IntArray) -> Json:
+    """Describe the rows of `values` (n, k) as a three.js buffer attribute (float32 or uint32)."""
+    import umsgpack
+
+    floats = np.issubdtype(values.dtype, np.floating)
+    name, code, dtype = ("Float32Array", 0x17, "<f4") if floats else ("Uint32Array", 0x16, "<u4")
+    return {
+        "itemSize": values.shape[1] if values.ndim == 2 else 1,
+        "type": name,
+        "array": umsgpack.Ext(code, np.ascontiguousarray(values, dtype=dtype).tobytes()),
+        "normalized": False,
+    }
+
+
+def triangle_mesh(vertices: FloatArray, triangles: IntArray) -> Json:
+    """Geometry of an indexed mesh: `vertices` (n, 3) [m], `triangles` (t, 3)."""
+    return {
+        "type": "BufferGeometry",
+        "data": {
+            "attributes": {"position": typed_array(vertices)},
+            "index": typed_array(triangles.reshape(-1)),
+        },
+    }
+
+
+def line_segments(vertices: FloatArray, segments: IntArray) -> Json:
+    """Geometry of lines: `segments` (s, 2) index `vertices` (n, 3) [m]."""
+    return {
+        "type": "BufferGeometry",
+        "data": {
+            "attributes": {"position": typed_array(vertices)},
+            "index": typed_array(segments.reshape(-1)),
+        },
+    }
+
+
+def sphere(radius: float, segments: int = 32) -> Json:
+    """Geometry of a sphere of `radius` [m]."""
+    return {
+        "type": "SphereGeometry",
+        "radius": radius,
+        "widthSegments": segments,
+        "heightSegments": segments // 2,
+    }
+
+
+def rod(radius_start: float, radius_end: float) -> Json:
+    """Geometry of a rod or cone along y, one unit long and centred, as three.js has it."""
+    return {
+        "type": "CylinderGeometry",
+        "radiusTop": radius_end,
+        "radiusBottom": radius_start,
+        "height": 1.0,
+        "radialSegments": 24,
+    }
+
+
+def material(kind: str, color: int, opacity: float = 1.0, **properties: Any) -> Json:
+    """Material `kind` ("MeshPhong", "MeshBasic", "LineBasic"), two-sided unless told otherwise."""
+    return {
+        "type": f"{kind}Material",
+        "color": color,
+        "side": 2,
+        "transparent": opacity < 1.0,
+        "opacity": opacity,
+        **properties,
+    }
+
+
+def on_top(color: int, opacity: float = 1.0) -> Json:
+    """Material drawn over whatever hides it, unlit: for arrows and contact points."""
+    return material(
+        "MeshBasic", color, opacity, side=0, depthTest=False, depthWrite=False, transparent=True
+    )
+
+
+def set_object(
+    visualizer: Any, geometry: Json, look: Json, kind: str = "Mesh", order: int = 0
+) -> None:
+    """Put one object at the visualizer's path; larger `order` is drawn later.
+
+    Its identifiers are made from the path, so that equal scenes give equal pages.
+    """
+    path = visualizer.path.lower()
+    geometry = {"uuid": f"{path}#geometry", **geometry}
+    look = {"uuid": f"{path}#material", **look}
+    entity = {
+        "uuid": f"{path}#object",
+        "type": kind,
+        "geometry": geometry["uuid"],
+        "material": look["uuid"],
+        "renderOrder": order,
+    }
+    data = {
+        "metadata": {"version": 4.5, "type": "Object"},
+        "geometries": [geometry],
+        "materials": [look],
+        "object": entity,
+    }
+    visualizer.window.send(Command({"type": "set_object", "path": path, "object": data}))
+
+
+def set_camera(visualizer: Any, camera: Mapping[str, Any]) -> None:
+    """Replace the page's camera by the three.js `camera` description."""
+    node = visualizer["/Cameras/default/rotated"]
+    path = node.path.lower()
+    data = {"object": {"uuid": f"{path}#camera", **camera}}
+    visualizer.window.send(Command({"type": "set_object", "path": path, "object": data}))
+
+
+def node_name(name: str) -> str:
+    """Make `name` one step of a meshcat path, where a slash would open a new level."""
+    return name.replace("/", "_") or "_"
+
+
+def pose(rotation: FloatArray, translation: FloatArray, scale: FloatArray | float = 1.0) -> Any:
+    """Homogeneous (4, 4) of `rotation` (3, 3) times diag(`scale`), and `translation` (3,) [m]."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation * np.broadcast_to(np.asarray(scale, dtype=float), 3)
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def rotation_to(direction: FloatArray) -> FloatArray:
+    """Return a rotation (3, 3) that takes y, the axis of three.js's cylinders, to `direction`."""
+    y = direction / np.linalg.norm(direction)
+    helper = np.eye(3)[int(np.argmin(np.abs(y)))]
+    x = np.cross(y, helper)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, y, np.cross(x, y)))

@@ -1,0 +1,189 @@
+"""One HTML file with a meshcat scene and its animation: opens offline, asks nobody for anything."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.view.nodes import HIDDEN_SCALE, FloatArray, Json, require_meshcat, typed_array
+
+# A mesh file this long may well be used by several links: it is stored once.
+SHARED_TEXT = 20_000
+
+
+class FilmWindow:
+    """Stands in for meshcat's window: keeps the scene, and films transforms instead of sending.
+
+    While `frame` is None a transform is part of the still scene; else it is the pose of its node
+    in that frame.
+    """
+
+    def __init__(self) -> None:
+        self.frame: int | None = None
+        self._commands: dict[tuple[str, str, str], Json] = {}
+        self._texts: dict[str, str] = {}
+        self._frames: dict[str, dict[int, list[float]]] = {}
+        self._switches: dict[str, tuple[FloatArray, list[bool]]] = {}
+
+    def send(self, command: Any) -> None:
+        """Take one meshcat command."""
+        data = command.lower()
+        kind, path = data["type"], data["path"]
+        if kind == "set_transform" and self.frame is not None:
+            self._frames.setdefault(path, {})[self.frame] = data["matrix"]
+            return
+        if kind == "delete":
+            below = path.rstrip("/") + "/"
+            for key in [key for key in self._commands if (key[1] + "/").startswith(below)]:
+                del self._commands[key]
+            return
+        if kind == "set_object":
+            data = self._share(data)
+        # An object that replaces another comes first again, before its properties.
+        self._commands[kind, path, data.get("property", "")] = data
+
+    def switch(self, visualizer: Any, times: FloatArray, visible: list[bool]) -> None:
+        """Show or hide the visualizer's node from each of `times` (k,) [s of the page] on."""
+        self._switches[visualizer.path.lower()] = (times, visible)
+
+    def _share(self, data: Json) -> Json:
+        def shared(value: Any) -> Any:
+            if isinstance(value, dict):
+                return {key: shared(item) for key, item in value.items()}
+            if isinstance(value, list):
+                return [shared(item) for item in value]
+            if isinstance(value, str) and len(value) > SHARED_TEXT:
+                name = hashlib.sha256(value.encode()).hexdigest()[:16]
+                self._texts[name] = value
+                return {"$text": name}
+            return value
+
+        result: Json = shared(data)
+        return result
+
+    def commands(self, times: FloatArray) -> list[Json]:
+        """Return every command of the page; frame k is shown at `times[k]` [s of the page]."""
+        moving: list[Json] = []
+        stills: list[Json] = []
+        for path, frames in self._frames.items():
+            matrices = np.array([frames[frame] for frame in sorted(frames)])
+            matrices = matrices.reshape(-1, 4, 4).transpose(0, 2, 1)
+            stills.append(
+                {
+                    "type": "set_transform",
+                    "path": path,
+                    "matrix": matrices[0].T.reshape(-1).tolist(),
+                }
+            )
+            tracks = _pose_tracks(times[sorted(frames)], matrices)
+            if tracks:
+                moving.append(_clip(path, tracks, times))
+        for path, (instants, visible) in self._switches.items():
+            track = {
+                "name": ".visible",
+                "type": "bool",
+                "times": instants.tolist(),
+                "values": visible,
+            }
+            moving.append(_clip(path, [track], times))
+        texts = [{"type": "text", "name": name, "text": t} for name, t in self._texts.items()]
+        kinds = ("set_object", "set_transform", "set_property", "set_target")
+        scene = sorted(self._commands.values(), key=lambda data: kinds.index(data["type"]))
+        # The clips are loaded at rest; the page starts them once it has drawn the first frame.
+        animation = {
+            "type": "set_animation",
+            "path": "",
+            "animations": moving,
+            "options": {"play": False, "repetitions": 1},
+        }
+        return [*texts, *scene, *stills, *([animation] if moving else [])]
+
+
+def _clip(path: str, tracks: list[Json], times: FloatArray) -> Json:
+    duration = max(float(times[-1]), 1e-3)
+    clip = {"name": "default", "fps": 1, "duration": duration, "tracks": tracks}
+    return {"path": path, "clip": clip}
+
+
+def _pose_tracks(times: FloatArray, matrices: FloatArray) -> list[Json]:
+    """Split `matrices` (n, 4, 4) into position, quaternion and scale tracks, those that change."""
+    scale = np.linalg.norm(matrices[:, :3, :3], axis=1)
+    # A mirror goes into x, as three.js has it when it decomposes a matrix.
+    scale[np.linalg.det(matrices[:, :3, :3]) < 0.0, 0] *= -1.0
+    quaternion = np.array(
+        [
+            pin.Quaternion(matrix[:3, :3] / size[None, :]).coeffs()
+            for matrix, size in zip(matrices, scale, strict=True)
+        ]
+    )
+    flips = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0.0
+    quaternion[1:][np.cumsum(flips) % 2 == 1] *= -1.0
+    position = matrices[:, :3, 3].copy()
+    hidden = np.abs(scale).max(axis=1) <= 1.5 * HIDDEN_SCALE
+    # A node that appears grows where it will be, instead of flying in from where it last was.
+    appears = np.flatnonzero(hidden[:-1] & ~hidden[1:])
+    position[appears], quaternion[appears] = position[appears + 1], quaternion[appears + 1]
+    tracks = []
+    for name, kind, values in (
+        ("position", "vector3", position),
+        ("quaternion", "quaternion", quaternion),
+        ("scale", "vector3", scale),
+    ):
+        step = np.abs(np.diff(values, axis=0)).max(axis=1, initial=0.0)
+        if np.ptp(values, axis=0).max(initial=0.0) <= 1e-9:
+            continue
+        # Keys amid a standstill say nothing.
+        moves = step > 1e-9
+        kept = np.ones(len(values), dtype=bool)
+        kept[1:-1] = moves[:-1] | moves[1:]
+        tracks.append(
+            {
+                "name": f".{name}",
+                "type": kind,
+                "times": typed_array(times[kept])["array"],
+                "values": typed_array(values[kept].reshape(-1))["array"],
+            }
+        )
+    return tracks
+
+
+def render_page(
+    commands: list[Json], title: str, legend: list[tuple[str, str]], clock: Json
+) -> str:
+    """Return the HTML of a page that replays `commands`.
+
+    `legend` holds (colour, sentence) pairs; `clock` says "start" and "speed" of the simulated time
+    [s] and [s/s].
+    """
+    import umsgpack
+
+    packed = bytearray()
+    for command in commands:
+        data = umsgpack.packb(command)
+        packed += struct.pack("<I", len(data)) + data
+    scene = base64.b64encode(gzip.compress(bytes(packed), compresslevel=6, mtime=0)).decode()
+    rows = "".join(
+        f'<div><span class="swatch" style="background:{html.escape(color)}"></span>'
+        f"{html.escape(text)}</div>"
+        for color, text in legend
+    )
+    viewer = Path(require_meshcat().__file__).parent / "viewer" / "dist" / "main.min.js"
+    parts = {
+        "title": html.escape(title),
+        "legend": rows,
+        "clock": json.dumps(clock),
+        "viewer": viewer.read_text(encoding="utf-8").replace("</script", "<\\/script"),
+        "scene": scene,
+    }
+    page = Path(__file__).with_name("recording.html").read_text(encoding="utf-8")
+    pieces = page.split("@@")
+    return "".join(parts[piece] if index % 2 else piece for index, piece in enumerate(pieces))

@@ -1,0 +1,140 @@
+"""The contact path on one matplotlib axis: on its shell's outline, coloured by force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sphshell_pin.view.contact_path import ContactPath, FloatArray, contact_paths, spaced
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.shell.shell import Shell
+
+MOST_STEPS = 20_000
+MOST_FILLED = 60_000
+
+
+@dataclass(frozen=True)
+class PathGroup:
+    """The paths that share one picture: those on one shell, or all others in the world."""
+
+    shell: Shell | None
+    paths: list[ContactPath]
+
+
+def group_paths(result: Result, scene: Scene | None) -> list[PathGroup]:
+    """Return the paths of `result`, those on one shell together."""
+    groups: dict[Any, PathGroup] = {}
+    for path in contact_paths(result, scene):
+        key, shell = None, None
+        if path.on_shell and scene is not None:
+            pair = scene.pairs[path.pair]
+            shell = pair.shell
+            key = (id(shell), pair.joint_j, pair.shell_placement.homogeneous.tobytes())
+        groups.setdefault(key, PathGroup(shell, [])).paths.append(path)
+    return list(groups.values())
+
+
+def draw_paths(
+    axis: Any, group: PathGroup, names: list[str], factor: float, limits: tuple[float, float]
+) -> Any:
+    """Draw one picture; `factor` scales forces and `limits` bound their colours."""
+    from matplotlib.collections import LineCollection
+
+    first, second = _seen_axes(np.concatenate([path.normals for path in group.paths]).mean(axis=0))
+    chosen = [first, second]
+    spread = np.concatenate([path.points for path in group.paths])
+    if group.shell is not None:
+        spread = np.vstack((spread, np.asarray(group.shell.box)))
+    size = float(np.ptp(spread, axis=0).max())
+    length_factor, unit = reading_unit(size, "m")
+    if group.shell is not None:
+        _draw_shell(axis, group.shell, chosen, length_factor)
+    segments, colors = [], []
+    for path in group.paths:
+        flat = path.points[:, chosen] * length_factor
+        for run in path.runs:
+            kept = run[spaced(path.points[run], size / MOST_STEPS)] if size > 0.0 else run[:1]
+            # A touch that lasts one row is a segment without length: its round ends make a dot.
+            ends = np.stack((kept[:-1], kept[1:]), axis=1) if len(kept) > 1 else kept[[[0, 0]]]
+            segments.append(flat[ends])
+            colors.append(path.force[ends].mean(axis=1))
+        axis.plot(*flat[0], marker="o", markersize=5, color="#101418", zorder=4)
+        axis.annotate(
+            names[path.pair],
+            flat[0],
+            xytext=(6, 6),
+            textcoords="offset points",
+            fontsize=8,
+            bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.7},
+            zorder=5,
+        )
+    lines = LineCollection(
+        list(np.concatenate(segments)), cmap="turbo", linewidths=2.4, capstyle="round", zorder=3
+    )
+    lines.set_array(np.concatenate(colors) * factor)
+    lines.set_clim(*limits)
+    axis.add_collection(lines)
+    axis.autoscale_view()
+    axis.set_aspect("equal")
+    frame = "world" if group.shell is None else "shell"
+    axis.set_xlabel(f"{'xyz'[first]} of the {frame} [{unit}]")
+    axis.set_ylabel(f"{'xyz'[second]} of the {frame} [{unit}]")
+    where = "in the world" if group.shell is None else f"on {group.shell.name}"
+    axis.set_title(f"{where} (dot: first touch)", fontsize=10)
+    axis.grid(True, alpha=0.25, linewidth=0.6)
+    return lines
+
+
+def reading_unit(largest: float, base: str) -> tuple[float, str]:
+    """Return factor and name of the unit in which `largest` [base] reads well."""
+    steps = {
+        "m": ((1.0, 1.0, "m"), (1e-4, 1e3, "mm"), (1e-7, 1e6, "µm"), (0.0, 1e9, "nm")),
+        "N": ((1e4, 1e-3, "kN"), (0.1, 1.0, "N"), (1e-4, 1e3, "mN"), (0.0, 1e6, "µN")),
+        "J": (
+            (1e4, 1e-3, "kJ"),
+            (0.1, 1.0, "J"),
+            (1e-4, 1e3, "mJ"),
+            (1e-7, 1e6, "µJ"),
+            (0.0, 1e9, "nJ"),
+        ),
+    }
+    for least, factor, name in steps[base]:
+        if largest >= least and largest > 0.0:
+            return factor, name
+    return 1.0, base
+
+
+def _seen_axes(normal: FloatArray) -> tuple[int, int]:
+    """Return the axes that point right and up for an eye on the side of the mean `normal` (3,)."""
+    along = int(np.argmax(np.abs(normal)))
+    right, up = {0: (1, 2), 1: (2, 0), 2: (0, 1)}[along]
+    return (up, right) if normal[along] < 0.0 else (right, up)
+
+
+def _draw_shell(axis: Any, shell: Shell, chosen: list[int], factor: float) -> None:
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    flat = np.asarray(shell.vertices)[:, chosen] * factor
+    triangles = np.asarray(shell.triangles)
+    if len(triangles) <= MOST_FILLED:
+        fill = PolyCollection(
+            list(flat[triangles]),
+            facecolors="#dfe7e5",
+            edgecolors="#dfe7e5",
+            linewidths=0.4,
+            zorder=1,
+        )
+        axis.add_collection(fill)
+    edges = shell.edge_vertices
+    sharp = edges[shell.edge_class != 0]
+    if not len(sharp) and len(edges) <= MOST_FILLED:
+        sharp = edges
+    outline = LineCollection(flat[sharp], colors="#6f8f89", linewidths=0.7, zorder=2)
+    axis.add_collection(outline)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    axis.update_datalim(np.array([low, high]))

@@ -1,0 +1,208 @@
+"""A finished run as one HTML file that anybody can open: robot, shells, contacts, force arrows."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.view.arrows import (
+    FRICTION_COLOR,
+    NORMAL_COLOR,
+    POINT_COLOR,
+    TOTAL_COLOR,
+    ArrowKind,
+    ArrowScale,
+    largest_force,
+)
+from sphshell_pin.view.contact_path import ContactRows, contact_paths, spaced
+from sphshell_pin.view.display import SPHERE_COLOR, TRAIL_COLOR, Display, choose_view
+from sphshell_pin.view.nodes import FloatArray, require_meshcat
+from sphshell_pin.view.page import FilmWindow, render_page
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from numpy.typing import NDArray
+
+    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.scene import Scene
+
+MOST_ARROWS = 24
+MOST_PIECES = 80  # of a trail
+
+
+def write_recording(
+    path: str | PathLike[str],
+    result: Result,
+    scene: Scene,
+    visual_model: pin.GeometryModel | None = None,
+    *,
+    fps: float = 30,
+    speed: float = 1.0,
+    title: str | None = None,
+    arrows: ArrowKind = "components",
+) -> Path:
+    """Write `result` as one self-contained HTML file at `path`, and return the path.
+
+    The page opens offline, plays, pauses and scrubs. `visual_model` is any geometry model of
+    `scene.model`, visual or collision; without one the joints are drawn as a skeleton. `fps` [1/s]
+    frames are kept per second of the page, `speed` seconds of simulated time pass in one second of
+    it. Each frame shows the recorded row nearest in time, or, where a touch begins and ends between
+    two frames, that touch at its peak. `arrows` is "components" (normal and friction) or "total".
+
+    Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
+    positive or a geometry model that does not fit, ResultError if the file cannot be written.
+    """
+    meshcat = require_meshcat()
+    for name, value in (("fps", fps), ("speed", speed)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise InvalidParameter(name, value, "must be positive")
+    if not len(result.t):
+        raise InvalidParameter("result", "0 recorded rows", "must hold at least one row")
+    contacts = ContactRows.of(result.contacts)
+    rows, times = choose_rows(np.asarray(result.t), contacts, fps, speed)
+    shown = contacts.select(np.isin(contacts.row, rows))
+    view = choose_view(
+        scene, np.asarray(result.q)[rows], contacts.point_world, contacts.normal_world
+    )
+    scale = ArrowScale.from_forces(_forces(shown, arrows), 0.16 * view.distance)
+    most = int(np.bincount(shown.row).max(initial=0)) if len(shown.row) else 0
+
+    window = FilmWindow()
+    display = Display(
+        scene,
+        visual_model,
+        meshcat.Visualizer(window=window),
+        view=view,
+        arrows=arrows,
+        arrow_scale=scale,
+        pool=min(most, MOST_ARROWS),
+    )
+    for frame, row in enumerate(rows):
+        window.frame = frame
+        display.update(result.q[row], contacts.at(int(row)))
+    window.frame = None
+    trailed = _draw_trails(display, window, result, speed)
+
+    name = title or Path(path).stem
+    page = render_page(
+        window.commands(times),
+        name,
+        _legend(scene, scale, arrows, shown, trailed),
+        {"start": float(result.t[0]), "speed": float(speed), "digits": _digits(speed, fps)},
+    )
+    return _write(Path(path), page)
+
+
+def choose_rows(
+    t: FloatArray, contacts: ContactRows, fps: float, speed: float
+) -> tuple[NDArray[np.int64], FloatArray]:
+    """Return the recorded row of each frame (f,) and its time in the page (f,) [s]."""
+    duration = float(t[-1] - t[0]) / speed
+    count = max(2, round(duration * fps) + 1)
+    times = np.linspace(0.0, duration, count)
+    wanted = t[0] + speed * times
+    after = np.clip(np.searchsorted(t, wanted), 1, max(1, len(t) - 1))
+    before = after - 1
+    after = np.minimum(after, len(t) - 1)
+    rows = np.where(wanted - t[before] <= t[after] - wanted, before, after).astype(np.int64)
+    if not len(contacts.row):
+        return rows, times
+    force = np.zeros(len(t))
+    np.maximum.at(force, contacts.row, largest_force(contacts))
+    # A touch shorter than a frame would otherwise be lost between two frames.
+    middles = np.searchsorted(t, 0.5 * (wanted[1:] + wanted[:-1]))
+    starts, ends = np.append(0, middles), np.append(middles, len(t))
+    for frame, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        if end > start and force[rows[frame]] == 0.0:
+            peak = start + int(np.argmax(force[start:end]))
+            if force[peak] > 0.0:
+                rows[frame] = peak
+    return rows, times
+
+
+def _forces(contacts: ContactRows, arrows: ArrowKind) -> FloatArray:
+    """Magnitudes of all arrows that `contacts` bring into the picture [N]."""
+    if arrows == "total":
+        return largest_force(contacts)
+    # Friction is a fraction of the normal force: it shares its scale, and has no say in it.
+    return contacts.normal_force
+
+
+def _draw_trails(display: Display, window: FilmWindow, result: Result, speed: float) -> bool:
+    """Draw each pair's contact path on its shell, in pieces that appear as the run gets there."""
+    drawn = False
+    for path in contact_paths(result, display.scene):
+        if not path.on_shell:
+            continue
+        step = 0.5 * display.trail_width
+        runs = [run[spaced(path.points[run], step)] for run in path.runs]
+        # A contact that chatters has thousands of runs: the long ones are the picture.
+        longest = sorted(runs, key=len, reverse=True)[:MOST_PIECES]
+        length = max(1, -(-sum(map(len, longest)) // MOST_PIECES))
+        for run in longest:
+            for first in range(0, len(run) - 1, length):
+                piece = run[first : first + length + 1]
+                name = f"{path.pair}_{piece[0]}"
+                node = display.draw_trail(name, path.points[piece], path.pair)
+                if node is not None:
+                    seen = float(result.t[path.row[piece[-1]]] - result.t[0]) / speed
+                    window.switch(node, np.array([0.0, max(seen, 1e-3)]), [False, True])
+                    drawn = True
+    return drawn
+
+
+def _legend(
+    scene: Scene, scale: ArrowScale, arrows: ArrowKind, shown: ContactRows, trailed: bool
+) -> list[tuple[str, str]]:
+    legend = []
+    if any(pair.sphere is not None for pair in scene.pairs):
+        radii = sorted({pair.sphere.radius for pair in scene.pairs if pair.sphere is not None})
+        sizes = ", ".join(f"{radius * 1e3:g}" for radius in radii[:3])
+        legend.append((_css(SPHERE_COLOR), f"sphere, radius {sizes} mm"))
+    if not len(shown.row):
+        return [*legend, ("transparent", "no contact in this run")]
+    if arrows == "total":
+        legend.append((_css(TOTAL_COLOR), f"force on the sphere, {scale}"))
+    else:
+        legend.append((_css(NORMAL_COLOR), f"normal force on the sphere, {scale}"))
+        legend.append((_css(FRICTION_COLOR), "friction force, same scale"))
+    if scale.cuts(_forces(shown, arrows)):
+        cut = f"arrows longer than {scale.longest * 1e3:.0f} mm are cut"
+        legend.append(("transparent", cut))
+    legend.append((_css(POINT_COLOR), "contact point"))
+    if trailed:
+        legend.append((_css(TRAIL_COLOR), "path on the shell"))
+    return legend
+
+
+def _css(color: int) -> str:
+    return f"#{color:06x}"
+
+
+def _digits(speed: float, fps: float) -> int:
+    """Return the decimals that tell two frames apart, two at least."""
+    return max(2, int(np.ceil(-np.log10(speed / fps))))
+
+
+def _write(path: Path, page: str) -> Path:
+    """Write `page` at `path`, whole or not at all."""
+    scratch = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, scratch = tempfile.mkstemp(dir=path.parent, suffix=".html.part")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(page)
+        os.chmod(scratch, 0o644)
+        os.replace(scratch, path)
+    except OSError as fault:
+        if scratch is not None:
+            Path(scratch).unlink(missing_ok=True)
+        raise ResultError(path, f"the recording cannot be written ({fault.strerror})") from fault
+    return path

@@ -1,0 +1,130 @@
+"""The robot in the picture: its geometry where there is one, else a skeleton of its joints."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.view.nodes import (
+    HIDDEN_SCALE,
+    FloatArray,
+    material,
+    node_name,
+    pose,
+    rod,
+    rotation_to,
+    set_object,
+    sphere,
+)
+
+LINK_COLOR = 0x8B95A1
+JOINT_COLOR = 0x4A5560
+AXIS_COLORS = (0xE79A9A, 0x97CC99, 0x8FBFEA)  # pale: no axis may pass for an arrow
+
+
+def check_geometry_model(model: pin.Model, geometry_model: pin.GeometryModel) -> None:
+    """Raise InvalidParameter unless `geometry_model` hangs on the joints of `model`.
+
+    A geometry model made for the full robot does not fit a model with locked joints.
+    """
+    for geometry in geometry_model.geometryObjects:
+        joint, frame = geometry.parentJoint, geometry.parentFrame
+        fits = joint < model.njoints and (
+            frame >= model.nframes or model.frames[frame].parentJoint == joint
+        )
+        if not fits:
+            raise InvalidParameter(
+                "visual_model",
+                geometry.name,
+                "must hang on a joint of scene.model: where joints are locked, reduce the geometry "
+                "model too with pinocchio.buildReducedModel",
+            )
+
+
+class GeometryRobot:
+    """The geometry objects of a visual or collision model, drawn by Pinocchio's own loader."""
+
+    def __init__(
+        self, visualizer: Any, model: pin.Model, geometry_model: pin.GeometryModel
+    ) -> None:
+        from pinocchio.visualize import MeshcatVisualizer
+
+        check_geometry_model(model, geometry_model)
+        self._viewer = MeshcatVisualizer(model, pin.GeometryModel(), geometry_model)
+        self._viewer.initViewer(viewer=visualizer, open=False)
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._viewer.loadViewerModel("robot")
+
+    def update(self, data: pin.Data, q: FloatArray) -> None:
+        """Place all geometry at configuration `q` (nq,)."""
+        self._viewer.display(q)
+
+
+class SkeletonRobot:
+    """A rod from each joint to its children, and the axes of each joint's frame.
+
+    A joint that lets a body fly free of the world gets no rod to the world's origin. `tips`
+    (joint, offset (3,) [m]) are places worth a rod of their own: the spheres. Joints in `drawn`
+    have something to see already, and massless ones nothing to show: they get no axes.
+    """
+
+    def __init__(
+        self,
+        visualizer: Any,
+        model: pin.Model,
+        size: float,
+        tips: list[tuple[int, FloatArray]],
+        drawn: set[int],
+    ) -> None:
+        self._width = 0.012 * size
+        self._links: list[tuple[Any, int, int, FloatArray]] = []
+        self._axes: list[tuple[Any, int]] = []
+        root = visualizer["robot"]
+        ends = [
+            (model.parents[joint], joint, np.zeros(3), model.names[joint])
+            for joint in range(1, model.njoints)
+            if model.parents[joint] != 0 or model.joints[joint].nv == 1
+        ]
+        ends += [
+            (joint, joint, offset, f"tip_{index}")
+            for index, (joint, offset) in enumerate(tips)
+            if joint != 0
+        ]
+        for start, end, offset, name in ends:
+            node = root["links"][node_name(name)]
+            set_object(node, rod(1.0, 1.0), material("MeshPhong", LINK_COLOR))
+            self._links.append((node, start, end, offset))
+        for joint in range(1, model.njoints):
+            if joint in drawn or model.inertias[joint].mass == 0.0:
+                continue
+            node = root["joints"][node_name(model.names[joint])]
+            set_object(
+                node["ball"], sphere(1.6 * self._width, 20), material("MeshPhong", JOINT_COLOR)
+            )
+            for axis, color in enumerate(AXIS_COLORS):
+                arm = node["xyz"[axis]]
+                set_object(arm, rod(0.45, 0.45), material("MeshBasic", color))
+                direction = np.eye(3)[axis]
+                length = 5.0 * self._width
+                shape = np.array([self._width, length, self._width])
+                arm.set_transform(pose(rotation_to(direction), 0.5 * length * direction, shape))
+            self._axes.append((node, joint))
+
+    def update(self, data: pin.Data, q: FloatArray) -> None:
+        """Place rods and axes where forward kinematics left the joints in `data`."""
+        for node, start, end, offset in self._links:
+            first = data.oMi[start].translation
+            step = data.oMi[end].act(offset) - first
+            length = float(np.linalg.norm(step))
+            if length < self._width:
+                node.set_transform(pose(np.eye(3), first, HIDDEN_SCALE))
+                continue
+            shape = np.array([self._width, length, self._width])
+            node.set_transform(pose(rotation_to(step), first + 0.5 * step, shape))
+        for node, joint in self._axes:
+            node.set_transform(data.oMi[joint].homogeneous)

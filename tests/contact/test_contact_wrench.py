@@ -1,0 +1,127 @@
+"""The wrench routine for anybody's contact points: one point, two bodies that move and turn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import CoulombFriction, HuntCrossleyLaw, ImpactLaw, contact_wrench
+from sphshell_pin.errors import InvalidParameter
+from tests.oracle import laws
+from tests.oracle.mechanics import force_on_i
+
+LAW = ImpactLaw(1e5, 1.5, 50.0, 1e-3)
+FRICTION = CoulombFriction(0.3, 0.1, 0.1, 1.0)
+
+
+def impact(depth: float, gap_rate: float) -> float:
+    return laws.impact(-depth, gap_rate, 0.0, 1e5, 1.5, 50.0, 1e-3)
+
+
+def coulomb(slip: float) -> float:
+    return laws.coulomb(slip, 0.3, 0.1, 0.1, 1.0)
+
+
+def random_case(seed: int):
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=3)
+    speed = 10 ** rng.uniform(-2, 1)
+    motions = [pin.Motion(rng.normal(size=6) * speed) for _ in range(2)]
+    return rng.normal(size=3), normal / np.linalg.norm(normal), rng.uniform(1e-3, 1e-2), *motions
+
+
+@pytest.mark.parametrize("friction", [None, FRICTION])
+@pytest.mark.parametrize("seed", range(40))
+def test_against_plain_vectors(seed: int, friction) -> None:
+    point, normal, depth, motion_i, motion_j = random_case(seed)
+    on_i, on_j = contact_wrench(point, normal, depth, motion_i, motion_j, LAW, friction)
+    force = force_on_i(
+        point,
+        normal,
+        depth,
+        motion_i,
+        motion_j,
+        normal_force=impact,
+        coefficient=coulomb if friction else None,
+    )
+    scale = np.linalg.norm(force) + 1.0
+    assert np.abs(on_i.linear - force).max() <= 1e-12 * scale
+    assert np.abs(on_i.angular - np.cross(point, force)).max() <= 1e-11 * scale
+    assert np.array_equal(on_i.vector, -on_j.vector)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_common_motion_changes_nothing(seed: int) -> None:
+    """Only the relative motion counts: carry both bodies along any rigid motion."""
+    point, normal, depth, motion_i, motion_j = random_case(seed)
+    carried = pin.Motion(np.random.default_rng(seed + 99).normal(size=6) * 3.0)
+    a, _ = contact_wrench(point, normal, depth, motion_i, motion_j, LAW, FRICTION)
+    b, _ = contact_wrench(
+        point, normal, depth, motion_i + carried, motion_j + carried, LAW, FRICTION
+    )
+    assert b.vector == pytest.approx(a.vector, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_exchanging_the_bodies_turns_the_normal(seed: int) -> None:
+    point, normal, depth, motion_i, motion_j = random_case(seed)
+    a = contact_wrench(point, normal, depth, motion_i, motion_j, LAW, FRICTION)
+    b = contact_wrench(point, -normal, depth, motion_j, motion_i, LAW, FRICTION)
+    assert b[0].vector == pytest.approx(a[1].vector, rel=1e-12, abs=1e-12)
+
+
+def test_turntable() -> None:
+    """1 rev/s at 0.2 m: slip 1.2566 m/s, past v_dynamic: 0.1 N along the rim for 1 N of load."""
+    table = pin.Motion(np.zeros(3), np.array([0.0, 0.0, 2 * np.pi]))
+    law = ImpactLaw(1.0, 1.0, 0.0, 1.0)
+    point, normal = np.array([0.2, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    # A friction whose knots bracket the slip speed tells it apart to seven digits.
+    slip = 0.2 * 2 * np.pi
+    assert slip == pytest.approx(1.2566, abs=5e-5)
+    ramp = CoulombFriction(0.3, 0.1, 0.5, 2.0)
+    for friction in (FRICTION, ramp):
+        on_ball, on_table = contact_wrench(
+            point, normal, 1.0, pin.Motion.Zero(), table, law, friction
+        )
+        mu = friction.coefficient(slip)
+        assert on_ball.linear == pytest.approx([0.0, mu, 1.0], abs=1e-14)
+        assert on_table.angular[2] == pytest.approx(-0.2 * mu, abs=1e-14)
+    assert FRICTION.coefficient(slip) == 0.1
+
+
+def test_creep_is_smooth_through_zero_slip() -> None:
+    """No division by the slip speed: tiny slips give tiny, exact forces."""
+    normal = np.array([0.0, 0.0, 1.0])
+    law = ImpactLaw(1.0, 1.0, 0.0, 1.0)
+    for slip in (0.0, 1e-300, 1e-160, 1e-20, 1e-9):
+        motion = pin.Motion(np.array([slip, 0.0, 0.0]), np.zeros(3))
+        on_i, _ = contact_wrench(np.zeros(3), normal, 1.0, motion, pin.Motion.Zero(), law, FRICTION)
+        assert on_i.linear == pytest.approx([-0.3 * 1.5 * slip / 0.1, 0.0, 1.0], rel=1e-9, abs=0.0)
+
+
+def test_no_touch_no_force() -> None:
+    zero = pin.Motion.Zero()
+    args = (np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    for law in (LAW, HuntCrossleyLaw(1e5, 1.5, 0.1)):
+        for depth in (0.0, -1e-3):
+            for wrench in contact_wrench(*args, depth, zero, zero, law, FRICTION):
+                assert not wrench.vector.any()
+
+
+@pytest.mark.parametrize(
+    ("point", "normal", "depth", "name"),
+    [
+        ([0, 0], [0, 0, 1], 1e-3, "point"),
+        ([0, 0, float("nan")], [0, 0, 1], 1e-3, "point"),
+        ([0, 0, 0], [0, 0, 2], 1e-3, "normal"),
+        ([0, 0, 0], [0, 0, 0], 1e-3, "normal"),
+        ([0, 0, 0], [0, 0, 1], float("nan"), "depth"),
+    ],
+)
+def test_bad_arguments_are_named(point, normal, depth, name: str) -> None:
+    zero = pin.Motion.Zero()
+    with pytest.raises(InvalidParameter, match=name):
+        contact_wrench(
+            np.array(point, float), np.array(normal, float), depth, zero, zero, LAW, None
+        )

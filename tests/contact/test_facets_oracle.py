@@ -1,0 +1,100 @@
+"""The fast query meets the brute-force definition on random, structured and nasty surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests import meshes
+from tests.contact.helpers import heights, positions, shell_of
+from tests.oracle import contacts as oracle
+from tests.oracle.geometry import closest_on_triangles, corners_of, norm
+
+EPS = float(np.finfo(float).eps)
+
+# name -> (mesh, radii to try)
+SURFACES = {
+    "two triangles": (meshes.grid_plate(), (0.2, 1.5)),
+    "quads": (meshes.grid_plate(3, 3, quads=True), (0.2, 1.5)),
+    "random plate": (meshes.random_plate(60, seed=1), (0.1, 0.4)),
+    "l plate": (meshes.l_plate(2), (0.2, 0.8)),
+    "v groove": (meshes.v_groove(0.5, cells=2), (0.2, 1.2)),
+    "sharp v groove": (meshes.v_groove(1.3), (0.3, 1.0)),
+    "flat v groove": (meshes.v_groove(1e-3, cells=2), (0.3, 1.0)),
+    "ridge": (meshes.v_groove(-0.5, cells=2), (0.2, 1.2)),
+    "cube": (meshes.cube(), (0.3, 1.2)),
+    "cube of quads": (meshes.cube(quads=True), (0.3, 1.2)),
+    "icosahedron": (meshes.icosphere(0), (0.4, 1.2)),
+    "icosphere": (meshes.icosphere(2), (0.2, 0.95)),
+    "dome": (meshes.dome(6), (0.3,)),
+    "bowl": (meshes.bowl(6), (0.3, 1.5)),
+    "crumpled": (meshes.crumpled(5, seed=2), (0.15, 0.5)),
+    "needles": (meshes.needles(24, 1e4), (0.05, 0.6)),
+    "fan": (meshes.fan(5, seed=1), (0.2, 0.6)),
+    "wide fan": (meshes.fan(9, seed=4), (0.4,)),
+    "soup": (meshes.soup(40, seed=0), (0.2, 0.5)),
+    "sparse soup": (meshes.soup(12, seed=5, spread=0.3), (0.4, 1.5)),
+    "dense soup": (meshes.soup(120, seed=7, spread=0.2), (0.15,)),
+}
+
+
+@pytest.mark.parametrize("method", ["facets", "elements"])
+@pytest.mark.parametrize("name", SURFACES)
+def test_same_set(name: str, method: str) -> None:
+    """Same set to 1e-12 of the size; a needle's plane is known to eps / height only."""
+    (vertices, elements), radii = SURFACES[name]
+    shell = shell_of((vertices, elements))
+    corners, owner = corners_of(vertices, elements)
+    find = getattr(oracle, method)
+    height = heights(vertices, elements[:, :3]).min()
+    touched = 0
+    for radius in radii:
+        for center in positions(vertices, elements, radius, 60, seed=len(name)):
+            expected = find(center, radius, corners, owner)
+            found = shell.contacts(center, radius, method=method)
+            size = oracle.size_of(center, radius, corners)
+            tolerance = 1e-12 * size + 8 * EPS * size**2 / height
+            why = oracle.mismatch(found, expected, tolerance)
+            assert not why, f"{name}, radius {radius}, center {center.tolist()}: {why}"
+            close = [t for t in expected if t.depth < 0.99 * radius]
+            if len(close) == len(expected):
+                assert oracle.normal_error(found, expected) <= 1e2 * tolerance / radius
+            touched += len(found)
+    assert touched > 60
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_soups(seed: int) -> None:
+    vertices, elements = meshes.soup(30, seed=100 + seed, spread=0.15 + 0.05 * seed)
+    shell = shell_of((vertices, elements))
+    corners, owner = corners_of(vertices, elements)
+    for center in positions(vertices, elements, 0.4, 25, seed=seed):
+        found = shell.contacts(center, 0.4, method="facets")
+        why = oracle.mismatch(found, oracle.facets(center, 0.4, corners, owner), 1e-12)
+        assert not why, f"seed {seed}, center {center.tolist()}: {why}"
+
+
+@pytest.mark.parametrize("name", ["cube", "icosphere", "crumpled", "soup", "fan", "needles"])
+def test_closest_points(name: str) -> None:
+    """The distance of `closest_points` is the smallest over all triangles."""
+    vertices, elements = SURFACES[name][0]
+    shell = shell_of((vertices, elements))
+    corners, _ = corners_of(vertices, elements)
+    points = np.array(list(positions(vertices, elements, 0.8, 50, seed=1)))
+    closest = shell.closest_points(points)
+    for k, point in enumerate(points):
+        distance = float(norm(point - closest_on_triangles(point, corners)).min())
+        assert abs(abs(closest.distances[k]) - distance) <= 1e-12
+        assert abs(np.linalg.norm(point - closest.points[k]) - distance) <= 1e-12
+        assert abs(np.linalg.norm(closest.normals[k]) - 1.0) <= 1e-14
+
+
+def test_crease_angle_does_not_matter_to_the_exact_polyhedron() -> None:
+    mesh = meshes.crumpled(5, seed=3)
+    reference = shell_of(mesh)
+    for angle in (0.0, 0.2, np.pi):
+        shell = shell_of(mesh, crease_angle=angle)
+        for center in positions(*mesh, 0.3, 40, seed=5):
+            a, b = (s.contacts(center, 0.3, method="facets") for s in (reference, shell))
+            assert np.array_equal(a.point, b.point)
+            assert np.array_equal(a.depth, b.depth)

@@ -1,0 +1,154 @@
+"""A flat plate is one contact, whatever its tessellation: no ghost force, no side force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sphshell_pin import Shell
+from sphshell_pin.contact.contact_set import Feature
+from tests import meshes
+from tests.contact.helpers import force_sum, heights, shell_of
+
+RADIUS, DEPTH, EXPONENT = 0.1, 0.005, 1.5
+EPS = float(np.finfo(float).eps)
+COUNTS = (2, 8, 200, 2000, 20_000, 200_000)
+
+
+def spots(vertices, triangles, seed, count=1000):
+    """Places (x, y) on the plate: random ones, then vertices and middles of sides."""
+    rng = np.random.default_rng(seed)
+    random = rng.uniform(-0.5, 0.5, (count, 2))
+    corners = vertices[rng.choice(len(vertices), min(200, len(vertices)), replace=False), :2]
+    chosen = triangles[rng.choice(len(triangles), min(200, len(triangles)), replace=False)]
+    k = rng.integers(3, size=len(chosen))
+    rows = np.arange(len(chosen))
+    share = rng.choice([0.5, 0.25, rng.uniform()], size=(len(chosen), 1))
+    ends = vertices[chosen[rows, k], :2], vertices[chosen[rows, (k + 1) % 3], :2]
+    return random, np.concatenate([corners, ends[0] + share * (ends[1] - ends[0])])
+
+
+def errors(contacts, normal):
+    """Relative force error and side force of a contact of depth DEPTH against `normal`."""
+    force = force_sum(contacts, EXPONENT) / DEPTH**EXPONENT
+    along = float(force @ normal)
+    return abs(along - 1.0), float(np.linalg.norm(force - along * normal))
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("kind", ["slivers", "delaunay"])
+def test_one_exact_contact(kind: str, count: int) -> None:
+    if kind == "delaunay":
+        pytest.importorskip("scipy")
+        vertices, triangles = meshes.delaunay_plate(count, seed=count)
+    else:
+        vertices, triangles = meshes.random_plate(count, seed=count)
+    shell = Shell(vertices, triangles)
+    assert len(shell.elements) == len(triangles)
+    up = np.array([0.0, 0.0, 1.0])
+    worst = np.zeros(2)
+    for place in np.concatenate(spots(vertices, triangles, seed=count)):
+        for sign in (1.0, -1.0):
+            center = np.array([place[0], place[1], sign * (RADIUS - DEPTH)])
+            contacts = shell.contacts(center, RADIUS, method="facets")
+            assert len(contacts) == 1, (center, contacts.point)
+            worst = np.maximum(worst, errors(contacts, sign * up))
+    assert worst.max() <= 1e-12
+
+
+@pytest.mark.parametrize("slivers", [False, True])
+@pytest.mark.parametrize("count", COUNTS)
+def test_rotated_plate(count: int, slivers: bool) -> None:
+    """A rotated plate is flat only to rounding: vertices are off its plane by about eps * size.
+
+    An element of height h and length l is then tilted by up to eps * size / h, and so much may the
+    side force be; the depth may be off by the tilt times l. On regular elements (height above 1e-3
+    of the size) both errors stay below 1e-12.
+    """
+    flat, triangles = meshes.random_plate(count, seed=count, slivers=slivers)
+    rotation, shift = meshes.random_rotation(count), np.array([0.3, -0.2, 0.4])
+    vertices = flat @ rotation.T + shift
+    normal = rotation[:, 2]
+    shell = Shell(vertices, triangles)
+    height = heights(vertices, triangles)
+    size = float(np.abs(vertices).max())
+    random, special = spots(flat, triangles, seed=count)
+    for place in np.concatenate([random, special]):
+        center = rotation @ [place[0], place[1], RADIUS - DEPTH] + shift
+        contacts = shell.contacts(center, RADIUS, method="facets")
+        assert len(contacts) == 1, (place, contacts.point)
+        force_error, side_force = errors(contacts, normal)
+        element = shell.source_element[contacts.element[0]]
+        tilt = 4 * EPS * size / height[element] if slivers or count > 20_000 else 0.0
+        length = np.ptp(vertices[triangles[element]], axis=0).max()
+        assert force_error <= 1e-12 + EXPONENT * tilt * length / DEPTH
+        assert side_force <= 1e-12 + tilt
+
+
+def test_over_and_beyond_the_border() -> None:
+    """Beyond the border the closest point is the clamped one, the feature the border's."""
+    vertices, triangles = meshes.random_plate(200, seed=3)
+    shell = Shell(vertices, triangles)
+    rng = np.random.default_rng(3)
+    seen = set()
+    for x, y in rng.uniform(-0.56, 0.56, (2000, 2)):
+        center = np.array([x, y, rng.uniform(-0.05, 0.05)])
+        foot = np.array([np.clip(x, -0.5, 0.5), np.clip(y, -0.5, 0.5), 0.0])
+        distance = np.linalg.norm(center - foot)
+        contacts = shell.contacts(center, RADIUS, method="facets")
+        outside = int(abs(x) > 0.5) + int(abs(y) > 0.5)
+        if distance >= RADIUS:
+            assert len(contacts) == 0
+            continue
+        assert len(contacts) == 1
+        assert np.abs(contacts.point[0] - foot).max() <= 1e-15
+        assert abs(contacts.depth[0] - (RADIUS - distance)) <= 1e-15
+        assert np.abs(contacts.normal[0] - (center - foot) / distance).max() <= 1e-12
+        assert contacts.feature[0] == (Feature.FACE, Feature.EDGE, Feature.VERTEX)[outside]
+        seen.add(outside)
+    assert seen == {0, 1, 2}
+
+
+def test_inner_edges_and_vertices_are_face_contacts() -> None:
+    vertices, triangles = meshes.grid_plate(4, 4)
+    shell = Shell(vertices, triangles)
+    for x, y in [(0.0, 0.0), (0.25, 0.0), (0.125, 0.125), (0.1, 0.25), (-0.25, 0.25)]:
+        contacts = shell.contacts([x, y, 0.09], RADIUS, method="facets")
+        assert len(contacts) == 1
+        assert contacts.feature[0] == Feature.FACE
+        assert np.array_equal(contacts.point[0], [x, y, 0.0])
+        assert np.array_equal(contacts.normal[0], [0.0, 0.0, 1.0])
+
+
+def test_quads_are_elements_and_change_nothing() -> None:
+    quads = shell_of(meshes.grid_plate(4, 4, quads=True))
+    assert quads.elements.shape == (16, 4)
+    for x, y in np.random.default_rng(0).uniform(-0.5, 0.5, (200, 2)):
+        contacts = quads.contacts([x, y, 0.095], RADIUS, method="facets")
+        assert len(contacts) == 1
+        assert np.abs(contacts.point[0] - [x, y, 0.0]).max() <= 1e-16
+        cell = int((x + 0.5) * 4) * 4 + int((y + 0.5) * 4)
+        assert contacts.element[0] == cell
+
+
+def test_reentrant_corner_of_an_l_plate() -> None:
+    """Over the missing quarter the plate's two borders push, each at its own closest point."""
+    shell = shell_of(meshes.l_plate(3))
+    contacts = shell.contacts([0.03, 0.04, 0.0], RADIUS, method="facets")
+    points = sorted(map(tuple, np.round(contacts.point, 14)))
+    assert points == [(0.0, 0.04, 0.0), (0.03, 0.0, 0.0)]
+    assert sorted(np.round(contacts.depth, 14)) == [0.06, 0.07]
+    assert all(contacts.feature == Feature.EDGE)
+    over = shell.contacts([-1e-3, -1e-3, 0.09], RADIUS, method="facets")
+    assert len(over) == 1
+    assert over.feature[0] == Feature.FACE
+
+
+def test_centre_on_the_surface_gives_a_finite_unit_normal() -> None:
+    """With the centre on the plate the direction is undefined but for the element's own normal."""
+    shell = shell_of(meshes.grid_plate(3, 3))
+    for x, y in [(0.05, 0.1), (0.0, 0.0), (1 / 6, 0.05)]:
+        contacts = shell.contacts([x, y, 0.0], RADIUS, method="facets")
+        assert len(contacts) == 1
+        assert contacts.depth[0] == pytest.approx(RADIUS, abs=1e-15)
+        assert np.abs(contacts.normal[0]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-15)

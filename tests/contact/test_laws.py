@@ -1,0 +1,153 @@
+"""Normal force laws: documented spot values, units, closed forms, limits of their parameters."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sphshell_pin import HuntCrossleyLaw, ImpactLaw
+from sphshell_pin.errors import InvalidParameter
+from tests.oracle import laws as oracle
+
+MM = 1e-3
+DEFAULTS = ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s")
+
+
+@pytest.mark.parametrize(
+    ("depth", "gap_rate", "force"),
+    [
+        (0.05, 0.0, 137.320068),
+        (0.05, -100.0, 637.320068),
+        (0.05, 100.0, 0.0),
+        (0.1, -100.0, 1630.957344),
+        (0.2, -1000.0, 12899.118655),
+        (0.01, 100.0, 0.0),
+    ],
+)
+def test_impact_spot_values(depth: float, gap_rate: float, force: float) -> None:
+    """ADAMS's IMPACT with its default numbers, mm and mm/s."""
+    assert DEFAULTS.normal_force(depth * MM, gap_rate * MM) == pytest.approx(force, abs=5e-7)
+
+
+def test_the_documented_example() -> None:
+    """IMPACT(14.5, -20, 15, 100, 1.2, 2.5, 0.01) in its own units."""
+    law = ImpactLaw(stiffness=100.0, exponent=1.2, damping=2.5, full_damping_depth=0.01)
+    assert law.normal_force(0.5, -20.0) == pytest.approx(93.5275281648, abs=1e-10)
+
+
+def test_adams_units() -> None:
+    """K [N/m^e] = K [N/mm^e] 1000^e; damping by 1000; depth by 1e-3."""
+    assert DEFAULTS.stiffness == pytest.approx(1e5 * 1000.0**2.2, rel=1e-14)
+    assert DEFAULTS.exponent == 2.2
+    assert DEFAULTS.damping == pytest.approx(1e4, rel=1e-15)
+    assert DEFAULTS.full_damping_depth == pytest.approx(1e-4, rel=1e-15)
+    assert DEFAULTS.stiffness / 1e8 == pytest.approx(3981.0717, rel=1e-7)
+    with pytest.raises(InvalidParameter, match="units"):
+        ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="furlong")
+
+
+@given(
+    depth=st.floats(-1e-3, 1e-3),
+    gap_rate=st.floats(-5.0, 5.0),
+    exponent=st.floats(1.0, 3.0),
+    damping=st.floats(0.0, 1e4),
+    full=st.floats(1e-5, 1e-3),
+)
+def test_impact_is_the_printed_formula(depth, gap_rate, exponent, damping, full) -> None:
+    law = ImpactLaw(1e7, exponent, damping, full)
+    expected = oracle.impact(-depth, gap_rate, 0.0, 1e7, exponent, damping, full)
+    scale = 1e7 * abs(depth) ** exponent + damping * abs(gap_rate)
+    assert law.normal_force(depth, gap_rate) == pytest.approx(expected, abs=1e-11 * scale + 1e-300)
+
+
+@given(
+    depth=st.floats(-1e-3, 1e-3), gap_rate=st.floats(-5.0, 5.0), dissipation=st.floats(0.0, 10.0)
+)
+def test_hunt_crossley_is_the_printed_formula(depth, gap_rate, dissipation) -> None:
+    law = HuntCrossleyLaw(stiffness=1e9, exponent=1.5, dissipation=dissipation)
+    expected = oracle.hunt_crossley(depth, gap_rate, 1e9, 1.5, dissipation)
+    assert law.normal_force(depth, gap_rate) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("law", [DEFAULTS, HuntCrossleyLaw(1e9, 1.5, 0.3), ImpactLaw(1e4, 1, 0, 1)])
+def test_energy_is_the_work_of_the_spring(law) -> None:
+    assert law.energy(0.0) == law.energy(-1e-3) == 0.0
+    for depth in np.linspace(1e-5, 2e-3, 7):
+        h = 1e-4 * depth
+        slope = (law.energy(depth + h) - law.energy(depth - h)) / (2 * h)
+        assert slope == pytest.approx(law.normal_force(depth, 0.0), rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("radius_mm", "stiffness"), [(5, 3.369e5), (10, 4.765e5), (25, 7.534e5), (30, 8.253e5)]
+)
+def test_hertz_steel_ball_on_steel_plane(radius_mm: float, stiffness: float) -> None:
+    """E = 207 GPa, nu = 0.29: K [N/mm^1.5] = 4/3 E* sqrt(R)."""
+    law = ImpactLaw.hertz(radius_mm * MM, 207e9, 0.29, 207e9, 0.29)
+    assert law.exponent == 1.5
+    assert law.stiffness / 1000**1.5 == pytest.approx(stiffness, rel=2e-4)
+    exact = 4 / 3 * 207e9 / (2 * (1 - 0.29**2)) * (radius_mm * MM) ** 0.5
+    assert law.stiffness == pytest.approx(exact, rel=1e-14)
+    assert law.normal_force(1e-5, -1.0) == pytest.approx(exact * 1e-5**1.5, rel=1e-14)
+
+
+def test_hertz_of_two_materials() -> None:
+    law = ImpactLaw.hertz(0.01, 207e9, 0.29, 3e9, 0.4)
+    inverse = (1 - 0.29**2) / 207e9 + (1 - 0.4**2) / 3e9
+    assert law.stiffness == pytest.approx(4 / 3 / inverse * 0.1, rel=1e-14)
+
+
+@pytest.mark.parametrize("restitution", [0.05, 0.3, 0.7, 0.95, 0.999])
+@pytest.mark.parametrize("speed", [0.01, 0.3, 5.0])
+def test_hertz_with_restitution(restitution: float, speed: float) -> None:
+    """d v0 - ln(1 + d v0) = -d v1 - ln(1 - d v1), v1 = restitution v0."""
+    law = ImpactLaw.hertz(0.01, 207e9, 0.29, 207e9, 0.29, restitution=restitution, speed=speed)
+    assert isinstance(law, HuntCrossleyLaw)
+    assert law.exponent == 1.5
+    got = oracle.hunt_crossley_restitution(speed, law.dissipation)
+    assert got == pytest.approx(restitution, abs=1e-8)
+
+
+def test_hertz_asks_for_both_restitution_and_speed() -> None:
+    for half in ({"restitution": 0.5}, {"speed": 1.0}):
+        with pytest.raises(InvalidParameter):
+            ImpactLaw.hertz(0.01, 207e9, 0.29, 207e9, 0.29, **half)
+
+
+BAD_LAWS = [
+    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 0, -1.0, "stiffness"),
+    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 0, float("nan"), "stiffness"),
+    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 1, 0.0, "exponent"),
+    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 1, float("inf"), "exponent"),
+    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 2, -1.0, "damping"),
+    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 3, 0.0, "full_damping_depth"),
+    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 3, float("nan"), "full_damping_depth"),
+    (HuntCrossleyLaw, (1e5, 1.5, 0.1), 0, -1.0, "stiffness"),
+    (HuntCrossleyLaw, (1e5, 1.5, 0.1), 1, -1.0, "exponent"),
+    (HuntCrossleyLaw, (1e5, 1.5, 0.1), 2, -1e-9, "dissipation"),
+    (ImpactLaw.hertz, (0.01, 2e11, 0.3, 2e11, 0.3, 0.5, 1.0), 0, 0.0, "radius"),
+    (ImpactLaw.hertz, (0.01, 2e11, 0.3, 2e11, 0.3, 0.5, 1.0), 1, -1.0, "young_1"),
+    (ImpactLaw.hertz, (0.01, 2e11, 0.3, 2e11, 0.3, 0.5, 1.0), 4, 0.6, "poisson_2"),
+    (ImpactLaw.hertz, (0.01, 2e11, 0.3, 2e11, 0.3, 0.5, 1.0), 5, 1.5, "restitution"),
+    (ImpactLaw.hertz, (0.01, 2e11, 0.3, 2e11, 0.3, 0.5, 1.0), 6, -1.0, "speed"),
+]
+
+
+@pytest.mark.parametrize(("make", "good", "place", "value", "name"), BAD_LAWS)
+def test_bad_values_are_named(make, good, place: int, value: float, name: str) -> None:
+    make(*good)
+    bad = [*good[:place], value, *good[place + 1 :]]
+    with pytest.raises(InvalidParameter) as caught:
+        make(*bad)
+    assert caught.value.name == name
+    assert name in str(caught.value)
+
+
+def test_laws_are_values() -> None:
+    assert ImpactLaw(1.0, 1.5, 0.0, 1.0) == ImpactLaw(1.0, 1.5, 0.0, 1.0)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        DEFAULTS.stiffness = 1.0

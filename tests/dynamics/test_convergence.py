@@ -1,0 +1,174 @@
+"""Orders of convergence in dt, resting depths, and restitution, through the package's own runs."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import (
+    CoulombFriction,
+    ImpactLaw,
+    RungeKutta4,
+    Scene,
+    SemiImplicitEuler,
+    Simulation,
+    Sphere,
+)
+from tests.models import (
+    ball,
+    free_q,
+    linear_law,
+    on_plate,
+    plate,
+    slider,
+    two_free_bodies,
+    two_free_state,
+)
+from tests.oracle.laws import hunt_crossley_restitution
+
+MM, RADIUS = 1e-3, 0.05
+SMOOTH_FRICTION = CoulombFriction(0.3, 0.1, 20.0, 40.0)
+STEPPERS = [(SemiImplicitEuler, 1), (RungeKutta4, 4)]
+
+
+def order_of(model: pin.Model, results) -> float:
+    """Observed order from the end states of three runs, each with half the dt of the one before."""
+    ends = [(r.q[-1], r.v[-1]) for r in results]
+    steps = [
+        np.linalg.norm(np.concatenate([pin.difference(model, b[0], a[0]), a[1] - b[1]]))
+        for a, b in pairwise(ends)
+    ]
+    return float(np.log2(steps[0] / steps[1]))
+
+
+def rolling(integrator, steps: int, damping: float = 20.0, friction=SMOOTH_FRICTION):
+    """Ball deep in a plate that slides, spins and bobs without ever leaving it."""
+    scene = on_plate(ball(), linear_law(4000.0, damping), friction, radius=RADIUS)
+    q0 = free_q([-0.1, 0.03, RADIUS - 0.004])
+    v0 = np.array([1.0, -0.5, 0.05, 20.0, 30.0, -10.0])
+    result = Simulation(scene, integrator(dt=0.1 / steps)).run(q0, v0, 0.1)
+    assert not [e for e in result.events if e.kind == "lift_off"]
+    return scene.model, result
+
+
+@pytest.mark.parametrize(("integrator", "order"), STEPPERS)
+def test_order_of_a_ball_rolling_on_a_plate(integrator, order: int) -> None:
+    steps = 200 if order == 1 else 25
+    runs = [rolling(integrator, steps * k) for k in (1, 2, 4)]
+    seen = order_of(runs[0][0], [r for _, r in runs])
+    assert seen == pytest.approx(order, abs=0.25)
+
+
+@pytest.mark.parametrize(("integrator", "order"), STEPPERS)
+def test_order_with_both_bodies_tumbling(integrator, order: int) -> None:
+    scene = two_free_bodies(linear_law(2000.0, 5.0), SMOOTH_FRICTION)
+    q0, v0 = two_free_state()
+    steps = 200 if order == 1 else 20
+    runs = [
+        Simulation(scene, integrator(dt=0.02 / (steps * k))).run(q0, v0, 0.02) for k in (1, 2, 4)
+    ]
+    assert order_of(scene.model, runs) == pytest.approx(order, abs=0.3)
+
+
+@pytest.mark.parametrize(("integrator", "order"), STEPPERS)
+@pytest.mark.parametrize("friction", [None, SMOOTH_FRICTION])
+@pytest.mark.parametrize("damping", [0.0, 20.0])
+def test_energy_residual_falls_at_the_order(integrator, order, friction, damping) -> None:
+    steps = 200 if order == 1 else 25
+    audits = [rolling(integrator, steps * k, damping, friction)[1].energy for k in (1, 2, 4)]
+    residual = [float(np.abs(a.residual[-1])) for a in audits]
+    scale = float(audits[-1].kinetic[0])
+    for a, b in pairwise(residual):
+        assert np.log2(a / b) >= order - 0.3 or b <= 1e-13 * scale, residual
+    assert residual[-1] <= (2e-2 if order == 1 else 1e-7) * scale
+    finest = audits[-1]
+    assert (finest.damping_loss[-1] > 1e-3) == (damping > 0)
+    assert (finest.friction_loss[-1] > 1e-3) == (friction is not None)
+
+
+def test_linear_oscillation_against_the_closed_form() -> None:
+    """Mass on an undamped linear plate: z = z_rest + A cos(omega t) while in touch."""
+    stiffness, sag = 4000.0, 9.81 / 4000.0
+    scene = on_plate(slider(), linear_law(stiffness), radius=RADIUS)
+    start, omega = 0.5 * sag, stiffness**0.5
+    q0 = np.array([RADIUS - sag + start])
+    result = Simulation(scene, RungeKutta4(dt=1e-4)).run(q0, np.zeros(1), 0.2)
+    exact = RADIUS - sag + start * np.cos(omega * result.t)
+    assert result.q[:, 0] == pytest.approx(exact, abs=1e-5 * sag)
+
+
+@pytest.mark.parametrize(
+    ("law", "depth_mm"),
+    [
+        (ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s"), 0.0150671588506),
+        (ImpactLaw(1e8, 2.2, 150.0, 1e-4), 0.652221338485),
+    ],
+)
+def test_resting_depth(law: ImpactLaw, depth_mm: float) -> None:
+    """1 kg let go a little above its rest settles at (m g / k)^(1/e)."""
+    scene = on_plate(slider(), law, radius=RADIUS)
+    q0 = np.array([RADIUS - 0.9 * depth_mm * MM])
+    slow = depth_mm > 0.1
+    dt, duration = (2e-5, 0.6) if slow else (1e-5, 0.15)
+    result = Simulation(scene, RungeKutta4(dt=dt)).run(q0, np.zeros(1), duration)
+    assert (RADIUS - result.q[-1, 0]) / MM == pytest.approx(depth_mm, rel=1e-9)
+    assert abs(result.v[-1, 0]) < 1e-10
+    assert scene.contacts(result.q[-1], result.v[-1]).normal_force == pytest.approx(
+        [9.81], rel=1e-8
+    )
+
+
+@pytest.mark.parametrize(
+    ("speed_mm", "restitution", "deepest_mm"), [(100, 0.2074, 0.04295), (1000, 0.0874, 0.13032)]
+)
+def test_restitution_of_impact(speed_mm: float, restitution: float, deepest_mm: float) -> None:
+    """1 kg against a fixed plane with ADAMS's defaults, no gravity."""
+    law = ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s")
+    scene = on_plate(slider(gravity=0.0), law, radius=RADIUS)
+    v0 = np.array([-speed_mm * MM])
+    result = Simulation(scene, RungeKutta4(dt=1e-6)).run(np.array([RADIUS + 1e-6]), v0, 4e-3)
+    assert result.v[-1, 0] / (speed_mm * MM) == pytest.approx(restitution, abs=1e-4)
+    deepest = result.stats["pairs"]["ball-plate"]["max_depth"]
+    assert deepest / MM == pytest.approx(deepest_mm, abs=1e-5)
+
+
+@pytest.mark.parametrize("restitution", [0.3, 0.8])
+def test_restitution_of_hertz_with_hunt_crossley(restitution: float) -> None:
+    law = ImpactLaw.hertz(RADIUS, 1e8, 0.3, 1e8, 0.3, restitution=restitution, speed=0.5)
+    scene = on_plate(slider(gravity=0.0), law, radius=RADIUS)
+    q0 = np.array([RADIUS + 1e-6])
+    for speed in (0.5, 0.2):
+        result = Simulation(scene, RungeKutta4(dt=5e-6)).run(q0, np.array([-speed]), 0.06)
+        expected = hunt_crossley_restitution(speed, law.dissipation)
+        assert result.v[-1, 0] / speed == pytest.approx(expected, abs=1e-5)
+        if speed == 0.5:
+            assert expected == pytest.approx(restitution, abs=1e-9)
+
+
+def test_turntable_ball_is_dragged_along() -> None:
+    """A frictionless table leaves a resting ball at rest; friction drags it in the rim's sense."""
+    model = ball()
+    index = model.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "table_joint")
+    model.appendBodyToJoint(index, pin.Inertia.FromSphere(5.0, 0.3), pin.SE3.Identity())
+    model.addFrame(pin.Frame("table", index, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    ends = {}
+    for name, friction in (("none", None), ("coulomb", CoulombFriction(0.3, 0.1, 0.1, 1.0))):
+        scene = Scene(model)
+        scene.add_contact(
+            sphere=Sphere(RADIUS, frame="ball"),
+            shell=plate(),
+            frame="table",
+            law=linear_law(4000.0, 20.0),
+            friction=friction,
+            method="facets",
+        )
+        q0 = np.concatenate([free_q([0.2, 0.0, RADIUS - 9.81 / 4000.0]), [1.0, 0.0]])
+        v0 = np.concatenate([np.zeros(6), [2 * np.pi]])
+        ends[name] = Simulation(scene, RungeKutta4(dt=1e-4)).run(q0, v0, 0.05)
+    assert ends["none"].q[-1, :2] == pytest.approx([0.2, 0.0], abs=1e-12)
+    assert ends["none"].v[-1, 6] == pytest.approx(2 * np.pi, rel=1e-12)
+    assert ends["coulomb"].q[-1, 1] > 1e-4
+    assert ends["coulomb"].v[-1, 6] < 2 * np.pi

@@ -1,0 +1,224 @@
+"""External forces through ABA are J^T f, for every joint type, with both bodies moving."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import CoulombFriction, ImpactLaw, Scene, Shell, Sphere
+from tests import meshes
+from tests.models import JOINTS, add_body, ball, empty, free_q, on_plate
+from tests.oracle import laws
+from tests.oracle.mechanics import (
+    force_on_i,
+    generalised_force_by_virtual_work,
+    point_velocity,
+    world_motion,
+)
+
+RADIUS, DEPTH = 0.08, 0.01
+K, E, C, D = 5e4, 1.5, 30.0, 2e-3
+FRICTION = CoulombFriction(0.4, 0.2, 0.5, 3.0)
+
+
+def normal_force(depth: float, gap_rate: float) -> float:
+    return laws.impact(-depth, gap_rate, 0.0, K, E, C, D)
+
+
+def coefficient(slip: float) -> float:
+    return laws.coulomb(slip, 0.4, 0.2, 0.5, 3.0)
+
+
+class Case:
+    """Two bodies on their joints; a plate on body j so placed that body i's sphere is in it."""
+
+    def __init__(self, joint_i: str, joint_j: str, tree: str, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        model = empty()
+
+        def inertia() -> pin.Inertia:
+            lump = pin.Inertia.Random()
+            return pin.Inertia(rng.uniform(0.5, 2.0), rng.uniform(-0.1, 0.1, 3), lump.inertia)
+
+        def somewhere() -> pin.SE3:
+            return pin.SE3(meshes.random_rotation(rng.integers(10**6)), rng.uniform(-0.5, 0.5, 3))
+
+        base = add_body(model, "base", pin.JointModelRY(), inertia=inertia())
+        parents = {"apart": (base, 0), "siblings": (base, base), "chain": (None, base)}[tree]
+        self.j = add_body(
+            model,
+            "shell_body",
+            JOINTS[joint_j](),
+            parents[1],
+            placement=somewhere(),
+            inertia=inertia(),
+            frame=somewhere(),
+        )
+        self.i = add_body(
+            model,
+            "tip",
+            JOINTS[joint_i](),
+            self.j if parents[0] is None else parents[0],
+            placement=somewhere(),
+            inertia=inertia(),
+            frame=somewhere(),
+        )
+        self.q = pin.integrate(model, pin.neutral(model), rng.uniform(-1, 1, model.nv))
+        self.v = rng.normal(size=model.nv)
+        self.tau = rng.normal(size=model.nv)
+        data = model.createData()
+        pin.forwardKinematics(model, data, self.q, self.v)
+        pin.updateFramePlacements(model, data)
+        offset = rng.uniform(-0.1, 0.1, 3)
+        center = data.oMf[model.getFrameId("tip")] * offset
+        rotation = meshes.random_rotation(seed + 7)
+        self.normal = rotation[:, 2]
+        self.point = center - (RADIUS - DEPTH) * self.normal
+        pose = pin.SE3(rotation, self.point - rotation @ np.append(rng.uniform(-0.1, 0.1, 2), 0.0))
+        self.motions = [world_motion(model, data, k) for k in (self.i, self.j)]
+        relative = [point_velocity(motion, self.point) for motion in self.motions]
+        if self.normal @ (relative[0] - relative[1]) > 0:  # closing keeps the law off its clamp
+            self.v = -self.v
+            self.motions = [-motion for motion in self.motions]
+        self.model, self.data = model, data
+        self.scene = Scene(model)
+        self.scene.add_contact(
+            sphere=Sphere(RADIUS, frame="tip", offset=offset),
+            shell=Shell(*meshes.random_plate(50, seed=seed, slivers=False)),
+            frame="shell_body",
+            placement=data.oMf[model.getFrameId("shell_body")].actInv(pose),
+            law=ImpactLaw(K, E, C, D),
+            friction=FRICTION,
+            method="facets",
+        )
+        self.force = force_on_i(
+            self.point,
+            self.normal,
+            DEPTH,
+            *self.motions,
+            normal_force=normal_force,
+            coefficient=coefficient,
+        )
+
+    def jacobian(self, joint: int) -> np.ndarray:
+        """Of the material point of `joint`'s body that is at the contact point, world axes."""
+        model = self.model.copy()
+        place = pin.SE3(np.eye(3), self.data.oMi[joint].actInv(self.point))
+        frame = model.addFrame(pin.Frame("contact", joint, 0, place, pin.FrameType.OP_FRAME))
+        data = model.createData()
+        return np.asarray(
+            pin.computeFrameJacobian(
+                model, data, self.q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            )[:3]
+        )
+
+
+CASES = [
+    (i, j, tree, seed)
+    for seed, (i, j, tree) in enumerate(
+        (i, j, tree) for i in JOINTS for j in JOINTS for tree in ("apart", "siblings", "chain")
+    )
+]
+
+
+@pytest.mark.parametrize(("joint_i", "joint_j", "tree", "seed"), CASES)
+def test_aba_with_external_forces(joint_i: str, joint_j: str, tree: str, seed: int) -> None:
+    case = Case(joint_i, joint_j, tree, seed)
+    assert np.linalg.norm(case.force) > 1.0
+    fext = case.scene.external_forces(case.q, case.v)
+    assert len(fext) == case.model.njoints
+    data = case.model.createData()
+    got = pin.aba(case.model, data, case.q, case.v, case.tau, fext).copy()
+
+    generalised = (case.jacobian(case.i) - case.jacobian(case.j)).T @ case.force
+    expected = pin.aba(case.model, data, case.q, case.v, case.tau + generalised).copy()
+    scale = np.abs(expected).max() + np.linalg.norm(case.force)
+    assert np.abs(got - expected).max() <= 1e-10 * scale
+
+    virtual = generalised_force_by_virtual_work(
+        case.model, case.q, case.point, {case.i: case.force, case.j: -case.force}
+    )
+    assert virtual == pytest.approx(generalised, abs=1e-8 * np.linalg.norm(case.force))
+    expected = pin.aba(case.model, data, case.q, case.v, case.tau + virtual).copy()
+    assert np.abs(got - expected).max() <= 1e-6 * scale
+
+
+@pytest.mark.parametrize(("joint_i", "joint_j", "tree", "seed"), CASES[::7])
+def test_columns_of_contacts(joint_i: str, joint_j: str, tree: str, seed: int) -> None:
+    case = Case(joint_i, joint_j, tree, seed)
+    contacts = case.scene.contacts(case.q, case.v)
+    assert contacts.depth == pytest.approx([DEPTH], abs=1e-12)
+    assert contacts.point_world == pytest.approx(case.point[None], abs=1e-12)
+    assert contacts.normal_world == pytest.approx(case.normal[None], abs=1e-11)
+    slip = point_velocity(case.motions[0], case.point) - point_velocity(case.motions[1], case.point)
+    rate = slip @ case.normal
+    assert contacts.slip_velocity_world[0] == pytest.approx(slip - rate * case.normal, abs=1e-10)
+    assert contacts.normal_force == pytest.approx([normal_force(DEPTH, rate)], rel=1e-10)
+    force = contacts.normal_force[0] * case.normal + contacts.friction_force_world[0]
+    assert force == pytest.approx(case.force, rel=1e-9, abs=1e-9)
+
+
+def test_nothing_in_reach_is_no_force() -> None:
+    scene = on_plate(ball(), ImpactLaw(K, E, C, D), FRICTION)
+    for force in scene.external_forces(free_q([0, 0, 0.2]), np.ones(6)):
+        assert not force.vector.any()
+    assert len(scene.contacts(free_q([0, 0, 0.2]), np.ones(6)).depth) == 0
+
+
+def test_only_the_touching_joints_are_loaded() -> None:
+    case = Case("spherical", "free-flyer", "apart", 5)
+    fext = case.scene.external_forces(case.q, case.v)
+    for joint, force in enumerate(fext):
+        assert force.vector.any() == (joint in (case.i, case.j))
+
+
+def test_several_pairs_add_up() -> None:
+    """Two spheres on one body: the wrench is the sum of each pair's own."""
+    model = ball()
+    law, shell = ImpactLaw(K, E, C, D), Shell(*meshes.grid_plate(4, 4))
+    offsets = (np.array([0.2, 0.0, 0.01]), np.array([-0.1, 0.1, -0.02]))
+    scenes = []
+    for chosen in (offsets[:1], offsets[1:], offsets):
+        scene = Scene(model)
+        for k, offset in enumerate(chosen):
+            scene.add_contact(
+                sphere=Sphere(RADIUS, frame="ball", offset=offset),
+                shell=shell,
+                frame="universe",
+                law=law,
+                friction=FRICTION,
+                method="facets",
+                name=f"pair {k}",
+            )
+        scenes.append(scene)
+    q, v = free_q([0.0, 0.0, RADIUS - 0.015]), np.array([0.2, 0.1, -0.1, 1.0, 2.0, 3.0])
+    one, two, both = (s.external_forces(q, v)[1].vector for s in scenes)
+    assert np.abs(one).max() > 1
+    assert np.abs(two).max() > 1
+    assert both == pytest.approx(one + two, rel=1e-13, abs=1e-12)
+    assert list(scenes[2].contacts(q, v).pair) == [0, 1]
+
+
+def test_turntable_slip_speed() -> None:
+    """Ball at rest 0.2 m off the axis of a table at 1 rev/s: 1.2566 m/s of slip."""
+    model = ball()
+    add_body(model, "table", pin.JointModelRUBZ(), inertia=pin.Inertia.FromSphere(5.0, 0.3))
+    scene = Scene(model)
+    scene.add_contact(
+        sphere=Sphere(0.05, frame="ball"),
+        shell=Shell(*meshes.random_plate(200, seed=1)),
+        frame="table",
+        law=ImpactLaw(1e4, 1.0, 0.0, 1e-3),
+        friction=CoulombFriction(0.3, 0.1, 0.1, 1.0),
+        method="facets",
+    )
+    q = np.concatenate([free_q([0.2, 0.0, 0.049]), [np.cos(0.4), np.sin(0.4)]])
+    v = np.concatenate([np.zeros(6), [2 * np.pi]])
+    contacts = scene.contacts(q, v)
+    assert np.linalg.norm(contacts.slip_velocity_world[0]) == pytest.approx(0.4 * np.pi, rel=1e-13)
+    assert 0.4 * np.pi == pytest.approx(1.2566, abs=5e-5)
+    # The table slides under the ball towards +y, so the ball is pushed that way.
+    assert contacts.friction_force_world[0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-10)
+    fext = scene.external_forces(q, v)
+    assert fext[2].angular[2] == pytest.approx(-0.2, abs=1e-10)

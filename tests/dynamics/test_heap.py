@@ -1,0 +1,91 @@
+"""A step allocates nothing: heap calls do not grow with the number of steps."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+COUNTER = r"""
+#include <stddef.h>
+void *__libc_malloc(size_t); void *__libc_calloc(size_t, size_t);
+void *__libc_realloc(void *, size_t); void *__libc_memalign(size_t, size_t);
+static long calls;
+static void count(void) { __atomic_add_fetch(&calls, 1, __ATOMIC_RELAXED); }
+long heap_calls(void) { return __atomic_load_n(&calls, __ATOMIC_RELAXED); }
+void *malloc(size_t n) { count(); return __libc_malloc(n); }
+void *calloc(size_t k, size_t n) { count(); return __libc_calloc(k, n); }
+void *realloc(void *p, size_t n) { count(); return __libc_realloc(p, n); }
+void *memalign(size_t a, size_t n) { count(); return __libc_memalign(a, n); }
+void *aligned_alloc(size_t a, size_t n) { count(); return __libc_memalign(a, n); }
+int posix_memalign(void **p, size_t a, size_t n) {
+  count(); *p = __libc_memalign(a, n); return *p ? 0 : 12;
+}
+"""
+
+PROBE = """
+import ctypes, sys
+sys.path.insert(0, {root!r})
+import numpy as np
+import sphshell_pin as sp
+from tests.models import ARM_Q, FRICTION, LAW, arm, on_plate, plate
+heap = ctypes.CDLL(None).heap_calls
+heap.restype = ctypes.c_long
+scene = on_plate(arm(), LAW, FRICTION, shell=plate(2.0, 5000))
+controller = {controller}
+sim = sp.Simulation(scene, sp.{stepper}(dt=1e-4))
+counts = []
+for steps in (200, 1000, 11000):
+    duration = steps * 1e-4
+    before = heap()
+    result = sim.run(ARM_Q, np.zeros(3), duration, controller, record_dt=duration)
+    counts.append(heap() - before)
+print(*counts, result.stats["pairs"]["ball-plate"]["contact_time"])
+"""
+
+CONTROLLERS = {
+    "none": "None",
+    "gravity": "sp.GravityCompensation()",
+    "pd": "sp.JointPD(np.full(3, 60.0), np.full(3, 3.0), ARM_Q + [0.2, 0.3, 0.2])",
+    "impedance": (
+        "sp.CartesianImpedance('ball', np.array([[0.25, 0.08, 0.04], [0.2, 0.15, 0.04]]),"
+        " stiffness=200.0, damping=20.0, joint_damping=0.5)"
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def counter(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    compiler = shutil.which("cc")
+    if compiler is None or not sys.platform.startswith("linux"):
+        pytest.skip("counting heap calls needs Linux and a C compiler called cc")
+    folder = tmp_path_factory.mktemp("heap")
+    source, library = folder / "counter.c", folder / "counter.so"
+    source.write_text(COUNTER)
+    build = [compiler, "-O2", "-shared", "-fPIC", "-fno-builtin", source, "-o", library]
+    subprocess.run(build, check=True, capture_output=True)
+    return library
+
+
+@pytest.mark.parametrize("stepper", ["SemiImplicitEuler", "RungeKutta4"])
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_steps_do_not_touch_the_heap(counter: Path, controller: str, stepper: str) -> None:
+    """10 000 more steps may cost a handful of calls (events grow), never one a step."""
+    program = PROBE.format(root=str(ROOT), controller=CONTROLLERS[controller], stepper=stepper)
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "LD_PRELOAD": str(counter)},
+    )
+    assert done.returncode == 0, done.stderr
+    _, short, long, contact_time = done.stdout.split()
+    assert int(long) - int(short) <= 100, done.stdout
+    assert controller == "gravity" or float(contact_time) > 0.0

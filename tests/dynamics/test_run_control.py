@@ -1,0 +1,406 @@
+"""How runs start, stop, repeat and are kept: controllers, faults, files, locked joints."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import (
+    GravityCompensation,
+    JointPD,
+    Result,
+    RungeKutta4,
+    Scene,
+    SemiImplicitEuler,
+    Simulation,
+    Sphere,
+)
+from sphshell_pin.errors import (
+    DeepStart,
+    FrameNotFound,
+    InvalidParameter,
+    NameNotFound,
+    ResultError,
+    SimulationDiverged,
+)
+from tests.models import (
+    ARM_Q,
+    FRICTION,
+    LAW,
+    arm,
+    ball,
+    free_q,
+    linear_law,
+    on_plate,
+    plate,
+    slider,
+)
+
+RADIUS = 0.05
+START = free_q([0.1, -0.05, RADIUS + 0.01]), np.array([1.0, 0.3, -0.2, 10.0, -20.0, 5.0])
+ROOT = Path(__file__).parents[2]
+
+
+def bouncing(integrator=None) -> Simulation:
+    scene = on_plate(ball(), LAW, FRICTION)
+    return Simulation(scene, integrator or SemiImplicitEuler(dt=1e-4))
+
+
+# ---------------------------------------------------------------------------------------------
+# faults
+
+
+def test_a_diverging_run_keeps_what_it_computed() -> None:
+    """Explicit damping with dt kd / m = 1e4 multiplies the speed at every step."""
+    sim = Simulation(on_plate(slider(), LAW), SemiImplicitEuler(dt=1e-2))
+    controller = JointPD(kp=np.zeros(1), kd=np.full(1, 1e6), q_ref=np.array([0.5]))
+    with pytest.raises(SimulationDiverged) as caught:
+        sim.run(np.array([0.5]), np.array([0.1]), 100.0, controller)
+    result = caught.value.result
+    assert 0.0 < caught.value.t < 100.0
+    assert len(result.t) == len(result.q) == len(result.v) >= 1
+    assert result.t[-1] <= caught.value.t
+    for rows in (result.t, result.q, result.v):
+        assert np.isfinite(rows).all()
+    assert "dt" in str(caught.value)
+
+
+def test_a_controller_that_answers_nan_stops_the_run() -> None:
+    def controller(t, q, v, contacts):
+        return np.full(6, np.nan if t > 0.005 else 0.0)
+
+    with pytest.raises((SimulationDiverged, InvalidParameter)):
+        bouncing().run(*START, 0.02, controller, control_dt=1e-3)
+
+
+CTRL_C = """
+import sys
+sys.path.insert(0, {root!r})
+from tests.dynamics.test_run_control import START, bouncing
+from sphshell_pin.errors import Interrupted
+try:
+    print("started", flush=True)
+    bouncing().run(*START, 1e5, record_dt=1e-2, **{options})
+except Interrupted as stop:
+    rows = stop.result
+    print("kept", len(rows.t), rows.t[-1] > 0, stop.t >= rows.t[-1], flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    "options",
+    ["{}", "{'controller': lambda t, q, v, c: 0 * v, 'control_dt': 1e-3}"],
+    ids=["plain", "python controller"],
+)
+def test_ctrl_c(options: str) -> None:
+    program = CTRL_C.format(root=str(ROOT), options=options)
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as child:
+        assert child.stdout is not None
+        assert child.stderr is not None
+        assert child.stdout.readline().strip() == "started"
+        time.sleep(1.0)
+        child.send_signal(signal.SIGINT)
+        asked = time.monotonic()
+        try:
+            said, faults = child.communicate(timeout=20)
+        finally:
+            child.kill()
+    assert time.monotonic() - asked < 5.0
+    assert child.returncode == 0, faults
+    kept, rows, *truths = said.split()
+    assert kept == "kept"
+    assert int(rows) > 1
+    assert truths == ["True", "True"]
+
+
+@pytest.mark.parametrize(
+    ("q", "v", "name"),
+    [
+        (np.zeros(6), np.zeros(6), "q0"),
+        (START[0], np.zeros(7), "v0"),
+        (START[0] * np.nan, np.zeros(6), "q0"),
+        (START[0], np.full(6, np.inf), "v0"),
+    ],
+)
+def test_wrong_state(q, v, name: str) -> None:
+    with pytest.raises(InvalidParameter, match=name):
+        bouncing().run(q, v, 0.1)
+
+
+def test_wrong_state_in_a_scene_call() -> None:
+    scene = on_plate(ball(), LAW)
+    for call in (scene.external_forces, scene.contacts):
+        with pytest.raises(InvalidParameter, match="q"):
+            call(np.zeros(6), np.zeros(6))
+        with pytest.raises(InvalidParameter, match="v"):
+            call(START[0], np.zeros(5))
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, float("nan")])
+def test_wrong_duration(duration: float) -> None:
+    with pytest.raises(InvalidParameter, match="duration"):
+        bouncing().run(*START, duration)
+
+
+@pytest.mark.parametrize("stepper", [SemiImplicitEuler, RungeKutta4])
+@pytest.mark.parametrize("dt", [0.0, -1e-3, float("nan"), float("inf")])
+def test_wrong_dt(stepper, dt: float) -> None:
+    with pytest.raises(InvalidParameter, match="dt"):
+        stepper(dt=dt)
+
+
+def test_deep_start() -> None:
+    with pytest.raises(DeepStart) as caught:
+        bouncing().run(free_q([0, 0, 0.4 * RADIUS]), np.zeros(6), 0.1)
+    assert caught.value.pair == "ball-plate"
+    assert caught.value.depth == pytest.approx(0.6 * RADIUS)
+    assert caught.value.radius == RADIUS
+
+
+def test_unknown_frame_lists_the_valid_ones() -> None:
+    scene = Scene(ball())
+    for frames in ({"sphere": "bll", "frame": "universe"}, {"sphere": "ball", "frame": "ground"}):
+        with pytest.raises(FrameNotFound) as caught:
+            scene.add_contact(
+                sphere=Sphere(RADIUS, frame=frames["sphere"]),
+                shell=plate(),
+                frame=frames["frame"],
+                law=LAW,
+            )
+        assert {"ball", "universe"} <= set(caught.value.valid)
+        assert "ball" in str(caught.value)
+        assert "universe" in str(caught.value)
+
+
+def test_unknown_locked_joint_lists_the_valid_ones() -> None:
+    with pytest.raises(NameNotFound) as caught:
+        Scene(arm(), lock=["elbow"])
+    assert "two_joint" in caught.value.valid
+
+
+def test_a_failed_run_leaves_the_simulation_usable() -> None:
+    sim = bouncing()
+    before = sim.run(*START, 0.05)
+    with pytest.raises(InvalidParameter):
+        sim.run(np.zeros(3), np.zeros(6), 0.1)
+    with pytest.raises(DeepStart):
+        sim.run(free_q([0, 0, 0.01]), np.zeros(6), 0.1)
+    assert np.array_equal(sim.run(*START, 0.05).q, before.q)
+
+
+# ---------------------------------------------------------------------------------------------
+# controllers
+
+
+def test_a_python_controller_is_called_every_control_dt_and_held() -> None:
+    calls = []
+
+    def controller(t, q, v, contacts):
+        calls.append((t, q.copy(), v.copy(), len(contacts.depth)))
+        return np.array([float(len(calls))])
+
+    scene = on_plate(slider(gravity=0.0, mass=2.0), LAW)
+    sim = Simulation(scene, SemiImplicitEuler(dt=1e-3))
+    result = sim.run(np.array([1.0]), np.zeros(1), 0.1, controller, control_dt=1e-2)
+    assert [c[0] for c in calls] == pytest.approx(np.arange(10) * 1e-2, abs=1e-12)
+    held = np.repeat(np.arange(1.0, 11.0), 10) / 2.0 * 1e-3
+    assert result.v[-1, 0] == pytest.approx(held.sum(), rel=1e-12)
+    for k, (_, _, v, touching) in enumerate(calls):
+        assert v[0] == pytest.approx(held[: 10 * k].sum(), abs=1e-13)
+        assert touching == 0
+
+
+def test_a_python_controller_sees_contacts() -> None:
+    seen = []
+
+    def controller(t, q, v, contacts):
+        seen.append(float(contacts.normal_force.sum()))
+        return np.zeros(1)
+
+    scene = on_plate(slider(), linear_law(4000.0))
+    rest = np.array([RADIUS - 9.81 / 4000.0])
+    sim = Simulation(scene, SemiImplicitEuler(dt=1e-3))
+    sim.run(rest, np.zeros(1), 0.01, controller, control_dt=2e-3)
+    assert seen == pytest.approx([9.81] * 5, rel=1e-9)
+
+
+def test_a_python_controller_equals_the_built_in_one() -> None:
+    """Joint PD without gravity compensation, evaluated at every step."""
+    kp, kd = np.array([40.0, 40.0, 20.0]), np.array([2.0, 2.0, 1.0])
+    scene = on_plate(arm(), LAW, FRICTION)
+    sim = Simulation(scene, SemiImplicitEuler(dt=1e-3))
+    goal = ARM_Q + np.array([0.1, 0.2, -0.1])
+    built_in = JointPD(kp, kd, goal, gravity_compensation=False)
+    a = sim.run(ARM_Q, np.zeros(3), 0.3, built_in)
+    b = sim.run(
+        ARM_Q, np.zeros(3), 0.3, lambda t, q, v, c: kp * (goal - q) - kd * v, control_dt=1e-3
+    )
+    assert b.q == pytest.approx(a.q, abs=1e-9)
+
+
+def test_gravity_compensation_holds_still() -> None:
+    sim = Simulation(on_plate(arm(), LAW), RungeKutta4(dt=1e-3))
+    result = sim.run(ARM_Q, np.zeros(3), 0.5, GravityCompensation())
+    assert result.q[-1] == pytest.approx(ARM_Q, abs=1e-10)
+
+
+def test_an_error_in_a_controller_comes_through() -> None:
+    def controller(t, q, v, contacts):
+        raise LookupError("no torque today")
+
+    with pytest.raises(LookupError, match="no torque today"):
+        bouncing().run(*START, 0.1, controller, control_dt=1e-2)
+
+
+def test_a_controller_of_the_wrong_size_is_named() -> None:
+    with pytest.raises(InvalidParameter):
+        bouncing().run(*START, 0.1, lambda t, q, v, c: np.zeros(5), control_dt=1e-2)
+
+
+# ---------------------------------------------------------------------------------------------
+# results
+
+
+def same(a: Result, b: Result) -> None:
+    for name in ("t", "q", "v"):
+        assert np.array_equal(getattr(a, name), getattr(b, name)), name
+    for name in (
+        "t",
+        "row",
+        "pair",
+        "point_world",
+        "normal_world",
+        "depth",
+        "normal_force",
+        "friction_force_world",
+        "slip_velocity_world",
+        "element",
+        "feature",
+    ):
+        assert np.array_equal(getattr(a.contacts, name), getattr(b.contacts, name)), name
+    for name in (
+        "kinetic",
+        "potential",
+        "elastic",
+        "damping_loss",
+        "friction_loss",
+        "control_work",
+        "residual",
+    ):
+        assert np.array_equal(getattr(a.energy, name), getattr(b.energy, name)), name
+    assert list(a.pairs) == list(b.pairs)
+    assert a.events == b.events
+
+
+@pytest.mark.parametrize("stepper", [SemiImplicitEuler, RungeKutta4])
+def test_repeated_runs_are_bit_identical(stepper) -> None:
+    sim = bouncing(stepper(dt=1e-4))
+    first, again = sim.run(*START, 0.3), sim.run(*START, 0.3)
+    same(first, again)
+    same(first, bouncing(stepper(dt=1e-4)).run(*START, 0.3))
+    assert len(first.contacts.depth) > 10
+
+
+def test_recording_less_often_changes_nothing_else() -> None:
+    full = bouncing().run(*START, 0.3)
+    sparse = bouncing().run(*START, 0.3, record_dt=1e-2)
+    assert len(sparse.t) == 31
+    assert np.array_equal(sparse.q[-1], full.q[-1])
+    assert np.array_equal(sparse.v[-1], full.v[-1])
+    assert sparse.events == full.events
+    assert sparse.t == pytest.approx(np.arange(31) * 1e-2, abs=1e-9)
+
+
+def test_rows_of_a_result() -> None:
+    result = bouncing().run(*START, 0.3, record_dt=1e-3)
+    assert result.t[0] == 0.0
+    assert result.t[-1] == pytest.approx(0.3, abs=1e-12)
+    assert np.array_equal(result.q[0], START[0])
+    assert np.array_equal(result.v[0], START[1])
+    log = result.contacts
+    assert np.array_equal(log.t, result.t[log.row])
+    kinds = [e.kind for e in result.events if e.pair == "ball-plate"]
+    assert kinds[:2] == ["touch", "lift_off"]
+    drop = ((0.2**2 + 2 * 9.81 * 0.01) ** 0.5 - 0.2) / 9.81
+    assert result.events[0].t == pytest.approx(drop, abs=2e-4)
+    stats = result.stats["pairs"]["ball-plate"]
+    assert stats["touches"] == kinds.count("touch")
+    assert stats["max_depth"] >= log.depth.max() - 1e-12
+    assert stats["peak_force"] >= log.normal_force.max() - 1e-9
+    assert 0 < stats["mean_force"] < stats["peak_force"]
+    assert 0 < stats["contact_time"] < 0.3
+
+
+def test_save_and_load(tmp_path: Path) -> None:
+    result = bouncing().run(*START, 0.1)
+    path = tmp_path / "run.npz"
+    result.save(path)
+    loaded = Result.load(path)
+    same(result, loaded)
+    assert loaded.scene is None
+    assert loaded.stats == result.stats
+    with pytest.raises(ResultError):
+        Result.load(tmp_path / "nothing.npz")
+    (tmp_path / "text.npz").write_text("not an archive")
+    with pytest.raises(ResultError):
+        Result.load(tmp_path / "text.npz")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_unwritable_folder(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(ResultError):
+        bouncing().run(*START, 0.01).save(tmp_path / "run.npz")
+
+
+def test_saving_into_a_missing_folder_is_a_clear_error(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ResultError):
+        bouncing().run(*START, 0.01).save(tmp_path / "file" / "run.npz")
+
+
+# ---------------------------------------------------------------------------------------------
+# locked joints
+
+
+def test_lock_equals_the_model_reduced_by_hand() -> None:
+    model = arm()
+    locked = model.getJointId("two_joint")
+    q_lock = np.array([0.0, 1.9, 0.0])
+    by_hand = on_plate(pin.buildReducedModel(model, [locked], q_lock), LAW, FRICTION)
+    scene = Scene(model, lock=["two_joint"], q_lock=q_lock)
+    scene.add_contact(
+        sphere=Sphere(RADIUS, frame="ball"),
+        shell=plate(),
+        frame="universe",
+        law=LAW,
+        friction=FRICTION,
+        method="facets",
+        name="ball-plate",
+    )
+    assert scene.model.nq == 2
+    q0, v0 = np.array([0.3, 0.5]), np.array([1.0, 0.0])
+    a, b = (Simulation(s, RungeKutta4(dt=1e-3)).run(q0, v0, 0.4) for s in (by_hand, scene))
+    assert len(a.contacts.depth) > 0
+    same(a, b)
+
+
+def test_the_scene_keeps_its_own_model() -> None:
+    model = ball()
+    scene = on_plate(model, LAW)
+    model.gravity.linear = np.zeros(3)
+    model.inertias[1] = pin.Inertia.FromSphere(50.0, RADIUS)
+    result = Simulation(scene, SemiImplicitEuler(dt=1e-3)).run(
+        free_q([0, 0, 1.0]), np.zeros(6), 0.1
+    )
+    assert result.v[-1, 2] == pytest.approx(-0.981, rel=1e-9)

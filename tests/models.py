@@ -1,0 +1,150 @@
+"""Small models the dynamics tests share, built joint by joint."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin import CoulombFriction, ImpactLaw, Scene, Shell, Sphere
+from tests import meshes
+
+Vector = NDArray[np.float64]
+
+JOINTS = {
+    "free-flyer": pin.JointModelFreeFlyer,
+    "continuous x": pin.JointModelRUBX,
+    "continuous z": pin.JointModelRUBZ,
+    "prismatic": pin.JointModelPZ,
+    "spherical": pin.JointModelSpherical,
+}
+
+
+def empty(gravity: float = 9.81) -> pin.Model:
+    """Model without bodies; gravity along -z [m/s^2]."""
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, 0.0, -gravity])
+    return model
+
+
+def add_body(
+    model: pin.Model,
+    name: str,
+    joint: pin.JointModel,
+    parent: int = 0,
+    *,
+    placement: pin.SE3 | None = None,
+    inertia: pin.Inertia | None = None,
+    frame: pin.SE3 | None = None,
+) -> int:
+    """Add a body on `joint` with a frame called `name` on it; return the joint's index."""
+    index = model.addJoint(parent, joint, placement or pin.SE3.Identity(), f"{name}_joint")
+    inertia = inertia or pin.Inertia.FromSphere(1.0, 0.05)
+    model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
+    placed = frame or pin.SE3.Identity()
+    model.addFrame(pin.Frame(name, index, 0, placed, pin.FrameType.OP_FRAME))
+    return int(index)
+
+
+def ball(gravity: float = 9.81, mass: float = 1.0, radius: float = 0.05) -> pin.Model:
+    """Free ball whose centre is the frame "ball"."""
+    model = empty(gravity)
+    inertia = pin.Inertia.FromSphere(mass, radius)
+    add_body(model, "ball", pin.JointModelFreeFlyer(), inertia=inertia)
+    return model
+
+
+def slider(gravity: float = 9.81, mass: float = 1.0) -> pin.Model:
+    """Mass on a vertical prismatic joint, frame "ball" at its centre: q is the centre's height."""
+    model = empty(gravity)
+    add_body(model, "ball", pin.JointModelPZ(), inertia=pin.Inertia.FromSphere(mass, 0.05))
+    return model
+
+
+def free_q(position: Vector) -> Vector:
+    """Configuration of a free-flyer at `position`, unturned."""
+    return np.concatenate([np.asarray(position, dtype=float), [0.0, 0.0, 0.0, 1.0]])
+
+
+def plate(size: float = 1.0, count: int = 8, side: str = "both") -> Shell:
+    """Flat plate z = 0."""
+    return Shell(*meshes.random_plate(count, seed=count, size=size, slivers=False), side=side)
+
+
+def linear_law(stiffness: float, damping: float = 0.0) -> ImpactLaw:
+    """Spring and dashpot whose damping is constant from a micrometre of depth on."""
+    return ImpactLaw(stiffness, 1.0, damping, 1e-6)
+
+
+def on_plate(model: pin.Model, law, friction=None, *, radius: float = 0.05, **more) -> Scene:  # type: ignore[no-untyped-def]
+    """Scene of the frame "ball" on a fixed plate z = 0."""
+    scene = Scene(model)
+    scene.add_contact(
+        sphere=Sphere(radius, frame="ball"),
+        shell=more.pop("shell", None) or plate(),
+        frame="universe",
+        law=law,
+        friction=friction,
+        method="facets",
+        name="ball-plate",
+        **more,
+    )
+    return scene
+
+
+def two_free_bodies(law, friction=None, *, radius: float = 0.05) -> Scene:  # type: ignore[no-untyped-def]
+    """Free ball ("ball") and free plate ("table", its shell turned in it), no gravity."""
+    model = empty(gravity=0.0)
+    add_body(model, "ball", pin.JointModelFreeFlyer(), inertia=pin.Inertia.FromSphere(1.0, radius))
+    lump = pin.Inertia(2.0, np.array([0.02, -0.03, 0.01]), np.diag([0.03, 0.02, 0.04]))
+    add_body(model, "table", pin.JointModelFreeFlyer(), inertia=lump)
+    scene = Scene(model)
+    scene.add_contact(
+        sphere=Sphere(radius, frame="ball"),
+        shell=plate(size=2.0),
+        frame="table",
+        placement=TABLE,
+        law=law,
+        friction=friction,
+        method="facets",
+        name="ball-table",
+    )
+    return scene
+
+
+TABLE = pin.SE3(pin.utils.rpyToMatrix(0.3, -0.4, 0.5), np.array([0.05, 0.02, -0.03]))
+
+
+def two_free_state(depth: float = 0.01, radius: float = 0.05) -> tuple[Vector, Vector]:
+    """State of `two_free_bodies`: both spin fast, the ball `depth` deep in the plate."""
+    table = pin.SE3(pin.utils.rpyToMatrix(-0.7, 0.2, 0.9), np.array([0.3, -0.2, 0.5]))
+    center = table * TABLE * np.array([0.1, 0.07, radius - depth])
+    q = np.concatenate([pin.SE3ToXYZQUAT(pin.SE3(np.eye(3), center)), pin.SE3ToXYZQUAT(table)])
+    v_ball = np.array([0.3, -0.2, 0.1, 40.0, -30.0, 50.0])
+    v_table = np.array([-0.1, 0.2, 0.1, 3.0, -4.0, 12.0])
+    model = empty()
+    add_body(model, "table", pin.JointModelFreeFlyer())
+    # The ball's centre rides along with the table, but for a small velocity of its own.
+    along = pin.Motion(v_table)
+    world = table.act(along)
+    v_ball[:3] += world.linear + np.cross(world.angular, center)
+    return q, np.concatenate([v_ball, v_table])
+
+
+LAW = linear_law(4000.0, 20.0)
+FRICTION = CoulombFriction(0.3, 0.1, 0.1, 1.0)
+
+
+def arm() -> pin.Model:
+    """Three-joint arm over the plate, frame "ball" at its tip."""
+    model = empty()
+    reach = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.2]))
+    lump = pin.Inertia(1.0, np.array([0.0, 0.0, 0.1]), np.diag([0.01, 0.01, 0.002]))
+    base = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.1]))
+    joint = add_body(model, "one", pin.JointModelRZ(), placement=base, inertia=lump)
+    joint = add_body(model, "two", pin.JointModelRY(), joint, placement=reach, inertia=lump)
+    add_body(model, "ball", pin.JointModelRY(), joint, placement=reach, inertia=lump, frame=reach)
+    return model
+
+
+ARM_Q = np.array([0.3, 1.6, 0.9])  # the tip a few centimetres over the plate

@@ -1,0 +1,1 @@
+"""The slow, obvious twin: contacts, laws and mechanics straight from their definitions."""

@@ -1,0 +1,101 @@
+"""The gears' meshes and the scenario's own routine describe the same teeth."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from sphshell_pin.robots import gear_mesh
+
+from sphshell_pin import robots, scenarios
+
+
+@pytest.fixture(scope="module")
+def gears():
+    file = Path(scenarios.__file__).parent / "gear_contact.py"
+    spec = importlib.util.spec_from_file_location("gear_contact", file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def poses(model, angle_1, angle_2):
+    data = model.createData()
+    q = np.array([np.cos(angle_1), np.sin(angle_1), np.cos(angle_2), np.sin(angle_2)])
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[model.getFrameId("gear_2")], data.oMf[model.getFrameId("gear_1")]
+
+
+def test_pitch_tooth_thickness():
+    for teeth in (20, 40):
+        outline = gear_mesh.gear_outline(teeth, points=400)
+        radius = np.linalg.norm(outline, axis=1)
+        angle = np.arctan2(outline[:, 1], outline[:, 0])
+        upper = (angle > 0) & (angle < np.pi / teeth)
+        order = np.argsort(radius[upper])
+        pitch = gear_mesh.MODULE * teeth / 2
+        half = np.interp(pitch, radius[upper][order], angle[upper][order])
+        play = gear_mesh.BACKLASH / np.cos(gear_mesh.PRESSURE_ANGLE)
+        thickness = np.pi * gear_mesh.MODULE / 2 - play / 2
+        assert 2 * half * pitch == pytest.approx(thickness, rel=1e-4)
+
+
+def test_shipped_meshes_are_the_drawn_ones():
+    folder = Path(robots.__file__).parent / "meshes"
+    for teeth in (20, 40):
+        count = np.frombuffer((folder / f"gear_{teeth}.stl").read_bytes()[80:84], "<u4")[0]
+        assert count == len(gear_mesh.gear_triangles(teeth))
+
+
+def test_points_lie_on_the_flanks(gears):
+    """Pressed together by little, the points lie on both outlines."""
+    model = robots.load("gear_pair").model
+    touched = 0
+    for angle in np.linspace(0, 0.5, 23):
+        for side in (1, -1):
+            turn_2 = -angle / 2 + side * (gears.BACKLASH / 2 + gears.RELIEF) / gears.BASE_2
+            pose_2, pose_1 = poses(model, angle, turn_2)
+            points, _, depths = gears.find(pose_2, pose_1)
+            assert len(depths) >= 1
+            assert (depths > 0).all()
+            for pose, teeth, turn in ((pose_1, 20, 0), (pose_2, 40, np.pi / 40)):
+                outline = gear_mesh.gear_outline(teeth, points=400)
+                cs, sn = np.cos(turn), np.sin(turn)
+                outline = outline @ np.array([[cs, sn], [-sn, cs]])
+                for point in points:
+                    local = pose.actInv(point)[:2]
+                    distance = np.linalg.norm(outline - local, axis=1).min()
+                    # The relief's slope moves a point along its flank, a tip's by 0.36 mm at most.
+                    assert distance < 4e-4
+                    touched += 1
+    assert touched > 100
+
+
+def test_the_lever_is_the_slope_of_the_depth(gears):
+    """What the contact does to each shaft is the derivative of the depth: no energy is made."""
+    model = robots.load("gear_pair").model
+    h = 1e-7
+    for angle in np.linspace(0, 0.6, 37):
+        turn_2 = -angle / 2 + 1.3e-4 / gears.BASE_2
+        pose_2, pose_1 = poses(model, angle, turn_2)
+        points, normals, depths = gears.find(pose_2, pose_1)
+        plus = gears.find(*poses(model, angle + h, turn_2))[2]
+        minus = gears.find(*poses(model, angle - h, turn_2))[2]
+        plus_2 = gears.find(*poses(model, angle, turn_2 + h))[2]
+        if not len(plus) == len(minus) == len(plus_2) == len(depths):
+            continue
+        lever_1 = np.cross(points - pose_1.translation, normals)[:, 2]
+        lever_2 = np.cross(points - pose_2.translation, normals)[:, 2]
+        np.testing.assert_allclose((plus - minus) / (2 * h), lever_1, atol=1e-6)
+        np.testing.assert_allclose((plus_2 - depths) / h, -lever_2, atol=1e-6)
+
+
+def test_no_contact_within_the_backlash(gears):
+    model = robots.load("gear_pair").model
+    for angle in np.linspace(0, 0.5, 11):
+        points, normals, depths = gears.find(*poses(model, angle, -angle / 2))
+        assert points.shape == normals.shape == (0, 3)
+        assert depths.shape == (0,)

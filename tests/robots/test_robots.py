@@ -1,0 +1,82 @@
+"""Robots by name: sound inertias, fingertips where they should be, clear faults."""
+
+from __future__ import annotations
+
+import builtins
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import robots
+from sphshell_pin.errors import MissingExtra, NameNotFound
+
+
+@pytest.mark.parametrize("name", robots.OWN)
+def test_own_robots_are_sound(name):
+    robot = robots.load(name)
+    assert robot.name == name
+    assert robot.q0.shape == (robot.model.nq,)
+    assert robot.visual_model.ngeoms > 0
+    for joint, inertia in enumerate(robot.model.inertias):
+        if joint:
+            assert inertia.mass > 0
+            moments = np.linalg.eigvalsh(inertia.inertia)
+            # Rigid bodies obey the triangle inequality.
+            assert moments[0] > 0
+            assert moments[2] <= moments[0] + moments[1] + 1e-12
+    data = robot.model.createData()
+    acceleration = pin.aba(robot.model, data, robot.q0, *np.zeros((2, robot.model.nv)))
+    assert np.isfinite(acceleration).all()
+
+
+def test_the_ball_is_a_solid_steel_ball():
+    ball = robots.load("ball").model.inertias[1]
+    assert ball.mass == pytest.approx(7800 * 4 / 3 * np.pi * 0.012**3, rel=1e-4)
+    assert ball.inertia[0, 0] == pytest.approx(0.4 * ball.mass * 0.012**2, rel=1e-4)
+    (tip,) = robots.fingertips("ball")
+    assert (tip.frame, tip.radius) == ("ball", 0.012)
+
+
+def test_unknown_names_list_the_known_ones():
+    with pytest.raises(NameNotFound, match="turntable"):
+        robots.load("turntabel")
+
+
+def test_without_the_library_own_robots_still_load(monkeypatch):
+    real = builtins.__import__
+
+    def refuse(name, *args, **kwargs):
+        if name.startswith("example_robot_data"):
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", refuse)
+    assert robots.names() == list(robots.OWN)
+    assert robots.load("ball").model.nv == 6
+    with pytest.raises(MissingExtra, match=r"sphshell-pin\[robots\]"):
+        robots.load("panda")
+
+
+@pytest.mark.robots
+@pytest.mark.parametrize(
+    ("name", "count", "radius"),
+    [("allegro_right_hand", 4, 0.012), ("a1", 4, 0.02), ("panda", 1, 0.012), ("ur5", 1, 0.012)],
+)
+def test_fingertips_of_known_robots(name, count, radius):
+    pytest.importorskip("example_robot_data")
+    tips = robots.fingertips(name)
+    model = robots.load(name).model
+    assert len(tips) == count
+    for tip in tips:
+        assert tip.radius == pytest.approx(radius)
+        assert model.existFrame(tip.frame)
+
+
+@pytest.mark.robots
+def test_a_robot_this_machine_cannot_read_is_told_in_a_sentence():
+    pytest.importorskip("example_robot_data")
+    if hasattr(pin, "buildModelFromSdf"):
+        pytest.skip("this pinocchio reads SDF files")
+    with pytest.raises(robots.RobotError, match="cassie"):
+        robots.load("cassie")

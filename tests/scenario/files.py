@@ -1,0 +1,35 @@
+"""Small scenario files for the tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+DROP = """
+title = "a ball falls on a box"
+
+[robot]
+name = "ball"
+start = { root_joint = [0.01, 0.02, 0.0125, 0, 0, 0, 1] }
+
+[[shell]]
+name = "plate"
+primitive = { type = "box", size = [0.2, 0.2, 0.02] }
+placement = { xyz = [0, 0, -0.01] }
+
+[[contact]]
+name = "ball-plate"
+sphere = { frame = "ball", radius = 0.012 }
+shell = "plate"
+law = { type = "impact", stiffness = 1e6, exponent = 1.5, damping = 20.0 }
+
+[run]
+duration = 0.05
+dt = 1e-4
+"""
+
+
+def write(folder: Path, text: str = DROP, name: str = "drop.toml") -> Path:
+    """Write a scenario file and return its path."""
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path

@@ -1,0 +1,125 @@
+"""Several robots in one model: names, placements, start values, locked joints."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin.errors import ScenarioError
+from sphshell_pin.scenario.bodies import assemble, reduce_visual, restrict
+from sphshell_pin.scenario.reading import read_scenario
+from tests.scenario.files import write
+
+TWO = """
+title = "a finger and a ball"
+gravity = [0, 1, -2]
+
+[[robot]]
+name = "three_link_finger"
+placement = { xyz = [0.1, 0.2, 0.3], rpy_deg = [0, 0, 90] }
+lock = ["middle_joint"]
+start = { knuckle = 0.3, middle_joint = 0.4 }
+speed = { knuckle = 1.5 }
+
+[[robot]]
+name = "ball"
+start = { root_joint = [1, 2, 3, 0, 0, 0.6, 0.8] }
+speed = { root_joint = [1, 2, 3, 4, 5, 6] }
+
+[run]
+duration = 1
+"""
+
+
+def assembled(folder, text=TWO):
+    path = write(folder, text)
+    return assemble(read_scenario(path), path)
+
+
+def test_names_carry_the_robot_and_the_values_their_joint(tmp_path):
+    assembly = assembled(tmp_path)
+    model = assembly.model
+    assert list(model.names)[1:] == [
+        "three_link_finger/knuckle",
+        "three_link_finger/middle_joint",
+        "three_link_finger/distal_joint",
+        "ball/root_joint",
+    ]
+    assert assembly.lock == ("three_link_finger/middle_joint",)
+    np.testing.assert_allclose(model.gravity.linear, [0, 1, -2])
+    np.testing.assert_allclose(assembly.q0, [0.3, 0.4, 0, 1, 2, 3, 0, 0, 0.6, 0.8])
+    np.testing.assert_allclose(assembly.v0, [1.5, 0, 0, 1, 2, 3, 4, 5, 6])
+
+
+def test_each_robot_moves_as_it_would_alone(tmp_path):
+    from sphshell_pin import robots
+
+    assembly = assembled(tmp_path)
+    alone = robots.load("three_link_finger").model
+    data, data_alone = assembly.model.createData(), alone.createData()
+    pin.framesForwardKinematics(assembly.model, data, assembly.q0)
+    pin.framesForwardKinematics(alone, data_alone, np.array([0.3, 0.4, 0.0]))
+    stand = pin.SE3(pin.rpy.rpyToMatrix(0, 0, np.pi / 2), np.array([0.1, 0.2, 0.3]))
+    tip = data.oMf[assembly.model.getFrameId("three_link_finger/tip")]
+    expected = stand * data_alone.oMf[alone.getFrameId("tip")]
+    assert tip.isApprox(expected, 1e-12)
+    masses = [inertia.mass for inertia in assembly.model.inertias][1:4]
+    np.testing.assert_allclose(masses, [inertia.mass for inertia in alone.inertias][1:])
+
+
+def test_locking_keeps_the_other_joints_values(tmp_path):
+    assembly = assembled(tmp_path)
+    ids = [assembly.model.getJointId(name) for name in assembly.lock]
+    reduced = pin.buildReducedModel(assembly.model, ids, assembly.q0)
+    q, v = restrict(assembly.model, reduced, assembly.q0, assembly.v0)
+    np.testing.assert_allclose(q, [0.3, 0, 1, 2, 3, 0, 0, 0.6, 0.8])
+    np.testing.assert_allclose(v, [1.5, 0, 1, 2, 3, 4, 5, 6])
+    visual = reduce_visual(assembly)
+    assert visual.ngeoms == assembly.visual_model.ngeoms
+    assert max(g.parentJoint for g in visual.geometryObjects) == reduced.njoints - 1
+
+
+def test_one_robot_keeps_its_names(tmp_path):
+    assembly = assembled(tmp_path, 'title = "x"\nrobot.name = "turntable"\nrun.duration = 1\n')
+    assert list(assembly.model.names) == ["universe", "axle"]
+
+
+def test_a_continuous_joint_takes_an_angle(tmp_path):
+    text = 'title = "x"\nrobot.name = "turntable"\nrobot.start = { axle = 0.7 }\nrun.duration = 1\n'
+    np.testing.assert_allclose(assembled(tmp_path, text).q0, [np.cos(0.7), np.sin(0.7)])
+
+
+FAULTS = {
+    "unknown joint": ("knuckle = 0.3", "nuckle = 0.3", 'robot[0].start."nuckle"', "knuckle"),
+    "unknown joint in speed": ("knuckle = 1.5", "x = 1", 'robot[0].speed."x"', "knuckle"),
+    "unknown joint to lock": ('["middle_joint"]', '["x"]', "robot[0].lock[0]", "distal_joint"),
+    "number for a free-flyer": ("[1, 2, 3, 0, 0, 0.6, 0.8]", "1", "robot[1].start", "list of 7"),
+    "short list": ("[1, 2, 3, 4, 5, 6]", "[1, 2]", 'robot[1].speed."root_joint"', "6 numbers"),
+    "no unit quaternion": ("0.6, 0.8]", "0, 0.5]", "robot[1]", "length 1"),
+    "unknown robot": ('"ball"', '"bal"', "robot[1]", "turntable"),
+    "same label": ('"ball"', '"three_link_finger"\nlabel = "three_link_finger"', "robot[1]", ""),
+    "no such urdf": ('name = "ball"', 'urdf = "b.urdf"', "robot[1]", "no such URDF file"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_name_the_key(fault, tmp_path):
+    old, new, key, words = FAULTS[fault]
+    assert old in TWO
+    with pytest.raises(ScenarioError) as caught:
+        assembled(tmp_path, TWO.replace(old, new, 1))
+    assert caught.value.key.startswith(key)
+    assert words in str(caught.value)
+
+
+def test_a_missing_mesh_names_the_searched_folders(tmp_path):
+    (tmp_path / "r.urdf").write_text(
+        '<robot name="r"><link name="a"><visual><geometry>'
+        '<mesh filename="package://arm/a.stl"/></geometry></visual></link></robot>'
+    )
+    text = 'title = "x"\nrobot.urdf = "r.urdf"\nrun.duration = 1\n'
+    with pytest.raises(ScenarioError, match=r"package://arm/a.stl.*package_dirs"):
+        assembled(tmp_path, text)
+    with pytest.raises(ScenarioError, match="does not exist"):
+        assembled(tmp_path, text + 'robot.package_dirs = ["meshes"]\n')

@@ -1,0 +1,157 @@
+"""A scenario file becomes a scene: what it names is found, or a fault names what would be valid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sphshell_pin.errors import ScenarioError
+from sphshell_pin.scenario import build
+from tests.scenario.files import DROP, write
+
+LAW_LINE = next(line for line in DROP.splitlines() if line.startswith("law"))
+
+
+def test_the_example_is_built(tmp_path):
+    built = build(write(tmp_path))
+    assert built.name == "drop"
+    (pair,) = built.scene.pairs
+    assert pair.name == "ball-plate"
+    assert pair.sphere.radius == 0.012
+    assert pair.friction is None
+    np.testing.assert_allclose(pair.placement.translation, [0, 0, -0.01])
+    np.testing.assert_allclose(built.q0[:3], [0.01, 0.02, 0.0125])
+    assert built.controller is None
+
+
+@pytest.mark.parametrize(
+    ("law", "kind", "attribute", "value"),
+    [
+        ('{ type = "adams" }', "ImpactLaw", "stiffness", 1e5 * 1000**2.2),
+        ('{ type = "hunt-crossley", stiffness = 5 }', "HuntCrossleyLaw", "stiffness", 5.0),
+        (
+            '{ type = "hertz", radius = 0.012, young_1 = 2e11, poisson_1 = 0.3, '
+            "young_2 = 2e11, poisson_2 = 0.3 }",
+            "ImpactLaw",
+            "stiffness",
+            4 / 3 * np.sqrt(0.012) * 1e11 / 0.91,
+        ),
+    ],
+)
+def test_laws(law, kind, attribute, value, tmp_path):
+    built = build(write(tmp_path, DROP.replace(LAW_LINE, f"law = {law}")))
+    found = built.scene.pairs[0].law
+    assert type(found).__name__ == kind
+    assert getattr(found, attribute) == pytest.approx(value, rel=1e-12)
+
+
+def test_a_half_space_is_a_square_sheet(tmp_path):
+    old = 'type = "box", size = [0.2, 0.2, 0.02]'
+    text = DROP.replace(old, 'type = "half-space", extent = 0.5')
+    shell = build(write(tmp_path, text)).scene.pairs[0].shell
+    np.testing.assert_allclose(shell.box, [[-0.25, -0.25, 0], [0.25, 0.25, 0]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "primitive",
+    [
+        'type = "box", size = [0.1, 0.2, 0.3]',
+        'type = "sphere", radius = 0.1',
+        'type = "cylinder", radius = 0.1, length = 0.2',
+        'type = "capsule", radius = 0.1, length = 0.2',
+        'type = "cone", radius = 0.1, length = 0.2',
+        'type = "ellipsoid", radii = [0.1, 0.2, 0.3]',
+    ],
+)
+def test_primitives_are_closed_shells_of_their_size(primitive, tmp_path):
+    old = 'type = "box", size = [0.2, 0.2, 0.02]'
+    shell = build(write(tmp_path, DROP.replace(old, primitive))).scene.pairs[0].shell
+    assert shell.is_closed
+    assert 0.1 <= shell.size <= 0.8
+
+
+def test_magnify_scales_the_shell(tmp_path):
+    text = DROP.replace('name = "plate"', 'name = "plate"\nmagnify = 2.5', 1)
+    small, large = build(write(tmp_path)), build(write(tmp_path, text, "large.toml"))
+    ratio = large.scene.pairs[0].shell.size / small.scene.pairs[0].shell.size
+    assert ratio == pytest.approx(2.5)
+
+
+def test_a_python_controller_is_found_beside_the_file(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "import numpy as np\ndef tau(t, q, v, contacts):\n    return 0\n"
+    )
+    text = DROP.replace("[run]", '[controller]\ntype = "python"\nfunction = "own.py:tau"\n[run]')
+    assert build(write(tmp_path, text)).controller(0, 0, 0, 0) == 0
+    with pytest.raises(ScenarioError, match=r"no function 'tua'.*has: tau"):
+        build(write(tmp_path, text.replace("own.py:tau", "own.py:tua")))
+    with pytest.raises(ScenarioError, match="no such file"):
+        build(write(tmp_path, text.replace("own.py", "other.py")))
+    with pytest.raises(ScenarioError, match=r"file\.py:function"):
+        build(write(tmp_path, text.replace("own.py:tau", "own")))
+    (tmp_path / "own.py").write_text("import nothing_of_that_name\n")
+    with pytest.raises(ScenarioError, match="nothing_of_that_name"):
+        build(write(tmp_path, text))
+
+
+def test_a_gain_spares_the_free_bodies(tmp_path):
+    text = """
+title = "x"
+[[robot]]
+name = "three_link_finger"
+[[robot]]
+name = "ball"
+[controller]
+type = "joint-pd"
+kp = 2.0
+kd = { "three_link_finger/knuckle" = 0.1 }
+q_ref = { "three_link_finger/knuckle" = 0.5 }
+[run]
+duration = 1
+"""
+    controller = build(write(tmp_path, text)).controller
+    np.testing.assert_allclose(controller.kp, [2, 2, 2, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(controller.kd, [0.1, 0, 0, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(controller.q_ref[:4], [0.5, 0, 0, 0])
+
+
+PD = '[controller]\ntype = "joint-pd"\nkp = {}\nkd = 1\nq_ref = {}\n[run]'
+FAULTS = {
+    "frame": ('frame = "ball"', 'frame = "bal"', "contact[0]", "root_joint"),
+    "shell": ('shell = "plate"', 'shell = "plaet"', "contact[0].shell", "plate"),
+    "shell's frame": ("placement =", 'frame = "x"\nplacement =', "contact[0]", "universe"),
+    "surface": (
+        'primitive = { type = "box", size = [0.2, 0.2, 0.02] }',
+        'file = "none.stl"',
+        "shell[0]",
+        "none.stl",
+    ),
+    "flat box": ("[0.2, 0.2, 0.02]", "[0.2, 0.2, -0.02]", "shell[0]", ""),
+    "kp's length": ("[run]", PD.format("[1, 2]", "{}"), "controller.kp", "6 numbers"),
+    "q_ref's length": ("[run]", PD.format("1", "[1]"), "controller.q_ref", "7 numbers"),
+    "controller's frame": (
+        "[run]",
+        '[controller]\ntype = "cartesian-impedance"\nframe = "x"\npath = [[0, 0, 0]]\n'
+        "stiffness = 1\ndamping = 1\n[run]",
+        "controller",
+        "no frame 'x'",
+    ),
+    "kp's joint": ("[run]", PD.format("{ x = 1 }", "{}"), "controller.kp", "root_joint"),
+    "own figure": ("[run]", '[figures]\nx = "a.py:b"\n[run]', "figures.x", "no such file"),
+    "source": (
+        "[run]",
+        '[[source]]\nname = "s"\nfind = "a.py:b"\nframe_i = "ball"\nlaw.type = "adams"\n[run]',
+        "source[0].find",
+        "no such file",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_name_the_key(fault, tmp_path):
+    old, new, key, words = FAULTS[fault]
+    assert old in DROP
+    with pytest.raises(ScenarioError) as caught:
+        build(write(tmp_path, DROP.replace(old, new, 1)))
+    assert caught.value.key == key
+    assert words in str(caught.value)

@@ -1,0 +1,133 @@
+"""What a scenario file may say, and how its faults are told: file, key, value, valid choices."""
+
+from __future__ import annotations
+
+import pytest
+
+from sphshell_pin.errors import NameNotFound, ScenarioError
+from sphshell_pin.scenario.reading import find_scenario, read_scenario, shipped_scenarios
+from tests.scenario.files import DROP, write
+
+FAULTS = {
+    # what is put in: (old text, new text, key told, words told)
+    "unknown key": ("dt = 1e-4", "dtt = 1e-4", "run.dtt", ["did you mean 'dt'", "integrator"]),
+    "unknown table": (
+        "[run]",
+        "[ruin]\nx = 1\n[run]",
+        "ruin",
+        ["did you mean 'run'", "controller"],
+    ),
+    "unknown key in a law": ("stiffness", "stifness", "contact[0].law.stifness", ["'stiffness'"]),
+    "unknown type": ('"impact"', '"impct"', "contact[0].law", ["impct", "hertz", "hunt-crossley"]),
+    "no type": ('type = "impact", ', "", "contact[0].law", ["type is missing", "hunt-crossley"]),
+    "unknown choice": ("[[contact]]", 'side = "up"\n[[contact]]', "shell[0].side", ["'inside'"]),
+    "negative": ("1e6", "-1e6", "contact[0].law.stiffness", ["greater than 0", "-1000000.0"]),
+    "not a number": ("1e6", "nan", "contact[0].law.stiffness", ["finite"]),
+    "text for a number": ("1e6", '"stiff"', "contact[0].law.stiffness", ["number", "'stiff'"]),
+    "missing": ("duration = 0.05", "", "run.duration", ["is missing"]),
+    "no source": ('name = "ball"\n', "", "robot[0]", ["either name", "or urdf"]),
+    "two sources": ('name = "plate"', 'name = "p"\nfile = "x"', "shell[0]", ["file or primitive"]),
+    "not a table": ("[run]", "[expect]\nx = 1\n[run]", "expect.x", ["must be a table"]),
+    "no tolerance": (
+        "[run]",
+        '[expect]\n"a.b" = { value = 1 }\n[run]',
+        'expect."a.b"',
+        ["rtol or atol"],
+    ),
+    "wrong gain": (
+        "[run]",
+        '[controller]\ntype = "joint-pd"\nkp = "x"\nkd = 1\n[run]',
+        "controller.kp",
+        ["number"],
+    ),
+    "short vector": ("[0, 0, -0.01]", "[0, 0]", "shell[0].placement.xyz", ["at least 3"]),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_names_file_key_and_choices(fault, tmp_path):
+    old, new, key, words = FAULTS[fault]
+    assert old in DROP
+    path = write(tmp_path, DROP.replace(old, new, 1))
+    with pytest.raises(ScenarioError) as caught:
+        read_scenario(path)
+    assert caught.value.key == key
+    assert str(path) in str(caught.value)
+    for word in words:
+        assert word in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_example_is_valid(tmp_path):
+    scenario = read_scenario(write(tmp_path))
+    assert scenario.robot[0].name == "ball"
+    assert scenario.gravity == [0.0, 0.0, -9.81]
+    assert scenario.contact[0].friction.type == "none"
+
+
+def test_not_toml_and_not_there(tmp_path):
+    with pytest.raises(ScenarioError, match="not valid TOML"):
+        read_scenario(write(tmp_path, "title = "))
+    with pytest.raises(ScenarioError, match="is missing"):
+        read_scenario(write(tmp_path, ""))
+    with pytest.raises(ScenarioError, match="cannot be read"):
+        read_scenario(tmp_path / "nothing.toml")
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ScenarioError, match="UTF-8"):
+        read_scenario(binary)
+
+
+def test_changes_by_dotted_key(tmp_path):
+    path = write(tmp_path)
+    changes = {
+        "run.dt": "2e-5",
+        "contact.ball-plate.law.stiffness": "5e5",
+        "contact.0.sphere.radius": "0.01",
+        "robot.name": "turntable",
+        "shell.plate.side": "outside",
+        "controller.type": "gravity-compensation",
+    }
+    scenario = read_scenario(path, changes)
+    assert scenario.run.dt == 2e-5
+    assert scenario.contact[0].law.stiffness == 5e5
+    assert scenario.contact[0].sphere.radius == 0.01
+    assert scenario.robot[0].name == "turntable"
+    assert scenario.shell[0].side == "outside"
+    assert scenario.controller.type == "gravity-compensation"
+
+
+def test_changes_that_fit_nowhere(tmp_path):
+    path = write(tmp_path)
+    with pytest.raises(ScenarioError, match=r"run\.dtt.*did you mean 'dt'"):
+        read_scenario(path, {"run.dtt": "1"})
+    with pytest.raises(ScenarioError, match=r"there are: ball-plate"):
+        read_scenario(path, {"contact.tip.law.stiffness": "1"})
+    with pytest.raises(ScenarioError, match="'dt' is a value"):
+        read_scenario(path, {"run.dt.x": "1"})
+
+
+def test_shipped_scenarios_are_found_by_name_and_path(tmp_path):
+    shipped = shipped_scenarios()
+    assert {
+        "fingertip_on_blade",
+        "sphere_on_shell",
+        "ball_on_turntable",
+        "allegro_hand_object",
+        "gear_contact",
+    } <= set(shipped)
+    assert find_scenario("gear_contact") == shipped["gear_contact"]
+    path = write(tmp_path)
+    assert find_scenario(path) == path
+    with pytest.raises(NameNotFound, match="gear_contact"):
+        find_scenario("gear_contat")
+    with pytest.raises(ScenarioError, match="no such file"):
+        find_scenario("folder/that/is/not.toml")
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_shipped_scenarios_are_valid_and_expect_something(name):
+    scenario = read_scenario(find_scenario(name))
+    assert scenario.expect
+    assert len(scenario.title) > 20
+    assert len(scenario.description) > 100

@@ -1,0 +1,65 @@
+"""Surfaces the shell tests share, and ways to compare them by place instead of by number."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sphshell_pin.shell import CleanedSurface
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+
+CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+CUBE_QUADS = [
+    [0, 1, 3, 2],
+    [4, 6, 7, 5],
+    [0, 4, 5, 1],
+    [2, 3, 7, 6],
+    [0, 2, 6, 4],
+    [1, 5, 7, 3],
+]
+
+
+def plate(n, height=0.0):
+    """Return a unit plate of n x n quads with +z normals: vertices, quads."""
+    x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="ij")
+    index = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    quads = np.stack([a, b, c, d], axis=-1).reshape(-1, 4)
+    return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, height)]), quads
+
+
+def tetrahedron(scale=1.0, at=(0.0, 0.0, 0.0)):
+    """Return a tetrahedron wound outward: vertices, triangles."""
+    points = scale * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) + np.array(at)
+    return points, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+
+
+def joined(*parts):
+    """Return several (vertices, elements) as one list of polygons."""
+    vertices, polygons, before = [], [], 0
+    for points, elements in parts:
+        vertices.append(points)
+        polygons += [[int(v) + before for v in row if v >= 0] for row in elements]
+        before += len(points)
+    return np.concatenate(vertices), polygons
+
+
+def areas(surface: CleanedSurface):
+    """Return the area vector of each triangle (t, 3)."""
+    p = surface.vertices[surface.triangles]
+    return 0.5 * np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+
+
+def by_place(surface: CleanedSurface, wound=True):
+    """Return the elements as a sorted list of corner places, cyclic, with or without winding."""
+    out = []
+    for row in surface.elements:
+        places = [tuple(np.round(surface.vertices[v], 9) + 0.0) for v in row if v >= 0]
+        if wound:
+            k = places.index(min(places))
+            out.append(tuple(places[k:] + places[:k]))
+        else:
+            out.append(tuple(sorted(places)))
+    return sorted(out)

@@ -1,0 +1,95 @@
+"""Vertices on the open edges of other elements become corners there: no crack stays open."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sphshell_pin.shell import clean
+
+from .surfaces import CUBE, CUBE_QUADS, areas, plate
+
+
+def halves(cuts, gap=0.0):
+    """Return a plate whose left half is one quad and whose right half is cut at heights `cuts`."""
+    heights = [0.0, *cuts, 1.0]
+    points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    quads = [[0, 1, 2, 3]]
+    for low, high in zip(heights[:-1], heights[1:], strict=True):
+        k = len(points)
+        points += [[1 + gap, low, 0], [2, low, 0], [2, high, 0], [1 + gap, high, 0]]
+        quads.append([k, k + 1, k + 2, k + 3])
+    return np.array(points, float), quads
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-8, -1e-8])
+@pytest.mark.parametrize("cuts", [[0.5], [0.3, 0.6], [0.1, 0.11, 0.5, 0.9]])
+def test_a_coarse_side_meets_a_fine_one(cuts, gap):
+    surface = clean(*halves(cuts, gap))
+    health = surface.health
+    assert health.t_junctions == len(cuts)
+    assert health.boundary_loops == 1
+    assert health.non_manifold_edges == 0
+    assert health.euler_number == 1
+    assert np.linalg.norm(areas(surface), axis=1).sum() == pytest.approx(2.0, rel=1e-6)
+    assert (areas(surface)[:, 2] > 0.0).all()
+    assert surface.source_element.min() == 0
+    assert "T-junctions" in " ".join(health.repairs)
+
+
+def test_one_inserted_corner_keeps_the_element_whole():
+    surface = clean(
+        np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.5, 0.5, 0]]),
+        [[0, 1, 2], [1, 3, 4], [3, 2, 4]],
+    )
+    assert surface.health.t_junctions == 1
+    assert surface.source_element.tolist() == [0, 1, 2]
+    assert surface.health.quads == 1
+
+
+def test_no_vertex_is_taken_beyond_the_tolerance():
+    assert clean(*halves([0.5], gap=1e-5)).health.t_junctions == 0
+
+
+def test_dropping_a_filler_opens_a_crack_that_is_closed_again():
+    # A zero-area triangle on the edge between a coarse and a fine side.
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [0.5, -1, 0]])
+    surface = clean(points, [[0, 1, 2], [0, 2, 4][::-1], [2, 1, 4][::-1], [0, 1, 3]])
+    assert surface.health.degenerate_elements == 1
+    assert surface.health.t_junctions == 1
+    assert surface.health.boundary_edges == 4
+    assert surface.health.components == 1
+
+
+def test_a_closed_cube_with_a_finer_face_is_closed():
+    vertices, quads = plate(4, height=1.0)
+    points = np.concatenate([CUBE, vertices])
+    elements = [q for q in CUBE_QUADS if q != [1, 5, 7, 3]] + (quads + 8).tolist()
+    health = clean(points, elements).health
+    assert health.is_closed
+    assert health.volume == pytest.approx(1.0, rel=1e-12)
+    assert health.t_junctions == 12
+
+
+def test_corner_normals_are_interpolated():
+    points, quads = halves([0.25])
+    left, right = np.array([0.0, 0.6, 0.8]), np.array([0.0, -0.6, 0.8])
+    normals = np.where(points[:, 1:2] < 0.5, left, right)
+    surface = clean(points, quads, normals)
+    at = np.argwhere(np.isclose(surface.vertices[surface.triangles], [1, 0.25, 0]).all(axis=2))
+    own = [k for k in at if surface.source_element[surface.triangle_element[k[0]]] == 0]
+    wanted = left + 0.25 * (right - left)
+    for triangle, corner in own:
+        assert surface.normals[triangle, corner] == pytest.approx(wanted / np.linalg.norm(wanted))
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.floats(0.001, 0.999), min_size=1, max_size=6, unique=True), st.integers(0, 3))
+def test_area_and_topology_survive_any_cuts(cuts, turn):
+    cuts = sorted(cuts)
+    points, quads = halves([c for k, c in enumerate(cuts) if k == 0 or c - cuts[k - 1] > 1e-5])
+    quads[0] = quads[0][turn:] + quads[0][:turn]
+    surface = clean(points, quads)
+    assert surface.health.boundary_loops == 1
+    assert surface.health.euler_number == 1
+    assert np.linalg.norm(areas(surface), axis=1).sum() == pytest.approx(2.0)

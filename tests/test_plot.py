@@ -1,0 +1,184 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.plot import (
+    MOST_PAIRS,
+    MOST_POINTS,
+    NO_CONTACT,
+    PairSeries,
+    plot_contact_path,
+    plot_energy,
+    plot_force_and_depth,
+    plot_result,
+    save_figures,
+)
+from tests.view.stand_ins import (
+    a_result,
+    a_scene,
+    ball_configuration,
+    ball_model,
+    ball_on_plate,
+    contact_pair,
+    plate,
+)
+
+
+def texts(figure):
+    """Everything written in a figure."""
+    from matplotlib.text import Text
+
+    figure.canvas.draw()
+    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+
+
+def labels(figure):
+    return {axis.get_ylabel() for axis in figure.axes} | {axis.get_xlabel() for axis in figure.axes}
+
+
+def without_contact():
+    q = np.tile(ball_configuration(np.ones(3)), (5, 1))
+    return a_result(np.arange(5.0), q)
+
+
+def test_the_three_figures_are_written_and_not_blank(tmp_path):
+    from PIL import Image
+
+    scene, result = ball_on_plate()
+    paths = save_figures(result, tmp_path / "new", scene)
+    assert [path.name for path in paths] == [
+        "force_and_depth.png",
+        "energy.png",
+        "contact_path.png",
+    ]
+    for path in paths:
+        pixels = np.asarray(Image.open(path).convert("L"))
+        assert pixels.shape[1] >= 900
+        assert 0.002 < np.mean(pixels < 128) < 0.5
+
+
+def test_axes_carry_their_units():
+    scene, result = ball_on_plate()
+    assert {"force [N]", "depth [mm]", "time [s]"} <= labels(plot_force_and_depth(result))
+    assert {"x of the shell [m]", "y of the shell [m]", "normal force [N]"} <= labels(
+        plot_contact_path(result, scene)
+    )
+    assert {"x of the world [mm]", "y of the world [mm]"} <= labels(plot_contact_path(result))
+    energetic = a_result(
+        [0, 1], np.zeros((2, 8)), kinetic=np.array([0, 2e-3]), residual=np.array([0, 3e-9])
+    )
+    assert {"energy [mJ]", "residual [nJ]"} <= labels(plot_energy(energetic))
+
+
+def test_forces_of_one_pair_add_normal_as_numbers_and_friction_as_vectors():
+    rows = [
+        {"row": 1, "normal_force": 2.0, "friction_force_world": [1.0, 0, 0], "depth": 1e-3},
+        {"row": 1, "normal_force": 3.0, "friction_force_world": [-1.0, 0, 0], "depth": 2e-3},
+        {"row": 2, "pair": 1, "normal_force": 9.0},
+    ]
+    series = PairSeries.of(a_result([0, 1, 2], np.zeros((3, 8)), rows, ("one", "two")), 0)
+    np.testing.assert_array_equal(series.normal, [0, 5, 0])
+    np.testing.assert_array_equal(series.friction, [0, 0, 0])
+    np.testing.assert_array_equal(series.depth, [0, 2e-3, 0])
+
+
+def test_a_run_without_contact_is_told_in_words(tmp_path):
+    result = without_contact()
+    for figure in (plot_force_and_depth(result), plot_contact_path(result), plot_result(result)):
+        assert NO_CONTACT in texts(figure)
+    assert len(save_figures(result, tmp_path)) == 3
+
+
+def test_a_single_instant_of_contact_is_drawn(tmp_path):
+    scene, _ = ball_on_plate()
+    q = np.tile(ball_configuration([0, 0, 0.05]), (2, 1))
+    result = a_result([0, 1], q, [{"row": 1, "point_world": [0.1, 0.2, 0.0]}], ("ball",))
+    assert len(save_figures(result, tmp_path, scene)) == 3
+    assert len(save_figures(result, tmp_path)) == 3
+
+
+def test_the_path_on_a_wall_is_seen_along_its_normal():
+    model = ball_model()
+    scene = a_scene(model, contact_pair(model, "ball", 0.05, plate()))
+    q = np.tile(ball_configuration(np.zeros(3)), (3, 1))
+    rows = [
+        {"row": k, "point_world": [0, 0.1 * k, 0.2], "normal_world": [-1.0, 0, 0]} for k in range(3)
+    ]
+    wall = plot_contact_path(a_result([0, 1, 2], q, rows), scene)
+    # From the side of the normal -x, with z pointing right, y points up: a right-handed view.
+    assert {"z of the shell [m]", "y of the shell [m]"} <= labels(wall)
+
+
+def test_every_shell_has_its_own_picture_and_every_pair_its_name():
+    model = ball_model()
+    shells = [plate(name=f"plate {k}") for k in range(3)]
+    pairs = [
+        contact_pair(model, "ball", 0.05, shells[k // 2], name=f"finger {k}") for k in range(6)
+    ]
+    names = [pair.name for pair in pairs]
+    rows = [
+        {"row": row, "pair": k, "point_world": [0.01 * row, 0.05 * k, 0]}
+        for row in range(5)
+        for k in range(6)
+    ]
+    q = np.tile(ball_configuration(np.zeros(3)), (5, 1))
+    figure = plot_contact_path(a_result(np.arange(5), q, rows, names), a_scene(model, *pairs))
+    written = " ".join(texts(figure))
+    assert all(name in written for name in names)
+    assert all(f"on plate {k}" in written for k in range(3))
+
+
+def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
+    count = MOST_PAIRS + 3
+    rows = [{"row": 1, "pair": k, "normal_force": 1.0 + k} for k in range(count)]
+    names = [f"pair {k}" for k in range(count)]
+    written = texts(plot_force_and_depth(a_result([0, 1], np.zeros((2, 8)), rows, names)))
+    assert "pair 0" not in written
+    assert f"pair {count - 1}" in written
+    assert any("3 pairs with smaller forces left out" in text for text in written)
+
+
+def test_a_long_run_keeps_its_one_row_peak():
+    count = 300_000
+    result = a_result(np.arange(count) * 1e-4, np.zeros((count, 1)), pairs=("tip",))
+    result.contacts = a_result(
+        [0], [[0]], [{"row": 123_457, "normal_force": 77.0, "depth": 1e-3}]
+    ).contacts
+    line = plot_force_and_depth(result).axes[0].lines[0]
+    assert len(line.get_xdata()) <= MOST_POINTS + 2
+    assert line.get_ydata().max() == 77.0
+
+
+def test_potential_energy_is_shown_from_where_it_started():
+    result = without_contact()
+    result.energy.potential = np.linspace(1000.0, 1001.0, 5)
+    line = next(
+        line for line in plot_energy(result).axes[0].lines if "potential" in line.get_label()
+    )
+    assert line.get_ydata()[0] == 0.0
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(ResultError, match=r"force_and_depth\.png"):
+        save_figures(without_contact(), tmp_path / "file")
+
+
+def test_without_matplotlib_one_sentence_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(MissingExtra, match=r"sphshell-pin\[view\]"):
+        plot_result(without_contact())
+
+
+def test_no_global_figure_is_made(tmp_path):
+    script = (
+        "import sys; from sphshell_pin.plot import save_figures;"
+        "from tests.test_plot import without_contact;"
+        f"save_figures(without_contact(), {str(tmp_path)!r});"
+        "print('matplotlib.pyplot' in sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "False"

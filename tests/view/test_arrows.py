@@ -1,0 +1,121 @@
+from types import SimpleNamespace
+
+import meshcat
+import numpy as np
+import pytest
+
+from sphshell_pin.view.arrows import ArrowPool, ArrowScale
+from sphshell_pin.view.page import FilmWindow
+
+
+def forces(*normal, friction=None):
+    count = len(normal)
+    return SimpleNamespace(
+        point_world=np.arange(3.0 * count).reshape(count, 3),
+        normal_world=np.tile([0.6, 0.0, 0.8], (count, 1)),
+        normal_force=np.array(normal, dtype=float),
+        friction_force_world=np.zeros((count, 3)) if friction is None else np.array(friction),
+    )
+
+
+def last_transforms(pool_of, contacts, scale, **options):
+    """Transforms (path -> 4x4) after one update of a pool."""
+    window = FilmWindow()
+    pool = ArrowPool(meshcat.Visualizer(window=window), pool_of, 0.001, **options)
+    window.frame = 0
+    pool.update(contacts, scale)
+    commands = window.commands(np.zeros(1))
+    return {
+        command["path"].removeprefix("/meshcat/"): np.reshape(command["matrix"], (4, 4)).T
+        for command in commands
+        if command["type"] == "set_transform"
+    }
+
+
+@pytest.mark.parametrize("peak", [1e-6, 0.03, 4.9, 5.0, 777.0, 2e7])
+@pytest.mark.parametrize("length", [1e-4, 0.07, 30.0])
+def test_the_peak_arrow_is_about_as_long_as_asked(peak, length):
+    scale = ArrowScale.from_forces(np.array([0.0, 0.4 * peak, peak]), length)
+    # Both ends of the scale are rounded to 1, 2 or 5: at most sqrt(2.5) off.
+    assert 1 / 1.6 < peak * scale.metres_per_newton / length < 1.6
+
+
+def test_the_scale_reads_as_a_sentence():
+    assert str(ArrowScale(0.1, 5.0)) == "100 mm = 5 N"
+    assert str(ArrowScale.from_forces(np.array([5.2]), 0.21)) == "200 mm = 5 N"
+
+
+def test_an_impact_does_not_shrink_the_rest_to_nothing():
+    values = np.concatenate((np.full(100, 2.0), [5000.0]))
+    scale = ArrowScale.from_forces(values, 0.1)
+    assert 2.0 * scale.metres_per_newton > 0.1 / 8.0
+    assert scale.cuts(values)
+    assert not scale.cuts(np.full(3, 2.0))
+
+
+def test_no_force_at_all_still_gives_a_scale():
+    assert ArrowScale.from_forces(np.zeros(0), 0.1).metres_per_newton > 0.0
+
+
+def test_an_arrow_goes_from_the_contact_along_the_force():
+    scale = ArrowScale(0.1, 5.0)
+    contacts = forces(4.0, friction=[[0.0, 1.0, 0.0]])
+    where = last_transforms(1, contacts, scale)
+    start = contacts.point_world[0]
+    for name, force in (("normal", np.array([2.4, 0.0, 3.2])), ("friction", np.array([0, 1.0, 0]))):
+        shaft, head = where[f"{name}_0/shaft"], where[f"{name}_0/head"]
+        # three.js's unit cylinder lies along y from -1/2 to 1/2.
+        np.testing.assert_allclose((shaft @ [0, -0.5, 0, 1])[:3], start, atol=1e-12)
+        np.testing.assert_allclose(
+            (head @ [0, 0.5, 0, 1])[:3], start + force * scale.metres_per_newton, atol=1e-12
+        )
+        np.testing.assert_allclose(shaft @ [0, 0.5, 0, 1], head @ [0, -0.5, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(where["point_0"][:3, 3], start)
+
+
+def test_the_total_force_is_one_arrow():
+    where = last_transforms(1, forces(4.0, friction=[[0.0, 1.0, 0.0]]), ArrowScale(), kind="total")
+    tip = (where["total_0/head"] @ [0, 0.5, 0, 1])[:3]
+    np.testing.assert_allclose(tip - [0, 1, 2], np.array([2.4, 1.0, 3.2]) * 0.01, atol=1e-12)
+    assert not any(name.startswith("normal") for name in where)
+
+
+def test_no_node_ever_gets_a_singular_transform():
+    for contacts in (None, forces(), forces(0.0), forces(1e-12), forces(3.0)):
+        for matrix in last_transforms(2, contacts, ArrowScale()).values():
+            assert np.linalg.norm(matrix[:3, :3], axis=0).min() > 0.0
+            assert np.isfinite(matrix).all()
+
+
+def test_a_full_pool_shows_the_largest_forces():
+    where = last_transforms(2, forces(1.0, 9.0, 2.0, 5.0), ArrowScale())
+    shown = sorted(tuple(where[f"point_{k}"][:3, 3]) for k in range(2))
+    assert shown == [(3.0, 4.0, 5.0), (9.0, 10.0, 11.0)]
+
+
+def test_no_arrow_is_longer_than_the_longest():
+    scale = ArrowScale(0.1, 1.0, longest=0.25)
+    where = last_transforms(1, forces(1000.0), scale)
+    tip = (where["normal_0/head"] @ [0, 0.5, 0, 1])[:3]
+    assert np.linalg.norm(tip - [0, 1, 2]) == pytest.approx(0.25)
+
+
+def test_a_contact_keeps_its_arrow_when_another_lets_go():
+    window = FilmWindow()
+    pool = ArrowPool(meshcat.Visualizer(window=window), 3, 0.001)
+    both = forces(1.0, 2.0)
+    second = SimpleNamespace(**{name: column[1:] for name, column in vars(both).items()})
+    second.point_world = second.point_world + 0.01
+    for window.frame, contacts in enumerate((both, second, both)):
+        pool.update(contacts, ArrowScale())
+    clips = next(c for c in window.commands(np.arange(3.0)) if c["type"] == "set_animation")
+    sizes = {
+        clip["path"].rsplit("/", maxsplit=1)[1]: np.frombuffer(
+            next(t for t in clip["clip"]["tracks"] if t["name"] == ".scale")["values"].data, "<f4"
+        ).reshape(-1, 3)[:, 0]
+        for clip in clips["animations"]
+        if "point" in clip["path"] and any(t["name"] == ".scale" for t in clip["clip"]["tracks"])
+    }
+    # Only the first contact's point ever shrinks; the second's stays in its slot throughout.
+    assert list(sizes) == ["point_0"]
+    assert sizes["point_0"][1] < 1e-3 * sizes["point_0"][0]

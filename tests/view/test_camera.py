@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+
+from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View
+
+
+def in_picture(view, points):
+    """Picture coordinates (k, 2) of world points, -1 to 1 inside the free part of the window."""
+    back = (view.eye - view.target) / view.distance
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    up = np.cross(back, right)
+    relative = points - view.eye
+    depth = -relative @ back
+    assert (depth > 0.0).all()
+    slope = np.tan(np.deg2rad(0.5 * FIELD_OF_VIEW))
+    return (
+        np.column_stack((relative @ right / (ASPECT * slope), relative @ up / slope))
+        / (depth[:, None])
+    )
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_everything_near_the_action_is_in_the_picture(seed):
+    random = np.random.default_rng(seed)
+    size = 10.0 ** random.uniform(-3, 2)
+    action = size * (random.normal(size=(5, 3)) + random.normal(size=3))
+    around = action.mean(axis=0) + size * random.uniform(-2, 2, (30, 3))
+    normal = random.normal(size=3)
+    normal /= np.linalg.norm(normal)
+    view = View.of(action, around, normal, 0.02 * size)
+    picture = in_picture(view, np.vstack((action, around)))
+    assert np.abs(picture).max() < 1.0
+    assert np.abs(picture).max() > 0.4
+
+
+@pytest.mark.parametrize("normal", [*np.eye(3), *-np.eye(3)])
+def test_the_eye_stands_on_the_side_of_the_contact_normal(normal):
+    point = np.array([[0.5, 0.1, 0.3]])
+    view = View.of(point, np.zeros((0, 3)), normal, 0.01)
+    assert (view.eye - point[0]) @ normal > 0.15 * view.distance
+
+
+def test_things_far_away_do_not_shrink_the_contact():
+    near = View.of(np.zeros((1, 3)), np.zeros((0, 3)), np.zeros(3), 0.01)
+    far = View.of(np.zeros((1, 3)), np.array([[50.0, 0, 0]]), np.zeros(3), 0.01)
+    assert far.distance == pytest.approx(near.distance)

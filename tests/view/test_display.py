@@ -1,0 +1,175 @@
+import subprocess
+import sys
+
+import meshcat
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin.errors import InvalidParameter, MissingExtra
+from sphshell_pin.view import ArrowScale, Display
+from sphshell_pin.view.page import FilmWindow
+from tests.view.stand_ins import (
+    a_scene,
+    ball_configuration,
+    ball_model,
+    contact_log,
+    contact_pair,
+    plate,
+)
+
+
+def filmed(scene, q, contacts=None, **options):
+    """Transforms by path after one update, and all commands."""
+    window = FilmWindow()
+    display = Display(scene, visualizer=meshcat.Visualizer(window=window), **options)
+    window.frame = 0
+    display.update(q, contacts)
+    commands = window.commands(np.zeros(1))
+    transforms = {
+        command["path"].removeprefix("/meshcat/"): np.reshape(command["matrix"], (4, 4)).T
+        for command in commands
+        if command["type"] == "set_transform"
+    }
+    return transforms, commands
+
+
+def turntable_scene():
+    model = ball_model()
+    placement = pin.SE3(pin.utils.rpyToMatrix(0.1, 0.2, 0.3), np.array([0.4, 0.0, 0.1]))
+    pair = contact_pair(model, "ball", 0.05, plate(name="disc"), "table", placement)
+    return a_scene(model, pair)
+
+
+def test_shells_and_spheres_move_with_their_bodies():
+    scene = turntable_scene()
+    where, _ = filmed(scene, ball_configuration([1.0, 2.0, 3.0], 0.7))
+    expected = pin.SE3(pin.utils.rotate("z", 0.7), np.zeros(3)) * scene.pairs[0].placement
+    np.testing.assert_allclose(where["shells/0_disc"], expected.homogeneous, atol=1e-12)
+    np.testing.assert_allclose(where["spheres/0_tip"][:3, 3], [1.0, 2.0, 3.0])
+
+
+def test_a_shell_shared_by_many_spheres_is_drawn_once():
+    model = ball_model()
+    shell = plate()
+    pairs = [contact_pair(model, "ball", 0.05, shell, name=f"p{k}") for k in range(4)]
+    _, commands = filmed(a_scene(model, *pairs), ball_configuration(np.zeros(3)))
+    surfaces = [c for c in commands if c["path"].endswith("/surface")]
+    balls = [c for c in commands if c["path"].endswith("/ball") and "spheres" in c["path"]]
+    assert (len(surfaces), len(balls)) == (1, 1)
+
+
+def test_a_pair_without_sphere_or_shell_shows_its_contacts():
+    model = ball_model()
+    scene = a_scene(model, contact_pair(model, "ball", None, None, "table", name="gears"))
+    contacts = contact_log([{"point_world": [0.1, 0.2, 0.3], "normal_force": 7.0}])
+    where, _ = filmed(scene, ball_configuration(np.zeros(3)), contacts)
+    np.testing.assert_allclose(where["contacts/point_0"][:3, 3], [0.1, 0.2, 0.3])
+
+
+def test_names_with_slashes_stay_one_node():
+    model = ball_model()
+    pair = contact_pair(model, "ball", 0.05, plate(name="/parts//blade"), name="a/b")
+    where, _ = filmed(a_scene(model, pair), ball_configuration(np.zeros(3)))
+    assert "shells/0__parts__blade" in where
+    assert "spheres/0_a_b" in where
+
+
+def test_a_model_without_geometry_gets_a_skeleton():
+    model = pin.buildSampleModelManipulator()
+    scene = a_scene(model, contact_pair(model, "effector_body", 0.05, plate()))
+    q = pin.neutral(model)
+    where, _ = filmed(scene, q)
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    elbow = model.getJointId("elbow_joint")
+    rod = where["robot/links/elbow_joint"]
+    np.testing.assert_allclose((rod @ [0, 0.5, 0, 1])[:3], data.oMi[elbow].translation, atol=1e-12)
+    np.testing.assert_allclose(
+        (rod @ [0, -0.5, 0, 1])[:3], data.oMi[model.parents[elbow]].translation, atol=1e-12
+    )
+    for matrix in where.values():
+        assert np.linalg.norm(matrix[:3, :3], axis=0).min() > 0.0
+
+
+def test_given_geometry_is_drawn_where_pinocchio_puts_it():
+    model = pin.buildSampleModelManipulator()
+    geometry = pin.buildSampleGeometryModelManipulator(model)
+    scene = a_scene(model, contact_pair(model, "effector_body", 0.05, plate()))
+    q = pin.integrate(model, pin.neutral(model), np.linspace(0.1, 0.6, model.nv))
+    where, _ = filmed(scene, q, visual_model=geometry)
+    data, placed = model.createData(), geometry.createData()
+    pin.updateGeometryPlacements(model, data, geometry, placed, q)
+    for index, body in enumerate(geometry.geometryObjects):
+        np.testing.assert_allclose(
+            where[f"robot/visuals/{body.name}"], placed.oMg[index].homogeneous, atol=1e-12
+        )
+
+
+def test_geometry_of_another_model_is_refused():
+    full = pin.buildSampleModelManipulator()
+    geometry = pin.buildSampleGeometryModelManipulator(full)
+    reduced = pin.buildReducedModel(full, [2], pin.neutral(full))
+    scene = a_scene(reduced, contact_pair(reduced, "effector_body", 0.05, plate()))
+    with pytest.raises(InvalidParameter, match="buildReducedModel"):
+        filmed(scene, pin.neutral(reduced), visual_model=geometry)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 300.0])
+def test_arrows_and_points_scale_with_the_scene(size):
+    model = ball_model()
+    scene = a_scene(model, contact_pair(model, "ball", 0.05 * size, plate(size)))
+    contacts = contact_log([{"normal_force": 5.0}])
+    where, _ = filmed(
+        scene,
+        ball_configuration([0, 0, 0.05 * size]),
+        contacts,
+        arrow_scale=ArrowScale(0.3 * size, 5.0),
+    )
+    shaft = where["contacts/normal_0/shaft"]
+    width, length = np.linalg.norm(shaft[:3, :2], axis=0)
+    assert 2e-4 * size < width < 2e-2 * size
+    assert 0.1 * size < length < 0.3 * size
+
+
+def test_wrong_arguments_are_named():
+    scene = turntable_scene()
+    page = meshcat.Visualizer(window=FilmWindow())
+    with pytest.raises(InvalidParameter, match="arrows"):
+        Display(scene, visualizer=page, arrows="both")
+    display = Display(scene, visualizer=page)
+    with pytest.raises(InvalidParameter, match=r"\(8,\)"):
+        display.update(np.zeros(3))
+
+
+def test_a_trail_needs_two_places():
+    display = Display(turntable_scene(), visualizer=meshcat.Visualizer(window=FilmWindow()))
+    assert display.draw_trail("still", np.ones((5, 3))) is None
+    node = display.draw_trail("moved", [[0, 0, 0], [0.1, 0, 0]], pair=0)
+    assert node.path.lower() == "/meshcat/shells/0_disc/trail/moved"
+
+
+def test_a_stock_meshcat_page_takes_the_scene():
+    page = meshcat.Visualizer()
+    try:
+        display = Display(turntable_scene(), visualizer=page)
+        display.update(ball_configuration([0, 0, 0.2], 0.1), contact_log([{}]))
+        assert "set_3d_pane_size" in page.static_html()
+    finally:
+        page.window.server_proc.terminate()
+        page.window.server_proc.wait()
+
+
+def test_without_meshcat_one_sentence_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "meshcat", None)
+    with pytest.raises(MissingExtra, match=r"pip install 'sphshell-pin\[view\]'"):
+        Display(turntable_scene())
+
+
+def test_importing_the_folder_loads_no_picture_library():
+    script = (
+        "import sys, sphshell_pin.view, sphshell_pin.plot;"
+        "print([name for name in ('meshcat', 'matplotlib', 'zmq') if name in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"

@@ -1,0 +1,137 @@
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
+from sphshell_pin.view import write_recording
+from sphshell_pin.view.contact_path import ContactRows
+from sphshell_pin.view.recording import choose_rows
+from tests.view.stand_ins import (
+    a_result,
+    a_scene,
+    ball_configuration,
+    ball_model,
+    ball_on_plate,
+    contact_log,
+    contact_pair,
+    plate,
+)
+from tests.view.test_page import unpacked
+
+
+def rows_of(t, log=(), fps=10.0, speed=1.0):
+    return choose_rows(np.asarray(t, dtype=float), ContactRows.of(contact_log(log)), fps, speed)
+
+
+def test_each_frame_shows_the_nearest_recorded_row():
+    t = np.sort(np.random.default_rng(1).uniform(2.0, 5.0, 500))
+    rows, times = rows_of(t, fps=30.0)
+    nearest = np.abs(t[None, :] - (t[0] + times)[:, None]).argmin(axis=1)
+    np.testing.assert_array_equal(t[rows], t[nearest])
+    assert times[-1] == pytest.approx(t[-1] - t[0])
+
+
+def test_speed_stretches_the_page_not_the_run():
+    t = np.linspace(0.0, 1.0, 1001)
+    rows, times = rows_of(t, fps=20.0, speed=0.1)
+    assert times[-1] == pytest.approx(10.0)
+    assert len(rows) == 201
+    assert rows[-1] == 1000
+
+
+def test_a_touch_between_two_frames_is_shown_at_its_peak():
+    t = np.linspace(0.0, 1.0, 1001)
+    touch = [{"row": row, "normal_force": force} for row, force in ((341, 2.0), (342, 9.0))]
+    rows, _ = rows_of(t, touch)
+    assert rows[3] == 342
+    assert np.count_nonzero(rows == 342) == 1
+
+
+@pytest.mark.parametrize("t", [[0.0], [3.0, 3.5], [0.0, 1e-9]])
+def test_a_run_of_hardly_any_rows_has_frames(t):
+    rows, times = rows_of(t)
+    assert len(rows) == len(times) >= 2
+    assert set(rows) <= set(range(len(t)))
+
+
+def test_the_page_holds_the_run(tmp_path):
+    scene, result = ball_on_plate()
+    threads = threading.active_count()
+    path = write_recording(tmp_path / "new" / "run.html", result, scene, title="Ball <on> plate")
+    assert path == tmp_path / "new" / "run.html"
+    assert threading.active_count() == threads
+    assert [file.name for file in path.parent.iterdir()] == ["run.html"]
+    assert path.stat().st_size < 1_200_000
+    page = path.read_text()
+    assert "Ball &lt;on&gt; plate" in page
+    assert "normal force on the sphere, 200 mm = 5 N" in page
+    clips = {
+        clip["path"]: {track["name"] for track in clip["clip"]["tracks"]}
+        for command in unpacked(page)
+        if command["type"] == "set_animation"
+        for clip in command["animations"]
+    }
+    assert ".position" in clips["/meshcat/spheres/0_ball"]
+    assert {".position", ".scale"} <= clips["/meshcat/contacts/normal_0/shaft"]
+    trails = [path for path in clips if path.startswith("/meshcat/shells/0_plate/trail")]
+    assert trails
+    assert all(clips[path] == {".visible"} for path in trails)
+
+
+def test_a_run_without_contact_says_so(tmp_path):
+    model = ball_model()
+    scene = a_scene(model, contact_pair(model, "ball", 0.05, plate()))
+    q = [ball_configuration([0, 0, height]) for height in (1.0, 0.9, 0.8)]
+    page = write_recording(tmp_path / "run.html", a_result([0, 0.1, 0.2], q), scene).read_text()
+    assert "no contact in this run" in page
+
+
+def test_equal_runs_give_equal_pages(tmp_path):
+    scene, result = ball_on_plate()
+    one, two = (
+        write_recording(tmp_path / name, result, scene, title="same").read_bytes()
+        for name in ("one.html", "two.html")
+    )
+    assert one == two
+
+
+@pytest.mark.parametrize(("name", "value"), [("fps", 0.0), ("fps", np.nan), ("speed", -1.0)])
+def test_a_pace_that_is_not_positive_is_refused(tmp_path, name, value):
+    scene, result = ball_on_plate()
+    with pytest.raises(InvalidParameter, match=name):
+        write_recording(tmp_path / "run.html", result, scene, **{name: value})
+
+
+def test_a_folder_that_cannot_be_written_is_named_and_left_clean(tmp_path):
+    scene, result = ball_on_plate()
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(ResultError, match=r"run\.html"):
+        write_recording(tmp_path / "file" / "run.html", result, scene)
+    (tmp_path / "run.html").mkdir()
+    with pytest.raises(ResultError, match=r"run\.html"):
+        write_recording(tmp_path / "run.html", result, scene)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["file", "run.html"]
+
+
+def test_without_meshcat_one_sentence_says_how_to_get_it(tmp_path, monkeypatch):
+    scene, result = ball_on_plate()
+    monkeypatch.setitem(sys.modules, "meshcat", None)
+    with pytest.raises(MissingExtra, match=r"sphshell-pin\[view\]"):
+        write_recording(tmp_path / "run.html", result, scene)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_chattering_contact_does_not_swell_the_page(tmp_path):
+    model = ball_model()
+    scene = a_scene(model, contact_pair(model, "ball", 0.05, plate()))
+    t = np.linspace(0.0, 2.0, 20_001)
+    q = np.tile(ball_configuration([0, 0, 0.05]), (len(t), 1))
+    rows = [
+        {"row": row, "point_world": [0.4 * np.sin(t[row]), 0.4 * np.cos(3.0 * t[row]), 0.0]}
+        for row in range(len(t))
+        if row % 4
+    ]
+    page = write_recording(tmp_path / "run.html", a_result(t, q, rows), scene)
+    assert page.stat().st_size < 1_300_000

@@ -1,0 +1,168 @@
+"""The recording in a real browser: pixels, clicks, no network."""
+
+import io
+import shutil
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin.view import write_recording
+from sphshell_pin.view.arrows import NORMAL_COLOR
+from sphshell_pin.view.display import SPHERE_COLOR
+from tests.view.stand_ins import a_result, a_scene, ball_on_plate, contact_pair, plate
+
+pytestmark = pytest.mark.browser
+
+# Software rendering, on machines that have no graphics card.
+FLAGS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+]
+SIZE = {"width": 800, "height": 500}
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api")
+    names = ("chromium", "chromium-browser", "google-chrome")
+    program = next(filter(None, map(shutil.which, names)), None)
+    if program is None:
+        pytest.skip("no Chromium on this machine")
+    with playwright.sync_playwright() as driver:
+        running = driver.chromium.launch(executable_path=program, args=FLAGS)
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def opened(browser):
+    """Opens a file in a page without network; complaints of the page end the test."""
+    context = browser.new_context(viewport=SIZE, offline=True)
+    page = context.new_page()
+    complaints = []
+    page.on("pageerror", lambda fault: complaints.append(str(fault)))
+    page.on(
+        "request",
+        lambda request: (
+            request.url.startswith(("file:", "data:", "blob:")) or complaints.append(request.url)
+        ),
+    )
+
+    def open_file(path):
+        page.goto(path.resolve().as_uri())
+        page.wait_for_function("window.recording_ready", timeout=60_000)
+        return page
+
+    yield open_file
+    context.close()
+    assert complaints == []
+
+
+def at_time(page, time):
+    """Pause, scrub to `time` [s] and return the picture (h, w, 3)."""
+    page.evaluate(
+        """time => {
+            viewer.animator.pause();
+            viewer.animator.time_scrubber.setValue(time);
+            viewer.render();
+        }""",
+        time,
+    )
+    return picture(page)
+
+
+def picture(page):
+    from PIL import Image
+
+    # The captions may lie over what is looked for.
+    page.add_style_tag(content="#caption, .dg.main { visibility: hidden !important; }")
+    image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    return np.asarray(image).astype(int)
+
+
+def count(pixels, color, tolerance=25):
+    wanted = np.array([color >> 16, color >> 8 & 255, color & 255])
+    return np.count_nonzero(np.abs(pixels - wanted).max(axis=2) <= tolerance)
+
+
+def is_blue(pixels):
+    return pixels[..., 2] - pixels[..., 0] > 60
+
+
+@pytest.fixture(scope="module")
+def ball_page(tmp_path_factory):
+    scene, result = ball_on_plate()
+    return write_recording(tmp_path_factory.mktemp("page") / "ball.html", result, scene)
+
+
+def test_the_ball_its_shell_and_its_arrow_are_seen(ball_page, opened):
+    page = opened(ball_page)
+    before, during = at_time(page, 0.0), at_time(page, 1.5)
+    for pixels in (before, during):
+        assert np.count_nonzero(is_blue(pixels)) > 100  # the ball
+        # The shell: greenish, unlike the grey and blue background.
+        shell = (pixels[..., 1] - pixels[..., 0] > 15) & (pixels[..., 1] >= pixels[..., 2])
+        assert np.count_nonzero(shell) > 0.05 * shell.size
+    assert count(before, NORMAL_COLOR) == 0
+    assert count(during, NORMAL_COLOR) > 60
+    # Over the run the ball goes from one side to the other.
+    start, end = (np.nonzero(is_blue(at_time(page, time)))[1].mean() for time in (0.0, 3.0))
+    assert abs(end - start) > 0.15 * SIZE["width"]
+
+
+def test_it_plays_pauses_and_starts_again(ball_page, opened):
+    page = opened(ball_page)
+    page.wait_for_function("viewer.animator.time > 0.2", timeout=20_000)
+    page.get_by_text("pause", exact=True).click()
+    stopped = page.evaluate("viewer.animator.time")
+    page.wait_for_timeout(400)
+    assert page.evaluate("viewer.animator.time") == stopped
+    shown = page.locator("#clock").inner_text()
+    assert float(shown.split()[2]) == pytest.approx(stopped, abs=0.006)
+    page.get_by_text("play", exact=True).click()
+    page.wait_for_function(f"viewer.animator.time > {stopped} + 0.2", timeout=20_000)
+
+
+def test_the_trail_grows_with_time(ball_page, opened):
+    page = opened(ball_page)
+    visible = """() => {
+        let shown = 0;
+        viewer.scene.traverse(node => { if (node.name === "trail")
+            shown += node.children.filter(piece => piece.visible).length; });
+        return shown;
+    }"""
+    counts = []
+    for time in (0.0, 1.2, 1.8, 3.0):
+        at_time(page, time)
+        counts.append(page.evaluate(visible))
+    assert counts[0] == 0
+    assert counts == sorted(set(counts))
+
+
+def test_a_robot_with_geometry_is_seen_and_moves(tmp_path, opened):
+    model = pin.buildSampleModelManipulator()
+    geometry = pin.buildSampleGeometryModelManipulator(model)
+    scene = a_scene(model, contact_pair(model, "effector_body", 0.08, plate()))
+    t = np.linspace(0.0, 1.0, 11)
+    q = [pin.integrate(model, pin.neutral(model), x * np.full(model.nv, 0.5)) for x in t]
+    page = opened(write_recording(tmp_path / "arm.html", a_result(t, q), scene, geometry))
+    first, last = at_time(page, 0.0), at_time(page, 1.0)
+    # The sample arm is pale yellow: less blue than red, which nothing else in the page is.
+    arm = [np.count_nonzero(pixels[..., 0] - pixels[..., 2] > 12) for pixels in (first, last)]
+    assert min(arm) > 300
+    moved = np.abs(first - last).max(axis=2) > 40
+    assert np.count_nonzero(moved) > 300
+    assert count(first, SPHERE_COLOR, 90) > 20
+
+
+def test_a_damaged_page_says_so(ball_page, tmp_path, browser):
+    damaged = tmp_path / "damaged.html"
+    damaged.write_text(ball_page.read_text().replace('id="scene">H4sI', 'id="scene">AAAA'))
+    page = browser.new_page()
+    page.goto(damaged.as_uri())
+    page.wait_for_function("document.getElementById('fault').textContent", timeout=20_000)
+    assert "cannot be shown" in page.locator("#fault").inner_text()
+    page.close()

@@ -1,0 +1,54 @@
+import numpy as np
+
+from sphshell_pin.view.surface import great_circles, outlined_edges, split_at_creases, tube
+from tests.view.stand_ins import CUBE_ELEMENTS, CUBE_VERTICES, quad_shell
+
+
+def test_patches_share_no_vertices_and_keep_their_shape():
+    cube = quad_shell(CUBE_VERTICES, CUBE_ELEMENTS)
+    vertices, triangles = split_at_creases(cube)
+    assert len(vertices) == 24
+    np.testing.assert_array_equal(vertices[triangles], cube.vertices[cube.triangles])
+
+
+def test_within_a_patch_vertices_are_shared():
+    cube = quad_shell(CUBE_VERTICES, CUBE_ELEMENTS, patches=np.zeros(6))
+    assert len(split_at_creases(cube)[0]) == 8
+
+
+def test_a_fine_shell_is_outlined_by_its_sharp_edges_only(monkeypatch):
+    cube = quad_shell(CUBE_VERTICES, CUBE_ELEMENTS)
+    cube.edge_class[:7] = 0
+    assert len(outlined_edges(cube)) == 12
+    monkeypatch.setattr("sphshell_pin.view.surface.MOST_OUTLINED_EDGES", 11)
+    assert len(outlined_edges(cube)) == 5
+
+
+def test_a_tube_keeps_its_radius_round_a_helix():
+    angle = np.linspace(0.0, 12.0, 400)
+    helix = np.column_stack((np.cos(angle), np.sin(angle), 0.1 * angle))
+    vertices, triangles = tube(helix, 0.01)
+    rings = vertices.reshape(len(helix), -1, 3)
+    np.testing.assert_allclose(
+        np.linalg.norm(rings - helix[:, None], axis=2), 0.01, rtol=1e-9, atol=0
+    )
+    assert triangles.min() == 0
+    assert triangles.max() == len(vertices) - 1
+    # Every inner edge of the mantle belongs to two triangles: no holes.
+    edges = np.sort(np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    counts = np.unique(edges, axis=0, return_counts=True)[1]
+    assert np.count_nonzero(counts == 1) == 2 * 6
+    assert counts.max() == 2
+
+
+def test_a_tube_survives_a_path_that_turns_back():
+    vertices, _ = tube(np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0.0]]), 0.01)
+    assert np.isfinite(vertices).all()
+
+
+def test_great_circles_lie_on_the_sphere_in_three_planes():
+    vertices, segments = great_circles(0.3)
+    np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 0.3)
+    assert np.linalg.matrix_rank(vertices) == 3
+    steps = np.linalg.norm(vertices[segments[:, 0]] - vertices[segments[:, 1]], axis=1)
+    np.testing.assert_allclose(steps, steps[0])
