@@ -56,7 +56,7 @@ def positions(
 def difference(a, b, radius: float) -> float:  # type: ignore[no-untyped-def]
     """Largest difference of two sets matched by nearest point; inf if counts differ.
 
-    A normal is known to rounding / distance only, so its difference is weighed by distance / radius.
+    A normal is known to rounding / distance only: its difference is weighed by distance / radius.
     """
     if len(a) != len(b):
         return float("inf")
