@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="sphshell-pin",
-    help="Exact contact of spheres with CAD surfaces, for Pinocchio's robots.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -27,6 +26,8 @@ app = typer.Typer(
 
 # Exit codes: 1 an expectation was missed, 2 an error, 130 interrupted (as shells have it).
 MISSED, ERROR, INTERRUPTED = 1, 2, 130
+# A share of the exchanged energy that no sound run loses or gains.
+SUSPICIOUS_RESIDUAL = 0.05
 
 ScenarioArgument = Annotated[
     str, typer.Argument(help="Name of a shipped scenario, or path of a .toml file.")
@@ -35,7 +36,7 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a value; may be given several times."),
 ]
-DtOption = Annotated[float | None, typer.Option(help="Time step [s] in place of run.dt.")]
+DtOption = Annotated[float | None, typer.Option(help="Time step \\[s] in place of run.dt.")]
 
 
 @app.callback()
@@ -60,7 +61,7 @@ def run(
     ] = None,
     dt: DtOption = None,
     duration: Annotated[
-        float | None, typer.Option(help="Time to simulate [s] in place of run.duration.")
+        float | None, typer.Option(help="Time to simulate \\[s] in place of run.duration.")
     ] = None,
     recording: Annotated[
         bool, typer.Option("--recording/--no-recording", help="Write recording.html.")
@@ -74,7 +75,7 @@ def run(
     with _faults(context):
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-        from sphshell_pin.scenario import build, run_built
+        from sphshell_pin.scenario import build, explain_built, run_built
 
         changes = _changes(set_, dt, duration)
         built = build(scenario, changes)
@@ -85,7 +86,10 @@ def run(
             TimeRemainingColumn(),
             console=_console(err=True),
             transient=True,
+            disable=not sys.stderr.isatty(),
         )
+        for warning in explain_built(built).warnings:
+            typer.echo(f"warning: {warning}", err=True)
         with bar:
             task = bar.add_task(built.name, total=1.0)
             report = run_built(
@@ -108,13 +112,12 @@ def explain(
     Example: sphshell-pin explain ball_on_turntable --dt 1e-4
     """
     with _faults(context):
-        from sphshell_pin.scenario import build
+        from sphshell_pin.scenario import build, explain_built
 
         built = build(scenario, _changes(set_, dt, None))
         console = _console()
         console.print(f"[bold]{built.name}[/bold]: {_plain(built.scenario.title)}")
-        explanation = built.scene.explain(built.q0, built.v0, built.scenario.run.dt)
-        console.print(str(explanation), markup=False, highlight=False)
+        console.print(str(explain_built(built)), markup=False, highlight=False)
 
 
 @app.command()
@@ -152,7 +155,8 @@ def list_(context: typer.Context) -> None:
 
         robots = importlib.import_module("sphshell_pin.robots")
         console = _console()
-        table = _table("scenario", "what it shows")
+        table = _table("scenario")
+        table.add_column("what it shows")
         for name, path in shipped_scenarios().items():
             table.add_row(name, _plain(read_scenario(path).title))
         console.print(table)
@@ -255,6 +259,8 @@ def _print_report(report: RunReport) -> None:
         f"in {stats['wall_time']:.3g} s, {stats['steps']} steps of {stats['dt']:g} s)",
         highlight=False,
     )
+    if energy["relative_residual"] > SUSPICIOUS_RESIDUAL:
+        typer.echo("warning: the energy does not add up: reduce dt (see explain)", err=True)
     if report.verdicts:
         expected = _table("figure", "expected", "measured", "verdict")
         for verdict in report.verdicts:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,22 +137,36 @@ def plot_contact_path(result: Result, scene: Scene | None = None) -> Any:
         return figure
     columns = min(len(groups), 2)
     rows = -(-len(groups) // columns)
-    figure = _figure(3.0 + 5.0 * columns, 0.8 + 5.5 * rows)
+    figure = _figure(3.0 + 5.0 * columns, 0.8 + 5.5 * rows, "compressed")
     axes = figure.subplots(rows, columns, squeeze=False).reshape(-1)
     forces = np.concatenate([path.force for group in groups for path in group.paths])
-    factor, unit = reading_unit(float(forces.max()), "N")
-    low, high = float(forces.min()) * factor, float(forces.max()) * factor
-    # Colours start at zero, unless that would leave only a few of them to tell forces apart.
-    limits = (low if low > 0.5 * high and high > low else 0.0, high or 1.0)
+    low, high = _color_limits(forces)
+    factor, unit = reading_unit(high, "N")
+    limits = (low * factor, high * factor)
     names = [str(name) for name in result.pairs]
     lines = None
     for axis, group in zip(axes, groups, strict=False):
         lines = draw_paths(axis, group, names, factor, limits)
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
-    figure.colorbar(lines, ax=axes.tolist(), label=f"normal force [{unit}]", shrink=0.8)
+    extend = "max" if forces.max() > high else "neither"
+    label = f"normal force [{unit}]"
+    figure.colorbar(lines, ax=axes.tolist(), label=label, shrink=0.8, extend=extend)
     figure.suptitle("Path of the contact", fontsize=12)
     return figure
+
+
+def _color_limits(forces: FloatArray) -> tuple[float, float]:
+    """Return the range of `forces` (k,) [N] that gets the colours.
+
+    It ends below an impact far above the rest, and starts at zero unless that would leave only a
+    few colours to tell forces apart.
+    """
+    high, low = float(forces.max()), float(forces.min())
+    usual = float(np.percentile(forces, 98.0, method="lower"))
+    if high > 1.5 * usual > 0.0:
+        high = usual
+    return (low if 0.5 * high < low < high else 0.0), high or 1.0
 
 
 @dataclass(frozen=True)
@@ -189,12 +203,14 @@ class PairSeries:
         return cls(str(result.pairs[pair]), normal, np.linalg.norm(friction, axis=1), depth)
 
 
-def _figure(width: float, height: float) -> Any:
+def _figure(
+    width: float, height: float, layout: Literal["constrained", "compressed"] = "constrained"
+) -> Any:
     try:
         from matplotlib.figure import Figure
     except ImportError as missing:
         raise MissingExtra("matplotlib", "view", "a figure") from missing
-    return Figure(figsize=(width, height), layout="constrained")
+    return Figure(figsize=(width, height), layout=layout)
 
 
 def _say(axis: Any, sentence: str) -> None:
@@ -246,7 +262,7 @@ def _pair_title(result: Result, pair: PairSeries) -> str:
     touches = _count(int(stats["touches"]), "touch", "touches")
     return (
         f"{pair.name}: {float(stats['contact_time']):.3g} s in contact, {touches}, "
-        f"peak {float(stats['peak_force']):.3g} N, mean {float(stats['mean_force']):.3g} N"
+        f"peak {float(stats['peak_force']):.4g} N, mean {float(stats['mean_force']):.4g} N"
     )
 
 

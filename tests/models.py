@@ -40,9 +40,10 @@ def add_body(
     """Add a body on `joint` with a frame called `name` on it; return the joint's index."""
     index = model.addJoint(parent, joint, placement or pin.SE3.Identity(), f"{name}_joint")
     inertia = inertia or pin.Inertia.FromSphere(1.0, 0.05)
+    model.addJointFrame(index)
     model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
     placed = frame or pin.SE3.Identity()
-    model.addFrame(pin.Frame(name, index, 0, placed, pin.FrameType.OP_FRAME))
+    model.addFrame(pin.Frame(name, index, placed, pin.FrameType.OP_FRAME))
     return int(index)
 
 

@@ -112,6 +112,13 @@ def test_the_path_on_a_wall_is_seen_along_its_normal():
     assert {"z of the shell [m]", "y of the shell [m]"} <= labels(wall)
 
 
+def test_colours_serve_the_usual_forces_not_one_impact():
+    scene, result = ball_on_plate()
+    result.contacts.normal_force[0] = 4000.0
+    bar = plot_contact_path(result, scene).axes[-1]
+    assert 4.0 < bar.get_ylim()[1] < 10.0
+
+
 def test_every_shell_has_its_own_picture_and_every_pair_its_name():
     model = ball_model()
     shells = [plate(name=f"plate {k}") for k in range(3)]

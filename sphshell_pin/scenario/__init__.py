@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sphshell_pin.scenario.build import Built, build
+from sphshell_pin.scenario.build import Built, build, explain_built
 from sphshell_pin.scenario.figures import Verdict, judge
 from sphshell_pin.scenario.reading import find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.run import RunReport, run_built, run_scenario
@@ -14,6 +14,7 @@ __all__ = [
     "Scenario",
     "Verdict",
     "build",
+    "explain_built",
     "find_scenario",
     "judge",
     "read_scenario",

@@ -115,6 +115,14 @@ def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -
     )
 
 
+def explain_built(built: Built) -> Any:
+    """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
+    run = built.scenario.run
+    # The recommended step is the first-order stepper's: no other is judged by it.
+    dt = run.dt if run.integrator == "semi-implicit-euler" else None
+    return built.scene.explain(built.q0, built.v0, dt)
+
+
 def load_function(where: str, path: Path, key: str) -> Callable[..., Any]:
     """Return the function that "file.py:function" names, the file relative to the scenario's.
 

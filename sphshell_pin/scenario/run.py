@@ -237,11 +237,18 @@ def _write_summary(
         },
         "settings": built.scenario.model_dump(mode="json"),
     }
-    path.write_text(json.dumps(summary, indent=2, default=_plain) + "\n", encoding="utf-8")
+    text = json.dumps(_plain(summary), indent=2, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8")
 
 
 def _plain(value: Any) -> Any:
-    """Return numpy's numbers and arrays as JSON knows them."""
+    """Return `value` made of what JSON knows; it has no infinity: null stands for it."""
     if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    return str(value)
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value if value is None or isinstance(value, str | int | float) else str(value)

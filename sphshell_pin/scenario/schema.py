@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Lengths3 = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=3)]
 
@@ -58,7 +59,7 @@ class Box(Section):
     """A box of edge lengths `size` [m], centred."""
 
     type: Literal["box"]
-    size: Vector3
+    size: Lengths3
 
 
 class SphereSurface(Section):
@@ -96,7 +97,7 @@ class Ellipsoid(Section):
     """An ellipsoid of the three half axes `radii` [m], centred."""
 
     type: Literal["ellipsoid"]
-    radii: Vector3
+    radii: Lengths3
 
 
 class HalfSpace(Section):

@@ -1,7 +1,22 @@
 """A clean shell from a file, from arrays or from a geometry, and the record of its cleaning."""
 
-from sphshell_pin.shell.cleaning import CleanedSurface, clean
-from sphshell_pin.shell.health import ShellHealth
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from sphshell_pin.shell.shell import ClosestPoints, Shell
 
+if TYPE_CHECKING:
+    from sphshell_pin.shell.cleaning import CleanedSurface, clean
+    from sphshell_pin.shell.health import ShellHealth
+
 __all__ = ["CleanedSurface", "ClosestPoints", "Shell", "ShellHealth", "clean"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load the cleaning when it is asked for: it is not needed to import the package."""
+    if name in ("CleanedSurface", "ShellHealth", "clean"):
+        from sphshell_pin.shell import cleaning
+
+        return getattr(cleaning, name)
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

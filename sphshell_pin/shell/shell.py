@@ -13,22 +13,16 @@ import numpy.typing as npt
 from sphshell_pin import _core
 from sphshell_pin.checks import check_points, check_positive, check_vector, read_only
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.shell.cleaning import CleanedSurface, clean_surface, take_surface
-from sphshell_pin.shell.health import ShellHealth
-from sphshell_pin.shell.loading import load_surface
-from sphshell_pin.shell.primitives import geometry_surface
-from sphshell_pin.shell.raw import Floats, Ints, raw_surface
+from sphshell_pin.shell.options import CREASE_ANGLE, SIDES, check_options, thread_count
 from sphshell_pin.shell.topology import Topology
-from sphshell_pin.shell.writers import Written, corners_of_elements, write_surface
-from sphshell_pin.units import metres_per_unit
 
+# Readers, writers, cleaning and tessellation load with the first shell that needs them: importing
+# the package should cost little more than importing Pinocchio.
 if TYPE_CHECKING:
     from sphshell_pin.contact.contact_set import ContactSet
-
-CREASE_ANGLE = float(np.deg2rad(30.0))
-"""Edges that turn by less are smooth [rad]."""
-
-SIDES = ("both", "outside", "inside")
+    from sphshell_pin.shell.cleaning import CleanedSurface
+    from sphshell_pin.shell.health import ShellHealth
+    from sphshell_pin.shell.raw import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -108,6 +102,9 @@ class Shell(Topology):
         name: str = "shell",
         clean: bool = True,
     ) -> None:
+        from sphshell_pin.shell.cleaning import clean_surface, take_surface
+        from sphshell_pin.shell.raw import raw_surface
+
         check_options(crease_angle, side)
         raw = raw_surface(vertices, elements, normals)
         surface = clean_surface(raw) if clean else take_surface(raw)
@@ -145,6 +142,9 @@ class Shell(Topology):
         InvalidShell
             If the file holds no element with an area.
         """
+        from sphshell_pin.shell.cleaning import clean_surface
+        from sphshell_pin.shell.loading import load_surface
+
         check_options(crease_angle, side)
         raw, taken_unit, factor = load_surface(path, unit, scale)
         surface = clean_surface(raw)
@@ -187,6 +187,9 @@ class Shell(Topology):
         InvalidParameter
             If the geometry is of another kind, or an option is out of range.
         """
+        from sphshell_pin.shell.cleaning import clean_surface
+        from sphshell_pin.shell.primitives import geometry_surface
+
         check_options(crease_angle, side)
         surface = clean_surface(geometry_surface(geometry, chord_error, segments, extent))
         shell = cls.__new__(cls)
@@ -215,7 +218,9 @@ class Shell(Topology):
         self.triangle_element = read_only(np.array(surface.triangle_element, np.int32))
         self.source_element = read_only(np.array(surface.source_element, np.int32))
         self.normals = None if surface.normals is None else read_only(surface.normals.copy())
-        corners = self.vertices[np.unique(self.triangles)]
+        # Without cleaning there may be vertices no element uses.
+        in_use = np.bincount(self.triangles.ravel(), minlength=len(self.vertices)) > 0
+        corners = self.vertices[in_use]
         self.box = read_only(np.stack([corners.min(axis=0), corners.max(axis=0)]))
         self.size = float(np.linalg.norm(self.box[1] - self.box[0]))
         self.health: ShellHealth = surface.health.labelled(name=self.name, size=self.size)
@@ -287,7 +292,7 @@ class Shell(Topology):
         if wrong.size:
             k = int(wrong[0])
             raise InvalidParameter(f"radii[{k}]", float(sizes[k]), "must be positive [m]")
-        workers = _threads(threads)
+        workers = thread_count(threads)
         depth, count = self.core.contacts_batch(
             places, sizes, int(Method.from_name(method)), workers
         )
@@ -298,7 +303,7 @@ class Shell(Topology):
 
         Raises InvalidParameter if the points are out of range.
         """
-        found = self.core.closest_points(check_points("points", points), _threads(threads))
+        found = self.core.closest_points(check_points("points", points), thread_count(threads))
         return ClosestPoints(*(read_only(column) for column in found))
 
     def transformed(self, placement: Any = None, scale: float = 1.0) -> Shell:
@@ -310,6 +315,8 @@ class Shell(Topology):
         """
         if isinstance(placement, (int, float, np.number)):
             placement, scale = None, float(placement)
+        from sphshell_pin.shell.cleaning import CleanedSurface
+
         scale = check_positive("scale", scale)
         rotation, translation = np.eye(3), np.zeros(3)
         if placement is not None:
@@ -347,6 +354,9 @@ class Shell(Topology):
         ShellFileError
             If the file cannot be written.
         """
+        from sphshell_pin.shell.writers import Written, corners_of_elements, write_surface
+        from sphshell_pin.units import metres_per_unit
+
         scale = metres_per_unit(unit)
         written = Written(
             vertices=self.vertices / scale,
@@ -379,27 +389,9 @@ class Shell(Topology):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Rebuild from arrays that are clean already."""
+        from sphshell_pin.shell.cleaning import CleanedSurface
+
         names = [field.name for field in fields(CleanedSurface)]
         surface = CleanedSurface(**{name: state[name] for name in names})
         rest = (state[name] for name in ("crease_angle", "side", "name", "source", "unit"))
         self._set(surface, *rest)
-
-
-def check_options(crease_angle: float, side: str) -> None:
-    """Raise InvalidParameter unless crease_angle [rad] is in 0..pi and side a known one."""
-    if side not in SIDES:
-        raise InvalidParameter("side", side, f"must be one of: {', '.join(SIDES)}")
-    try:
-        fits = 0.0 <= float(crease_angle) <= np.pi
-    except (TypeError, ValueError):
-        fits = False
-    if not fits:
-        raise InvalidParameter("crease_angle", crease_angle, "must lie between 0 and pi [rad]")
-
-
-def _threads(threads: int | None) -> int:
-    if threads is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-    if isinstance(threads, bool) or int(threads) != threads or threads < 1:
-        raise InvalidParameter("threads", threads, "must be a whole number of at least 1")
-    return int(threads)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sphshell_pin.checks import read_only
-from sphshell_pin.shell.raw import Bytes, Floats, Ints
+
+if TYPE_CHECKING:
+    from sphshell_pin.shell.raw import Bytes, Floats, Ints
 
 
 class Topology:

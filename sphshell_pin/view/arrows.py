@@ -77,13 +77,13 @@ class ArrowScale:
         """Choose the scale at which the peak of `forces` (k,) [N] is about `length` [m] long.
 
         A peak far above the rest (an impact before a rest) would leave nothing to see of the rest:
-        beyond four times the median, the median sets the scale, and longer arrows are cut.
+        beyond 1.6 times the median, the median sets the scale, and very long arrows are cut.
         """
         reference = _nice(length)
         present = forces[np.isfinite(forces) & (forces > 0.0)]
         if not present.size:
             return cls(reference, 10.0, 2.5 * reference)
-        peak = min(float(present.max()), 4.0 * float(np.median(present)))
+        peak = min(float(present.max()), 1.6 * float(np.median(present)))
         return cls(reference, _nice(peak * reference / length), 2.5 * reference)
 
     def cuts(self, forces: FloatArray) -> bool:

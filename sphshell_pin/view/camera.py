@@ -73,7 +73,10 @@ def _direction(target: FloatArray, subject: FloatArray, normal: FloatArray) -> F
             0.0,
         ]
     )
-    direction = sideways + 0.35 * normal + np.array([0.0, 0.0, 0.3])
+    # The flatter the subject lies, the more from above: a turntable, a pair of gears.
+    extent = np.ptp(subject, axis=0)
+    flatness = 1.0 - min(1.0, float(extent[2] / max(extent[0], extent[1], 1e-12)))
+    direction = sideways + 0.35 * normal + np.array([0.0, 0.0, 0.3 + 0.6 * flatness])
     if direction @ normal < 0.25:
         direction = direction + 0.8 * normal
     # Straight from above or below there is no upright.

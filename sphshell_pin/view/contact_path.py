@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
+LARGEST = 1e15  # beyond this, [m] or [N], nothing can be drawn
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,12 @@ class ContactRows:
 
     @classmethod
     def of(cls, log: Any) -> ContactRows:
-        """Take the columns of a Result's contact log, ordered by row."""
+        """Take the columns of a Result's contact log, ordered by row.
+
+        The end of a run that diverged may hold numbers no picture can show: they are left out.
+        """
         order = np.argsort(np.asarray(log.row), kind="stable")
-        return cls(
+        rows = cls(
             np.asarray(log.row, dtype=np.int64)[order],
             np.asarray(log.pair, dtype=np.int64)[order],
             *(
@@ -45,6 +49,11 @@ class ContactRows:
                 )
             ),
         )
+        vectors = (rows.point_world, rows.normal_world, rows.friction_force_world)
+        sound = np.abs(rows.normal_force) < LARGEST
+        for vector in vectors:
+            sound &= (np.abs(vector) < LARGEST).all(axis=1)
+        return rows if sound.all() else rows.select(sound)
 
     def select(self, chosen: Any) -> ContactRows:
         """Return the entries that `chosen`, a slice, mask or indices, picks."""

@@ -21,7 +21,7 @@ from sphshell_pin.view.nodes import (
     sphere,
     triangle_mesh,
 )
-from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot
+from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot, check_geometry_model
 from sphshell_pin.view.surface import draw_shell, great_circles, tube
 
 if TYPE_CHECKING:
@@ -74,7 +74,9 @@ class Display:
         self._model = scene.model
         self._data = self._model.createData()
         neutral = pin.neutral(self._model)
-        self.view = choose_view(scene, neutral[None, :]) if view is None else view
+        if view is None:
+            view = choose_view(scene, neutral[None, :], visual_model=visual_model)
+        self.view = view
         self.arrow_scale = ArrowScale() if arrow_scale is None else arrow_scale
         self._placed: list[_Placed] = []
         self._shell_nodes: dict[int, Any] = {}
@@ -150,7 +152,18 @@ class Display:
             set_object(
                 node["ball"],
                 sphere(radius, 48),
-                material("MeshPhong", SPHERE_COLOR, 0.6, side=0, depthWrite=False, shininess=60),
+                # Pulled forward a little: robots draw their own fingertip of the same radius.
+                material(
+                    "MeshPhong",
+                    SPHERE_COLOR,
+                    0.6,
+                    side=0,
+                    depthWrite=False,
+                    shininess=60,
+                    polygonOffset=True,
+                    polygonOffsetFactor=-2.0,
+                    polygonOffsetUnits=-2.0,
+                ),
                 order=5,
             )
             # A faint disc through whatever hides the sphere: it often sits inside a hand.
@@ -183,15 +196,26 @@ def choose_view(
     configurations: FloatArray,
     points_world: FloatArray | None = None,
     normals_world: FloatArray | None = None,
+    visual_model: pin.GeometryModel | None = None,
 ) -> View:
     """Choose a camera for the `configurations` (n, nq) and the contacts seen in them, world [m].
 
-    Without contacts the spheres are where things happen; without spheres, the joints.
+    Without contacts the spheres are where things happen; without spheres, the joints. Raises
+    InvalidParameter for a `visual_model` that does not hang on the scene's joints.
     """
     model, data = scene.model, scene.model.createData()
+    boxes = [
+        (pair.joint_j, pair.shell_placement, *np.asarray(pair.shell.box))
+        for pair in scene.pairs
+        if pair.shell is not None
+    ]
+    if visual_model is not None:
+        check_geometry_model(model, visual_model)
+        boxes += _geometry_boxes(visual_model)
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     centres: list[FloatArray] = []
     around: list[FloatArray] = []
-    radii: list[float] = []
+    radii = [pair.sphere.radius for pair in scene.pairs if pair.sphere is not None]
     for row in np.unique(np.linspace(0, len(configurations) - 1, 60).astype(int)):
         pin.forwardKinematics(model, data, configurations[row])
         for joint in range(1, model.njoints):
@@ -199,12 +223,10 @@ def choose_view(
         for pair in scene.pairs:
             if pair.sphere is not None:
                 centres.append(data.oMi[pair.joint_i].act(pair.sphere_placement.translation))
-                radii.append(pair.sphere.radius)
-            if pair.shell is not None and row == 0:
-                where = data.oMi[pair.joint_j] * pair.shell_placement
-                low, high = np.asarray(pair.shell.box)
-                corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
-                around.extend(where.act(corner) for corner in corners)
+        if row == 0:
+            for joint, placement, low, high in boxes:
+                where = data.oMi[joint] * placement
+                around.extend(where.act(low + corner * (high - low)) for corner in corners)
     touched = points_world is not None and len(points_world)
     action = np.array(centres) if centres else np.array(around or [np.zeros(3)])
     if touched and points_world is not None:
@@ -214,3 +236,20 @@ def choose_view(
         mean = normals_world.mean(axis=0)
         normal = mean / max(float(np.linalg.norm(mean)), 1e-9)
     return View.of(action, np.array(around).reshape(-1, 3), normal, min(radii, default=0.02))
+
+
+def _geometry_boxes(
+    geometry_model: pin.GeometryModel,
+) -> list[tuple[int, pin.SE3, FloatArray, FloatArray]]:
+    """Return joint, placement and box (low, high) of geometry whose loaded size can be trusted."""
+    boxes = []
+    for body in geometry_model.geometryObjects:
+        # Coal ignores the length unit that a Collada file states, the page does not.
+        if body.meshPath.lower().endswith(".dae"):
+            continue
+        body.geometry.computeLocalAABB()
+        box = body.geometry.aabb_local
+        low, high = np.array(box.min_), np.array(box.max_)
+        if np.isfinite([low, high]).all() and np.abs([low, high]).max() < 1e6:
+            boxes.append((body.parentJoint, body.placement, low, high))
+    return boxes

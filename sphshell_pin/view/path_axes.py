@@ -45,11 +45,15 @@ def draw_paths(
     """Draw one picture; `factor` scales forces and `limits` bound their colours."""
     from matplotlib.collections import LineCollection
 
-    first, second = _seen_axes(np.concatenate([path.normals for path in group.paths]).mean(axis=0))
-    chosen = [first, second]
     spread = np.concatenate([path.points for path in group.paths])
     if group.shell is not None:
         spread = np.vstack((spread, np.asarray(group.shell.box)))
+        toward_eye = np.concatenate([path.normals for path in group.paths]).mean(axis=0)
+    else:
+        # Along the axis in which the path is shortest; from above, if that is undecided.
+        toward_eye = np.eye(3)[2 - int(np.argmin(np.ptp(spread, axis=0)[::-1]))]
+    first, second = _seen_axes(toward_eye)
+    chosen = [first, second]
     size = float(np.ptp(spread, axis=0).max())
     length_factor, unit = reading_unit(size, "m")
     if group.shell is not None:
@@ -80,6 +84,7 @@ def draw_paths(
     lines.set_clim(*limits)
     axis.add_collection(lines)
     axis.autoscale_view()
+    _widen(axis)
     axis.set_aspect("equal")
     frame = "world" if group.shell is None else "shell"
     axis.set_xlabel(f"{'xyz'[first]} of the {frame} [{unit}]")
@@ -88,6 +93,16 @@ def draw_paths(
     axis.set_title(f"{where} (dot: first touch)", fontsize=10)
     axis.grid(True, alpha=0.25, linewidth=0.6)
     return lines
+
+
+def _widen(axis: Any) -> None:
+    """Give the narrow direction a third of the wide one, so that a straight path has a picture."""
+    (left, right), (bottom, top) = axis.get_xlim(), axis.get_ylim()
+    least = max(right - left, top - bottom) / 3.0
+    if right - left < least:
+        axis.set_xlim(0.5 * (left + right - least), 0.5 * (left + right + least))
+    if top - bottom < least:
+        axis.set_ylim(0.5 * (bottom + top - least), 0.5 * (bottom + top + least))
 
 
 def reading_unit(largest: float, base: str) -> tuple[float, str]:

@@ -20,7 +20,7 @@ from sphshell_pin.view.arrows import (
     ArrowScale,
     largest_force,
 )
-from sphshell_pin.view.contact_path import ContactRows, contact_paths, spaced
+from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, spaced
 from sphshell_pin.view.display import SPHERE_COLOR, TRAIL_COLOR, Display, choose_view
 from sphshell_pin.view.nodes import FloatArray, require_meshcat
 from sphshell_pin.view.page import FilmWindow, render_page
@@ -63,15 +63,25 @@ def write_recording(
     for name, value in (("fps", fps), ("speed", speed)):
         if not (np.isfinite(value) and value > 0.0):
             raise InvalidParameter(name, value, "must be positive")
-    if not len(result.t):
-        raise InvalidParameter("result", "0 recorded rows", "must hold at least one row")
+    # A run that diverged is shown up to where its numbers end.
+    sound = np.all(np.abs(np.asarray(result.q)) < LARGEST, axis=1)
+    count = len(sound) if sound.all() else int(np.argmin(sound))
+    if not count:
+        raise InvalidParameter("result", "0 rows", "must hold at least one row of finite q")
     contacts = ContactRows.of(result.contacts)
-    rows, times = choose_rows(np.asarray(result.t), contacts, fps, speed)
+    contacts = contacts.select(contacts.row < count)
+    rows, times = choose_rows(np.asarray(result.t)[:count], contacts, fps, speed)
     shown = contacts.select(np.isin(contacts.row, rows))
     view = choose_view(
-        scene, np.asarray(result.q)[rows], contacts.point_world, contacts.normal_world
+        scene,
+        np.asarray(result.q)[rows],
+        contacts.point_world,
+        contacts.normal_world,
+        visual_model,
     )
-    scale = ArrowScale.from_forces(_forces(shown, arrows), 0.16 * view.distance)
+    radii = [pair.sphere.radius for pair in scene.pairs if pair.sphere is not None]
+    length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
+    scale = ArrowScale.from_forces(_forces(shown, arrows), length)
     most = int(np.bincount(shown.row).max(initial=0)) if len(shown.row) else 0
 
     window = FilmWindow()
@@ -162,16 +172,20 @@ def _legend(
     scene: Scene, scale: ArrowScale, arrows: ArrowKind, shown: ContactRows, trailed: bool
 ) -> list[tuple[str, str]]:
     legend = []
-    if any(pair.sphere is not None for pair in scene.pairs):
-        radii = sorted({pair.sphere.radius for pair in scene.pairs if pair.sphere is not None})
+    radii = sorted({pair.sphere.radius for pair in scene.pairs if pair.sphere is not None})
+    firsts = {pair.frame_i for pair in scene.pairs}
+    on_what = "on the sphere"
+    if not radii:
+        on_what = f"on {firsts.pop()}" if len(firsts) == 1 else "on the first body of each pair"
+    if radii:
         sizes = ", ".join(f"{radius * 1e3:g}" for radius in radii[:3])
         legend.append((_css(SPHERE_COLOR), f"sphere, radius {sizes} mm"))
     if not len(shown.row):
         return [*legend, ("transparent", "no contact in this run")]
     if arrows == "total":
-        legend.append((_css(TOTAL_COLOR), f"force on the sphere, {scale}"))
+        legend.append((_css(TOTAL_COLOR), f"force {on_what}, {scale}"))
     else:
-        legend.append((_css(NORMAL_COLOR), f"normal force on the sphere, {scale}"))
+        legend.append((_css(NORMAL_COLOR), f"normal force {on_what}, {scale}"))
         legend.append((_css(FRICTION_COLOR), "friction force, same scale"))
     if scale.cuts(_forces(shown, arrows)):
         cut = f"arrows longer than {scale.longest * 1e3:.0f} mm are cut"

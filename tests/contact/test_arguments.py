@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Sphere
-from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.errors import InvalidParameter, SphshellError
 from tests import meshes
 from tests.contact.helpers import shell_of
 
@@ -29,7 +29,7 @@ def test_center(center) -> None:
 
 
 def test_method() -> None:
-    with pytest.raises(InvalidParameter, match="facets"):
+    with pytest.raises(SphshellError, match=r"magic.*facets"):
         shell_of(meshes.cube()).contacts([0, 0, 1], 0.1, method="magic")
 
 

@@ -152,3 +152,19 @@ def test_centre_on_the_surface_gives_a_finite_unit_normal() -> None:
         assert len(contacts) == 1
         assert contacts.depth[0] == pytest.approx(RADIUS, abs=1e-15)
         assert np.abs(contacts.normal[0]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-15)
+
+
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("share", [0.3, 0.999, 1.0, 1.5])
+def test_sheet_folded_flat_onto_itself(share: float, flip: bool) -> None:
+    """Two triangles on the same side of their edge are coplanar but no planar face."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, share, 0]], dtype=float)
+    triangles = np.array([[0, 1, 2], [0, 1, 3] if flip else [1, 0, 3]])
+    shell = Shell(vertices, triangles)
+    for sign in (1.0, -1.0):
+        contacts = shell.contacts([0.3, 0.05, sign * 0.1], 1.0, method="facets")
+        assert len(contacts) == 1
+        assert contacts.point[0] == pytest.approx([0.3, 0.05, 0.0], abs=1e-15)
+        beside = shell.contacts([0.4, -0.2, sign * 0.1], 1.0, method="facets")
+        assert len(beside) == 1
+        assert beside.point[0] == pytest.approx([0.4, 0.0, 0.0], abs=1e-15)

@@ -124,7 +124,7 @@ def test_other_diagonals_and_quads() -> None:
     other = np.concatenate([quads[:, [0, 1, 3]], quads[:, [1, 2, 3]]])
     mixed = np.concatenate([np.c_[one[[0, 6]], [-1, -1]], quads[1:]])
     shells = [shell_of((vertices, e)) for e in (quads, one, other, mixed)]
-    for center in positions(vertices, quads, RADIUS, 150, seed=3):
+    for center in positions(vertices, quads, RADIUS, 150, seed=3, heights=(0.3, 0.9)):
         sets = [s.contacts(center, RADIUS, method="facets") for s in shells]
         for other_set in sets[1:]:
             assert difference(sets[0], other_set, RADIUS) <= 1e-12, center.tolist()

@@ -126,15 +126,16 @@ def test_ctrl_c(options: str) -> None:
 @pytest.mark.parametrize(
     ("q", "v", "name"),
     [
-        (np.zeros(6), np.zeros(6), "q0"),
-        (START[0], np.zeros(7), "v0"),
-        (START[0] * np.nan, np.zeros(6), "q0"),
-        (START[0], np.full(6, np.inf), "v0"),
+        (np.zeros(6), np.zeros(6), "q"),
+        (START[0], np.zeros(7), "v"),
+        (START[0] * np.nan, np.zeros(6), "q"),
+        (START[0], np.full(6, np.inf), "v"),
     ],
 )
 def test_wrong_state(q, v, name: str) -> None:
-    with pytest.raises(InvalidParameter, match=name):
+    with pytest.raises(InvalidParameter) as caught:
         bouncing().run(q, v, 0.1)
+    assert caught.value.name in (name, f"{name}0")
 
 
 def test_wrong_state_in_a_scene_call() -> None:
@@ -146,7 +147,7 @@ def test_wrong_state_in_a_scene_call() -> None:
             call(START[0], np.zeros(5))
 
 
-@pytest.mark.parametrize("duration", [0.0, -1.0, float("nan")])
+@pytest.mark.parametrize("duration", [-1.0, float("nan"), float("inf")])
 def test_wrong_duration(duration: float) -> None:
     with pytest.raises(InvalidParameter, match="duration"):
         bouncing().run(*START, duration)

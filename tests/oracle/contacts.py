@@ -5,7 +5,8 @@ A triangle is convex, so p is a local minimum iff for every triangle that contai
 corner x of it (c - p) . (x - p) <= 0.
 
 A definition has sharp borders and floating point has not, so the answer is a pair of sets: what
-must be found, and what may be found (a superset). Away from the borders they are equal.
+must be found, and what may be found: what a centre moved by rounding (NUDGE) would have. Away from
+the borders they are equal.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from tests.oracle.geometry import Array, closest_on_triangles, dot, feature_norm
 SAME_POINT = 1e-9
 SURE, DOUBTFUL = 1e-14, 1e-11
 EDGE_OF_REACH = 1e-12
+NUDGE, ON_SURFACE = 5e-14, 1e-17
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,43 @@ def size_of(center: NDArray[np.float64], radius: float, corners: Array) -> float
 
 def _descends(slack: Array, tolerance: float) -> bool:
     return bool((slack > tolerance).any())
+
+
+def _nudges(center: Array, points: Array, corners: Array, size: float) -> list[list[Array]]:
+    """Steps for each triangle, of rounding's size, that its closest point follows.
+
+    Tried are steps into the triangle and, from a corner, along its sides. Away from the borders of
+    the triangle's regions there are none.
+    """
+    tries = [corners.mean(axis=1) - points]
+    for k in range(3):
+        side = corners[:, k - 2] - corners[:, k]
+        inward = np.cross(np.cross(side, corners[:, k - 1] - corners[:, k]), side)
+        at_corner = norm(corners - points[:, None]).min(axis=1) <= SAME_POINT * size
+        along = np.where(at_corner[:, None], side, 0)
+        tries += [along, -along, inward]
+    found: list[list[Array]] = [[] for _ in points]
+    for step in tries:
+        length = norm(step)
+        step = NUDGE * size * step / np.where(length > 0, length, 1)[:, None]
+        there = closest_on_triangles(center + step, corners)
+        follows = (length > 0) & (norm(there - points - step) <= 1e-3 * NUDGE * size)
+        for k in np.flatnonzero(follows):
+            found[k].append(step[k])
+    return found
+
+
+def _some_nudge_holds(
+    center: Array, point: Array, nudges: list[Array], near: Array, size: float
+) -> bool:
+    """True where a centre within rounding of `center` has a local minimum beside `point`."""
+    for step in nudges:
+        there = point + step
+        holders = near[norm(there - closest_on_triangles(there, near)) <= ON_SURFACE * size]
+        slack = ((holders - there) * (center - point)).sum(axis=2)
+        if not _descends(slack / size**2, 1e-17):
+            return True
+    return False
 
 
 def _touch(center, point, elements, *, sure, depth, group=0, normal=None) -> Touch:  # type: ignore[no-untyped-def]
@@ -86,12 +125,15 @@ def facets(
     reached = distances < radius + EDGE_OF_REACH * size
     corners, owner = corners[reached], owner[reached]
     found: list[Touch] = []
-    for point in points[reached]:
+    points = points[reached]
+    for point, nudges in zip(points, _nudges(center, points, corners, size), strict=True):
         gap = norm(point - closest_on_triangles(point, corners))
         away = center - point
         slack = ((corners - point) * away).sum(axis=2).max(axis=1) / size**2
         possible = not _descends(slack[gap <= 1e-13 * size], DOUBTFUL)
         certain = not _descends(slack[gap <= SAME_POINT * size], SURE)
+        near = corners[gap <= SAME_POINT * size]
+        possible = possible or _some_nudge_holds(center, point, nudges, near, size)
         sure = certain and bool(norm(away) < radius - EDGE_OF_REACH * size)
         if side != "both" and possible:
             lift = dot(away, sign * feature_normal(point, corners, SAME_POINT * size))

@@ -41,14 +41,15 @@ def closest_on_segment(point: Array, a: Array, b: Array) -> Array:
 
 
 def closest_on_triangles(point: NDArray[np.float64], corners: Array) -> Array:
-    """Closest point (t,3) to `point` on each triangle.
+    """Closest point (t,3) to `point` (one, or one for each triangle) on each triangle.
 
     The foot of the perpendicular if it lies inside; else the foot on a side it lies beyond, if that
     one is between the side's ends; else the nearest corner. No distances of near-by candidates are
     compared: they differ by the square of their separation, which rounding hides.
     """
-    point = np.asarray(point, dtype=Long)
-    best = corners[np.arange(len(corners)), norm(corners - point).argmin(axis=1)]
+    point = np.broadcast_to(np.asarray(point, dtype=Long), (len(corners), 3))
+    nearest = norm(corners - point[:, None]).argmin(axis=1)
+    best = corners[np.arange(len(corners)), nearest]
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     normal = np.cross(b - a, c - a)
     foot = point - (dot(point - a, normal) / dot(normal, normal))[:, None] * normal

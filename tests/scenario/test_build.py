@@ -126,7 +126,7 @@ FAULTS = {
         "shell[0]",
         "none.stl",
     ),
-    "flat box": ("[0.2, 0.2, 0.02]", "[0.2, 0.2, -0.02]", "shell[0]", ""),
+    "flat box": ("[0.2, 0.2, 0.02]", "[0.2, 0.2, -0.02]", "shell[0].primitive.size[2]", "greater"),
     "kp's length": ("[run]", PD.format("[1, 2]", "{}"), "controller.kp", "6 numbers"),
     "q_ref's length": ("[run]", PD.format("1", "[1]"), "controller.q_ref", "7 numbers"),
     "controller's frame": (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sphshell_pin import robots
+from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario import build, judge, shipped_scenarios
 from sphshell_pin.scenario.figures import check_expectations
 from sphshell_pin.scenario.run import simulate
@@ -14,7 +14,7 @@ from sphshell_pin.scenario.run import simulate
 def test_a_shipped_scenario_comes_out_as_expected(name):
     try:
         built = build(name)
-    except robots.MissingExtra:
+    except MissingExtra:
         pytest.skip("needs the example-robot-data loaders")
     check_expectations(built)
     result, stopped = simulate(built)

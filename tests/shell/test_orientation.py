@@ -40,7 +40,7 @@ def test_an_open_sheet_keeps_the_winding_of_most_of_its_area():
 def test_nested_components_alternate():
     inner = (0.2 * CUBE + 0.4, CUBE_QUADS)
     middle = (0.6 * CUBE + 0.2, CUBE_QUADS)
-    beside = (CUBE + [3.0, 0, 0], CUBE_QUADS)
+    beside = (CUBE + np.array([3.0, 0, 0]), CUBE_QUADS)
     surface = clean(*joined((CUBE, CUBE_QUADS), inner, middle, beside))
     health = surface.health
     assert health.cavities == 1
@@ -58,7 +58,7 @@ def test_a_cavity_wound_as_such_is_left_alone():
 
 
 def test_two_cubes_with_a_common_edge_are_both_closed():
-    surface = clean(*joined((CUBE, CUBE_QUADS), (CUBE + [1.0, 1.0, 0.0], CUBE_QUADS)))
+    surface = clean(*joined((CUBE, CUBE_QUADS), (CUBE + np.array([1.0, 1.0, 0.0]), CUBE_QUADS)))
     health = surface.health
     assert health.closed_components == 2
     assert health.non_manifold_edges == 1

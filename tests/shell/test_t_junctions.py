@@ -1,11 +1,14 @@
 """Vertices on the open edges of other elements become corners there: no crack stays open."""
 
+from itertools import pairwise
+
+import coal
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sphshell_pin.shell import clean
+from sphshell_pin.shell import Shell, clean
 
 from .surfaces import CUBE, CUBE_QUADS, areas, plate
 
@@ -15,7 +18,7 @@ def halves(cuts, gap=0.0):
     heights = [0.0, *cuts, 1.0]
     points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     quads = [[0, 1, 2, 3]]
-    for low, high in zip(heights[:-1], heights[1:], strict=True):
+    for low, high in pairwise(heights):
         k = len(points)
         points += [[1 + gap, low, 0], [2, low, 0], [2, high, 0], [1 + gap, high, 0]]
         quads.append([k, k + 1, k + 2, k + 3])
@@ -93,3 +96,27 @@ def test_area_and_topology_survive_any_cuts(cuts, turn):
     assert surface.health.boundary_loops == 1
     assert surface.health.euler_number == 1
     assert np.linalg.norm(areas(surface), axis=1).sum() == pytest.approx(2.0)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.05, 0.95), st.booleans())
+def test_a_ball_refined_here_and_there_is_closed(seed, share, turn):
+    rng = np.random.default_rng(seed)
+    ball = Shell.from_geometry(coal.Sphere(1.0), segments=16)
+    vertices, triangles = list(ball.vertices), []
+    for triangle in ball.triangles:
+        a, b, c = triangle
+        if rng.random() < share:
+            p = ball.vertices[triangle]
+            k = len(vertices)
+            vertices += list((p + np.roll(p, -1, axis=0)) / 2)
+            triangles += [[a, k, k + 2], [k, b, k + 1], [k + 2, k + 1, c], [k, k + 1, k + 2]]
+        else:
+            triangles.append([a, b, c])
+    basis = np.linalg.qr(rng.normal(size=(3, 3)))[0] if turn else np.eye(3)
+    health = clean(np.array(vertices) @ basis, triangles).health
+    assert health.is_closed
+    assert health.euler_number == 2
+    assert health.non_manifold_edges == 0
+    assert health.volume == pytest.approx(ball.health.volume, rel=1e-9)
+    assert health.area == pytest.approx(ball.health.area, rel=1e-6)

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sphshell_pin import _core
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell import clean
 
@@ -31,10 +32,26 @@ def test_tolerance_is_a_share_of_the_box(factor, merged):
     # The box is longer now: the same distance against the new diagonal.
     assert surface.health.weld_tolerance == pytest.approx(1e-7 * np.linalg.norm([3.0, 6.0]))
     assert surface.health.welded_vertices == 3
-    apart, polygons = joined(
-        (vertices, quads), (vertices + [0, 3.0, factor * surface.health.weld_tolerance], quads)
-    )
+    gap = np.array([0.0, 3.0, factor * surface.health.weld_tolerance])
+    apart, polygons = joined((vertices, quads), (vertices + gap, quads))
     assert (clean(apart, polygons).health.welded_vertices == 3) == merged
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.sampled_from([0.5, 1.0, 3.0, 100.0]))
+def test_grid_finds_what_all_pairs_find(seed, count, spread):
+    rng = np.random.default_rng(seed)
+    tolerance = 1e-3
+    centres = rng.uniform(0, 1, (4, 3))
+    points = centres[rng.integers(0, 4, count)] + rng.normal(size=(count, 3)) * spread * tolerance
+    points[rng.random(count) < 0.2] = points[0]
+    near = np.linalg.norm(points[:, None] - points[None], axis=2) <= tolerance
+    group = np.arange(count)
+    for _ in range(count):
+        group = np.where(near, group[None], count).min(axis=1)
+    found, distance = _core.mend_weld(points, tolerance)
+    assert found.tolist() == group.tolist()
+    assert distance == pytest.approx(np.linalg.norm(points - points[group], axis=1).max())
 
 
 def test_first_position_is_kept_exactly():

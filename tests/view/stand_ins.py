@@ -46,6 +46,7 @@ def contact_pair(model, frame, radius, shell, shell_frame="universe", placement=
     placement = placement or pin.SE3.Identity()
     return SimpleNamespace(
         name=name,
+        frame_i=frame,
         sphere=None if radius is None else SimpleNamespace(radius=radius),
         shell=shell,
         placement=placement,

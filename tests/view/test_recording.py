@@ -80,12 +80,40 @@ def test_the_page_holds_the_run(tmp_path):
     assert all(clips[path] == {".visible"} for path in trails)
 
 
+def test_a_run_that_diverged_is_shown_up_to_its_end(tmp_path):
+    scene, result = ball_on_plate()
+    result.q[-5:] = np.nan
+    result.contacts.normal_force[-1] = np.inf
+    result.contacts.point_world[-2] = np.nan
+    path = write_recording(tmp_path / "run.html", result, scene)
+    for command in unpacked(path.read_text()):
+        if command["type"] == "set_animation":
+            for clip in command["animations"]:
+                assert clip["clip"]["duration"] == pytest.approx(result.t[-6])
+                for track in clip["clip"]["tracks"]:
+                    if track["type"] != "bool":
+                        assert np.isfinite(np.frombuffer(track["values"].data, "<f4")).all()
+    result.q[:] = np.nan
+    with pytest.raises(InvalidParameter, match="finite"):
+        write_recording(tmp_path / "run.html", result, scene)
+
+
 def test_a_run_without_contact_says_so(tmp_path):
     model = ball_model()
     scene = a_scene(model, contact_pair(model, "ball", 0.05, plate()))
     q = [ball_configuration([0, 0, height]) for height in (1.0, 0.9, 0.8)]
     page = write_recording(tmp_path / "run.html", a_result([0, 0.1, 0.2], q), scene).read_text()
     assert "no contact in this run" in page
+
+
+def test_without_spheres_the_legend_names_the_body_the_force_acts_on(tmp_path):
+    model = ball_model()
+    scene = a_scene(model, contact_pair(model, "ball", None, None, "table", name="gears"))
+    q = np.tile(ball_configuration(np.zeros(3)), (2, 1))
+    result = a_result([0.0, 0.1], q, [{"row": 1, "normal_force": 3.0}], ("gears",))
+    assert (
+        "normal force on ball," in write_recording(tmp_path / "a.html", result, scene).read_text()
+    )
 
 
 def test_equal_runs_give_equal_pages(tmp_path):

@@ -81,8 +81,9 @@ Vec3 direction(const Vec3& point, const Vec3& centre, const Vec3& if_equal) {
 
 }  // namespace
 
-Query::Query() {
-  near_.reserve(1024);
+Query::Query(bool follow) : follow_(follow) {
+  reached_.reserve(1024);
+  near_.reserve(256);
   contacts.reserve(64);
   faces_.reserve(64);
   edges_.reserve(64);
@@ -119,13 +120,54 @@ void Query::find_facets(const Shell& shell, const Vec3& centre, double radius) {
     });
 }
 
-void Query::walk(const Shell& shell, const Vec3& centre, double radius) {
-  near_.clear();
+// All facets whose box meets the sphere, and perhaps some more.
+const std::vector<int>& Query::facets_near(const Shell& shell, const Vec3& centre,
+                                           double radius) {
+  const NormalCone* cones = shell.cones().data();
+  double margin = 0;
+  if (follow_) {
+    const bool same = followed_ == &shell && followed_radius_ == radius;
+    const double moved = same ? (centre - last_).norm() : radius;
+    last_ = centre;
+    if (same && (centre - anchor_).squaredNorm() <= margin_ * margin_) return reached_;
+    // A slow sphere stays near for many calls; for a fast one a wider ball does not pay.
+    if (moved < 0.01 * radius) margin = std::clamp(16 * moved, 1e-3 * radius, 0.1 * radius);
+    followed_ = &shell;
+    followed_radius_ = radius;
+    anchor_ = centre;
+    margin_ = margin;
+  }
+  reached_.clear();
+  shell.bvh().near(centre, radius + margin, reached_, [cones](int first) {
+    prefetch(&cones[first]);
+    prefetch(&cones[first + 3]);
+  });
+  return reached_;
+}
+
+// Leaves in near_ the facets that may hold a contact: the centre stands inside the cone of normals
+// of the features that they decide about (Johnson and Cohen 2001).
+void Query::keep_in_cone(const Shell& shell, const Vec3& centre, double radius) {
+  const std::vector<int>& reached = facets_near(shell, centre, radius);
+  const NormalCone* cones = shell.cones().data();
   const Facet* facets = shell.facets().data();
-  shell.bvh().near(centre, radius, near_, [facets](int f) {
+  const Vec3 local = centre - shell.origin();
+  const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
+  const float slack = 1e-6f * (float(shell.size()) + float(radius));
+  near_.clear();
+  for (int f : reached) {
+    const NormalCone& cone = cones[f];
+    const float x = c[0] - cone.middle[0], y = c[1] - cone.middle[1], z = c[2] - cone.middle[2];
+    const float height = std::abs(x * cone.axis[0] + y * cone.axis[1] + z * cone.axis[2]);
+    const float allowed = cone.reach + slack + (height + slack) * cone.tan_opening;
+    const float square = x * x + y * y + z * z;
+    const float farthest = float(radius) * 1.000001f + cone.reach + slack;
+    if (square * 0.999999f > farthest * farthest) continue;
+    if (square * 0.999999f - height * height > allowed * allowed) continue;
     prefetch(&facets[f]);
     prefetch(reinterpret_cast<const char*>(&facets[f]) + 64);
-  });
+    near_.push_back(f);
+  }
 }
 
 void Query::collect_claims(const Shell& shell, const Vec3& centre, double radius,
@@ -133,7 +175,7 @@ void Query::collect_claims(const Shell& shell, const Vec3& centre, double radius
   const double tolerance2 = tolerance * tolerance;
   const double reach2 = radius * radius;
   const double wide_reach2 = reach2 * (1 + 1e-12);
-  walk(shell, centre, radius);
+  keep_in_cone(shell, centre, radius);
   for (int f : near_) {
     const Facet& facet = shell.facets()[f];
     const double height = facet.normal.dot(centre - facet.corner[0]);
@@ -299,8 +341,7 @@ void Query::find_elements(const Shell& shell, const Vec3& centre, double radius)
     }
     return true;
   };
-  walk(shell, centre, radius);
-  for (int f : near_) {
+  for (int f : facets_near(shell, centre, radius)) {
     const int t = shell.triangle_of_facet(f);
     const ClosestPoint at = closest(t);
     const double d2 = (centre - at.point).squaredNorm();

@@ -20,9 +20,11 @@ struct Contact {
 };
 
 // Scratch of one query; keep one per thread and pair, and queries use no heap once it has grown.
+// With `follow`, the facets near a sphere are kept while it moves little from call to call (same
+// shell and radius); the contacts are the same to the bit.
 class Query {
  public:
-  Query();
+  explicit Query(bool follow = false);
 
   // The contacts of the sphere (centre in the shell's frame [m]); valid until the next call.
   const std::vector<Contact>& find(const Shell& shell, const Vec3& centre, double radius,
@@ -48,7 +50,8 @@ class Query {
 
   void find_facets(const Shell& shell, const Vec3& centre, double radius);
   void find_elements(const Shell& shell, const Vec3& centre, double radius);
-  void walk(const Shell& shell, const Vec3& centre, double radius);
+  const std::vector<int>& facets_near(const Shell& shell, const Vec3& centre, double radius);
+  void keep_in_cone(const Shell& shell, const Vec3& centre, double radius);
   void collect_claims(const Shell& shell, const Vec3& centre, double radius, double tolerance);
   void drop_claims_of_neighbours(const Shell& shell);
   void claims_to_contacts(const Shell& shell, const Vec3& centre, double radius);
@@ -56,7 +59,13 @@ class Query {
   void keep_one_side(const Shell& shell, const Vec3& centre, double radius);
   void remove(std::size_t i);
 
-  std::vector<int> near_;  // facets whose box the sphere meets
+  bool follow_;
+  std::vector<int> reached_;  // facets whose box meets the ball of radius + margin_ round anchor_
+  const Shell* followed_ = nullptr;
+  double followed_radius_ = 0, margin_ = -1;
+  Vec3 anchor_, last_;
+
+  std::vector<int> near_;  // those of them that may hold a contact
   std::vector<FaceClaim> faces_;
   std::vector<EdgeClaim> edges_;
   std::vector<VertexClaim> vertices_;

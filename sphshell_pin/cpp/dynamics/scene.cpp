@@ -8,7 +8,7 @@ namespace sphshell {
 Scene::Scene(const pinocchio::Model& model, std::vector<Pair> pairs)
     : body_(model),
       pairs_(std::move(pairs)),
-      queries_(pairs_.size()),
+      queries_(pairs_.size(), Query(true)),
       states_(pairs_.size()),
       external_(static_cast<std::size_t>(model.njoints), pinocchio::Force::Zero()) {
   for (const Pair& pair : pairs_) {

@@ -35,14 +35,37 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
     }
   };
   store(root_, 0, all);
+
+  // Subtrees of a few triangles become leaves: their triangles are tested faster than their boxes.
+  const int count = static_cast<int>(tree.getNumBVs());
+  const auto source = [&](int i) -> decltype(auto) {
+    return tree.getBV(static_cast<unsigned int>(i));
+  };
+  std::vector<int> size(static_cast<std::size_t>(count), 1);
+  for (int i = count - 1; i >= 0; --i)  // children stand behind their parent
+    if (!source(i).isLeaf()) size[i] = size[source(i).leftChild()] + size[source(i).rightChild()];
   order.clear();
   order.reserve(triangles.size());
-  if (triangles.size() == 1) {
-    order.push_back(0);
+  std::vector<int> stack;
+  const auto make_leaf = [&](int root) {
+    const int first = static_cast<int>(order.size());
+    stack.assign(1, root);
+    while (!stack.empty()) {
+      const auto& node = source(stack.back());
+      stack.pop_back();
+      if (node.isLeaf()) {
+        order.push_back(node.primitiveId());
+      } else {
+        stack.push_back(node.rightChild());
+        stack.push_back(node.leftChild());
+      }
+    }
+    return leaf(first, static_cast<int>(order.size()) - first);
+  };
+  if (size[0] <= kLeafSize) {
+    root_.child[0] = make_leaf(0);
     return;
   }
-
-  nodes_.reserve(triangles.size() - 1);
   struct Task {
     int source, parent, side, depth;
   };
@@ -50,23 +73,23 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
   while (!tasks.empty()) {
     const Task task = tasks.back();
     tasks.pop_back();
-    const auto& source = tree.getBV(static_cast<unsigned int>(task.source));
     int id;
-    if (source.isLeaf()) {
-      id = ~static_cast<int>(order.size());
-      order.push_back(source.primitiveId());
+    if (size[task.source] <= kLeafSize) {
+      id = make_leaf(task.source);
     } else {
       if (task.depth + 2 >= kMaxDepth)
         throw std::length_error("the bounding-box tree of the shell is too deep");
+      const auto& node = source(task.source);
       id = static_cast<int>(nodes_.size());
       nodes_.emplace_back();
-      store(nodes_[id], 0, tree.getBV(static_cast<unsigned int>(source.leftChild())).bv);
-      store(nodes_[id], 1, tree.getBV(static_cast<unsigned int>(source.rightChild())).bv);
-      tasks.push_back({source.rightChild(), id, 1, task.depth + 1});
-      tasks.push_back({source.leftChild(), id, 0, task.depth + 1});
+      store(nodes_[id], 0, source(node.leftChild()).bv);
+      store(nodes_[id], 1, source(node.rightChild()).bv);
+      tasks.push_back({node.rightChild(), id, 1, task.depth + 1});
+      tasks.push_back({node.leftChild(), id, 0, task.depth + 1});
     }
     if (task.parent >= 0) nodes_[task.parent].child[task.side] = id;
   }
+  nodes_.shrink_to_fit();
 }
 
 }  // namespace sphshell

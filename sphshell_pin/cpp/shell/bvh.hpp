@@ -26,9 +26,9 @@ class Bvh {
   Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
       std::vector<int>& order);
 
-  // Appends the positions in `order` of all triangles whose box meets the ball. Never misses one;
-  // may add one that lies outside by single-precision round-off. `touch(position)` is called as
-  // soon as a triangle is known, so that its memory can be on its way while the walk goes on.
+  // Appends the positions in `order` of the triangles in all leaves whose box meets the ball. Never
+  // misses one that meets it itself; adds its companions in the leaf. touch(first position) is
+  // called as soon as a leaf is known, so that its memory can be on its way while the walk goes on.
   template <class Touch>
   void near(const Vec3& centre, double radius, std::vector<int>& out, Touch&& touch) const {
     const Vec3 local = centre - origin_;
@@ -36,7 +36,12 @@ class Bvh {
     const float reach = float(radius) * 1.000001f;
     const float limit = reach * reach;
     if (!(distance2(root_, 0, c) <= limit)) return;
-    if (nodes_.empty()) return out.push_back(0);
+    const auto take = [&](int leaf) {
+      const int first = first_of(leaf), end = first + count_of(leaf);
+      touch(first);
+      for (int i = first; i < end; ++i) out.push_back(i);
+    };
+    if (nodes_.empty()) return take(root_.child[0]);
     int stack[kMaxDepth], top = 0, node = 0;
     for (;;) {
       const Node& n = nodes_[node];
@@ -45,8 +50,7 @@ class Bvh {
         if (!(distance2(n, side, c) <= limit)) continue;
         const int child = n.child[side];
         if (child < 0) {
-          touch(~child);
-          out.push_back(~child);
+          take(child);
         } else if (next < 0) {
           next = child;
         } else {
@@ -69,10 +73,14 @@ class Bvh {
   void nearest(const Vec3& point, Visit&& visit) const {
     const Vec3 local = point - origin_;
     const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
-    if (nodes_.empty()) return void(visit(0));
+    double best = 1e300;
+    const auto visit_leaf = [&](int leaf) {
+      const int first = first_of(leaf), end = first + count_of(leaf);
+      for (int i = first; i < end; ++i) best = std::min(best, visit(i));
+    };
+    if (nodes_.empty()) return visit_leaf(root_.child[0]);
     // Boxes are widened by the round-off at the surface, the point's own is added here.
     const double slack = 1e-6 * local.norm();
-    double best = 1e300;
     struct Entry {
       int node;
       double bound;
@@ -90,10 +98,10 @@ class Bvh {
         bound[side] = d * d;
       }
       const int near = bound[0] <= bound[1] ? 0 : 1;
-      if (bound[near] <= best && n.child[near] < 0) best = std::min(best, visit(~n.child[near]));
+      if (bound[near] <= best && n.child[near] < 0) visit_leaf(n.child[near]);
       if (bound[1 - near] <= best) {
         if (n.child[1 - near] < 0)
-          best = std::min(best, visit(~n.child[1 - near]));
+          visit_leaf(n.child[1 - near]);
         else
           stack[top++] = {n.child[1 - near], bound[1 - near]};
       }
@@ -101,15 +109,22 @@ class Bvh {
     }
   }
 
+  const Vec3& origin() const { return origin_; }
   std::size_t bytes() const { return nodes_.size() * sizeof(Node); }
 
  private:
   static constexpr int kMaxDepth = 1024;  // checked when the tree is built
+  static constexpr int kLeafSize = 4;     // triangles in a leaf, at most
+
+  // A leaf is stored as the complement of 8 * first position + count.
+  static int leaf(int first, int count) { return ~(8 * first + count); }
+  static int first_of(int leaf) { return ~leaf >> 3; }
+  static int count_of(int leaf) { return ~leaf & 7; }
 
   // One cache line: the boxes of both children relative to origin_, rounded outward.
   struct alignas(64) Node {
     float low[2][3], high[2][3];
-    int child[2];  // >= 0 a node, < 0 the complement of a triangle's position
+    int child[2];  // >= 0 a node, < 0 a leaf
   };
 
   static float distance2(const Node& n, int side, const float c[3]) {

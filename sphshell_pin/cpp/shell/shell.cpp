@@ -1,5 +1,8 @@
 #include "shell/shell.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "shell/triangle.hpp"
@@ -20,6 +23,7 @@ Shell::Shell(std::vector<Vec3> vertices, std::vector<Triangle> triangles, std::v
   facet_of_.resize(order_.size());
   for (std::size_t f = 0; f < order_.size(); ++f) facet_of_[order_[f]] = static_cast<int>(f);
   build_facets(order_);
+  build_cones();
 }
 
 void Shell::build_facets(const std::vector<int>& order) {
@@ -64,6 +68,60 @@ void Shell::build_facets(const std::vector<int>& order) {
   }
 }
 
+// Bound on the angle between `axis` and any direction u that points away from all edges at the
+// vertex. Seen along the axis the edges leave no gap wider than g, so one of them is within g/2 of
+// u's shadow; it rises by at most phi, hence tan(angle) <= tan(phi) / cos(g/2).
+double Shell::tan_vertex_cone(int vertex, const Vec3& axis) const {
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  if (topology_.vertex_on_rim[vertex]) return kAny;
+  const Vec3 first = axis.unitOrthogonal(), second = axis.cross(first);
+  std::vector<double> bearing;
+  double rise = 0;
+  for (int i = topology_.neighbour_begin[vertex]; i < topology_.neighbour_begin[vertex + 1]; ++i) {
+    const Vec3 edge = vertices_[topology_.neighbours[i]] - vertices_[vertex];
+    const double x = edge.dot(first), y = edge.dot(second), flat = std::hypot(x, y);
+    if (flat == 0) return kAny;
+    rise = std::max(rise, std::abs(edge.dot(axis)) / flat);
+    bearing.push_back(std::atan2(y, x));
+  }
+  std::sort(bearing.begin(), bearing.end());
+  double gap = bearing.front() + 2 * M_PI - bearing.back();
+  for (std::size_t i = 1; i < bearing.size(); ++i)
+    gap = std::max(gap, bearing[i] - bearing[i - 1]);
+  const double narrow = std::cos(0.5 * gap);
+  return narrow > 0.05 ? rise / narrow : kAny;
+}
+
+void Shell::build_cones() {
+  cones_.resize(facets_.size());
+  for (std::size_t f = 0; f < facets_.size(); ++f) {
+    const Facet& facet = facets_[f];
+    double tangent = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (facet.twin[k] >= 0) {
+        const Vec3& other = facets_[triangle_of(facet.twin[k])].normal;
+        const double cosine = facet.normal.dot(other);
+        tangent = std::max(tangent, cosine > 0.05 ? facet.normal.cross(other).norm() / cosine
+                                                  : std::numeric_limits<double>::infinity());
+      } else if (facet.twin[k] != kNotMine) {
+        tangent = std::numeric_limits<double>::infinity();
+      }
+      if (facet.vertex[k] >= 0)
+        tangent = std::max(tangent, tan_vertex_cone(facet.vertex[k], facet.normal));
+    }
+    const Vec3 middle = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
+    double reach = 0;
+    for (const Vec3& corner : facet.corner) reach = std::max(reach, (corner - middle).norm());
+    NormalCone& cone = cones_[f];
+    for (int k = 0; k < 3; ++k) {
+      cone.middle[k] = static_cast<float>(middle[k] - origin()[k]);
+      cone.axis[k] = static_cast<float>(facet.normal[k]);
+    }
+    cone.reach = static_cast<float>(reach + 1e-6 * size_);
+    cone.tan_opening = tangent < 1e3 ? static_cast<float>(tangent * 1.00001 + 1e-6) : 1e9f;
+  }
+}
+
 SurfacePoint Shell::closest_point(const Vec3& point) const {
   double best = 1e300;
   ClosestPoint at{};
@@ -94,7 +152,7 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
 }
 
 std::size_t Shell::bytes() const {
-  return bvh_.bytes() + facets_.size() * sizeof(Facet) + vertices_.size() * sizeof(Vec3) +
+  return bvh_.bytes() + facets_.size() * (sizeof(Facet) + sizeof(NormalCone)) + vertices_.size() * sizeof(Vec3) +
          topology_.incidence.size() * 2 * sizeof(int) + topology_.edges.size() * sizeof(Edge) +
          topology_.face_normal.size() * sizeof(Vec3);
 }

@@ -22,6 +22,14 @@ struct alignas(64) Facet {
 };
 static_assert(sizeof(Facet) == 128);
 
+// What a query reads of most triangles: enough to see that the sphere's centre stands over no
+// feature that the facet decides about. Single precision, widened by its round-off.
+struct alignas(32) NormalCone {
+  float middle[3], reach;      // ball round the triangle [m], relative to Shell::origin()
+  float axis[3], tan_opening;  // all normals of those features lie this close to +axis or -axis
+};
+static_assert(sizeof(NormalCone) == 32);
+
 // Codes in Facet::twin and Facet::vertex.
 constexpr int kNotMine = -1;   // another facet decides about this edge or vertex, or it is flat
 constexpr int kBoundary = -2;  // an edge with no other facet
@@ -48,6 +56,8 @@ class Shell {
   const Topology& topology() const { return topology_; }
   const Bvh& bvh() const { return bvh_; }
   const std::vector<Facet>& facets() const { return facets_; }
+  const std::vector<NormalCone>& cones() const { return cones_; }
+  const Vec3& origin() const { return bvh_.origin(); }
   Side side() const { return side_; }
   int num_elements() const { return element_.empty() ? 0 : element_.back() + 1; }
   double size() const { return size_; }  // box diagonal [m]
@@ -59,6 +69,8 @@ class Shell {
 
  private:
   void build_facets(const std::vector<int>& order);
+  void build_cones();
+  double tan_vertex_cone(int vertex, const Vec3& axis) const;
 
   std::vector<Vec3> vertices_;
   std::vector<Triangle> triangles_;
@@ -70,6 +82,7 @@ class Shell {
   std::vector<std::vector<int>> manifold_;  // see half_edges_of
   Bvh bvh_;
   std::vector<Facet> facets_;
+  std::vector<NormalCone> cones_;
   double size_;
 };
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.raw import RawSurface
-from sphshell_pin.shell.readers.mesh import read_obj, read_off, read_ply, read_stl
+from sphshell_pin.shell.readers.mesh import read_obj, read_off, read_stl
+from sphshell_pin.shell.readers.ply import read_ply
 from sphshell_pin.shell.readers.shl import read_shl
 
 __all__ = ["READERS", "read_obj", "read_off", "read_ply", "read_shl", "read_stl", "reader_for"]

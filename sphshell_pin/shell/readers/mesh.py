@@ -1,4 +1,4 @@
-"""Mesh files without a unit: stl and ply through trimesh, obj and off by readers of our own.
+"""Mesh files without a unit: stl through trimesh, obj and off by readers of our own.
 
 trimesh triangulates the quads and larger polygons of obj files and drops the normals of their
 corners, and it loses the quads of off files altogether; here elements must stay what they are.
@@ -13,57 +13,12 @@ from typing import Any
 import numpy as np
 
 from sphshell_pin.errors import MissingExtra, ShellFileError
-from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface
+from sphshell_pin.shell.raw import Floats, RawSurface
 from sphshell_pin.shell.readers.text import finish, pack_polygons, read_text
 
 
 def read_stl(path: Path) -> RawSurface:
     """Read a binary or text .stl file: a soup of triangles."""
-    mesh = _load_with_trimesh(path, "stl")
-    triangles = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
-    offsets, corners = pack_polygons(np.full(len(triangles), 3), triangles.ravel())
-    return finish(path, np.asarray(mesh.vertices, np.float64), offsets, corners)
-
-
-def read_ply(path: Path) -> RawSurface:
-    """Read a text or binary .ply file: polygons of any size, and vertex normals if it has them."""
-    mesh = _load_with_trimesh(path, "ply")
-    # trimesh hands out triangles, but keeps what the file said beside them.
-    kept = mesh.metadata.get("_ply_raw", {})
-    faces = kept.get("face", {}).get("data", {})
-    notes: tuple[str, ...] = ()
-    rows = next((faces[name] for name in ("vertex_indices", "vertex_index") if name in faces), None)
-    if rows is None:
-        triangles = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
-        offsets, corners = pack_polygons(np.full(len(triangles), 3), triangles.ravel())
-        notes = ("larger elements of the file were triangulated on reading",)
-    else:
-        offsets, corners = _flatten(rows)
-    vertices = np.asarray(mesh.vertices, np.float64)
-    data = kept.get("vertex", {}).get("data", {})
-    normals = None
-    try:
-        columns = [np.asarray(data[name], np.float64).ravel() for name in ("nx", "ny", "nz")]
-    except (KeyError, IndexError, ValueError):
-        columns = []
-    raw = finish(path, vertices, offsets, corners, None, notes)
-    if columns and len(columns[0]) == len(vertices):
-        normals = np.stack(columns, axis=1)[corners]
-    return RawSurface(raw.vertices, raw.offsets, raw.corners, normals, raw.notes)
-
-
-def _flatten(rows: Any) -> tuple[Longs, Ints]:
-    table = np.asarray(rows)
-    if table.dtype == object:
-        counts = [len(row) for row in rows]
-        flat = np.array([index for row in rows for index in row], np.int64)
-        return pack_polygons(counts, flat)
-    if table.dtype.names:
-        table = table[table.dtype.names[-1]]
-    return pack_polygons(np.full(len(table), table.shape[1]), table.astype(np.int64).ravel())
-
-
-def _load_with_trimesh(path: Path, kind: str) -> Any:
     try:
         import trimesh
     except ImportError as error:
@@ -74,12 +29,14 @@ def _load_with_trimesh(path: Path, kind: str) -> Any:
     except OSError as error:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
     try:
-        mesh: Any = trimesh.load(data, file_type=kind, process=False, force="mesh")
+        mesh: Any = trimesh.load(data, file_type="stl", process=False, force="mesh")
         if len(mesh.faces) == 0:
-            raise ValueError("it holds no elements")
+            raise ValueError("it holds no triangles")
     except Exception as error:  # whatever a damaged file makes the parser raise
-        raise ShellFileError(path, f"is not a readable .{kind} file ({error})") from error
-    return mesh
+        raise ShellFileError(path, f"is not a readable .stl file ({error})") from error
+    triangles = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
+    offsets, corners = pack_polygons(np.full(len(triangles), 3), triangles.ravel())
+    return finish(path, np.asarray(mesh.vertices, np.float64), offsets, corners)
 
 
 def read_obj(path: Path) -> RawSurface:
@@ -98,7 +55,7 @@ def read_obj(path: Path) -> RawSurface:
         if row.endswith("\\"):
             pending += row[:-1] + " "
             continue
-        words = (pending + row).split()
+        words = (pending + row).split("#", 1)[0].split()
         pending = ""
         if not words:
             continue
@@ -110,7 +67,7 @@ def read_obj(path: Path) -> RawSurface:
             normals += words[1:4]
         elif words[0] == "f":
             at, along = len(points) // 3, len(normals) // 3
-            named = [word for word in words[1:] if not word.startswith("#")]
+            named = words[1:]
             if len(named) < 3:
                 raise ShellFileError(path, f"a face of {len(named)} corners needs three", number)
             for word in named:

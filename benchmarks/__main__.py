@@ -1,0 +1,48 @@
+"""Speed of the package, as ratios: python -m benchmarks [--quick]."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+from benchmarks.query import against_peers, against_size
+from benchmarks.step import ingredients, step_cost
+from benchmarks.timing import machine, one_core, ratio, take_turns
+
+
+def import_time(rounds: int) -> None:
+    """Time of importing the package against importing Pinocchio, each in a fresh interpreter."""
+
+    def fresh(module: str) -> float:
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-c", f"import {module}"], check=True)
+        return time.perf_counter() - start
+
+    times = take_turns({m: lambda m=m: fresh(m) for m in ("sphshell_pin", "pinocchio")}, rounds)
+    print("Import, whole interpreter")
+    print(
+        f"  {'sphshell_pin / pinocchio':40s} {np.median(times['sphshell_pin']) * 1e3:9.1f} ms   "
+        f"{ratio(times['sphshell_pin'], times['pinocchio'])} x"
+    )
+
+
+def main() -> None:
+    """Print all ratios."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer rounds, rougher figures")
+    rounds = 5 if parser.parse_args().quick else 25
+    one_core()
+    print(machine())
+    against_peers(rounds)
+    against_size(rounds)
+    step_cost(2 * rounds)
+    ingredients(2 * rounds)
+    import_time(max(5, rounds // 2))
+
+
+if __name__ == "__main__":
+    main()

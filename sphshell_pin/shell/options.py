@@ -1,0 +1,34 @@
+"""Options every way of making or asking a shell has, and their checks."""
+
+from __future__ import annotations
+
+import math
+import os
+
+from sphshell_pin.errors import InvalidParameter
+
+CREASE_ANGLE = math.radians(30.0)
+"""Edges that turn by less are smooth [rad]."""
+
+SIDES = ("both", "outside", "inside")
+
+
+def check_options(crease_angle: float, side: str) -> None:
+    """Raise InvalidParameter unless crease_angle [rad] is in 0..pi and side a known one."""
+    if side not in SIDES:
+        raise InvalidParameter("side", side, f"must be one of: {', '.join(SIDES)}")
+    try:
+        fits = 0.0 <= float(crease_angle) <= math.pi
+    except (TypeError, ValueError):
+        fits = False
+    if not fits:
+        raise InvalidParameter("crease_angle", crease_angle, "must lie between 0 and pi [rad]")
+
+
+def thread_count(threads: int | None) -> int:
+    """Return how many threads to use, all processors if None; InvalidParameter unless >= 1."""
+    if threads is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    if isinstance(threads, bool) or int(threads) != threads or threads < 1:
+        raise InvalidParameter("threads", threads, "must be a whole number of at least 1")
+    return int(threads)

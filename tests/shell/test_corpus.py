@@ -1,0 +1,78 @@
+"""Real files that others wrote: what is known about each of them is found."""
+
+import numpy as np
+import pytest
+
+from sphshell_pin.shell import Shell
+
+from .surfaces import DATA
+
+# elements given, elements kept, open edges, non-manifold, without area, duplicates, components
+FILES = {
+    "bladex_upper.stl": (522, 522, 58, 0, 0, 0, 1),
+    "trimesh_featuretype.STL": (3476, 3476, 0, 0, 0, 0, 1),
+    "c3d_fandisk.obj": (12946, 12946, 0, 0, 0, 0, 1),
+    "c3d_stanford-bunny.obj": (69451, 69451, 223, 0, 0, 0, 1),
+    "fcpw_dragon.obj": (100000, 100000, 0, 0, 0, 0, 1),
+    "libigl_inspired_mesh_quads_Smooth.off": (1838, 3676, 248, 0, 0, 0, 1),
+    "trimesh_quadknot.obj": (1440, 2880, 0, 0, 0, 0, 1),
+    "trimesh_wallhole.obj": (13, 66, 0, 0, 0, 0, 1),
+    "trimesh_joined_tetrahedra.obj": (8, 7, 0, 3, 0, 1, 3),
+    "trimesh_soup.stl": (100, 100, 300, 0, 0, 0, 100),
+    "libigltest_sliver_tet.ply": (4, 4, 0, 0, 0, 0, 1),
+    "manifold_openscad-nonmanifold-crash.obj": (1442, 1438, 2, 18, 1, 3, 5),
+    "cgal_degtri_nullface_bis.off": (9, 3, 3, 0, 6, 0, 1),
+    "cgal_degtri_2dt_1edge_split_twice.off": (6, 6, 4, 0, 2, 0, 1),
+}
+
+
+def load(name):
+    path = DATA / name
+    if not path.exists():
+        pytest.skip(f"the corpus of other people's surfaces is absent: {path}")
+    return Shell.from_file(path, unit="mm")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_what_is_known_of_each_file_is_found(name):
+    shell = load(name)
+    health = shell.health
+    given, kept, boundary, non_manifold, flat, duplicates, components = FILES[name]
+    assert health.input_elements == given
+    assert health.elements == kept == len(shell.elements)
+    assert health.boundary_edges == boundary
+    assert health.non_manifold_edges == non_manifold
+    assert health.degenerate_elements == flat
+    assert health.duplicate_elements == duplicates
+    assert health.components == components
+    lost = health.welded_vertices + health.unused_vertices
+    assert health.vertices + lost == health.input_vertices
+    assert health.worst_shape > 1e-12
+    corners = shell.vertices[shell.triangles]
+    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (np.linalg.norm(spans, axis=1) > 0.0).all()
+    if health.is_closed:
+        assert health.volume > 0.0
+        assert np.abs(spans.sum(axis=0)).max() < 1e-9 * np.abs(spans).sum()
+    # Cleaning again finds nothing to do.
+    again = Shell(shell.vertices, shell.elements, side=shell.side).health
+    assert again.elements == health.elements
+    assert again.boundary_edges == health.boundary_edges
+    assert not again.repairs
+
+
+def test_polygons_with_holes_keep_their_area():
+    # A wall 10 x 10 x 10 m with a passage through it, in polygons of up to 11 corners.
+    health = load("trimesh_wallhole.obj").health
+    assert health.polygons == 13
+    assert health.largest_polygon == 11
+    assert health.tangled_polygons == 0
+    assert health.euler_number == 2
+
+
+def test_given_normals_of_the_knot_are_kept():
+    shell = load("trimesh_quadknot.obj")
+    assert shell.health.has_normals
+    assert shell.health.missing_normals == 0
+    assert shell.health.largest_normal_angle < np.deg2rad(20.0)
+    assert np.linalg.norm(shell.normals, axis=2) == pytest.approx(1.0)

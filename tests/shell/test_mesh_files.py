@@ -1,0 +1,250 @@
+"""stl, obj, ply and off: elements and normals stay what the file says; faults are sentences."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from sphshell_pin.errors import InvalidParameter, InvalidShell, ShellFileError
+from sphshell_pin.shell import Shell
+
+from .surfaces import CUBE, CUBE_QUADS, by_place, plate
+
+SUFFIXES = ["shl", "stl", "obj", "ply", "off"]
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(name, text):
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write
+
+
+def cube(**options):
+    return Shell(CUBE, CUBE_QUADS, **options)
+
+
+def corner_normals(shell):
+    """Return {place: sorted normals of the corners there}."""
+    out = {}
+    for triangle, normals in zip(shell.triangles, shell.normals, strict=True):
+        for vertex, normal in zip(triangle, normals, strict=True):
+            key = tuple(np.round(shell.vertices[vertex], 6) + 0.0)
+            out.setdefault(key, set()).add(tuple(np.round(normal, 6) + 0.0))
+    return out
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("unit", ["m", "mm", "in"])
+def test_round_trip(tmp_path, suffix, unit):
+    vertices, quads = plate(3)
+    vertices = vertices + np.array([0.1, 0.2, 0.3])
+    shell = Shell(vertices, [q[:3].tolist() if k == 4 else q.tolist() for k, q in enumerate(quads)])
+    path = tmp_path / f"plate.{suffix}"
+    shell.to_file(path, unit=unit)
+    back = Shell.from_file(path, unit=None if suffix == "shl" else unit)
+    tolerance = 1e-6 if suffix == "stl" else 1e-15
+    assert back.size == pytest.approx(shell.size, rel=tolerance)
+    if suffix == "stl":
+        assert back.num_elements == len(shell.triangles)
+    else:
+        assert by_place(back) == by_place(shell)
+    assert back.normals is None
+
+
+@pytest.mark.parametrize("suffix", ["shl", "obj", "ply"])
+def test_round_trip_with_normals(tmp_path, suffix):
+    rng = np.random.default_rng(0)
+    normals = rng.normal(size=(6, 4, 3)) * 0.1
+    centre = np.array([0.5, 0.5, 0.5])
+    for k, quad in enumerate(CUBE_QUADS):
+        normals[k] += 2 * (CUBE[quad].mean(axis=0) - centre)
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    shell = cube(normals=normals)
+    path = tmp_path / f"cube.{suffix}"
+    shell.to_file(path)
+    back = Shell.from_file(path, unit="m")
+    assert by_place(back) == by_place(shell)
+    assert corner_normals(back) == corner_normals(shell)
+
+
+def test_shl_version_follows_the_normals(tmp_path):
+    cube().to_file(tmp_path / "one.shl", unit="mm")
+    first = (tmp_path / "one.shl").read_text().splitlines()
+    assert first[0] == "8 6 0.001"
+    assert len(first) == 1 + 8 + 6
+    normals = np.repeat(np.eye(3)[None, 2], 8, axis=0)
+    vertices, quads = plate(2)
+    Shell(vertices, quads, normals=np.tile([0, 0, 1.0], (9, 1))).to_file(tmp_path / "two.shl")
+    second = (tmp_path / "two.shl").read_text().splitlines()
+    assert second[:2] == ["Version: 2", "9 4 9 1.0"]
+    assert len(second) == 2 + 9 + 4 + 9
+    assert len(normals) == 8
+
+
+def test_a_good_file_is_never_half_overwritten(tmp_path):
+    path = tmp_path / "cube.obj"
+    cube().to_file(path)
+    before = path.read_bytes()
+    with pytest.raises(InvalidParameter):
+        cube().to_file(path, unit="furlong")
+    assert path.read_bytes() == before
+    with pytest.raises(ShellFileError, match="cannot be written"):
+        cube().to_file(tmp_path / "none" / "cube.obj")
+    with pytest.raises(InvalidParameter, match=r"\.shl, \.stl"):
+        cube().to_file(tmp_path / "cube.step")
+    target = tmp_path / "taken.off"
+    target.mkdir()
+    with pytest.raises(ShellFileError, match="cannot be written"):
+        cube().to_file(target)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["cube.obj", "taken.off"]
+
+
+def test_unit_must_be_stated(tmp_path):
+    path = tmp_path / "cube.obj"
+    cube().transformed(60.0).to_file(path)
+    with pytest.raises(InvalidParameter) as caught:
+        Shell.from_file(path)
+    text = str(caught.value)
+    for part in ("unit", "mm", "ft", "103.9 units", "0.1039 m"):
+        assert part in text
+    with pytest.raises(InvalidParameter, match="must be one of: m, dm, cm, mm"):
+        Shell.from_file(path, unit="parsec")
+    with pytest.raises(InvalidParameter, match="must be a number"):
+        Shell.from_file(path, unit="m", scale="apply")
+    assert Shell.from_file(path, unit="mm", scale=10.0).size == pytest.approx(0.6 * np.sqrt(3.0))
+    assert Shell.from_file(path, unit="inches").unit == "inches"
+
+
+def test_unknown_suffix(tmp_path, write):
+    with pytest.raises(InvalidParameter, match=r"\.stl, \.obj, \.ply, \.off, \.shl"):
+        Shell.from_file(write("blade.dae", "x"), unit="m")
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "off"])
+def test_missing_empty_and_damaged(tmp_path, write, suffix):
+    with pytest.raises(ShellFileError, match="no such file"):
+        Shell.from_file(tmp_path / f"none.{suffix}", unit="m")
+    with pytest.raises(ShellFileError, match="is empty"):
+        Shell.from_file(write(f"empty.{suffix}", ""), unit="m")
+    for damage in (b"\x00\x01\x02 nothing", b"text only\n", bytes(range(256)) * 3):
+        with pytest.raises(ShellFileError):
+            Shell.from_file(write(f"damaged.{suffix}", damage), unit="m")
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "off"])
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_truncated(tmp_path, suffix, share):
+    path = tmp_path / f"cube.{suffix}"
+    cube().to_file(path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(ShellFileError):
+        Shell.from_file(path, unit="m")
+
+
+def test_obj_dialects(write):
+    text = "\ufeff# made by hand\r\nmtllib none.mtl\r\no thing\r\n"
+    text += "".join(f"v {x} {y} {z} 0.5 0.5 0.5\r\n" for x, y, z in CUBE)
+    text += "vt 0 0\r\nvn 0 0 1\r\ng faces\r\nusemtl blue\r\ns off\r\nl 1 2\r\n"
+    rows = [[str(v + 1) for v in q] for q in CUBE_QUADS]
+    rows[1] = [f"{v}/1" for v in rows[1]]
+    rows[2] = [str(int(v) - 9) for v in rows[2]]
+    rows[3] = [f"{v}/1/1" for v in rows[3]]
+    rows[4] = [f"{v}//-1" for v in rows[4]]
+    text += "".join("f " + " ".join(row) + "\r\n" for row in rows[:5])
+    text += "f " + rows[5][0] + " \\\r\n " + " ".join(rows[5][1:]) + " # last"
+    shell = Shell.from_file(write("cube.obj", text), unit="m")
+    assert shell.is_closed
+    assert shell.health.quads == 6
+    assert shell.health.missing_normals == 16
+
+
+@pytest.mark.parametrize(
+    ("line", "say"),
+    [
+        ("f 1 2 9", "vertex 9"),
+        ("f 1 2 0", "vertex 0"),
+        ("f 1 2 -9", "vertex -9"),
+        ("f 1 2", "needs three"),
+        ("f 1 2 x", "'x'"),
+        ("f 1//1 2//1 3//1", "normal"),
+        ("v 1 2", "three numbers"),
+        ("v 1 2 x", "could not convert"),
+        ("v 1 2 nan", "not finite"),
+    ],
+)
+def test_obj_faults(write, line, say):
+    points = "".join(f"v {x} {y} {z}\n" for x, y, z in CUBE)
+    with pytest.raises(ShellFileError, match=say):
+        Shell.from_file(write("bad.obj", points + "f 1 2 3\n" + line + "\n"), unit="m")
+
+
+def test_off_with_comments_colours_and_loose_lines(write):
+    body = "".join(f"{x} {y} {z}\n" for x, y, z in CUBE)
+    plain = "".join(f"4 {a} {b} {c} {d}\n" for a, b, c, d in CUBE_QUADS)
+    texts = {
+        "plain": f"OFF\n8 6 0\n{body}{plain}",
+        "one line": "OFF 8 6 0 " + (body + plain).replace("\n", " "),
+        "comments": f"OFF # cube\n# by hand\n\n8 6 12 # counts\n{body}\n{plain}# end",
+        "no edges": f"OFF\n8 6\n{body}{plain}",
+        "colours": f"OFF\n8 6 0\n{body}" + plain.replace("\n", " 3 255 0 0\n"),
+        "vertex colours": "COFF\n8 6 0\n" + body.replace("\n", " 1 0 0 1\n") + plain,
+    }
+    for name, text in texts.items():
+        shell = Shell.from_file(write("cube.off", text), unit="m")
+        assert shell.health.quads == 6, name
+        assert shell.is_closed, name
+    normals = f"NOFF\n8 6 0\n{body}".replace("\n", " 0 0 1\n").replace("NOFF 0 0 1", "NOFF")
+    normals = normals.replace("8 6 0 0 0 1", "8 6 0") + plain
+    assert Shell.from_file(write("cube.off", normals), unit="m").normals is not None
+
+
+@pytest.mark.parametrize("index", [-1, 8, 10**12])
+def test_off_index_out_of_range(write, index):
+    body = "".join(f"{x} {y} {z}\n" for x, y, z in CUBE)
+    with pytest.raises(ShellFileError, match="element 2 uses vertex"):
+        Shell.from_file(write("bad.off", f"OFF\n8 2 0\n{body}3 0 1 2\n3 0 1 {index}\n"), unit="m")
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_binary_ply_with_mixed_elements(write, order):
+    name = "little" if order == "<" else "big"
+    head = (
+        f"ply\nformat binary_{name}_endian 1.0\nelement vertex 8\n"
+        "property float x\nproperty float y\nproperty float z\n"
+        "element face 7\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    data = head.encode() + CUBE.astype(f"{order}f4").tobytes()
+    for quad in [*CUBE_QUADS[:5], CUBE_QUADS[5][:3], [CUBE_QUADS[5][k] for k in (2, 3, 0)]]:
+        data += struct.pack(f"{order}B{len(quad)}i", len(quad), *quad)
+    shell = Shell.from_file(write("cube.ply", data), unit="m")
+    assert (shell.health.quads, shell.num_elements) == (5, 7)
+    assert shell.is_closed
+
+
+def test_text_stl(write):
+    lines = ["solid cube"]
+    for triangle in cube().vertices[cube().triangles]:
+        lines += ["facet normal 0 0 0", "outer loop"]
+        lines += ["vertex " + " ".join(map(repr, map(float, p))) for p in triangle]
+        lines += ["endloop", "endfacet"]
+    shell = Shell.from_file(write("cube.stl", "\n".join([*lines, "endsolid"])), unit="m")
+    assert shell.is_closed
+    assert shell.num_elements == 12
+
+
+def test_nan_in_a_file_names_the_vertex(write):
+    corners = np.array(CUBE[[0, 1, 2]], "<f4")
+    corners[1, 2] = np.nan
+    data = b" " * 80 + struct.pack("<I", 1) + bytes(12) + corners.tobytes() + bytes(2)
+    with pytest.raises(ShellFileError, match="vertex 2 is not finite"):
+        Shell.from_file(write("nan.stl", data), unit="m")
+
+
+def test_all_degenerate(write):
+    with pytest.raises(InvalidShell, match="no element is left"):
+        Shell.from_file(write("flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n"), unit="m")

@@ -1,0 +1,216 @@
+"""Solids become closed shells, within the chord error, with their exact normals."""
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.shell import Shell
+
+ROUND = {
+    "sphere": coal.Sphere(0.3),
+    "cylinder": coal.Cylinder(0.2, 0.7),
+    "capsule": coal.Capsule(0.1, 0.4),
+    "thin capsule": coal.Capsule(0.001, 1.0),
+    "cone": coal.Cone(0.2, 0.5),
+    "ellipsoid": coal.Ellipsoid(0.1, 0.2, 0.35),
+}
+VOLUME = {
+    "sphere": 4 / 3 * np.pi * 0.3**3,
+    "cylinder": np.pi * 0.2**2 * 0.7,
+    "capsule": np.pi * 0.1**2 * (0.4 + 4 / 3 * 0.1),
+    "thin capsule": np.pi * 1e-6 * (1.0 + 4 / 3 * 1e-3),
+    "cone": np.pi * 0.2**2 * 0.5 / 3,
+    "ellipsoid": 4 / 3 * np.pi * 0.1 * 0.2 * 0.35,
+}
+
+
+def samples(shell, n=40):
+    """Return points spread over the triangles (t * n, 3), with their interpolated normals."""
+    weights = np.random.default_rng(0).dirichlet([1, 1, 1], n)
+    points = np.einsum("nk,tkx->tnx", weights, shell.vertices[shell.triangles])
+    normals = np.einsum("nk,tkx->tnx", weights, shell.normals)
+    return points.reshape(-1, 3), normals.reshape(-1, 3)
+
+
+def depth_inside(name, p):
+    """Return how deep points lie in the solid [m]; for the ellipsoid to first order."""
+    rho, z = np.hypot(p[:, 0], p[:, 1]), p[:, 2]
+    if name == "sphere":
+        return 0.3 - np.hypot(rho, z)
+    if name == "cylinder":
+        return np.minimum(0.2 - rho, 0.35 - np.abs(z))
+    if name.endswith("capsule"):
+        r, half = (0.1, 0.2) if name == "capsule" else (0.001, 0.5)
+        return r - np.hypot(rho, z - np.clip(z, -half, half))
+    if name == "cone":
+        slant = np.hypot(0.2, 0.5)
+        return np.minimum((0.25 - z) * 0.2 / slant - rho * 0.5 / slant, z + 0.25)
+    radii = np.array([0.1, 0.2, 0.35])
+    level = np.linalg.norm(p / radii, axis=1)
+    return (1 - level) * level / np.linalg.norm(p / radii**2, axis=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "segments"),
+    [(name, share, None) for name in ROUND for share in (None, 1e-2)]
+    + [(name, None, 7) for name in ROUND]
+    + [("cylinder", 1e-5, None)],
+)
+def test_round_solids(name, share, segments):
+    shape = ROUND[name]
+    diameter = 2 * float(np.max(getattr(shape, "radius", getattr(shape, "radii", 0.0))))
+    option = {"segments": segments} if segments else {}
+    if share is not None:
+        option["chord_error"] = share * diameter
+    share = share or 1e-3
+    shell = Shell.from_geometry(shape, **option)
+    health = shell.health
+    assert health.ok
+    assert not health.repairs
+    assert health.is_closed
+    assert health.euler_number == 2
+    assert health.opposing_normals == 0
+    assert np.linalg.norm(shell.normals, axis=2) == pytest.approx(1.0, abs=1e-15)
+    inside = depth_inside(name, samples(shell)[0])
+    assert inside.min() > -1e-12 * diameter
+    if "segments" not in option:
+        assert inside.max() <= share * diameter * 1.001
+        assert health.volume == pytest.approx(VOLUME[name], rel=6 * share)
+        assert health.volume < VOLUME[name]
+    at = depth_inside(name, shell.vertices)
+    assert np.abs(at).max() < 1e-12 * max(shell.size, diameter)
+
+
+@pytest.mark.parametrize("name", ["sphere", "capsule", "thin capsule", "ellipsoid"])
+def test_corner_normals_of_smooth_solids(name):
+    shell = Shell.from_geometry(ROUND[name], segments=24)
+    points, normals = shell.vertices[shell.triangles].reshape(-1, 3), shell.normals.reshape(-1, 3)
+    # Only along the true normal does the depth change by as much as the step.
+    step = 1e-7
+    change = depth_inside(name, points - step * normals) - depth_inside(name, points)
+    assert change == pytest.approx(step, rel=1e-3)
+
+
+@pytest.mark.parametrize(("name", "slope"), [("cylinder", 0.0), ("cone", 0.4)])
+def test_corner_normals_of_solids_with_a_rim(name, slope):
+    shell = Shell.from_geometry(ROUND[name], segments=24)
+    points, normals = shell.vertices[shell.triangles], shell.normals
+    flat = np.abs(shell.triangle_normals[:, 2]) > 0.999
+    assert normals[flat] == pytest.approx(
+        np.repeat(np.sign(shell.triangle_normals[flat, None, 2:]) * [0, 0, 1.0], 3, axis=1)
+    )
+    assert flat.sum() == (44 if name == "cylinder" else 22)
+    points, normals = points[~flat].reshape(-1, 3), normals[~flat].reshape(-1, 3)
+    length = np.hypot(1.0, slope)
+    assert normals[:, 2] == pytest.approx(slope / length)
+    rim = np.hypot(points[:, 0], points[:, 1]) > 0.1
+    assert normals[rim, :2] * 0.2 * length == pytest.approx(points[rim, :2])
+
+
+def test_normals_turn_only_at_true_creases():
+    for name, normals in (("cylinder", 2), ("cone", 2), ("capsule", 1), ("sphere", 1)):
+        shell = Shell.from_geometry(ROUND[name], segments=16)
+        kinds = {}
+        for triangle, corner in zip(shell.triangles, shell.normals, strict=True):
+            for v, n in zip(triangle, corner, strict=True):
+                if name != "cone" or shell.vertices[v, 2] < 0.2:
+                    kinds.setdefault(v, set()).add(tuple(np.round(n, 9) + 0.0))
+        assert max(map(len, kinds.values())) == normals, name
+
+
+def test_box():
+    shell = Shell.from_geometry(coal.Box(1.0, 2.0, 3.0), name="crate")
+    assert (shell.health.quads, shell.num_elements) == (6, 6)
+    assert shell.health.volume == pytest.approx(6.0)
+    assert shell.box == pytest.approx(np.array([[-0.5, -1, -1.5], [0.5, 1, 1.5]]))
+    assert shell.name == "crate"
+    assert shell.health.largest_normal_angle == pytest.approx(0.0, abs=1e-7)
+
+
+@pytest.mark.parametrize("kind", [coal.Halfspace, coal.Plane])
+def test_half_space_is_a_square_sheet(kind):
+    normal = np.array([1.0, 2.0, 2.0]) / 3.0
+    shell = Shell.from_geometry(kind(normal, 0.4), extent=3.0)
+    assert shell.num_elements == 1
+    assert shell.vertices @ normal == pytest.approx(0.4)
+    assert shell.health.area == pytest.approx(9.0)
+    assert shell.normals == pytest.approx(np.broadcast_to(normal, (2, 3, 3)))
+    assert any("stands for the endless" in note for note in shell.health.notes)
+
+
+def test_triangle():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0]])
+    shell = Shell.from_geometry(coal.TriangleP(*points))
+    assert shell.vertices.tolist() == points.tolist()
+    assert shell.normals[0].tolist() == [[0, 0, 1]] * 3
+
+
+def mesh(shell, kind=coal.BVHModelOBBRSS):
+    model = kind()
+    model.beginModel(len(shell.triangles), len(shell.vertices))
+    model.addVertices(np.array(shell.vertices))
+    model.addTriangles(np.array(shell.triangles))
+    model.endModel()
+    return model
+
+
+@pytest.mark.parametrize("kind", [coal.BVHModelOBBRSS, coal.BVHModelOBB])
+def test_mesh_is_taken_as_it_is(kind):
+    ball = Shell.from_geometry(coal.Sphere(0.5), segments=12)
+    back = Shell.from_geometry(mesh(ball, kind))
+    assert back.vertices == pytest.approx(ball.vertices)
+    assert back.triangles.tolist() == ball.triangles.tolist()
+
+
+def test_convex():
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for point in ([0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]):
+        points.append(np.array(point, float))
+    for corners in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)):
+        triangles.append(coal.Triangle(*corners))
+    shell = Shell.from_geometry(coal.Convex(points, triangles))
+    assert shell.is_closed
+    assert shell.health.volume == pytest.approx(1 / 6)
+
+
+def test_geometry_object_gives_name_and_own_frame():
+    placement = pin.SE3.Random()
+    held = pin.GeometryObject("lid", 0, 0, placement, coal.Box(1.0, 1.0, 1.0))
+    held.meshScale = np.array([2.0, 2.0, 2.0])
+    shell = Shell.from_geometry(held)
+    assert shell.name == "lid"
+    assert shell.box == pytest.approx(np.array([[-0.5] * 3, [0.5] * 3]))
+
+
+def test_mesh_scale_of_a_urdf_is_applied_once(tmp_path):
+    Shell.from_geometry(coal.Box(1.0, 1.0, 1.0)).to_file(tmp_path / "box.stl")
+    urdf = tmp_path / "robot.urdf"
+    urdf.write_text(
+        '<robot name="r"><link name="base"><collision><geometry>'
+        f'<mesh filename="{tmp_path}/box.stl" scale="2 3 4"/>'
+        "</geometry></collision></link></robot>"
+    )
+    model = pin.buildModelFromUrdf(str(urdf))
+    geometry = pin.buildGeomFromUrdf(model, str(urdf), pin.GeometryType.COLLISION)
+    held = geometry.geometryObjects[0]
+    assert held.meshScale.tolist() == [2, 3, 4]
+    shell = Shell.from_geometry(held)
+    assert shell.box == pytest.approx(np.array([[-1, -1.5, -2], [1, 1.5, 2]]))
+
+
+def test_faults():
+    with pytest.raises(InvalidParameter, match="Capsule, Cone, Ellipsoid"):
+        Shell.from_geometry("sphere")
+    with pytest.raises(InvalidParameter, match="Box"):
+        Shell.from_geometry(coal.HeightFieldAABB(1.0, 1.0, np.zeros((3, 3)), -1.0))
+    for options in ({"chord_error": 0.0}, {"chord_error": np.nan}, {"segments": 2}):
+        with pytest.raises(InvalidParameter):
+            Shell.from_geometry(coal.Sphere(1.0), **options)
+    with pytest.raises(InvalidParameter, match="extent"):
+        Shell.from_geometry(coal.Halfspace(np.array([0, 0, 1.0]), 0.0), extent=-1.0)
+    swollen = coal.Box(1.0, 1.0, 1.0)
+    swollen.setSweptSphereRadius(0.1)
+    with pytest.raises(InvalidParameter, match="swept-sphere"):
+        Shell.from_geometry(swollen)
