@@ -1,0 +1,1 @@
+"""Speed of the package against others, as ratios."""

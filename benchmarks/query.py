@@ -96,7 +96,7 @@ def against_peers(rounds: int) -> None:
 
 
 def against_size(rounds: int) -> None:
-    """The same contact patch on sheets of 2 k to 2 M triangles."""
+    """Time the same contact patch on sheets of 2 k to 2 M triangles."""
     contestants = {}
     for cells, size in ((32, 0.1), (100, 0.316), (316, 1.0), (1000, 3.16)):
         shell = Shell(*wavy_sheet(cells, size))

@@ -113,7 +113,7 @@ def with_moving_sheet(shell: sp.Shell) -> sp.Scene:
 
 
 def ingredients(rounds: int) -> None:
-    """What each ingredient of a scene adds to the step."""
+    """Time what each ingredient of a scene adds to the step."""
     shell = sp.Shell(*wavy_sheet(316, 1.0))
 
     def touching(**settings: Any) -> sp.Scene:

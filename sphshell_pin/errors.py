@@ -78,8 +78,8 @@ class DeepStart(SphshellError, ValueError):
     def __init__(self, pair: str, depth: float, radius: float) -> None:
         """Say how deep the sphere of `pair` starts."""
         super().__init__(
-            f"contact '{pair}' starts at depth {depth:.6g} m, more than half of its sphere's radius "
-            f"{radius:.6g} m: move the start configuration, or turn the shell's side"
+            f"contact '{pair}' starts at depth {depth:.6g} m, more than half of its sphere's "
+            f"radius {radius:.6g} m: move the start configuration, or turn the shell's side"
         )
         self.pair = pair
         self.depth = depth
@@ -115,8 +115,9 @@ class SimulationDiverged(SphshellError, ArithmeticError):
     def __init__(self, t: float, why: str, result: Result) -> None:
         """Say when and why the run had to stop."""
         super().__init__(
-            f"the simulation diverged at t = {t:.6g} s: {why}; what was computed until then is kept in "
-            "the error's .result; reduce dt, or the stiffness and damping (see Scene.explain)"
+            f"the simulation diverged at t = {t:.6g} s: {why}; what was computed until then is "
+            "kept in the error's .result; reduce dt, or the stiffness and damping "
+            "(see Scene.explain)"
         )
         self.t = t
         self.result = result

@@ -26,9 +26,13 @@ class CoulombFriction:
     v_dynamic: float
 
     def __post_init__(self) -> None:
-        """Raise InvalidParameter unless mu >= 0 and 0 < v_static < v_dynamic."""
+        """Raise InvalidParameter unless mu_dynamic <= mu_static and v_static < v_dynamic."""
         check_not_negative("mu_static", self.mu_static)
         check_not_negative("mu_dynamic", self.mu_dynamic)
+        if self.mu_dynamic > self.mu_static:
+            raise InvalidParameter(
+                "mu_dynamic", self.mu_dynamic, f"must not exceed mu_static = {self.mu_static!r}"
+            )
         check_positive("v_static", self.v_static, "m/s")
         check_positive("v_dynamic", self.v_dynamic, "m/s")
         if self.v_dynamic <= self.v_static:

@@ -114,10 +114,12 @@ class ImpactLaw(NormalLaw):
                 raise InvalidParameter(f"poisson_{i}", poisson, "must lie in (-1, 0.5]")
             moduli += (1 - poisson**2) / young
         stiffness = 4 / 3 / moduli * math.sqrt(radius)
-        if restitution is None:
+        if (restitution is None) != (speed is None):
+            raise InvalidParameter(
+                "restitution, speed", (restitution, speed), "must be given together, or neither"
+            )
+        if restitution is None or speed is None:
             return ImpactLaw(stiffness, 1.5)
-        if speed is None:
-            raise InvalidParameter("speed", speed, "must be given with restitution [m/s]")
         return HuntCrossleyLaw(stiffness, 1.5, dissipation_for(restitution, speed))
 
     @cached_property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -187,7 +188,7 @@ class CartesianImpedance(Controller):
         # Straight pieces between corners leave a curved surface: project a fine division of them.
         spacing = self.shell.size / 500
         pieces = [corners[:1]]
-        for a, b in zip(corners[:-1], corners[1:], strict=True):
+        for a, b in itertools.pairwise(corners):
             n = max(1, int(np.ceil(np.linalg.norm(b - a) / spacing)))
             pieces.append(a + (b - a) * (np.arange(1, n + 1) / n)[:, None])
         at = self.shell.closest_points(np.concatenate(pieces))

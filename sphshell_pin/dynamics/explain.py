@@ -188,7 +188,8 @@ def _point_jacobian(scene: Scene, data: pin.Data, joint: int, point: Array) -> A
     if joint == 0:
         return np.zeros((3, scene.model.nv))
     jacobian = pin.getJointJacobian(scene.model, data, joint, pin.WORLD)
-    return jacobian[:3] - pin.skew(point) @ jacobian[3:]
+    moved: Array = jacobian[:3] - pin.skew(point) @ jacobian[3:]
+    return moved
 
 
 def _ingredients(pair: ContactPair) -> tuple[str, ...]:
@@ -236,7 +237,7 @@ def _law_text(law: NormalLaw) -> str:
 
 
 def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> list[str]:
-    out = []
+    out: list[str] = []
     where = f"contact '{pair.name}'"
     if pair.sphere is None or pair.shell is None:
         return out

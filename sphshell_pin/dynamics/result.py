@@ -235,4 +235,5 @@ class Result:
         """Return an overview figure: forces, depth and energy over time."""
         from sphshell_pin.plot import plot_result
 
-        return plot_result(self)
+        figure: Figure = plot_result(self)
+        return figure

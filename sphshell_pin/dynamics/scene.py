@@ -343,29 +343,24 @@ def _default_law() -> NormalLaw:
 
 def _checked_source(find: Find, name: str) -> Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]:
     """Wrap a user's routine so that what reaches the core has the right shapes and unit normals."""
+    where = f"contact source '{name}'"
+    shapes = "must return points (k, 3), normals (k, 3), depths (k,)"
 
     def checked(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[Array, Array, Array]:
-        where = f"contact source '{name}'"
+        answer = find(pose_i, pose_j)
         try:
-            points, normals, depths = find(pose_i, pose_j)
-        except (TypeError, ValueError) as error:
-            raise InvalidParameter(
-                where, str(error), "must return points (k, 3), normals (k, 3), depths (k,)"
-            ) from error
-        depth = np.asarray(depths, dtype=np.float64).reshape(-1)
-        shape = (len(depth), 3)
-        point = np.asarray(points, dtype=np.float64).reshape(-1, 3)
-        normal = np.asarray(normals, dtype=np.float64).reshape(-1, 3)
-        if point.shape != shape or normal.shape != shape:
-            raise InvalidParameter(
-                where,
-                (point.shape, normal.shape, depth.shape),
-                "must return points (k, 3), normals (k, 3), depths (k,)",
-            )
+            points, normals, depths = answer
+            depth = np.array(depths, dtype=np.float64).reshape(-1)
+            point = np.array(points, dtype=np.float64).reshape(-1, 3)
+            normal = np.array(normals, dtype=np.float64).reshape(-1, 3)
+        except (TypeError, ValueError):
+            raise InvalidParameter(where, answer, shapes) from None
+        if not len(point) == len(normal) == len(depth):
+            raise InvalidParameter(where, (point.shape, normal.shape, depth.shape), shapes)
         if not (np.isfinite(point).all() and np.isfinite(depth).all()):
             raise InvalidParameter(where, point.tolist(), "must return finite points and depths")
         if len(normal) and not np.allclose(np.linalg.norm(normal, axis=1), 1, atol=1e-6):
             raise InvalidParameter(where, normal.tolist(), "must return unit normals")
-        return np.ascontiguousarray(point), np.ascontiguousarray(normal), depth
+        return point, normal, depth
 
     return checked

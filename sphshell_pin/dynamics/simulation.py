@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import signal
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -85,11 +87,14 @@ class Simulation:
         blocks: list[dict[str, NDArray[Any]]] = []
         status = 0
         try:
-            while not status:
-                status = core.advance(_GLANCE)
-                blocks.append(core.take())
-                if progress is not None:
-                    progress(core.progress)
+            with _CtrlC() as ctrl_c:
+                while not status:
+                    status = core.advance(_GLANCE)
+                    blocks.append(core.take())
+                    if progress is not None:
+                        progress(core.progress)
+                    if ctrl_c.pressed and not status:
+                        raise KeyboardInterrupt
         except KeyboardInterrupt:
             blocks.append(core.take())
             raise Interrupted(core.time, self._gather(core, blocks)) from None
@@ -159,6 +164,33 @@ class Simulation:
             "pairs": figures,
         }
         return Result.from_blocks(blocks, names, stats, self.scene)
+
+
+class _CtrlC:
+    """Notes Ctrl-C during a run instead of letting it break into somebody's callback.
+
+    A second one breaks in all the same. Outside the main thread signals cannot be caught.
+    """
+
+    def __init__(self) -> None:
+        self.pressed = False
+        self._before: Any = None
+
+    def __enter__(self) -> _CtrlC:
+        if threading.current_thread() is threading.main_thread():
+            self._before = signal.getsignal(signal.SIGINT)
+            if self._before is signal.default_int_handler:
+                signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._before is signal.default_int_handler:
+            signal.signal(signal.SIGINT, self._before)
+
+    def _note(self, number: int, frame: Any) -> None:
+        if self.pressed:
+            signal.default_int_handler(number, frame)
+        self.pressed = True
 
 
 def _why(core: _core.Simulation, scene: Scene) -> str:

@@ -78,10 +78,10 @@ def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> 
     its inside, and so on by turns. An open one keeps the winding most of its area has. With
     `keep_winding` nothing is turned, and a component counts as closed only if it need not be.
     """
-    component, flip, one_sided = _core.mend_flood_fill(
+    component, flipped, one_sided = _core.mend_flood_fill(
         polygons.offsets, polygons.corners, len(vertices)
     )
-    flip = flip.astype(np.bool_)
+    flip: Mask = flipped.astype(np.bool_)
     number = len(one_sided)
     split = split_elements(polygons, vertices)
     corners = vertices[polygons.corners[split.slots]]

@@ -57,6 +57,7 @@ def difference(a, b, radius: float) -> float:  # type: ignore[no-untyped-def]
     """Largest difference of two sets matched by nearest point; inf if counts differ.
 
     A normal is known to rounding / distance only: its difference is weighed by distance / radius.
+    Where the centre lies on the surface (distance below 1e-9 radius) it is not known at all.
     """
     if len(a) != len(b):
         return float("inf")
@@ -65,7 +66,8 @@ def difference(a, b, radius: float) -> float:  # type: ignore[no-untyped-def]
     for k in range(len(a)):
         nearest = min(free, key=lambda i: float(np.linalg.norm(b.point[i] - a.point[k])))
         free.remove(nearest)
-        weight = 1.0 - a.depth[k] / radius
+        distance = 1.0 - a.depth[k] / radius
+        weight = distance if distance > 1e-9 else 0.0
         worst = max(
             worst,
             float(np.abs(b.point[nearest] - a.point[k]).max()),

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sphshell_pin import HuntCrossleyLaw, ImpactLaw
@@ -50,6 +50,7 @@ def test_adams_units() -> None:
         ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="furlong")
 
 
+@settings(derandomize=True, deadline=None)
 @given(
     depth=st.floats(-1e-3, 1e-3),
     gap_rate=st.floats(-5.0, 5.0),
@@ -64,6 +65,7 @@ def test_impact_is_the_printed_formula(depth, gap_rate, exponent, damping, full)
     assert law.normal_force(depth, gap_rate) == pytest.approx(expected, abs=1e-11 * scale + 1e-300)
 
 
+@settings(derandomize=True, deadline=None)
 @given(
     depth=st.floats(-1e-3, 1e-3), gap_rate=st.floats(-5.0, 5.0), dissipation=st.floats(0.0, 10.0)
 )

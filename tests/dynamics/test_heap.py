@@ -86,6 +86,7 @@ def test_steps_do_not_touch_the_heap(counter: Path, controller: str, stepper: st
         env={**os.environ, "LD_PRELOAD": str(counter)},
     )
     assert done.returncode == 0, done.stderr
-    _, short, long, contact_time = done.stdout.split()
+    first, short, long, contact_time = done.stdout.split()
+    assert int(first) > 0, "the counter counted nothing"
     assert int(long) - int(short) <= 100, done.stdout
     assert controller == "gravity" or float(contact_time) > 0.0

@@ -54,10 +54,6 @@ def bouncing(integrator=None) -> Simulation:
     return Simulation(scene, integrator or SemiImplicitEuler(dt=1e-4))
 
 
-# ---------------------------------------------------------------------------------------------
-# faults
-
-
 def test_a_diverging_run_keeps_what_it_computed() -> None:
     """Explicit damping with dt kd / m = 1e4 multiplies the speed at every step."""
     sim = Simulation(on_plate(slider(), LAW), SemiImplicitEuler(dt=1e-2))
@@ -199,10 +195,6 @@ def test_a_failed_run_leaves_the_simulation_usable() -> None:
     assert np.array_equal(sim.run(*START, 0.05).q, before.q)
 
 
-# ---------------------------------------------------------------------------------------------
-# controllers
-
-
 def test_a_python_controller_is_called_every_control_dt_and_held() -> None:
     calls = []
 
@@ -266,10 +258,6 @@ def test_an_error_in_a_controller_comes_through() -> None:
 def test_a_controller_of_the_wrong_size_is_named() -> None:
     with pytest.raises(InvalidParameter):
         bouncing().run(*START, 0.1, lambda t, q, v, c: np.zeros(5), control_dt=1e-2)
-
-
-# ---------------------------------------------------------------------------------------------
-# results
 
 
 def same(a: Result, b: Result) -> None:
@@ -368,10 +356,6 @@ def test_saving_into_a_missing_folder_is_a_clear_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(ResultError):
         bouncing().run(*START, 0.01).save(tmp_path / "file" / "run.npz")
-
-
-# ---------------------------------------------------------------------------------------------
-# locked joints
 
 
 def test_lock_equals_the_model_reduced_by_hand() -> None:

@@ -63,11 +63,11 @@ def _nudges(center: Array, points: Array, corners: Array, size: float) -> list[l
         along = np.where(at_corner[:, None], side, 0)
         tries += [along, -along, inward]
     found: list[list[Array]] = [[] for _ in points]
-    for step in tries:
-        length = norm(step)
-        step = NUDGE * size * step / np.where(length > 0, length, 1)[:, None]
+    for direction in tries:
+        length = norm(direction)
+        step = NUDGE * size * direction / np.where(length > 0, length, 1)[:, None]
         there = closest_on_triangles(center + step, corners)
-        follows = (length > 0) & (norm(there - points - step) <= 1e-3 * NUDGE * size)
+        follows = (length > 0) & (norm(there - points - step) <= 0.1 * NUDGE * size)
         for k in np.flatnonzero(follows):
             found[k].append(step[k])
     return found

@@ -31,9 +31,8 @@ void bind_contact(nb::module_& m) {
             new (law) CoulombLaw{true, mu_static, mu_dynamic, v_static, v_dynamic};
           },
           nb::arg("mu_static"), nb::arg("mu_dynamic"), nb::arg("v_static"), nb::arg("v_dynamic"))
-      .def("coefficient", [](const CoulombLaw& law, double speed) {
-        return speed * law.over_speed(speed);
-      });
+      .def("coefficient",
+           [](const CoulombLaw& law, double speed) { return speed * law.over_speed(speed); });
   m.def(
       "contact_force",
       [](const NormalLaw& law, const CoulombLaw* friction, double depth, const Vec3& normal,

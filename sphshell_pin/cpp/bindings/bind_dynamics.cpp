@@ -214,15 +214,13 @@ void bind_dynamics(nanobind::module_& m) {
           [](Simulation* self, nb::handle model, const std::vector<const Pair*>& pairs,
              std::shared_ptr<Controller> controller, VectorX q0, VectorX v0, bool runge_kutta,
              double dt, double duration, double start_time, double control_dt, int record_every) {
-            new (self) Simulation(
-                model_of(model), copies(pairs),
-                {dt, duration, start_time, control_dt, record_every, runge_kutta},
-                std::move(controller), std::move(q0), std::move(v0));
+            new (self) Simulation(model_of(model), copies(pairs),
+                                  {dt, duration, start_time, control_dt, record_every, runge_kutta},
+                                  std::move(controller), std::move(q0), std::move(v0));
           },
           nb::arg("model"), nb::arg("pairs"), nb::arg("controller").none(), nb::arg("q0"),
-          nb::arg("v0"), nb::kw_only(), nb::arg("runge_kutta"), nb::arg("dt"),
-          nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"),
-          nb::arg("record_every"))
+          nb::arg("v0"), nb::kw_only(), nb::arg("runge_kutta"), nb::arg("dt"), nb::arg("duration"),
+          nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_every"))
       .def("advance",
            [](Simulation& self, double wall_seconds) {
              nb::gil_scoped_release release;

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "../shell/mending.hpp"
+#include "shell/mending.hpp"
 
 namespace nb = nanobind;
 
@@ -107,15 +107,16 @@ void bind_mending(nb::module_& module) {
         sphshell::Insertions result;
         {
           nb::gil_scoped_release released;
-          result = sphshell::find_t_junctions(view(offsets, corners), points.data(),
-                                              copy(open_slots), copy(open_polygons),
-                                              copy(candidates), tolerance);
+          result =
+              sphshell::find_t_junctions(view(offsets, corners), points.data(), copy(open_slots),
+                                         copy(open_polygons), copy(candidates), tolerance);
         }
         return nb::make_tuple(give(std::move(result.slot)), give(std::move(result.vertex)),
                               give(std::move(result.parameter)));
       },
       "offsets"_a, "corners"_a, "points"_a, "open_slots"_a, "open_polygons"_a, "candidates"_a,
-      "tolerance"_a, "(slot, vertex, parameter) of vertices inside open edges, in order along them.");
+      "tolerance"_a,
+      "(slot, vertex, parameter) of vertices inside open edges, in order along them.");
 
   module.def(
       "mend_flood_fill",

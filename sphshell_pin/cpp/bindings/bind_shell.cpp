@@ -125,40 +125,45 @@ void bind_shell(nanobind::module_& m) {
       .def_prop_ro("num_elements", &Shell::num_elements)
       .def_prop_ro("num_patches", [](const Shell& s) { return s.topology().num_patches; })
       .def_prop_ro("bytes", &Shell::bytes)
-      .def_prop_ro("element_patch", [](const Shell& s) { return to_array(s.topology().patch); },
-                   nb::rv_policy::automatic)
+      .def_prop_ro(
+          "element_patch", [](const Shell& s) { return to_array(s.topology().patch); },
+          nb::rv_policy::automatic)
       .def_prop_ro("num_edges",
                    [](const Shell& s) {
                      return std::count_if(s.topology().edges.begin(), s.topology().edges.end(),
                                           [](const Edge& e) { return !e.inner; });
                    })
-      .def_prop_ro("edge_vertices",
-                   [](const Shell& s) {
-                     return per_edge<int>(s, 2, [](const Edge& e, std::vector<int>& out) {
-                       out.push_back(e.first_vertex);
-                       out.push_back(e.last_vertex);
-                     });
-                   },
-                   nb::rv_policy::automatic)
-      .def_prop_ro("edge_class",
-                   [](const Shell& s) {
-                     return per_edge<std::uint8_t>(
-                         s, 1, [](const Edge& e, std::vector<std::uint8_t>& out) {
-                           out.push_back(static_cast<std::uint8_t>(e.kind));
-                         });
-                   },
-                   nb::rv_policy::automatic)
-      .def_prop_ro("edge_angle",
-                   [](const Shell& s) {
-                     return per_edge<double>(s, 1, [](const Edge& e, std::vector<double>& out) {
-                       out.push_back(e.angle);
-                     });
-                   },
-                   nb::rv_policy::automatic)
-      .def_prop_ro("triangle_normals", [](const Shell& s) {
-        std::vector<double> out;
-        for (const Vec3& n : s.topology().face_normal) append(out, n);
-        const std::size_t t = s.topology().face_normal.size();
-        return to_array(std::move(out), {t, 3});
-      }, nb::rv_policy::automatic);
+      .def_prop_ro(
+          "edge_vertices",
+          [](const Shell& s) {
+            return per_edge<int>(s, 2, [](const Edge& e, std::vector<int>& out) {
+              out.push_back(e.first_vertex);
+              out.push_back(e.last_vertex);
+            });
+          },
+          nb::rv_policy::automatic)
+      .def_prop_ro(
+          "edge_class",
+          [](const Shell& s) {
+            return per_edge<std::uint8_t>(s, 1, [](const Edge& e, std::vector<std::uint8_t>& out) {
+              out.push_back(static_cast<std::uint8_t>(e.kind));
+            });
+          },
+          nb::rv_policy::automatic)
+      .def_prop_ro(
+          "edge_angle",
+          [](const Shell& s) {
+            return per_edge<double>(
+                s, 1, [](const Edge& e, std::vector<double>& out) { out.push_back(e.angle); });
+          },
+          nb::rv_policy::automatic)
+      .def_prop_ro(
+          "triangle_normals",
+          [](const Shell& s) {
+            std::vector<double> out;
+            for (const Vec3& n : s.topology().face_normal) append(out, n);
+            const std::size_t t = s.topology().face_normal.size();
+            return to_array(std::move(out), {t, 3});
+          },
+          nb::rv_policy::automatic);
 }

@@ -9,6 +9,8 @@ void bind_dynamics(nb::module_& m);
 void bind_reference(nb::module_& m);
 
 NB_MODULE(_core, m) {
+  // Interpreters that end with objects alive are no leak of ours.
+  nb::set_leak_warnings(false);
   m.doc() = "C++ core of sphshell_pin; its Python face checks and converts, this trusts and runs.";
   bind_mending(m);
   bind_shell(m);

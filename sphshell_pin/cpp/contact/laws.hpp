@@ -71,11 +71,11 @@ struct CoulombLaw {
 };
 
 struct ContactForce {
-  double normal = 0;              // [N]
-  double damping_power = 0;       // lost by the normal damping [W]
-  double friction_power = 0;      // lost by friction [W]
-  Vec3 friction = Vec3::Zero();   // on the sphere [N]
-  Vec3 slip = Vec3::Zero();       // tangential velocity of the sphere against the shell [m/s]
+  double normal = 0;             // [N]
+  double damping_power = 0;      // lost by the normal damping [W]
+  double friction_power = 0;     // lost by friction [W]
+  Vec3 friction = Vec3::Zero();  // on the sphere [N]
+  Vec3 slip = Vec3::Zero();      // tangential velocity of the sphere against the shell [m/s]
 };
 
 // relative: velocity of the sphere's body against the shell's, both at the contact point [m/s].

@@ -16,11 +16,11 @@ constexpr double kSamePoint = 1e-10;
 
 // Position of the sphere's centre against side k of a facet, in the facet's plane.
 struct SideTest {
-  bool beyond;      // outside the side by more than round-off
-  bool not_within;  // outside it, round-off included
-  bool before, after;  // past the side's first, second end (round-off included)
+  bool beyond;                   // outside the side by more than round-off
+  bool not_within;               // outside it, round-off included
+  bool before, after;            // past the side's first, second end (round-off included)
   bool past_first, past_second;  // ... by more than round-off
-  double t;  // foot along the side, 0 to 1
+  double t;                      // foot along the side, 0 to 1
 };
 
 inline SideTest test_side(const Facet& facet, int k, const Vec3& centre, double tolerance2) {
@@ -111,7 +111,11 @@ void Query::find_facets(const Shell& shell, const Vec3& centre, double radius) {
   if (faces_.empty() && edges_.empty() && vertices_.empty()) return;
   drop_claims_of_neighbours(shell);
   claims_to_contacts(shell, centre, radius);
-  if (contacts.size() > 1) merge_equal_points(kSamePoint * radius + 16 * tolerance);
+  if (contacts.size() > 1) {
+    const double same = kSamePoint * radius + 16 * tolerance;
+    merge_equal_points(same);
+    drop_crossed(shell, centre, same);
+  }
   if (shell.side() != Side::Both && !contacts.empty()) keep_one_side(shell, centre, radius);
   // Deepest first: the order must not depend on the numbering of the elements.
   if (contacts.size() > 1)
@@ -121,8 +125,7 @@ void Query::find_facets(const Shell& shell, const Vec3& centre, double radius) {
 }
 
 // All facets whose box meets the sphere, and perhaps some more.
-const std::vector<int>& Query::facets_near(const Shell& shell, const Vec3& centre,
-                                           double radius) {
+const std::vector<int>& Query::facets_near(const Shell& shell, const Vec3& centre, double radius) {
   const NormalCone* cones = shell.cones().data();
   double margin = 0;
   if (follow_) {
@@ -224,9 +227,8 @@ void Query::drop_claims_of_neighbours(const Shell& shell) {
     return std::any_of(
                faces_.begin(), faces_.end(),
                [&](const FaceClaim& face) { return has_vertex(corners(face), v.vertex); }) ||
-           std::any_of(edges_.begin(), edges_.end(), [&](const EdgeClaim& e) {
-             return e.from == v.vertex || e.to == v.vertex;
-           });
+           std::any_of(edges_.begin(), edges_.end(),
+                       [&](const EdgeClaim& e) { return e.from == v.vertex || e.to == v.vertex; });
   };
   vertices_.erase(std::remove_if(vertices_.begin(), vertices_.end(), taken), vertices_.end());
 }
@@ -297,6 +299,25 @@ void Query::merge_equal_points(double tolerance) {
       }
 }
 
+// Elements may overlap or cross without sharing an edge. Where another one passes through a contact
+// point and comes nearer to the centre, the distance has no minimum there. The deepest contact is
+// the nearest point of all, so a single one needs no such test.
+void Query::drop_crossed(const Shell& shell, const Vec3& centre, double tolerance) {
+  const auto crossed = [&](const Vec3& point) {
+    const double nearer = std::max(0.0, (centre - point).norm() - tolerance);
+    return std::any_of(reached_.begin(), reached_.end(), [&](int f) {
+      const Facet& facet = shell.facets()[f];
+      if (std::abs(facet.normal.dot(point - facet.corner[0])) > tolerance) return false;
+      const Vec3 here = closest_on_triangle(point, facet.corner, facet.normal).point;
+      if ((point - here).squaredNorm() > tolerance * tolerance) return false;
+      const Vec3 best = closest_on_triangle(centre, facet.corner, facet.normal).point;
+      return (centre - best).squaredNorm() < nearer * nearer;
+    });
+  };
+  for (std::size_t i = contacts.size(); i-- > 0;)
+    if (crossed(contacts[i].point)) remove(i);
+}
+
 // side = outside | inside: the nearest contact tells on which side the centre is. On the right side
 // count the contacts whose feature faces the centre; on the wrong side the sphere is pushed back
 // out through the nearest point.
@@ -312,7 +333,8 @@ void Query::keep_one_side(const Shell& shell, const Vec3& centre, double radius)
     for (std::size_t i = contacts.size(); i-- > 0;)
       if (!faces_centre(i)) remove(i);
     for (std::size_t i = 0; i < contacts.size(); ++i)
-      if (contacts[i].depth == radius) contacts[i].normal = sign * carriers_[i].outward.normalized();
+      if (contacts[i].depth == radius)
+        contacts[i].normal = sign * carriers_[i].outward.normalized();
     return;
   }
   Contact out = contacts[nearest];

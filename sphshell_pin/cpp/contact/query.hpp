@@ -56,6 +56,7 @@ class Query {
   void drop_claims_of_neighbours(const Shell& shell);
   void claims_to_contacts(const Shell& shell, const Vec3& centre, double radius);
   void merge_equal_points(double tolerance);
+  void drop_crossed(const Shell& shell, const Vec3& centre, double tolerance);
   void keep_one_side(const Shell& shell, const Vec3& centre, double radius);
   void remove(std::size_t i);
 

@@ -89,8 +89,8 @@ void CartesianImpedance::torque(Scene& scene, double t, const VectorX& q, const 
   pinocchio::Force& opposed = opposed_[s_.joint];
   const Vec3 local = joint.rotation().transpose() * force;
   opposed.linear() = -local;
-  opposed.angular() = -(joint.rotation().transpose() * moment) -
-                      s_.frame.translation().cross(local);
+  opposed.angular() =
+      -(joint.rotation().transpose() * moment) - s_.frame.translation().cross(local);
   tau = body.bias(q, v, opposed_);
   if (s_.posture_stiffness.size() > 0) {
     body.difference(q, s_.q_ref, error_);

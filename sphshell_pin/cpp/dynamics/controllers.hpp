@@ -14,8 +14,7 @@ class Controller {
   // Called once before a run, to ask for the placements that torque() reads.
   virtual void prepare(Scene&) {}
   // Writes the torques; the scene's contacts have been evaluated at (q, v).
-  virtual void torque(Scene& scene, double t, const VectorX& q, const VectorX& v,
-                      VectorX& tau) = 0;
+  virtual void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) = 0;
 };
 
 // `actuated` is 1 where a joint's velocity is driven, else 0 (a free-floating base or object).
@@ -40,11 +39,11 @@ class JointPd : public Controller {
 };
 
 struct ImpedanceSettings {
-  int joint = 0;              // that carries the controlled frame
+  int joint = 0;                // that carries the controlled frame
   SE3 frame = SE3::Identity();  // in that joint
-  int path_joint = 0;         // that carries the path
+  int path_joint = 0;           // that carries the path
   SE3 path_placement = SE3::Identity();
-  std::vector<double> times;        // [s], increasing
+  std::vector<double> times;          // [s], increasing
   std::vector<Vec3> points, normals;  // in the path's frame; normals zero where there is no surface
   double stiffness = 0, damping = 0;  // [N/m], [N s/m]
   double normal_force = 0;            // pressed against the normal [N]

@@ -40,17 +40,17 @@ void Multibody::need(int joint) {
 }
 
 void Multibody::kinematics(const VectorX& q) {
-  using Step = pinocchio::impl::ForwardKinematicZeroStep<double, 0,
-                                                         pinocchio::JointCollectionDefaultTpl,
-                                                         VectorX>;
+  using Step =
+      pinocchio::impl::ForwardKinematicZeroStep<double, 0, pinocchio::JointCollectionDefaultTpl,
+                                                VectorX>;
   for (int j : needed_)
     Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q));
 }
 
 void Multibody::kinematics(const VectorX& q, const VectorX& v) {
-  using Step = pinocchio::impl::ForwardKinematicFirstStep<double, 0,
-                                                          pinocchio::JointCollectionDefaultTpl,
-                                                          VectorX, VectorX>;
+  using Step =
+      pinocchio::impl::ForwardKinematicFirstStep<double, 0, pinocchio::JointCollectionDefaultTpl,
+                                                 VectorX, VectorX>;
   for (int j : needed_)
     Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, v));
 }

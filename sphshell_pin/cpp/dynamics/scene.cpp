@@ -26,8 +26,7 @@ void Scene::need_velocity_of(int joint) {
   needs_velocity_ = true;
 }
 
-void Scene::evaluate(const VectorX& q, const VectorX& v, bool audit,
-                     std::vector<ContactRow>* log) {
+void Scene::evaluate(const VectorX& q, const VectorX& v, bool audit, std::vector<ContactRow>* log) {
   touching_ = false;
   powers_ = Powers();
   if (needs_velocity_ || log != nullptr)
@@ -51,7 +50,8 @@ void Scene::evaluate(const VectorX& q, const VectorX& v, bool audit,
     for (const Contact& contact : contacts) {
       const bool in_world = pair.source != nullptr;
       const Vec3 point = in_world ? contact.point : world_from_j.act(contact.point);
-      const Vec3 normal = in_world ? contact.normal : Vec3(world_from_j.rotation() * contact.normal);
+      const Vec3 normal =
+          in_world ? contact.normal : Vec3(world_from_j.rotation() * contact.normal);
       Vec3 relative = Vec3::Zero();
       if (pair.needs_velocity() || log != nullptr)
         relative = velocity_at(pair.joint_i, point) - velocity_at(pair.joint_j, point);

@@ -16,8 +16,8 @@ using SE3 = pinocchio::SE3;
 
 // A user's own contact points: poses of both frames in, contacts (points and normals in the world,
 // normals from j to i) out.
-using ContactSource = std::function<void(const SE3& pose_i, const SE3& pose_j,
-                                         std::vector<Contact>& contacts)>;
+using ContactSource =
+    std::function<void(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& contacts)>;
 
 // Body i carries the sphere, body j the shell. With a source, both placements are those of its
 // frames; else `placement_i` holds the sphere's centre and `placement_j` the shell.

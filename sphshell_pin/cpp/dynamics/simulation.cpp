@@ -16,9 +16,8 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 }  // namespace
 
-Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
-                       RunSettings settings, std::shared_ptr<Controller> controller, VectorX q0,
-                       VectorX v0)
+Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, RunSettings settings,
+                       std::shared_ptr<Controller> controller, VectorX q0, VectorX v0)
     : settings_(settings),
       scene_(model, std::move(pairs)),
       controller_(std::move(controller)),
@@ -67,8 +66,7 @@ Simulation::Status Simulation::advance(double wall_seconds) {
     const bool last = step_ == steps_;
     const bool record = last || step_ % settings_.record_every == 0;
     const bool full = record_.t.size() == kRowsPerCall ||
-                      record_.contacts.size() * 2 > kContactsPerCall ||
-                      record_.events.size() > 128;
+                      record_.contacts.size() * 2 > kContactsPerCall || record_.events.size() > 128;
     if (full || ((checked & 15) == 15 && seconds_since(start) > wall_seconds)) break;
     const double dt = last ? 0 : step_ + 1 == steps_ ? last_dt_ : settings_.dt;
     evaluate(record);
@@ -81,8 +79,8 @@ Simulation::Status Simulation::advance(double wall_seconds) {
     hold_torques();
     integrator_->step(*this, dt, state_, ledger_);
     ++step_;
-    state_.t = settings_.start_time + (step_ == steps_ ? settings_.duration
-                                                       : double(step_) * settings_.dt);
+    state_.t = settings_.start_time +
+               (step_ == steps_ ? settings_.duration : double(step_) * settings_.dt);
     // Not-a-number fails every comparison.
     if (!(state_.v.squaredNorm() < 1e24) || !(state_.q.squaredNorm() < 1e24)) {
       finished_ = true;

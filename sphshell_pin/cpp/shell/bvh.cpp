@@ -66,6 +66,7 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
     root_.child[0] = make_leaf(0);
     return;
   }
+  nodes_.reserve(triangles.size() / 2);
   struct Task {
     int source, parent, side, depth;
   };

@@ -7,6 +7,7 @@
 #include <array>
 #include <vector>
 
+#include "shell/large_array.hpp"
 #include "shell/topology.hpp"
 
 namespace sphshell {
@@ -138,7 +139,7 @@ class Bvh {
 
   Vec3 origin_;
   Node root_;  // side 0 holds the box of everything: a far sphere costs this one test
-  std::vector<Node> nodes_;
+  LargeArray<Node> nodes_;
 };
 
 }  // namespace sphshell

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "mending.hpp"
+#include "shell/mending.hpp"
 
 namespace sphshell {
 namespace {
@@ -24,9 +24,9 @@ double shape(const Vec2& a, const Vec2& b, const Vec2& c) {
   return longest > 0.0 ? cross(a, b, c) / longest : 0.0;
 }
 
-constexpr double kFlat = 2e-12;   // 2 area / longest edge^2 of a triangle without area
-constexpr double kTie = 1e-9;     // shapes nearer than this count as equal; place decides
-constexpr double kLast = 1e-6;    // factor on the shape of ears that would leave a sliver behind
+constexpr double kFlat = 2e-12;  // 2 area / longest edge^2 of a triangle without area
+constexpr double kTie = 1e-9;    // shapes nearer than this count as equal; place decides
+constexpr double kLast = 1e-6;   // factor on the shape of ears that would leave a sliver behind
 
 class Clipper {
  public:

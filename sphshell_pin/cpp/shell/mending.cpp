@@ -1,4 +1,4 @@
-#include "mending.hpp"
+#include "shell/mending.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "disjoint_sets.hpp"
+#include "shell/disjoint_sets.hpp"
 
 namespace sphshell {
 namespace {

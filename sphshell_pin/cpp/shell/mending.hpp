@@ -72,9 +72,9 @@ Insertions find_t_junctions(const PolygonView& polygons, const double* points,
                             const std::vector<std::int32_t>& candidates, double tolerance);
 
 struct Orientation {
-  std::vector<std::int32_t> component;    // per polygon, numbered in order of first polygon
-  std::vector<std::uint8_t> flip;         // relative to the first polygon of the component
-  std::vector<std::uint8_t> one_sided;    // per component: 1 if no consistent winding exists
+  std::vector<std::int32_t> component;  // per polygon, numbered in order of first polygon
+  std::vector<std::uint8_t> flip;       // relative to the first polygon of the component
+  std::vector<std::uint8_t> one_sided;  // per component: 1 if no consistent winding exists
 };
 
 // Flood fill across the edges that exactly two different polygons use.

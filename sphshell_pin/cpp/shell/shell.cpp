@@ -86,8 +86,7 @@ double Shell::tan_vertex_cone(int vertex, const Vec3& axis) const {
   }
   std::sort(bearing.begin(), bearing.end());
   double gap = bearing.front() + 2 * M_PI - bearing.back();
-  for (std::size_t i = 1; i < bearing.size(); ++i)
-    gap = std::max(gap, bearing[i] - bearing[i - 1]);
+  for (std::size_t i = 1; i < bearing.size(); ++i) gap = std::max(gap, bearing[i] - bearing[i - 1]);
   const double narrow = std::cos(0.5 * gap);
   return narrow > 0.05 ? rise / narrow : kAny;
 }
@@ -152,9 +151,9 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
 }
 
 std::size_t Shell::bytes() const {
-  return bvh_.bytes() + facets_.size() * (sizeof(Facet) + sizeof(NormalCone)) + vertices_.size() * sizeof(Vec3) +
-         topology_.incidence.size() * 2 * sizeof(int) + topology_.edges.size() * sizeof(Edge) +
-         topology_.face_normal.size() * sizeof(Vec3);
+  return bvh_.bytes() + facets_.size() * (sizeof(Facet) + sizeof(NormalCone)) +
+         vertices_.size() * sizeof(Vec3) + topology_.incidence.size() * 2 * sizeof(int) +
+         topology_.edges.size() * sizeof(Edge) + topology_.face_normal.size() * sizeof(Vec3);
 }
 
 }  // namespace sphshell

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "shell/bvh.hpp"
+#include "shell/large_array.hpp"
 #include "shell/topology.hpp"
 
 namespace sphshell {
@@ -14,9 +15,9 @@ enum class Side : int { Both = 0, Outside = 1, Inside = 2 };
 // What a query reads of one triangle: two cache lines.
 struct alignas(64) Facet {
   Vec3 corner[3];
-  Vec3 normal;      // unit, that of the planar face it belongs to
-  int twin[3];      // across side k: a half-edge (3 facet + side) to test, or one of the codes below
-  int vertex[3];    // the vertex at corner k where this facet decides for it, else kNotMine
+  Vec3 normal;    // unit, that of the planar face it belongs to
+  int twin[3];    // across side k: a half-edge (3 facet + side) to test, or one of the codes below
+  int vertex[3];  // the vertex at corner k where this facet decides for it, else kNotMine
   int planar_face;  // facets of one planar face touch once
   int element;
 };
@@ -55,8 +56,8 @@ class Shell {
   const std::vector<int>& element() const { return element_; }
   const Topology& topology() const { return topology_; }
   const Bvh& bvh() const { return bvh_; }
-  const std::vector<Facet>& facets() const { return facets_; }
-  const std::vector<NormalCone>& cones() const { return cones_; }
+  const LargeArray<Facet>& facets() const { return facets_; }
+  const LargeArray<NormalCone>& cones() const { return cones_; }
   const Vec3& origin() const { return bvh_.origin(); }
   Side side() const { return side_; }
   int num_elements() const { return element_.empty() ? 0 : element_.back() + 1; }
@@ -81,8 +82,8 @@ class Shell {
   std::vector<int> facet_of_;
   std::vector<std::vector<int>> manifold_;  // see half_edges_of
   Bvh bvh_;
-  std::vector<Facet> facets_;
-  std::vector<NormalCone> cones_;
+  LargeArray<Facet> facets_;
+  LargeArray<NormalCone> cones_;
   double size_;
 };
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "mending.hpp"
+#include "shell/mending.hpp"
 
 namespace sphshell {
 namespace {

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "shell/disjoint_sets.hpp"
@@ -10,8 +11,9 @@
 namespace sphshell {
 namespace {
 
-// Two triangles are one planar face when each lies in the other's plane to this share of the box.
-constexpr double kPlanarTolerance = 1e-10;
+// Two triangles are one planar face when they share a plane to the round-off of their coordinates:
+// this share of the box and of its distance from the origin. A real bump, however low, is kept.
+constexpr double kPlanarTolerance = 16 * std::numeric_limits<double>::epsilon();
 
 // Consecutive labels of the sets, in the order of first appearance.
 std::vector<int> labels(DisjointSets& sets, std::size_t size, int& count) {
@@ -25,10 +27,11 @@ std::vector<int> labels(DisjointSets& sets, std::size_t size, int& count) {
   return out;
 }
 
-double box_diagonal(const std::vector<Vec3>& vertices) {
+// What coordinates are rounded in proportion to [m].
+double coordinate_scale(const std::vector<Vec3>& vertices) {
   Vec3 low = vertices.front(), high = low;
   for (const Vec3& v : vertices) low = low.cwiseMin(v), high = high.cwiseMax(v);
-  return (high - low).norm();
+  return (high - low).norm() + low.cwiseAbs().cwiseMax(high.cwiseAbs()).maxCoeff();
 }
 
 Vec3 area_vector(const std::vector<Vec3>& v, const Triangle& t) {
@@ -81,7 +84,8 @@ void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Tri
         triangles[t][side_of(h)] == triangles[u][side_of(g)];  // windings disagree
     const Vec3 normal = (same_direction ? Vec3(area[t] - area[u]) : Vec3(area[t] + area[u]));
     const double length = normal.norm();
-    if (!(length > 0) || area[t].dot(normal) <= 0) continue;
+    // A sheet folded back onto itself lies in one plane, but is no planar face.
+    if (!(area[t].dot(area[u]) * (same_direction ? -1 : 1) > 0)) continue;
     const Vec3& p = vertices[edge.first_vertex];
     const Vec3& q = vertices[edge.last_vertex];
     const Vec3& a = vertices[triangles[t][previous_corner(side_of(h))]];
@@ -143,7 +147,7 @@ void build_patches(const std::vector<int>& element, Topology& out) {
   for (const Edge& edge : out.edges)
     if (edge.inner || edge.kind == EdgeClass::Smooth)
       sets.join(element[triangle_of(out.incidence[edge.begin])],
-                 element[triangle_of(out.incidence[edge.begin + 1])]);
+                element[triangle_of(out.incidence[edge.begin + 1])]);
   out.patch = labels(sets, count, out.num_patches);
 }
 
@@ -182,7 +186,7 @@ void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangl
 Topology::Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                    const std::vector<int>& element, double crease_angle) {
   build_edges(triangles, *this);
-  build_planar_faces(vertices, triangles, element, kPlanarTolerance * box_diagonal(vertices),
+  build_planar_faces(vertices, triangles, element, kPlanarTolerance * coordinate_scale(vertices),
                      *this);
   classify_edges(vertices, triangles, crease_angle, *this);
   build_patches(element, *this);

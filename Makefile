@@ -1,0 +1,57 @@
+# make demo   build into .venv and run the main job
+# make test   build into .venv and run all tests
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := CMakeLists.txt pyproject.toml $(shell find sphshell_pin/cpp -name '*.[ch]pp')
+CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
+OUT ?= results
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test bench lint format clean
+
+help:
+	@sed -n 's/^# make/make/p' Makefile
+
+# make lint   check style and types; make format mends the style
+# make bench  print what contact costs, as ratios (OUT and rounds: see benchmarks/)
+# make clean  remove everything that was built
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --upgrade pip
+
+# One stamp per set of extras; a change of the C++ sources or of the packaging builds anew.
+$(VENV)/.demo: $(BIN)/python $(SOURCES)
+	@echo "Building sphshell_pin into $(VENV): about two minutes"
+	$(BIN)/python -m pip install -q -e '.[view,robots]'
+	@touch $@
+
+$(VENV)/.test: $(BIN)/python $(SOURCES)
+	@echo "Building sphshell_pin into $(VENV): about two minutes"
+	$(BIN)/python -m pip install -q -e '.[test]'
+	@touch $@ $(VENV)/.demo
+
+demo: $(VENV)/.demo
+	$(BIN)/sphshell-pin run fingertip_on_blade --out $(OUT)/fingertip_on_blade
+
+test: $(VENV)/.test
+	$(BIN)/python -m pytest
+
+bench: $(VENV)/.test
+	$(BIN)/python -m pip install -q -e '.[bench]'
+	$(BIN)/python -m benchmarks
+
+lint: $(VENV)/.test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/clang-format --dry-run --Werror $(CPP)
+
+format: $(VENV)/.test
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/clang-format -i $(CPP)
+
+clean:
+	rm -rf $(VENV) build $(OUT)

@@ -1,0 +1,191 @@
+"""The C++ core as Python sees it. Arguments are trusted: the package's own classes check them."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+_Doubles = NDArray[np.float64]
+_Ints = NDArray[np.int32]
+_Bytes = NDArray[np.uint8]
+_Longs = NDArray[np.int64]
+
+pinocchio_version: str
+coal_version: str
+
+class Shell:
+    def __init__(
+        self,
+        vertices: _Doubles,
+        triangles: _Ints,
+        triangle_element: _Ints,
+        crease_angle: float,
+        side: int,
+    ) -> None: ...
+    def contacts(
+        self, center: _Doubles, radius: float, method: int
+    ) -> tuple[_Doubles, _Doubles, _Doubles, _Ints, _Bytes]: ...
+    def contacts_batch(
+        self, centers: _Doubles, radii: _Doubles, method: int, threads: int
+    ) -> tuple[_Doubles, _Ints]: ...
+    def closest_points(
+        self, points: _Doubles, threads: int = 1
+    ) -> tuple[_Doubles, _Doubles, _Doubles, _Ints]: ...
+    @property
+    def num_elements(self) -> int: ...
+    @property
+    def num_patches(self) -> int: ...
+    @property
+    def num_edges(self) -> int: ...
+    @property
+    def bytes(self) -> int: ...
+    @property
+    def element_patch(self) -> _Ints: ...
+    @property
+    def edge_vertices(self) -> _Ints: ...
+    @property
+    def edge_class(self) -> _Bytes: ...
+    @property
+    def edge_angle(self) -> _Doubles: ...
+    @property
+    def triangle_normals(self) -> _Doubles: ...
+
+class NormalLaw:
+    def __init__(
+        self,
+        kind: int,
+        stiffness: float,
+        exponent: float,
+        damping: float,
+        full_damping_depth: float = 1.0,
+    ) -> None: ...
+    def force(self, depth: float, gap_rate: float) -> float: ...
+    def energy(self, depth: float) -> float: ...
+
+class CoulombLaw:
+    def __init__(
+        self, mu_static: float, mu_dynamic: float, v_static: float, v_dynamic: float
+    ) -> None: ...
+    def coefficient(self, speed: float) -> float: ...
+
+def contact_force(
+    law: NormalLaw, friction: CoulombLaw | None, depth: float, normal: _Doubles, relative: _Doubles
+) -> tuple[float, _Doubles, _Doubles]: ...
+
+class Pair:
+    def __init__(
+        self,
+        name: str,
+        joint_i: int,
+        placement_i: _Doubles,
+        joint_j: int,
+        placement_j: _Doubles,
+        radius: float,
+        shell: Shell | None,
+        source: Callable[[pin.SE3, pin.SE3], tuple[_Doubles, _Doubles, _Doubles]] | None,
+        method: int,
+        law: NormalLaw,
+        friction: CoulombLaw | None,
+    ) -> None: ...
+
+class Scene:
+    def __init__(self, model: pin.Model, pairs: Sequence[Pair]) -> None: ...
+    def external_forces(self, q: _Doubles, v: _Doubles) -> pin.StdVec_Force: ...
+    def contacts(self, q: _Doubles, v: _Doubles) -> _Doubles: ...
+
+class Controller: ...
+
+class GravityCompensation(Controller):
+    def __init__(self, actuated: _Doubles) -> None: ...
+
+class JointPd(Controller):
+    def __init__(
+        self, kp: _Doubles, kd: _Doubles, q_ref: _Doubles, gravity: bool, actuated: _Doubles
+    ) -> None: ...
+
+class PythonController(Controller):
+    def __init__(self, callable: Callable[[float, _Doubles, _Doubles, _Doubles], Any]) -> None: ...
+
+class CartesianImpedance(Controller):
+    def __init__(
+        self,
+        num_joints: int,
+        joint: int,
+        frame: _Doubles,
+        path_joint: int,
+        path_placement: _Doubles,
+        times: Sequence[float],
+        points: _Doubles,
+        normals: _Doubles,
+        stiffness: float,
+        damping: float,
+        normal_force: float,
+        rotational_stiffness: float,
+        rotational_damping: float,
+        posture_stiffness: _Doubles,
+        joint_damping: _Doubles,
+        q_ref: _Doubles,
+        actuated: _Doubles,
+    ) -> None: ...
+
+class Simulation:
+    def __init__(
+        self,
+        model: pin.Model,
+        pairs: Sequence[Pair],
+        controller: Controller | None,
+        q0: _Doubles,
+        v0: _Doubles,
+        *,
+        runge_kutta: bool,
+        dt: float,
+        duration: float,
+        start_time: float,
+        control_dt: float,
+        record_every: int,
+    ) -> None: ...
+    def advance(self, wall_seconds: float) -> int: ...
+    def take(self) -> dict[str, NDArray[Any]]: ...
+    @property
+    def progress(self) -> float: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def q(self) -> _Doubles: ...
+    @property
+    def v(self) -> _Doubles: ...
+    @property
+    def steps(self) -> int: ...
+    @property
+    def wall_time(self) -> float: ...
+    @property
+    def summaries(self) -> list[dict[str, float]]: ...
+
+def bare_dynamics(model: pin.Model, q: _Doubles, v: _Doubles, dt: float, steps: int) -> float: ...
+def coal_collide_all(
+    vertices: _Doubles, triangles: _Ints, centers: _Doubles, radius: float
+) -> tuple[float, float]: ...
+def mend_weld(vertices: _Doubles, tolerance: float) -> tuple[_Ints, float]: ...
+def mend_edges(offsets: _Longs, corners: _Ints, vertices: int) -> tuple[_Ints, _Ints, _Ints]: ...
+def mend_duplicates(offsets: _Longs, corners: _Ints) -> tuple[_Ints, _Bytes]: ...
+def mend_clip_ears(
+    offsets: _Longs, corners: _Ints, vertices: _Doubles, tolerance: float
+) -> tuple[_Longs, _Ints, _Bytes]: ...
+def mend_t_junctions(
+    offsets: _Longs,
+    corners: _Ints,
+    vertices: _Doubles,
+    slots: _Longs,
+    polygon: _Ints,
+    candidates: _Ints,
+    tolerance: float,
+) -> tuple[_Longs, _Ints, _Doubles]: ...
+def mend_flood_fill(
+    offsets: _Longs, corners: _Ints, vertices: int
+) -> tuple[_Ints, _Bytes, _Bytes]: ...
+def mend_components(nodes: int, pairs: _Ints) -> _Ints: ...
+def mend_nesting(
+    vertices: _Doubles, triangles: _Ints, component: _Ints, queries: _Doubles, closed: _Bytes
+) -> _Ints: ...

@@ -1,0 +1,104 @@
+"""The documents keep their word: code runs, scenarios are valid, links lead somewhere."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from sphshell_pin.errors import MissingExtra
+from sphshell_pin.scenario import build, read_scenario
+
+tomllib = pytest.importorskip("tomllib", reason="scenarios need Python 3.11 or newer")
+
+ROOT = Path(__file__).parent.parent
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CHANGELOG.md",
+    ROOT / "scenarios" / "README.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+]
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+INLINE_CODE = re.compile(r"`[^`\n]*`")
+LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+
+
+def blocks(page: Path, language: str) -> list[tuple[int, str]]:
+    """Return the blocks of one language: the number of lines above each, and its text."""
+    text = page.read_text(encoding="utf-8")
+    return [
+        (text.count("\n", 0, found.start(2)), found[2])
+        for found in FENCE.finditer(text)
+        if found[1] == language
+    ]
+
+
+def with_blocks(language: str) -> list[Path]:
+    return [page for page in PAGES if blocks(page, language)]
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def anchors(page: Path) -> set[str]:
+    """Return what GitHub makes of the headings."""
+    text = FENCE.sub("", page.read_text(encoding="utf-8"))
+    plain = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in HEADING.findall(text))
+    return {heading.replace(" ", "-") for heading in plain}
+
+
+@pytest.mark.parametrize("page", with_blocks("python"), ids=name_of)
+def test_the_python_of_a_page_runs(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    namespace: dict[str, object] = {"__name__": "page"}
+    for above, text in blocks(page, "python"):
+        # Blank lines in front: a traceback then names the line of the page.
+        code = compile("\n" * above + text, str(page), "exec")
+        try:
+            exec(code, namespace)
+        except MissingExtra as missing:
+            pytest.skip(f"{name_of(page)}, line {above + 1}: {missing}")
+
+
+@pytest.mark.parametrize("page", with_blocks("toml"), ids=name_of)
+def test_the_scenarios_of_a_page_are_valid(page, tmp_path):
+    for k, (above, text) in enumerate(blocks(page, "toml")):
+        where = f"{name_of(page)}, line {above + 1}"
+        whole = "title" in tomllib.loads(text)
+        if not whole:
+            continue
+        file = tmp_path / f"scenario_{k}.toml"
+        file.write_text(text, encoding="utf-8")
+        read_scenario(file)
+        try:
+            build(file)
+        except MissingExtra as missing:
+            pytest.skip(f"{where}: {missing}")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_the_links_of_a_page_lead_somewhere(page):
+    text = INLINE_CODE.sub("", FENCE.sub("", page.read_text(encoding="utf-8")))
+    for link in LINK.findall(text):
+        if re.match(r"[a-z]+:", link):
+            continue
+        path, _, anchor = link.partition("#")
+        target = page if not path else (page.parent / path).resolve()
+        assert target.exists(), f"{link}: no such file"
+        if anchor:
+            assert anchor in anchors(target), f"{link}: no such heading"
+
+
+def test_no_page_is_an_orphan():
+    linked = set()
+    for page in PAGES:
+        for link in LINK.findall(page.read_text(encoding="utf-8")):
+            if not re.match(r"[a-z]+:", link):
+                linked.add((page.parent / link.partition("#")[0]).resolve())
+    assert {page for page in PAGES if page.parent.name == "docs"} <= linked
+    pictures = set((ROOT / "docs" / "pictures").iterdir())
+    assert pictures <= linked
+    assert all(picture.stat().st_size < 400_000 for picture in pictures)
