@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.contact import HuntCrossleyLaw, ImpactLaw, NormalLaw
-from sphshell_pin.dynamics.scene import ContactPair, Scene
+from sphshell_pin.contact import CoulombFriction, HuntCrossleyLaw, ImpactLaw, NormalLaw
+from sphshell_pin.dynamics.scene import ContactPair, Scene, checked_source
 from sphshell_pin.units import size_warning
 
 Array = NDArray[np.float64]
@@ -25,11 +25,12 @@ STEPS_PER_SCALE = 30
 class PairExplanation:
     """Time scales and depths of one pair; nan where the pair cannot move along the normal.
 
-    `gap` [m] at q (negative in overlap; nan for a source); `effective_mass` [kg] along the normal;
-    `approach_speed` [m/s] the figures below are for; `contact_time` [s] of an undamped impact at
-    that speed, `impact_depth` [m] its largest depth; `resting_depth` [m] under the effective
-    mass's own weight; `depth_limit_speed` [m/s] at which the depth would reach the radius;
-    `shortest_time` [s] of all time scales, damping and friction included.
+    `gap` [m] at q (negative in overlap; nan for a source that finds nothing at q);
+    `effective_mass` [kg] along the normal; `approach_speed` [m/s] the figures below are for;
+    `contact_time` [s] of an undamped impact at that speed, `impact_depth` [m] its largest depth;
+    `resting_depth` [m] under the effective mass's own weight; `depth_limit_speed` [m/s] at which
+    the depth would reach the radius; `shortest_time` [s] of all time scales, damping and friction
+    included.
     """
 
     name: str
@@ -110,37 +111,59 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     return Explanation(tuple(modelled), tuple(absent), tuple(pairs), recommended, tuple(warnings))
 
 
+@dataclass(frozen=True)
+class _Touch:
+    """Where a pair touches, or would: in the world."""
+
+    gap: float
+    point: Array
+    normal: Array
+
+
+def _touch_of(pair: ContactPair, data: pin.Data) -> _Touch | None:
+    pose_i = data.oMi[pair.joint_i] * pair.sphere_placement
+    pose_j = data.oMi[pair.joint_j] * pair.shell_placement
+    if pair.find is not None:
+        points, normals, depths = checked_source(pair.find, pair.name)(pose_i, pose_j)
+        if not len(depths):
+            return None
+        deepest = int(np.argmax(depths))
+        return _Touch(-float(depths[deepest]), points[deepest], normals[deepest])
+    if pair.sphere is None or pair.shell is None:
+        return None
+    centre = pose_i.translation
+    at = pair.shell.closest_points(pose_j.actInv(centre)[None])
+    distance = float(at.distances[0])
+    signed = {"both": abs(distance), "outside": distance, "inside": -distance}[pair.shell.side]
+    point = pose_j.act(at.points[0])
+    away = centre - point
+    length = float(np.linalg.norm(away))
+    normal = away / length if length > 0 else pose_j.rotation @ at.normals[0]
+    return _Touch(signed - pair.sphere.radius, point, normal)
+
+
 def _explain_pair(
     scene: Scene, pair: ContactPair, data: pin.Data, mass_matrix: Array, v: Array, gravity: float
 ) -> PairExplanation:
-    nan = math.nan
-    gap, point, normal = nan, None, None
-    if pair.sphere is not None and pair.shell is not None:
-        centre = (data.oMi[pair.joint_i] * pair.sphere_placement).translation
-        shell_pose = data.oMi[pair.joint_j] * pair.shell_placement
-        at = pair.shell.closest_points(shell_pose.actInv(centre)[None])
-        distance = float(at.distances[0])
-        signed = {"both": abs(distance), "outside": distance, "inside": -distance}[pair.shell.side]
-        gap = signed - pair.sphere.radius
-        point = shell_pose.act(at.points[0])
-        away = centre - point
-        length = float(np.linalg.norm(away))
-        normal = away / length if length > 0 else shell_pose.rotation @ at.normals[0]
-    mass, speed = nan, nan
-    if point is not None and normal is not None:
-        row = normal @ (
-            _point_jacobian(scene, data, pair.joint_i, point)
-            - _point_jacobian(scene, data, pair.joint_j, point)
+    gap = mass = slip_mass = speed = math.nan
+    touch = _touch_of(pair, data)
+    if touch is not None:
+        gap = touch.gap
+        jacobian = _point_jacobian(scene, data, pair.joint_i, touch.point) - _point_jacobian(
+            scene, data, pair.joint_j, touch.point
         )
-        mobility = float(row @ np.linalg.solve(mass_matrix, row)) if len(row) else 0.0
-        mass = 1 / mobility if mobility > 1e-12 else nan
+        mobility = jacobian @ np.linalg.solve(mass_matrix, jacobian.T) if v.size else np.eye(3) * 0
+        mass = _mass(float(touch.normal @ mobility @ touch.normal))
+        tangent = np.eye(3) - np.outer(touch.normal, touch.normal)
+        slip_mass = _mass(float(np.linalg.eigvalsh(tangent @ mobility @ tangent).max()))
         fall = math.sqrt(2 * gravity * max(gap, 0.0))
-        speed = max(abs(float(row @ v)), fall) or DEFAULT_SPEED
+        speed = max(abs(float(touch.normal @ jacobian @ v)), fall) or DEFAULT_SPEED
     law = pair.law
     k, e = law.stiffness, law.exponent
     weight = mass * gravity
     depth = (0.5 * (e + 1) * mass * speed**2 / k) ** (1 / (e + 1))
-    radius = pair.sphere.radius if pair.sphere is not None else nan
+    radius = pair.sphere.radius if pair.sphere is not None else math.nan
+    load = max(weight, law.normal_force(-gap)) if math.isfinite(weight) else math.nan
     return PairExplanation(
         name=pair.name,
         modelled=_ingredients(pair),
@@ -149,10 +172,16 @@ def _explain_pair(
         approach_speed=speed,
         contact_time=2 * depth / speed * _duration_integral(e),
         impact_depth=depth,
-        resting_depth=law.depth_at(weight) if math.isfinite(weight) else nan,
+        resting_depth=law.depth_at(weight) if math.isfinite(weight) else math.nan,
         depth_limit_speed=math.sqrt(2 * k * radius ** (e + 1) / ((e + 1) * mass)),
-        shortest_time=_shortest_time(pair, mass, speed, depth, weight),
+        shortest_time=min(
+            _impact_times(law, mass, speed, depth, load), _slip_time(pair.friction, slip_mass, load)
+        ),
     )
+
+
+def _mass(mobility: float) -> float:
+    return 1 / mobility if mobility > 1e-12 else math.nan
 
 
 def _duration_integral(e: float) -> float:
@@ -160,27 +189,28 @@ def _duration_integral(e: float) -> float:
     return math.sqrt(math.pi) * math.gamma(1 + 1 / (e + 1)) / math.gamma(0.5 + 1 / (e + 1))
 
 
-def _shortest_time(
-    pair: ContactPair, mass: float, speed: float, depth: float, weight: float
-) -> float:
-    """Smallest of: contact time, oscillation at rest, decay by damping, decay by friction."""
+def _impact_times(law: NormalLaw, mass: float, speed: float, depth: float, load: float) -> float:
+    """Return the shortest of: contact time, oscillation under the load, decay by damping [s]."""
     if not math.isfinite(mass):
-        return math.nan
-    law = pair.law
+        return math.inf
     k, e = law.stiffness, law.exponent
     times = [2 * depth / speed * _duration_integral(e)]
-    if weight > 0:
-        times.append(math.pi * math.sqrt(mass / (k * e * law.depth_at(weight) ** (e - 1))))
+    if load > 0:
+        times.append(math.pi * math.sqrt(mass / (k * e * law.depth_at(load) ** (e - 1))))
+    # A decay needs fewer steps than an oscillation: 20 decay times count like one period.
     if isinstance(law, ImpactLaw) and law.damping:
         share = min(depth / law.full_damping_depth, 1.0)
         times.append(20 * mass / (law.damping * share * share * (3 - 2 * share)))
     if isinstance(law, HuntCrossleyLaw) and law.dissipation:
         times.append(20 * mass / (k * depth**e * law.dissipation))
-    if pair.friction is not None and pair.friction.mu_static and weight > 0:
-        slope = 1.5 * pair.friction.mu_static * weight / pair.friction.v_static
-        # A sphere's own spin makes it react 7/2 as fast as its mass alone.
-        times.append(20 * mass * (2 / 7) / slope)
     return min(times)
+
+
+def _slip_time(friction: CoulombFriction | None, slip_mass: float, load: float) -> float:
+    """Return 20 times the decay time [s] of slow slip, where friction acts like a damper."""
+    if friction is None or not friction.mu_static or not load > 0 or not math.isfinite(slip_mass):
+        return math.inf
+    return 20 * slip_mass * friction.v_static / (1.5 * friction.mu_static * load)
 
 
 def _point_jacobian(scene: Scene, data: pin.Data, joint: int, point: Array) -> Array:

@@ -59,7 +59,7 @@ class ContactPair:
             placement_j=self.shell_placement.homogeneous,
             radius=0.0 if self.sphere is None else self.sphere.radius,
             shell=None if self.shell is None else self.shell.core,
-            source=None if self.find is None else _checked_source(self.find, self.name),
+            source=None if self.find is None else checked_source(self.find, self.name),
             method=int(Method.from_name(self.method)),
             law=self.law.core,
             friction=None if self.friction is None else self.friction.core,
@@ -341,7 +341,7 @@ def _default_law() -> NormalLaw:
     return ImpactLaw.from_adams()
 
 
-def _checked_source(find: Find, name: str) -> Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]:
+def checked_source(find: Find, name: str) -> Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]:
     """Wrap a user's routine so that what reaches the core has the right shapes and unit normals."""
     where = f"contact source '{name}'"
     shapes = "must return points (k, 3), normals (k, 3), depths (k,)"
