@@ -1,46 +1,71 @@
-"""Exact contact of spheres with CAD surfaces, as wrenches for Pinocchio's dynamics."""
+"""Exact contact of spheres with CAD surfaces, as wrenches for Pinocchio's dynamics.
+
+The public names are loaded when they are first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
-from sphshell_pin.contact import (
-    ContactSet,
-    CoulombFriction,
-    Feature,
-    HuntCrossleyLaw,
-    ImpactLaw,
-    Sphere,
-    contact_wrench,
-)
-from sphshell_pin.dynamics import (
-    CartesianImpedance,
-    GravityCompensation,
-    JointPD,
-    Result,
-    RungeKutta4,
-    Scene,
-    SemiImplicitEuler,
-    Simulation,
-)
-from sphshell_pin.errors import SphshellError
-from sphshell_pin.shell import Shell
+
+if TYPE_CHECKING:
+    from sphshell_pin.contact import ContactSet as ContactSet
+    from sphshell_pin.contact import CoulombFriction as CoulombFriction
+    from sphshell_pin.contact import Feature as Feature
+    from sphshell_pin.contact import HuntCrossleyLaw as HuntCrossleyLaw
+    from sphshell_pin.contact import ImpactLaw as ImpactLaw
+    from sphshell_pin.contact import Sphere as Sphere
+    from sphshell_pin.contact import contact_wrench as contact_wrench
+    from sphshell_pin.dynamics import CartesianImpedance as CartesianImpedance
+    from sphshell_pin.dynamics import GravityCompensation as GravityCompensation
+    from sphshell_pin.dynamics import JointPD as JointPD
+    from sphshell_pin.dynamics import Result as Result
+    from sphshell_pin.dynamics import RungeKutta4 as RungeKutta4
+    from sphshell_pin.dynamics import Scene as Scene
+    from sphshell_pin.dynamics import SemiImplicitEuler as SemiImplicitEuler
+    from sphshell_pin.dynamics import Simulation as Simulation
+    from sphshell_pin.errors import SphshellError as SphshellError
+    from sphshell_pin.shell import Shell as Shell
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "CartesianImpedance",
-    "ContactSet",
-    "CoulombFriction",
-    "Feature",
-    "GravityCompensation",
-    "HuntCrossleyLaw",
-    "ImpactLaw",
-    "JointPD",
-    "Result",
-    "RungeKutta4",
-    "Scene",
-    "SemiImplicitEuler",
-    "Shell",
-    "Simulation",
-    "Sphere",
-    "SphshellError",
-    "contact_wrench",
-]
+_HOME = {
+    "CartesianImpedance": "dynamics",
+    "ContactSet": "contact",
+    "CoulombFriction": "contact",
+    "Feature": "contact",
+    "GravityCompensation": "dynamics",
+    "HuntCrossleyLaw": "contact",
+    "ImpactLaw": "contact",
+    "JointPD": "dynamics",
+    "Result": "dynamics",
+    "RungeKutta4": "dynamics",
+    "Scene": "dynamics",
+    "SemiImplicitEuler": "dynamics",
+    "Shell": "shell",
+    "Simulation": "dynamics",
+    "Sphere": "contact",
+    "SphshellError": "errors",
+    "contact_wrench": "contact",
+}
+_PARTS = ("contact", "dynamics", "errors", "robots", "scenario", "shell", "units", "view")
+
+__all__ = sorted(_HOME)  # noqa: PLE0605
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name or a part of the package at its first use."""
+    if name in _HOME:
+        value = getattr(import_module(f"sphshell_pin.{_HOME[name]}"), name)
+        globals()[name] = value
+        return value
+    if name in _PARTS:
+        return import_module(f"sphshell_pin.{name}")
+    raise AttributeError(f"module 'sphshell_pin' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    """List the public names too, loaded or not."""
+    return sorted({*globals(), *_HOME, *_PARTS})

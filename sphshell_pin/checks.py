@@ -67,6 +67,30 @@ def check_points(name: str, value: Any) -> Array:
     return array
 
 
+def off_unit_length(model: Any, q: Array) -> InvalidParameter:
+    """Return the fault of a `q` (nq,) of `model` that is not normalised.
+
+    It names the joint whose quaternion or (cos, sin) pair is farthest from unit length.
+    """
+    parts: list[tuple[str, Array]] = []
+    joints = list(zip(model.names, model.joints, strict=True))[1:]
+    while joints:
+        name, joint = joints.pop()
+        kind = joint.shortname()
+        if kind == "JointModelComposite":
+            joints.extend((name, part) for part in joint.extract().joints)
+        elif joint.nq != joint.nv:
+            first = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2}.get(kind, 0)
+            parts.append((name, q[joint.idx_q + first : joint.idx_q + joint.nq]))
+    name, part = max(parts, key=lambda one: abs(float(np.linalg.norm(one[1])) - 1.0))
+    what = "quaternion (x, y, z, w)" if len(part) == 4 else "pair (cos, sin)"
+    return InvalidParameter(
+        f"q: the {what} of joint '{name}'",
+        part.tolist(),
+        f"must be of unit length, its length is {float(np.linalg.norm(part)):.6g}",
+    )
+
+
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
     """Return `array` with writing switched off."""
     array.setflags(write=False)

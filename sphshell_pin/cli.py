@@ -130,6 +130,10 @@ def check(
     side: Annotated[
         str, typer.Option(help="Where spheres may be: both, outside, inside.")
     ] = "both",
+    scale: Annotated[
+        str | None,
+        typer.Option(help="Use of the SCALE of a .shl file: apply, ignore, or a number instead."),
+    ] = None,
 ) -> None:
     """Print the health of a surface file: what was found in it, and what was repaired.
 
@@ -137,8 +141,12 @@ def check(
     """
     with _faults(context):
         from sphshell_pin import Shell
+        from sphshell_pin.errors import SphshellError, UnitMissing
 
-        shell = Shell.from_file(file, unit=unit, side=_side(side))
+        try:
+            shell = Shell.from_file(file, unit, _number_or_word(scale), side=_side(side))
+        except UnitMissing as error:
+            raise SphshellError(f"the unit {error.must('--unit {}')}") from error
         _console().print(str(shell.health), markup=False, highlight=False)
 
 
@@ -207,6 +215,13 @@ def _changes(set_: list[str] | None, dt: float | None, duration: float | None) -
     if duration is not None:
         changes["run.duration"] = repr(duration)
     return changes
+
+
+def _number_or_word(text: str | None) -> str | float | None:
+    try:
+        return text if text is None else float(text)
+    except ValueError:
+        return text
 
 
 def _side(side: str) -> Any:

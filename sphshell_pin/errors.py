@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -22,6 +23,26 @@ class InvalidParameter(SphshellError, ValueError):
         super().__init__(f"{name} = {value!r} {must}")
         self.name = name
         self.value = value
+
+
+class UnitMissing(InvalidParameter):
+    """A surface file without a unit of its own: `path`, `size` of its box diagonal as it stands."""
+
+    def __init__(self, path: str | PathLike[str], size: float, units: Iterable[str]) -> None:
+        """Say that the unit of the file at `path` must be stated as one of `units`."""
+        self.path = Path(path)
+        self.size = size
+        self.units = tuple(units)
+        super().__init__("unit", None, self.must("unit='{}'"))
+
+    def must(self, option: str) -> str:
+        """Say what to do; `option` is how the caller states a unit, with {} in its place."""
+        mm, m = option.format("mm"), option.format("m")
+        return (
+            f"must be stated, as {self.path.suffix.lower()} files carry none: one of "
+            f"{', '.join(self.units)}; {self.path.name} measures {self.size:.4g} units: say {mm} if "
+            f"that is {self.size * 1e-3:.4g} m, {m} if it is {self.size:.4g} m"
+        )
 
 
 class InvalidShell(SphshellError, ValueError):

@@ -76,6 +76,7 @@ FAULTS = {
     "no such file": (["run", "no/such.toml"], "no such file"),
     "no such surface": (["check", "no_such.stl"], "no_such.stl"),
     "wrong side": (["check", "no_such.stl", "--side", "up"], "outside"),
+    "wrong scale": (["check", "no_such.shl", "--scale", "big"], '"apply", "ignore" or a positive'),
 }
 
 
@@ -122,6 +123,33 @@ def test_check_prints_the_health_of_a_file(tmp_path):
     assert "1" in told.output
     path.write_text("")
     assert call("check", path, "--unit", "mm").exit_code == 2
+
+
+def test_check_asks_for_the_unit_as_the_command_line_states_it(tmp_path):
+    path = tmp_path / "triangle.obj"
+    path.write_text("v 0 0 0\nv 30 0 0\nv 0 40 0\nf 1 2 3\n")
+    told = call("check", path)
+    assert told.exit_code == 2
+    assert "the unit must be stated, as .obj files carry none" in told.stderr
+    assert "triangle.obj measures 50 units: say --unit mm if that is 0.05 m" in told.stderr
+    assert "unit=" not in told.stderr
+    assert told.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("scale", "told_of"),
+    [
+        ("apply", "SCALE 0.001 of the file applied"),
+        ("ignore", "SCALE 0.001 of the file ignored"),
+        ("0.5", "scale 0.5 used in place of SCALE 0.001"),
+    ],
+)
+def test_check_uses_the_scale_of_a_shl_file_as_told(scale, told_of, tmp_path):
+    path = tmp_path / "triangle.shl"
+    path.write_text("3 1 0.001\n0 0 0\n1 0 0\n0 1 0\n3 1 2 3\n")
+    told = call("check", path, "--scale", scale)
+    assert told.exit_code == 0
+    assert told_of in told.output
 
 
 def test_list_names_scenarios_and_robots():

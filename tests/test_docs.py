@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario import build, read_scenario
-
-tomllib = pytest.importorskip("tomllib", reason="scenarios need Python 3.11 or newer")
 
 ROOT = Path(__file__).parent.parent
 PAGES = [

@@ -207,11 +207,14 @@ class Result:
             raise ResultError(path, "is not a file that Result.save wrote") from error
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the contact log as a pandas DataFrame, one row a contact, units in the names."""
+        """Return the contact log as a pandas DataFrame, one row a contact, units in the names.
+
+        Raises MissingExtra without pandas.
+        """
         try:
             import pandas
         except ImportError:
-            raise MissingExtra("pandas", "view", "Result.to_dataframe") from None
+            raise MissingExtra("pandas", "tables", "Result.to_dataframe") from None
         return pandas.DataFrame(self.contact_columns())
 
     def contact_columns(self) -> dict[str, Any]:

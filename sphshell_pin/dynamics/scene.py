@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_positive, check_vector, read_only
+from sphshell_pin.checks import check_positive, check_vector, off_unit_length, read_only
 from sphshell_pin.contact import CoulombFriction, Method, NormalLaw, Sphere
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
 from sphshell_pin.shell import Shell
@@ -276,16 +276,18 @@ class Scene:
         return explain_scene(self, q, v, None if dt is None else check_positive("dt", dt, "s"))
 
     def check_state(self, q: Any, v: Any = None) -> tuple[Array, Array]:
-        """Return copies of q (nq,) and v (nv,); InvalidParameter for other sizes or no numbers."""
+        """Return copies of q (nq,) and v (nv,).
+
+        InvalidParameter for other sizes, no numbers, or a joint whose quaternion or (cos, sin) pair
+        is not of unit length.
+        """
         model = self._model
         what = f": this model has nq = {model.nq}, nv = {model.nv}"
         if self.lock:
             what += f" after locking {', '.join(self.lock)}"
         q = check_vector("q", q, model.nq, what)
         if not pin.isNormalized(model, q, 1e-3):
-            raise InvalidParameter(
-                "q", q.tolist(), "has a quaternion or a (cos, sin) pair that is not of unit length"
-            )
+            raise off_unit_length(model, q)
         v = np.zeros(model.nv) if v is None else check_vector("v", v, model.nv, what)
         return q, v
 

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.checks import off_unit_length
 from sphshell_pin.errors import MissingExtra, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.scenario.schema import Placement, RobotSection, Scenario
 
@@ -190,7 +191,7 @@ def _start(
     unit = pin.normalize(model, q)
     # Rounded quaternions and cosines are set right; a wrong one (not of unit length) is a mistake.
     if not np.allclose(unit, q, rtol=0, atol=1e-2):
-        raise ScenarioError(path, key, "a quaternion of the start configuration is not of length 1")
+        raise ScenarioError(path, key, str(off_unit_length(model, q)))
     return unit, v
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
-import sys
+import tomllib
 import types
 import typing
 from collections.abc import Iterable, Mapping
@@ -17,11 +17,6 @@ from pydantic_core import ErrorDetails
 
 from sphshell_pin.errors import NameNotFound, ScenarioError
 from sphshell_pin.scenario.schema import Scenario
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    tomllib = None
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -71,8 +66,6 @@ def read_scenario(path: str | PathLike[str], changes: Mapping[str, str] | None =
 
 
 def _read_toml(path: str | PathLike[str]) -> dict[str, Any]:
-    if tomllib is None:
-        raise ScenarioError(path, "", "reading TOML needs Python 3.11 or newer")
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:

@@ -146,7 +146,7 @@ class Impact(Section):
 
     type: Literal["impact"]
     stiffness: Positive
-    exponent: Positive = 2.2
+    exponent: Positive = 1.5
     damping: NotNegative = 0.0
     full_damping_depth: Positive = 1e-4
 

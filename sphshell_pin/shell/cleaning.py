@@ -15,7 +15,7 @@ import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.errors import InvalidShell
-from sphshell_pin.shell.corner_normals import NormalFindings, settle_normals, unit_normals
+from sphshell_pin.shell.corner_normals import settle_normals, unit_normals
 from sphshell_pin.shell.health import Place, ShellHealth
 from sphshell_pin.shell.orientation import Borders, Oriented, find_borders, orient, split_elements
 from sphshell_pin.shell.polygons import Polygons, examine_quads, triangle_shapes, without_area
@@ -80,7 +80,7 @@ def clean_surface(raw: RawSurface) -> CleanedSurface:
         "input_elements": raw.num_polygons,
         "notes": raw.notes,
     }
-    table, normal_findings = unit_normals(raw)
+    table = unit_normals(raw, found)
     used, compact = _used_vertices(raw.corners, len(raw.vertices))
     vertices = np.ascontiguousarray(raw.vertices[used])
     size = box_diagonal(vertices)
@@ -98,7 +98,7 @@ def clean_surface(raw: RawSurface) -> CleanedSurface:
     # Those merged into another vertex are counted there.
     found["unused_vertices"] = len(raw.vertices) - found["welded_vertices"] - len(used)
     oriented = replace(oriented, polygons=oriented.polygons.with_corners(compact))
-    return _assemble(oriented, vertices[used], table, normal_findings, found)
+    return _assemble(oriented, vertices[used], table, found)
 
 
 def take_surface(raw: RawSurface) -> CleanedSurface:
@@ -122,15 +122,15 @@ def take_surface(raw: RawSurface) -> CleanedSurface:
             f"element {int(flat[0])} has no area ({flat.size} such elements): leave clean=True to "
             "have it dropped"
         )
-    table, normal_findings = unit_normals(raw)
     as_given = orient(polygons, raw.vertices, keep_winding=True)
-    found = {
+    found: dict[str, Any] = {
         "input_vertices": len(raw.vertices),
         "input_elements": raw.num_polygons,
         "notes": raw.notes,
         "cleaned": False,
     }
-    return _assemble(as_given, raw.vertices, table, normal_findings, found, turn_normals=False)
+    table = unit_normals(raw, found)
+    return _assemble(as_given, raw.vertices, table, found, turn_normals=False)
 
 
 def box_diagonal(points: Floats) -> float:
@@ -296,7 +296,6 @@ def _assemble(
     oriented: Oriented,
     vertices: Floats,
     table: Floats | None,
-    normal_findings: NormalFindings,
     found: dict[str, Any],
     turn_normals: bool = True,
 ) -> CleanedSurface:
@@ -308,9 +307,7 @@ def _assemble(
     areas = 0.5 * np.linalg.norm(spans, axis=1)
     normals = None
     if table is not None and polygons.normal_row is not None:
-        normals, normal_findings = settle_normals(
-            table, polygons, split, spans, normal_findings, turn_normals
-        )
+        normals = settle_normals(table, polygons, split, spans, found, turn_normals)
     elements = np.full((len(polygons), 4), -1, np.int32)
     place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
     elements[polygons.polygon_of_slot, place] = polygons.corners
@@ -322,7 +319,6 @@ def _assemble(
     )
     health = ShellHealth(
         **found,
-        **normal_findings.counts(),
         **_holes(borders, component_area),
         vertices=len(vertices),
         elements=len(polygons),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,26 +14,13 @@ UNIT_TOLERANCE = 1e-3
 """Normals off unit length by less than this were rounded when written; more is worth a word."""
 
 
-@dataclass(frozen=True)
-class NormalFindings:
-    """What was found about normals; the names are those of ShellHealth."""
+def unit_normals(raw: RawSurface, found: dict[str, Any]) -> Floats | None:
+    """Return unit normals (c, 3) of all corners, zero where there is none to be had.
 
-    has_normals: bool = False
-    missing_normals: int = 0
-    rescaled_normals: int = 0
-    turned_normals: int = 0
-    opposing_normals: int = 0
-    largest_normal_angle: float = 0.0
-
-    def counts(self) -> dict[str, Any]:
-        """All fields by name."""
-        return dict(vars(self))
-
-
-def unit_normals(raw: RawSurface) -> tuple[Floats | None, NormalFindings]:
-    """Return unit normals (c, 3) of all corners, zero where there is none to be had."""
+    What was found about them goes into `found`, under the names of ShellHealth.
+    """
     if raw.normals is None:
-        return None, NormalFindings()
+        return None
     largest = np.abs(raw.normals).max(axis=1)
     usable = np.isfinite(largest) & (largest > 0.0)
     # Divided by the largest component first: squares of tiny normals would vanish.
@@ -42,13 +28,11 @@ def unit_normals(raw: RawSurface) -> tuple[Floats | None, NormalFindings]:
     scaled /= np.where(usable, largest, 1.0)[:, None]
     length = np.linalg.norm(scaled, axis=1)
     rescaled = usable & (np.abs(length * np.where(usable, largest, 0.0) - 1.0) > UNIT_TOLERANCE)
-    table = scaled / np.where(usable, length, 1.0)[:, None]
-    findings = NormalFindings(
-        has_normals=True,
-        missing_normals=int((~usable).sum()),
-        rescaled_normals=int(rescaled.sum()),
-    )
-    return table, findings
+    found["has_normals"] = True
+    found["missing_normals"] = int((~usable).sum())
+    found["rescaled_normals"] = int(rescaled.sum())
+    table: Floats = scaled / np.where(usable, length, 1.0)[:, None]
+    return table
 
 
 def settle_normals(
@@ -56,14 +40,14 @@ def settle_normals(
     polygons: Polygons,
     split: Split,
     spans: Floats,
-    findings: NormalFindings,
+    found: dict[str, Any],
     turn: bool = True,
-) -> tuple[Floats, NormalFindings]:
+) -> Floats:
     """Return normals (t, 3, 3) of the triangle corners, on the side of their elements.
 
     All corners of an element are turned together, if their sum points against the element's own
     normal. spans : (t, 3) twice the area vector of the triangles. Missing normals become the
-    element's.
+    element's. What was found goes into `found`, under the names of ShellHealth.
     """
     sums = [np.bincount(split.element, spans[:, k], len(polygons)) for k in range(3)]
     vectors = np.stack(sums, axis=1).astype(np.float64)
@@ -76,13 +60,10 @@ def settle_normals(
         turned: Mask = np.asarray(total[polygons.polygon_of_slot] < 0.0, np.bool_)
         corner = np.where(turned[:, None], -corner, corner)
         along = np.where(turned, -along, along)
-        findings = replace(findings, turned_normals=int(turned.sum()))
+        found["turned_normals"] = int(turned.sum())
     missing: Mask = np.asarray(~np.any(corner, axis=1), np.bool_)
     corner = np.where(missing[:, None], own, corner)
     along = np.where(missing, 1.0, along)
-    findings = replace(
-        findings,
-        opposing_normals=int((along < 0.0).sum()),
-        largest_normal_angle=float(np.arccos(np.clip(along.min(), -1.0, 1.0))),
-    )
-    return np.ascontiguousarray(corner[split.slots]), findings
+    found["opposing_normals"] = int((along < 0.0).sum())
+    found["largest_normal_angle"] = float(np.arccos(np.clip(along.min(), -1.0, 1.0)))
+    return np.ascontiguousarray(corner[split.slots])

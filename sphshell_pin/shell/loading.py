@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 
-from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.errors import InvalidParameter, UnitMissing
 from sphshell_pin.shell.cleaning import box_diagonal
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers import READERS, read_shl, reader_for
@@ -21,8 +21,10 @@ def load_surface(
 
     Raises
     ------
+    UnitMissing
+        If `unit` is not stated where the format has none.
     InvalidParameter
-        If `unit` is missing where the format has none, or unit, scale or suffix is unknown.
+        If unit, scale or suffix is unknown.
     ShellFileError
         If the file is missing, empty, truncated or damaged.
     """
@@ -37,13 +39,7 @@ def load_surface(
     raw = READERS[suffix](file)
     if unit is None:
         size = box_diagonal(raw.vertices[raw.corners.ravel()])
-        raise InvalidParameter(
-            "unit",
-            None,
-            f"must be stated, as {suffix} files carry none: one of {', '.join(METRES_PER_UNIT)}; "
-            f"{file.name} measures {size:.4g} units: say unit='mm' if that is {size * 1e-3:.4g} m, "
-            f"unit='m' if it is {size:.4g} m",
-        )
+        raise UnitMissing(file, size, METRES_PER_UNIT)
     factor = metres_per_unit(unit) * number
     notes = [] if number == 1.0 else [f"scaled by {number:.6g} as asked"]
     return raw.scaled(factor).noting(*notes), unit, factor

@@ -60,7 +60,9 @@ class Shell(Topology):
     elements : (m, 3) or (m, 4) vertex indices, triangles among four columns ending in -1; or a list
         of lists for polygons of any size
     normals : unit normals per vertex (n, 3) or per element corner (m, 3 or 4, 3), or None
-    crease_angle : edges that turn by less are smooth [rad]; 0 makes every element flat and exact
+    crease_angle : edges that turn by less are smooth [rad], and smooth edges join elements to a
+        patch; 0 leaves smooth only the edges within a plane. It sets edge classes and patches and
+        changes no contact and no force: elements are flat and exact at any angle
     side : where spheres may be: "both", "outside" (where the winding's normals point), "inside"
     name : how messages call it
     clean : False takes the elements as they are: no welding, no repair, no reorientation

@@ -114,7 +114,12 @@ def _y_up(point: FloatArray) -> list[float]:
 
 
 def set_surroundings(visualizer: Any) -> None:
-    """Give the page a light background and drop the axes at the world's origin."""
+    """Give the page a light background; hide the axes at the world's origin and the ground grid.
+
+    The grid lies at z = 0 and would cut through whatever stands there; the page's controls bring
+    both back.
+    """
     visualizer["/Background"].set_property("top_color", [1.0, 1.0, 1.0])
     visualizer["/Background"].set_property("bottom_color", [0.80, 0.84, 0.88])
-    visualizer["/Axes"].set_property("visible", False)
+    for node in ("/Axes", "/Grid"):
+        visualizer[node].set_property("visible", False)

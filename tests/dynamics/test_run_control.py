@@ -27,6 +27,7 @@ from sphshell_pin.errors import (
     DeepStart,
     FrameNotFound,
     InvalidParameter,
+    MissingExtra,
     NameNotFound,
     ResultError,
     SimulationDiverged,
@@ -35,8 +36,10 @@ from tests.models import (
     ARM_Q,
     FRICTION,
     LAW,
+    add_body,
     arm,
     ball,
+    empty,
     free_q,
     linear_law,
     on_plate,
@@ -132,6 +135,35 @@ def test_wrong_state(q, v, name: str) -> None:
     with pytest.raises(InvalidParameter) as caught:
         bouncing().run(q, v, 0.1)
     assert caught.value.name in (name, f"{name}0")
+
+
+def test_a_joint_that_is_not_of_unit_length_is_named() -> None:
+    model = empty()
+    mixed = pin.JointModelComposite(pin.JointModelPX())
+    mixed.addJoint(pin.JointModelRUBZ(), pin.SE3.Identity())
+    parts = {
+        "flyer": (pin.JointModelFreeFlyer(), slice(3, 7)),
+        "hinge": (pin.JointModelRX(), None),
+        "sled": (pin.JointModelPlanar(), slice(2, 4)),
+        "mixed": (mixed, slice(1, 3)),
+        "wheel": (pin.JointModelRUBX(), slice(0, 2)),
+        "socket": (pin.JointModelSpherical(), slice(0, 4)),
+    }
+    parent = 0
+    for name, (joint, _) in parts.items():
+        parent = add_body(model, name, joint, parent)
+    scene = Scene(model)
+    for name, (_, part) in parts.items():
+        if part is None:
+            continue
+        joint = model.joints[model.getJointId(f"{name}_joint")]
+        for scale in (0.0, 0.9, 2.0):
+            q = pin.neutral(model)
+            q[joint.idx_q : joint.idx_q + joint.nq][part] *= scale
+            with pytest.raises(InvalidParameter, match=f"'{name}_joint'.*unit length") as caught:
+                scene.check_state(q)
+            assert np.linalg.norm(caught.value.value) == pytest.approx(scale)
+            assert len(caught.value.value) == part.stop - part.start
 
 
 def test_wrong_state_in_a_scene_call() -> None:
@@ -328,6 +360,13 @@ def test_rows_of_a_result() -> None:
     assert stats["peak_force"] >= log.normal_force.max() - 1e-9
     assert 0 < stats["mean_force"] < stats["peak_force"]
     assert 0 < stats["contact_time"] < 0.3
+
+
+def test_a_table_without_pandas_names_the_extra_that_brings_it(monkeypatch) -> None:
+    result = bouncing().run(*START, 0.01)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MissingExtra, match=r"sphshell-pin\[tables\]"):
+        result.to_dataframe()
 
 
 def test_save_and_load(tmp_path: Path) -> None:

@@ -96,7 +96,7 @@ FAULTS = {
     "unknown joint to lock": ('["middle_joint"]', '["x"]', "robot[0].lock[0]", "distal_joint"),
     "number for a free-flyer": ("[1, 2, 3, 0, 0, 0.6, 0.8]", "1", "robot[1].start", "list of 7"),
     "short list": ("[1, 2, 3, 4, 5, 6]", "[1, 2]", 'robot[1].speed."root_joint"', "6 numbers"),
-    "no unit quaternion": ("0.6, 0.8]", "0, 0.5]", "robot[1]", "length 1"),
+    "no unit quaternion": ("0.6, 0.8]", "0, 0.5]", "robot[1]", "its length is"),
     "unknown robot": ('"ball"', '"bal"', "robot[1]", "turntable"),
     "same label": ('"ball"', '"three_link_finger"\nlabel = "three_link_finger"', "robot[1]", ""),
     "no such urdf": ('name = "ball"', 'urdf = "b.urdf"', "robot[1]", "no such URDF file"),

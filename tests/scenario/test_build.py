@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sphshell_pin import ImpactLaw
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build
 from tests.scenario.files import DROP, write
@@ -28,6 +29,8 @@ def test_the_example_is_built(tmp_path):
     ("law", "kind", "attribute", "value"),
     [
         ('{ type = "adams" }', "ImpactLaw", "stiffness", 1e5 * 1000**2.2),
+        ('{ type = "adams" }', "ImpactLaw", "exponent", 2.2),
+        ('{ type = "impact", stiffness = 5 }', "ImpactLaw", "exponent", ImpactLaw(5.0).exponent),
         ('{ type = "hunt-crossley", stiffness = 5 }', "HuntCrossleyLaw", "stiffness", 5.0),
         (
             '{ type = "hertz", radius = 0.012, young_1 = 2e11, poisson_1 = 0.3, '

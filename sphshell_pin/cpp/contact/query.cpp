@@ -124,15 +124,14 @@ void Query::find_facets(const Shell& shell, const Vec3& centre, double radius) {
     });
 }
 
-// All facets whose box meets the sphere, and perhaps some more.
-const std::vector<int>& Query::facets_near(const Shell& shell, const Vec3& centre, double radius) {
-  const NormalCone* cones = shell.cones().data();
+// Fills reached_ and near_, unless they still hold from an earlier call.
+void Query::gather(const Shell& shell, const Vec3& centre, double radius) {
   double margin = 0;
   if (follow_) {
     const bool same = followed_ == &shell && followed_radius_ == radius;
     const double moved = same ? (centre - last_).norm() : radius;
     last_ = centre;
-    if (same && (centre - anchor_).squaredNorm() <= margin_ * margin_) return reached_;
+    if (same && (centre - anchor_).squaredNorm() <= margin_ * margin_) return;
     // A slow sphere stays near for many calls; for a fast one a wider ball does not pay.
     if (moved < 0.01 * radius) margin = std::clamp(16 * moved, 1e-3 * radius, 0.1 * radius);
     followed_ = &shell;
@@ -140,25 +139,25 @@ const std::vector<int>& Query::facets_near(const Shell& shell, const Vec3& centr
     anchor_ = centre;
     margin_ = margin;
   }
+  const NormalCone* cones = shell.cones().data();
   reached_.clear();
   shell.bvh().near(centre, radius + margin, reached_, [cones](int first) {
     prefetch(&cones[first]);
     prefetch(&cones[first + 3]);
   });
-  return reached_;
+  keep_in_cone(shell, centre, radius, margin);
 }
 
-// Leaves in near_ the facets that may hold a contact: the centre stands inside the cone of normals
-// of the features that they decide about (Johnson and Cohen 2001).
-void Query::keep_in_cone(const Shell& shell, const Vec3& centre, double radius) {
-  const std::vector<int>& reached = facets_near(shell, centre, radius);
+// Leaves in near_ the facets that may hold a contact: the centre, wherever within the margin, may
+// stand inside the cone of normals of the features that they decide about (Johnson and Cohen 2001).
+void Query::keep_in_cone(const Shell& shell, const Vec3& centre, double radius, double margin) {
   const NormalCone* cones = shell.cones().data();
   const Facet* facets = shell.facets().data();
   const Vec3 local = centre - shell.origin();
   const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
-  const float slack = 1e-6f * (float(shell.size()) + float(radius));
+  const float slack = 1e-6f * (float(shell.size()) + float(radius)) + 1.000001f * float(margin);
   near_.clear();
-  for (int f : reached) {
+  for (int f : reached_) {
     const NormalCone& cone = cones[f];
     const float x = c[0] - cone.middle[0], y = c[1] - cone.middle[1], z = c[2] - cone.middle[2];
     const float height = std::abs(x * cone.axis[0] + y * cone.axis[1] + z * cone.axis[2]);
@@ -178,7 +177,7 @@ void Query::collect_claims(const Shell& shell, const Vec3& centre, double radius
   const double tolerance2 = tolerance * tolerance;
   const double reach2 = radius * radius;
   const double wide_reach2 = reach2 * (1 + 1e-12);
-  keep_in_cone(shell, centre, radius);
+  gather(shell, centre, radius);
   for (int f : near_) {
     const Facet& facet = shell.facets()[f];
     const double height = facet.normal.dot(centre - facet.corner[0]);
@@ -363,7 +362,8 @@ void Query::find_elements(const Shell& shell, const Vec3& centre, double radius)
     }
     return true;
   };
-  for (int f : facets_near(shell, centre, radius)) {
+  gather(shell, centre, radius);
+  for (int f : reached_) {
     const int t = shell.triangle_of_facet(f);
     const ClosestPoint at = closest(t);
     const double d2 = (centre - at.point).squaredNorm();

@@ -50,8 +50,8 @@ class Query {
 
   void find_facets(const Shell& shell, const Vec3& centre, double radius);
   void find_elements(const Shell& shell, const Vec3& centre, double radius);
-  const std::vector<int>& facets_near(const Shell& shell, const Vec3& centre, double radius);
-  void keep_in_cone(const Shell& shell, const Vec3& centre, double radius);
+  void gather(const Shell& shell, const Vec3& centre, double radius);
+  void keep_in_cone(const Shell& shell, const Vec3& centre, double radius, double margin);
   void collect_claims(const Shell& shell, const Vec3& centre, double radius, double tolerance);
   void drop_claims_of_neighbours(const Shell& shell);
   void claims_to_contacts(const Shell& shell, const Vec3& centre, double radius);

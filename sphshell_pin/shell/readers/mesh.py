@@ -12,17 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.errors import MissingExtra, ShellFileError
+from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import Floats, RawSurface
 from sphshell_pin.shell.readers.text import finish, pack_polygons, read_text
 
 
 def read_stl(path: Path) -> RawSurface:
     """Read a binary or text .stl file: a soup of triangles."""
-    try:
-        import trimesh
-    except ImportError as error:
-        raise MissingExtra("trimesh", "all", f"reading {path.name}") from error
+    import trimesh
+
     try:
         # From memory: a file that cannot be opened is then told from one that cannot be parsed.
         data = io.BytesIO(path.read_bytes())
