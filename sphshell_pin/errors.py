@@ -40,8 +40,8 @@ class UnitMissing(InvalidParameter):
         mm, m = option.format("mm"), option.format("m")
         return (
             f"must be stated, as {self.path.suffix.lower()} files carry none: one of "
-            f"{', '.join(self.units)}; {self.path.name} measures {self.size:.4g} units: say {mm} if "
-            f"that is {self.size * 1e-3:.4g} m, {m} if it is {self.size:.4g} m"
+            f"{', '.join(self.units)}; {self.path.name} measures {self.size:.4g} units: "
+            f"say {mm} if that is {self.size * 1e-3:.4g} m, {m} if it is {self.size:.4g} m"
         )
 
 

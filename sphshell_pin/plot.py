@@ -27,6 +27,8 @@ FloatArray = NDArray[np.float64]
 NORMAL_COLOR = "#d4202a"
 FRICTION_COLOR = "#f08a00"
 DEPTH_COLOR = "#2f6fde"
+COUNT_COLOR = "#6b7280"
+COUNT_SHARE = 4.0  # the number of contacts takes up a quarter of its axis
 NO_CONTACT = "No contact in this run."
 MOST_POINTS = 20_000
 MOST_PAIRS = 8
@@ -93,7 +95,7 @@ def plot_force_and_depth(result: Result) -> Any:
         figure = _figure(12.0, 1.2 + 2.1 * len(shown))
         axes = figure.subplots(len(shown), 2, sharex=True, squeeze=False)
     if not shown:
-        for axis, quantity in zip(axes[0], ("force", "depth"), strict=True):
+        for axis, quantity in zip(axes[0], ("force", "largest depth"), strict=True):
             _say(axis, NO_CONTACT)
             axis.set_ylabel(quantity)
     largest = max((pair.peak for pair in shown), default=0.0)
@@ -171,12 +173,17 @@ def _color_limits(forces: FloatArray) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class PairSeries:
-    """Forces [N] and depth [m] of one pair at every recorded row, zero where nothing touches."""
+    """Forces [N] and depth [m] of one pair at every recorded row, zero where nothing touches.
+
+    Where a row has several contacts (`count`), the forces are their sums, the depth the largest:
+    neighbours that take over a share of the load let the depth dip while the force stays.
+    """
 
     name: str
     normal: FloatArray
     friction: FloatArray
     depth: FloatArray
+    count: FloatArray
 
     @property
     def touches(self) -> bool:
@@ -190,7 +197,7 @@ class PairSeries:
 
     @classmethod
     def of(cls, result: Result, pair: int) -> PairSeries:
-        """Sum the contacts of pair number `pair`: normal forces add, friction forces as vectors."""
+        """Join the contacts of pair number `pair`: normal forces add, friction as vectors."""
         log, rows = result.contacts, len(result.t)
         own = np.asarray(log.pair) == pair
         row = np.asarray(log.row, dtype=np.int64)[own]
@@ -200,7 +207,9 @@ class PairSeries:
         np.add.at(friction, row, np.asarray(log.friction_force_world, dtype=float)[own])
         depth = np.zeros(rows)
         np.maximum.at(depth, row, np.asarray(log.depth, dtype=float)[own])
-        return cls(str(result.pairs[pair]), normal, np.linalg.norm(friction, axis=1), depth)
+        count = np.bincount(row, minlength=rows).astype(np.float64)
+        size = np.linalg.norm(friction, axis=1)
+        return cls(str(result.pairs[pair]), normal, size, depth, count)
 
 
 def _figure(
@@ -283,33 +292,60 @@ def _draw_forces(axis: Any, result: Result, pair: PairSeries, largest: float) ->
 
 
 def _draw_overview_forces(axis: Any, result: Result, touched: list[PairSeries]) -> None:
-    if not touched:
-        _say(axis, NO_CONTACT)
-        axis.set_ylabel("force")
-        return
     if len(touched) == 1:
         _draw_forces(axis, result, touched[0], touched[0].peak)
         axis.set_title(f"force of {touched[0].name}", fontsize=10)
         return
-    factor, unit = reading_unit(max(pair.peak for pair in touched), "N")
-    for pair in touched:
-        _line(axis, np.asarray(result.t), pair.normal * factor, linewidth=1.1, label=pair.name)
-    axis.set_ylabel(f"normal force [{unit}]")
-    _finish(axis)
+    curves = {pair.name: pair.normal for pair in touched}
+    _draw_curves(axis, result, curves, "normal force", "N", NORMAL_COLOR)
 
 
 def _draw_depths(axis: Any, result: Result, touched: list[PairSeries]) -> None:
-    if not touched:
+    curves = {pair.name: pair.depth for pair in touched}
+    _draw_curves(axis, result, curves, "largest depth", "m", DEPTH_COLOR)
+    if touched:
+        axis.set_ylim(bottom=0.0)
+    if len(touched) == 1 and touched[0].count.max() > 1.0:
+        _draw_count(axis, result, touched[0])
+
+
+def _draw_curves(
+    axis: Any,
+    result: Result,
+    curves: dict[str, FloatArray],
+    quantity: str,
+    symbol: str,
+    color: str,
+) -> None:
+    """Draw a quantity of every pair, by name; that of a single pair in `color`."""
+    if not curves:
         _say(axis, NO_CONTACT)
-        axis.set_ylabel("depth")
+        axis.set_ylabel(quantity)
         return
-    factor, unit = reading_unit(max(float(pair.depth.max()) for pair in touched), "m")
-    for pair in touched:
-        look = {"color": DEPTH_COLOR} if len(touched) == 1 else {"label": pair.name}
-        _line(axis, np.asarray(result.t), pair.depth * factor, linewidth=1.1, **look)
-    axis.set_ylabel(f"depth [{unit}]")
-    axis.set_ylim(bottom=0.0)
-    _finish(axis, legend=len(touched) > 1)
+    factor, unit = reading_unit(max(float(values.max()) for values in curves.values()), symbol)
+    for name, values in curves.items():
+        look = {"color": color} if len(curves) == 1 else {"label": name}
+        _line(axis, np.asarray(result.t), values * factor, linewidth=1.1, **look)
+    axis.set_ylabel(f"{quantity} [{unit}]")
+    _finish(axis, legend=len(curves) > 1)
+
+
+def _draw_count(axis: Any, result: Result, pair: PairSeries) -> None:
+    """Draw, at the foot of `axis`, how many contacts share the load."""
+    beside = axis.twinx()
+    t, count = _thinned(np.asarray(result.t), pair.count)
+    beside.fill_between(t, count, step="mid", color=COUNT_COLOR, alpha=0.15, linewidth=0.0)
+    # A line of its own: an area as narrow as a row would not be seen.
+    beside.step(t, count, where="mid", color=COUNT_COLOR, linewidth=0.7)
+    beside.margins(x=0.01)
+    most = int(pair.count.max())
+    beside.set_ylim(0.0, COUNT_SHARE * most)
+    beside.set_yticks(range(0, most + 1, -(-most // 4)))
+    beside.tick_params(colors=COUNT_COLOR, labelsize=8)
+    beside.set_ylabel("contacts at once", color=COUNT_COLOR, loc="bottom", fontsize=9)
+    # The depth is drawn on top.
+    axis.set_zorder(beside.get_zorder() + 1)
+    axis.patch.set_visible(False)
 
 
 def _draw_energies(axis: Any, result: Result) -> None:

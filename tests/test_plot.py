@@ -62,7 +62,7 @@ def test_the_three_figures_are_written_and_not_blank(tmp_path):
 
 def test_axes_carry_their_units():
     scene, result = ball_on_plate()
-    assert {"force [N]", "depth [mm]", "time [s]"} <= labels(plot_force_and_depth(result))
+    assert {"force [N]", "largest depth [mm]", "time [s]"} <= labels(plot_force_and_depth(result))
     assert {"x of the shell [m]", "y of the shell [m]", "normal force [N]"} <= labels(
         plot_contact_path(result, scene)
     )
@@ -83,6 +83,18 @@ def test_forces_of_one_pair_add_normal_as_numbers_and_friction_as_vectors():
     np.testing.assert_array_equal(series.normal, [0, 5, 0])
     np.testing.assert_array_equal(series.friction, [0, 0, 0])
     np.testing.assert_array_equal(series.depth, [0, 2e-3, 0])
+    np.testing.assert_array_equal(series.count, [0, 2, 0])
+
+
+def test_contacts_that_share_the_load_are_counted_in_the_figure():
+    alone = [{"row": row, "depth": 1e-3} for row in range(3)]
+    shared = [*alone, {"row": 1, "depth": 1e-3}]
+    for rows, drawn in ((alone, False), (shared, True)):
+        result = a_result([0, 1, 2], np.zeros((3, 8)), rows, ("tip",))
+        for figure in (plot_force_and_depth(result), plot_result(result)):
+            assert ("contacts at once" in labels(figure)) == drawn
+    counts = plot_force_and_depth(result).axes[-1].lines[0].get_ydata()
+    np.testing.assert_array_equal(counts, [1, 2, 1])
 
 
 def test_a_run_without_contact_is_told_in_words(tmp_path):

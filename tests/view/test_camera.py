@@ -1,7 +1,9 @@
+import meshcat
 import numpy as np
 import pytest
 
-from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View
+from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View, set_surroundings
+from sphshell_pin.view.page import FilmWindow
 
 
 def in_picture(view, points):
@@ -45,3 +47,14 @@ def test_things_far_away_do_not_shrink_the_contact():
     near = View.of(np.zeros((1, 3)), np.zeros((0, 3)), np.zeros(3), 0.01)
     far = View.of(np.zeros((1, 3)), np.array([[50.0, 0, 0]]), np.zeros(3), 0.01)
     assert far.distance == pytest.approx(near.distance)
+
+
+def test_nothing_of_the_page_itself_cuts_through_the_scene():
+    window = FilmWindow()
+    set_surroundings(meshcat.Visualizer(window=window))
+    hidden = {
+        command["path"]
+        for command in window.commands(np.zeros(1))
+        if command.get("property") == "visible" and command["value"] is False
+    }
+    assert hidden == {"/Axes", "/Grid"}

@@ -49,8 +49,9 @@ auto contacts(const Shell& shell, const Vec3& centre, double radius, int method)
 // Splits 0..n over threads; each writes only to its own rows, so results do not depend on threads.
 template <class Work>
 void in_parallel(std::size_t n, int threads, Work&& work) {
-  const std::size_t workers =
-      std::clamp<std::size_t>(static_cast<std::size_t>(std::max(threads, 1)), 1, n / 64 + 1);
+  const int cores = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
+  const std::size_t wanted = static_cast<std::size_t>(std::clamp(threads, 1, cores));
+  const std::size_t workers = std::clamp<std::size_t>(wanted, 1, n / 64 + 1);
   std::vector<std::thread> pool;
   for (std::size_t w = 1; w < workers; ++w)
     pool.emplace_back([&, w] { work(n * w / workers, n * (w + 1) / workers); });

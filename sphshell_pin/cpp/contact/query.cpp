@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "shell/triangle.hpp"
 
@@ -70,8 +72,6 @@ bool vertex_is_minimum(const Shell& shell, int vertex, const Vec3& centre, doubl
   }
   return true;
 }
-
-inline bool has_vertex(const Triangle& t, int v) { return t[0] == v || t[1] == v || t[2] == v; }
 
 Vec3 direction(const Vec3& point, const Vec3& centre, const Vec3& if_equal) {
   const Vec3 d = centre - point;
@@ -211,47 +211,52 @@ void Query::collect_claims(const Shell& shell, const Vec3& centre, double radius
 // A facet is convex: where its face holds the nearest point, its own edges and corners cannot, and
 // likewise an edge and its ends. Both claim only within round-off of their common border.
 void Query::drop_claims_of_neighbours(const Shell& shell) {
-  const auto corners = [&](const FaceClaim& face) -> const Triangle& {
-    return shell.triangles()[shell.triangle_of_facet(face.facet)];
+  if (edges_.empty() && vertices_.empty()) return;
+  taken_edges_.clear();
+  taken_vertices_.clear();
+  for (const FaceClaim& face : faces_) {
+    const Triangle& t = shell.triangles()[shell.triangle_of_facet(face.facet)];
+    for (int k = 0; k < 3; ++k) {
+      taken_edges_.push_back(std::minmax(t[k], t[next_corner(k)]));
+      taken_vertices_.push_back(t[k]);
+    }
+  }
+  std::sort(taken_edges_.begin(), taken_edges_.end());
+  const auto edge_taken = [&](const EdgeClaim& e) {
+    return std::binary_search(taken_edges_.begin(), taken_edges_.end(),
+                              std::pair<int, int>(std::minmax(e.from, e.to)));
   };
-  const auto taken_by_face = [&](const EdgeClaim& e) {
-    return std::any_of(faces_.begin(), faces_.end(), [&](const FaceClaim& face) {
-      return has_vertex(corners(face), e.from) && has_vertex(corners(face), e.to);
-    });
+  edges_.erase(std::remove_if(edges_.begin(), edges_.end(), edge_taken), edges_.end());
+  for (const EdgeClaim& e : edges_) {
+    taken_vertices_.push_back(e.from);
+    taken_vertices_.push_back(e.to);
+  }
+  std::sort(taken_vertices_.begin(), taken_vertices_.end());
+  const auto vertex_taken = [&](const VertexClaim& v) {
+    return std::binary_search(taken_vertices_.begin(), taken_vertices_.end(), v.vertex);
   };
-  if (!edges_.empty() && !faces_.empty())
-    edges_.erase(std::remove_if(edges_.begin(), edges_.end(), taken_by_face), edges_.end());
-  if (vertices_.empty()) return;
-  const auto taken = [&](const VertexClaim& v) {
-    return std::any_of(
-               faces_.begin(), faces_.end(),
-               [&](const FaceClaim& face) { return has_vertex(corners(face), v.vertex); }) ||
-           std::any_of(edges_.begin(), edges_.end(),
-                       [&](const EdgeClaim& e) { return e.from == v.vertex || e.to == v.vertex; });
-  };
-  vertices_.erase(std::remove_if(vertices_.begin(), vertices_.end(), taken), vertices_.end());
+  vertices_.erase(std::remove_if(vertices_.begin(), vertices_.end(), vertex_taken),
+                  vertices_.end());
 }
 
 void Query::claims_to_contacts(const Shell& shell, const Vec3& centre, double radius) {
   const Topology& topology = shell.topology();
   const bool one_sided = shell.side() != Side::Both;
   carriers_.clear();
+  // A planar face has one foot point, whichever of its facets claim it.
+  const LargeArray<Facet>& facets = shell.facets();
+  std::sort(faces_.begin(), faces_.end(), [&](const FaceClaim& x, const FaceClaim& y) {
+    const Facet &a = facets[x.facet], &b = facets[y.facet];
+    return a.planar_face != b.planar_face ? a.planar_face < b.planar_face : a.element < b.element;
+  });
   for (std::size_t i = 0; i < faces_.size(); ++i) {
-    const Facet& facet = shell.facets()[faces_[i].facet];
-    // A planar face has one foot point, whichever of its facets claim it.
-    bool first = true;
-    int element = facet.element;
-    for (std::size_t j = 0; j < faces_.size(); ++j) {
-      const Facet& other = shell.facets()[faces_[j].facet];
-      if (j == i || other.planar_face != facet.planar_face) continue;
-      first = first && i < j;
-      element = std::min(element, other.element);
-    }
+    const Facet& facet = facets[faces_[i].facet];
+    if (i > 0 && facets[faces_[i - 1].facet].planar_face == facet.planar_face) continue;
     const double height = facet.normal.dot(centre - facet.corner[0]);
-    if (!first || std::abs(height) >= radius) continue;
+    if (std::abs(height) >= radius) continue;
     const Vec3 normal = height < 0 ? Vec3(-facet.normal) : facet.normal;
-    contacts.push_back({centre - height * facet.normal, normal, radius - std::abs(height), element,
-                        Feature::Face});
+    contacts.push_back({centre - height * facet.normal, normal, radius - std::abs(height),
+                        facet.element, Feature::Face});
     if (one_sided) carriers_.push_back({facet.normal, false});
   }
   for (const EdgeClaim& claim : edges_) {
@@ -283,28 +288,45 @@ void Query::claims_to_contacts(const Shell& shell, const Vec3& centre, double ra
   }
 }
 
-void Query::remove(std::size_t i) {
-  contacts.erase(contacts.begin() + static_cast<std::ptrdiff_t>(i));
-  if (!carriers_.empty()) carriers_.erase(carriers_.begin() + static_cast<std::ptrdiff_t>(i));
+// Keeps the contacts (and their carriers) that are not marked in dropped_.
+void Query::remove_dropped() {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (dropped_[i]) continue;
+    contacts[kept] = contacts[i];
+    if (!carriers_.empty()) carriers_[kept] = carriers_[i];
+    ++kept;
+  }
+  contacts.resize(kept);
+  if (!carriers_.empty()) carriers_.resize(kept);
 }
 
 // The simplest feature wins (face, edge, vertex: the order in which contacts were made).
 void Query::merge_equal_points(double tolerance) {
-  for (std::size_t i = 0; i < contacts.size(); ++i)
-    for (std::size_t j = contacts.size() - 1; j > i; --j)
-      if ((contacts[i].point - contacts[j].point).squaredNorm() <= tolerance * tolerance) {
-        contacts[i].element = std::min(contacts[i].element, contacts[j].element);
-        remove(j);
-      }
+  by_x_.resize(contacts.size());
+  std::iota(by_x_.begin(), by_x_.end(), 0);
+  const auto x = [&](int i) { return contacts[i].point.x(); };
+  std::sort(by_x_.begin(), by_x_.end(), [&](int i, int j) { return x(i) < x(j); });
+  dropped_.assign(contacts.size(), 0);
+  for (std::size_t a = 0; a < by_x_.size(); ++a)
+    for (std::size_t b = a + 1; b < by_x_.size() && x(by_x_[b]) - x(by_x_[a]) <= tolerance; ++b) {
+      const auto [first, second] = std::minmax(by_x_[a], by_x_[b]);
+      Contact& kept = contacts[first];
+      if ((kept.point - contacts[second].point).squaredNorm() > tolerance * tolerance) continue;
+      kept.element = std::min(kept.element, contacts[second].element);
+      dropped_[second] = 1;
+    }
+  remove_dropped();
 }
 
 // Elements may overlap or cross without sharing an edge. Where another one passes through a contact
 // point and comes nearer to the centre, the distance has no minimum there. The deepest contact is
 // the nearest point of all, so a single one needs no such test.
 void Query::drop_crossed(const Shell& shell, const Vec3& centre, double tolerance) {
-  const auto crossed = [&](const Vec3& point) {
+  if (contacts.size() < 2) return;
+  const auto crossed = [&](const Vec3& point, const std::vector<int>& facets) {
     const double nearer = std::max(0.0, (centre - point).norm() - tolerance);
-    return std::any_of(reached_.begin(), reached_.end(), [&](int f) {
+    return std::any_of(facets.begin(), facets.end(), [&](int f) {
       const Facet& facet = shell.facets()[f];
       if (std::abs(facet.normal.dot(point - facet.corner[0])) > tolerance) return false;
       const Vec3 here = closest_on_triangle(point, facet.corner, facet.normal).point;
@@ -313,8 +335,17 @@ void Query::drop_crossed(const Shell& shell, const Vec3& centre, double toleranc
       return (centre - best).squaredNorm() < nearer * nearer;
     });
   };
-  for (std::size_t i = contacts.size(); i-- > 0;)
-    if (crossed(contacts[i].point)) remove(i);
+  // With many facets at hand it is cheaper to ask the tree for those at each point.
+  const bool ask = reached_.size() > 256;
+  dropped_.assign(contacts.size(), 0);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (ask) {
+      at_point_.clear();
+      shell.bvh().near(contacts[i].point, 2 * tolerance, at_point_, [](int) {});
+    }
+    dropped_[i] = crossed(contacts[i].point, ask ? at_point_ : reached_);
+  }
+  remove_dropped();
 }
 
 // side = outside | inside: the nearest contact tells on which side the centre is. On the right side
@@ -329,8 +360,9 @@ void Query::keep_one_side(const Shell& shell, const Vec3& centre, double radius)
   for (std::size_t i = 1; i < contacts.size(); ++i)
     if (contacts[i].depth > contacts[nearest].depth) nearest = i;
   if (faces_centre(nearest)) {
-    for (std::size_t i = contacts.size(); i-- > 0;)
-      if (!faces_centre(i)) remove(i);
+    dropped_.resize(contacts.size());
+    for (std::size_t i = 0; i < contacts.size(); ++i) dropped_[i] = !faces_centre(i);
+    remove_dropped();
     for (std::size_t i = 0; i < contacts.size(); ++i)
       if (contacts[i].depth == radius)
         contacts[i].normal = sign * carriers_[i].outward.normalized();

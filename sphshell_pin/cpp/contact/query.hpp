@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "shell/shell.hpp"
@@ -58,7 +59,7 @@ class Query {
   void merge_equal_points(double tolerance);
   void drop_crossed(const Shell& shell, const Vec3& centre, double tolerance);
   void keep_one_side(const Shell& shell, const Vec3& centre, double radius);
-  void remove(std::size_t i);
+  void remove_dropped();
 
   bool follow_;
   std::vector<int> reached_;  // facets whose box meets the ball of radius + margin_ round anchor_
@@ -70,6 +71,9 @@ class Query {
   std::vector<FaceClaim> faces_;
   std::vector<EdgeClaim> edges_;
   std::vector<VertexClaim> vertices_;
+  std::vector<std::pair<int, int>> taken_edges_;
+  std::vector<int> taken_vertices_, by_x_, at_point_;
+  std::vector<char> dropped_;      // beside `contacts`
   std::vector<Carrier> carriers_;  // beside `contacts`, for one-sided shells only
 };
 

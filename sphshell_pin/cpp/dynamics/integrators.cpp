@@ -57,21 +57,32 @@ void SemiImplicitEuler::step(Derivative& f, double dt, State& state, Ledger& led
   // A free body's linear velocity is counted in axes that turn with it. Stepping those components
   // makes it gain speed in proportion to spin^2 dt; stepping the vector itself does not.
   for (const CurvedSegment& s : body.curved()) {
-    if (s.group != CurvedSegment::Group::Rigid) continue;
     const int i = s.index_v;
-    const Vec3 linear = state.v.segment<3>(i), spin = state.v.segment<3>(i + 3);
-    v_.segment<3>(i) = linear + dt * (Vec3(a.segment<3>(i)) + spin.cross(linear));
+    if (s.group == CurvedSegment::Group::Rigid) {
+      const Vec3 spin = state.v.segment<3>(i + 3), linear = state.v.segment<3>(i);
+      v_.segment<3>(i) += dt * spin.cross(linear);
+    } else if (s.group == CurvedSegment::Group::Planar) {
+      v_[i] -= dt * state.v[i + 2] * state.v[i + 1];
+      v_[i + 1] += dt * state.v[i + 2] * state.v[i];
+    }
   }
   ledger.control += 0.5 * dt * tau.dot(state.v + v_);
   step_ = dt * v_;
   body.integrate(state.q, step_, q_);
   for (const CurvedSegment& s : body.curved()) {
-    if (s.group != CurvedSegment::Group::Rigid) continue;
-    const int i = s.index_v;
-    const Vec3 linear = v_.segment<3>(i), turn = step_.segment<3>(i + 3);
-    const Eigen::Quaterniond old(Eigen::Map<const Eigen::Vector4d>(state.q.data() + s.index_q + 3));
-    q_.segment<3>(s.index_q) = state.q.segment<3>(s.index_q) + dt * (old * linear);
-    v_.segment<3>(i) = rotated_back(turn, linear);
+    const int i = s.index_v, k = s.index_q;
+    if (s.group == CurvedSegment::Group::Rigid) {
+      const Vec3 linear = v_.segment<3>(i), turn = step_.segment<3>(i + 3);
+      const Eigen::Quaterniond old(Eigen::Map<const Eigen::Vector4d>(state.q.data() + k + 3));
+      q_.segment<3>(k) = state.q.segment<3>(k) + dt * (old * linear);
+      v_.segment<3>(i) = rotated_back(turn, linear);
+    } else if (s.group == CurvedSegment::Group::Planar) {
+      const Eigen::Vector2d linear = v_.segment<2>(i);
+      const double cosine = state.q[k + 2], sine = state.q[k + 3];
+      q_[k] = state.q[k] + dt * (cosine * linear.x() - sine * linear.y());
+      q_[k + 1] = state.q[k + 1] + dt * (sine * linear.x() + cosine * linear.y());
+      v_.segment<2>(i) = Eigen::Rotation2Dd(-step_[i + 2]) * linear;
+    }
   }
   state.q.swap(q_);
   state.v.swap(v_);

@@ -31,9 +31,9 @@ Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, R
     integrator_ = std::make_unique<SemiImplicitEuler>(scene_.body());
   if (controller_) controller_->prepare(scene_);
   state_ = {settings_.start_time, std::move(q0), std::move(v0)};
-  next_control_ = state_.t;
   // The last step is shortened to end at the duration; a hair's breadth is not a step.
-  steps_ = std::lround(std::ceil(settings_.duration / settings_.dt - 1e-9));
+  const double ratio = settings_.duration / settings_.dt;
+  steps_ = std::lround(std::ceil(ratio - 1e-9 - 4e-16 * ratio));
   last_dt_ = settings_.duration - settings_.dt * double(steps_ - 1);
   reserve();
 }
@@ -52,6 +52,8 @@ void Simulation::reserve() {
 }
 
 Record Simulation::take() {
+  // A callback that threw in the middle of an evaluation leaves contacts without a row.
+  record_.contacts.resize(record_.contact_row.size());
   Record out;
   std::swap(out, record_);
   reserve();
@@ -62,12 +64,18 @@ Simulation::Status Simulation::advance(double wall_seconds) {
   if (finished_) return Status::Finished;
   const auto start = std::chrono::steady_clock::now();
   Status status = Status::Running;
+  int pause = 15;
   for (int checked = 0;; ++checked) {
     const bool last = step_ == steps_;
     const bool record = last || step_ % settings_.record_every == 0;
     const bool full = record_.t.size() == kRowsPerCall ||
                       record_.contacts.size() * 2 > kContactsPerCall || record_.events.size() > 128;
-    if (full || ((checked & 15) == 15 && seconds_since(start) > wall_seconds)) break;
+    if (full) break;
+    if ((checked & pause) == pause) {
+      const double elapsed = seconds_since(start);
+      if (elapsed > wall_seconds) break;
+      if (elapsed > 1e-3 * (checked + 1)) pause = 0;  // slow steps: look at the clock at each
+    }
     const double dt = last ? 0 : step_ + 1 == steps_ ? last_dt_ : settings_.dt;
     evaluate(record);
     note_pairs(dt);
@@ -155,9 +163,9 @@ void Simulation::contacts(const VectorX& q, const VectorX& v) {
 // Torques that are held over control_dt change at the start of a step, never inside one.
 void Simulation::hold_torques() {
   if (!controller_ || settings_.control_dt == 0) return;
-  const double early = state_.t + 1e-6 * settings_.dt;
-  if (early < next_control_) return;
-  while (next_control_ <= early) next_control_ += settings_.control_dt;
+  const double elapsed = state_.t - settings_.start_time + 1e-6 * settings_.dt;
+  if (elapsed < next_control_) return;
+  next_control_ = (std::floor(elapsed / settings_.control_dt) + 1) * settings_.control_dt;
   controller_->torque(scene_, state_.t, state_.q, state_.v, tau_);
 }
 

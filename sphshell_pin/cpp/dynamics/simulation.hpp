@@ -88,7 +88,8 @@ class Simulation : private Derivative {
   std::vector<PairSummary> summaries_;
   std::vector<char> touching_, deep_;
   long step_ = 0, steps_ = 0, rows_ = 0;
-  double last_dt_ = 0, next_control_ = 0, wall_time_ = 0;
+  double last_dt_ = 0, wall_time_ = 0;
+  double next_control_ = 0;  // when held torques change next, since the start [s]
   bool finished_ = false;
 };
 

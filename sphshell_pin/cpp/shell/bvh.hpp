@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <array>
 #include <vector>
 
@@ -74,7 +76,7 @@ class Bvh {
   void nearest(const Vec3& point, Visit&& visit) const {
     const Vec3 local = point - origin_;
     const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
-    double best = 1e300;
+    double best = std::numeric_limits<double>::infinity();
     const auto visit_leaf = [&](int leaf) {
       const int first = first_of(leaf), end = first + count_of(leaf);
       for (int i = first; i < end; ++i) best = std::min(best, visit(i));

@@ -17,9 +17,7 @@ Shell::Shell(std::vector<Vec3> vertices, std::vector<Triangle> triangles, std::v
       side_(side),
       topology_(vertices_, triangles_, element_, crease_angle),
       bvh_(vertices_, triangles_, order_) {
-  Vec3 low = vertices_.front(), high = low;
-  for (const Vec3& v : vertices_) low = low.cwiseMin(v), high = high.cwiseMax(v);
-  size_ = (high - low).norm();
+  size_ = bounds(vertices_, triangles_).diagonal().norm();
   facet_of_.resize(order_.size());
   for (std::size_t f = 0; f < order_.size(); ++f) facet_of_[order_[f]] = static_cast<int>(f);
   build_facets(order_);
@@ -122,7 +120,7 @@ void Shell::build_cones() {
 }
 
 SurfacePoint Shell::closest_point(const Vec3& point) const {
-  double best = 1e300;
+  double best = std::numeric_limits<double>::infinity();
   ClosestPoint at{};
   int which = 0;
   bvh_.nearest(point, [&](int f) {

@@ -28,14 +28,21 @@ std::vector<int> labels(DisjointSets& sets, std::size_t size, int& count) {
 }
 
 // What coordinates are rounded in proportion to [m].
-double coordinate_scale(const std::vector<Vec3>& vertices) {
-  Vec3 low = vertices.front(), high = low;
-  for (const Vec3& v : vertices) low = low.cwiseMin(v), high = high.cwiseMax(v);
-  return (high - low).norm() + low.cwiseAbs().cwiseMax(high.cwiseAbs()).maxCoeff();
+double coordinate_scale(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles) {
+  const Eigen::AlignedBox3d box = bounds(vertices, triangles);
+  return box.diagonal().norm() + box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
 }
 
+// Twice the area vector. Of a needle only the two shorter edges give an accurate one.
 Vec3 area_vector(const std::vector<Vec3>& v, const Triangle& t) {
-  return (v[t[1]] - v[t[0]]).cross(v[t[2]] - v[t[0]]);
+  int apex = 0;  // opposite the longest edge
+  double longest = -1;
+  for (int k = 0; k < 3; ++k) {
+    const double length2 = (v[t[previous_corner(k)]] - v[t[next_corner(k)]]).squaredNorm();
+    if (length2 > longest) longest = length2, apex = k;
+  }
+  const Vec3& p = v[t[apex]];
+  return (v[t[next_corner(apex)]] - p).cross(v[t[previous_corner(apex)]] - p);
 }
 
 void build_edges(const std::vector<Triangle>& triangles, Topology& out) {
@@ -183,11 +190,19 @@ void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangl
 
 }  // namespace
 
+Eigen::AlignedBox3d bounds(const std::vector<Vec3>& vertices,
+                           const std::vector<Triangle>& triangles) {
+  Eigen::AlignedBox3d box;
+  for (const Triangle& t : triangles)
+    for (int v : t) box.extend(vertices[v]);
+  return box;
+}
+
 Topology::Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                    const std::vector<int>& element, double crease_angle) {
   build_edges(triangles, *this);
-  build_planar_faces(vertices, triangles, element, kPlanarTolerance * coordinate_scale(vertices),
-                     *this);
+  build_planar_faces(vertices, triangles, element,
+                     kPlanarTolerance * coordinate_scale(vertices, triangles), *this);
   classify_edges(vertices, triangles, crease_angle, *this);
   build_patches(element, *this);
   build_vertices(vertices, triangles, *this);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -10,6 +11,10 @@ namespace sphshell {
 
 using Vec3 = Eigen::Vector3d;
 using Triangle = std::array<int, 3>;
+
+// Box of the vertices that triangles use.
+Eigen::AlignedBox3d bounds(const std::vector<Vec3>& vertices,
+                           const std::vector<Triangle>& triangles);
 
 enum class EdgeClass : std::uint8_t { Smooth = 0, Crease = 1, Boundary = 2, NonManifold = 3 };
 
