@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.errors import InvalidParameter
@@ -89,6 +90,19 @@ def off_unit_length(model: Any, q: Array) -> InvalidParameter:
         part.tolist(),
         f"must be of unit length, its length is {float(np.linalg.norm(part)):.6g}",
     )
+
+
+def check_moved_mass(model: pin.Model) -> None:
+    """Raise InvalidParameter for a joint that moves no mass: its acceleration would be infinite."""
+    moved = [inertia.mass + float(np.trace(inertia.inertia)) for inertia in model.inertias]
+    for joint in range(model.njoints - 1, 0, -1):
+        if moved[joint] <= 0 and model.joints[joint].nv:
+            raise InvalidParameter(
+                "model",
+                model.names[joint],
+                "is a joint that moves no mass: give its link an inertial, or lock the joint",
+            )
+        moved[model.parents[joint]] += moved[joint]
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:

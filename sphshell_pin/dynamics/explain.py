@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin.checks import check_moved_mass
 from sphshell_pin.contact import CoulombFriction, HuntCrossleyLaw, ImpactLaw, NormalLaw
 from sphshell_pin.dynamics.scene import ContactPair, Scene, checked_source
 from sphshell_pin.units import size_warning
@@ -83,6 +84,7 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     data = model.createData()
     pin.forwardKinematics(model, data, q, v)
     pin.computeJointJacobians(model, data, q)
+    check_moved_mass(model)
     pin.crba(model, data, q)
     mass_matrix = np.triu(data.M) + np.triu(data.M, 1).T
     gravity = float(np.linalg.norm(model.gravity.linear))
@@ -100,9 +102,9 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
         )
     free = sum(1 for j in model.joints[1:] if j.nv)
     modelled = [
-        f"{free} joints with {model.nv} degrees of freedom",
+        f"{_count(free, 'joint')} with {_count(model.nv, 'degree')} of freedom",
         f"gravity {gravity:.4g} m/s^2" if gravity else "no gravity",
-        f"{len(pairs)} contact pairs",
+        _count(len(pairs), "contact pair"),
     ]
     absent = ["joint limits, joint friction and contact between other pairs of bodies"]
     if scene.lock:
@@ -293,6 +295,11 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
         out.append(f"{where}: starts at depth {-figures.gap * 1e3:.4g} mm, deep inside")
     if not math.isfinite(figures.effective_mass):
         out.append(f"{where}: neither body can move along the normal at this q")
+    if shell.side != "both" and not shell.is_closed:
+        out.append(
+            f"{where}: shell '{shell.name}' is open and one-sided: a sphere that goes round its "
+            "rim is thrown out on the other side and gains energy"
+        )
     if pair.method == "elements":
         out.append(f"{where}: method 'elements' counts a place of touch once per touched element")
     return out
@@ -305,6 +312,10 @@ def _reach(model: pin.Model) -> float:
         step = float(np.linalg.norm(model.jointPlacements[j].translation))
         reach[j] = reach[model.parents[j]] + step
     return float(reach.max())
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _round_down(x: float) -> float:

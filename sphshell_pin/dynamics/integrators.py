@@ -12,7 +12,9 @@ from sphshell_pin.checks import check_positive
 class SemiImplicitEuler:
     """Velocity first, then position with the new velocity, in steps of `dt` [s]; order 1.
 
-    Symplectic for conservative forces: energy oscillates but does not drift.
+    Cheap, and forgiving with stiff contact: where the mass matrix is constant it is symplectic, and
+    energy oscillates without drift. Gyroscopic terms are stepped explicitly: a body that is not
+    round gains energy in proportion to spin^2 dt, so take RungeKutta4 for fast tumbling.
     """
 
     dt: float = 1e-4

@@ -9,10 +9,16 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_finite, check_not_negative, check_positive
+from sphshell_pin.checks import (
+    check_finite,
+    check_moved_mass,
+    check_not_negative,
+    check_positive,
+)
 from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callable
 from sphshell_pin.dynamics.integrators import Integrator, RungeKutta4, SemiImplicitEuler
 from sphshell_pin.dynamics.result import Result
@@ -24,6 +30,9 @@ Array = NDArray[np.float64]
 _FINISHED, _DIVERGED = 1, 2
 # Python looks up this often [s] while the compiled loop runs: progress, Ctrl-C.
 _GLANCE = 0.05
+_MOST_STEPS = 2.0**31 - 1
+# The compiled loop gives up beyond this position [m or rad].
+_FARTHEST = 1e12
 
 
 class Simulation:
@@ -68,9 +77,18 @@ class Simulation:
         duration = check_not_negative("duration", duration, "s")
         self._check_start(q0)
         core_controller, hold = self._bind(controller, control_dt, q0)
+        t0 = check_finite("t0", t0)
+        if np.spacing(abs(t0) + duration) > 1e-3 * dt:
+            raise InvalidParameter(
+                "t0, duration",
+                (t0, duration),
+                f"must be small enough to count steps of dt = {dt!r} s",
+            )
+        check_moved_mass(self.scene.model)
         every = 1
         if record_dt is not None:
-            every = max(1, round(check_positive("record_dt", record_dt, "s") / dt))
+            steps = check_positive("record_dt", record_dt, "s") / dt
+            every = round(min(max(steps, 1.0), _MOST_STEPS))
         core = _core.Simulation(
             self.scene.model,
             [pair.to_core() for pair in self.scene.pairs],
@@ -80,7 +98,7 @@ class Simulation:
             runge_kutta=isinstance(self.integrator, RungeKutta4),
             dt=dt,
             duration=duration,
-            start_time=check_finite("t0", t0),
+            start_time=t0,
             control_dt=hold,
             record_every=every,
         )
@@ -134,8 +152,6 @@ class Simulation:
 
     def _depth_in_solid(self, index: int, q0: Array) -> float:
         """Signed depth [m] of a sphere's start in a one-sided shell, however deep."""
-        import pinocchio as pin
-
         pair = self.scene.pairs[index]
         if pair.shell is None or pair.sphere is None:
             return -math.inf
@@ -195,6 +211,8 @@ class _CtrlC:
 
 def _why(core: _core.Simulation, scene: Scene) -> str:
     """Say which joint ran away first."""
+    if not np.abs(np.asarray(core.q)).max(initial=0.0) < _FARTHEST:
+        return "a joint's position grew beyond all bounds"
     v = np.abs(np.asarray(core.v))
     v = np.where(np.isfinite(v), v, np.inf)
     worst = int(np.argmax(v))

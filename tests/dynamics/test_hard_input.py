@@ -1,0 +1,105 @@
+"""Runs that are easy to get wrong: crowded contacts, callbacks that throw, odd models and times."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import Interrupted, InvalidParameter
+from tests import meshes
+
+
+def ball_model(joint=None, inertia=None) -> pin.Model:
+    model = pin.Model()
+    joint = pin.JointModelFreeFlyer() if joint is None else joint
+    index = model.addJoint(0, joint, pin.SE3.Identity(), "ball")
+    inertia = pin.Inertia.FromSphere(1.0, 0.1) if inertia is None else inertia
+    model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
+    model.addFrame(pin.Frame("tip", index, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    return model
+
+
+def test_a_ball_that_fills_a_faceted_socket_touches_every_facet() -> None:
+    vertices, elements = meshes.icosphere(5)
+    shell = sp.Shell(vertices, elements)
+    inner = shell.contacts(np.zeros(3), 1.01)
+    assert len(inner) == len(elements)
+    assert len(np.unique(inner.element)) == len(elements)
+
+
+@pytest.mark.parametrize("spin", [1.0, 100.0])
+def test_a_free_planar_body_keeps_its_momentum(spin: float) -> None:
+    model = ball_model(pin.JointModelPlanar())
+    model.gravity.linear = np.zeros(3)
+    start = np.array([0.0, 0.0, 1.0, 0.0])
+    result = sp.Simulation(sp.Scene(model), sp.SemiImplicitEuler(1e-3)).run(
+        start, [1.0, 0.0, spin], 1.0
+    )
+    assert np.linalg.norm(result.v[-1, :2]) == pytest.approx(1.0, abs=1e-12)
+    assert result.q[-1, :2] == pytest.approx([1.0, 0.0], abs=1e-12)
+
+
+def test_an_interrupted_source_leaves_a_consistent_record(tmp_path) -> None:
+    """The pair before it has been evaluated when the source throws; its contacts have no row."""
+    calls = 0
+
+    def find(pose_i: pin.SE3, pose_j: pin.SE3):
+        nonlocal calls
+        calls += 1
+        if calls > 40:
+            raise KeyboardInterrupt
+        return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
+
+    scene = sp.Scene(ball_model())
+    plate = sp.Shell(*meshes.grid_plate())
+    law = sp.ImpactLaw(1e4, 1.5)
+    scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=plate, law=law, name="plate")
+    scene.add_contact_source(find, "tip", "universe", law, name="mine")
+    q = pin.neutral(scene.model)
+    q[2] = 0.099
+    with pytest.raises(Interrupted) as caught:
+        sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(q, None, 1.0)
+    result = caught.value.result
+    assert 0 < len(result.contacts) == len(result.contacts.row) == len(result.contacts.t)
+    assert result.contacts.row.max() < len(result.t)
+    assert len(sp.Result.load(result.save(tmp_path / "part.npz")).t) == len(result.t)
+
+
+def test_a_joint_that_moves_no_mass_is_named() -> None:
+    scene = sp.Scene(ball_model(inertia=pin.Inertia.Zero()))
+    with pytest.raises(InvalidParameter, match=r"'ball'.*moves no mass"):
+        sp.Simulation(scene).run(pin.neutral(scene.model), None, 0.01)
+    with pytest.raises(InvalidParameter, match="moves no mass"):
+        scene.explain()
+
+
+def test_times_that_cannot_be_counted_are_refused() -> None:
+    scene = sp.Scene(ball_model())
+    q = pin.neutral(scene.model)
+    with pytest.raises(InvalidParameter, match="t0"):
+        sp.Simulation(scene).run(q, None, 0.01, t0=1e13)
+    rows = sp.Simulation(scene).run(q, None, 0.01, record_dt=1e9)
+    assert rows.t.tolist() == [0.0, 0.01]
+
+
+def test_normals_of_needles_do_not_depend_on_the_first_corner() -> None:
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.3, 0.2], [0.5, 0.15 + 1e-7, 0.1]])
+    turn = pin.exp3(np.array([0.3, -0.8, 0.5]))
+    corners = corners @ turn.T
+    first, last = corners[2] - corners[0], corners[1] - corners[2]
+    exact = np.cross(first, last)
+    exact /= np.linalg.norm(exact)
+    for k in range(3):
+        shell = sp.Shell(corners, [[k, (k + 1) % 3, (k + 2) % 3]])
+        normal = shell.core.triangle_normals[0]
+        assert abs(normal @ exact) == pytest.approx(1.0, abs=1e-15)
+        assert np.linalg.norm(normal - np.sign(normal @ exact) * exact) < 1e-8
+
+
+def test_one_sided_open_shells_are_warned_of() -> None:
+    scene = sp.Scene(ball_model())
+    sheet = sp.Shell(*meshes.grid_plate(), side="outside")
+    scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=sheet)
+    q = pin.neutral(scene.model)
+    q[2] = 0.2
+    assert any("one-sided" in warning for warning in scene.explain(q).warnings)
