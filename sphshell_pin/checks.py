@@ -33,9 +33,12 @@ def check_not_negative(name: str, value: float, unit: str = "") -> float:
 def check_finite(name: str, value: float) -> float:
     """Return `value` as a float; raise InvalidParameter unless it is one finite number."""
     try:
-        number = float(value)
-    except (TypeError, ValueError):
+        array = as_floats(value)
+    except (TypeError, ValueError, OverflowError):
         raise InvalidParameter(name, value, "must be a number") from None
+    if array.ndim:
+        raise InvalidParameter(name, value, "must be one number")
+    number = float(array)
     if not math.isfinite(number):
         raise InvalidParameter(name, value, "must be finite")
     return number
@@ -44,11 +47,11 @@ def check_finite(name: str, value: float) -> float:
 def check_vector(name: str, value: Any, size: int, what: str = "") -> Array:
     """Return a copy of `value` as an array (size,); raise InvalidParameter otherwise."""
     try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+        array = as_floats(value)
+    except (TypeError, ValueError, OverflowError):
         raise InvalidParameter(name, value, f"must hold {size} numbers{what}") from None
     if array.shape != (size,):
-        raise InvalidParameter(name, array.shape, f"must have shape ({size},){what}")
+        raise _wrong_shape(name, array.shape, f"({size},){what}")
     if not np.isfinite(array).all():
         raise InvalidParameter(name, value, "must be finite")
     return array
@@ -57,18 +60,92 @@ def check_vector(name: str, value: Any, size: int, what: str = "") -> Array:
 def check_points(name: str, value: Any) -> Array:
     """Return a copy of `value` as an array (n, 3); raise InvalidParameter otherwise."""
     try:
-        array = np.array(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
+        array = as_floats(value)
+    except (TypeError, ValueError, OverflowError):
         raise InvalidParameter(name, value, "must be an array of shape (n, 3)") from None
     if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidParameter(name, array.shape, "must have shape (n, 3)")
+        raise _wrong_shape(name, array.shape, "(n, 3)")
     if not np.isfinite(array).all():
         row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
         raise InvalidParameter(f"{name}[{row}]", array[row].tolist(), "must be finite")
     return array
 
 
-def off_unit_length(model: Any, q: Array) -> InvalidParameter:
+def as_floats(value: Any) -> Array:
+    """Return a copy of `value` as an array of float64.
+
+    TypeError for truth values, texts and complex numbers, which numpy would take.
+    """
+    given = np.asarray(value)
+    odd = given.dtype.kind not in "iufO"
+    if odd or any(one is None or isinstance(one, bool | str) for one in _objects(given)):
+        raise TypeError(f"real numbers are needed, not {given.dtype}")
+    return np.array(given, dtype=np.float64, order="C")
+
+
+def check_type(name: str, value: Any, kind: type | tuple[type, ...], must: str) -> None:
+    """Raise InvalidParameter unless `value` is an instance of `kind`; `must` says what it is."""
+    if isinstance(value, kind):
+        return
+    if isinstance(value, type) and issubclass(value, kind):
+        raise InvalidParameter(name, value, f"{must}, not its class: did you forget ()?")
+    raise InvalidParameter(name, value, must)
+
+
+def check_name(name: str, value: Any) -> None:
+    """Raise InvalidParameter unless `value` is a text."""
+    check_type(name, value, str, "must be a name (str)")
+
+
+def check_names(name: str, value: Any) -> tuple[str, ...]:
+    """Return `value` as a tuple of texts; raise InvalidParameter for others and for repeats."""
+    if isinstance(value, str):
+        raise InvalidParameter(name, value, f"must be a list of names: write [{value!r}]")
+    try:
+        names = tuple(value)
+    except TypeError:
+        raise InvalidParameter(name, value, "must be a list of names") from None
+    for k, one in enumerate(names):
+        check_name(f"{name}[{k}]", one)
+        if one in names[:k]:
+            raise InvalidParameter(f"{name}[{k}]", one, "must not be listed twice")
+    return names
+
+
+def check_placement(name: str, value: Any) -> pin.SE3:
+    """Return a copy of `value` (None: the identity).
+
+    InvalidParameter unless it is a pinocchio.SE3 of finite numbers with a rotation: orthonormal to
+    1e-6 and right-handed.
+    """
+    if value is None:
+        return pin.SE3.Identity()
+    is_matrix = getattr(value, "shape", None) == (4, 4)
+    how = "; of a 4x4 array: pinocchio.SE3(array)" if is_matrix else ""
+    check_type(name, value, pin.SE3, f"must be a pinocchio.SE3{how}")
+    if not np.isfinite(value.homogeneous).all():
+        raise InvalidParameter(name, value.homogeneous.tolist(), "must be finite")
+    rotation = np.array(value.rotation)
+    if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
+        raise InvalidParameter(
+            f"{name}.rotation", rotation.tolist(), "must be a rotation: orthonormal, determinant +1"
+        )
+    return pin.SE3(value)
+
+
+def check_configuration(name: str, model: pin.Model, value: Any, what: str = "") -> Array:
+    """Return a copy of `value` as a configuration (nq,) of `model`.
+
+    InvalidParameter for another size, no numbers, or a joint whose quaternion or (cos, sin) pair is
+    not of unit length.
+    """
+    q = check_vector(name, value, model.nq, what)
+    if not pin.isNormalized(model, q, 1e-3):
+        raise off_unit_length(model, q, name)
+    return q
+
+
+def off_unit_length(model: pin.Model, q: Array, called: str = "q") -> InvalidParameter:
     """Return the fault of a `q` (nq,) of `model` that is not normalised.
 
     It names the joint whose quaternion or (cos, sin) pair is farthest from unit length.
@@ -86,7 +163,7 @@ def off_unit_length(model: Any, q: Array) -> InvalidParameter:
     name, part = max(parts, key=lambda one: abs(float(np.linalg.norm(one[1])) - 1.0))
     what = "quaternion (x, y, z, w)" if len(part) == 4 else "pair (cos, sin)"
     return InvalidParameter(
-        f"q: the {what} of joint '{name}'",
+        f"{called}: the {what} of joint '{name}'",
         part.tolist(),
         f"must be of unit length, its length is {float(np.linalg.norm(part)):.6g}",
     )
@@ -109,6 +186,14 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
     """Return `array` with writing switched off."""
     array.setflags(write=False)
     return array
+
+
+def _objects(array: NDArray[Any]) -> list[Any]:
+    return array.ravel().tolist() if array.dtype == object else []
+
+
+def _wrong_shape(name: str, shape: tuple[int, ...], must: str) -> InvalidParameter:
+    return InvalidParameter(name, shape, f"must have shape {must}", f"has shape {shape},")
 
 
 def _in(unit: str) -> str:

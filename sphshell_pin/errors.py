@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
@@ -11,6 +12,11 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result import Result
 
 
+# Longer lists of valid names are cut to the nearest ones, longer values in the middle.
+_MOST_NAMES = 20
+_LONGEST_VALUE = 200
+
+
 class SphshellError(Exception):
     """Root of all faults of this package; its text is one sentence a user can act on."""
 
@@ -18,9 +24,12 @@ class SphshellError(Exception):
 class InvalidParameter(SphshellError, ValueError):
     """A value outside its limits: `name` and `value` say which."""
 
-    def __init__(self, name: str, value: object, must: str) -> None:
-        """Say that parameter `name` has `value` but `must` (e.g. "must be positive [m]")."""
-        super().__init__(f"{name} = {value!r} {must}")
+    def __init__(self, name: str, value: object, must: str, given: str | None = None) -> None:
+        """Say that parameter `name` has `value` but `must` (e.g. "must be positive [m]").
+
+        `given` takes the place of "= value" in the text.
+        """
+        super().__init__(f"{name} {f'= {_shown(value)}' if given is None else given} {must}")
         self.name = name
         self.value = value
 
@@ -69,8 +78,11 @@ class NameNotFound(SphshellError, LookupError):
         self.kind = kind
         self.name = name
         self.valid = tuple(valid)
-        listed = ", ".join(self.valid) if self.valid else "none"
-        super().__init__(f"no {kind} '{name}'; {owner} has: {listed}")
+        has = f"{owner} has: {', '.join(self.valid) or 'none'}"
+        if len(self.valid) > _MOST_NAMES:
+            near = difflib.get_close_matches(name, self.valid, n=5, cutoff=0.0)
+            has = f"nearest of the {len(self.valid)} that {owner} has: {', '.join(near)}"
+        super().__init__(f"no {kind} '{name}'; {has}")
 
 
 class FrameNotFound(NameNotFound):
@@ -136,9 +148,8 @@ class SimulationDiverged(SphshellError, ArithmeticError):
     def __init__(self, t: float, why: str, result: Result) -> None:
         """Say when and why the run had to stop."""
         super().__init__(
-            f"the simulation diverged at t = {t:.6g} s: {why}; what was computed until then is "
-            "kept in the error's .result; reduce dt, or the stiffness and damping "
-            "(see Scene.explain)"
+            f"the simulation diverged at t = {t:.6g} s: {why}; reduce dt, or the stiffness and "
+            "damping"
         )
         self.t = t
         self.result = result
@@ -149,6 +160,13 @@ class Interrupted(SphshellError, KeyboardInterrupt):
 
     def __init__(self, t: float, result: Result) -> None:
         """Say when the run was interrupted."""
-        super().__init__(f"interrupted at t = {t:.6g} s; what was computed is kept in .result")
+        super().__init__(f"interrupted at t = {t:.6g} s")
         self.t = t
         self.result = result
+
+
+def _shown(value: object) -> str:
+    """Return `value` on one line, cut in the middle where it is long."""
+    text = " ".join(repr(value).split())
+    half = _LONGEST_VALUE // 2
+    return text if len(text) <= _LONGEST_VALUE else f"{text[:half]} ... {text[-half:]}"

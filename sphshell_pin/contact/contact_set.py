@@ -33,7 +33,7 @@ class Method(IntEnum):
         for method in cls:
             if method.name.lower() == name:
                 return method
-        raise NameNotFound("method", name, "the contact query", [m.name.lower() for m in cls])
+        raise NameNotFound("method", str(name), "the contact query", [m.name.lower() for m in cls])
 
 
 @dataclass(frozen=True)

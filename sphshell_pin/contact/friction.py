@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_not_negative, check_positive
+from sphshell_pin.checks import check_not_negative, check_positive, check_type
 from sphshell_pin.errors import InvalidParameter
 
 
@@ -56,3 +57,9 @@ class CoulombFriction:
     def core(self) -> _core.CoulombLaw:
         """The C++ twin of this object."""
         return _core.CoulombLaw(self.mu_static, self.mu_dynamic, self.v_static, self.v_dynamic)
+
+
+def check_friction(friction: Any) -> None:
+    """Raise InvalidParameter unless `friction` is a CoulombFriction, or None."""
+    if friction is not None:
+        check_type("friction", friction, CoulombFriction, "must be a CoulombFriction or None")

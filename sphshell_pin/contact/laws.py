@@ -6,9 +6,10 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_finite, check_not_negative, check_positive
+from sphshell_pin.checks import check_finite, check_not_negative, check_positive, check_type
 from sphshell_pin.errors import InvalidParameter
 
 
@@ -152,6 +153,11 @@ class HuntCrossleyLaw(NormalLaw):
     def core(self) -> _core.NormalLaw:
         """The C++ twin of this law."""
         return _core.NormalLaw(1, self.stiffness, self.exponent, self.dissipation)
+
+
+def check_law(law: Any) -> None:
+    """Raise InvalidParameter unless `law` is a normal law."""
+    check_type("law", law, NormalLaw, "must be a law, for instance ImpactLaw(stiffness)")
 
 
 def dissipation_for(restitution: float, speed: float) -> float:

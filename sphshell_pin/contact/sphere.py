@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sphshell_pin.checks import check_positive, check_vector
+from sphshell_pin.checks import check_name, check_positive, check_vector
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,8 @@ class Sphere:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Raise InvalidParameter unless the radius is positive and the offset has 3 numbers."""
+        """Raise InvalidParameter for a radius that is not positive, or another type."""
+        check_name("frame", self.frame)
         object.__setattr__(self, "radius", check_positive("radius", self.radius, "m"))
         offset = (0.0, 0.0, 0.0) if self.offset is None else self.offset
         x, y, z = check_vector("offset", offset, 3).tolist()

@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_finite, check_vector
-from sphshell_pin.contact.friction import CoulombFriction
-from sphshell_pin.contact.laws import NormalLaw
+from sphshell_pin.checks import check_finite, check_type, check_vector
+from sphshell_pin.contact.friction import CoulombFriction, check_friction
+from sphshell_pin.contact.laws import NormalLaw, check_law
 from sphshell_pin.errors import InvalidParameter
 
 
@@ -34,6 +34,10 @@ def contact_wrench(
     direction = check_vector("normal", normal, 3)
     if abs(np.linalg.norm(direction) - 1) > 1e-6:
         raise InvalidParameter("normal", direction.tolist(), "must be a unit vector")
+    for name, motion in (("motion_i", motion_i), ("motion_j", motion_j)):
+        check_type(name, motion, pin.Motion, "must be a pinocchio.Motion")
+    check_law(law)
+    check_friction(friction)
     if check_finite("depth", depth) <= 0:
         return pin.Force.Zero(), pin.Force.Zero()
     relative = (motion_i - motion_j).linear + np.cross((motion_i - motion_j).angular, place)

@@ -14,14 +14,19 @@ from numpy.typing import NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.checks import (
-    check_finite,
+    check_configuration,
+    check_name,
+    check_names,
     check_not_negative,
+    check_placement,
     check_points,
     check_positive,
+    check_type,
     check_vector,
 )
+from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
-from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
+from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.shell import Shell
 
 Array = NDArray[np.float64]
@@ -36,6 +41,11 @@ class Controller(ABC):
     """
 
     joints: Iterable[str] | None
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter unless `joints` is None or a list of names."""
+        if self.joints is not None:
+            object.__setattr__(self, "joints", check_names("joints", self.joints))
 
     @abstractmethod
     def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
@@ -89,7 +99,7 @@ class JointPD(Controller):
     def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller."""
         model = scene.model
-        q_ref = q0 if self.q_ref is None else check_vector("q_ref", self.q_ref, model.nq)
+        q_ref = q0 if self.q_ref is None else check_configuration("q_ref", model, self.q_ref)
         return _core.JointPd(
             _gains("kp", self.kp, model.nv),
             _gains("kd", self.kd, model.nv),
@@ -104,8 +114,8 @@ class CartesianImpedance(Controller):
     """Follow a path with a frame's origin and press on the surface: J^T F plus the bias torques.
 
     F = stiffness (x_d - x) + damping (x_d' - x') [N/m], [N s/m] (Hogan 1985). `path` (k, 3) [m] are
-    the corners of the way: with `shell` (at `placement` in `shell_frame`) in the shell's frame and
-    projected on it, else in the world. With `normal_force` [N] (needs a shell) the spring acts in
+    the corners of the way: with `shell` (at `placement` in `shell_frame`, by default the universe)
+    in the shell's frame and projected on it, else in the world. With `normal_force` [N] (needs a shell) the spring acts in
     the tangent plane only, and the frame is pushed against the shell's normal, on the side where
     the frame is at the start. The target waits `lead_in` [s] at the first point, then moves at
     `speed` [m/s], then waits at the last. `rotational_stiffness` [N m/rad] and
@@ -120,7 +130,7 @@ class CartesianImpedance(Controller):
     damping: float
     normal_force: float = 0.0
     shell: Shell | None = None
-    shell_frame: str = "universe"
+    shell_frame: str | None = None
     placement: pin.SE3 | None = None
     speed: float = 0.05
     lead_in: float = 0.0
@@ -131,15 +141,26 @@ class CartesianImpedance(Controller):
     q_ref: Any = None
     joints: Iterable[str] | None = None
 
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for wrong types, and for a shell's place without a shell."""
+        super().__post_init__()
+        check_name("frame", self.frame)
+        if self.shell is not None:
+            check_type("shell", self.shell, Shell, "must be a Shell or None")
+        for name, value in (("shell_frame", self.shell_frame), ("placement", self.placement)):
+            if value is not None and self.shell is None:
+                raise InvalidParameter(name, value, "says where the shell is: give the shell too")
+        if self.shell_frame is not None:
+            check_name("shell_frame", self.shell_frame)
+        object.__setattr__(self, "placement", check_placement("placement", self.placement))
+
     def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller: resample the path, project it, find the frames."""
         model = scene.model
-        for name in (self.frame, self.shell_frame):
-            if not model.existFrame(name):
-                raise FrameNotFound(name, [f.name for f in model.frames])
-        frame = model.frames[model.getFrameId(self.frame)]
-        carrier = model.frames[model.getFrameId(self.shell_frame)]
-        placement = pin.SE3.Identity() if self.placement is None else self.placement
+        frame_index = find_frame(model, self.frame)
+        carrier_index = find_frame(model, self.shell_frame or "universe", "shell_frame")
+        frame, carrier = model.frames[frame_index], model.frames[carrier_index]
+        placement = check_placement("placement", self.placement)
         normal_force = check_not_negative("normal_force", self.normal_force, "N")
         if normal_force and self.shell is None:
             raise InvalidParameter("normal_force", normal_force, "needs a shell to press on")
@@ -147,8 +168,8 @@ class CartesianImpedance(Controller):
         if self.shell is not None:
             data = model.createData()
             pin.framesForwardKinematics(model, data, q0)
-            shell_pose = data.oMf[model.getFrameId(self.shell_frame)] * placement
-            at = shell_pose.actInv(data.oMf[model.getFrameId(self.frame)].translation)
+            shell_pose = data.oMf[carrier_index] * placement
+            at = shell_pose.actInv(data.oMf[frame_index].translation)
             above = float((at - points[0]) @ normals[0])
             normals = normals if above >= 0 else -normals
         times = self._times(points)
@@ -174,7 +195,7 @@ class CartesianImpedance(Controller):
             ),
             posture_stiffness=_gains("posture_stiffness", self.posture_stiffness, model.nv),
             joint_damping=_gains("joint_damping", self.joint_damping, model.nv),
-            q_ref=q0 if self.q_ref is None else check_vector("q_ref", self.q_ref, model.nq),
+            q_ref=q0 if self.q_ref is None else check_configuration("q_ref", model, self.q_ref),
             actuated=self.actuated(model),
         )
 
@@ -209,7 +230,11 @@ def wrap_callable(callback: Callback, model: pin.Model) -> _core.Controller:
     """Wrap tau(t, q, v, contacts) -> (nv,) for the core; its answers are checked."""
 
     def torque(t: float, q: Array, v: Array, rows: Array) -> Array:
-        tau = callback(t, q, v, SceneContacts.from_rows(rows))
+        try:
+            tau = callback(t, q, v, SceneContacts.from_rows(rows))
+        except Exception as error:
+            error.add_note(f"raised by the controller at t = {t:.6g} s")
+            raise
         return check_vector("controller's tau", tau, model.nv)
 
     return _core.PythonController(torque)
@@ -217,5 +242,9 @@ def wrap_callable(callback: Callback, model: pin.Model) -> _core.Controller:
 
 def _gains(name: str, value: Any, nv: int) -> Array:
     if np.ndim(value) == 0:
-        return np.full(nv, check_finite(name, value))
-    return check_vector(name, value, nv)
+        return np.full(nv, check_not_negative(name, value))
+    gains = check_vector(name, value, nv)
+    if (gains < 0).any():
+        k = int(np.argmin(gains))
+        raise InvalidParameter(f"{name}[{k}]", float(gains[k]), "must not be negative")
+    return gains

@@ -5,7 +5,9 @@ from __future__ import annotations
 import coal
 import pinocchio as pin
 
+from sphshell_pin.checks import check_type
 from sphshell_pin.contact import CoulombFriction, NormalLaw, Sphere
+from sphshell_pin.dynamics.models import find_frame, frame_on_joint
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
@@ -18,6 +20,9 @@ def add_pairs(
     friction: CoulombFriction | None,
 ) -> None:
     """Add a contact to `scene` for every collision pair of a sphere and something else."""
+    check_type(
+        "geometry_model", geometry_model, pin.GeometryModel, "must be a pinocchio.GeometryModel"
+    )
     objects = geometry_model.geometryObjects
     shells: dict[int, Shell] = {}
     for pair in geometry_model.collisionPairs:
@@ -29,13 +34,15 @@ def add_pairs(
             continue
         if second not in shells:
             shells[second] = Shell.from_geometry(other)
-        joint_i = scene.model.names[ball.parentJoint]
-        # Geometry is placed in the joint's frame; the joint's own frame carries the joint's name.
+        frame_i, on_i = _frame_of(scene.model, ball.parentJoint)
+        frame_j, on_j = _frame_of(scene.model, other.parentJoint)
         scene.add_contact(
-            sphere=Sphere(ball.geometry.radius, joint_i, tuple(ball.placement.translation)),
+            sphere=Sphere(
+                ball.geometry.radius, frame_i, tuple(on_i.actInv(ball.placement.translation))
+            ),
             shell=shells[second],
-            frame=scene.model.names[other.parentJoint],
-            placement=other.placement,
+            frame=frame_j,
+            placement=on_j.actInv(other.placement),
             law=law,
             friction=friction,
             name=f"{ball.name}-{other.name}",
@@ -46,3 +53,13 @@ def add_pairs(
             f"{len(geometry_model.collisionPairs)} collision pairs",
             "must have at least one pair of a sphere and another shape (addCollisionPair)",
         )
+
+
+def _frame_of(model: pin.Model, joint: int) -> tuple[str, pin.SE3]:
+    """Return the name of a frame on `joint`, in which geometry is placed, and where it stands."""
+    name = frame_on_joint(model, joint)
+    if name is None:
+        raise InvalidParameter(
+            "model", model.names[joint], "is a joint without a frame: call model.addJointFrame"
+        )
+    return name, pin.SE3(model.frames[find_frame(model, name)].placement)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,16 +11,29 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_positive, check_vector, off_unit_length, read_only
+from sphshell_pin.checks import (
+    check_configuration,
+    check_name,
+    check_names,
+    check_placement,
+    check_positive,
+    check_type,
+    check_vector,
+    off_unit_length,
+    read_only,
+)
 from sphshell_pin.contact import CoulombFriction, Method, NormalLaw, Sphere
-from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
+from sphshell_pin.contact.friction import check_friction
+from sphshell_pin.contact.laws import check_law
+from sphshell_pin.dynamics.models import check_no_mimic, find_frame, reduced_model
+from sphshell_pin.dynamics.sources import Find, checked_source
+from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.shell import Shell
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.explain import Explanation
 
 Array = NDArray[np.float64]
-Find = Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]
 
 
 @dataclass(frozen=True)
@@ -121,23 +134,21 @@ class Scene:
 
     `lock` names joints to hold at their values in `q_lock` (nq of the given model, default
     neutral): they drop out of the scene's model and cost nothing. FrameNotFound and NameNotFound
-    list what the model has.
+    list what the model has; InvalidParameter names mimic joints that are left.
     """
 
     def __init__(self, model: pin.Model, lock: Iterable[str] = (), q_lock: Any = None) -> None:
         if not isinstance(model, pin.Model):
             raise InvalidParameter("model", type(model).__name__, "must be a pinocchio.Model")
-        lock = tuple(lock)
-        known = list(model.names)[1:]
-        for name in lock:
-            if name not in known:
-                raise NameNotFound("joint", name, "the model", known)
-        if lock:
-            q = pin.neutral(model) if q_lock is None else check_vector("q_lock", q_lock, model.nq)
-            self._model = pin.buildReducedModel(model, [model.getJointId(n) for n in lock], q)
+        self.lock = check_names("lock", lock)
+        if q_lock is None:
+            q = pin.neutral(model)
+        elif self.lock:
+            q = check_configuration("q_lock", model, q_lock)
         else:
-            self._model = pin.Model(model)
-        self.lock = lock
+            raise InvalidParameter("q_lock", q_lock, "must come with lock, the joints to hold there")
+        self._model = reduced_model(model, self.lock, q) if self.lock else pin.Model(model)
+        check_no_mimic(self._model)
         self._pairs: tuple[ContactPair, ...] = ()
         self._core: _core.Scene | None = None
 
@@ -167,10 +178,15 @@ class Scene:
         Without `law` the contact has ADAMS's default IMPACT law, without `friction` none; `method`
         is "facets" (default) or "elements". Returns the pair.
         """
+        check_type("sphere", sphere, Sphere, "must be a Sphere(radius, frame)")
+        check_type("shell", shell, Shell, "must be a Shell (of a file: Shell.from_file)")
+        law = _default_law() if law is None else law
+        check_law(law)
+        check_friction(friction)
         method = "facets" if method is None else method
         Method.from_name(method)
         joint_i, in_i = self._frame(sphere.frame)
-        placement = pin.SE3.Identity() if placement is None else pin.SE3(placement)
+        placement = check_placement("placement", placement)
         joint_j, in_j = self._frame(frame)
         centre = in_i * pin.SE3(np.eye(3), np.array(sphere.offset))
         return self._add(
@@ -184,7 +200,7 @@ class Scene:
                 sphere_placement=centre,
                 placement=placement,
                 shell_placement=in_j * placement,
-                law=_default_law() if law is None else law,
+                law=law,
                 friction=friction,
                 method=method,
                 sphere=sphere,
@@ -209,8 +225,11 @@ class Scene:
         """
         if not callable(find):
             raise InvalidParameter("find", find, "must be callable: find(pose_i, pose_j)")
-        joint_i, in_i = self._frame(frame_i)
-        joint_j, in_j = self._frame(frame_j)
+        law = _default_law() if law is None else law
+        check_law(law)
+        check_friction(friction)
+        joint_i, in_i = self._frame(frame_i, "frame_i")
+        joint_j, in_j = self._frame(frame_j, "frame_j")
         return self._add(
             ContactPair(
                 name=self._pair_name(name, f"{frame_i}-{frame_j}"),
@@ -222,7 +241,7 @@ class Scene:
                 sphere_placement=in_i,
                 placement=pin.SE3.Identity(),
                 shell_placement=in_j,
-                law=_default_law() if law is None else law,
+                law=law,
                 friction=friction,
                 method="facets",
                 find=find,
@@ -303,6 +322,11 @@ class Scene:
         unknown = set(changes) - {"law", "friction", "method"}
         if unknown:
             raise NameNotFound("setting", unknown.pop(), "a pair", ("law", "friction", "method"))
+        if "law" in changes:
+            check_law(changes["law"])
+        check_friction(changes.get("friction"))
+        if "method" in changes:
+            Method.from_name(changes["method"])
         old = self.pair(name)
         self._pairs = tuple(replace(p, **changes) if p is old else p for p in self._pairs)
         self._core = None
@@ -322,6 +346,7 @@ class Scene:
     def _pair_name(self, name: str | None, default: str) -> str:
         taken = {p.name for p in self._pairs}
         if name is not None:
+            check_name("name", name)
             if name in taken:
                 raise InvalidParameter("name", name, "is taken by another contact of this scene")
             return name
@@ -330,10 +355,8 @@ class Scene:
             wanted, k = f"{default}-{k}", k + 1
         return wanted
 
-    def _frame(self, name: str) -> tuple[int, pin.SE3]:
-        if not self._model.existFrame(name):
-            raise FrameNotFound(name, [f.name for f in self._model.frames])
-        frame = self._model.frames[self._model.getFrameId(name)]
+    def _frame(self, name: str, called: str = "frame") -> tuple[int, pin.SE3]:
+        frame = self._model.frames[find_frame(self._model, name, called)]
         return int(frame.parentJoint), pin.SE3(frame.placement)
 
 
@@ -341,28 +364,3 @@ def _default_law() -> NormalLaw:
     from sphshell_pin.contact import ImpactLaw
 
     return ImpactLaw.from_adams()
-
-
-def checked_source(find: Find, name: str) -> Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]:
-    """Wrap a user's routine so that what reaches the core has the right shapes and unit normals."""
-    where = f"contact source '{name}'"
-    shapes = "must return points (k, 3), normals (k, 3), depths (k,)"
-
-    def checked(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[Array, Array, Array]:
-        answer = find(pose_i, pose_j)
-        try:
-            points, normals, depths = answer
-            depth = np.array(depths, dtype=np.float64).reshape(-1)
-            point = np.array(points, dtype=np.float64).reshape(-1, 3)
-            normal = np.array(normals, dtype=np.float64).reshape(-1, 3)
-        except (TypeError, ValueError):
-            raise InvalidParameter(where, answer, shapes) from None
-        if not len(point) == len(normal) == len(depth):
-            raise InvalidParameter(where, (point.shape, normal.shape, depth.shape), shapes)
-        if not (np.isfinite(point).all() and np.isfinite(depth).all()):
-            raise InvalidParameter(where, point.tolist(), "must return finite points and depths")
-        if len(normal) and not np.allclose(np.linalg.norm(normal, axis=1), 1, atol=1e-6):
-            raise InvalidParameter(where, normal.tolist(), "must return unit normals")
-        return point, normal, depth
-
-    return checked

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 import os
 
 from sphshell_pin.errors import InvalidParameter
@@ -29,6 +30,7 @@ def thread_count(threads: int | None) -> int:
     """Return how many threads to use, all processors if None; InvalidParameter unless >= 1."""
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-    if isinstance(threads, bool) or int(threads) != threads or threads < 1:
+    number = isinstance(threads, numbers.Real) and not isinstance(threads, bool)
+    if not number or threads != threads // 1 or threads < 1:
         raise InvalidParameter("threads", threads, "must be a whole number of at least 1")
     return int(threads)

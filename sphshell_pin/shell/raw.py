@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from sphshell_pin.checks import as_floats
 from sphshell_pin.errors import InvalidShell
 
 Floats = npt.NDArray[np.float64]
@@ -87,7 +88,7 @@ def check_indices(offsets: Longs, corners: Ints, num_vertices: int) -> None:
 
 def _vertices(vertices: object) -> Floats:
     try:
-        points = np.array(vertices, dtype=np.float64)
+        points = as_floats(vertices)
     except (TypeError, ValueError) as error:
         raise InvalidShell(f"vertices must be an (n, 3) array of numbers [m]: {error}") from error
     if points.ndim != 2 or points.shape[1] != 3:
@@ -164,7 +165,7 @@ def _corner_normals(
     if normals is None:
         return None
     try:
-        given = np.array(normals, dtype=np.float64)
+        given = as_floats(normals)
     except (TypeError, ValueError) as error:
         raise InvalidShell(f"normals must be an array of numbers: {error}") from error
     if given.shape == points.shape:

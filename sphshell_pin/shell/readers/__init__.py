@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from sphshell_pin.checks import check_type
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers.mesh import read_obj, read_off, read_stl
@@ -35,6 +36,7 @@ def reader_for(path: str | os.PathLike[str]) -> tuple[Path, str]:
     ShellFileError
         If the file is missing, empty or not a file.
     """
+    check_type("path", path, (str, os.PathLike), "must be the path of a surface file")
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:

@@ -1,0 +1,94 @@
+"""Questions to a Pinocchio model: frames by name, joints held, joints that no run can move."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.checks import check_name
+from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
+
+Array = NDArray[np.float64]
+
+
+def find_frame(model: pin.Model, name: str, called: str = "frame") -> int:
+    """Return the index of the frame called `name`.
+
+    Names may repeat (a link called as its joint): a body's frame comes first, then an operational
+    frame, then any other. FrameNotFound lists the names; `called` is the argument's name.
+    """
+    check_name(called, name)
+    found = [k for k, frame in enumerate(model.frames) if frame.name == name]
+    if not found:
+        raise FrameNotFound(name, [frame.name for frame in model.frames])
+    order = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
+    kinds = [model.frames[k].type for k in found]
+    first = next((kinds.index(kind) for kind in order if kind in kinds), 0)
+    return found[first]
+
+
+def frame_on_joint(model: pin.Model, joint: int) -> str | None:
+    """Return the name of a frame that `find_frame` finds on `joint`, the joint's own if it can."""
+    names = [model.names[joint], *(f.name for f in model.frames if f.parentJoint == joint)]
+    known = {frame.name for frame in model.frames}
+    for name in names:
+        if name in known and model.frames[find_frame(model, name)].parentJoint == joint:
+            return str(name)
+    return None
+
+
+def reduced_model(model: pin.Model, lock: tuple[str, ...], q: Array) -> pin.Model:
+    """Return a copy of `model` in which the joints named by `lock` are held at q (nq,).
+
+    NameNotFound lists the joints; InvalidParameter says why Pinocchio cannot hold one.
+    """
+    known = list(model.names)[1:]
+    for name in lock:
+        if name not in known:
+            raise NameNotFound("joint", name, "the model", known)
+    held = [int(model.getJointId(name)) for name in lock]
+    for name, joint in zip(lock, held, strict=True):
+        _check_joint_frame(model, name, joint)
+    try:
+        return pin.buildReducedModel(model, held, q)
+    except (ValueError, RuntimeError, IndexError) as error:
+        reason = str(error).strip()
+        what = f"cannot be held ({reason}): name other joints to lock"
+        if "imic" in reason:
+            what = f"cannot be held ({reason}): lock the joints that mimic them too, or load the "
+            what += "model with mimic=False"
+        raise InvalidParameter("lock", list(lock), what) from None
+
+
+def check_no_mimic(model: pin.Model) -> None:
+    """Raise InvalidParameter if a joint of `model` mimics another: forward dynamics has none."""
+    joints = list(zip(model.names, model.joints, strict=True))[1:]
+    found = [name for name, joint in joints if _mimics(joint)]
+    if found:
+        raise InvalidParameter(
+            "model",
+            found,
+            "forward dynamics knows none: load the model with mimic=False, or lock them",
+            f"has joints that mimic others ({', '.join(found)}), but",
+        )
+
+
+def _mimics(joint: pin.JointModel) -> bool:
+    kind = joint.shortname()
+    if kind == "JointModelComposite":
+        return any(_mimics(part) for part in joint.extract().joints)
+    return bool(kind == "JointModelMimic")
+
+
+def _check_joint_frame(model: pin.Model, name: str, joint: int) -> None:
+    """Pinocchio reads the frame of a joint it locks, unchecked, before the frames on the joint."""
+    on_joint = [frame for frame in model.frames if frame.parentJoint == joint]
+    first = on_joint[0] if on_joint else None
+    if first is None or first.name != name or first.type != pin.FrameType.JOINT:
+        raise InvalidParameter(
+            "lock",
+            name,
+            "is a joint that cannot be held, as its own frame is missing or comes after other "
+            "frames on it: call model.addJointFrame(joint) right after model.addJoint",
+        )

@@ -1,0 +1,55 @@
+"""Contact points from the user's own routine, checked on their way to the core."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.checks import as_floats
+from sphshell_pin.errors import InvalidParameter
+
+Array = NDArray[np.float64]
+Find = Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]
+
+_SHAPES = "must return points (k, 3), normals (k, 3), depths (k,)"
+
+
+def checked_source(find: Find, name: str) -> Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]:
+    """Wrap a user's routine so that what reaches the core has the right shapes and unit normals.
+
+    InvalidParameter names the source `name`; what the routine itself raises passes, with a note.
+    """
+    where = f"contact source '{name}'"
+
+    def checked(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[Array, Array, Array]:
+        try:
+            answer = find(pose_i, pose_j)
+        except Exception as error:
+            places = (np.round(pose.translation, 6).tolist() for pose in (pose_i, pose_j))
+            error.add_note("raised by {} with its frames at {} m and {} m".format(where, *places))
+            raise
+        try:
+            points, normals, depths = answer
+            point, normal, depth = _rows(points), _rows(normals), as_floats(depths)
+        except (TypeError, ValueError):
+            raise InvalidParameter(where, answer, _SHAPES) from None
+        shapes = point.shape, normal.shape, depth.shape
+        if shapes != ((len(depth), 3), (len(depth), 3), (len(depth),)):
+            raise InvalidParameter(where, shapes, _SHAPES, f"returns shapes {shapes},")
+        if not (np.isfinite(point).all() and np.isfinite(depth).all()):
+            raise InvalidParameter(where, point.tolist(), "must return finite points and depths")
+        if len(normal) and not np.allclose(np.linalg.norm(normal, axis=1), 1, atol=1e-6):
+            raise InvalidParameter(where, normal.tolist(), "must return unit normals")
+        return point, normal, depth
+
+    return checked
+
+
+def _rows(vectors: Any) -> Array:
+    """Return vectors (k, 3); an empty list is none."""
+    rows = as_floats(vectors)
+    return rows if rows.size else np.zeros((0, 3))
