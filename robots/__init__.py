@@ -81,11 +81,14 @@ def load(name: str) -> LoadedRobot:
     except ImportError:
         raise MissingExtra("example-robot-data-loaders", "robots", f"the robot '{name}'") from None
     if name not in _library():
-        raise NameNotFound("robot", name, "sphshell_pin.robots", names())
+        raise NameNotFound("robot", name, "sphshell_pin.robots", names(), "sphshell-pin list")
     try:
         robot = example_robot_data.load(name)
     except Exception as error:
-        raise RobotError(f"the robot '{name}' cannot be loaded: {error}") from error
+        reason = str(error)
+        if "SDF" in reason and not hasattr(pin, "buildModelFromSdf"):
+            reason = "it is an SDF file, and the wheel of pinocchio has no SDF reader"
+        raise RobotError(f"the robot '{name}' cannot be loaded: {reason}") from error
     # A reference posture may state a free-flyer's quaternion with a few digits only.
     q0 = pin.normalize(robot.model, np.asarray(robot.q0, dtype=float))
     return LoadedRobot(name, robot.model, robot.collision_model, robot.visual_model, q0)

@@ -195,9 +195,10 @@ def _faults(context: typer.Context) -> Iterator[None]:
         if debug:
             raise
         known = isinstance(error, SphshellError)
-        # A fault that is not the package's own is a defect: say where to look.
-        told = str(error) if known else f"{type(error).__name__}: {error} (see it with --debug)"
-        typer.echo(f"error: {told}", err=True)
+        # Any other fault is a defect, or comes from the user's routines: say where to look.
+        told = str(error) if known else f"{type(error).__name__}: {error}"
+        told = ", ".join([told, *getattr(error, "__notes__", ())])
+        typer.echo(f"error: {told}{'' if known else ' (see it with --debug)'}", err=True)
         raise typer.Exit(ERROR) from None
 
 
@@ -233,13 +234,13 @@ def _side(side: str) -> Any:
 
 
 def _exit_code(report: RunReport, *, changed: bool) -> int:
-    from sphshell_pin.errors import Interrupted
+    from sphshell_pin.errors import Interrupted, SimulationDiverged
 
     if report.stopped is not None:
-        typer.echo(
-            f"{report.stopped}\nwhat was computed until then is written to {report.folder}",
-            err=True,
-        )
+        hint = ""
+        if isinstance(report.stopped, SimulationDiverged):
+            hint = "; sphshell-pin explain, with the same --set, names a fitting dt"
+        typer.echo(f"{report.stopped}{hint}\npartial results are in {report.folder}", err=True)
         return INTERRUPTED if isinstance(report.stopped, Interrupted) else ERROR
     if all(verdict.met for verdict in report.verdicts):
         return 0

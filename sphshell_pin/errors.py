@@ -54,6 +54,10 @@ class UnitMissing(InvalidParameter):
         )
 
 
+class UnitWarning(UserWarning):
+    """A shell is so large beside its sphere or robot that its unit was probably taken wrongly."""
+
+
 class InvalidShell(SphshellError, ValueError):
     """Vertices or elements from which no surface can be made."""
 
@@ -73,15 +77,21 @@ class ShellFileError(SphshellError, ValueError):
 class NameNotFound(SphshellError, LookupError):
     """A name nothing carries: `kind`, `name`, and the `valid` ones."""
 
-    def __init__(self, kind: str, name: str, owner: str, valid: Iterable[str]) -> None:
-        """Say that `owner` has no `kind` called `name`, and list what it has."""
+    def __init__(
+        self, kind: str, name: str, owner: str, valid: Iterable[str], see: str = ""
+    ) -> None:
+        """Say that `owner` has no `kind` called `name`, and list what it has.
+
+        Of a long list the nearest names are told; `see` is where the others stand.
+        """
         self.kind = kind
         self.name = name
         self.valid = tuple(valid)
         has = f"{owner} has: {', '.join(self.valid) or 'none'}"
         if len(self.valid) > _MOST_NAMES:
             near = difflib.get_close_matches(name, self.valid, n=5, cutoff=0.0)
-            has = f"nearest of the {len(self.valid)} that {owner} has: {', '.join(near)}"
+            has = f"the nearest are {', '.join(near)}; {owner} has {len(self.valid)}"
+            has += f": see {see}" if see else ""
         super().__init__(f"no {kind} '{name}'; {has}")
 
 
@@ -163,6 +173,16 @@ class Interrupted(SphshellError, KeyboardInterrupt):
         super().__init__(f"interrupted at t = {t:.6g} s")
         self.t = t
         self.result = result
+
+
+def add_origin(error: Exception, what: str) -> None:
+    """Note on `error`, which user code has just raised, `what` it was and where it stands."""
+    place = error.__traceback__ and error.__traceback__.tb_next
+    where = ""
+    if place:
+        code = place.tb_frame.f_code
+        where = f" ({Path(code.co_filename).name}:{code.co_name}, line {place.tb_lineno})"
+    error.add_note(f"raised by {what}{where}")
 
 
 def _shown(value: object) -> str:

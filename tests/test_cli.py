@@ -101,6 +101,54 @@ def test_a_faulty_scenario_and_debug(tmp_path):
     assert type(told.exception).__name__ == "ScenarioError"
 
 
+def test_a_quaternion_of_no_length_names_file_and_key(tmp_path):
+    for last in ("0", "0.5"):
+        told = call("run", write(tmp_path, DROP.replace("0, 0, 0, 1]", f"0, 0, 0, {last}]")))
+        assert told.exit_code == 2
+        assert "drop.toml: robot.ball.start: " in told.stderr
+        assert "'root_joint'" in told.stderr
+
+
+OWN = """
+import numpy as np
+
+def tau(t, q, v, contacts):
+    raise RuntimeError("no torque")
+
+def find(pose_i, pose_j):
+    raise RuntimeError("no teeth")
+"""
+
+
+def test_a_fault_of_the_users_routine_says_whose_it_is(tmp_path):
+    (tmp_path / "own.py").write_text(OWN)
+    text = DROP.replace("[run]", '[controller]\ntype = "python"\nfunction = "own.py:tau"\n[run]')
+    told = call("run", write(tmp_path, text), "--out", tmp_path / "out")
+    assert told.exit_code == 2
+    assert "RuntimeError: no torque, raised by the controller at t = 0 s (own.py:tau" in told.stderr
+    assert told.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+    source = '[[source]]\nname = "gears"\nfind = "own.py:find"\nframe_i = "ball"\n'
+    text = DROP.replace("[run]", f'{source}law.type = "adams"\n[run]')
+    told = call("run", write(tmp_path, text), "--out", tmp_path / "out")
+    assert "RuntimeError: no teeth, raised by contact source 'gears' with" in told.stderr
+    assert "(own.py:find, line 8)" in told.stderr
+
+
+def test_a_diverged_run_says_where_its_part_is_and_spares_the_complete_one(tmp_path):
+    out = tmp_path / "out"
+    arguments = ["run", write(tmp_path), "--out", out, "--no-recording"]
+    assert call(*arguments).exit_code == 0
+    before = (out / "run.npz").read_bytes()
+    told = call(*arguments, "--set", "contact.ball-plate.law.stiffness=1e30")
+    assert told.exit_code == 2
+    assert "diverged at t =" in told.stderr
+    assert "sphshell-pin explain" in told.stderr
+    assert f"partial results are in {out / 'stopped'}" in told.stderr
+    assert ".result" not in told.stderr
+    assert (out / "run.npz").read_bytes() == before
+
+
 def test_an_unwritable_folder_is_told(tmp_path):
     (tmp_path / "file").write_text("")
     told = call("run", write(tmp_path), "--out", tmp_path / "file" / "out")
@@ -123,6 +171,27 @@ def test_check_prints_the_health_of_a_file(tmp_path):
     assert "1" in told.output
     path.write_text("")
     assert call("check", path, "--unit", "mm").exit_code == 2
+
+
+def test_check_names_a_file_that_holds_no_surface(tmp_path):
+    path = tmp_path / "deg.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+    told = call("check", path, "--unit", "mm")
+    assert told.exit_code == 2
+    assert f"{path}: no element is left" in told.stderr
+    surface = 'primitive = { type = "box", size = [0.2, 0.2, 0.02] }'
+    text = DROP.replace(surface, 'file = "deg.obj"\nunit = "mm"')
+    told = call("explain", write(tmp_path, text))
+    assert "drop.toml: shell.plate: " in told.stderr
+    assert "deg.obj: no element is left" in told.stderr
+
+
+def test_check_has_a_verdict_for_every_usable_file(tmp_path):
+    path = tmp_path / "fan.obj"  # three triangles on one edge
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n")
+    told = call("check", path, "--unit", "mm")
+    assert told.exit_code == 0
+    assert "ok, with " in told.output.splitlines()[-1]
 
 
 def test_check_asks_for_the_unit_as_the_command_line_states_it(tmp_path):

@@ -26,7 +26,7 @@ from sphshell_pin.checks import (
 )
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
-from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.errors import InvalidParameter, NameNotFound, add_origin
 from sphshell_pin.shell import Shell
 
 Array = NDArray[np.float64]
@@ -115,10 +115,10 @@ class CartesianImpedance(Controller):
 
     F = stiffness (x_d - x) + damping (x_d' - x') [N/m], [N s/m] (Hogan 1985). `path` (k, 3) [m] are
     the corners of the way: with `shell` (at `placement` in `shell_frame`, by default the universe)
-    in the shell's frame and projected on it, else in the world. With `normal_force` [N] (needs a shell) the spring acts in
-    the tangent plane only, and the frame is pushed against the shell's normal, on the side where
-    the frame is at the start. The target waits `lead_in` [s] at the first point, then moves at
-    `speed` [m/s], then waits at the last. `rotational_stiffness` [N m/rad] and
+    in the shell's frame and projected on it, else in the world. With `normal_force` [N] (needs a
+    shell) the spring acts in the tangent plane only, and the frame is pushed against the shell's
+    normal, on the side where the frame is at the start. The target waits `lead_in` [s] at the first
+    point, then moves at `speed` [m/s], then waits at the last. `rotational_stiffness` [N m/rad] and
     `rotational_damping` [N m s/rad] hold the orientation of the start. `posture_stiffness`
     [N m/rad] draws the joints to `q_ref` (default: the start) and `joint_damping` [N m s/rad]
     calms the motion that the frame does not show; both are one number or (nv,).
@@ -152,7 +152,7 @@ class CartesianImpedance(Controller):
                 raise InvalidParameter(name, value, "says where the shell is: give the shell too")
         if self.shell_frame is not None:
             check_name("shell_frame", self.shell_frame)
-        object.__setattr__(self, "placement", check_placement("placement", self.placement))
+        check_placement("placement", self.placement)
 
     def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller: resample the path, project it, find the frames."""
@@ -233,7 +233,7 @@ def wrap_callable(callback: Callback, model: pin.Model) -> _core.Controller:
         try:
             tau = callback(t, q, v, SceneContacts.from_rows(rows))
         except Exception as error:
-            error.add_note(f"raised by the controller at t = {t:.6g} s")
+            add_origin(error, f"the controller at t = {t:.6g} s")
             raise
         return check_vector("controller's tau", tau, model.nv)
 

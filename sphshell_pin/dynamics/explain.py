@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_moved_mass
 from sphshell_pin.contact import CoulombFriction, HuntCrossleyLaw, ImpactLaw, NormalLaw
-from sphshell_pin.dynamics.scene import ContactPair, Scene, checked_source
-from sphshell_pin.units import size_warning
+from sphshell_pin.dynamics.models import unit_warning
+from sphshell_pin.dynamics.scene import ContactPair, Scene
+from sphshell_pin.dynamics.sources import checked_source
 
 Array = NDArray[np.float64]
 
@@ -274,12 +275,9 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
     if pair.sphere is None or pair.shell is None:
         return out
     radius, shell = pair.sphere.radius, pair.shell
-    reach = _reach(scene.model)
-    for reference, what in ((radius, "sphere"), (reach, "robot")):
-        sentence = size_warning(shell.size, reference, what) if reference > 0 else None
-        if sentence:
-            out.append(f"{where}: {sentence}")
-            break
+    sentence = unit_warning(scene.model, radius, shell.size)
+    if sentence:
+        out.append(f"{where}: {sentence}")
     out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
     if figures.impact_depth >= radius:
         out.append(
@@ -303,15 +301,6 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
     if pair.method == "elements":
         out.append(f"{where}: method 'elements' counts a place of touch once per touched element")
     return out
-
-
-def _reach(model: pin.Model) -> float:
-    """Length [m] of the longest chain of joint placements: the robot's size."""
-    reach = np.zeros(model.njoints)
-    for j in range(1, model.njoints):
-        step = float(np.linalg.norm(model.jointPlacements[j].translation))
-        reach[j] = reach[model.parents[j]] + step
-    return float(reach.max())
 
 
 def _count(number: int, noun: str) -> str:

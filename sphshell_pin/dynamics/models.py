@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_name
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
+from sphshell_pin.units import size_warning
 
 Array = NDArray[np.float64]
 
@@ -92,3 +93,24 @@ def _check_joint_frame(model: pin.Model, name: str, joint: int) -> None:
             "is a joint that cannot be held, as its own frame is missing or comes after other "
             "frames on it: call model.addJointFrame(joint) right after model.addJoint",
         )
+
+
+def unit_warning(model: pin.Model, radius: float, shell_size: float) -> str | None:
+    """Tell, in a sentence, that a shell is suspiciously large for its sphere or the robot.
+
+    `radius` [m] of the sphere, `shell_size` [m] the shell's box diagonal; None if all is well.
+    """
+    for reference, what in ((radius, "sphere's radius"), (_reach(model), "robot's reach")):
+        sentence = size_warning(shell_size, reference, what)
+        if sentence:
+            return sentence
+    return None
+
+
+def _reach(model: pin.Model) -> float:
+    """Length [m] of the longest chain of joint placements: the robot's size."""
+    reach = np.zeros(model.njoints)
+    for j in range(1, model.njoints):
+        step = float(np.linalg.norm(model.jointPlacements[j].translation))
+        reach[j] = reach[model.parents[j]] + step
+    return float(reach.max())

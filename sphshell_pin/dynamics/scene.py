@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -19,15 +20,14 @@ from sphshell_pin.checks import (
     check_positive,
     check_type,
     check_vector,
-    off_unit_length,
     read_only,
 )
 from sphshell_pin.contact import CoulombFriction, Method, NormalLaw, Sphere
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.laws import check_law
-from sphshell_pin.dynamics.models import check_no_mimic, find_frame, reduced_model
+from sphshell_pin.dynamics.models import check_no_mimic, find_frame, reduced_model, unit_warning
 from sphshell_pin.dynamics.sources import Find, checked_source
-from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.errors import InvalidParameter, NameNotFound, UnitWarning
 from sphshell_pin.shell import Shell
 
 if TYPE_CHECKING:
@@ -146,7 +146,9 @@ class Scene:
         elif self.lock:
             q = check_configuration("q_lock", model, q_lock)
         else:
-            raise InvalidParameter("q_lock", q_lock, "must come with lock, the joints to hold there")
+            raise InvalidParameter(
+                "q_lock", q_lock, "must come with lock, the joints to hold there"
+            )
         self._model = reduced_model(model, self.lock, q) if self.lock else pin.Model(model)
         check_no_mimic(self._model)
         self._pairs: tuple[ContactPair, ...] = ()
@@ -176,7 +178,8 @@ class Scene:
         """Let `sphere` touch `shell`, which is placed at `placement` in `frame`.
 
         Without `law` the contact has ADAMS's default IMPACT law, without `friction` none; `method`
-        is "facets" (default) or "elements". Returns the pair.
+        is "facets" (default) or "elements". Returns the pair. A shell a thousand times larger than
+        the sphere or the robot earns a UnitWarning.
         """
         check_type("sphere", sphere, Sphere, "must be a Sphere(radius, frame)")
         check_type("shell", shell, Shell, "must be a Shell (of a file: Shell.from_file)")
@@ -189,6 +192,9 @@ class Scene:
         placement = check_placement("placement", placement)
         joint_j, in_j = self._frame(frame)
         centre = in_i * pin.SE3(np.eye(3), np.array(sphere.offset))
+        suspicion = unit_warning(self._model, sphere.radius, shell.size)
+        if suspicion:
+            warnings.warn(f"shell '{shell.name}': {suspicion}", UnitWarning, stacklevel=2)
         return self._add(
             ContactPair(
                 name=self._pair_name(name, f"{sphere.frame}-{shell.name}"),
@@ -304,9 +310,7 @@ class Scene:
         what = f": this model has nq = {model.nq}, nv = {model.nv}"
         if self.lock:
             what += f" after locking {', '.join(self.lock)}"
-        q = check_vector("q", q, model.nq, what)
-        if not pin.isNormalized(model, q, 1e-3):
-            raise off_unit_length(model, q)
+        q = check_configuration("q", model, q, what)
         v = np.zeros(model.nv) if v is None else check_vector("v", v, model.nv, what)
         return q, v
 

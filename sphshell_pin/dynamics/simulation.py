@@ -129,6 +129,10 @@ class Simulation:
             raise InvalidParameter("control_dt", control_dt, f"must not be below dt = {dt!r} s")
         if controller is None:
             return None, 0.0
+        if isinstance(controller, type):
+            raise InvalidParameter(
+                "controller", controller, "is a class, not a controller: did you forget ()?"
+            )
         if isinstance(controller, Controller):
             return controller.to_core(self.scene, q0), control_dt or 0.0
         if callable(controller):

@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.checks import as_floats
-from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.errors import InvalidParameter, add_origin
 
 Array = NDArray[np.float64]
 Find = Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]
@@ -30,7 +30,7 @@ def checked_source(find: Find, name: str) -> Callable[[pin.SE3, pin.SE3], tuple[
             answer = find(pose_i, pose_j)
         except Exception as error:
             places = (np.round(pose.translation, 6).tolist() for pose in (pose_i, pose_j))
-            error.add_note("raised by {} with its frames at {} m and {} m".format(where, *places))
+            add_origin(error, "{} with its frames at {} m and {} m".format(where, *places))
             raise
         try:
             points, normals, depths = answer

@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from sphshell_pin.checks import off_unit_length
 from sphshell_pin.errors import MissingExtra, NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.scenario.reading import item_key
 from sphshell_pin.scenario.schema import Placement, RobotSection, Scenario
 
 Array = npt.NDArray[np.float64]
@@ -71,7 +72,7 @@ def assemble(scenario: Scenario, path: Path) -> Assembly:
     lock: list[str] = []
     labels: set[str] = set()
     for i, section in enumerate(scenario.robot):
-        key = f"robot[{i}]"
+        key = item_key("robot", scenario.robot, i)
         with blamed_on(path, key):
             robot = _load(robots, section, path)
         model, geometry = robot.model.copy(), robot.visual_model.copy()
@@ -190,8 +191,9 @@ def _start(
         v[span] = values
     unit = pin.normalize(model, q)
     # Rounded quaternions and cosines are set right; a wrong one (not of unit length) is a mistake.
-    if not np.allclose(unit, q, rtol=0, atol=1e-2):
-        raise ScenarioError(path, key, str(off_unit_length(model, q)))
+    if not np.allclose(unit, q, rtol=0, atol=1e-2) or not pin.isNormalized(model, unit, 1e-3):
+        where = f"{key}.start" if section.start or section.q is None else f"{key}.q"
+        raise ScenarioError(path, where, str(off_unit_length(model, q)))
     return unit, v
 
 

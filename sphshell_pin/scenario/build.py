@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -16,7 +17,7 @@ import numpy.typing as npt
 
 import sphshell_pin as sp
 from sphshell_pin.dynamics.controllers import Controller
-from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError, UnitWarning
 from sphshell_pin.scenario import schema
 from sphshell_pin.scenario.bodies import (
     assemble,
@@ -26,7 +27,7 @@ from sphshell_pin.scenario.bodies import (
     restrict,
     to_se3,
 )
-from sphshell_pin.scenario.reading import find_scenario, read_scenario
+from sphshell_pin.scenario.reading import find_scenario, item_key, read_scenario
 
 Array = npt.NDArray[np.float64]
 
@@ -65,17 +66,19 @@ def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -
     scenario = read_scenario(path, changes)
     assembly = assemble(scenario, path)
     with blamed_on(path, "robot"):
-        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=assembly.q0)
+        q_lock = assembly.q0 if assembly.lock else None
+        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock)
     shells = {
-        section.name: (_build_shell(section, path, f"shell[{i}]"), section)
+        section.name: (_build_shell(section, path, item_key("shell", scenario.shell, i)), section)
         for i, section in enumerate(scenario.shell)
     }
     if len(shells) < len(scenario.shell):
         raise ScenarioError(path, "shell", "two shells share a name")
     for i, contact in enumerate(scenario.contact):
-        _add_contact(scene, contact, shells, path, f"contact[{i}]")
+        key = item_key("contact", scenario.contact, i)
+        _add_contact(scene, contact, shells, path, key)
     for i, source in enumerate(scenario.source):
-        key = f"source[{i}]"
+        key = item_key("source", scenario.source, i)
         find = load_function(source.find, path, f"{key}.find")
         with blamed_on(path, key):
             scene.add_contact_source(
@@ -209,7 +212,8 @@ def _add_contact(
         if contact.shell not in shells:
             raise NameNotFound("shell", contact.shell, "the scenario", shells)
     shell, section = shells[contact.shell]
-    with blamed_on(path, key):
+    with blamed_on(path, key), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnitWarning)  # Scene.explain tells it for every scenario
         sphere = contact.sphere
         x, y, z = sphere.offset
         scene.add_contact(

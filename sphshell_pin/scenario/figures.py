@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.errors import ScenarioError
+from sphshell_pin.errors import ScenarioError, add_origin
 from sphshell_pin.scenario.build import Built
 
 PAIR_FIGURES = {
@@ -80,7 +80,11 @@ def measure(built: Built, result: Any, name: str) -> float:
         pair, _, figure = rest.rpartition(".")
         return float(result.stats["pairs"][pair][figure])
     if kind == "figures":
-        return float(built.figures[rest](result, built.scene))
+        try:
+            return float(built.figures[rest](result, built.scene))
+        except Exception as error:
+            add_origin(error, f"the scenario's figure '{rest}'")
+            raise
     if kind == "final":
         return _final(built.scene.model, result, rest)
     if kind == "energy":

@@ -7,7 +7,7 @@ import importlib
 import tomllib
 import types
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,9 @@ from pydantic_core import ErrorDetails
 
 from sphshell_pin.errors import NameNotFound, ScenarioError
 from sphshell_pin.scenario.schema import Scenario
+
+LISTS = ("robot", "shell", "contact", "source")
+"""Tables of which there may be several."""
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -62,7 +65,15 @@ def read_scenario(path: str | PathLike[str], changes: Mapping[str, str] | None =
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        raise _explain(error, path) from None
+        raise _explain(error, path, data) from None
+
+
+def item_key(table: str, items: Sequence[Any], index: int) -> str:
+    """Return the dotted key of an item of a list: by its label or name, else by its index."""
+    entries = [dict(one) if isinstance(one, BaseModel | Mapping) else {} for one in items]
+    names = [str(one.get("label") or one.get("name") or "") for one in entries]
+    name = names[index]
+    return f"{table}.{name}" if name and names.count(name) == 1 else f"{table}[{index}]"
 
 
 def _read_toml(path: str | PathLike[str]) -> dict[str, Any]:
@@ -97,7 +108,11 @@ def _change(data: dict[str, Any], key: str, value: Any, path: str | PathLike[str
             break
         if not isinstance(heads[head], dict | list):
             raise ScenarioError(path, key, f"'{head}' is a value, it holds no further keys", value)
+        single = node is data and head in LISTS and isinstance(heads[head], dict)
         rest, node = rest[len(head) + 1 :], heads[head]
+        # A table alone is a list of one: its name may stand in the key as in a list's.
+        if single and (name := _item_name(node)) not in node:
+            rest = rest.removeprefix(f"{name}.")
     if isinstance(node, list):
         if rest.isdecimal() and int(rest) < len(node):
             node[int(rest)] = value
@@ -117,12 +132,14 @@ def _item_name(item: Mapping[str, Any]) -> str:
     return str(item.get("label") or item.get("name") or item.get("urdf") or "")
 
 
-def _explain(error: ValidationError, path: str | PathLike[str]) -> ScenarioError:
+def _explain(
+    error: ValidationError, path: str | PathLike[str], data: Mapping[str, Any]
+) -> ScenarioError:
     """Turn the first of pydantic's complaints into one sentence with the valid choices."""
     # An unknown key often hides a missing one ("stifness" for "stiffness"): it is told first.
     details = sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
     first = details[0]
-    key, section = _locate(first["loc"])
+    key, section = _locate(first["loc"], data)
     reason, value = _reason(first, section)
     if len(details) > 1:
         reason += f" (and {len(details) - 1} more: first repair this one)"
@@ -149,8 +166,10 @@ def _reason(detail: ErrorDetails, section: type[BaseModel] | None) -> tuple[str,
     return message[:1].lower() + message[1:], plain
 
 
-def _locate(loc: Iterable[int | str]) -> tuple[str, type[BaseModel] | None]:
-    """Return the dotted key of a pydantic location, and the section that holds its last part."""
+def _locate(
+    loc: Iterable[int | str], data: Mapping[str, Any]
+) -> tuple[str, type[BaseModel] | None]:
+    """Return the dotted key of a pydantic location in `data`, and the section of its last part."""
     key, section, annotation = "", None, Scenario
     here: Any = annotation
     for part in loc:
@@ -159,7 +178,9 @@ def _locate(loc: Iterable[int | str]) -> tuple[str, type[BaseModel] | None]:
             here = tagged[part]
             continue
         if isinstance(part, int):
-            key += f"[{part}]"
+            items = data[key] if key in LISTS else ()
+            items = [items] if isinstance(items, Mapping) else items
+            key = item_key(key, items, part) if part < len(items) else f"{key}[{part}]"
             here = next(iter(_arguments(here)), None)
             continue
         models = [one for one in _members(here) if _is_section(one)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
@@ -25,6 +26,19 @@ from sphshell_pin.scenario.build import Built, build
 from sphshell_pin.scenario.figures import Verdict, check_expectations, judge, measure_energy
 
 RECORDING = "recording.html"
+STOPPED = "stopped"
+"""Subfolder for what a run computed that stopped early, beside an earlier one's results."""
+
+# What a run writes: a later one replaces all of it, so that no folder mixes two runs.
+RESULTS = (
+    "run.npz",
+    "contacts.csv",
+    "summary.json",
+    "force_and_depth.png",
+    "energy.png",
+    "contact_path.png",
+    RECORDING,
+)
 
 
 @dataclass(frozen=True)
@@ -54,7 +68,9 @@ def run_scenario(
     """Build and run the scenario called `name` (shipped, or a path) and write its results folder.
 
     `out` is the folder, results/<name> by default; `changes` are values by dotted key. An
-    interrupted or diverged run is written like any other, and `stopped` says so.
+    interrupted or diverged run is written like any other, and `stopped` says so; where the folder
+    has the results of a complete run, it is written to the subfolder `stopped`. Files take the
+    place of an earlier run's all at once, when all are made.
 
     Raises
     ------
@@ -76,11 +92,33 @@ def run_built(
 ) -> RunReport:
     """Run a scenario that is already built; see `run_scenario`."""
     check_expectations(built)
-    folder = prepare_folder(Path("results") / built.name if out is None else out)
-    result, stopped = simulate(built, progress)
-    verdicts = tuple(judge(built, result)) if stopped is None else ()
-    files, notes = _write_all(built, result, folder, verdicts, stopped, recording=recording)
+    folder, made = prepare_folder(Path("results") / built.name if out is None else out)
+    try:
+        result, stopped = simulate(built, progress)
+        verdicts, fault = _judge(built, result) if stopped is None else ((), None)
+        notes: list[str] = []
+        if stopped is not None and _holds_complete(folder):
+            notes.append(f"the complete results of an earlier run stay in {folder}")
+            folder, more = prepare_folder(folder / STOPPED)
+            made = [*more, *made]
+        files = _write_all(built, result, folder, verdicts, stopped, notes, recording=recording)
+    except BaseException:
+        # A start that was refused leaves no folder behind.
+        with contextlib.suppress(OSError):
+            for one in made:
+                one.rmdir()
+        raise
+    if fault is not None:
+        raise fault
     return RunReport(built, result, folder, tuple(files), tuple(notes), verdicts, stopped)
+
+
+def _judge(built: Built, result: Any) -> tuple[tuple[Verdict, ...], Exception | None]:
+    """Return the verdicts; or the fault of a figure of the user's, told when all is written."""
+    try:
+        return tuple(judge(built, result)), None
+    except Exception as fault:
+        return (), fault
 
 
 def simulate(
@@ -103,8 +141,10 @@ def simulate(
     return result, None
 
 
-def prepare_folder(out: str | PathLike[str]) -> Path:
-    """Make the results folder and prove that it can be written.
+def prepare_folder(out: str | PathLike[str]) -> tuple[Path, list[Path]]:
+    """Make the results folder and prove that it can be written; return it, and what was made.
+
+    The folders made are listed from the innermost.
 
     Raises
     ------
@@ -113,6 +153,7 @@ def prepare_folder(out: str | PathLike[str]) -> Path:
     """
     folder = Path(out)
     try:
+        made = [one for one in (folder, *folder.parents) if not one.exists()]
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
@@ -121,7 +162,17 @@ def prepare_folder(out: str | PathLike[str]) -> Path:
             folder,
             f"the results folder cannot be written: {error.strerror}; give another with --out",
         ) from None
-    return folder
+    return folder, made
+
+
+def _holds_complete(folder: Path) -> bool:
+    """Whether `folder` has results that a run which stopped early must not replace."""
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        return bool(summary["complete"])
+    except (OSError, ValueError, KeyError, TypeError):
+        # Somebody's results without a summary count as complete.
+        return any((folder / name).exists() for name in RESULTS)
 
 
 def _write_all(
@@ -130,50 +181,65 @@ def _write_all(
     folder: Path,
     verdicts: Iterable[Verdict],
     stopped: SphshellError | None,
+    notes: list[str],
     *,
     recording: bool,
-) -> tuple[list[Path], list[str]]:
-    files: list[Path] = []
-    notes: list[str] = []
-
-    def keep(made: Path) -> None:
-        """Put a finished file in place of an earlier one in a single step."""
-        os.replace(made, folder / made.name)
-        files.append(folder / made.name)
-
+) -> list[Path]:
+    """Make all files aside, then put them in place of an earlier run's; return their paths."""
     try:
         with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
-            desk = Path(scratch)
+            desk, attic = Path(scratch) / "new", Path(scratch) / "old"
+            desk.mkdir()
+            attic.mkdir()
             result.save(desk / "run.npz")
-            keep(desk / "run.npz")
             write_contacts(desk / "contacts.csv", result)
-            keep(desk / "contacts.csv")
             _write_summary(desk / "summary.json", built, result, verdicts, stopped)
-            keep(desk / "summary.json")
-            for made in _try_view(notes, lambda: _write_figures(result, desk, built)):
-                keep(made)
+            files = [desk / name for name in ("run.npz", "contacts.csv", "summary.json")]
+            files += _try_view(notes, "figures", lambda: _write_figures(result, desk, built))
             if recording:
-                for made in _try_view(notes, lambda: _write_recording(result, desk, built)):
-                    keep(made)
+                files += _try_view(notes, RECORDING, lambda: _write_recording(result, desk, built))
+            names = [file.name for file in files]
+            if RECORDING not in names and (folder / RECORDING).exists():
+                notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
+            _exchange(folder, desk, attic, names)
     except OSError as error:
-        # MissingExtra aside, nothing in here raises OSError but the disk.
         raise ResultError(
             folder, f"the results cannot be written: {error.strerror or error}"
         ) from None
-    stale = folder / RECORDING
-    if stale not in files and stale.exists():
-        stale.unlink()
-        notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
-    return files, notes
+    return [folder / name for name in names]
 
 
-def _try_view(notes: list[str], write: Callable[[], list[Path]]) -> list[Path]:
-    """Return what `write` made; without the packages it needs, note why it made nothing."""
+def _exchange(folder: Path, desk: Path, attic: Path, names: list[str]) -> None:
+    """Move an earlier run's files from `folder` to `attic` and `names` in from `desk`.
+
+    Whatever breaks in, the folder holds one run's files: all the new ones, or all the old.
+    """
+    placed: list[str] = []
+    try:
+        for name in {*RESULTS, *names}:
+            if (folder / name).exists():
+                os.replace(folder / name, attic / name)
+        for name in names:
+            placed.append(name)
+            os.replace(desk / name, folder / name)
+    except BaseException:
+        for name in placed:
+            (folder / name).unlink(missing_ok=True)
+        for old in attic.iterdir():
+            os.replace(old, folder / old.name)
+        raise
+
+
+def _try_view(notes: list[str], what: str, write: Callable[[], list[Path]]) -> list[Path]:
+    """Return what `write` made; where it fails, note why: the numbers are worth more."""
     try:
         return write()
     except MissingExtra as error:
         notes.append(str(error))
-        return []
+    except (Exception, KeyboardInterrupt) as error:
+        reason = f"{type(error).__name__}: {error}".removesuffix(": ")
+        notes.append(f"{what} could not be made: {reason}")
+    return []
 
 
 def _write_figures(result: Any, desk: Path, built: Built) -> list[Path]:

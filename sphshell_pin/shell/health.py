@@ -258,7 +258,10 @@ class ShellHealth:
             *(("note", note) for note in self.notes),
             *(("repaired", sentence) for sentence in self.repairs),
             *(("look at", sentence) for sentence in self.problems),
-            ("verdict", "ok" if self.ok else f"{_many(len(self.problems), 'thing')} to look at"),
+            (
+                "verdict",
+                "ok" if self.ok else f"ok, with {_many(len(self.problems), 'thing')} to look at",
+            ),
         ]
         shown = [(label, value) for label, value in rows if value]
         width = max(len(label) for label, _ in shown)

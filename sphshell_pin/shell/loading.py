@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import os
 
-from sphshell_pin.errors import InvalidParameter, UnitMissing
-from sphshell_pin.shell.cleaning import box_diagonal
+from sphshell_pin.errors import InvalidParameter, InvalidShell, UnitMissing
+from sphshell_pin.shell.cleaning import CleanedSurface, box_diagonal, clean_surface
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers import READERS, read_shl, reader_for
 from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
@@ -16,11 +16,13 @@ Scale = str | float | None
 
 def load_surface(
     path: str | os.PathLike[str], unit: str | None, scale: Scale
-) -> tuple[RawSurface, str, float]:
-    """Read a surface file: the surface in metres, the unit taken, metres per file unit.
+) -> tuple[CleanedSurface, str, float]:
+    """Read and clean a surface file: in metres, the unit taken, metres per file unit.
 
     Raises
     ------
+    InvalidShell
+        If no surface can be made of what the file holds.
     UnitMissing
         If `unit` is not stated where the format has none.
     InvalidParameter
@@ -28,6 +30,16 @@ def load_surface(
     ShellFileError
         If the file is missing, empty, truncated or damaged.
     """
+    raw, taken, factor = _load_raw(path, unit, scale)
+    try:
+        return clean_surface(raw), taken, factor
+    except InvalidShell as error:
+        raise InvalidShell(f"{path}: {error}") from error
+
+
+def _load_raw(
+    path: str | os.PathLike[str], unit: str | None, scale: Scale
+) -> tuple[RawSurface, str, float]:
     if unit is not None:
         metres_per_unit(unit)  # an unknown unit is said before a long file is read
     number = _check_scale(scale)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_points, check_positive, check_vector, read_only
+from sphshell_pin.checks import as_floats, check_points, check_positive, check_vector, read_only
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.options import CREASE_ANGLE, SIDES, check_options, thread_count
 from sphshell_pin.shell.topology import Topology
@@ -144,12 +144,10 @@ class Shell(Topology):
         InvalidShell
             If the file holds no element with an area.
         """
-        from sphshell_pin.shell.cleaning import clean_surface
         from sphshell_pin.shell.loading import load_surface
 
         check_options(crease_angle, side)
-        raw, taken_unit, factor = load_surface(path, unit, scale)
-        surface = clean_surface(raw)
+        surface, taken_unit, factor = load_surface(path, unit, scale)
         found = surface.health.labelled(source=str(path), unit=taken_unit, scale=factor)
         called = Path(path).stem if name is None else name
         shell = cls.__new__(cls)
@@ -285,7 +283,7 @@ class Shell(Topology):
 
         places = check_points("centers", centers)
         try:
-            sizes = np.array(np.broadcast_to(np.asarray(radii, np.float64), (len(places),)))
+            sizes = np.array(np.broadcast_to(as_floats(radii), (len(places),)))
         except (TypeError, ValueError):
             raise InvalidParameter(
                 "radii", np.shape(radii), f"must be one number or have shape ({len(places)},)"

@@ -98,8 +98,11 @@ def test_an_error_in_the_callable_comes_through() -> None:
         raise RuntimeError("teeth fell out")
 
     scene = by_source(ball(), broken)
-    with pytest.raises(RuntimeError, match="teeth fell out"):
+    with pytest.raises(RuntimeError, match="teeth fell out") as caught:
         scene.external_forces(*START)
+    (note,) = caught.value.__notes__
+    assert "raised by contact source 'mine' with its frames at [0.1, -0.05, 0.06] m" in note
+    assert "(test_contact_sources.py:broken, line " in note
     with pytest.raises(RuntimeError, match="teeth fell out"):
         Simulation(scene, SemiImplicitEuler(dt=1e-3)).run(*START, 0.01)
 
@@ -112,12 +115,21 @@ def test_an_error_in_the_callable_comes_through() -> None:
         (np.full((1, 3), np.nan), np.array([[0.0, 0.0, 1.0]]), np.array([0.01])),
         None,
         (np.zeros((1, 3)),),
+        (np.zeros(6), np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros(2)),
+        (np.zeros((2, 3)), np.tile([0.0, 0.0, 1.0], 2), np.zeros(2)),
+        (np.zeros((2, 3)), np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros((1, 2))),
+        (np.zeros((1, 3), complex), np.array([[0.0, 0.0, 1.0]]), np.zeros(1)),
     ],
 )
 def test_a_wrong_answer_is_named(answer) -> None:
     scene = by_source(ball(), lambda pose_i, pose_j: answer)
     with pytest.raises(SphshellError, match="mine"):
         scene.external_forces(*START)
+
+
+def test_empty_lists_are_no_contacts() -> None:
+    scene = by_source(ball(), lambda pose_i, pose_j: ([], [], []))
+    assert len(scene.contacts(*START)) == 0
 
 
 def test_unknown_frames() -> None:

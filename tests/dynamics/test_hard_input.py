@@ -1,11 +1,13 @@
 """Runs that are easy to get wrong: crowded contacts, callbacks that throw, odd models and times."""
 
+import warnings
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import Interrupted, InvalidParameter
+from sphshell_pin.errors import Interrupted, InvalidParameter, UnitWarning
 from tests import meshes
 
 
@@ -103,3 +105,15 @@ def test_one_sided_open_shells_are_warned_of() -> None:
     q = pin.neutral(scene.model)
     q[2] = 0.2
     assert any("one-sided" in warning for warning in scene.explain(q).warnings)
+
+
+def test_millimetres_taken_for_metres_are_suspected() -> None:
+    scene = sp.Scene(ball_model())
+    vertices, elements = meshes.grid_plate()
+    large = sp.Shell(1000 * vertices, elements, name="plate")
+    with pytest.warns(UnitWarning, match="'plate'.*unit='mm'"):
+        scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=large)
+    assert any("unit='mm'" in warning for warning in scene.explain().warnings)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=sp.Shell(vertices, elements))

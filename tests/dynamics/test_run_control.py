@@ -283,8 +283,10 @@ def test_an_error_in_a_controller_comes_through() -> None:
     def controller(t, q, v, contacts):
         raise LookupError("no torque today")
 
-    with pytest.raises(LookupError, match="no torque today"):
+    with pytest.raises(LookupError, match="no torque today") as caught:
         bouncing().run(*START, 0.1, controller, control_dt=1e-2)
+    (note,) = caught.value.__notes__
+    assert "raised by the controller at t = 0 s (test_run_control.py:controller, line " in note
 
 
 def test_a_controller_of_the_wrong_size_is_named() -> None:

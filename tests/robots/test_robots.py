@@ -59,6 +59,17 @@ def test_without_the_library_own_robots_still_load(monkeypatch):
 
 
 @pytest.mark.robots
+def test_of_many_known_names_the_nearest_are_told():
+    pytest.importorskip("example_robot_data")
+    with pytest.raises(NameNotFound) as caught:
+        robots.load("pnda")
+    count = len(robots.names())
+    assert "no robot 'pnda'; the nearest are panda, " in str(caught.value)
+    assert f"has {count}: see sphshell-pin list" in str(caught.value)
+    assert len(caught.value.valid) == count
+
+
+@pytest.mark.robots
 @pytest.mark.parametrize(
     ("name", "count", "radius"),
     [("allegro_right_hand", 4, 0.012), ("a1", 4, 0.02), ("panda", 1, 0.012), ("ur5", 1, 0.012)],
@@ -78,5 +89,5 @@ def test_a_robot_this_machine_cannot_read_is_told_in_a_sentence():
     pytest.importorskip("example_robot_data")
     if hasattr(pin, "buildModelFromSdf"):
         pytest.skip("this pinocchio reads SDF files")
-    with pytest.raises(robots.RobotError, match="cassie"):
+    with pytest.raises(robots.RobotError, match=r"cassie.*wheel of pinocchio has no SDF reader"):
         robots.load("cassie")

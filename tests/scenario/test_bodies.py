@@ -91,13 +91,28 @@ def test_a_continuous_joint_takes_an_angle(tmp_path):
 
 
 FAULTS = {
-    "unknown joint": ("knuckle = 0.3", "nuckle = 0.3", 'robot[0].start."nuckle"', "knuckle"),
-    "unknown joint in speed": ("knuckle = 1.5", "x = 1", 'robot[0].speed."x"', "knuckle"),
-    "unknown joint to lock": ('["middle_joint"]', '["x"]', "robot[0].lock[0]", "distal_joint"),
-    "number for a free-flyer": ("[1, 2, 3, 0, 0, 0.6, 0.8]", "1", "robot[1].start", "list of 7"),
-    "short list": ("[1, 2, 3, 4, 5, 6]", "[1, 2]", 'robot[1].speed."root_joint"', "6 numbers"),
-    "no unit quaternion": ("0.6, 0.8]", "0, 0.5]", "robot[1]", "its length is"),
-    "unknown robot": ('"ball"', '"bal"', "robot[1]", "turntable"),
+    "unknown joint": (
+        "knuckle = 0.3",
+        "nuckle = 0.3",
+        'robot.three_link_finger.start."nuckle"',
+        "knuckle",
+    ),
+    "unknown joint in speed": (
+        "knuckle = 1.5",
+        "x = 1",
+        'robot.three_link_finger.speed."x"',
+        "knuckle",
+    ),
+    "unknown joint to lock": (
+        '["middle_joint"]',
+        '["x"]',
+        "robot.three_link_finger.lock[0]",
+        "distal_joint",
+    ),
+    "number for a free-flyer": ("[1, 2, 3, 0, 0, 0.6, 0.8]", "1", "robot.ball.start", "list of 7"),
+    "short list": ("[1, 2, 3, 4, 5, 6]", "[1, 2]", 'robot.ball.speed."root_joint"', "6 numbers"),
+    "no unit quaternion": ("0.6, 0.8]", "0, 0.5]", "robot.ball.start", "its length is"),
+    "unknown robot": ('"ball"', '"bal"', "robot.bal", "ball"),
     "same label": ('"ball"', '"three_link_finger"\nlabel = "three_link_finger"', "robot[1]", ""),
     "no such urdf": ('name = "ball"', 'urdf = "b.urdf"', "robot[1]", "no such URDF file"),
 }

@@ -120,16 +120,21 @@ duration = 1
 
 PD = '[controller]\ntype = "joint-pd"\nkp = {}\nkd = 1\nq_ref = {}\n[run]'
 FAULTS = {
-    "frame": ('frame = "ball"', 'frame = "bal"', "contact[0]", "root_joint"),
-    "shell": ('shell = "plate"', 'shell = "plaet"', "contact[0].shell", "plate"),
-    "shell's frame": ("placement =", 'frame = "x"\nplacement =', "contact[0]", "universe"),
+    "frame": ('frame = "ball"', 'frame = "bal"', "contact.ball-plate", "root_joint"),
+    "shell": ('shell = "plate"', 'shell = "plaet"', "contact.ball-plate.shell", "plate"),
+    "shell's frame": ("placement =", 'frame = "x"\nplacement =', "contact.ball-plate", "universe"),
     "surface": (
         'primitive = { type = "box", size = [0.2, 0.2, 0.02] }',
         'file = "none.stl"',
-        "shell[0]",
+        "shell.plate",
         "none.stl",
     ),
-    "flat box": ("[0.2, 0.2, 0.02]", "[0.2, 0.2, -0.02]", "shell[0].primitive.size[2]", "greater"),
+    "flat box": (
+        "[0.2, 0.2, 0.02]",
+        "[0.2, 0.2, -0.02]",
+        "shell.plate.primitive.size[2]",
+        "greater",
+    ),
     "kp's length": ("[run]", PD.format("[1, 2]", "{}"), "controller.kp", "6 numbers"),
     "q_ref's length": ("[run]", PD.format("1", "[1]"), "controller.q_ref", "7 numbers"),
     "controller's frame": (
@@ -144,7 +149,7 @@ FAULTS = {
     "source": (
         "[run]",
         '[[source]]\nname = "s"\nfind = "a.py:b"\nframe_i = "ball"\nlaw.type = "adams"\n[run]',
-        "source[0].find",
+        "source.s.find",
         "no such file",
     ),
 }

@@ -17,16 +17,41 @@ FAULTS = {
         "ruin",
         ["did you mean 'run'", "controller"],
     ),
-    "unknown key in a law": ("stiffness", "stifness", "contact[0].law.stifness", ["'stiffness'"]),
-    "unknown type": ('"impact"', '"impct"', "contact[0].law", ["impct", "hertz", "hunt-crossley"]),
-    "no type": ('type = "impact", ', "", "contact[0].law", ["type is missing", "hunt-crossley"]),
-    "unknown choice": ("[[contact]]", 'side = "up"\n[[contact]]', "shell[0].side", ["'inside'"]),
-    "negative": ("1e6", "-1e6", "contact[0].law.stiffness", ["greater than 0", "-1000000.0"]),
-    "not a number": ("1e6", "nan", "contact[0].law.stiffness", ["finite"]),
-    "text for a number": ("1e6", '"stiff"', "contact[0].law.stiffness", ["number", "'stiff'"]),
+    "unknown key in a law": (
+        "stiffness",
+        "stifness",
+        "contact.ball-plate.law.stifness",
+        ["'stiffness'"],
+    ),
+    "unknown type": (
+        '"impact"',
+        '"impct"',
+        "contact.ball-plate.law",
+        ["impct", "hertz", "hunt-crossley"],
+    ),
+    "no type": (
+        'type = "impact", ',
+        "",
+        "contact.ball-plate.law",
+        ["type is missing", "hunt-crossley"],
+    ),
+    "unknown choice": ("[[contact]]", 'side = "up"\n[[contact]]', "shell.plate.side", ["'inside'"]),
+    "negative": (
+        "1e6",
+        "-1e6",
+        "contact.ball-plate.law.stiffness",
+        ["greater than 0", "-1000000.0"],
+    ),
+    "not a number": ("1e6", "nan", "contact.ball-plate.law.stiffness", ["finite"]),
+    "text for a number": (
+        "1e6",
+        '"stiff"',
+        "contact.ball-plate.law.stiffness",
+        ["number", "'stiff'"],
+    ),
     "missing": ("duration = 0.05", "", "run.duration", ["is missing"]),
     "no source": ('name = "ball"\n', "", "robot[0]", ["either name", "or urdf"]),
-    "two sources": ('name = "plate"', 'name = "p"\nfile = "x"', "shell[0]", ["file or primitive"]),
+    "two sources": ('name = "plate"', 'name = "p"\nfile = "x"', "shell.p", ["file or primitive"]),
     "not a table": ("[run]", "[expect]\nx = 1\n[run]", "expect.x", ["must be a table"]),
     "no tolerance": (
         "[run]",
@@ -40,7 +65,7 @@ FAULTS = {
         "controller.kp",
         ["number"],
     ),
-    "short vector": ("[0, 0, -0.01]", "[0, 0]", "shell[0].placement.xyz", ["at least 3"]),
+    "short vector": ("[0, 0, -0.01]", "[0, 0]", "shell.plate.placement.xyz", ["at least 3"]),
 }
 
 
@@ -95,6 +120,22 @@ def test_changes_by_dotted_key(tmp_path):
     assert scenario.robot[0].name == "turntable"
     assert scenario.shell[0].side == "outside"
     assert scenario.controller.type == "gravity-compensation"
+
+
+@pytest.mark.parametrize("table", ["[robot]", "[[robot]]"])
+def test_a_key_as_a_fault_tells_it_may_be_set(table, tmp_path):
+    path = write(tmp_path, DROP.replace("[robot]", table).replace('name = "ball"', 'name = "a.b"'))
+    with pytest.raises(ScenarioError) as caught:
+        read_scenario(path, {"robot.a.b.free_flyer": "5"})
+    assert caught.value.key == "robot.a.b.free_flyer"
+
+
+def test_items_of_one_name_are_told_by_their_index(tmp_path):
+    twice = DROP[DROP.index("[[shell]]") : DROP.index("[[contact]]")]
+    path = write(tmp_path, DROP + twice.replace("0.02]", "-1]"))
+    with pytest.raises(ScenarioError) as caught:
+        read_scenario(path)
+    assert caught.value.key == "shell[1].primitive.size[2]"
 
 
 def test_changes_that_fit_nowhere(tmp_path):

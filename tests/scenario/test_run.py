@@ -11,7 +11,13 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, SimulationDiverged
+from sphshell_pin.errors import (
+    DeepStart,
+    Interrupted,
+    ResultError,
+    ScenarioError,
+    SimulationDiverged,
+)
 from sphshell_pin.scenario import build, run_built, run_scenario
 from sphshell_pin.scenario.figures import figure_names, measure
 from tests.scenario.files import DROP, write
@@ -90,8 +96,11 @@ def test_without_the_view_packages_the_rest_is_written(built, tmp_path, monkeypa
         assert "sphshell-pin[view]" in note
 
 
-@pytest.mark.parametrize("fault", [Interrupted, SimulationDiverged])
-def test_what_was_computed_until_then_is_written(fault, built, tmp_path, monkeypatch):
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def stop_early(monkeypatch, fault=SimulationDiverged):
     real = sp.Simulation.run
 
     def stop(self, q0, v0, duration, *args, **kwargs):
@@ -100,10 +109,108 @@ def test_what_was_computed_until_then_is_written(fault, built, tmp_path, monkeyp
         raise fault(*details)
 
     monkeypatch.setattr(sp.Simulation, "run", stop)
+
+
+@pytest.mark.parametrize("fault", [Interrupted, SimulationDiverged])
+def test_what_was_computed_until_then_is_written(fault, built, tmp_path, monkeypatch):
+    stop_early(monkeypatch, fault)
     report = run_built(built, tmp_path / "out", recording=False)
     assert isinstance(report.stopped, fault)
     assert sp.Result.load(tmp_path / "out" / "run.npz").t[-1] == pytest.approx(0.025)
     assert not json.loads((tmp_path / "out" / "summary.json").read_text())["complete"]
+
+
+@pytest.mark.parametrize("fault", [Interrupted, SimulationDiverged])
+def test_a_run_that_stops_early_spares_complete_results(fault, built, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    run_built(built, out, recording=False)
+    (out / "recording.html").write_text("of the complete run")
+    (out / "notes.txt").write_text("mine")
+    before = contents(out)
+    stop_early(monkeypatch, fault)
+    for _ in range(2):  # partial results give way to later partial ones
+        report = run_built(built, out, recording=False)
+        assert report.folder == out / "stopped"
+        assert contents(out) == before
+        assert sp.Result.load(out / "stopped" / "run.npz").t[-1] == pytest.approx(0.025)
+        assert any("earlier run" in note for note in report.notes)
+    monkeypatch.undo()
+    assert run_built(built, out, recording=False).folder == out
+    assert json.loads((out / "summary.json").read_text())["complete"]
+    assert (out / "notes.txt").read_text() == "mine"
+
+
+def test_partial_results_are_replaced_in_place(built, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    stop_early(monkeypatch)
+    assert run_built(built, out, recording=False).folder == out
+    assert run_built(built, out, recording=False).folder == out
+    monkeypatch.undo()
+    assert run_built(built, out, recording=False).folder == out
+    assert not (out / "stopped").exists()
+
+
+def test_results_without_a_summary_count_as_complete(built, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "run.npz").write_text("somebody's")
+    stop_early(monkeypatch)
+    assert run_built(built, out, recording=False).folder == out / "stopped"
+    assert contents(out) == {"run.npz": b"somebody's"}
+
+
+@pytest.mark.parametrize("fault", [OSError(5, "Input/output error"), KeyboardInterrupt()])
+@pytest.mark.parametrize("after", range(1, 12))
+def test_a_break_half_way_leaves_one_runs_files(fault, after, built, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    run_built(built, out, recording=False)
+    (out / "recording.html").write_text("of the first run")
+    before = contents(out)
+    changed = build(built.path, {"run.duration": "0.02"})
+    real, count = os.replace, 0
+
+    def replace(*paths):
+        nonlocal count
+        count += 1
+        if count == after:
+            raise fault
+        real(*paths)
+
+    monkeypatch.setattr("sphshell_pin.scenario.run.os.replace", replace)
+    with pytest.raises((ResultError, KeyboardInterrupt)):
+        run_built(changed, out, recording=False)
+    assert contents(out) == before
+    assert set(os.listdir(out)) == set(before)
+
+
+def test_a_refused_start_leaves_no_folder(tmp_path):
+    deep = build(write(tmp_path), {"robot.start.root_joint": "[0.01, 0.02, 0.0, 0, 0, 0, 1]"})
+    with pytest.raises(DeepStart):
+        run_built(deep, tmp_path / "a" / "b")
+    assert not (tmp_path / "a").exists()
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(DeepStart):
+        run_built(deep, tmp_path / "mine")
+    assert (tmp_path / "mine").is_dir()
+
+
+def test_a_figure_that_fails_costs_no_numbers(built, tmp_path, monkeypatch):
+    def fail(*_, **__):
+        raise ZeroDivisionError("no axis")
+
+    monkeypatch.setattr("sphshell_pin.plot.save_figures", fail)
+    report = run_built(built, tmp_path / "out", recording=False)
+    assert [file.name for file in report.files] == ["run.npz", "contacts.csv", "summary.json"]
+    assert any("ZeroDivisionError: no axis" in note for note in report.notes)
+
+
+def test_a_figure_of_ones_own_that_fails_is_told_after_the_writing(tmp_path):
+    (tmp_path / "own.py").write_text("def wrong(result, scene):\n    return 1 / 0\n")
+    text = DROP + '[figures]\nw = "own.py:wrong"\n[expect]\n"figures.w" = { min = 1 }\n'
+    with pytest.raises(ZeroDivisionError) as caught:
+        run_scenario(write(tmp_path, text), tmp_path / "out", recording=False)
+    assert "figure 'w' (own.py:wrong, line 2)" in caught.value.__notes__[0]
+    assert (tmp_path / "out" / "run.npz").is_file()
 
 
 def test_a_recording_of_another_run_does_not_stay(built, tmp_path):
