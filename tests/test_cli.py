@@ -14,6 +14,11 @@ from typer.testing import CliRunner
 from sphshell_pin.cli import app
 from tests.scenario.files import DROP, write
 
+# Tests that run in the background pass on that Ctrl-C is to be ignored.
+HEARS_CTRL_C = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from sphshell_pin.cli import main; main()"
+)
 ENTRY = [sys.executable, "-c", "from sphshell_pin.cli import main; main()"]
 
 
@@ -233,7 +238,10 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
     out = tmp_path / "out"
     arguments = ["run", str(path), "--out", str(out), "--no-recording", "--dt", "1e-6"]
     process = subprocess.Popen(
-        [*ENTRY, *arguments], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", HEARS_CTRL_C, *arguments],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
     )
     # The folder appears just before the run starts.
     deadline = time.monotonic() + 30

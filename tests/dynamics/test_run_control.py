@@ -81,7 +81,10 @@ def test_a_controller_that_answers_nan_stops_the_run() -> None:
 
 
 CTRL_C = """
+import signal
 import sys
+# Tests that run in the background pass on that Ctrl-C is to be ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.path.insert(0, {root!r})
 from tests.dynamics.test_run_control import START, bouncing
 from sphshell_pin.errors import Interrupted
