@@ -1,6 +1,9 @@
-"""The surface and the sphere positions of the speed measurements."""
+"""The surfaces and the sphere positions of the measurements."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,3 +37,75 @@ def touching_centres(count: int, size: float, radius: float, depth: float) -> Ar
     normal = np.c_[-slope_x, -slope_y, np.ones(count)]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     return np.c_[xy, height(x, y)] + normal * (radius - depth)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Vertices (n, 3) [m], triangles (m, 3) and the exact outward unit normals (n, 3)."""
+
+    vertices: Array
+    triangles: NDArray[np.int32]
+    normals: Array
+
+    @property
+    def mean_side(self) -> float:
+        """Mean length of the sides [m]."""
+        corners = self.vertices[self.triangles]
+        return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+
+
+def icosphere(level: int, radius: float) -> Mesh:
+    """Return a sphere [m] of 20 * 4^level triangles: an icosahedron, halved `level` times."""
+    golden = (1 + 5**0.5) / 2
+    vertices = np.array(
+        [np.roll([0.0, a, b * golden], k) for k in range(3) for a in (-1, 1) for b in (-1, 1)]
+    )
+    apart = np.linalg.norm(vertices[:, None] - vertices, axis=2)
+    triples = combinations(range(12), 3)
+    triangles = np.array([t for t in triples if apart[np.ix_(t, t)].max() < 2.1])
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
+    triangles[inward] = triangles[inward, ::-1]
+    for _ in range(level):
+        sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        halved, middle = np.unique(sides, axis=0, return_inverse=True)
+        ab, bc, ca = (len(vertices) + middle.reshape(-1, 3)).T
+        vertices = np.concatenate([vertices, vertices[halved].mean(axis=1)])
+        a, b, c = triangles.T
+        quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        triangles = np.concatenate([np.stack(q, axis=1) for q in quarters])
+        vertices /= np.linalg.norm(vertices, axis=1)[:, None]
+    vertices /= np.linalg.norm(vertices, axis=1)[:, None]
+    return Mesh(radius * vertices, triangles.astype(np.int32), vertices)
+
+
+def on_torus(ring: float, tube: float, along: Array, around: Array) -> tuple[Array, Array]:
+    """Return points (n, 3) of a torus round z [m] and their outward unit normals (n, 3)."""
+    out = np.c_[np.cos(along), np.sin(along), np.zeros(len(along))]
+    normals = np.cos(around)[:, None] * out
+    normals[:, 2] = np.sin(around)
+    return ring * out + tube * normals, normals
+
+
+def torus(ring: float, tube: float, side: float) -> Mesh:
+    """Return a closed torus round z [m] of triangles with sides of about `side` [m].
+
+    Vertices are moved by up to a fifth of a cell and diagonals drawn at random, so that no
+    symmetry of the mesh cancels an error.
+    """
+    rng = np.random.default_rng(1)
+    rows, columns = (max(6, round(2 * np.pi * length / side)) for length in (ring, tube))
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"))
+    moved_i, moved_j = (k + rng.uniform(-0.2, 0.2, len(k)) for k in (i, j))
+    turn = 2 * np.pi
+    vertices, normals = on_torus(ring, tube, turn * moved_i / rows, turn * moved_j / columns)
+    next_i, next_j = (i + 1) % rows, (j + 1) % columns
+    a, b = i * columns + j, next_i * columns + j
+    c, d = next_i * columns + next_j, i * columns + next_j
+    first = rng.random(len(a)) < 0.5
+    halves = (
+        np.where(first, [a, b, c], [a, b, d]),
+        np.where(first, [a, c, d], [b, c, d]),
+    )
+    triangles = np.concatenate([half.T for half in halves]).astype(np.int32)
+    return Mesh(vertices, triangles, normals)

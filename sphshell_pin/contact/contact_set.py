@@ -26,10 +26,11 @@ class Method(IntEnum):
 
     FACETS = 0
     ELEMENTS = 1
+    SMOOTH = 2
 
     @classmethod
     def from_name(cls, name: str) -> Method:
-        """Look up "facets" or "elements"; NameNotFound lists the valid ones."""
+        """Look up "facets", "elements" or "smooth"; NameNotFound lists the valid ones."""
         for method in cls:
             if method.name.lower() == name:
                 return method

@@ -71,7 +71,7 @@ class ContactPair:
             joint_j=self.joint_j,
             placement_j=self.shell_placement.homogeneous,
             radius=0.0 if self.sphere is None else self.sphere.radius,
-            shell=None if self.shell is None else self.shell.core,
+            shell=None if self.shell is None else self.shell.core_for(self.method),
             source=None if self.find is None else checked_source(self.find, self.name),
             method=int(Method.from_name(self.method)),
             law=self.law.core,
@@ -178,8 +178,8 @@ class Scene:
         """Let `sphere` touch `shell`, which is placed at `placement` in `frame`.
 
         Without `law` the contact has ADAMS's default IMPACT law, without `friction` none; `method`
-        is "facets" (default) or "elements". Returns the pair. A shell a thousand times larger than
-        the sphere or the robot earns a UnitWarning.
+        is "facets" (default), "smooth" or "elements". Returns the pair. A shell a thousand times
+        larger than the sphere or the robot earns a UnitWarning.
         """
         check_type("sphere", sphere, Sphere, "must be a Sphere(radius, frame)")
         check_type("shell", shell, Shell, "must be a Shell (of a file: Shell.from_file)")

@@ -220,7 +220,7 @@ class ContactSection(Section):
     name: str
     sphere: SphereSection
     shell: str
-    method: Literal["facets", "elements"] | None = None
+    method: Literal["facets", "smooth", "elements"] | None = None
     law: Law
     friction: Friction = NoFriction(type="none")
 

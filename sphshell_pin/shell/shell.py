@@ -61,8 +61,8 @@ class Shell(Topology):
         of lists for polygons of any size
     normals : unit normals per vertex (n, 3) or per element corner (m, 3 or 4, 3), or None
     crease_angle : edges that turn by less are smooth [rad], and smooth edges join elements to a
-        patch; 0 leaves smooth only the edges within a plane. It sets edge classes and patches and
-        changes no contact and no force: elements are flat and exact at any angle
+        patch; 0 leaves smooth only the edges within a plane and every element flat. It matters to
+        the method "smooth"; "facets" and "elements" are flat and exact at any angle
     side : where spheres may be: "both", "outside" (where the winding's normals point), "inside"
     name : how messages call it
     clean : False takes the elements as they are: no welding, no repair, no reorientation
@@ -235,8 +235,9 @@ class Shell(Topology):
         ----------
         center : (3,) of the sphere, in the shell's frame [m]
         radius : of the sphere [m]
-        method : "facets" (each true feature of the polyhedron once) or "elements" (every touched
-            element by itself, as ADAMS's SPHSHL3 has it: counts shared edges twice)
+        method : "facets" (each true feature of the polyhedron once), "smooth" (elements curved to
+            meet the vertex normals, each minimum of a smooth patch once) or "elements" (every
+            touched element by itself, as ADAMS's SPHSHL3 has it: counts shared edges twice)
 
         Raises
         ------
@@ -247,7 +248,7 @@ class Shell(Topology):
 
         centre = check_vector("center", center, 3, " [m]")
         radius = check_positive("radius", radius, "m")
-        found = self.core.contacts(centre, radius, int(Method.from_name(method)))
+        found = self.core_for(method).contacts(centre, radius, int(Method.from_name(method)))
         point, normal, depth, element, feature = found
         patch = self.element_patch[element]
         columns = (read_only(c) for c in (point, normal, depth, element, patch, feature))
@@ -293,10 +294,19 @@ class Shell(Topology):
             k = int(wrong[0])
             raise InvalidParameter(f"radii[{k}]", float(sizes[k]), "must be positive [m]")
         workers = thread_count(threads)
-        depth, count = self.core.contacts_batch(
+        depth, count = self.core_for(method).contacts_batch(
             places, sizes, int(Method.from_name(method)), workers
         )
         return depth, count
+
+    def core_for(self, method: str) -> _core.Shell:
+        """Return the compiled surface, with curved elements if `method` is "smooth"."""
+        if method == "smooth":
+            # With no smooth edges every element is flat, whatever normals came with it.
+            given = self.normals if self.crease_angle > 0 else None
+            self.core.curve(None if given is None else given.reshape(-1, 3))
+        core: _core.Shell = self.core
+        return core
 
     def closest_points(self, points: npt.ArrayLike, threads: int | None = 1) -> ClosestPoints:
         """Project points (n, 3) [m] of the shell's frame on the surface.

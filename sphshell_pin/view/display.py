@@ -127,14 +127,16 @@ class Display:
         return node
 
     def _draw_shells(self) -> None:
-        drawn: dict[tuple[int, int, bytes], Any] = {}
+        drawn: dict[tuple[int, int, bytes, bool], Any] = {}
         for index, pair in enumerate(self.scene.pairs):
             if pair.shell is None:
                 continue
-            key = (id(pair.shell), pair.joint_j, pair.shell_placement.homogeneous.tobytes())
+            place = pair.shell_placement.homogeneous.tobytes()
+            curved = pair.method == "smooth"
+            key = (id(pair.shell), pair.joint_j, place, curved)
             if key not in drawn:
                 node = self.visualizer["shells"][f"{len(drawn)}_{node_name(pair.shell.name)}"]
-                draw_shell(node, pair.shell, len(drawn))
+                draw_shell(node, pair.shell, len(drawn), curved=curved)
                 self._placed.append(_Placed(node, pair.joint_j, pair.shell_placement))
                 drawn[key] = node
             self._shell_nodes[index] = drawn[key]

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 SURFACE_COLORS = (0x7FA8A0, 0xC4A878, 0x9A94C0, 0xB58C8C)
 EDGE_COLOR = 0x22302E
 MOST_OUTLINED_EDGES = 60_000
+# Curved elements are drawn finely up to the first number, and not curved beyond the second: there
+# the flat ones look the same.
+MOST_FINELY_CURVED = 3_000
+MOST_CURVED = 20_000
 
 
 def split_at_creases(shell: Shell) -> tuple[FloatArray, IntArray]:
@@ -47,9 +51,40 @@ def outlined_edges(shell: Shell) -> IntArray:
     return sharp
 
 
-def draw_shell(visualizer: Any, shell: Shell, index: int) -> None:
-    """Draw `shell` in its own frame below `visualizer`; `index` chooses its colour."""
-    vertices, triangles = split_at_creases(shell)
+def curved_surface(shell: Shell) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
+    """Return the curved elements of the method "smooth" as fine triangles, and their outlines.
+
+    Vertices (n, 3) [m], triangles (t, 3), points of the outlines (p, 3) [m], segments (s, 2).
+    """
+    from sphshell_pin.shell.curved import curved_mesh
+
+    divisions = 6 if len(shell.triangles) <= MOST_FINELY_CURVED else 2
+    points, triangles, owner = curved_mesh(shell, divisions)
+    # Points of one patch at one place become one, for the page to average their normals.
+    patch = np.asarray(shell.element_patch)[np.asarray(shell.triangle_element)][owner]
+    grid = np.round(points / (1e-7 * shell.size)).astype(np.int64)
+    of_point = np.zeros(len(points), np.int64)
+    of_point[triangles] = patch[:, None]
+    keys = np.column_stack((of_point, grid))
+    _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    vertices, corners = points[first], number.reshape(-1)[triangles]
+    # A border of an element is a chain of small edges that no second small triangle of it has.
+    small = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, count = np.unique(small, axis=0, return_counts=True)
+    return vertices, corners, points, edges[count == 1]
+
+
+def draw_shell(visualizer: Any, shell: Shell, index: int, *, curved: bool = False) -> None:
+    """Draw `shell` in its own frame below `visualizer`; `index` chooses its colour.
+
+    With `curved` the elements are drawn as the method "smooth" touches them.
+    """
+    curved = curved and len(shell.triangles) <= MOST_CURVED
+    if curved:
+        vertices, triangles, outline, edges = curved_surface(shell)
+    else:
+        vertices, triangles = split_at_creases(shell)
+        outline, edges = np.asarray(shell.vertices), outlined_edges(shell)
     # The surface is pushed back a little, so that lines on it are not drawn half inside it.
     look = material(
         "MeshPhong",
@@ -61,11 +96,10 @@ def draw_shell(visualizer: Any, shell: Shell, index: int) -> None:
         polygonOffsetUnits=1.0,
     )
     set_object(visualizer["surface"], triangle_mesh(vertices, triangles), look)
-    edges = outlined_edges(shell)
     if len(edges):
         # The finer the mesh, the lighter its lines, so that the surface stays visible.
-        opacity = float(np.clip(5.0 / np.sqrt(len(edges)), 0.10, 0.45))
-        lines = line_segments(np.asarray(shell.vertices), edges)
+        opacity = float(np.clip(5.0 / np.sqrt(len(shell.edge_vertices)), 0.10, 0.45))
+        lines = line_segments(outline, edges)
         set_object(
             visualizer["elements"],
             lines,

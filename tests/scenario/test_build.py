@@ -163,3 +163,33 @@ def test_faults_name_the_key(fault, tmp_path):
         build(write(tmp_path, DROP.replace(old, new, 1)))
     assert caught.value.key == key
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("method", ["facets", "smooth", "elements"])
+def test_methods(method, tmp_path):
+    built = build(write(tmp_path, DROP.replace(LAW_LINE, f'method = "{method}"\n{LAW_LINE}')))
+    (pair,) = built.scene.pairs
+    assert pair.method == method
+    assert len(built.scene.contacts(built.q0, built.v0)) == 0
+    built.q0[2] = 0.0119
+    contacts = built.scene.contacts(built.q0, built.v0)
+    np.testing.assert_allclose(contacts.depth, [1e-4], rtol=1e-9)
+
+
+def test_a_smooth_bowl_touches_once_where_a_faceted_one_pushes_twice(tmp_path):
+    box = 'primitive = { type = "box", size = [0.2, 0.2, 0.02] }'
+    ball = 'primitive = { type = "sphere", radius = 0.1 }\nsegments = 64'
+    text = DROP.replace(box, ball).replace("-0.01]", "0.0]")
+    counts = {}
+    for method in ("facets", "smooth"):
+        lines = f'method = "{method}"\n{LAW_LINE}'
+        built = build(write(tmp_path, text.replace(LAW_LINE, lines), f"{method}.toml"))
+        built.q0[:3] = [0.0, 0.0, -0.0884]  # 0.4 mm deep in the pole of a sphere, R = 100 mm
+        counts[method] = len(built.scene.contacts(built.q0, built.v0))
+    assert counts["smooth"] == 1 < counts["facets"]
+
+
+def test_an_unknown_method_is_answered_with_the_valid_ones(tmp_path):
+    text = DROP.replace(LAW_LINE, f'method = "smoth"\n{LAW_LINE}')
+    with pytest.raises(ScenarioError, match=r"'facets', 'smooth' or 'elements'"):
+        build(write(tmp_path, text))

@@ -160,8 +160,8 @@ def test_queries_check_their_arguments(shell):
     for center, radius in (([0, 0], 1.0), ([0, 0, np.nan], 1.0), ([0, 0, 0], 0.0), ([0, 0, 0], -1)):
         with pytest.raises(InvalidParameter):
             shell.contacts(center, radius)
-    with pytest.raises(SphshellError, match="facets, elements"):
-        shell.contacts([0, 0, 0], 1.0, method="smooth")
+    with pytest.raises(SphshellError, match="facets, elements, smooth"):
+        shell.contacts([0, 0, 0], 1.0, method="exact")
     with pytest.raises(InvalidParameter, match=r"radii\[1\]"):
         shell.contacts_batch(np.zeros((3, 3)), [1.0, 0.0, 1.0])
     with pytest.raises(InvalidParameter, match="radii"):

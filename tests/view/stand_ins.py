@@ -54,6 +54,7 @@ def contact_pair(model, frame, radius, shell, shell_frame="universe", placement=
         shell_placement=shell_body.placement * placement,
         joint_i=sphere_frame.parentJoint,
         joint_j=shell_body.parentJoint,
+        method="facets",
     )
 
 

@@ -1,12 +1,15 @@
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "bindings/arrays.hpp"
 #include "contact/query.hpp"
+#include "shell/curved.hpp"
 #include "shell/shell.hpp"
 
 #include <nanobind/eigen/dense.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
@@ -119,12 +122,35 @@ void bind_shell(nanobind::module_& m) {
   nb::class_<Shell>(m, "Shell")
       .def(nb::new_(&make_shell), nb::arg("vertices"), nb::arg("triangles"),
            nb::arg("triangle_element"), nb::arg("crease_angle"), nb::arg("side"))
+      .def(
+          "curve",
+          [](Shell& shell, std::optional<Points> normals) {
+            std::vector<Vec3> corners;
+            if (normals)
+              for (std::size_t i = 0; i < normals->shape(0); ++i)
+                corners.push_back(row(*normals, i));
+            nb::gil_scoped_release release;
+            shell.curve(std::move(corners));
+          },
+          nb::arg("normals").none())
       .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"))
       .def("contacts_batch", &contacts_batch, nb::arg("centers"), nb::arg("radii"),
            nb::arg("method"), nb::arg("threads"))
       .def("closest_points", &closest_points, nb::arg("points"), nb::arg("threads") = 1)
       .def_prop_ro("num_elements", &Shell::num_elements)
       .def_prop_ro("num_patches", [](const Shell& s) { return s.topology().num_patches; })
+      .def_prop_ro(
+          "bends",
+          [](const Shell& s) {
+            const std::size_t n = s.curved() ? s.triangles().size() : 0;
+            std::vector<double> out(9 * n);
+            for (std::size_t f = 0; f < n; ++f)
+              for (int k = 0; k < 3; ++k)
+                std::copy_n(s.curved()->facets()[f].bend[k].data(), 3,
+                            &out[9 * std::size_t(s.triangle_of_facet(int(f))) + 3 * k]);
+            return to_array(std::move(out), {n, 3, 3});
+          },
+          nb::rv_policy::automatic)
       .def_prop_ro("bytes", &Shell::bytes)
       .def_prop_ro(
           "element_patch", [](const Shell& s) { return to_array(s.topology().patch); },

@@ -5,82 +5,11 @@
 #include <numeric>
 #include <utility>
 
+#include "contact/regions.hpp"
+#include "shell/curved.hpp"
 #include "shell/triangle.hpp"
 
 namespace sphshell {
-namespace {
-
-// Round-off of a coordinate test, as a share of shell size + radius. Regions overlap by this much,
-// so that no position falls between two of them; what is claimed twice is then told apart.
-constexpr double kTolerance = 1e-14;
-// Two minima of the distance closer than this share of the radius are one.
-constexpr double kSamePoint = 1e-10;
-
-// Position of the sphere's centre against side k of a facet, in the facet's plane.
-struct SideTest {
-  bool beyond;                   // outside the side by more than round-off
-  bool not_within;               // outside it, round-off included
-  bool before, after;            // past the side's first, second end (round-off included)
-  bool past_first, past_second;  // ... by more than round-off
-  double t;                      // foot along the side, 0 to 1
-};
-
-inline SideTest test_side(const Facet& facet, int k, const Vec3& centre, double tolerance2) {
-  const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
-  const Vec3 from = centre - facet.corner[k];
-  const double length2 = edge.squaredNorm();
-  const double slack2 = tolerance2 * length2;
-  const double inward = facet.normal.dot(edge.cross(from));
-  const double along = from.dot(edge), left = length2 - along;
-  SideTest out;
-  const bool near_line = inward * inward <= slack2;
-  out.beyond = inward < 0 && !near_line;
-  out.not_within = inward <= 0 || near_line;
-  out.past_first = along < 0 && along * along > slack2;
-  out.past_second = left < 0 && left * left > slack2;
-  out.before = along <= 0 || along * along <= slack2;
-  out.after = left <= 0 || left * left <= slack2;
-  out.t = std::clamp(along / length2, 0.0, 1.0);
-  return out;
-}
-
-// True where the distance to the facet does not fall when one leaves its side k inward.
-inline bool side_holds(const Facet& facet, int k, const Vec3& centre, double tolerance2) {
-  const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
-  const double inward = facet.normal.dot(edge.cross(centre - facet.corner[k]));
-  return inward <= 0 || inward * inward <= tolerance2 * edge.squaredNorm();
-}
-
-bool edge_is_minimum(const Shell& shell, int code, const Vec3& centre, double tolerance2) {
-  if (code == kBoundary) return true;
-  const auto holds = [&](int h) {
-    return side_holds(shell.facets()[triangle_of(h)], side_of(h), centre, tolerance2);
-  };
-  if (code >= 0) return holds(code);
-  const std::vector<int>& all = shell.half_edges_of(kManifold - code);
-  return std::all_of(all.begin(), all.end(), holds);
-}
-
-bool vertex_is_minimum(const Shell& shell, int vertex, const Vec3& centre, double tolerance) {
-  const std::vector<Vec3>& p = shell.vertices();
-  const Topology& topology = shell.topology();
-  const Vec3 from = centre - p[vertex];
-  for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i) {
-    const Vec3 edge = p[topology.neighbours[i]] - p[vertex];
-    const double along = from.dot(edge);
-    if (along > 0 && along * along > tolerance * tolerance * edge.squaredNorm()) return false;
-  }
-  return true;
-}
-
-Vec3 direction(const Vec3& point, const Vec3& centre, const Vec3& if_equal) {
-  const Vec3 d = centre - point;
-  const double length = d.norm();
-  return length > 0 ? Vec3(d / length) : if_equal;
-}
-
-}  // namespace
-
 Query::Query(bool follow) : follow_(follow) {
   reached_.reserve(1024);
   near_.reserve(256);
@@ -94,10 +23,17 @@ Query::Query(bool follow) : follow_(follow) {
 const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& centre, double radius,
                                         Method method) {
   contacts.clear();
-  if (method == Method::Facets)
-    find_facets(shell, centre, radius);
-  else
-    find_elements(shell, centre, radius);
+  switch (method) {
+    case Method::Facets:
+      find_facets(shell, centre, radius);
+      break;
+    case Method::Elements:
+      find_elements(shell, centre, radius);
+      break;
+    case Method::Smooth:
+      find_smooth(shell, centre, radius);
+      break;
+  }
   return contacts;
 }
 
@@ -125,7 +61,8 @@ void Query::find_facets(const Shell& shell, const Vec3& centre, double radius) {
 }
 
 // Fills reached_ and near_, unless they still hold from an earlier call.
-void Query::gather(const Shell& shell, const Vec3& centre, double radius) {
+void Query::gather(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
+                   const Vec3& centre, double radius) {
   double margin = 0;
   if (follow_) {
     const bool same = followed_ == &shell && followed_radius_ == radius;
@@ -139,19 +76,18 @@ void Query::gather(const Shell& shell, const Vec3& centre, double radius) {
     anchor_ = centre;
     margin_ = margin;
   }
-  const NormalCone* cones = shell.cones().data();
   reached_.clear();
-  shell.bvh().near(centre, radius + margin, reached_, [cones](int first) {
+  shell.bvh().near(centre, radius + margin + bulge, reached_, [&cones](int first) {
     prefetch(&cones[first]);
     prefetch(&cones[first + 3]);
   });
-  keep_in_cone(shell, centre, radius, margin);
+  keep_in_cone(shell, cones, centre, radius, margin);
 }
 
 // Leaves in near_ the facets that may hold a contact: the centre, wherever within the margin, may
 // stand inside the cone of normals of the features that they decide about (Johnson and Cohen 2001).
-void Query::keep_in_cone(const Shell& shell, const Vec3& centre, double radius, double margin) {
-  const NormalCone* cones = shell.cones().data();
+void Query::keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones,
+                         const Vec3& centre, double radius, double margin) {
   const Facet* facets = shell.facets().data();
   const Vec3 local = centre - shell.origin();
   const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
@@ -177,7 +113,7 @@ void Query::collect_claims(const Shell& shell, const Vec3& centre, double radius
   const double tolerance2 = tolerance * tolerance;
   const double reach2 = radius * radius;
   const double wide_reach2 = reach2 * (1 + 1e-12);
-  gather(shell, centre, radius);
+  gather(shell, shell.cones(), 0, centre, radius);
   for (int f : near_) {
     const Facet& facet = shell.facets()[f];
     const double height = facet.normal.dot(centre - facet.corner[0]);
@@ -190,20 +126,20 @@ void Query::collect_claims(const Shell& shell, const Vec3& centre, double radius
     }
     if (inside) faces_.push_back({f});
     for (int k = 0; k < 3; ++k) {
-      if (facet.twin[k] != kNotMine && side[k].not_within && !side[k].past_first &&
+      if (facet.owned.twin[k] != kNotMine && side[k].not_within && !side[k].past_first &&
           !side[k].past_second) {
         const Vec3& a = facet.corner[k];
         const Vec3 foot = a + side[k].t * (facet.corner[next_corner(k)] - a);
         if ((centre - foot).squaredNorm() < reach2 &&
-            edge_is_minimum(shell, facet.twin[k], centre, tolerance2)) {
+            edge_is_minimum(shell, facet.owned.twin[k], centre, tolerance2)) {
           const Triangle& t = shell.triangles()[shell.triangle_of_facet(f)];
           edges_.push_back({f, k, t[k], t[next_corner(k)]});
         }
       }
-      if (facet.vertex[k] >= 0 && side[k].before && side[previous_corner(k)].after &&
+      if (facet.owned.vertex[k] >= 0 && side[k].before && side[previous_corner(k)].after &&
           (centre - facet.corner[k]).squaredNorm() < reach2 &&
-          vertex_is_minimum(shell, facet.vertex[k], centre, tolerance))
-        vertices_.push_back({f, facet.vertex[k]});
+          vertex_is_minimum(shell, facet.owned.vertex[k], centre, tolerance))
+        vertices_.push_back({f, facet.owned.vertex[k]});
     }
   }
 }
@@ -394,7 +330,7 @@ void Query::find_elements(const Shell& shell, const Vec3& centre, double radius)
     }
     return true;
   };
-  gather(shell, centre, radius);
+  gather(shell, shell.cones(), 0, centre, radius);
   for (int f : reached_) {
     const int t = shell.triangle_of_facet(f);
     const ClosestPoint at = closest(t);

@@ -9,7 +9,7 @@
 
 namespace sphshell {
 
-enum class Method : int { Facets = 0, Elements = 1 };
+enum class Method : int { Facets = 0, Elements = 1, Smooth = 2 };
 enum class Feature : std::uint8_t { Face = 0, Edge = 1, Vertex = 2 };
 
 struct Contact {
@@ -44,15 +44,25 @@ class Query {
   struct VertexClaim {
     int facet, vertex;
   };
+  // Where the centre's projection on a facet's plane falls.
+  struct Shadow {
+    int facet;
+    double height, outside[3], lean;  // above the plane; beyond each side; how far it may be [m]
+  };
   struct Carrier {
     Vec3 outward;  // pseudo-normal of the feature that carries a contact
     bool rim;      // on the border of an open sheet: no inside there
   };
 
   void find_facets(const Shell& shell, const Vec3& centre, double radius);
+  void find_smooth(const Shell& shell, const Vec3& centre, double radius);
   void find_elements(const Shell& shell, const Vec3& centre, double radius);
-  void gather(const Shell& shell, const Vec3& centre, double radius);
-  void keep_in_cone(const Shell& shell, const Vec3& centre, double radius, double margin);
+  void gather(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
+              const Vec3& centre, double radius);
+  void keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones, const Vec3& centre,
+                    double radius, double margin);
+  void claim_on_patches(const Shell& shell, const Vec3& centre, double radius, double tolerance);
+  void keep_one_per_minimum(const Shell& shell, double radius);
   void collect_claims(const Shell& shell, const Vec3& centre, double radius, double tolerance);
   void drop_claims_of_neighbours(const Shell& shell);
   void claims_to_contacts(const Shell& shell, const Vec3& centre, double radius);
@@ -75,6 +85,10 @@ class Query {
   std::vector<int> taken_vertices_, by_x_, at_point_;
   std::vector<char> dropped_;      // beside `contacts`
   std::vector<Carrier> carriers_;  // beside `contacts`, for one-sided shells only
+  std::vector<Shadow> over_;
+  std::vector<Contact> sorted_;
+  std::vector<Carrier> sorted_carriers_;
+  std::vector<int> carrier_face_;  // beside `contacts`: a planar face, or a code of smooth.cpp
 };
 
 }  // namespace sphshell

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "shell/curved.hpp"
 #include "shell/triangle.hpp"
 
 namespace sphshell {
@@ -14,6 +15,7 @@ Shell::Shell(std::vector<Vec3> vertices, std::vector<Triangle> triangles, std::v
     : vertices_(std::move(vertices)),
       triangles_(std::move(triangles)),
       element_(std::move(element)),
+      crease_angle_(crease_angle),
       side_(side),
       topology_(vertices_, triangles_, element_, crease_angle),
       bvh_(vertices_, triangles_, order_) {
@@ -25,58 +27,67 @@ Shell::Shell(std::vector<Vec3> vertices, std::vector<Triangle> triangles, std::v
 }
 
 void Shell::build_facets(const std::vector<int>& order) {
-  const Topology& topology = topology_;
+  for (const Edge& edge : topology_.edges) {
+    if (edge.count == 1 || (edge.count == 2 && edge.kind != EdgeClass::NonManifold)) continue;
+    manifold_.emplace_back();
+    for (int i = 0; i < edge.count; ++i)
+      manifold_.back().push_back(facet_half_edge(topology_.incidence[edge.begin + i]));
+  }
+  const std::vector<Owned> owned = assign_owners(
+      [&](int t, int u) { return topology_.planar_face[t] == topology_.planar_face[u]; });
   facets_.resize(order.size());
   for (std::size_t f = 0; f < order.size(); ++f) {
     const int t = order[f];
     Facet& facet = facets_[f];
     for (int k = 0; k < 3; ++k) facet.corner[k] = vertices_[triangles_[t][k]];
-    facet.normal = topology.face_normal[t];
-    facet.planar_face = topology.planar_face[t];
+    facet.normal = topology_.face_normal[t];
+    facet.owned = owned[f];
+    facet.planar_face = topology_.planar_face[t];
     facet.element = element_[t];
-    for (int k = 0; k < 3; ++k) facet.twin[k] = facet.vertex[k] = kNotMine;
   }
-  // Each edge and vertex is decided once, by one facet: the first triangle that has it.
+}
+
+// The first triangle that has an edge or a vertex decides about it.
+std::vector<Owned> Shell::assign_owners(const std::function<bool(int t, int u)>& flat) const {
+  constexpr Owned kNothing = {{kNotMine, kNotMine, kNotMine}, {kNotMine, kNotMine, kNotMine}};
+  std::vector<Owned> owned(triangles_.size(), kNothing);
   std::vector<char> taken(vertices_.size(), 0);
-  const auto half_edge = [&](int h) { return 3 * facet_of_[triangle_of(h)] + side_of(h); };
   const auto claim_vertex = [&](int h, int corner) {
     const int t = triangle_of(h), v = triangles_[t][corner];
     if (taken[v]) return;
     taken[v] = 1;
-    facets_[facet_of_[t]].vertex[corner] = v;
+    owned[facet_of_[t]].vertex[corner] = v;
   };
-  for (const Edge& edge : topology.edges) {
-    const int h = topology.incidence[edge.begin];
-    int& mine = facets_[facet_of_[triangle_of(h)]].twin[side_of(h)];
+  int many_sided = 0;
+  for (const Edge& edge : topology_.edges) {
+    const int h = topology_.incidence[edge.begin];
+    int& mine = owned[facet_of_[triangle_of(h)]].twin[side_of(h)];
     if (edge.count == 2 && edge.kind != EdgeClass::NonManifold) {
-      const int g = topology.incidence[edge.begin + 1];
-      if (topology.planar_face[triangle_of(h)] == topology.planar_face[triangle_of(g)]) continue;
-      mine = half_edge(g);
-    } else if (edge.count == 1) {
-      mine = kBoundary;
+      const int g = topology_.incidence[edge.begin + 1];
+      if (flat(triangle_of(h), triangle_of(g))) continue;
+      mine = facet_half_edge(g);
     } else {
-      mine = kManifold - static_cast<int>(manifold_.size());
-      manifold_.emplace_back();
-      for (int i = 0; i < edge.count; ++i)
-        manifold_.back().push_back(half_edge(topology.incidence[edge.begin + i]));
+      mine = edge.count == 1 ? kBoundary : kManifold - many_sided++;
     }
-    // A vertex inside a planar face has no edge that reaches this line, and needs no decision.
+    // A vertex inside a flat region has no edge that reaches this line, and needs no decision.
     claim_vertex(h, side_of(h));
     claim_vertex(h, next_corner(side_of(h)));
   }
+  return owned;
 }
 
 // Bound on the angle between `axis` and any direction u that points away from all edges at the
 // vertex. Seen along the axis the edges leave no gap wider than g, so one of them is within g/2 of
 // u's shadow; it rises by at most phi, hence tan(angle) <= tan(phi) / cos(g/2).
-double Shell::tan_vertex_cone(int vertex, const Vec3& axis) const {
+double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Vec3* tangents) const {
   constexpr double kAny = std::numeric_limits<double>::infinity();
   if (topology_.vertex_on_rim[vertex]) return kAny;
   const Vec3 first = axis.unitOrthogonal(), second = axis.cross(first);
   std::vector<double> bearing;
   double rise = 0;
   for (int i = topology_.neighbour_begin[vertex]; i < topology_.neighbour_begin[vertex + 1]; ++i) {
-    const Vec3 edge = vertices_[topology_.neighbours[i]] - vertices_[vertex];
+    const Vec3 edge =
+        tangents ? tangents[i] : Vec3(vertices_[topology_.neighbours[i]] - vertices_[vertex]);
     const double x = edge.dot(first), y = edge.dot(second), flat = std::hypot(x, y);
     if (flat == 0) return kAny;
     rise = std::max(rise, std::abs(edge.dot(axis)) / flat);
@@ -95,16 +106,16 @@ void Shell::build_cones() {
     const Facet& facet = facets_[f];
     double tangent = 0;
     for (int k = 0; k < 3; ++k) {
-      if (facet.twin[k] >= 0) {
-        const Vec3& other = facets_[triangle_of(facet.twin[k])].normal;
+      if (facet.owned.twin[k] >= 0) {
+        const Vec3& other = facets_[triangle_of(facet.owned.twin[k])].normal;
         const double cosine = facet.normal.dot(other);
         tangent = std::max(tangent, cosine > 0.05 ? facet.normal.cross(other).norm() / cosine
                                                   : std::numeric_limits<double>::infinity());
-      } else if (facet.twin[k] != kNotMine) {
+      } else if (facet.owned.twin[k] != kNotMine) {
         tangent = std::numeric_limits<double>::infinity();
       }
-      if (facet.vertex[k] >= 0)
-        tangent = std::max(tangent, tan_vertex_cone(facet.vertex[k], facet.normal));
+      if (facet.owned.vertex[k] >= 0)
+        tangent = std::max(tangent, tan_vertex_cone(facet.owned.vertex[k], facet.normal));
     }
     const Vec3 middle = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
     double reach = 0;
@@ -115,7 +126,7 @@ void Shell::build_cones() {
       cone.axis[k] = static_cast<float>(facet.normal[k]);
     }
     cone.reach = static_cast<float>(reach + 1e-6 * size_);
-    cone.tan_opening = tangent < 1e3 ? static_cast<float>(tangent * 1.00001 + 1e-6) : 1e9f;
+    cone.tan_opening = tangent < 1e3 ? static_cast<float>(tangent * 1.00001 + 1e-6) : kAnyOpening;
   }
 }
 
@@ -148,8 +159,13 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
   return {at.point, normal, sign * distance, facet.element};
 }
 
+void Shell::curve(std::vector<Vec3> normals) {
+  if (!curved_) curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals));
+}
+
 std::size_t Shell::bytes() const {
-  return bvh_.bytes() + facets_.size() * (sizeof(Facet) + sizeof(NormalCone)) +
+  const std::size_t curved = curved_ ? curved_->bytes() : 0;
+  return curved + bvh_.bytes() + facets_.size() * (sizeof(Facet) + sizeof(NormalCone)) +
          vertices_.size() * sizeof(Vec3) + topology_.incidence.size() * 2 * sizeof(int) +
          topology_.edges.size() * sizeof(Edge) + topology_.face_normal.size() * sizeof(Vec3);
 }

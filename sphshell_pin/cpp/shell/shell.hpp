@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "shell/bvh.hpp"
@@ -12,12 +14,22 @@ namespace sphshell {
 
 enum class Side : int { Both = 0, Outside = 1, Inside = 2 };
 
+// The edges and vertices about which one facet decides, so that each is decided about once.
+struct Owned {
+  int twin[3];    // across side k: a half-edge (3 facet + side) to test, or one of the codes below
+  int vertex[3];  // the vertex at corner k where this facet decides about it, else kNotMine
+};
+
+// Codes in Owned.
+constexpr int kNotMine = -1;   // another facet decides about this edge or vertex, or it is flat
+constexpr int kBoundary = -2;  // an edge with no other facet
+constexpr int kManifold = -3;  // kManifold - i: many-sided edge i (or ill-wound)
+
 // What a query reads of one triangle: two cache lines.
 struct alignas(64) Facet {
   Vec3 corner[3];
-  Vec3 normal;    // unit, that of the planar face it belongs to
-  int twin[3];    // across side k: a half-edge (3 facet + side) to test, or one of the codes below
-  int vertex[3];  // the vertex at corner k where this facet decides for it, else kNotMine
+  Vec3 normal;  // unit, that of the planar face it belongs to
+  Owned owned;
   int planar_face;  // facets of one planar face touch once
   int element;
 };
@@ -31,10 +43,8 @@ struct alignas(32) NormalCone {
 };
 static_assert(sizeof(NormalCone) == 32);
 
-// Codes in Facet::twin and Facet::vertex.
-constexpr int kNotMine = -1;   // another facet decides about this edge or vertex, or it is flat
-constexpr int kBoundary = -2;  // an edge with no other facet
-constexpr int kManifold = -3;  // kManifold - e: edge e with more than two facets (or ill-wound)
+// NormalCone::tan_opening where normals may point anywhere.
+constexpr float kAnyOpening = 1e9f;
 
 struct SurfacePoint {
   Vec3 point;
@@ -42,6 +52,8 @@ struct SurfacePoint {
   double distance;  // signed by that normal [m]
   int element;
 };
+
+class CurvedShell;
 
 class Shell {
  public:
@@ -61,21 +73,36 @@ class Shell {
   const Vec3& origin() const { return bvh_.origin(); }
   Side side() const { return side_; }
   int num_elements() const { return element_.empty() ? 0 : element_.back() + 1; }
+  double crease_angle() const { return crease_angle_; }  // [rad]
+
+  // Who decides about which edge and vertex, per facet; edges between two triangles for which
+  // flat(t, u) holds need no decision.
+  std::vector<Owned> assign_owners(const std::function<bool(int t, int u)>& flat) const;
+  // Bound on the tangent of the angle between `axis` and any direction that points away from all
+  // edges at the vertex; `tangents` (beside Topology::neighbours) replace the straight edges.
+  double tan_vertex_cone(int vertex, const Vec3& axis, const Vec3* tangents = nullptr) const;
+
+  // Curved elements, made when first asked for: unit normals per triangle corner, or none.
+  void curve(std::vector<Vec3> normals);
+  const CurvedShell* curved() const { return curved_.get(); }
+
   double size() const { return size_; }  // box diagonal [m]
 
   // For the rare edge with more than two facets: its half-edges in facet numbering.
   const std::vector<int>& half_edges_of(int edge) const { return manifold_[edge]; }
   int triangle_of_facet(int facet) const { return order_[facet]; }
+  // The half-edge 3 triangle + side as 3 facet + side.
+  int facet_half_edge(int h) const { return 3 * facet_of_[triangle_of(h)] + side_of(h); }
   std::size_t bytes() const;
 
  private:
   void build_facets(const std::vector<int>& order);
   void build_cones();
-  double tan_vertex_cone(int vertex, const Vec3& axis) const;
 
   std::vector<Vec3> vertices_;
   std::vector<Triangle> triangles_;
   std::vector<int> element_;
+  double crease_angle_;
   Side side_;
   Topology topology_;
   std::vector<int> order_;  // facet -> triangle
@@ -85,6 +112,7 @@ class Shell {
   LargeArray<Facet> facets_;
   LargeArray<NormalCone> cones_;
   double size_;
+  std::shared_ptr<const CurvedShell> curved_;
 };
 
 }  // namespace sphshell

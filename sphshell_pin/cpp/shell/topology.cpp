@@ -163,9 +163,12 @@ void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangl
   const std::size_t n = vertices.size();
   out.neighbour_begin.assign(n + 1, 0);
   out.vertex_on_rim.assign(n, 0);
+  out.vertex_sharp.assign(n, 0);
   for (const Edge& e : out.edges) {
     ++out.neighbour_begin[e.first_vertex + 1];
     ++out.neighbour_begin[e.last_vertex + 1];
+    if (!e.inner && e.kind != EdgeClass::Smooth)
+      out.vertex_sharp[e.first_vertex] = out.vertex_sharp[e.last_vertex] = 1;
     if (e.kind == EdgeClass::Boundary || e.kind == EdgeClass::NonManifold)
       out.vertex_on_rim[e.first_vertex] = out.vertex_on_rim[e.last_vertex] = 1;
   }

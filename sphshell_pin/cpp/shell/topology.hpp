@@ -44,6 +44,7 @@ struct Topology {
   std::vector<int> neighbours;       // vertices joined to a vertex by an edge
   std::vector<Vec3> vertex_normal;   // angle-weighted pseudo-normal (Baerentzen and Aanaes 2005)
   std::vector<char> vertex_on_rim;   // touches a boundary or non-manifold edge
+  std::vector<char> vertex_sharp;    // touches an edge that is not smooth
   int num_patches = 0;
 
   // crease_angle [rad]; triangles of one element are contiguous in `element`.

@@ -1,0 +1,243 @@
+"""Error of the contact force against the size of the elements, and cost, of every contact method.
+
+python -m benchmarks.convergence [--out docs/pictures/convergence.png]
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.query import RADIUS as QUERY_RADIUS
+from benchmarks.query import query_contestant
+from benchmarks.surfaces import Mesh, icosphere, on_torus, torus, touching_centres, wavy_sheet
+from benchmarks.timing import machine, median_us, one_core, ratio, take_turns
+from sphshell_pin import Shell
+
+Array = NDArray[np.float64]
+RADIUS = 0.010  # of the touching sphere [m]
+DEPTH = 0.04 * RADIUS
+EXPONENT = 1.5
+PLACES = 300
+BALL = 4 * RADIUS
+RING, TUBE = 6 * RADIUS, 3 * RADIUS
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Meshes from coarse to fine, random places with outward normals, and where the sphere is."""
+
+    meshes: Callable[[], list[Mesh]]
+    places: Callable[[np.random.Generator], tuple[Array, Array]]
+    inside: bool
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A way to find contacts: a method, and whether the shell is given the exact normals."""
+
+    method: str
+    exact_normals: bool
+    color: str
+    marker: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """Errors of one rule on one mesh, over all places.
+
+    Of the force as a vector, divided by the exact one; of its magnitude alone; of its direction
+    [deg], where there is a force.
+    """
+
+    surface: str
+    rule: str
+    triangles: int
+    side: float  # mean side of the elements / radius of the sphere
+    mean: float
+    largest: float
+    magnitude: float
+    direction: float
+
+
+def ball_places(rng: np.random.Generator) -> tuple[Array, Array]:
+    normals = rng.normal(size=(PLACES, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return BALL * normals, normals
+
+
+def torus_places(rng: np.random.Generator) -> tuple[Array, Array]:
+    return on_torus(RING, TUBE, *rng.uniform(0, 2 * np.pi, (2, PLACES)))
+
+
+def balls() -> list[Mesh]:
+    return [icosphere(level, BALL) for level in (2, 3, 4, 5, 6)]
+
+
+def tori() -> list[Mesh]:
+    return [torus(RING, TUBE, side * RADIUS) for side in (1.0, 0.5, 0.25, 0.125, 0.0625)]
+
+
+SURFACES = {
+    "bowl: inside a sphere, R = 4 r": Surface(balls, ball_places, inside=True),
+    "dome: outside a sphere, R = 4 r": Surface(balls, ball_places, inside=False),
+    "inside a torus, R = 6 r and 3 r": Surface(tori, torus_places, inside=True),
+}
+RULES = {
+    "smooth, exact normals": Rule("smooth", True, "#2f6fde", "o"),
+    "smooth, estimated normals": Rule("smooth", False, "#1a9a5a", "s"),
+    "facets": Rule("facets", False, "#f08a00", "^"),
+    "elements": Rule("elements", False, "#d4202a", "v"),
+}
+
+
+def relative_forces(shell: Shell, method: str, centres: Array) -> Array:
+    """Return the forces (n, 3) of the law k depth^1.5, divided by the exact magnitude."""
+    forces = np.empty((len(centres), 3))
+    for i, centre in enumerate(centres):
+        found = shell.contacts(centre, RADIUS, method=method)
+        forces[i] = (found.depth / DEPTH) ** EXPONENT @ found.normal
+    return forces
+
+
+def measure(name: str, surface: Surface) -> list[Row]:
+    """Measure every rule on every mesh of a surface."""
+    points, outward = surface.places(np.random.default_rng(0))
+    normals = -outward if surface.inside else outward
+    centres = points + (RADIUS - DEPTH) * normals
+    rows = []
+    for mesh in surface.meshes():
+        estimated = Shell(mesh.vertices, mesh.triangles)
+        exact = Shell(mesh.vertices, mesh.triangles, normals=mesh.normals)
+        for label, rule in RULES.items():
+            shell = exact if rule.exact_normals else estimated
+            forces = relative_forces(shell, rule.method, centres)
+            errors = np.linalg.norm(forces - normals, axis=1)
+            magnitudes = np.linalg.norm(forces, axis=1)
+            some = magnitudes > 0
+            sines = np.linalg.norm(np.cross(forces, normals), axis=1)[some]
+            angles = np.arctan2(sines, np.einsum("ij,ij->i", forces, normals)[some])
+            rows.append(
+                Row(
+                    surface=name,
+                    rule=label,
+                    triangles=len(mesh.triangles),
+                    side=mesh.mean_side / RADIUS,
+                    mean=errors.mean(),
+                    largest=errors.max(),
+                    magnitude=np.abs(magnitudes - 1).mean(),
+                    direction=np.degrees(angles).mean(),
+                )
+            )
+    return rows
+
+
+def print_table(rows: list[Row]) -> None:
+    """Print the errors, and the orders observed between one mesh and the next."""
+    for name in SURFACES:
+        print(f"{name}; depth / r = {DEPTH / RADIUS:g}, {PLACES} places; means [order]")
+        print(f"  {'':26s} triangles    h/r          force  largest      magnitude  direction, deg")
+        for label in RULES:
+            coarser = None
+            for row in (r for r in rows if (r.surface, r.rule) == (name, label)):
+                columns = [
+                    f"{getattr(row, key):8.1e} {order(coarser, row, key):6s}"
+                    for key in ("mean", "magnitude", "direction")
+                ]
+                print(
+                    f"  {label:25s} {row.triangles:10d}  {row.side:5.3f}  {columns[0]}  "
+                    f"{row.largest:6.0e}  {columns[1]} {columns[2]}".rstrip()
+                )
+                coarser = row
+
+
+def order(coarser: Row | None, finer: Row, key: str) -> str:
+    """Return the exponent of the element size that a mean error followed, in brackets."""
+    if coarser is None:
+        return ""
+    fall = getattr(coarser, key) / getattr(finer, key)
+    return f"[{np.log(fall) / np.log(coarser.side / finer.side):.1f}]"
+
+
+def print_cost(rounds: int) -> None:
+    """Print the time of a query of each method, as `benchmarks.query` measures it."""
+    depth = 0.0005
+    vertices, triangles = wavy_sheet(316, 1.0)
+    centres = touching_centres(20_000, 1.0, QUERY_RADIUS, depth)
+    plate = vertices * [1.0, 1.0, 0.0]
+    above = centres * [1.0, 1.0, 0.0] + [0.0, 0.0, QUERY_RADIUS - depth]
+    for name, corners, places in (("wavy sheet", vertices, centres), ("flat plate", plate, above)):
+        shell = Shell(corners, triangles)
+        methods = ("facets", "smooth", "elements")
+        times = take_turns({m: query_contestant(shell, places, m) for m in methods}, rounds)
+        print(
+            f"Query, {name} of {len(triangles)} triangles, r = 10 mm, depth 0.5 mm, "
+            "cold random positions"
+        )
+        for method, t in times.items():
+            print(f"  {method:25s} {median_us(t)}   {ratio(t, times['facets'])} x")
+
+
+def figure_of(rows: list[Row]) -> Any:
+    """Draw mean force errors as lines, up to the largest as bands, one panel per surface."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, len(SURFACES), sharey=True)
+    for axis, name in zip(panels, SURFACES, strict=True):
+        for label, rule in RULES.items():
+            found = [r for r in rows if (r.surface, r.rule) == (name, label)]
+            side, mean, largest = np.array([(r.side, r.mean, r.largest) for r in found]).T
+            # On a sphere estimated normals are exact, and one line hides the other.
+            look = "-" if rule.exact_normals or rule.method != "smooth" else "--"
+            fill = "none" if look == "--" else rule.color
+            axis.fill_between(side, mean, largest, color=rule.color, alpha=0.13, linewidth=0)
+            axis.loglog(
+                side, mean, look, color=rule.color, marker=rule.marker, label=label,
+                markersize=8 if look == "--" else 5, markerfacecolor=fill,
+            )  # fmt: skip
+        for exponent in (2, 3, 4):
+            guide = np.array([0.28, 1.2])
+            fall = 3e-5 * (guide / guide[1]) ** exponent
+            axis.loglog(guide, fall, color="#6b7280", linestyle=":", linewidth=1)
+            axis.annotate(
+                f"order {exponent} ", (guide[0], fall[0]), color="#6b7280", fontsize=8,
+                ha="right", va="center",
+            )  # fmt: skip
+        axis.set_title(name, fontsize=10)
+        axis.set_xlabel("mean side of the elements / r")
+        axis.grid(True, which="major", color="#e5e7eb")
+        axis.set_axisbelow(True)
+    panels[0].set_ylabel("error of the force / force (line: mean, band: to the largest)")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(RULES), frameon=False)
+    return figure
+
+
+def main() -> None:
+    """Measure, print the tables, draw the figure."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.convergence", description=(__doc__ or "").partition("\n")[0]
+    )
+    default = Path(__file__).parent.parent / "docs" / "pictures" / "convergence.png"
+    parser.add_argument("--out", type=Path, default=default, help="the figure (.png)")
+    out = parser.parse_args().out
+    one_core()
+    print(machine())
+    rows = [row for name, surface in SURFACES.items() for row in measure(name, surface)]
+    print_table(rows)
+    print_cost(rounds=15)
+    figure_of(rows).savefig(out, dpi=110)
+    print(f"wrote {out}")
+
+
+if __name__ == "__main__":
+    main()

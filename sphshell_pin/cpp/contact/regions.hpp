@@ -1,0 +1,80 @@
+// Over which feature of a triangle a sphere's centre stands.
+#pragma once
+
+#include <algorithm>
+
+#include "shell/shell.hpp"
+
+namespace sphshell {
+
+// Round-off of a coordinate test, as a share of shell size + radius. Regions overlap by this much,
+// so that no position falls between two of them; what is claimed twice is then told apart.
+constexpr double kTolerance = 1e-14;
+// Two minima of the distance closer than this share of the radius are one.
+constexpr double kSamePoint = 1e-10;
+
+// Position of the sphere's centre against side k of a facet, in the facet's plane.
+struct SideTest {
+  bool beyond;                   // outside the side by more than round-off
+  bool not_within;               // outside it, round-off included
+  bool before, after;            // past the side's first, second end (round-off included)
+  bool past_first, past_second;  // ... by more than round-off
+  double t;                      // foot along the side, 0 to 1
+};
+
+inline SideTest test_side(const Facet& facet, int k, const Vec3& centre, double tolerance2) {
+  const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
+  const Vec3 from = centre - facet.corner[k];
+  const double length2 = edge.squaredNorm();
+  const double slack2 = tolerance2 * length2;
+  const double inward = facet.normal.dot(edge.cross(from));
+  const double along = from.dot(edge), left = length2 - along;
+  SideTest out;
+  const bool near_line = inward * inward <= slack2;
+  out.beyond = inward < 0 && !near_line;
+  out.not_within = inward <= 0 || near_line;
+  out.past_first = along < 0 && along * along > slack2;
+  out.past_second = left < 0 && left * left > slack2;
+  out.before = along <= 0 || along * along <= slack2;
+  out.after = left <= 0 || left * left <= slack2;
+  out.t = std::clamp(along / length2, 0.0, 1.0);
+  return out;
+}
+
+// True where the distance to the facet does not fall when one leaves its side k inward.
+inline bool side_holds(const Facet& facet, int k, const Vec3& centre, double tolerance2) {
+  const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
+  const double inward = facet.normal.dot(edge.cross(centre - facet.corner[k]));
+  return inward <= 0 || inward * inward <= tolerance2 * edge.squaredNorm();
+}
+
+inline bool edge_is_minimum(const Shell& shell, int code, const Vec3& centre, double tolerance2) {
+  if (code == kBoundary) return true;
+  const auto holds = [&](int h) {
+    return side_holds(shell.facets()[triangle_of(h)], side_of(h), centre, tolerance2);
+  };
+  if (code >= 0) return holds(code);
+  const std::vector<int>& all = shell.half_edges_of(kManifold - code);
+  return std::all_of(all.begin(), all.end(), holds);
+}
+
+inline bool vertex_is_minimum(const Shell& shell, int vertex, const Vec3& centre,
+                              double tolerance) {
+  const std::vector<Vec3>& p = shell.vertices();
+  const Topology& topology = shell.topology();
+  const Vec3 from = centre - p[vertex];
+  for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i) {
+    const Vec3 edge = p[topology.neighbours[i]] - p[vertex];
+    const double along = from.dot(edge);
+    if (along > 0 && along * along > tolerance * tolerance * edge.squaredNorm()) return false;
+  }
+  return true;
+}
+
+inline Vec3 direction(const Vec3& point, const Vec3& centre, const Vec3& if_equal) {
+  const Vec3 d = centre - point;
+  const double length = d.norm();
+  return length > 0 ? Vec3(d / length) : if_equal;
+}
+
+}  // namespace sphshell

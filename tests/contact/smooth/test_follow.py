@@ -1,0 +1,58 @@
+"""A scene follows a slow sphere from call to call; what it finds is what a fresh query finds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sphshell_pin import Scene, Sphere
+from tests.contact.smooth.surfaces import SURFACES, shell_of
+from tests.contact.smooth.test_potential import shell_with_edges
+from tests.models import ball, free_q, linear_law
+
+
+def rows(contacts, point, normal):
+    """Contacts as rows, in an order that does not depend on how they were found."""
+    table = np.column_stack([contacts.depth, point, normal, contacts.element, contacts.feature])
+    return table[np.lexsort(table.T)]
+
+
+def paths(name: str):
+    """Slow paths (n, 3) of centres: along the surface, and in and out of touch."""
+    rng = np.random.default_rng(4)
+    if name in SURFACES:
+        centers, normals = SURFACES[name].probes(6, 0.03, seed=4)
+    else:
+        shell = shell_with_edges(name)
+        edges = shell.edge_vertices[np.flatnonzero(shell.edge_class > 0)]
+        normals = rng.normal(size=(12, 3))
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        centers = shell.vertices[rng.choice(edges, 12)[:, 0]] + 0.97 * normals
+    for center, normal in zip(centers, normals, strict=True):
+        pace = rng.choice([1e-5, 1e-3, 5e-3])
+        along = np.cross(normal, rng.normal(size=3))
+        t = np.arange(120)[:, None]
+        yield center + pace * t * along + 0.03 * np.sin(0.1 * t) * normal
+
+
+@pytest.mark.parametrize("name", ["bowl", "torus inside", "wavy above", "can", "cube", "sheet"])
+def test_scene_finds_what_the_shell_finds(name: str) -> None:
+    shell = shell_of(name, 0.3) if name in SURFACES else shell_with_edges(name)
+    scene = Scene(ball(gravity=0.0))
+    scene.add_contact(
+        sphere=Sphere(1.0, frame="ball"),
+        shell=shell,
+        frame="universe",
+        law=linear_law(1000.0),
+        method="smooth",
+    )
+    found = 0
+    for path in paths(name):
+        for center in path:
+            followed = scene.contacts(free_q(center), np.zeros(6))
+            fresh = shell.contacts(center, 1.0, method="smooth")
+            a = rows(followed, followed.point_world, followed.normal_world)
+            b = rows(fresh, fresh.point, fresh.normal)
+            assert np.array_equal(a, b), center
+            found += len(fresh)
+    assert found > 100

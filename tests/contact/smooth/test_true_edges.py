@@ -1,0 +1,222 @@
+"""Flat surfaces and true edges are exact: closed forms of plates, grooves, ridges, cubes, cones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sphshell_pin import Shell
+from sphshell_pin.contact.contact_set import Feature
+from tests import meshes
+from tests.contact.helpers import difference, force_sum, positions, shell_of
+
+RADIUS, DEPTH = 0.1, 0.004
+
+
+def smooth(shell, center):
+    return shell.contacts(center, RADIUS, method="smooth")
+
+
+@pytest.mark.parametrize("given", [False, True])
+@pytest.mark.parametrize("count", [2, 8, 200, 2000, 20_000])
+@pytest.mark.parametrize("kind", ["slivers", "delaunay"])
+def test_plate(kind: str, count: int, given: bool) -> None:
+    if kind == "delaunay":
+        pytest.importorskip("scipy")
+        vertices, triangles = meshes.delaunay_plate(count, seed=count)
+    else:
+        vertices, triangles = meshes.random_plate(count, seed=count)
+    up = np.array([0.0, 0.0, 1.0])
+    shell = Shell(vertices, triangles, normals=np.tile(up, (len(vertices), 1)) if given else None)
+    rng = np.random.default_rng(count)
+    places = rng.uniform(-0.5, 0.5, (200, 2))
+    chosen = triangles[rng.choice(len(triangles), min(100, len(triangles)))]
+    middles = vertices[chosen[:, :2]].mean(axis=1)[:, :2]
+    for x, y in np.concatenate([places, vertices[chosen[:, 0], :2], middles]):
+        for sign in (1.0, -1.0):
+            contacts = smooth(shell, [x, y, sign * (RADIUS - DEPTH)])
+            assert len(contacts) == 1
+            force = force_sum(contacts) / DEPTH**1.5
+            assert np.abs(force - sign * up).max() <= 1e-12
+
+
+@pytest.mark.parametrize("cells", [1, 3, 8])
+@pytest.mark.parametrize("angle", [0.3, 0.6, 1.2])
+def test_v_groove(angle: float, cells: int) -> None:
+    """Two contacts, one with each side, wherever the sphere touches both."""
+    shell = shell_of(meshes.v_groove(angle, cells=cells))
+    sides = np.array([[s * np.sin(angle), 0.0, np.cos(angle)] for s in (1.0, -1.0)])
+    rng = np.random.default_rng(cells)
+    for _ in range(200):
+        depths = rng.uniform(-0.2, 1.0, 2) * 0.04 * RADIUS
+        x, z = np.linalg.solve(sides[:, [0, 2]], RADIUS - depths)
+        contacts = smooth(shell, [x, rng.uniform(-0.3, 0.3), z])
+        touched = depths > 0
+        assert len(contacts) == touched.sum()
+        exact = (np.maximum(depths, 0)[:, None] ** 1.5 * sides).sum(axis=0)
+        assert np.abs(force_sum(contacts) - exact).max() <= 1e-12 * RADIUS**1.5
+        for depth in contacts.depth:
+            assert np.abs(depths - depth).min() <= 1e-14
+
+
+@pytest.mark.parametrize("cells", [1, 3, 8])
+@pytest.mark.parametrize("angle", [0.3, 0.6, 1.2])
+def test_ridge(angle: float, cells: int) -> None:
+    """One contact: with a side, or with the edge where the centre is in its normal cone."""
+    vertices, triangles = meshes.v_groove(angle, cells=cells)
+    shell = Shell(vertices * [1.0, 1.0, -1.0], triangles)
+    rng = np.random.default_rng(cells)
+    seen = set()
+    for _ in range(300):
+        tilt, distance = rng.uniform(-1.5, 1.5) * angle, (1 - 0.04 * rng.uniform(0.1, 1)) * RADIUS
+        if abs(tilt) <= angle:
+            normal = np.array([np.sin(tilt), 0.0, np.cos(tilt)])
+            foot = np.zeros(3)
+        else:
+            normal = np.array([np.sign(tilt) * np.sin(angle), 0.0, np.cos(angle)])
+            foot = (abs(tilt) - angle) * RADIUS * np.array([normal[2], 0.0, -normal[0]])
+            foot *= np.sign(tilt)
+            foot[2] = -abs(foot[2])
+        y = rng.uniform(-0.3, 0.3)
+        contacts = smooth(shell, foot + distance * normal + [0.0, y, 0.0])
+        assert len(contacts) == 1
+        assert np.abs(contacts.point[0] - foot - [0.0, y, 0.0]).max() <= 1e-14
+        assert np.abs(contacts.normal[0] - normal).max() <= 1e-13
+        seen.add((bool(abs(tilt) <= angle), int(contacts.feature[0])))
+    assert seen == {(True, int(Feature.EDGE)), (False, int(Feature.FACE))}
+
+
+@pytest.mark.parametrize("given", [False, True])
+@pytest.mark.parametrize("body", ["cube", "quads", "sheet"])
+def test_cube_and_sheet(body: str, given: bool) -> None:
+    """From outside the contact is at the nearest point of the body, clamped to it."""
+    half = np.array([0.5, 0.5, 0.0 if body == "sheet" else 0.5])
+    if body == "sheet":
+        vertices, elements = meshes.grid_plate(3, 5)
+    else:
+        vertices, elements = meshes.cube(quads=body == "quads")
+    normals = None
+    if given:
+        a, b, c = (vertices[elements[:, k]] for k in range(3))
+        flat = np.cross(b - a, c - a)
+        flat /= np.linalg.norm(flat, axis=1)[:, None]
+        normals = np.repeat(flat[:, None, :], elements.shape[1], axis=1)
+    shell = Shell(vertices, elements, normals=normals)
+    rng = np.random.default_rng(1)
+    seen = set()
+    for _ in range(1500):
+        out = rng.choice([0.0, 1.0], 3) * rng.uniform(-RADIUS, RADIUS, 3)
+        if body == "sheet":
+            out[2] = rng.uniform(-RADIUS, RADIUS)
+        center = np.where(out == 0, rng.uniform(-0.5, 0.5, 3) * half * 2, 0)
+        center = np.where(out != 0, np.sign(out) * half + out, center)
+        foot = np.clip(center, -half, half)
+        distance = np.linalg.norm(center - foot)
+        if distance == 0:
+            continue
+        contacts = smooth(shell, center)
+        if distance >= RADIUS:
+            assert len(contacts) == 0
+            continue
+        beyond = int((np.abs(center) > half).sum()) - (0 if body == "sheet" else 1)
+        beyond = int((np.abs(center[:2]) > half[:2]).sum()) if body == "sheet" else beyond
+        assert len(contacts) == 1, center
+        assert np.abs(contacts.point[0] - foot).max() <= 1e-14
+        assert abs(contacts.depth[0] - (RADIUS - distance)) <= 1e-14
+        assert contacts.feature[0] == (Feature.FACE, Feature.EDGE, Feature.VERTEX)[beyond]
+        seen.add(beyond)
+    assert seen == {0, 1, 2}
+
+
+def cone(facets: int, slope: float, rings: int = 1):
+    """Open cone with its tip at the origin, falling by `slope` [rad], wound to the outside."""
+    angle = 2 * np.pi * np.arange(facets) / facets
+    vertices, triangles = [np.zeros((1, 3))], []
+    for ring in range(1, rings + 1):
+        reach = ring / rings
+        down = np.full(facets, -reach * np.tan(slope))
+        vertices.append(np.stack([reach * np.cos(angle), reach * np.sin(angle), down], axis=1))
+    for i in range(facets):
+        j = (i + 1) % facets
+        triangles.append((0, 1 + i, 1 + j))
+        for ring in range(rings - 1):
+            a, b = 1 + ring * facets, 1 + (ring + 1) * facets
+            triangles += [(a + i, b + i, b + j), (a + i, b + j, a + j)]
+    return np.concatenate(vertices), np.array(triangles, dtype=np.int32)
+
+
+@pytest.mark.parametrize("rings", [1, 4])
+@pytest.mark.parametrize("slope", [0.4, 0.6, 1.0])
+def test_cone_tip(slope: float, rings: int) -> None:
+    """Over the tip the force is that of the tip, however many facets meet there."""
+    rng = np.random.default_rng(0)
+    widest = np.arctan(np.tan(slope) * np.cos(np.pi / 10))
+    # Where the normals spread less than the crease angle, the tip is a rounded one.
+    shells = [Shell(*cone(n, slope, rings)) for n in (10, 50, 500)]
+    for _ in range(50):
+        tilt, turn = rng.uniform(0, 0.95) * widest, rng.uniform(0, 2 * np.pi)
+        normal = np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)])
+        for shell in shells:
+            contacts = smooth(shell, (RADIUS - DEPTH) * normal)
+            assert len(contacts) == 1
+            force = force_sum(contacts) / DEPTH**1.5
+            assert np.abs(force - normal).max() <= 1e-9
+            assert contacts.feature[0] == Feature.VERTEX
+
+
+def tetrahedron():
+    vertices = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / 2.0
+    return vertices, np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+
+
+def octahedron():
+    vertices = np.concatenate([np.eye(3), -np.eye(3)]) / 2.0
+    faces = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
+    return vertices, np.array(faces)
+
+
+POLYHEDRA = {
+    "cube": (meshes.cube(), None),
+    "tetrahedron": (tetrahedron(), None),
+    "octahedron": (octahedron(), None),
+    "icosahedron": (meshes.icosphere(0), None),
+    "l plate": (meshes.l_plate(3), None),
+    "book": (meshes.fan(5, seed=1), 0.0),
+    "crumpled": (meshes.crumpled(5, seed=2), 0.0),
+    "icosphere": (meshes.icosphere(2), 0.0),
+    "needles": (meshes.needles(aspect=100.0), 0.0),
+    "bowl": (meshes.bowl(6), 0.0),
+    "groove": (meshes.v_groove(0.1, cells=3), 0.0),
+}
+
+
+@pytest.mark.parametrize("radius", [0.1, 0.4])
+@pytest.mark.parametrize("name", POLYHEDRA)
+def test_facets_where_all_edges_are_true(name: str, radius: float) -> None:
+    """With every edge a crease (or a crease angle of zero) the query is the exact polyhedron's."""
+    mesh, crease = POLYHEDRA[name]
+    shell = shell_of(mesh, **({} if crease is None else {"crease_angle": crease}))
+    rng = np.random.default_rng(4)
+    for place in positions(*mesh, radius, 150, seed=7):
+        center = place + rng.uniform(-1e-3, 1e-3, 3)
+        found = shell.contacts(center, radius, method="smooth")
+        exact = shell.contacts(center, radius, method="facets")
+        assert difference(found, exact, radius) <= 1e-12, center
+
+
+@pytest.mark.parametrize("name", POLYHEDRA)
+def test_no_gap_at_borders_of_regions(name: str) -> None:
+    """Within rounding of where one feature takes over from another, the contacts are those of the
+    exact polyhedron there or right beside."""
+    radius = 0.1
+    mesh, crease = POLYHEDRA[name]
+    shell = shell_of(mesh, **({} if crease is None else {"crease_angle": crease}))
+    rng = np.random.default_rng(4)
+    for center in positions(*mesh, radius, 150, seed=7):
+        found = shell.contacts(center, radius, method="smooth")
+        nearby = [center, *(center + rng.normal(size=(40, 3)) * 2e-9)]
+        exact = [shell.contacts(c, radius, method="facets") for c in nearby]
+        assert len(found) >= min(len(contacts) for contacts in exact), list(center)
+        points = np.concatenate([contacts.point for contacts in exact])
+        for point in found.point:
+            assert np.linalg.norm(points - point, axis=1).min() <= 1e-7, list(center)
