@@ -129,7 +129,7 @@ void bind_shell(nanobind::module_& m) {
             if (normals)
               for (std::size_t i = 0; i < normals->shape(0); ++i)
                 corners.push_back(row(*normals, i));
-            nb::gil_scoped_release release;
+            // Under the GIL: two threads may ask for the first curved query at once.
             shell.curve(std::move(corners));
           },
           nb::arg("normals").none())
