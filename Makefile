@@ -14,7 +14,7 @@ help:
 	@sed -n 's/^# make/make/p' Makefile
 
 # make lint   check style and types; make format mends the style
-# make bench  print what contact costs, as ratios (OUT and rounds: see benchmarks/)
+# make bench  print what contact costs, as ratios
 # make clean  remove everything that was built
 
 $(BIN)/python:
@@ -38,8 +38,11 @@ demo: $(VENV)/.demo
 test: $(VENV)/.test
 	$(BIN)/python -m pytest
 
-bench: $(VENV)/.test
+$(VENV)/.bench: $(VENV)/.test
 	$(BIN)/python -m pip install -q -e '.[bench]'
+	@touch $@
+
+bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks
 
 lint: $(VENV)/.test
