@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "contact/regions.hpp"
-#include "shell/curved.hpp"
 #include "shell/triangle.hpp"
 
 namespace sphshell {
+
 Query::Query(bool follow) : follow_(follow) {
   reached_.reserve(1024);
   near_.reserve(256);
@@ -77,15 +77,17 @@ void Query::gather(const Shell& shell, const LargeArray<NormalCone>& cones, doub
     margin_ = margin;
   }
   reached_.clear();
-  shell.bvh().near(centre, radius + margin + bulge, reached_, [&cones](int first) {
-    prefetch(&cones[first]);
-    prefetch(&cones[first + 3]);
+  const NormalCone* all = cones.data();
+  shell.bvh().near(centre, radius + margin + bulge, reached_, [all](int first) {
+    prefetch(all + first);
+    prefetch(all + first + 3);
   });
-  keep_in_cone(shell, cones, centre, radius, margin);
+  keep_in_cone(shell, cones, centre, radius, margin + bulge);
 }
 
-// Leaves in near_ the facets that may hold a contact: the centre, wherever within the margin, may
-// stand inside the cone of normals of the features that they decide about (Johnson and Cohen 2001).
+// Leaves in near_ the facets that may hold a contact: the centre may stand inside the cone of
+// normals of the features that they decide about (Johnson and Cohen 2001), wherever it is within
+// the margin and however far within it the element bulges from its triangle.
 void Query::keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones,
                          const Vec3& centre, double radius, double margin) {
   const Facet* facets = shell.facets().data();
@@ -206,11 +208,7 @@ void Query::claims_to_contacts(const Shell& shell, const Vec3& centre, double ra
     contacts.push_back({point, direction(point, centre, facet.normal),
                         radius - (centre - point).norm(), facet.element, Feature::Edge});
     if (one_sided) {
-      Vec3 outward = Vec3::Zero();
-      for (int i = 0; i < edge.count; ++i)
-        outward += topology.face_normal[triangle_of(topology.incidence[edge.begin + i])];
-      const bool rim = edge.kind == EdgeClass::Boundary || edge.kind == EdgeClass::NonManifold;
-      carriers_.push_back({outward, rim});
+      carriers_.push_back({topology.edge_normal(edge), edge.on_rim()});
     }
   }
   for (const VertexClaim& claim : vertices_) {

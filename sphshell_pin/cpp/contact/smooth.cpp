@@ -183,12 +183,8 @@ void Query::claim_on_patches(const Shell& shell, const Vec3& centre, double radi
         }
         if (minimum) {
           const Edge& edge = topology.edges[topology.edge_of[3 * triangle + k]];
-          Vec3 outward = Vec3::Zero();
-          for (int i = 0; i < edge.count; ++i)
-            outward += topology.face_normal[triangle_of(topology.incidence[edge.begin + i])];
-          const bool rim = edge.kind == EdgeClass::Boundary || edge.kind == EdgeClass::NonManifold;
           add(point, direction(point, centre, facet.normal), facet.element, Feature::Edge,
-              edge.kind != EdgeClass::Smooth, outward, rim);
+              edge.kind != EdgeClass::Smooth, topology.edge_normal(edge), edge.on_rim());
         }
       }
       const int vertex = curved.owned.vertex[k];

@@ -202,7 +202,7 @@ void CurvedShell::build_cones(const Shell& shell) {
       reach = std::max(reach, (control - middle).norm() + 1e-6 * shell.size());
     }
     cone.reach = static_cast<float>(reach);
-    cone.tan_opening = tangent < 1e3 ? static_cast<float>(tangent * 1.00001 + 1e-6) : kAnyOpening;
+    cone.tan_opening = widened_opening(tangent);
   }
 }
 

@@ -126,7 +126,7 @@ void Shell::build_cones() {
       cone.axis[k] = static_cast<float>(facet.normal[k]);
     }
     cone.reach = static_cast<float>(reach + 1e-6 * size_);
-    cone.tan_opening = tangent < 1e3 ? static_cast<float>(tangent * 1.00001 + 1e-6) : kAnyOpening;
+    cone.tan_opening = widened_opening(tangent);
   }
 }
 
@@ -147,10 +147,7 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
   if (at.feature >= 4) {
     normal = topology_.vertex_normal[triangles_[t][at.feature - 4]];
   } else if (at.feature >= 1) {
-    const Edge& edge = topology_.edges[topology_.edge_of[3 * t + at.feature - 1]];
-    normal.setZero();
-    for (int i = 0; i < edge.count; ++i)
-      normal += topology_.face_normal[triangle_of(topology_.incidence[edge.begin + i])];
+    normal = topology_.edge_normal(topology_.edges[topology_.edge_of[3 * t + at.feature - 1]]);
   }
   const double length = normal.norm();
   normal = length > 1e-9 ? Vec3(normal / length) : facet.normal;

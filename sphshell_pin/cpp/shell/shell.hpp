@@ -46,6 +46,10 @@ static_assert(sizeof(NormalCone) == 32);
 // NormalCone::tan_opening where normals may point anywhere.
 constexpr float kAnyOpening = 1e9f;
 
+inline float widened_opening(double tangent) {
+  return tangent < 1e3 ? static_cast<float>(tangent * 1.00001 + 1e-6) : kAnyOpening;
+}
+
 struct SurfacePoint {
   Vec3 point;
   Vec3 normal;      // unit pseudo-normal of the feature that carries the point

@@ -169,8 +169,7 @@ void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangl
     ++out.neighbour_begin[e.last_vertex + 1];
     if (!e.inner && e.kind != EdgeClass::Smooth)
       out.vertex_sharp[e.first_vertex] = out.vertex_sharp[e.last_vertex] = 1;
-    if (e.kind == EdgeClass::Boundary || e.kind == EdgeClass::NonManifold)
-      out.vertex_on_rim[e.first_vertex] = out.vertex_on_rim[e.last_vertex] = 1;
+    if (e.on_rim()) out.vertex_on_rim[e.first_vertex] = out.vertex_on_rim[e.last_vertex] = 1;
   }
   std::partial_sum(out.neighbour_begin.begin(), out.neighbour_begin.end(),
                    out.neighbour_begin.begin());

@@ -30,6 +30,8 @@ struct Edge {
   EdgeClass kind;
   bool inner;    // the diagonal inside one element: no edge of the surface
   double angle;  // between the two normals [rad], > 0 convex, < 0 concave, 0 where not manifold
+
+  bool on_rim() const { return kind == EdgeClass::Boundary || kind == EdgeClass::NonManifold; }
 };
 
 // Everything about the surface that follows from vertices, triangles and the crease angle alone.
@@ -46,6 +48,13 @@ struct Topology {
   std::vector<char> vertex_on_rim;   // touches a boundary or non-manifold edge
   std::vector<char> vertex_sharp;    // touches an edge that is not smooth
   int num_patches = 0;
+
+  // Pseudo-normal of an edge, not of unit length: the sum of its triangles' normals.
+  Vec3 edge_normal(const Edge& edge) const {
+    Vec3 sum = Vec3::Zero();
+    for (int i = 0; i < edge.count; ++i) sum += face_normal[triangle_of(incidence[edge.begin + i])];
+    return sum;
+  }
 
   // crease_angle [rad]; triangles of one element are contiguous in `element`.
   Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
