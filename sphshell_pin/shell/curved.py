@@ -19,15 +19,17 @@ def curved_mesh(shell: Shell, divisions: int = 4) -> tuple[Floats, Ints, Ints]:
     are not shared between triangles of the shell.
     """
     n = divisions
-    bends = shell.core_for("smooth").bends
+    lifts = shell.core_for("smooth").lifts
     corners = shell.vertices[shell.triangles]
     grid = [(i, j) for i in range(n + 1) for j in range(n + 1 - i)]
     number = {place: k for k, place in enumerate(grid)}
     u, v = (np.array(grid) / n).T
     w = 1 - u - v
     weights = np.stack([w, u, v])
-    products = np.stack([w * u, u * v, v * w])
-    points = np.einsum("ck,tcx->tkx", weights, corners) - np.einsum("sk,tsx->tkx", products, bends)
+    # Bernstein's polynomials of the control points that are lifted off the flat triangle.
+    sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
+    inner = np.stack([*sides, 6 * u * v * w])
+    points = np.einsum("ck,tcx->tkx", weights, corners) + np.einsum("bk,tbx->tkx", inner, lifts)
     small = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in grid if i + j < n]
     small += [
         (number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]) for i, j in grid if i + j < n - 1

@@ -140,15 +140,18 @@ void bind_shell(nanobind::module_& m) {
       .def_prop_ro("num_elements", &Shell::num_elements)
       .def_prop_ro("num_patches", [](const Shell& s) { return s.topology().num_patches; })
       .def_prop_ro(
-          "bends",
+          "lifts",
           [](const Shell& s) {
             const std::size_t n = s.curved() ? s.triangles().size() : 0;
-            std::vector<double> out(9 * n);
-            for (std::size_t f = 0; f < n; ++f)
-              for (int k = 0; k < 3; ++k)
-                std::copy_n(s.curved()->facets()[f].bend[k].data(), 3,
-                            &out[9 * std::size_t(s.triangle_of_facet(int(f))) + 3 * k]);
-            return to_array(std::move(out), {n, 3, 3});
+            std::vector<double> out(21 * n);
+            for (std::size_t f = 0; f < n; ++f) {
+              const CurvedFacet& curved = s.curved()->facets()[f];
+              double* to = &out[21 * std::size_t(s.triangle_of_facet(int(f)))];
+              for (int k = 0; k < 6; ++k)
+                std::copy_n(curved.lift[k / 2][k % 2].data(), 3, to + 3 * k);
+              std::copy_n(curved.middle.data(), 3, to + 18);
+            }
+            return to_array(std::move(out), {n, 7, 3});
           },
           nb::rv_policy::automatic)
       .def_prop_ro("bytes", &Shell::bytes)

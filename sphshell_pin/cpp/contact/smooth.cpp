@@ -26,23 +26,24 @@ struct PatchPoint {
 
 // The foot of x on the curved element, by Newton's method on |x - p(u, v)|^2 / 2 from the foot on
 // the flat one. False where it lies outside, or is no minimum.
-bool foot_on_patch(const Facet& facet, const CurvedFacet& curved, const Vec3& x, PatchPoint& out) {
+bool foot_on_patch(const Facet& facet, const CubicPatch& patch, const Vec3& x, PatchPoint& out) {
   const Vec3 e1 = facet.corner[1] - facet.corner[0], e2 = facet.corner[2] - facet.corner[0];
   const Vec3 d = x - facet.corner[0];
   const double a = e1.dot(e1), b = e1.dot(e2), c = e2.dot(e2), p = d.dot(e1), q = d.dot(e2);
   const double area2 = a * c - b * b;
   double u = (c * p - b * q) / area2, v = (a * q - b * p) / area2;
-  // Start inside: far from the element the quadratic says nothing about the surface.
+  // Start inside: far from the element the cubic says nothing about the surface.
   u = std::clamp(u, 0.0, 1.0);
   v = std::clamp(v, 0.0, 1.0 - u);
-  const Vec3 uu = curved.along_uu(), uv = curved.along_uv(), vv = curved.along_vv();
   bool settled = false, convex = false;
   for (int i = 0; i < kMostIterations && !settled; ++i) {
-    const Vec3 xu = curved.along_u(facet, u, v), xv = curved.along_v(facet, u, v);
-    const Vec3 r = curved.point(facet, u, v) - x;
+    const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v);
+    const Vec3 r = patch.point(u, v) - x;
     const double gu = r.dot(xu), gv = r.dot(xv);
     double huu = xu.dot(xu), huv = xu.dot(xv), hvv = xv.dot(xv);
-    const double fuu = huu + r.dot(uu), fuv = huv + r.dot(uv), fvv = hvv + r.dot(vv);
+    const double fuu = huu + r.dot(patch.along_uu(u, v));
+    const double fuv = huv + r.dot(patch.along_uv(u, v));
+    const double fvv = hvv + r.dot(patch.along_vv(u, v));
     // Where the distance is not convex, its first-order part is: it leads downhill all the same.
     convex = fuu > 0 && fuu * fvv - fuv * fuv > 1e-9 * huu * hvv;
     if (convex) huu = fuu, huv = fuv, hvv = fvv;
@@ -56,20 +57,19 @@ bool foot_on_patch(const Facet& facet, const CurvedFacet& curved, const Vec3& x,
     if (std::max({-u, -v, u + v - 1}) > 1) return false;
   }
   if (!settled || !convex || std::max({-u, -v, u + v - 1}) > kOverlap) return false;
-  out = {u, v, curved.point(facet, u, v)};
+  out = {u, v, patch.point(u, v)};
   return true;
 }
 
-// The parameter of the point nearest to x on side k; false where it lies beyond the side's ends.
-bool foot_on_side(const Facet& facet, const CurvedFacet& curved, int k, const Vec3& x, double& t) {
-  const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
-  const Vec3 second = 2 * curved.bend[k];
-  t = std::clamp((x - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
+// The parameter of the point nearest to x on a side; false where it lies beyond the side's ends.
+bool foot_on_side(const CubicCurve& side, const Vec3& x, double& t) {
+  const Vec3 d = side.point(1) - side.c0;
+  t = std::clamp((x - side.c0).dot(d) / d.squaredNorm(), 0.0, 1.0);
   for (int i = 0; i < kMostIterations; ++i) {
-    const Vec3 tangent = curved.side_tangent(facet, k, t);
-    const Vec3 r = curved.side(facet, k, t) - x;
+    const Vec3 tangent = side.tangent(t);
+    const Vec3 r = side.point(t) - x;
     const double first = tangent.squaredNorm();
-    const double full = first + r.dot(second);
+    const double full = first + r.dot(side.second(t));
     double step = -r.dot(tangent) / (full > 1e-3 * first ? full : first);
     step = std::clamp(step, -0.5, 0.5);
     t += step;
@@ -86,7 +86,7 @@ bool foot_on_side(const Facet& facet, const CurvedFacet& curved, int k, const Ve
 bool leaves_no_lower(const Shell& shell, int h, double t, const Vec3& point, const Vec3& x,
                      double tolerance) {
   const int f = triangle_of(h), k = side_of(h);
-  const Vec3 inward = shell.curved()->facets()[f].inward(shell.facets()[f], k, t);
+  const Vec3 inward = shell.curved()->facets()[f].patch(shell.facets()[f]).inward(k, t);
   return (x - point).dot(inward) <= tolerance * inward.norm();
 }
 
@@ -157,10 +157,10 @@ void Query::claim_on_patches(const Shell& shell, const Vec3& centre, double radi
       }
     } else {
       PatchPoint foot;
-      if (foot_on_patch(facet, curved, centre, foot) &&
+      const CubicPatch patch = curved.patch(facet);
+      if (foot_on_patch(facet, patch, centre, foot) &&
           (centre - foot.point).squaredNorm() < reach2) {
-        const Vec3 outward =
-            curved.along_u(facet, foot.u, foot.v).cross(curved.along_v(facet, foot.u, foot.v));
+        const Vec3 outward = patch.along_u(foot.u, foot.v).cross(patch.along_v(foot.u, foot.v));
         add(foot.point, direction(foot.point, centre, outward.normalized()), facet.element,
             Feature::Face, false, outward, false);
       }
@@ -168,8 +168,9 @@ void Query::claim_on_patches(const Shell& shell, const Vec3& centre, double radi
     for (int k = 0; k < 3; ++k) {
       const int code = curved.owned.twin[k];
       double t = 0;
-      if (code != kNotMine && outside[k] >= -lean && foot_on_side(facet, curved, k, centre, t)) {
-        const Vec3 point = curved.side(facet, k, t);
+      if (code != kNotMine && outside[k] >= -lean &&
+          foot_on_side(curved.side(facet, k), centre, t)) {
+        const Vec3 point = curved.side(facet, k).point(t);
         const auto holds = [&](int h) {
           const Facet& other = shell.facets()[triangle_of(h)];
           const bool same_way = other.corner[side_of(h)] == facet.corner[k];

@@ -2,152 +2,283 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "shell/disjoint_sets.hpp"
+#include "shell/vertex_normals.hpp"
 
 namespace sphshell {
 namespace {
 
 constexpr double kAny = std::numeric_limits<double>::infinity();
-
-// The bend of an edge with direction d whose curve is to be tangent to the planes of all `first`
-// normals at its first end and of all `last` normals at its last: the shortest c with
-// n.(d - c) = 0 there and n.(d + c) = 0 here. Zero where the normals contradict each other (an
-// S-shaped edge) or would bend it beyond reason.
-Vec3 bend_of(const Vec3& d, const std::vector<Vec3>& first, const std::vector<Vec3>& last) {
-  Eigen::Matrix<double, Eigen::Dynamic, 3> rows(first.size() + last.size(), 3);
-  Eigen::VectorXd sides(rows.rows());
-  Eigen::Index i = 0;
-  for (const Vec3& n : first) rows.row(i) = n.transpose(), sides[i++] = n.dot(d);
-  for (const Vec3& n : last) rows.row(i) = n.transpose(), sides[i++] = -n.dot(d);
-  const double length = d.norm();
-  // Flat at one end and not at the other: the edge leads from a plane into a bend, or to a groove.
-  const auto steepest = [&](Eigen::Index begin, std::size_t count) {
-    return sides.segment(begin, static_cast<Eigen::Index>(count)).cwiseAbs().maxCoeff();
-  };
-  const double at_first = steepest(0, first.size());
-  const double at_last = steepest(static_cast<Eigen::Index>(first.size()), last.size());
-  if (std::min(at_first, at_last) <= 1e-9 * std::max(at_first, at_last)) return Vec3::Zero();
-  if (sides.cwiseAbs().maxCoeff() <= 1e-14 * length) return Vec3::Zero();
-  Eigen::JacobiSVD<Eigen::MatrixXd> svd(rows, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  // Two nearly parallel normals give one condition; what they disagree about is noise.
-  svd.setThreshold(1e-7);
-  const Vec3 c = svd.solve(sides);
-  const double miss = (rows * c - sides).cwiseAbs().maxCoeff();
-  const bool contradicts = miss > 0.5 * sides.cwiseAbs().maxCoeff();
-  return contradicts || c.norm() > 0.5 * length ? Vec3(Vec3::Zero()) : c;
-}
+// Normals closer than this [rad] are one: what they disagree about is noise.
+constexpr double kSameNormal = 1e-3;
+// An edge whose tangents would lean more than this (cosine) from its chord stays straight.
+constexpr double kMostLean = 0.6;
 
 void add_distinct(std::vector<Vec3>& normals, const Vec3& n) {
   for (const Vec3& other : normals)
-    if ((n - other).squaredNorm() < 1e-20) return;
+    if ((n - other).squaredNorm() < kSameNormal * kSameNormal) return;
   normals.push_back(n);
 }
 
+// The unit vector nearest to the chord d that is tangent to the planes of all normals: with one of
+// them the projection of d, with two their common line. False where there is none.
+bool tangent_of(const Vec3& d, const std::vector<Vec3>& normals, Vec3& out) {
+  if (normals.size() > 2) return false;
+  out = d - d.dot(normals[0]) * normals[0];
+  if (normals.size() == 2) {
+    const Vec3 line = normals[0].cross(normals[1]).normalized();
+    out = line.dot(d) * line;
+  }
+  const double length = out.norm();
+  if (length < kMostLean * d.norm()) return false;
+  out /= length;
+  return true;
+}
+
+// Lifts of the two control points of an edge with chord d, tangent to the planes of all `first`
+// normals at its first end and of all `last` normals at its last. The handles are those that make
+// a circular arc of a circle's tangents (Goldapp, CAGD 8 (1991) 227): order 4 on any curve.
+std::array<Vec3, 2> lifts_of(const Vec3& d, const std::vector<Vec3>& first,
+                             const std::vector<Vec3>& last) {
+  const std::array<Vec3, 2> straight = {Vec3::Zero(), Vec3::Zero()};
+  const double length = d.norm();
+  const auto steepest = [&](const std::vector<Vec3>& normals) {
+    double most = 0;
+    for (const Vec3& n : normals) most = std::max(most, std::abs(n.dot(d)) / length);
+    return most;
+  };
+  const double at_first = steepest(first), at_last = steepest(last);
+  if (std::max(at_first, at_last) <= 1e-14) return straight;
+  // Flat at one end and not at the other: the edge leads from a plane into a bend, or to a groove.
+  if (std::min(at_first, at_last) <= 1e-9 * std::max(at_first, at_last)) return straight;
+  Vec3 begin, end;
+  if (!tangent_of(d, first, begin) || !tangent_of(d, last, end)) return straight;
+  const auto handle = [&](const Vec3& tangent) -> Vec3 {
+    return 2 * length / (3 * (1 + tangent.dot(d) / length)) * tangent - d / 3;
+  };
+  return {handle(begin), -handle(end)};
+}
+
+// The ten control points of a patch, [i][j] with i steps from corner 0 to 1 and j to corner 2.
+using Net = std::array<std::array<Vec3, 4>, 4>;
+
+Net control_points(const Facet& f, const CurvedFacet& curved) {
+  Net net;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; i + j < 4; ++j)
+      net[i][j] = ((3 - i - j) * f.corner[0] + i * f.corner[1] + j * f.corner[2]) / 3;
+  net[1][0] += curved.lift[0][0], net[2][0] += curved.lift[0][1];
+  net[2][1] += curved.lift[1][0], net[1][2] += curved.lift[1][1];
+  net[0][2] += curved.lift[2][0], net[0][1] += curved.lift[2][1];
+  net[1][1] += curved.middle;
+  return net;
+}
+
+// Bound on the tangent of the angle between `axis` and any normal of the patch: its normal field
+// lies in the hull of products of the tangents' control vectors.
+double tan_opening_of(const Net& net, const Vec3& axis) {
+  std::array<Vec3, 6> a, b;
+  int n = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; i + j < 3; ++j, ++n) {
+      a[n] = net[i + 1][j] - net[i][j];
+      b[n] = net[i][j + 1] - net[i][j];
+    }
+  double widest = 0;
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) {
+      const Vec3 normal = a[i].cross(b[j]) + a[j].cross(b[i]);
+      const double along = normal.dot(axis);
+      widest = std::max(widest, along > 0 ? normal.cross(axis).norm() / along : kAny);
+    }
+  return widest;
+}
+
+// Where a patch, continued beyond its sides, misses a vertex with its normal, and what lifting its
+// middle by `a` along the facet's normal would do about it: a least-squares problem in `a`.
+class Continuation {
+ public:
+  Continuation(const Facet& facet, const CubicPatch& patch) : patch_(patch), up_(facet.normal) {
+    const Vec3* p = facet.corner;
+    east_ = (p[1] - p[0]).normalized();
+    north_ = up_.cross(east_);
+    length2_ =
+        ((p[1] - p[0]).squaredNorm() + (p[2] - p[1]).squaredNorm() + (p[0] - p[2]).squaredNorm()) /
+        3;
+  }
+
+  // Adds vertex q with its normal n, opposite side k, to the normal equation square * a = along.
+  void add(int k, const Vec3& q, const Vec3& n, double& along, double& square) const {
+    const double upright = n.dot(up_);
+    if (upright < 0.5) return;
+    // The parameters over which the vertex stands; the lift does not change them.
+    static constexpr double kU[3] = {1, -1, 1}, kV[3] = {-1, 1, 1};
+    Eigen::Vector2d at(kU[k], kV[k]);
+    for (int i = 0; i < 6; ++i) {
+      const Vec3 r = q - patch_.point(at.x(), at.y());
+      at += tangents(at).inverse() * Eigen::Vector2d(r.dot(east_), r.dot(north_));
+    }
+    if (!(at.cwiseAbs().maxCoeff() < 4)) return;
+    const double u = at.x(), v = at.y(), w = 1 - u - v;
+    const Eigen::Matrix2d to_slope = tangents(at).transpose().inverse();
+    const Eigen::Vector2d slope =
+        to_slope * Eigen::Vector2d(patch_.along_u(u, v).dot(up_), patch_.along_v(u, v).dot(up_));
+    const Eigen::Vector2d wanted = -Eigen::Vector2d(n.dot(east_), n.dot(north_)) / upright;
+    const Eigen::Vector2d gain = to_slope * Eigen::Vector2d(6 * v * (w - u), 6 * u * (w - v));
+    const double rise = 6 * u * v * w;
+    along += rise * up_.dot(q - patch_.point(u, v)) + length2_ * gain.dot(wanted - slope);
+    square += rise * rise + length2_ * gain.squaredNorm();
+  }
+
+ private:
+  Eigen::Matrix2d tangents(const Eigen::Vector2d& at) const {
+    const Vec3 xu = patch_.along_u(at.x(), at.y()), xv = patch_.along_v(at.x(), at.y());
+    Eigen::Matrix2d out;
+    out << xu.dot(east_), xv.dot(east_), xu.dot(north_), xv.dot(north_);
+    return out;
+  }
+
+  const CubicPatch patch_;
+  Vec3 up_, east_, north_;
+  double length2_;  // slopes count as much as heights over a side
+};
+
 }  // namespace
 
-Vec3 CurvedFacet::inward(const Facet& f, int k, double t) const {
+Vec3 CubicPatch::inward(int k, double t) const {
   switch (k) {
     case 0:
-      return along_v(f, t, 0) - t * along_u(f, t, 0);
+      return along_v(t, 0) - t * along_u(t, 0);
     case 1:
       // From side 1 (w = 0) towards corner 0: minus u and v in proportion to where one stands.
-      return -((1 - t) * along_u(f, 1 - t, t) + t * along_v(f, 1 - t, t));
+      return -((1 - t) * along_u(1 - t, t) + t * along_v(1 - t, t));
     default:
-      return along_u(f, 0, 1 - t) - (1 - t) * along_v(f, 0, 1 - t);
+      return along_u(0, 1 - t) - (1 - t) * along_v(0, 1 - t);
   }
+}
+
+// From Bernstein's polynomials to powers.
+CubicPatch CurvedFacet::patch(const Facet& f) const {
+  const Vec3 &a = lift[0][0], &b = lift[0][1];  // side 0, from corner 0 to 1
+  const Vec3 &c = lift[1][0], &d = lift[1][1];
+  const Vec3 &e = lift[2][1], &g = lift[2][0];  // side 2, seen from corner 0 as well
+  CubicPatch out;
+  out.c00 = f.corner[0];
+  out.c10 = f.corner[1] - f.corner[0] + 3 * a;
+  out.c01 = f.corner[2] - f.corner[0] + 3 * e;
+  out.c20 = 3 * b - 6 * a;
+  out.c02 = 3 * g - 6 * e;
+  out.c11 = 6 * (middle - a - e);
+  out.c30 = 3 * (a - b);
+  out.c03 = 3 * (e - g);
+  out.c21 = 3 * (2 * a - b + c + e - 2 * middle);
+  out.c12 = 3 * (2 * e - g + d + a - 2 * middle);
+  return out;
+}
+
+CubicCurve CurvedFacet::side(const Facet& f, int k) const {
+  const Vec3 &a = lift[k][0], &b = lift[k][1];
+  return {f.corner[k], f.corner[next_corner(k)] - f.corner[k] + 3 * a, 3 * b - 6 * a, 3 * (a - b)};
 }
 
 CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals)
-    : normals_(std::move(normals)) {
-  if (normals_.empty()) estimate_normals(shell);
+    : normals_(normals.empty() ? estimate_normals(shell) : std::move(normals)) {
   bend_edges(shell);
+  lift_middles(shell);
   build_cones(shell);
 }
 
-// One normal per vertex and fan of triangles that smooth edges join there. A fan whose triangles
-// spread more than its creases may (a cone's tip) keeps each triangle's own.
-void CurvedShell::estimate_normals(const Shell& shell) {
-  const std::vector<Triangle>& triangles = shell.triangles();
-  const std::vector<Vec3>& p = shell.vertices();
-  const Topology& topology = shell.topology();
-  const std::size_t corners = 3 * triangles.size();
-  DisjointSets fans(corners);
-  for (const Edge& edge : topology.edges) {
-    if (edge.count != 2 || !(edge.inner || edge.kind == EdgeClass::Smooth)) continue;
-    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
-    const int h0 = h, h1 = 3 * triangle_of(h) + next_corner(side_of(h));
-    const int g0 = g, g1 = 3 * triangle_of(g) + next_corner(side_of(g));
-    const auto vertex = [&](int c) { return triangles[c / 3][c % 3]; };
-    const bool opposed = vertex(h0) == vertex(g1);
-    fans.join(h0, opposed ? g1 : g0);
-    fans.join(h1, opposed ? g0 : g1);
-  }
-  std::vector<Vec3> sum(corners, Vec3::Zero());
-  for (std::size_t c = 0; c < corners; ++c) {
-    const Triangle& t = triangles[c / 3];
-    const int k = static_cast<int>(c % 3);
-    const Vec3 a = p[t[next_corner(k)]] - p[t[k]], b = p[t[previous_corner(k)]] - p[t[k]];
-    const double weight = 1 / (a.squaredNorm() * b.squaredNorm());
-    sum[fans.find(static_cast<int>(c))] += weight * a.cross(b).norm() * topology.face_normal[c / 3];
-  }
-  std::vector<double> widest(corners, 1);  // cosine
-  for (std::size_t c = 0; c < corners; ++c) {
-    const int fan = fans.find(static_cast<int>(c));
-    widest[fan] = std::min(widest[fan], sum[fan].normalized().dot(topology.face_normal[c / 3]));
-  }
-  const double limit = std::cos(shell.crease_angle());
-  normals_.resize(corners);
-  for (std::size_t c = 0; c < corners; ++c) {
-    const int fan = fans.find(static_cast<int>(c));
-    normals_[c] = widest[fan] < limit ? topology.face_normal[c / 3] : Vec3(sum[fan].normalized());
-  }
-}
-
-// One bend per edge, from the normals of all facets that meet there, so that they share the curve.
+// One curve per edge, from the normals of all facets that meet there, so that they share it.
 void CurvedShell::bend_edges(const Shell& shell) {
   const Topology& topology = shell.topology();
   const std::vector<Triangle>& triangles = shell.triangles();
   const std::vector<Vec3>& p = shell.vertices();
-  std::vector<Vec3> bend(3 * triangles.size());
+  facets_.resize(triangles.size());
   tangents_.assign(topology.neighbours.size(), Vec3::Zero());
   std::vector<int> fill(topology.neighbour_begin.begin(), topology.neighbour_begin.end() - 1);
   std::vector<Vec3> first, last;
   for (const Edge& edge : topology.edges) {
     first.clear();
     last.clear();
+    const auto forward = [&](int h) {
+      return triangles[triangle_of(h)][side_of(h)] == edge.first_vertex;
+    };
     for (int i = 0; i < edge.count; ++i) {
-      const int h = topology.incidence[edge.begin + i], t = triangle_of(h);
-      const int k = side_of(h), next = next_corner(k);
-      const bool forward = triangles[t][k] == edge.first_vertex;
-      add_distinct(forward ? first : last, normals_[3 * t + k]);
-      add_distinct(forward ? last : first, normals_[3 * t + next]);
+      const int h = topology.incidence[edge.begin + i];
+      const Vec3& here = normals_[h];
+      const Vec3& there = normals_[3 * triangle_of(h) + next_corner(side_of(h))];
+      add_distinct(first, forward(h) ? here : there);
+      add_distinct(last, forward(h) ? there : here);
     }
     const Vec3 d = p[edge.last_vertex] - p[edge.first_vertex];
-    const Vec3 c = bend_of(d, first, last);
-    for (int i = 0; i < edge.count; ++i) bend[topology.incidence[edge.begin + i]] = c;
-    // Beside Topology::neighbours, which was filled in the same order.
-    tangents_[fill[edge.first_vertex]++] = d - c;
-    tangents_[fill[edge.last_vertex]++] = -(d + c);
-  }
-  facets_.resize(triangles.size());
-  for (std::size_t f = 0; f < facets_.size(); ++f) {
-    const int t = shell.triangle_of_facet(static_cast<int>(f));
-    double largest = 0;
-    for (int k = 0; k < 3; ++k) {
-      facets_[f].bend[k] = bend[3 * t + k];
-      largest = std::max(largest, bend[3 * t + k].norm());
+    const std::array<Vec3, 2> lift = lifts_of(d, first, last);
+    for (int i = 0; i < edge.count; ++i) {
+      const int h = topology.incidence[edge.begin + i], g = shell.facet_half_edge(h);
+      Vec3* side = facets_[triangle_of(g)].lift[side_of(g)];
+      side[0] = lift[forward(h) ? 0 : 1];
+      side[1] = lift[forward(h) ? 1 : 0];
     }
-    facets_[f].flat = largest == 0;
-    bulge_ = std::max(bulge_, largest / 3);  // b0 b1 + b1 b2 + b2 b0 <= 1/3
+    // Beside Topology::neighbours, which was filled in the same order.
+    tangents_[fill[edge.first_vertex]++] = d + 3 * lift[0];
+    tangents_[fill[edge.last_vertex]++] = 3 * lift[1] - d;
   }
 }
 
-// Bounds from Bezier control points: the patch lies in the hull of six points, its normal field in
-// that of six vectors (products of the tangents' control vectors).
+// The inner control point: that of a PN triangle (Vlachos et al., I3D 2001), moved along the normal
+// so that the patch, continued beyond its sides, comes nearest to the positions and normals of the
+// vertices opposite. Corners alone do not say how the curvature changes across an element.
+void CurvedShell::lift_middles(const Shell& shell) {
+  for (CurvedFacet& curved : facets_) {
+    curved.middle.setZero();
+    curved.flat = true;
+    for (const auto& side : curved.lift)
+      for (const Vec3& lift : side) {
+        curved.middle += 0.25 * lift;
+        curved.flat = curved.flat && lift.isZero(0);
+      }
+  }
+  std::vector<double> rise(facets_.size(), 0);
+  for (std::size_t f = 0; f < facets_.size(); ++f) {
+    if (facets_[f].flat) continue;
+    const Facet& facet = shell.facets()[f];
+    const Continuation continuation(facet, facets_[f].patch(facet));
+    const int t = shell.triangle_of_facet(static_cast<int>(f));
+    double along = 0, square = 0;
+    for (int k = 0; k < 3; ++k) {
+      const int c = corner_beyond(shell, 3 * t + k);
+      if (c < 0) continue;
+      const Vec3& q = shell.vertices()[shell.triangles()[c / 3][c % 3]];
+      continuation.add(k, q, normals_[c], along, square);
+    }
+    if (square > 0) rise[f] = along / square;
+  }
+  for (std::size_t f = 0; f < facets_.size(); ++f)
+    facets_[f].middle += rise[f] * shell.facets()[f].normal;
+}
+
+// The corner (3 triangle + k) opposite half-edge h, where the surface goes on beyond it: not across
+// a crease, nor into a flat element, where the curvature ends. Else -1.
+int CurvedShell::corner_beyond(const Shell& shell, int h) const {
+  const Topology& topology = shell.topology();
+  const Edge& edge = topology.edges[topology.edge_of[h]];
+  if (edge.count != 2) return -1;
+  const int g = topology.incidence[edge.begin] == h ? topology.incidence[edge.begin + 1]
+                                                    : topology.incidence[edge.begin];
+  const int t = triangle_of(h), u = triangle_of(g), k = side_of(h), l = side_of(g);
+  if (shell.triangles()[t][k] != shell.triangles()[u][next_corner(l)]) return -1;  // ill-wound
+  if (facets_[triangle_of(shell.facet_half_edge(g))].flat) return -1;
+  const auto differ = [&](int i, int j) {
+    return (normals_[i] - normals_[j]).norm() > kSameNormal;
+  };
+  if (differ(h, 3 * u + next_corner(l)) || differ(3 * t + next_corner(k), g)) return -1;
+  return 3 * u + previous_corner(l);
+}
+
+// Bounds from Bezier control points: the patch lies in their hull.
 void CurvedShell::build_cones(const Shell& shell) {
   const LargeArray<Facet>& flat = shell.facets();
   const Topology& topology = shell.topology();
@@ -158,35 +289,19 @@ void CurvedShell::build_cones(const Shell& shell) {
     return topology.planar_face[t] == topology.planar_face[u] && is_flat(t) && is_flat(u);
   });
   for (std::size_t f = 0; f < facets_.size(); ++f) facets_[f].owned = owned[f];
-  const auto tan_patch = [&](std::size_t f, const Vec3& axis) {
-    const Facet& facet = flat[f];
-    const CurvedFacet& curved = facets_[f];
-    static constexpr double kU[3] = {0, 1, 0}, kV[3] = {0, 0, 1};
-    Vec3 a[3], b[3];
-    for (int i = 0; i < 3; ++i) {
-      a[i] = curved.along_u(facet, kU[i], kV[i]);
-      b[i] = curved.along_v(facet, kU[i], kV[i]);
-    }
-    double widest = 0;
-    for (int i = 0; i < 3; ++i)
-      for (int j = i; j < 3; ++j) {
-        const Vec3 n = a[i].cross(b[j]) + a[j].cross(b[i]);
-        const double along = n.dot(axis);
-        widest = std::max(widest, along > 0 ? n.cross(axis).norm() / along : kAny);
-      }
-    return widest;
-  };
   cones_ = shell.cones();
   for (std::size_t f = 0; f < cones_.size(); ++f) {
     const Facet& facet = flat[f];
     const Vec3& axis = facet.normal;
-    double tangent = tan_patch(f, axis);
+    const Net net = control_points(facet, facets_[f]);
+    double tangent = tan_opening_of(net, axis);
     const Owned& mine = facets_[f].owned;
     for (int k = 0; k < 3; ++k) {
       if (mine.twin[k] >= 0) {
         const std::size_t g = static_cast<std::size_t>(triangle_of(mine.twin[k]));
-        tangent =
-            std::max(tangent, facet.normal.dot(flat[g].normal) > 0.05 ? tan_patch(g, axis) : kAny);
+        tangent = std::max(tangent, facet.normal.dot(flat[g].normal) > 0.05
+                                        ? tan_opening_of(control_points(flat[g], facets_[g]), axis)
+                                        : kAny);
       } else if (mine.twin[k] != kNotMine) {
         tangent = kAny;
       }
@@ -196,13 +311,16 @@ void CurvedShell::build_cones(const Shell& shell) {
     NormalCone& cone = cones_[f];
     const Vec3 middle = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
     double reach = cone.reach;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3 control =
-          0.5 * (facet.corner[k] + facet.corner[next_corner(k)] - facets_[f].bend[k]);
-      reach = std::max(reach, (control - middle).norm() + 1e-6 * shell.size());
-    }
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; i + j < 4; ++j)
+        reach = std::max(reach, (net[i][j] - middle).norm() + 1e-6 * shell.size());
     cone.reach = static_cast<float>(reach);
     cone.tan_opening = widened_opening(tangent);
+    // The lifted points weigh 1 - b0^3 - b1^3 - b2^3 <= 8/9 in all.
+    double largest = facets_[f].middle.norm();
+    for (const auto& side : facets_[f].lift)
+      for (const Vec3& lift : side) largest = std::max(largest, lift.norm());
+    bulge_ = std::max(bulge_, largest * 8 / 9);
   }
 }
 

@@ -1,4 +1,4 @@
-// Curved elements over the triangles of a shell: quadratic patches that meet the vertex normals.
+// Curved elements over the triangles of a shell: cubic patches that meet the vertex normals.
 #pragma once
 
 #include <vector>
@@ -7,45 +7,53 @@
 
 namespace sphshell {
 
-// x(b) = b0 p0 + b1 p1 + b2 p2 - b0 b1 c0 - b1 b2 c1 - b2 b0 c2, with barycentric coordinates b,
-// corners p and the bend c_k of side k (Nagata, CAGD 22 (2005) 327, in symmetric form).
+// A cubic of one parameter, in powers.
+struct CubicCurve {
+  Vec3 c0, c1, c2, c3;
+
+  Vec3 point(double t) const { return c0 + t * (c1 + t * (c2 + t * c3)); }
+  Vec3 tangent(double t) const { return c1 + t * (2 * c2 + 3 * t * c3); }
+  Vec3 second(double t) const { return 2 * c2 + 6 * t * c3; }
+};
+
+// A cubic of two, in powers of u = b1 and v = b2, the barycentric coordinates of corners 1 and 2.
+struct CubicPatch {
+  Vec3 c00, c10, c01, c20, c11, c02, c30, c21, c12, c03;
+
+  Vec3 point(double u, double v) const {
+    return c00 + u * (c10 + u * (c20 + u * c30)) + v * (c01 + v * (c02 + v * c03)) +
+           u * v * (c11 + u * c21 + v * c12);
+  }
+  Vec3 along_u(double u, double v) const {
+    return c10 + u * (2 * c20 + 3 * u * c30) + v * (c11 + 2 * u * c21 + v * c12);
+  }
+  Vec3 along_v(double u, double v) const {
+    return c01 + v * (2 * c02 + 3 * v * c03) + u * (c11 + u * c21 + 2 * v * c12);
+  }
+  Vec3 along_uu(double u, double v) const { return 2 * c20 + 6 * u * c30 + 2 * v * c21; }
+  Vec3 along_uv(double u, double v) const { return c11 + 2 * u * c21 + 2 * v * c12; }
+  Vec3 along_vv(double u, double v) const { return 2 * c02 + 6 * v * c03 + 2 * u * c12; }
+  // A direction that leaves side k at its parameter t into the patch, tangent to it.
+  Vec3 inward(int k, double t) const;
+};
+
+// A cubic Bezier triangle, by what lifts its control points off those of the flat facet:
+// lift[k][0] and lift[k][1] at a third and two thirds of side k, middle at the centre.
 struct CurvedFacet {
-  Vec3 bend[3];
+  Vec3 lift[3][2];
+  Vec3 middle;
   Owned owned;  // as Facet::owned, where coplanar neighbours may still be curved
-  bool flat;    // no bends: the exact flat facet
+  bool flat;    // no lift: the exact flat facet
 
-  Vec3 point(const Facet& f, double u, double v) const {
-    const double w = 1 - u - v;
-    return w * f.corner[0] + u * f.corner[1] + v * f.corner[2] - w * u * bend[0] - u * v * bend[1] -
-           v * w * bend[2];
-  }
-  // Derivatives with respect to u = b1 and v = b2.
-  Vec3 along_u(const Facet& f, double u, double v) const {
-    return f.corner[1] - f.corner[0] - (1 - 2 * u - v) * bend[0] - v * bend[1] + v * bend[2];
-  }
-  Vec3 along_v(const Facet& f, double u, double v) const {
-    return f.corner[2] - f.corner[0] + u * bend[0] - u * bend[1] - (1 - u - 2 * v) * bend[2];
-  }
-  Vec3 along_uu() const { return 2 * bend[0]; }
-  Vec3 along_uv() const { return bend[0] - bend[1] + bend[2]; }
-  Vec3 along_vv() const { return 2 * bend[2]; }
-
-  // Side k as a curve from its corner at t = 0 to the next at t = 1, and its derivative.
-  Vec3 side(const Facet& f, int k, double t) const {
-    const Vec3& a = f.corner[k];
-    return a + t * (f.corner[next_corner(k)] - a) - t * (1 - t) * bend[k];
-  }
-  Vec3 side_tangent(const Facet& f, int k, double t) const {
-    return f.corner[next_corner(k)] - f.corner[k] - (1 - 2 * t) * bend[k];
-  }
-  // A direction that leaves side k at t into the facet, tangent to it.
-  Vec3 inward(const Facet& f, int k, double t) const;
+  CubicPatch patch(const Facet& f) const;
+  // Side k as a curve from its corner at t = 0 to the next at t = 1.
+  CubicCurve side(const Facet& f, int k) const;
 };
 
 class CurvedShell {
  public:
-  // normals: unit, per triangle corner (3 per triangle); empty: estimated within smooth patches
-  // (Max, J. Graphics Tools 4 (1999) 1). They are wound like the triangles.
+  // normals: unit, per triangle corner (3 per triangle), wound like the triangles; empty:
+  // estimated within smooth patches.
   CurvedShell(const Shell& shell, std::vector<Vec3> normals);
 
   const LargeArray<CurvedFacet>& facets() const { return facets_; }  // in the order of the tree
@@ -59,8 +67,9 @@ class CurvedShell {
   }
 
  private:
-  void estimate_normals(const Shell& shell);
   void bend_edges(const Shell& shell);
+  void lift_middles(const Shell& shell);
+  int corner_beyond(const Shell& shell, int half_edge) const;
   void build_cones(const Shell& shell);
 
   std::vector<Vec3> normals_;

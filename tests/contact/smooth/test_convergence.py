@@ -15,9 +15,6 @@ from tests.contact.smooth.surfaces import SIDES, SURFACES, can, shell_of, side_o
 COUNT = 300
 DEPTHS = (0.04, 0.004, 0.0004)
 
-# A quadratic element knows its corners alone: where the curvature varies along it, its middle is of
-# order 3 only. Spheres and cylinders are the exception.
-VARIED = ("torus inside", "wavy above", "wavy below")
 # On jittered meshes Max's normals are of order 1 off spheres, and the force of order 2 at best.
 ROUGH = ("torus inside", "cylinder inside", "cylinder outside")
 
@@ -50,16 +47,16 @@ def order(name: str, depth: float, exact: bool) -> float:
 @pytest.mark.parametrize("depth", DEPTHS)
 @pytest.mark.parametrize("name", SURFACES)
 def test_order_with_exact_normals(name: str, depth: float) -> None:
-    assert order(name, depth, exact=True) >= (2.5 if name in VARIED else 3.5)
+    assert order(name, depth, exact=True) >= 3.5
 
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_error_with_exact_normals(name: str) -> None:
     error, angle, _ = measured(name, 0.3, 0.04, True)
-    varied = name in VARIED
-    assert np.sqrt((error**2).mean()) <= (2e-3 if varied else 1e-4)
-    assert error.max() <= (1e-2 if varied else 3e-4)
-    assert np.sqrt((angle**2).mean()) <= (0.1 if varied else 0.01)
+    assert error.mean() <= 1e-4
+    assert error.max() <= 6e-4
+    assert np.sqrt((angle**2).mean()) <= 0.005
+    assert angle.max() <= 0.02
 
 
 @pytest.mark.parametrize("depth", DEPTHS[:2])

@@ -1,0 +1,367 @@
+"""Period and energy of a ball that swings in a bowl without friction, against the exact bowl.
+
+python -m benchmarks.swing [--long]
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from benchmarks.surfaces import Mesh, icosphere
+from benchmarks.timing import machine, one_core
+from sphshell_pin import ImpactLaw, RungeKutta4, Scene, Shell, Simulation, Sphere
+from sphshell_pin.dynamics import Result
+
+Array = NDArray[np.float64]
+RADIUS, BOWL = 0.010, 0.040  # of the ball and of the bowl [m]
+ARM = BOWL - RADIUS
+MASS, STIFFNESS, GRAVITY = 0.050, 1e4, 9.81
+LAW = ImpactLaw(STIFFNESS, exponent=1.0)
+ANGLE = math.radians(40)
+# At rest at the turning point the normal force is m g cos(40 deg): the ball starts in balance.
+START_DEPTH = MASS * GRAVITY * math.cos(ANGLE) / STIFFNESS
+ENERGY = MASS * GRAVITY * ARM * (1 - math.cos(ANGLE))
+DT, LONG_DT, PERIODS = 1e-4, 2e-3, 4
+AZIMUTHS = 0.1 + np.linspace(0, 2 * np.pi, 8, endpoint=False)
+LEVELS = {0.6: 3, 0.3: 4, 0.15: 5}  # of the icosphere, by h / r
+BARS = {0.3: (5e-6, 1e-5), 0.15: (5e-7, 1e-6)}  # of period and energy, with exact normals
+ELLIPSOID = np.array([4.0, 4.6, 3.6]) * RADIUS
+
+
+@dataclass(frozen=True)
+class Swing:
+    """One run: mean period [s], largest change of energy / energy of the swing, CPU s per s."""
+
+    period: float
+    energy: float
+    cpu: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """Runs in several directions: errors of the period / period, energy of the worst, mean cost."""
+
+    rms: float
+    mean: float
+    largest: float
+    energy: float
+    cpu: float
+
+
+def any_turn() -> Array:
+    """Return a rotation that puts the mirror planes of the icosphere off every swing."""
+    turn: Array = pin.utils.rpyToMatrix(0.4, 1.1, 2.3)
+    return turn
+
+
+def bowl(side: float, turn: Array | None = None) -> Mesh:
+    """Return the sphere whose elements have sides of `side` radii of the ball, as in LEVELS."""
+    mesh = icosphere(LEVELS[side], BOWL)
+    turn = any_turn() if turn is None else turn
+    return Mesh(mesh.vertices @ turn.T, mesh.triangles, mesh.normals @ turn.T)
+
+
+def ellipsoid(level: int, jitter: float = 0.2, seed: int = 3) -> Mesh:
+    """Return an ellipsoid whose vertices are moved along it by up to `jitter` sides."""
+    ball = icosphere(level, 1.0)
+    rng = np.random.default_rng(seed)
+    moved = ball.vertices + jitter * ball.mean_side * rng.uniform(-1, 1, ball.vertices.shape)
+    moved /= np.linalg.norm(moved, axis=1)[:, None]
+    normals = moved / ELLIPSOID
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return Mesh(moved * ELLIPSOID, ball.triangles, normals)
+
+
+def ball_model() -> pin.Model:
+    """Return the ball on a joint that moves along x, y, z: nothing turns it without friction."""
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball_joint")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(MASS, RADIUS), pin.SE3.Identity())
+    frame = pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
+    model.addFrame(frame)
+    return model
+
+
+def mesh_scene(mesh: Mesh, method: str = "smooth", exact_normals: bool = True) -> Scene:
+    """Return the ball and the surface of a mesh."""
+    normals = mesh.normals if exact_normals else None
+    shell = Shell(mesh.vertices, mesh.triangles, normals=normals)
+    scene = Scene(ball_model())
+    scene.add_contact(Sphere(RADIUS, "ball"), shell, law=LAW, method=method)
+    return scene
+
+
+def exact_scene() -> Scene:
+    """Return the ball and the exact bowl; what is wrong there is the stepper's."""
+
+    def touch(ball: pin.SE3, _: pin.SE3) -> tuple[list[Array], list[Array], list[float]]:
+        centre: Array = ball.translation
+        out = float(np.linalg.norm(centre))
+        outward = centre / out
+        return [BOWL * outward], [-outward], [out - ARM]
+
+    scene = Scene(ball_model())
+    scene.add_contact_source(touch, "ball", "universe", LAW)
+    return scene
+
+
+def start(azimuth: float) -> Array:
+    """Return the centre (3,) [m] at the turning point of the exact bowl, in balance."""
+    reach = ARM + START_DEPTH
+    side = reach * math.sin(ANGLE)
+    return np.array([side * math.cos(azimuth), side * math.sin(azimuth), -reach * math.cos(ANGLE)])
+
+
+def downward_crossings(t: Array, x: Array, v: Array) -> Array:
+    """Return when x falls through zero [s], by cubics through x and v at both ends of a step."""
+    rows = np.flatnonzero((x[:-1] > 0) & (x[1:] <= 0))
+    step = t[rows + 1] - t[rows]
+    a, b, va, vb = x[rows], x[rows + 1], v[rows] * step, v[rows + 1] * step
+    share = a / (a - b)
+    for _ in range(8):  # Newton's method, from the chord
+        cubic = 2 * a + va - 2 * b + vb, -3 * a - 2 * va + 3 * b - vb, va, a
+        value = ((cubic[0] * share + cubic[1]) * share + cubic[2]) * share + cubic[3]
+        slope = (3 * cubic[0] * share + 2 * cubic[1]) * share + cubic[2]
+        share = share - value / slope
+    crossings: Array = t[rows] + share * step
+    return crossings
+
+
+def mean_period(t: Array, x: Array, v: Array, periods: int) -> float:
+    """Return the mean of the first `periods` periods [s].
+
+    From one fall through the middle to another: a slope of the surface there delays all of them
+    alike. NaN where the run is too short.
+    """
+    crossings = downward_crossings(t, x, v)
+    if len(crossings) <= periods:
+        return math.nan
+    return float(crossings[periods] - crossings[0]) / periods
+
+
+def reference_period(dt: float = 2e-5, periods: int = PERIODS) -> float:
+    """Return the mean period [s] of the exact bowl with its spring, by a code of its own.
+
+    In the plane of the swing, by the classical method of order 4; a fifth of the step of the runs
+    leaves an error below 1e-9 of it.
+    """
+    pull, stretch = STIFFNESS / MASS, ARM
+
+    def slope(x: float, z: float, vx: float, vz: float) -> tuple[float, float, float, float]:
+        reach = math.sqrt(x * x + z * z)
+        back = pull * max(0.0, reach - stretch) / reach
+        return vx, vz, -back * x, -back * z - GRAVITY
+
+    first = start(0.0)
+    state = (float(first[0]), float(first[2]), 0.0, 0.0)
+    count = math.ceil((periods + 0.4) * 4 * math.sqrt(ARM / GRAVITY) * 1.7 / dt)
+    rows = np.empty((count + 1, 2))
+    for i in range(count + 1):
+        x, z, vx, vz = state
+        rows[i] = x, vx
+        a = slope(x, z, vx, vz)
+        h = 0.5 * dt
+        b = slope(x + h * a[0], z + h * a[1], vx + h * a[2], vz + h * a[3])
+        c = slope(x + h * b[0], z + h * b[1], vx + h * b[2], vz + h * b[3])
+        d = slope(x + dt * c[0], z + dt * c[1], vx + dt * c[2], vz + dt * c[3])
+        w = dt / 6
+        state = (
+            x + w * (a[0] + 2 * (b[0] + c[0]) + d[0]),
+            z + w * (a[1] + 2 * (b[1] + c[1]) + d[1]),
+            vx + w * (a[2] + 2 * (b[2] + c[2]) + d[2]),
+            vz + w * (a[3] + 2 * (b[3] + c[3]) + d[3]),
+        )
+    t = np.linspace(0, count * dt, count + 1)
+    return mean_period(t, rows[:, 0], rows[:, 1], periods)
+
+
+def closed_forms() -> tuple[float, float]:
+    """Return two closed forms of the period [s], both with the sink into the spring.
+
+    The sink is s = m (g cos a + L a'^2) / k = e L (3 cos a - 2 cos 40 deg), with L = R - r and
+    e = m g / (k L). The first takes the rigid pendulum's 4 sqrt(L / g) K(sin 20 deg) with L and
+    the mean of s. That leaves out what the spring holds, and gravity's work on the change of s:
+    it is off at first order of e. The second has all of the first order,
+
+        4 sqrt(L / g) K (1 + e (15 <cos a> - 13 cos 40 deg) / 4).
+
+    The means <> over time are those over phi, sin(a / 2) = sin(20 deg) sin(phi), with the weights
+    1 / sqrt(1 - sin(a / 2)^2), of which K is the integral up to pi / 2.
+    """
+    phi = np.pi * (np.arange(64) + 0.5) / 128
+    half = math.sin(ANGLE / 2) * np.sin(phi)
+    weight = 1 / np.sqrt(1 - half**2)
+    rigid = 4 * math.sqrt(ARM / GRAVITY) * float(weight.mean()) * math.pi / 2
+    cosine = float((weight * (1 - 2 * half**2)).sum() / weight.sum())
+    e = MASS * GRAVITY / (STIFFNESS * ARM)
+    with_sink = rigid * math.sqrt(1 + e * (3 * cosine - 2 * math.cos(ANGLE)))
+    return with_sink, rigid * (1 + e * (15 * cosine - 13 * math.cos(ANGLE)) / 4)
+
+
+def energy_changes(result: Result, swing_energy: float = ENERGY) -> Array:
+    """Return (E(t) - E(0)) / energy of the swing; E is kinetic, of gravity and of the contacts."""
+    changes: Array = result.energy.residual / swing_energy
+    return changes
+
+
+def swing(scene: Scene, azimuth: float, dt: float = DT, periods: int = PERIODS) -> Swing:
+    """Let the ball go at `azimuth` for a third of a period more than `periods`."""
+    duration = (periods + 0.35) * closed_forms()[1]
+    before = time.process_time()
+    result = Simulation(scene, RungeKutta4(dt)).run(start(azimuth), duration=duration)
+    spent = time.process_time() - before
+    along = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    period = mean_period(result.t, result.q @ along, result.v @ along, periods)
+    return Swing(period, float(np.abs(energy_changes(result)).max()), spent / duration)
+
+
+def measure(
+    scene: Scene,
+    period: float,
+    azimuths: Sequence[float] | Array = AZIMUTHS,
+    dt: float = DT,
+    periods: int = PERIODS,
+) -> Row:
+    """Swing in every direction; `period` [s] is the exact one."""
+    runs = [swing(scene, float(azimuth), dt, periods) for azimuth in azimuths]
+    errors = np.array([run.period for run in runs]) / period - 1
+    return Row(
+        rms=float(np.sqrt(np.mean(errors**2))),
+        mean=float(np.mean(errors)),
+        largest=float(np.abs(errors).max()),
+        energy=max(run.energy for run in runs),
+        cpu=float(np.mean([run.cpu for run in runs])),
+    )
+
+
+def long_run(scene: Scene, centre: Array, swings: int) -> Result:
+    """Run for so many periods of the bowl, with a row every millisecond."""
+    simulation = Simulation(scene, RungeKutta4(DT))
+    return simulation.run(centre, duration=swings * closed_forms()[1], record_dt=1e-3)
+
+
+def ellipsoid_start(azimuth: float) -> Array:
+    """Return a centre (3,) [m] in balance where the ellipsoid is 40 degrees from its bottom."""
+    out = np.array([math.sin(ANGLE) * math.cos(azimuth), math.sin(ANGLE) * math.sin(azimuth), 0])
+    out[2] = -math.cos(ANGLE)
+    point = out * ELLIPSOID
+    normal = out / ELLIPSOID
+    normal /= np.linalg.norm(normal)
+    depth = MASS * GRAVITY * -normal[2] / STIFFNESS
+    centre: Array = point - (RADIUS - depth) * normal
+    return centre
+
+
+def ellipsoid_energy(scene: Scene, azimuth: float, swings: int) -> float:
+    """Return the largest change of energy over the energy of a swing in the ellipsoid."""
+    centre = ellipsoid_start(azimuth)
+    fall = float(centre[2] + ELLIPSOID[2] - RADIUS)
+    changes = energy_changes(long_run(scene, centre, swings), MASS * GRAVITY * fall)
+    return float(np.abs(changes).max())
+
+
+def line(name: str, triangles: str, dt: float, runs: int, row: Row, bars: tuple[str, str]) -> str:
+    return (
+        f"{name:32s} {triangles:>9s} {dt * 1e3:4.1f} {runs:4d}   {row.rms:7.1e} {bars[0]:>7s}  "
+        f"{row.mean:+8.1e} {row.largest:7.1e}   {row.energy:7.1e} {bars[1]:>7s}  {row.cpu:7.4f}"
+    )
+
+
+def print_reference() -> float:
+    """Print the exact period from three sources; return it [s]."""
+    period, coarser = reference_period(), reference_period(4e-5)
+    with_sink, first_order = closed_forms()
+    print(
+        f"Ball of {RADIUS * 1e3:g} mm and {MASS * 1e3:g} g in a bowl of {BOWL * 1e3:g} mm, "
+        f"k = {STIFFNESS:g} N/m, {math.degrees(ANGLE):g} degrees, {PERIODS} periods\n"
+        f"  exact bowl, integrated         {period:.9f} s (twice the step: "
+        f"{coarser / period - 1:+.0e})\n"
+        f"  pendulum, length and sink      {with_sink:.9f} s ({with_sink / period - 1:+.1e})\n"
+        f"  with all of the first order    {first_order:.9f} s ({first_order / period - 1:+.1e})"
+    )
+    return period
+
+
+def print_table(period: float) -> None:
+    """Print errors of period and energy for meshes, normals and methods."""
+    print(
+        f"{'':32s} {'':9s} {'dt':>4s} {'':4s}   period error            {'':8s}  energy error\n"
+        f"{'':32s} triangles   ms runs       rms     bar      mean largest   largest     bar  "
+        "CPU s/s"
+    )
+    none = ("", "")
+    for dt in (DT, LONG_DT):
+        row = measure(exact_scene(), period, AZIMUTHS[:1], dt)
+        print(line("exact surface, the stepper alone", "", dt, 1, row, none))
+    for side in LEVELS:
+        mesh = bowl(side)
+        count = str(len(mesh.triangles))
+        for exact, normals in ((True, "exact"), (False, "estimated")):
+            scene = mesh_scene(mesh, exact_normals=exact)
+            bars = BARS.get(side)
+            shown = (f"{bars[0]:.0e}", f"{bars[1]:.0e}") if bars and exact else none
+            name = f"smooth, h / r = {side:g}, {normals}"
+            row = measure(scene, period)
+            print(line(name, count, DT, len(AZIMUTHS), row, shown))
+            if side == 0.3 and exact:
+                row = measure(scene, period, dt=LONG_DT)
+                print(line(name, count, LONG_DT, len(AZIMUTHS), row, none))
+    mesh = bowl(0.3)
+    row = measure(mesh_scene(mesh, "facets"), period, AZIMUTHS[:2], periods=1)
+    print(line("facets, h / r = 0.3, one period", str(len(mesh.triangles)), DT, 2, row, none))
+
+
+def print_long() -> None:
+    """Print the energy of 200 swings, and of 20 in an ellipsoid of uneven elements."""
+    swings, block = 200, 20
+    result = long_run(mesh_scene(bowl(0.3)), start(float(AZIMUTHS[0])), swings)
+    changes = energy_changes(result)
+    print(f"{swings} swings, h / r = 0.3, exact normals: energy error within {block} swings each")
+    bounds = np.linspace(0, len(changes), swings // block + 1).astype(int)
+    for k, (first, last) in enumerate(pairwise(bounds)):
+        part = changes[first:last]
+        print(
+            f"  to {block * (k + 1):3d}   largest {np.abs(part).max():7.1e}   "
+            f"mean {part.mean():+8.1e}   last {part[-1]:+8.1e}"
+        )
+    print(
+        "Ellipsoid of 4, 4.6, 3.6 r, vertices moved by up to a fifth of a side along it, "
+        "20 swings, 2 directions; bar 1e-05"
+    )
+    for level in (4, 5):
+        mesh = ellipsoid(level)
+        for exact, normals in ((True, "exact"), (False, "estimated")):
+            scene = mesh_scene(mesh, exact_normals=exact)
+            worst = max(ellipsoid_energy(scene, azimuth, 20) for azimuth in (0.1, 0.9))
+            print(
+                f"  h / r = {mesh.mean_side / RADIUS:4.2f}, {normals:9s} normals   "
+                f"energy error, largest {worst:7.1e}"
+            )
+
+
+def main() -> None:
+    """Measure and print the tables."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.swing", description=(__doc__ or "").partition("\n")[0]
+    )
+    parser.add_argument("--long", action="store_true", help="200 swings, and an uneven ellipsoid")
+    long = parser.parse_args().long
+    one_core()
+    print(machine().partition(";")[0])
+    print_table(print_reference())
+    if long:
+        print_long()
+
+
+if __name__ == "__main__":
+    main()
