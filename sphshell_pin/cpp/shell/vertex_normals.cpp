@@ -1,5 +1,6 @@
 #include "shell/vertex_normals.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
@@ -7,6 +8,12 @@
 
 namespace sphshell {
 namespace {
+
+// A fit leaves at most this share of the squared heights: what curves more unevenly is noise, or
+// the end of a fillet.
+constexpr double kMostUneven = 0.1;
+// Pivots of the normal equations, smallest to largest: below, the points lie along a curve.
+constexpr double kLeastPivot = 1e-5;
 
 // Corners 3 triangle + k joined where they share a vertex and a smooth edge.
 DisjointSets fans_of(const Shell& shell) {
@@ -26,34 +33,169 @@ DisjointSets fans_of(const Shell& shell) {
   return fans;
 }
 
+// The fans of a shell, each with its corners.
+class Fans {
+ public:
+  explicit Fans(const Shell& shell) : shell_(shell), sets_(fans_of(shell)) {
+    const int corners = 3 * static_cast<int>(shell.triangles().size());
+    begin_.assign(corners + 1, 0);
+    root_.resize(corners);
+    for (int c = 0; c < corners; ++c) ++begin_[(root_[c] = sets_.find(c)) + 1];
+    for (int c = 0; c < corners; ++c) begin_[c + 1] += begin_[c];
+    std::vector<int> fill(begin_.begin(), begin_.end() - 1);
+    members_.resize(corners);
+    for (int c = 0; c < corners; ++c) members_[fill[root_[c]]++] = c;
+  }
+
+  int size() const { return static_cast<int>(root_.size()); }  // fans are numbered below this
+  const int* begin(int fan) const { return &members_[begin_[fan]]; }
+  const int* end(int fan) const { return &members_[begin_[fan + 1]]; }
+
+  // The vertices two edges or less from the fan's own, through triangles that smooth edges join
+  // and not past a sharp vertex.
+  void vertices_around(int fan, const std::vector<char>& sharp, std::vector<int>& out) const {
+    const int own = vertex(*begin(fan));
+    out.clear();
+    const auto add_triangles = [&](int f) {
+      for (const int* c = begin(f); c != end(f); ++c)
+        for (int k = 0; k < 3; ++k) out.push_back(vertex(*c / 3 * 3 + k));
+    };
+    for (const int* c = begin(fan); c != end(fan); ++c) {
+      const int t = *c / 3;
+      for (int k = 0; k < 3; ++k)
+        if (!sharp[root_[3 * t + k]]) add_triangles(root_[3 * t + k]);
+    }
+    std::sort(out.begin(), out.end());
+    out.erase(std::unique(out.begin(), out.end()), out.end());
+    out.erase(std::remove(out.begin(), out.end(), own), out.end());
+  }
+
+  int vertex(int corner) const { return shell_.triangles()[corner / 3][corner % 3]; }
+
+ private:
+  const Shell& shell_;
+  DisjointSets sets_;
+  std::vector<int> begin_, root_, members_;
+};
+
+// Max, J. Graphics Tools 4 (1999) 1: exact where the vertices lie on a sphere.
+Vec3 max_normal(const Shell& shell, const int* begin, const int* end) {
+  Vec3 sum = Vec3::Zero();
+  for (const int* c = begin; c != end; ++c) {
+    const Triangle& t = shell.triangles()[*c / 3];
+    const int k = *c % 3;
+    const std::vector<Vec3>& p = shell.vertices();
+    const Vec3 a = p[t[next_corner(k)]] - p[t[k]], b = p[t[previous_corner(k)]] - p[t[k]];
+    const double weight = a.cross(b).norm() / (a.squaredNorm() * b.squaredNorm());
+    sum += weight * shell.topology().face_normal[*c / 3];
+  }
+  return sum.normalized();
+}
+
+// True where the surface falls away from a fan's vertex along straight lines, as from the tip of a
+// cone: seen from the vertices around it does not bend that much.
+bool is_tip(const Shell& shell, const std::vector<Vec3>& normals, const int* begin,
+            const int* end) {
+  double uneven = 0, bent = 0;
+  for (const int* c = begin; c != end; ++c) {
+    const int t = *c / 3, k = *c % 3;
+    const Triangle& triangle = shell.triangles()[t];
+    for (int far : {next_corner(k), previous_corner(k)}) {
+      const Vec3 edge = shell.vertices()[triangle[far]] - shell.vertices()[triangle[k]];
+      const double here = -normals[*c].dot(edge), there = normals[3 * t + far].dot(edge);
+      uneven += std::abs(here - there) / edge.norm();
+      bent += (std::abs(here) + std::abs(there)) / edge.norm();
+    }
+  }
+  return uneven > 0.5 * bent;
+}
+
+// The normal at `origin` of the surface through it that fits the points around best. Heights over
+// the tangent plane are those of circular arcs whose curvature is a quadratic form of the
+// direction, z = a x + b y + (A x^2 + 2 B x y + C y^2) (x^2 + y^2 + z^2) / (2 (x^2 + y^2)), so that
+// spheres are exact; with 9 terms the cubics too. False where the points do not determine it, or do
+// not fit.
+template <int Terms>
+bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& normal) {
+  using Row = Eigen::Matrix<double, Terms, 1>;
+  using Square = Eigen::Matrix<double, Terms, Terms>;
+  if (points.size() < Terms + 3) return false;
+  double size2 = 0;
+  for (const Vec3& p : points) size2 += (p - origin).squaredNorm();
+  const double scale = std::sqrt(double(points.size()) / size2);
+  Vec3 n = normal;
+  // The frame turns with the normal: a few rounds settle both.
+  for (int round = 0; round < 3; ++round) {
+    const Vec3 east = n.unitOrthogonal(), north = n.cross(east);
+    Square square = Square::Zero();
+    Row along = Row::Zero();
+    double heights2 = 0;
+    for (const Vec3& p : points) {
+      const Vec3 d = scale * (p - origin);
+      const double x = d.dot(east), y = d.dot(north), z = d.dot(n);
+      const double flat2 = x * x + y * y, full2 = d.squaredNorm();
+      if (flat2 < 0.1 * full2) return false;
+      const double arc = full2 / flat2, weight = 1 / full2;
+      Row row;
+      row.template head<5>() << x, y, arc * x * x, arc * x * y, arc * y * y;
+      if constexpr (Terms == 9)
+        row.template tail<4>() << x * x * x, x * x * y, x * y * y, y * y * y;
+      square.noalias() += weight * row * row.transpose();
+      along += weight * z * row;
+      heights2 += weight * z * z;
+    }
+    const Eigen::LDLT<Square> solver(square);
+    const auto pivots = solver.vectorD().cwiseAbs();
+    if (!(pivots.minCoeff() > kLeastPivot * pivots.maxCoeff())) return false;
+    const Row fit = solver.solve(along);
+    if (round > 0 && heights2 - fit.dot(along) > kMostUneven * heights2) return false;
+    n = (n - fit[0] * east - fit[1] * north).normalized();
+  }
+  normal = n;
+  return true;
+}
+
 }  // namespace
 
-// Max (J. Graphics Tools 4 (1999) 1). A fan whose triangles spread more than its creases may (a
-// cone's tip) keeps each triangle's own.
+// Sharp fans, whose triangles spread more than creases may, keep each triangle's own.
 std::vector<Vec3> estimate_normals(const Shell& shell) {
-  const std::vector<Triangle>& triangles = shell.triangles();
-  const std::vector<Vec3>& p = shell.vertices();
   const Topology& topology = shell.topology();
-  const std::size_t corners = 3 * triangles.size();
-  DisjointSets fans = fans_of(shell);
-  std::vector<Vec3> sum(corners, Vec3::Zero());
-  for (std::size_t c = 0; c < corners; ++c) {
-    const Triangle& t = triangles[c / 3];
-    const int k = static_cast<int>(c % 3);
-    const Vec3 a = p[t[next_corner(k)]] - p[t[k]], b = p[t[previous_corner(k)]] - p[t[k]];
-    const double weight = 1 / (a.squaredNorm() * b.squaredNorm());
-    sum[fans.find(static_cast<int>(c))] += weight * a.cross(b).norm() * topology.face_normal[c / 3];
+  const Fans fans(shell);
+  // Cosines of the angle from a triangle to the common normal.
+  const double always = std::cos(shell.crease_angle()), maybe = std::cos(shell.crease_angle() / 2);
+  const std::size_t count = static_cast<std::size_t>(fans.size());
+  std::vector<Vec3> normals(count);
+  std::vector<double> widest(count, 1);
+  std::vector<char> flat(count, 1), sharp(count, 0);
+  for (int fan = 0; fan < fans.size(); ++fan) {
+    const int *begin = fans.begin(fan), *end = fans.end(fan);
+    const Vec3 normal = max_normal(shell, begin, end);
+    for (const int* c = begin; c != end; ++c) {
+      const int t = *c / 3;
+      widest[fan] = std::min(widest[fan], normal.dot(topology.face_normal[t]));
+      if (topology.planar_face[t] != topology.planar_face[*begin / 3]) flat[fan] = 0;
+      normals[*c] = normal;
+    }
   }
-  std::vector<double> widest(corners, 1);  // cosine
-  for (std::size_t c = 0; c < corners; ++c) {
-    const int fan = fans.find(static_cast<int>(c));
-    widest[fan] = std::min(widest[fan], sum[fan].normalized().dot(topology.face_normal[c / 3]));
-  }
-  const double limit = std::cos(shell.crease_angle());
-  std::vector<Vec3> normals(corners);
-  for (std::size_t c = 0; c < corners; ++c) {
-    const int fan = fans.find(static_cast<int>(c));
-    normals[c] = widest[fan] < limit ? topology.face_normal[c / 3] : Vec3(sum[fan].normalized());
+  for (int fan = 0; fan < fans.size(); ++fan)
+    sharp[fan] = widest[fan] < always ||
+                 (widest[fan] < maybe && is_tip(shell, normals, fans.begin(fan), fans.end(fan)));
+  for (int fan = 0; fan < fans.size(); ++fan)
+    if (sharp[fan] || flat[fan])
+      for (const int* c = fans.begin(fan); c != fans.end(fan); ++c)
+        normals[*c] = topology.face_normal[*c / 3];
+  std::vector<int> around;
+  std::vector<Vec3> points;
+  for (int fan = 0; fan < fans.size(); ++fan) {
+    if (sharp[fan] || flat[fan]) continue;
+    const int *begin = fans.begin(fan), *end = fans.end(fan);
+    fans.vertices_around(fan, sharp, around);
+    points.clear();
+    for (int v : around) points.push_back(shell.vertices()[v]);
+    const Vec3& origin = shell.vertices()[fans.vertex(*begin)];
+    Vec3 normal = normals[*begin];
+    if (!fit_normal<9>(origin, points, normal)) fit_normal<5>(origin, points, normal);
+    for (const int* c = begin; c != end; ++c) normals[*c] = normal;
   }
   return normals;
 }
