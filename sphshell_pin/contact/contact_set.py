@@ -44,7 +44,9 @@ class ContactSet:
     With k contacts: `point` (k, 3) on the shell [m]; `normal` (k, 3) unit, from the shell to the
     sphere's centre; `depth` (k,) > 0 [m]; `element` (k,) row of shell.elements (of an edge or a
     vertex, one of those that share it); `patch` (k,) smooth piece of the surface; `feature` (k,)
-    values of Feature.
+    values of Feature; `weight` (k,) by which a contact's force counts: 1, but -1 at a pass, a place
+    where contacts flow together (method "smooth" only, where the sphere reaches a concave crease
+    between them).
     """
 
     point: Array
@@ -53,6 +55,7 @@ class ContactSet:
     element: NDArray[np.int32]
     patch: NDArray[np.int32]
     feature: NDArray[np.uint8]
+    weight: Array
 
     def __len__(self) -> int:
         """Return the number of contacts."""

@@ -249,9 +249,9 @@ class Shell(Topology):
         centre = check_vector("center", center, 3, " [m]")
         radius = check_positive("radius", radius, "m")
         found = self.core_for(method).contacts(centre, radius, int(Method.from_name(method)))
-        point, normal, depth, element, feature = found
+        point, normal, depth, element, feature, weight = found
         patch = self.element_patch[element]
-        columns = (read_only(c) for c in (point, normal, depth, element, patch, feature))
+        columns = (read_only(c) for c in (point, normal, depth, element, patch, feature, weight))
         return ContactSet(*columns)
 
     def contacts_batch(

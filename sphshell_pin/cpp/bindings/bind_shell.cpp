@@ -34,7 +34,7 @@ auto contacts(const Shell& shell, const Vec3& centre, double radius, int method)
   Query query;
   query.find(shell, centre, radius, static_cast<Method>(method));
   const std::size_t k = query.contacts.size();
-  std::vector<double> point, normal, depth;
+  std::vector<double> point, normal, depth, weight;
   std::vector<int> element;
   std::vector<std::uint8_t> feature;
   for (const Contact& c : query.contacts) {
@@ -43,10 +43,11 @@ auto contacts(const Shell& shell, const Vec3& centre, double radius, int method)
     depth.push_back(c.depth);
     element.push_back(c.element);
     feature.push_back(static_cast<std::uint8_t>(c.feature));
+    weight.push_back(c.weight);
   }
   return nb::make_tuple(to_array(std::move(point), {k, 3}), to_array(std::move(normal), {k, 3}),
                         to_array(std::move(depth)), to_array(std::move(element)),
-                        to_array(std::move(feature)));
+                        to_array(std::move(feature)), to_array(std::move(weight)));
 }
 
 // Splits 0..n over threads; each writes only to its own rows, so results do not depend on threads.
@@ -74,8 +75,7 @@ auto contacts_batch(const Shell& shell, const Points& centres, const Doubles& ra
       for (std::size_t i = begin; i < end; ++i) {
         for (const Contact& c :
              query.find(shell, row(centres, i), radii(i), static_cast<Method>(method)))
-          depth[i] = std::max(depth[i], c.depth);
-        count[i] = static_cast<int>(query.contacts.size());
+          depth[i] = std::max(depth[i], c.depth), count[i] += c.weight > 0;
       }
     });
   }

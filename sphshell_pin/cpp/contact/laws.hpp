@@ -71,19 +71,21 @@ struct CoulombLaw {
 };
 
 struct ContactForce {
-  double normal = 0;             // [N]
+  double normal = 0;             // [N], below zero where the weight is
   double damping_power = 0;      // lost by the normal damping [W]
   double friction_power = 0;     // lost by friction [W]
   Vec3 friction = Vec3::Zero();  // on the sphere [N]
   Vec3 slip = Vec3::Zero();      // tangential velocity of the sphere against the shell [m/s]
 };
 
-// relative: velocity of the sphere's body against the shell's, both at the contact point [m/s].
+// relative: velocity of the sphere's body against the shell's, both at the contact point [m/s];
+// weight: that of the contact, by which all of the force is multiplied.
 inline ContactForce contact_force(const NormalLaw& law, const CoulombLaw& friction, double depth,
-                                  const Vec3& normal, const Vec3& relative) {
+                                  const Vec3& normal, const Vec3& relative, double weight = 1) {
   ContactForce out;
   const double gap_rate = normal.dot(relative);
-  const NormalForce push = law.force(depth, gap_rate);
+  NormalForce push = law.force(depth, gap_rate);
+  push.total *= weight, push.elastic *= weight;
   out.normal = push.total;
   out.damping_power = -(push.total - push.elastic) * gap_rate;
   out.slip = relative - gap_rate * normal;

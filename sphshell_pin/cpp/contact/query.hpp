@@ -18,6 +18,11 @@ struct Contact {
   double depth;  // radius - distance > 0 [m]
   int element;
   Feature feature;
+  // Of its force: below zero at a pass between contacts that flow together; where they are nearly
+  // one, a little below one.
+  double weight = 1;
+
+  double energy_weight() const { return weight > 0 ? 1 : weight; }
 };
 
 // Scratch of one query; keep one per thread and pair, and queries use no heap once it has grown.
@@ -54,6 +59,30 @@ class Query {
     bool rim;      // on the border of an open sheet: no inside there
   };
 
+  // A way down from a pass.
+  struct Leg {
+    Vec3 direction;
+    int facet;  // that it enters; only its direction is known where this is -1
+  };
+  // A place from which the distance falls in several directions, legs_[first_leg .. last_leg).
+  struct Pass {
+    Contact contact;
+    Carrier carrier;
+    bool sharp;  // at a crease, a rim or a vertex of one
+    int first_leg, last_leg;
+  };
+  // A minimum, or a pass that counts.
+  struct Row {
+    Contact contact;
+    Carrier carrier;
+    int face;          // carrier_face_
+    int root, merged;  // a row that it is joined to, that it is one contact with; or itself
+    Vec3 normal;       // of all that is merged into it
+    double depth;
+  };
+  // In place of the planar face that carries a contact.
+  static constexpr int kSharp = -2, kCurved = -1;
+
   void find_facets(const Shell& shell, const Vec3& centre, double radius);
   void find_smooth(const Shell& shell, const Vec3& centre, double radius);
   void find_elements(const Shell& shell, const Vec3& centre, double radius);
@@ -62,7 +91,22 @@ class Query {
   void keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones, const Vec3& centre,
                     double radius, double margin);
   void claim_on_patches(const Shell& shell, const Vec3& centre, double radius, double tolerance);
-  void keep_one_per_minimum(const Shell& shell, double radius);
+  void claim_flat(const Shell& shell, const Shadow& shadow, const Vec3& centre, double radius,
+                  double tolerance);
+  void claim_curved(const Shell& shell, const Shadow& shadow, const Vec3& centre, double radius);
+  void claim_edge(const Shell& shell, int facet, int side, const Vec3& centre, double radius,
+                  double tolerance);
+  void claim_vertex(const Shell& shell, int facet, int corner, const Vec3& centre, double radius,
+                    double tolerance);
+  void add_minimum(const Shell& shell, const Contact& contact, int carrier_face,
+                   const Carrier& carrier);
+  void add_pass(const Contact& contact, const Carrier& carrier, bool sharp,
+                const std::vector<Leg>& exits);
+  void join_minima(const Shell& shell, const Vec3& centre, double radius);
+  void join_over_passes(const Shell& shell, const Vec3& centre, std::size_t minima, double same);
+  int minimum_below(const Shell& shell, const Vec3& centre, const Vec3& point, const Leg& leg,
+                    std::size_t minima, double same) const;
+  void drop_twins(const Shell& shell, std::size_t minima, double radius);
   void collect_claims(const Shell& shell, const Vec3& centre, double radius, double tolerance);
   void drop_claims_of_neighbours(const Shell& shell);
   void claims_to_contacts(const Shell& shell, const Vec3& centre, double radius);
@@ -86,9 +130,10 @@ class Query {
   std::vector<char> dropped_;      // beside `contacts`
   std::vector<Carrier> carriers_;  // beside `contacts`, for one-sided shells only
   std::vector<Shadow> over_;
-  std::vector<Contact> sorted_;
-  std::vector<Carrier> sorted_carriers_;
-  std::vector<int> carrier_face_;  // beside `contacts`: a planar face, or a code of smooth.cpp
+  std::vector<int> carrier_face_;  // beside `contacts`: a planar face, kSharp or kCurved
+  std::vector<Pass> passes_;
+  std::vector<Leg> legs_, exits_;
+  std::vector<Row> rows_;
 };
 
 }  // namespace sphshell

@@ -56,17 +56,17 @@ void Scene::evaluate(const VectorX& q, const VectorX& v, bool audit, std::vector
       if (pair.needs_velocity() || log != nullptr)
         relative = velocity_at(pair.joint_i, point) - velocity_at(pair.joint_j, point);
       const ContactForce f =
-          contact_force(pair.law, pair.friction, contact.depth, normal, relative);
+          contact_force(pair.law, pair.friction, contact.depth, normal, relative, contact.weight);
       const Vec3 total = f.normal * normal + f.friction;
       apply(pair.joint_i, point, total);
       apply(pair.joint_j, point, -total);
-      ++state.count;
+      if (contact.weight > 0) ++state.count;
       state.depth = std::max(state.depth, contact.depth);
       state.normal_force += f.normal;
       if (audit) {
         powers_.damping += f.damping_power;
         powers_.friction += f.friction_power;
-        powers_.elastic += pair.law.energy(contact.depth);
+        powers_.elastic += contact.energy_weight() * pair.law.energy(contact.depth);
       }
       if (log != nullptr)
         log->push_back({double(k),

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "shell/vertex_normals.hpp"
@@ -189,6 +190,7 @@ CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals)
     : normals_(normals.empty() ? estimate_normals(shell) : std::move(normals)) {
   bend_edges(shell);
   lift_middles(shell);
+  list_corners(shell);
   build_cones(shell);
 }
 
@@ -276,6 +278,18 @@ int CurvedShell::corner_beyond(const Shell& shell, int h) const {
   };
   if (differ(h, 3 * u + next_corner(l)) || differ(3 * t + next_corner(k), g)) return -1;
   return 3 * u + previous_corner(l);
+}
+
+void CurvedShell::list_corners(const Shell& shell) {
+  const std::vector<Triangle>& triangles = shell.triangles();
+  corner_begin_.assign(shell.vertices().size() + 1, 0);
+  for (const Triangle& t : triangles)
+    for (int v : t) ++corner_begin_[v + 1];
+  std::partial_sum(corner_begin_.begin(), corner_begin_.end(), corner_begin_.begin());
+  std::vector<int> fill(corner_begin_.begin(), corner_begin_.end() - 1);
+  corners_.resize(3 * triangles.size());
+  for (std::size_t h = 0; h < corners_.size(); ++h)
+    corners_[fill[triangles[h / 3][h % 3]]++] = shell.facet_half_edge(static_cast<int>(h));
 }
 
 // Bounds from Bezier control points: the patch lies in their hull.

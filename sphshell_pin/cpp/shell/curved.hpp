@@ -50,6 +50,12 @@ struct CurvedFacet {
   CubicCurve side(const Facet& f, int k) const;
 };
 
+struct Corners {
+  const int *first, *last;
+  const int* begin() const { return first; }
+  const int* end() const { return last; }
+};
+
 class CurvedShell {
  public:
   // normals: unit, per triangle corner (3 per triangle), wound like the triangles; empty:
@@ -61,14 +67,20 @@ class CurvedShell {
   double bulge() const { return bulge_; }  // farthest from the flat triangles [m]
   // Tangents of the edges that leave vertex i, beside Topology::neighbours.
   const std::vector<Vec3>& tangents() const { return tangents_; }
+  // The corners (3 facet + k) that meet at a vertex.
+  Corners corners_of(int vertex) const {
+    return {&corners_[corner_begin_[vertex]], &corners_[corner_begin_[vertex + 1]]};
+  }
   std::size_t bytes() const {
     return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone)) +
-           (tangents_.size() + normals_.size()) * sizeof(Vec3);
+           (tangents_.size() + normals_.size()) * sizeof(Vec3) +
+           (corners_.size() + corner_begin_.size()) * sizeof(int);
   }
 
  private:
   void bend_edges(const Shell& shell);
   void lift_middles(const Shell& shell);
+  void list_corners(const Shell& shell);
   int corner_beyond(const Shell& shell, int half_edge) const;
   void build_cones(const Shell& shell);
 
@@ -76,6 +88,7 @@ class CurvedShell {
   LargeArray<CurvedFacet> facets_;
   LargeArray<NormalCone> cones_;
   std::vector<Vec3> tangents_;
+  std::vector<int> corner_begin_, corners_;
   double bulge_ = 0;
 };
 

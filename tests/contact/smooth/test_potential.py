@@ -9,7 +9,7 @@ import pytest
 
 from sphshell_pin import Shell
 from tests import meshes
-from tests.contact.helpers import force_sum
+from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.surfaces import SURFACES, can, shell_of, side_of
 from tests.contact.smooth.test_true_edges import cone
 
@@ -20,13 +20,11 @@ def query(shell, center):
     return shell.contacts(center, 1.0, method="smooth")
 
 
-def energy(contacts) -> float:
-    return float((contacts.depth**2.5).sum() / 2.5)
-
-
 def label(contacts):
     """What the contacts are with: a change of it is the passing of some border."""
-    return sorted(zip(contacts.element.tolist(), contacts.feature.tolist(), strict=True))
+    merged = contacts.weight != 1
+    rows = zip(contacts.element, contacts.feature, merged, strict=True)
+    return sorted((int(e), int(f), bool(m)) for e, f, m in rows)
 
 
 def crossing(shell, start, end, width: float):

@@ -8,7 +8,8 @@ import pytest
 from sphshell_pin import Shell
 from sphshell_pin.contact.contact_set import Feature
 from tests import meshes
-from tests.contact.helpers import difference, force_sum, positions, shell_of
+from tests.contact.helpers import energy, force_sum, positions, shell_of
+from tests.oracle.pieces import potential_and_force
 
 RADIUS, DEPTH = 0.1, 0.004
 
@@ -192,31 +193,27 @@ POLYHEDRA = {
 
 @pytest.mark.parametrize("radius", [0.1, 0.4])
 @pytest.mark.parametrize("name", POLYHEDRA)
-def test_facets_where_all_edges_are_true(name: str, radius: float) -> None:
-    """With every edge a crease (or a crease angle of zero) the query is the exact polyhedron's."""
+def test_pieces_of_polyhedra(name: str, radius: float) -> None:
+    """With every edge a crease (or a crease angle of zero) potential and force are those of the
+    definition, over faces, edges and vertices and where one takes over from another."""
     mesh, crease = POLYHEDRA[name]
     shell = shell_of(mesh, **({} if crease is None else {"crease_angle": crease}))
-    rng = np.random.default_rng(4)
-    for place in positions(*mesh, radius, 150, seed=7):
-        center = place + rng.uniform(-1e-3, 1e-3, 3)
-        found = shell.contacts(center, radius, method="smooth")
-        exact = shell.contacts(center, radius, method="facets")
-        assert difference(found, exact, radius) <= 1e-12, center
-
-
-@pytest.mark.parametrize("name", POLYHEDRA)
-def test_no_gap_at_borders_of_regions(name: str) -> None:
-    """Within rounding of where one feature takes over from another, the contacts are those of the
-    exact polyhedron there or right beside."""
-    radius = 0.1
-    mesh, crease = POLYHEDRA[name]
-    shell = shell_of(mesh, **({} if crease is None else {"crease_angle": crease}))
-    rng = np.random.default_rng(4)
+    rng = np.random.default_rng(0)
+    seen = 0
     for center in positions(*mesh, radius, 150, seed=7):
+        # At the surface itself a normal is not defined.
+        if abs(shell.closest_points([center]).distances[0]) < 1e-3 * radius:
+            continue
         found = shell.contacts(center, radius, method="smooth")
-        nearby = [center, *(center + rng.normal(size=(40, 3)) * 2e-9)]
-        exact = [shell.contacts(c, radius, method="facets") for c in nearby]
-        assert len(found) >= min(len(contacts) for contacts in exact), list(center)
-        points = np.concatenate([contacts.point for contacts in exact])
-        for point in found.point:
-            assert np.linalg.norm(points - point, axis=1).min() <= 1e-7, list(center)
+        exact, force = potential_and_force(shell.vertices, shell.triangles, center, radius)
+        assert abs(energy(found) - exact) <= 3e-6 * exact + 1e-15 * radius**2.5, list(center)
+        # Contacts that are nearly one are joined; opposite ones may cancel.
+        size = np.linalg.norm(force) + 1e-2 * found.depth.max(initial=0) ** 1.5
+        # Inside a ring of pieces two passes may be equally high: either may be the last.
+        forces = [force]
+        while np.linalg.norm(force_sum(found) - forces[-1]) > 2e-5 * size + 1e-14:
+            assert len(forces) < 20, list(center)
+            beside = center + 1e-9 * rng.normal(size=3)
+            forces.append(potential_and_force(shell.vertices, shell.triangles, beside, radius)[1])
+        seen += len(found) > 0
+    assert seen > 50

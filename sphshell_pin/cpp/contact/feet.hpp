@@ -1,0 +1,107 @@
+// Where the distance from a point to a curved element, or to its side, is stationary.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "shell/curved.hpp"
+
+namespace sphshell {
+
+// Newton's iterations end with the step after one below this, in units of the element: errors
+// square.
+constexpr double kSettled = 1e-7;
+constexpr int kMostIterations = 20;
+// A foot counts this far outside its element; what two elements claim is then told apart.
+constexpr double kOverlap = 1e-9;
+
+struct PatchPoint {
+  double u, v;
+  Vec3 point;
+};
+
+enum class Stationary { Minimum, Saddle };
+
+// The foot of x on the curved element, by Newton's method on |x - p(u, v)|^2 / 2 from the foot on
+// the flat one. False where it lies outside, or is of another kind. `convex` tells whether the
+// distance is where the search ended.
+inline bool foot_on_patch(const Facet& facet, const CubicPatch& patch, const Vec3& x,
+                          Stationary kind, PatchPoint& out, bool& convex) {
+  const Vec3 e1 = facet.corner[1] - facet.corner[0], e2 = facet.corner[2] - facet.corner[0];
+  const Vec3 d = x - facet.corner[0];
+  const double a = e1.dot(e1), b = e1.dot(e2), c = e2.dot(e2), p = d.dot(e1), q = d.dot(e2);
+  const double area2 = a * c - b * b;
+  double u = (c * p - b * q) / area2, v = (a * q - b * p) / area2;
+  // Start inside: far from the element the cubic says nothing about the surface.
+  u = std::clamp(u, 0.0, 1.0);
+  v = std::clamp(v, 0.0, 1.0 - u);
+  bool settled = false;
+  convex = false;
+  for (int i = 0; i < kMostIterations && !settled; ++i) {
+    const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v);
+    const Vec3 r = patch.point(u, v) - x;
+    const double gu = r.dot(xu), gv = r.dot(xv);
+    double huu = xu.dot(xu), huv = xu.dot(xv), hvv = xv.dot(xv);
+    const double fuu = huu + r.dot(patch.along_uu(u, v));
+    const double fuv = huv + r.dot(patch.along_uv(u, v));
+    const double fvv = hvv + r.dot(patch.along_vv(u, v));
+    const double round_off = 1e-9 * huu * hvv, determined = fuu * fvv - fuv * fuv;
+    convex = fuu > 0 && determined > round_off;
+    // Where the distance is not convex, its first-order part is: it leads downhill all the same.
+    if (kind == Stationary::Minimum ? convex : std::abs(determined) > round_off)
+      huu = fuu, huv = fuv, hvv = fvv;
+    const double determinant = huu * hvv - huv * huv;
+    double du = -(hvv * gu - huv * gv) / determinant;
+    double dv = -(huu * gv - huv * gu) / determinant;
+    const double length = std::max(std::abs(du), std::abs(dv));
+    if (length > 0.5) du *= 0.5 / length, dv *= 0.5 / length;
+    u += du, v += dv;
+    settled = length < kSettled && (convex || determined < -round_off);
+    if (std::max({-u, -v, u + v - 1}) > 1) return false;
+  }
+  if (!settled || convex != (kind == Stationary::Minimum)) return false;
+  if (std::max({-u, -v, u + v - 1}) > kOverlap) return false;
+  out = {u, v, patch.point(u, v)};
+  return true;
+}
+
+// The direction in which the distance from x falls fastest at a saddle of it.
+inline Vec3 downhill(const CubicPatch& patch, const PatchPoint& at, const Vec3& x) {
+  const Vec3 xu = patch.along_u(at.u, at.v), xv = patch.along_v(at.u, at.v), r = at.point - x;
+  const Vec3 e1 = xu.normalized(), e2 = (xv - xv.dot(e1) * e1).normalized();
+  // Second derivatives by arc length along e1 and e2.
+  const double s = 1 / xu.norm(), t = -xv.dot(e1) / xv.dot(e2) * s, w = 1 / xv.dot(e2);
+  const double fuu = xu.dot(xu) + r.dot(patch.along_uu(at.u, at.v));
+  const double fuv = xu.dot(xv) + r.dot(patch.along_uv(at.u, at.v));
+  const double fvv = xv.dot(xv) + r.dot(patch.along_vv(at.u, at.v));
+  const double f11 = s * s * fuu, f12 = s * (t * fuu + w * fuv);
+  const double f22 = t * t * fuu + 2 * t * w * fuv + w * w * fvv;
+  const double angle = 0.5 * std::atan2(2 * f12, f11 - f22) + M_PI / 2;
+  return std::cos(angle) * e1 + std::sin(angle) * e2;
+}
+
+// The parameter at which the distance from x to a side is stationary, near the foot on its chord.
+// False where that lies beyond the side's ends. `summit`: it is the farthest place, not the
+// nearest.
+inline bool foot_on_side(const CubicCurve& side, const Vec3& x, double& t, bool& summit) {
+  const Vec3 d = side.point(1) - side.c0;
+  t = std::clamp((x - side.c0).dot(d) / d.squaredNorm(), 0.0, 1.0);
+  bool settled = false;
+  for (int i = 0; i < kMostIterations && !settled; ++i) {
+    const Vec3 tangent = side.tangent(t);
+    const Vec3 r = side.point(t) - x;
+    const double first = tangent.squaredNorm();
+    const double full = first + r.dot(side.second(t));
+    summit = full < 0;
+    double step = -r.dot(tangent) / (std::abs(full) > 1e-3 * first ? full : first);
+    settled = std::abs(step) < kSettled;
+    step = std::clamp(step, -0.5, 0.5);
+    t += step;
+    if (t < -1 || t > 2) return false;
+  }
+  if (!settled || t < -kOverlap || t > 1 + kOverlap) return false;
+  t = std::clamp(t, 0.0, 1.0);
+  return true;
+}
+
+}  // namespace sphshell
