@@ -178,7 +178,7 @@ class Scene:
         """Let `sphere` touch `shell`, which is placed at `placement` in `frame`.
 
         Without `law` the contact has ADAMS's default IMPACT law, without `friction` none; `method`
-        is "facets" (default), "smooth" or "elements". Returns the pair. A shell a thousand times
+        is "smooth" (default), "facets" or "elements". Returns the pair. A shell a thousand times
         larger than the sphere or the robot earns a UnitWarning.
         """
         check_type("sphere", sphere, Sphere, "must be a Sphere(radius, frame)")
@@ -186,7 +186,7 @@ class Scene:
         law = _default_law() if law is None else law
         check_law(law)
         check_friction(friction)
-        method = "facets" if method is None else method
+        method = "smooth" if method is None else method
         Method.from_name(method)
         joint_i, in_i = self._frame(sphere.frame)
         placement = check_placement("placement", placement)

@@ -228,7 +228,7 @@ class Shell(Topology):
             self.vertices, self.triangles, self.triangle_element, crease_angle, SIDES.index(side)
         )
 
-    def contacts(self, center: npt.ArrayLike, radius: float, method: str = "facets") -> ContactSet:
+    def contacts(self, center: npt.ArrayLike, radius: float, method: str = "smooth") -> ContactSet:
         """Find every place where a sphere touches, deepest first.
 
         Parameters
@@ -258,7 +258,7 @@ class Shell(Topology):
         self,
         centers: npt.ArrayLike,
         radii: npt.ArrayLike | float,
-        method: str = "facets",
+        method: str = "smooth",
         threads: int | None = None,
     ) -> tuple[Floats, Ints]:
         """Find the contacts of many spheres at once.

@@ -24,7 +24,7 @@ def ball_model(joint=None, inertia=None) -> pin.Model:
 def test_a_ball_that_fills_a_faceted_socket_touches_every_facet() -> None:
     vertices, elements = meshes.icosphere(5)
     shell = sp.Shell(vertices, elements)
-    inner = shell.contacts(np.zeros(3), 1.01)
+    inner = shell.contacts(np.zeros(3), 1.01, method="facets")
     assert len(inner) == len(elements)
     assert len(np.unique(inner.element)) == len(elements)
 

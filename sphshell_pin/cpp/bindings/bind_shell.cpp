@@ -154,6 +154,16 @@ void bind_shell(nanobind::module_& m) {
             return to_array(std::move(out), {n, 7, 3});
           },
           nb::rv_policy::automatic)
+      .def_prop_ro(
+          "corner_normals",
+          [](const Shell& s) {
+            std::vector<double> out;
+            if (s.curved())
+              for (const Vec3& n : s.curved()->normals()) append(out, n);
+            const std::size_t n = out.size() / 9;
+            return to_array(std::move(out), {n, 3, 3});
+          },
+          nb::rv_policy::automatic)
       .def_prop_ro("bytes", &Shell::bytes)
       .def_prop_ro(
           "element_patch", [](const Shell& s) { return to_array(s.topology().patch); },

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "shell/curved.hpp"
 
@@ -63,6 +64,41 @@ inline bool foot_on_patch(const Facet& facet, const CubicPatch& patch, const Vec
   if (std::max({-u, -v, u + v - 1}) > kOverlap) return false;
   out = {u, v, patch.point(u, v)};
   return true;
+}
+
+// The nearest place of a curved element, however ill-determined: from the best of some samples
+// downhill until no step within the element leads lower.
+inline PatchPoint nearest_on_patch(const CubicPatch& patch, const Vec3& x) {
+  constexpr int kParts = 4;
+  double u = 0, v = 0, best = (patch.point(0, 0) - x).squaredNorm();
+  const auto try_at = [&](double a, double b) {
+    const double distance2 = (patch.point(a, b) - x).squaredNorm();
+    if (distance2 >= best) return false;
+    u = a, v = b, best = distance2;
+    return true;
+  };
+  for (int i = 0; i <= kParts; ++i)
+    for (int j = 0; i + j <= kParts; ++j) try_at(double(i) / kParts, double(j) / kParts);
+  for (double step = 1.0 / kParts; step > 1e-9; step /= 2)
+    for (bool lower = true; lower;) {
+      lower = false;
+      const double a = u, b = v;
+      for (const auto& [du, dv] : {std::pair(1, 0), {-1, 0}, {0, 1}, {0, -1}, {1, -1}, {-1, 1}}) {
+        const double p = std::clamp(a + du * step, 0.0, 1.0);
+        lower = try_at(p, std::clamp(b + dv * step, 0.0, 1.0 - p)) || lower;
+      }
+    }
+  return {u, v, patch.point(u, v)};
+}
+
+// True where the distance from x is convex at a place that it is stationary at.
+inline bool is_convex_at(const CubicPatch& patch, double u, double v, const Vec3& x) {
+  const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v), r = patch.point(u, v) - x;
+  const double huu = xu.dot(xu), hvv = xv.dot(xv);
+  const double fuu = huu + r.dot(patch.along_uu(u, v));
+  const double fuv = xu.dot(xv) + r.dot(patch.along_uv(u, v));
+  const double fvv = hvv + r.dot(patch.along_vv(u, v));
+  return fuu > 0 && fuu * fvv - fuv * fuv > 1e-9 * huu * hvv;
 }
 
 // The direction in which the distance from x falls fastest at a saddle of it.

@@ -167,12 +167,13 @@ void Query::join_over_passes(const Shell& shell, const Vec3& centre, std::size_t
         return minimum.depth - at.depth < share * at.depth &&
                (minimum.normal - at.normal).squaredNorm() < kAlike * kAlike;
       };
-      if (!near(rows_[first].contact) || !near(rows_[here].contact)) {
+      int m = find(first, &Row::merged), n = find(here, &Row::merged);
+      if (m > n) std::swap(m, n);
+      if (!near(rows_[first].contact) || !near(rows_[here].contact) || !near(rows_[m].contact) ||
+          !near(rows_[n].contact)) {
         ++joined;
         continue;
       }
-      int m = find(first, &Row::merged), n = find(here, &Row::merged);
-      if (m > n) std::swap(m, n);
       rows_[n].merged = m;
       rows_[m].depth += rows_[n].depth - at.depth;
       rows_[m].normal += rows_[n].normal - at.normal;

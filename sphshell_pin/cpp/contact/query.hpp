@@ -98,6 +98,7 @@ class Query {
                   double tolerance);
   void claim_vertex(const Shell& shell, int facet, int corner, const Vec3& centre, double radius,
                     double tolerance);
+  void claim_nearest(const Shell& shell, const Vec3& centre, double radius);
   void add_minimum(const Shell& shell, const Contact& contact, int carrier_face,
                    const Carrier& carrier);
   void add_pass(const Contact& contact, const Carrier& carrier, bool sharp,

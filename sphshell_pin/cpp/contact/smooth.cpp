@@ -2,11 +2,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "contact/feet.hpp"
 #include "contact/query.hpp"
 #include "contact/regions.hpp"
 #include "shell/curved.hpp"
+#include "shell/triangle.hpp"
 
 namespace sphshell {
 namespace {
@@ -18,6 +20,11 @@ Vec3 inward_of(const Shell& shell, int h, double t, const Vec3& along) {
   return (inward - inward.dot(along) * along).normalized();
 }
 
+// The parameters u, v of a facet at t on its side k.
+std::pair<double, double> on_side(int k, double t) {
+  return k == 0 ? std::pair(t, 0.0) : k == 1 ? std::pair(1 - t, t) : std::pair(0.0, 1 - t);
+}
+
 }  // namespace
 
 void Query::find_smooth(const Shell& shell, const Vec3& centre, double radius) {
@@ -27,6 +34,7 @@ void Query::find_smooth(const Shell& shell, const Vec3& centre, double radius) {
   passes_.clear();
   legs_.clear();
   claim_on_patches(shell, centre, radius, tolerance);
+  if (contacts.empty()) claim_nearest(shell, centre, radius);
   if (contacts.empty()) return;
   if (contacts.size() > 1) join_minima(shell, centre, radius);
   if (shell.side() != Side::Both) keep_one_side(shell, centre, radius);
@@ -133,6 +141,7 @@ void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, dou
   const double spare = 4 * kOverlap * (facet.corner[next_corner(k)] - facet.corner[k]).norm();
   std::size_t sides = 0;
   double steepest = -1;
+  bool convex = true;
   exits_.clear();
   const Vec3 along = side.tangent(t).normalized();
   const auto look = [&](int h) {
@@ -142,7 +151,13 @@ void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, dou
     const double fall = (centre - point).dot(inward);
     steepest = sides == 0 ? fall : std::max(steepest, fall);
     ++sides;
-    if (fall > -spare) exits_.push_back({inward, sharp ? triangle_of(h) : -1});
+    if (fall <= -spare) return;
+    exits_.push_back({inward, sharp ? triangle_of(h) : -1});
+    // Where the element goes on level, its curvature decides.
+    const CurvedFacet& beyond = shell.curved()->facets()[triangle_of(h)];
+    if (fall > spare || beyond.flat || !convex) return;
+    const auto [u, v] = on_side(side_of(h), same_way ? t : 1 - t);
+    convex = is_convex_at(beyond.patch(other), u, v, centre);
   };
   const int code = shell.curved()->facets()[f].owned.twin[k];
   look(3 * f + k);
@@ -152,7 +167,7 @@ void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, dou
     exits_.clear();
     for (int h : shell.half_edges_of(kManifold - code)) look(h);
   }
-  const bool minimum = !summit && steepest <= tolerance;
+  const bool minimum = !summit && convex && steepest <= tolerance;
   if (summit && steepest <= tolerance) {
     exits_ = {{along, -1}, {-along, -1}};
   }
@@ -189,18 +204,22 @@ void Query::claim_vertex(const Shell& shell, int f, int k, const Vec3& centre, d
   }
   if (!minimum && falling < 2) return;
   exits_.clear();
-  if (!minimum) {
-    for (int c : surface.corners_of(vertex)) {
-      const Facet& other = shell.facets()[triangle_of(c)];
-      const CurvedFacet& curved = surface.facets()[triangle_of(c)];
-      const int j = side_of(c), last = previous_corner(j);
-      const Vec3 out = curved.side(other, j).tangent(0), in = -curved.side(other, last).tangent(1);
+  for (int c : surface.corners_of(vertex)) {
+    const Facet& other = shell.facets()[triangle_of(c)];
+    const CurvedFacet& curved = surface.facets()[triangle_of(c)];
+    const int j = side_of(c), last = previous_corner(j);
+    const Vec3 out = curved.side(other, j).tangent(0), in = -curved.side(other, last).tangent(1);
+    if (minimum) {
+      if (!falls(out) || !falls(in) || curved.flat) continue;
+      const auto [u, v] = on_side(j, 0);
+      if (!is_convex_at(curved.patch(other), u, v, centre)) return;
+    } else {
       joined += falls(out) && falls(in);
       if (falls(out) || falls(in))
         exits_.push_back({(falls(out) ? out : in).normalized(), sharp ? triangle_of(c) : -1});
     }
-    if (falling < joined + 2) return;
   }
+  if (!minimum && falling < joined + 2) return;
   const Contact contact = {facet.corner[k], direction(facet.corner[k], centre, facet.normal),
                            radius - from.norm(), facet.element, Feature::Vertex};
   const Carrier carrier = {topology.vertex_normal[vertex], bool(topology.vertex_on_rim[vertex])};
@@ -208,6 +227,30 @@ void Query::claim_vertex(const Shell& shell, int f, int k, const Vec3& centre, d
     add_minimum(shell, contact, sharp ? kSharp : kCurved, carrier);
   else
     add_pass(contact, carrier, sharp, exits_);
+}
+
+// Where the centre is nearly as far from a whole piece of the surface, as in a socket of the
+// sphere's own size, round-off hides the minimum: the nearest place is the contact.
+void Query::claim_nearest(const Shell& shell, const Vec3& centre, double radius) {
+  const CurvedShell& surface = *shell.curved();
+  double nearest = radius;
+  Contact contact{};
+  Carrier carrier{};
+  for (int f : near_) {
+    const Facet& facet = shell.facets()[f];
+    const Vec3 flat = closest_on_triangle(centre, facet.corner, facet.normal).point;
+    if ((flat - centre).norm() > nearest + surface.bulge()) continue;
+    const CubicPatch patch = surface.facets()[f].patch(facet);
+    const PatchPoint at = nearest_on_patch(patch, centre);
+    const double distance = (at.point - centre).norm();
+    if (distance >= nearest) continue;
+    nearest = distance;
+    const Vec3 outward = patch.along_u(at.u, at.v).cross(patch.along_v(at.u, at.v));
+    contact = {at.point, direction(at.point, centre, outward.normalized()), radius - distance,
+               facet.element, Feature::Face};
+    carrier = {outward, false};
+  }
+  if (nearest < radius) add_minimum(shell, contact, kCurved, carrier);
 }
 
 void Query::add_minimum(const Shell& shell, const Contact& contact, int carrier_face,

@@ -67,6 +67,7 @@ class CurvedShell {
   double bulge() const { return bulge_; }  // farthest from the flat triangles [m]
   // Tangents of the edges that leave vertex i, beside Topology::neighbours.
   const std::vector<Vec3>& tangents() const { return tangents_; }
+  const std::vector<Vec3>& normals() const { return normals_; }  // per corner, 3 triangle + k
   // The corners (3 facet + k) that meet at a vertex.
   Corners corners_of(int vertex) const {
     return {&corners_[corner_begin_[vertex]], &corners_[corner_begin_[vertex + 1]]};

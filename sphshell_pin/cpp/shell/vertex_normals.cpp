@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "shell/disjoint_sets.hpp"
 
@@ -12,8 +13,13 @@ namespace {
 // A fit leaves at most this share of the squared heights: what curves more unevenly is noise, or
 // the end of a fillet.
 constexpr double kMostUneven = 0.1;
-// Pivots of the normal equations, smallest to largest: below, the points lie along a curve.
-constexpr double kLeastPivot = 1e-5;
+// Smallest pivot of the scaled normal equations: below, the points do not tell the terms apart.
+constexpr double kLeastPivot = 1e-6;
+// Normals agree within this angle [rad] and share of the spread of the normals around.
+constexpr double kSmallTurn = 0.005, kLikely = 0.25;
+// Edges are long beyond this many times those that lead on from them: surely, and where no fit says
+// otherwise.
+constexpr double kFarLonger = 4, kLonger = 2.5;
 
 // Corners 3 triangle + k joined where they share a vertex and a smooth edge.
 DisjointSets fans_of(const Shell& shell) {
@@ -92,6 +98,37 @@ Vec3 max_normal(const Shell& shell, const int* begin, const int* end) {
   return sum.normalized();
 }
 
+// Where a long edge of a fan bends that goes on in short ones only, the normal is turned upright on
+// it. Max's would make a wall bulge that ends in a fillet; but a tessellation has long edges where
+// its surface is flat along them. False where there is none.
+bool turn_upright(const Shell& shell, const int* begin, const int* end, double longer,
+                  Vec3& normal) {
+  std::vector<Vec3> edges;
+  for (const int* c = begin; c != end; ++c) {
+    const Triangle& t = shell.triangles()[*c / 3];
+    const Vec3& origin = shell.vertices()[t[*c % 3]];
+    for (int k : {next_corner(*c % 3), previous_corner(*c % 3)})
+      edges.push_back(shell.vertices()[t[k]] - origin);
+  }
+  const auto slope = [&](const Vec3& edge) { return std::abs(edge.dot(normal)) / edge.norm(); };
+  double steepest = 0;
+  for (const Vec3& edge : edges) steepest = std::max(steepest, slope(edge));
+  Vec3 along = Vec3::Zero();
+  for (const Vec3& edge : edges) {
+    double onward = 0;
+    for (const Vec3& other : edges)
+      if (other.dot(edge) < -0.5 * other.norm() * edge.norm())
+        onward = std::max(onward, other.norm());
+    if (slope(edge) > 0.5 * steepest && onward > 0 && longer * onward < edge.norm() &&
+        along.dot(edge) >= 0)
+      along += edge;
+  }
+  if (along.isZero(0)) return false;
+  along.normalize();
+  normal = (normal - normal.dot(along) * along).normalized();
+  return true;
+}
+
 // True where the surface falls away from a fan's vertex along straight lines, as from the tip of a
 // cone: seen from the vertices around it does not bend that much.
 bool is_tip(const Shell& shell, const std::vector<Vec3>& normals, const int* begin,
@@ -144,10 +181,13 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
       along += weight * z * row;
       heights2 += weight * z * z;
     }
-    const Eigen::LDLT<Square> solver(square);
-    const auto pivots = solver.vectorD().cwiseAbs();
-    if (!(pivots.minCoeff() > kLeastPivot * pivots.maxCoeff())) return false;
-    const Row fit = solver.solve(along);
+    // Columns scaled alike, so that the pivots tell how nearly dependent they are.
+    const Row size = square.diagonal().cwiseSqrt();
+    if (!(size.minCoeff() > 0)) return false;
+    const Eigen::LDLT<Square> solver(size.cwiseInverse().asDiagonal() * square *
+                                     size.cwiseInverse().asDiagonal());
+    if (!(solver.vectorD().cwiseAbs().minCoeff() > kLeastPivot)) return false;
+    const Row fit = solver.solve(along.cwiseQuotient(size)).cwiseQuotient(size);
     if (round > 0 && heights2 - fit.dot(along) > kMostUneven * heights2) return false;
     n = (n - fit[0] * east - fit[1] * north).normalized();
   }
@@ -157,47 +197,76 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
 
 }  // namespace
 
-// Sharp fans, whose triangles spread more than creases may, keep each triangle's own.
 std::vector<Vec3> estimate_normals(const Shell& shell) {
   const Topology& topology = shell.topology();
   const Fans fans(shell);
-  // Cosines of the angle from a triangle to the common normal.
-  const double always = std::cos(shell.crease_angle()), maybe = std::cos(shell.crease_angle() / 2);
-  const std::size_t count = static_cast<std::size_t>(fans.size());
-  std::vector<Vec3> normals(count);
-  std::vector<double> widest(count, 1);
-  std::vector<char> flat(count, 1), sharp(count, 0);
-  for (int fan = 0; fan < fans.size(); ++fan) {
+  const int count = fans.size();
+  std::vector<Vec3> normals(static_cast<std::size_t>(count));
+  const auto set = [&](std::vector<Vec3>& to, int fan, const Vec3& normal) {
+    for (const int* c = fans.begin(fan); c != fans.end(fan); ++c) to[*c] = normal;
+  };
+  for (int fan = 0; fan < count; ++fan)
+    if (fans.begin(fan) != fans.end(fan))
+      set(normals, fan, max_normal(shell, fans.begin(fan), fans.end(fan)));
+  // Largest angle [rad] from a fan's normal to those of its triangles and of the fans beside it.
+  const auto spread = [&](int fan, bool beside) {
+    double cosine = 1;
+    for (const int* c = fans.begin(fan); c != fans.end(fan); ++c) {
+      cosine = std::min(cosine, normals[*c].dot(topology.face_normal[*c / 3]));
+      for (int k = 0; beside && k < 3; ++k)
+        cosine = std::min(cosine, normals[*c].dot(normals[*c / 3 * 3 + k]));
+    }
+    return std::acos(std::clamp(cosine, -1.0, 1.0));
+  };
+  // What is flat or sharp (its triangles spread more than creases may) keeps its triangles' own.
+  std::vector<Vec3> out = normals;
+  std::vector<char> settled(out.size(), 0), sharp(out.size(), 0);
+  for (int fan = 0; fan < count; ++fan) {
     const int *begin = fans.begin(fan), *end = fans.end(fan);
-    const Vec3 normal = max_normal(shell, begin, end);
-    for (const int* c = begin; c != end; ++c) {
-      const int t = *c / 3;
-      widest[fan] = std::min(widest[fan], normal.dot(topology.face_normal[t]));
-      if (topology.planar_face[t] != topology.planar_face[*begin / 3]) flat[fan] = 0;
-      normals[*c] = normal;
+    const double angle = spread(fan, false), limit = shell.crease_angle();
+    sharp[fan] = angle > limit || (angle > limit / 2 && is_tip(shell, normals, begin, end));
+    settled[fan] = sharp[fan] || std::all_of(begin, end, [&](int c) {
+                     return topology.planar_face[c / 3] == topology.planar_face[*begin / 3];
+                   });
+    if (settled[fan])
+      for (const int* c = begin; c != end; ++c) out[*c] = topology.face_normal[*c / 3];
+    Vec3 normal = normals[fan];
+    if (!settled[fan] && turn_upright(shell, begin, end, kFarLonger, normal)) {
+      set(out, fan, normal);
+      settled[fan] = 1;
     }
   }
-  for (int fan = 0; fan < fans.size(); ++fan)
-    sharp[fan] = widest[fan] < always ||
-                 (widest[fan] < maybe && is_tip(shell, normals, fans.begin(fan), fans.end(fan)));
-  for (int fan = 0; fan < fans.size(); ++fan)
-    if (sharp[fan] || flat[fan])
-      for (const int* c = fans.begin(fan); c != fans.end(fan); ++c)
-        normals[*c] = topology.face_normal[*c / 3];
+  normals = out;
   std::vector<int> around;
   std::vector<Vec3> points;
-  for (int fan = 0; fan < fans.size(); ++fan) {
-    if (sharp[fan] || flat[fan]) continue;
-    const int *begin = fans.begin(fan), *end = fans.end(fan);
+  for (int fan = 0; fan < count; ++fan) {
+    if (settled[fan]) continue;
     fans.vertices_around(fan, sharp, around);
     points.clear();
     for (int v : around) points.push_back(shell.vertices()[v]);
-    const Vec3& origin = shell.vertices()[fans.vertex(*begin)];
-    Vec3 normal = normals[*begin];
-    if (!fit_normal<9>(origin, points, normal)) fit_normal<5>(origin, points, normal);
-    for (const int* c = begin; c != end; ++c) normals[*c] = normal;
+    const Vec3& origin = shell.vertices()[fans.vertex(*fans.begin(fan))];
+    const Vec3& plain = normals[fan];
+    Vec3 quadratic = plain, cubic = plain;
+    const bool fits = fit_normal<5>(origin, points, quadratic);
+    const bool fits_better = fit_normal<9>(origin, points, cubic);
+    const auto agree = [](const Vec3& a, const Vec3& b, double angle) {
+      return a.cross(b).norm() <= kSmallTurn + angle;
+    };
+    // Two fits that agree are right. One alone has to stay close to the triangles; seen from one
+    // side only, a normal may lie somewhat beyond them.
+    const bool open = topology.vertex_sharp[fans.vertex(*fans.begin(fan))];
+    Vec3 normal = plain;
+    if (fits && fits_better ? agree(quadratic, cubic, kLikely * spread(fan, true))
+                            : fits_better && agree(cubic, plain, kLikely * spread(fan, false)))
+      normal = cubic;
+    else if (fits && !fits_better &&
+             agree(quadratic, plain, open ? 1.1 * spread(fan, true) : kLikely * spread(fan, false)))
+      normal = quadratic;
+    else
+      turn_upright(shell, fans.begin(fan), fans.end(fan), kLonger, normal);
+    set(out, fan, normal);
   }
-  return normals;
+  return out;
 }
 
 }  // namespace sphshell
