@@ -12,9 +12,9 @@ namespace sphshell {
 namespace {
 
 // Two minima are one contact where the pass between them is no more than this share of its depth
-// below both: what that changes of the force is the square of it. On a smooth patch, whose elements
+// below both: what that changes of the force is the square of it. Between curved elements, which
 // meet at small angles that nobody meant, the share is larger.
-constexpr double kShallow = 3e-3, kShallowOnPatch = 0.1;
+constexpr double kShallow = 1e-4, kShallowOnPatch = 1e-2;
 // ... and their normals differ from its by no more than this [rad].
 constexpr double kAlike = 0.03;
 
@@ -106,25 +106,30 @@ void Query::join_minima(const Shell& shell, const Vec3& centre, double radius) {
   }
 }
 
-// The minimum that a leg leads to, -1 if none. From a crease one walks down over the flat elements,
-// and takes what is nearest to where that ends. On a smooth patch all is close together, and the
-// leg's direction tells.
-int Query::minimum_below(const Shell& shell, const Vec3& centre, const Vec3& point, const Leg& leg,
+// The minimum that a leg leads to, -1 if none. Over flat elements one walks down, and takes what is
+// nearest to where that ends. On a curved patch all is close together and the leg's direction
+// tells; only from a crease may it lead to another patch.
+int Query::minimum_below(const Shell& shell, const Vec3& centre, const Pass& pass, const Leg& leg,
                          std::size_t minima, double same) const {
-  const Vec3 end = leg.facet < 0 ? point : walk_down(shell, centre, leg.facet);
-  int best = -1;
-  double nearest = std::numeric_limits<double>::infinity();
+  const bool flat = shell.curved()->facets()[leg.facet].flat;
+  const Vec3 end = flat ? walk_down(shell, centre, leg.facet) : pass.contact.point;
+  const std::vector<int>& patch = shell.topology().patch;
+  const int here = patch[shell.facets()[leg.facet].element];
+  int best = -1, best_here = -1;
+  double nearest = std::numeric_limits<double>::infinity(), nearest_here = nearest;
   for (std::size_t i = 0; i < minima; ++i) {
     const Vec3 way = rows_[i].contact.point - end;
     double distance = way.norm();
-    if (leg.facet < 0) {
+    if (!flat) {
       const double along = way.dot(leg.direction);
-      if (distance > same && along < 0.3 * distance) continue;
-      distance += 20 * std::max(0.0, distance - along);
+      if (distance <= same || along < 0.3 * distance) continue;
+      distance += 20 * (distance - along);
     }
     if (distance < nearest) nearest = distance, best = static_cast<int>(i);
+    if (distance < nearest_here && patch[rows_[i].contact.element] == here)
+      nearest_here = distance, best_here = static_cast<int>(i);
   }
-  return best;
+  return flat || (pass.sharp && best_here < 0) ? best : best_here;
 }
 
 // Highest pass first, as water rises: it joins what is not joined yet (Kruskal).
@@ -147,7 +152,7 @@ void Query::join_over_passes(const Shell& shell, const Vec3& centre, std::size_t
         here_too = static_cast<int>(i);
     int first = here_too;
     for (int leg = pass.first_leg; leg < pass.last_leg; ++leg) {
-      const int here = minimum_below(shell, centre, at.point, legs_[leg], minima, same);
+      const int here = minimum_below(shell, centre, pass, legs_[leg], minima, same);
       if (here < 0) continue;
       if (first < 0) {
         first = here;
@@ -162,7 +167,8 @@ void Query::join_over_passes(const Shell& shell, const Vec3& centre, std::size_t
         first = here;
         continue;
       }
-      const double share = pass.sharp ? kShallow : kShallowOnPatch;
+      const bool meant = pass.sharp || shell.curved()->facets()[legs_[leg].facet].flat;
+      const double share = meant ? kShallow : kShallowOnPatch;
       const auto near = [&](const Contact& minimum) {
         return minimum.depth - at.depth < share * at.depth &&
                (minimum.normal - at.normal).squaredNorm() < kAlike * kAlike;

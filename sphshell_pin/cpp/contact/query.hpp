@@ -62,7 +62,7 @@ class Query {
   // A way down from a pass.
   struct Leg {
     Vec3 direction;
-    int facet;  // that it enters; only its direction is known where this is -1
+    int facet;  // that it enters
   };
   // A place from which the distance falls in several directions, legs_[first_leg .. last_leg).
   struct Pass {
@@ -105,7 +105,7 @@ class Query {
                 const std::vector<Leg>& exits);
   void join_minima(const Shell& shell, const Vec3& centre, double radius);
   void join_over_passes(const Shell& shell, const Vec3& centre, std::size_t minima, double same);
-  int minimum_below(const Shell& shell, const Vec3& centre, const Vec3& point, const Leg& leg,
+  int minimum_below(const Shell& shell, const Vec3& centre, const Pass& pass, const Leg& leg,
                     std::size_t minima, double same) const;
   void drop_twins(const Shell& shell, std::size_t minima, double radius);
   void collect_claims(const Shell& shell, const Vec3& centre, double radius, double tolerance);

@@ -120,7 +120,7 @@ void Query::claim_curved(const Shell& shell, const Shadow& shadow, const Vec3& c
     add_minimum(shell, contact, kCurved, {outward, false});
   } else {
     const Vec3 leg = downhill(patch, foot, centre);
-    add_pass(contact, {outward, false}, false, {{leg, -1}, {-leg, -1}});
+    add_pass(contact, {outward, false}, false, {{leg, shadow.facet}, {-leg, shadow.facet}});
   }
 }
 
@@ -141,7 +141,7 @@ void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, dou
   const double spare = 4 * kOverlap * (facet.corner[next_corner(k)] - facet.corner[k]).norm();
   std::size_t sides = 0;
   double steepest = -1;
-  bool convex = true;
+  bool convex = true, bent = false;
   exits_.clear();
   const Vec3 along = side.tangent(t).normalized();
   const auto look = [&](int h) {
@@ -149,12 +149,13 @@ void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, dou
     const bool same_way = other.corner[side_of(h)] == facet.corner[k];
     const Vec3 inward = inward_of(shell, h, same_way ? t : 1 - t, along);
     const double fall = (centre - point).dot(inward);
+    const CurvedFacet& beyond = shell.curved()->facets()[triangle_of(h)];
+    bent = bent || !beyond.flat;
     steepest = sides == 0 ? fall : std::max(steepest, fall);
     ++sides;
     if (fall <= -spare) return;
-    exits_.push_back({inward, sharp ? triangle_of(h) : -1});
+    exits_.push_back({inward, triangle_of(h)});
     // Where the element goes on level, its curvature decides.
-    const CurvedFacet& beyond = shell.curved()->facets()[triangle_of(h)];
     if (fall > spare || beyond.flat || !convex) return;
     const auto [u, v] = on_side(side_of(h), same_way ? t : 1 - t);
     convex = is_convex_at(beyond.patch(other), u, v, centre);
@@ -169,14 +170,14 @@ void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, dou
   }
   const bool minimum = !summit && convex && steepest <= tolerance;
   if (summit && steepest <= tolerance) {
-    exits_ = {{along, -1}, {-along, -1}};
+    exits_ = {{along, f}, {-along, f}};
   }
   const bool pass = summit ? steepest <= tolerance : exits_.size() >= 2;
   if (!minimum && !pass) return;
   const Contact contact = {point, direction(point, centre, facet.normal),
                            radius - (centre - point).norm(), facet.element, Feature::Edge};
   const Carrier carrier = {topology.edge_normal(edge), edge.on_rim()};
-  if (minimum) add_minimum(shell, contact, sharp ? kSharp : kCurved, carrier);
+  if (minimum) add_minimum(shell, contact, sharp || !bent ? kSharp : kCurved, carrier);
   if (pass) add_pass(contact, carrier, sharp, exits_);
 }
 
@@ -191,40 +192,42 @@ void Query::claim_vertex(const Shell& shell, int f, int k, const Vec3& centre, d
   const int vertex = surface.facets()[f].owned.vertex[k];
   const Vec3 from = centre - facet.corner[k];
   const bool sharp = topology.vertex_sharp[vertex];
-  bool minimum = true;
-  std::size_t falling = 0, joined = 0;
-  // As for edges, a pass is one with a little to spare.
-  const auto falls = [&](const Vec3& tangent) {
-    return from.dot(tangent) > -4 * kOverlap * tangent.squaredNorm();
+  // Nearly level edges count as falling, or as rising: a pass is what is one either way.
+  const auto falls = [&](const Vec3& tangent, bool if_level) {
+    const double fall = from.dot(tangent), spare = 4 * kOverlap * tangent.squaredNorm();
+    return if_level ? fall > -spare : fall > spare;
   };
+  bool minimum = true, bent = false;
+  std::size_t falling[2] = {0, 0}, joined[2] = {0, 0};
   for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i) {
     const Vec3& tangent = surface.tangents()[i];
-    falling += falls(tangent);
+    for (bool level : {false, true}) falling[level] += falls(tangent, level);
     minimum = minimum && from.dot(tangent) <= tolerance * tangent.norm();
   }
-  if (!minimum && falling < 2) return;
+  if (!minimum && falling[true] < 2) return;
   exits_.clear();
   for (int c : surface.corners_of(vertex)) {
     const Facet& other = shell.facets()[triangle_of(c)];
     const CurvedFacet& curved = surface.facets()[triangle_of(c)];
     const int j = side_of(c), last = previous_corner(j);
     const Vec3 out = curved.side(other, j).tangent(0), in = -curved.side(other, last).tangent(1);
+    bent = bent || !curved.flat;
     if (minimum) {
-      if (!falls(out) || !falls(in) || curved.flat) continue;
+      if (!falls(out, true) || !falls(in, true) || curved.flat) continue;
       const auto [u, v] = on_side(j, 0);
       if (!is_convex_at(curved.patch(other), u, v, centre)) return;
     } else {
-      joined += falls(out) && falls(in);
-      if (falls(out) || falls(in))
-        exits_.push_back({(falls(out) ? out : in).normalized(), sharp ? triangle_of(c) : -1});
+      for (bool level : {false, true}) joined[level] += falls(out, level) && falls(in, level);
+      if (falls(out, true)) exits_.push_back({out.normalized(), triangle_of(c)});
+      if (falls(in, true)) exits_.push_back({in.normalized(), triangle_of(c)});
     }
   }
-  if (!minimum && falling < joined + 2) return;
+  if (!minimum && falling[false] < joined[false] + 2 && falling[true] < joined[true] + 2) return;
   const Contact contact = {facet.corner[k], direction(facet.corner[k], centre, facet.normal),
                            radius - from.norm(), facet.element, Feature::Vertex};
   const Carrier carrier = {topology.vertex_normal[vertex], bool(topology.vertex_on_rim[vertex])};
   if (minimum)
-    add_minimum(shell, contact, sharp ? kSharp : kCurved, carrier);
+    add_minimum(shell, contact, sharp || !bent ? kSharp : kCurved, carrier);
   else
     add_pass(contact, carrier, sharp, exits_);
 }

@@ -25,26 +25,30 @@ void add_distinct(std::vector<Vec3>& normals, const Vec3& n) {
   normals.push_back(n);
 }
 
-// The unit vector nearest to the chord d that is tangent to the planes of all normals: with one of
-// them the projection of d, with two their common line. False where there is none.
-bool tangent_of(const Vec3& d, const std::vector<Vec3>& normals, Vec3& out) {
+// What is known of an edge at one of its ends: the normals there, and which way it goes.
+struct EdgeEnd {
+  const std::vector<Vec3>& normals;
+  Vec3 direction;
+};
+
+// The unit vector nearest to the direction, forward along chord d, that is tangent to the planes of
+// all normals: with one of them its projection, with two their common line. False where there is
+// none.
+bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
+  const std::vector<Vec3>& normals = end.normals;
   if (normals.size() > 2) return false;
-  out = d - d.dot(normals[0]) * normals[0];
-  if (normals.size() == 2) {
-    const Vec3 line = normals[0].cross(normals[1]).normalized();
-    out = line.dot(d) * line;
-  }
-  const double length = out.norm();
-  if (length < kMostLean * d.norm()) return false;
-  out /= length;
-  return true;
+  const Vec3 direction = end.direction.isZero(0) || end.direction.dot(d) == 0 ? d : end.direction;
+  out = direction - direction.dot(normals[0]) * normals[0];
+  if (normals.size() == 2) out = normals[0].cross(normals[1]);
+  out.normalize();
+  if (out.dot(d) < 0) out = -out;
+  return out.dot(d) >= kMostLean * d.norm();
 }
 
-// Lifts of the two control points of an edge with chord d, tangent to the planes of all `first`
-// normals at its first end and of all `last` normals at its last. The handles are those that make
-// a circular arc of a circle's tangents (Goldapp, CAGD 8 (1991) 227): order 4 on any curve.
-std::array<Vec3, 2> lifts_of(const Vec3& d, const std::vector<Vec3>& first,
-                             const std::vector<Vec3>& last) {
+// Lifts of the two control points of an edge with chord d, tangent to the planes of all normals at
+// its ends. The handles are those that make a circular arc of a circle's tangents (Goldapp, CAGD 8
+// (1991) 227): order 4 on any curve.
+std::array<Vec3, 2> lifts_of(const Vec3& d, const EdgeEnd& first, const EdgeEnd& last) {
   const std::array<Vec3, 2> straight = {Vec3::Zero(), Vec3::Zero()};
   const double length = d.norm();
   const auto steepest = [&](const std::vector<Vec3>& normals) {
@@ -52,7 +56,7 @@ std::array<Vec3, 2> lifts_of(const Vec3& d, const std::vector<Vec3>& first,
     for (const Vec3& n : normals) most = std::max(most, std::abs(n.dot(d)) / length);
     return most;
   };
-  const double at_first = steepest(first), at_last = steepest(last);
+  const double at_first = steepest(first.normals), at_last = steepest(last.normals);
   if (std::max(at_first, at_last) <= 1e-14) return straight;
   // Flat at one end and not at the other: the edge leads from a plane into a bend, or to a groove.
   if (std::min(at_first, at_last) <= 1e-9 * std::max(at_first, at_last)) return straight;
@@ -62,6 +66,32 @@ std::array<Vec3, 2> lifts_of(const Vec3& d, const std::vector<Vec3>& first,
     return 2 * length / (3 * (1 + tangent.dot(d) / length)) * tangent - d / 3;
   };
   return {handle(begin), -handle(end)};
+}
+
+// Per vertex the direction of a border that passes through it, zero where it has a corner there or
+// ends: along the circle through three vertices.
+std::vector<Vec3> border_directions(const Shell& shell) {
+  const std::vector<Vec3>& p = shell.vertices();
+  std::vector<Vec3> sum(p.size(), Vec3::Zero()), one(p.size(), Vec3::Zero());
+  std::vector<int> count(p.size(), 0);
+  std::vector<char> corner(p.size(), 0);
+  for (const Edge& edge : shell.topology().edges) {
+    if (edge.kind != EdgeClass::Boundary) continue;
+    const Vec3 d = p[edge.last_vertex] - p[edge.first_vertex];
+    for (int v : {edge.first_vertex, edge.last_vertex}) {
+      const Vec3 away = v == edge.first_vertex ? d : Vec3(-d);
+      if (++count[v] == 1) {
+        one[v] = away;
+      } else {
+        sum[v] = away / away.squaredNorm() - one[v] / one[v].squaredNorm();
+        const double cosine = -away.dot(one[v]) / (away.norm() * one[v].norm());
+        corner[v] = count[v] > 2 || cosine < std::cos(shell.crease_angle());
+      }
+    }
+  }
+  for (std::size_t v = 0; v < p.size(); ++v)
+    if (corner[v]) sum[v].setZero();
+  return sum;
 }
 
 // The ten control points of a patch, [i][j] with i steps from corner 0 to 1 and j to corner 2.
@@ -202,6 +232,7 @@ void CurvedShell::bend_edges(const Shell& shell) {
   facets_.resize(triangles.size());
   tangents_.assign(topology.neighbours.size(), Vec3::Zero());
   std::vector<int> fill(topology.neighbour_begin.begin(), topology.neighbour_begin.end() - 1);
+  const std::vector<Vec3> borders = border_directions(shell);
   std::vector<Vec3> first, last;
   for (const Edge& edge : topology.edges) {
     first.clear();
@@ -217,7 +248,9 @@ void CurvedShell::bend_edges(const Shell& shell) {
       add_distinct(last, forward(h) ? there : here);
     }
     const Vec3 d = p[edge.last_vertex] - p[edge.first_vertex];
-    const std::array<Vec3, 2> lift = lifts_of(d, first, last);
+    const bool border = edge.kind == EdgeClass::Boundary;
+    const std::array<Vec3, 2> lift = lifts_of(d, {first, border ? borders[edge.first_vertex] : d},
+                                              {last, border ? borders[edge.last_vertex] : d});
     for (int i = 0; i < edge.count; ++i) {
       const int h = topology.incidence[edge.begin + i], g = shell.facet_half_edge(h);
       Vec3* side = facets_[triangle_of(g)].lift[side_of(g)];

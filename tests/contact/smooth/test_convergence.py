@@ -65,13 +65,13 @@ def test_order_with_estimated_normals(name: str, depth: float) -> None:
 @pytest.mark.parametrize("exact", [True, False])
 @pytest.mark.parametrize("name", SURFACES)
 def test_one_contact(name: str, exact: bool) -> None:
-    """Never none nor two, unless the surface of the elements is off by more than the depth."""
+    """Never none nor two, unless the surface of the elements is off by nearly the depth."""
     for h in SIDES:
         # In metres: the force goes with depth^1.5, and the probes are but a sample.
         error = 2 * measured(name, h, DEPTHS[0], exact)[0].max() * DEPTHS[0] / 1.5
         for depth in DEPTHS:
             count = measured(name, h, depth, exact)[2]
-            assert error > depth or (count == 1).all(), (h, depth)
+            assert error > depth / 2 or (count == 1).all(), (h, depth)
 
 
 def rim_errors(columns: int, rows: int):
