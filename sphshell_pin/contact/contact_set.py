@@ -8,7 +8,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.errors import NameNotFound
+from sphshell_pin.contact.laws import NormalLaw
+from sphshell_pin.errors import InvalidParameter, NameNotFound
 
 Array = NDArray[np.float64]
 
@@ -46,7 +47,8 @@ class ContactSet:
     vertex, one of those that share it); `patch` (k,) smooth piece of the surface; `feature` (k,)
     values of Feature; `weight` (k,) by which a contact's force counts: 1, but -1 at a pass, a place
     where contacts flow together (method "smooth" only, where the sphere reaches a concave crease
-    between them).
+    between them); `turn` (k, 3, 3), if asked for: derivative of weight * normal with respect to
+    the centre [1/m].
     """
 
     point: Array
@@ -56,7 +58,38 @@ class ContactSet:
     patch: NDArray[np.int32]
     feature: NDArray[np.uint8]
     weight: Array
+    turn: Array | None = None
 
     def __len__(self) -> int:
         """Return the number of contacts."""
         return len(self.depth)
+
+    def force(self, law: NormalLaw) -> Array:
+        """Return the elastic push (3,) on the sphere [N], in the shell's frame: no damping."""
+        push = np.array([law.normal_force(depth) for depth in self.depth])
+        return np.asarray((self.weight * push) @ self.normal)
+
+    def energy(self, law: NormalLaw) -> float:
+        """Return the elastic energy [J]: `force` is minus its gradient."""
+        stored = np.array([law.energy(depth) for depth in self.depth])
+        return float(np.where(self.weight > 0, 1.0, self.weight) @ stored)
+
+    def force_gradient(self, law: NormalLaw) -> Array:
+        """Return the derivative (3, 3) of `force` with respect to the sphere's centre [N/m].
+
+        Of contacts that were found with gradient=True; it is symmetric. With n the normal, t the
+        turn and F the law's elastic force: the sum of F t - F' weight n n^T.
+        """
+        if self.turn is None:
+            raise InvalidParameter(
+                "contacts", self, "know no turn: ask for them with gradient=True"
+            )
+        total = np.zeros((3, 3))
+        for depth, normal, weight, turn in zip(
+            self.depth, self.normal, self.weight, self.turn, strict=True
+        ):
+            # A merged contact's depth changes by |weight| along its normal, a pass's by one.
+            along = weight * min(abs(weight), 1.0)
+            total += law.normal_force(depth) * turn
+            total -= law.normal_stiffness(depth) * along * np.outer(normal, normal)
+        return total

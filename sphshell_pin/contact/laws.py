@@ -34,6 +34,13 @@ class NormalLaw(ABC):
         )
         return value
 
+    def normal_stiffness(self, depth: float) -> float:
+        """Return the slope of the elastic force at `depth` [m], in N/m (0 where not positive)."""
+        depth = check_finite("depth", depth)
+        if depth <= 0:
+            return 0.0
+        return float(self.exponent * self.stiffness * depth ** (self.exponent - 1))
+
     def energy(self, depth: float) -> float:
         """Return the elastic energy [J] stored at `depth` [m]."""
         value: float = self.core.energy(check_finite("depth", depth))

@@ -228,16 +228,25 @@ class Shell(Topology):
             self.vertices, self.triangles, self.triangle_element, crease_angle, SIDES.index(side)
         )
 
-    def contacts(self, center: npt.ArrayLike, radius: float, method: str = "smooth") -> ContactSet:
+    def contacts(
+        self,
+        center: npt.ArrayLike,
+        radius: float,
+        method: str = "smooth",
+        gradient: bool = False,
+    ) -> ContactSet:
         """Find every place where a sphere touches, deepest first.
 
         Parameters
         ----------
         center : (3,) of the sphere, in the shell's frame [m]
         radius : of the sphere [m]
-        method : "facets" (each true feature of the polyhedron once), "smooth" (elements curved to
-            meet the vertex normals, each minimum of a smooth patch once) or "elements" (every
-            touched element by itself, as ADAMS's SPHSHL3 has it: counts shared edges twice)
+        method : "smooth" (elements curved to meet the vertex normals; a connected piece of surface
+            inside the sphere counts once), "facets" (each true feature of the polyhedron once) or
+            "elements" (every touched element by itself, as ADAMS's SPHSHL3 has it: counts shared
+            edges twice)
+        gradient : also find how the normals turn as the sphere moves, for
+            `ContactSet.force_gradient`; not with "elements"
 
         Raises
         ------
@@ -248,11 +257,21 @@ class Shell(Topology):
 
         centre = check_vector("center", center, 3, " [m]")
         radius = check_positive("radius", radius, "m")
-        found = self.core_for(method).contacts(centre, radius, int(Method.from_name(method)))
-        point, normal, depth, element, feature, weight = found
-        patch = self.element_patch[element]
-        columns = (read_only(c) for c in (point, normal, depth, element, patch, feature, weight))
-        return ContactSet(*columns)
+        number = Method.from_name(method)
+        if gradient and number is Method.ELEMENTS:
+            raise InvalidParameter("gradient", gradient, "is not known with method 'elements'")
+        found = self.core_for(method).contacts(centre, radius, int(number), bool(gradient))
+        point, normal, depth, element, feature, weight, turn = map(read_only, found)
+        return ContactSet(
+            point=point,
+            normal=normal,
+            depth=depth,
+            element=element,
+            patch=read_only(self.element_patch[element]),
+            feature=feature,
+            weight=weight,
+            turn=turn if gradient else None,
+        )
 
     def contacts_batch(
         self,

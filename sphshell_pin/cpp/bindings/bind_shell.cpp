@@ -30,11 +30,12 @@ std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& tria
                                  crease_angle, static_cast<Side>(side));
 }
 
-auto contacts(const Shell& shell, const Vec3& centre, double radius, int method) {
+auto contacts(const Shell& shell, const Vec3& centre, double radius, int method, bool turns) {
   Query query;
+  if (turns) query.want_turns();
   query.find(shell, centre, radius, static_cast<Method>(method));
   const std::size_t k = query.contacts.size();
-  std::vector<double> point, normal, depth, weight;
+  std::vector<double> point, normal, depth, weight, turn;
   std::vector<int> element;
   std::vector<std::uint8_t> feature;
   for (const Contact& c : query.contacts) {
@@ -44,10 +45,12 @@ auto contacts(const Shell& shell, const Vec3& centre, double radius, int method)
     element.push_back(c.element);
     feature.push_back(static_cast<std::uint8_t>(c.feature));
     weight.push_back(c.weight);
+    for (int k = 0; turns && k < 3; ++k) append(turn, c.turn.row(k));
   }
   return nb::make_tuple(to_array(std::move(point), {k, 3}), to_array(std::move(normal), {k, 3}),
                         to_array(std::move(depth)), to_array(std::move(element)),
-                        to_array(std::move(feature)), to_array(std::move(weight)));
+                        to_array(std::move(feature)), to_array(std::move(weight)),
+                        to_array(std::move(turn), {turns ? k : 0, 3, 3}));
 }
 
 // Splits 0..n over threads; each writes only to its own rows, so results do not depend on threads.
@@ -133,7 +136,8 @@ void bind_shell(nanobind::module_& m) {
             shell.curve(std::move(corners));
           },
           nb::arg("normals").none())
-      .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"))
+      .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"),
+           nb::arg("gradient") = false)
       .def("contacts_batch", &contacts_batch, nb::arg("centers"), nb::arg("radii"),
            nb::arg("method"), nb::arg("threads"))
       .def("closest_points", &closest_points, nb::arg("points"), nb::arg("threads") = 1)

@@ -1,10 +1,12 @@
 // Where the distance from a point to a curved element, or to its side, is stationary.
 #pragma once
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "contact/query.hpp"
 #include "shell/curved.hpp"
 
 namespace sphshell {
@@ -99,6 +101,28 @@ inline bool is_convex_at(const CubicPatch& patch, double u, double v, const Vec3
   const double fuv = xu.dot(xv) + r.dot(patch.along_uv(u, v));
   const double fvv = hvv + r.dot(patch.along_vv(u, v));
   return fuu > 0 && fuu * fvv - fuv * fuv > 1e-9 * huu * hvv;
+}
+
+// How the foot of x follows it (3, 3): the second derivatives of the distance decide. Zero where
+// they do not.
+inline Mat3 slide_of(const CubicPatch& patch, double u, double v, const Vec3& x) {
+  const Vec3 r = patch.point(u, v) - x;
+  Eigen::Matrix<double, 3, 2> along;
+  along << patch.along_u(u, v), patch.along_v(u, v);
+  Eigen::Matrix2d second = along.transpose() * along;
+  second(0, 0) += r.dot(patch.along_uu(u, v));
+  second(0, 1) += r.dot(patch.along_uv(u, v));
+  second(1, 0) = second(0, 1);
+  second(1, 1) += r.dot(patch.along_vv(u, v));
+  if (second.determinant() == 0) return Mat3::Zero();
+  return along * second.inverse() * along.transpose();
+}
+
+inline Mat3 slide_of(const CubicCurve& side, double t, const Vec3& x) {
+  const Vec3 along = side.tangent(t);
+  const double second = along.squaredNorm() + (side.point(t) - x).dot(side.second(t));
+  if (second == 0) return Mat3::Zero();
+  return along * along.transpose() / second;
 }
 
 // The direction in which the distance from x falls fastest at a saddle of it.

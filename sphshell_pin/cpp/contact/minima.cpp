@@ -82,6 +82,7 @@ void Query::join_minima(const Shell& shell, const Vec3& centre, double radius) {
     row.root = row.merged = static_cast<int>(rows_.size());
     row.normal = row.contact.normal;
     row.depth = row.contact.depth;
+    row.turn = row.contact.turn;
     rows_.push_back(row);
   }
   const std::size_t minima = rows_.size();
@@ -100,6 +101,7 @@ void Query::join_minima(const Shell& shell, const Vec3& centre, double radius) {
       row.contact.weight = row.normal.norm();
       row.contact.normal = row.normal / row.contact.weight;
       row.contact.point = centre - (radius - row.depth) * row.contact.normal;
+      row.contact.turn = row.turn;
     }
     contacts.push_back(row.contact);
     if (one_sided) carriers_.push_back(row.carrier);
@@ -183,11 +185,13 @@ void Query::join_over_passes(const Shell& shell, const Vec3& centre, std::size_t
       rows_[n].merged = m;
       rows_[m].depth += rows_[n].depth - at.depth;
       rows_[m].normal += rows_[n].normal - at.normal;
+      rows_[m].turn += rows_[n].turn - at.turn;
     }
     if (joined == 0) continue;
     Row row;
     row.contact = at;
     row.contact.weight = -joined;
+    row.contact.turn *= -joined;
     row.carrier = pass.carrier;
     row.face = kSharp;
     row.root = row.merged = static_cast<int>(rows_.size());

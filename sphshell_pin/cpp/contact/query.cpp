@@ -195,6 +195,7 @@ void Query::claims_to_contacts(const Shell& shell, const Vec3& centre, double ra
     const Vec3 normal = height < 0 ? Vec3(-facet.normal) : facet.normal;
     contacts.push_back({centre - height * facet.normal, normal, radius - std::abs(height),
                         facet.element, Feature::Face});
+    if (turns_) contacts.back().turn.setZero();
     if (one_sided) carriers_.push_back({facet.normal, false});
   }
   for (const EdgeClaim& claim : edges_) {
@@ -205,17 +206,19 @@ void Query::claims_to_contacts(const Shell& shell, const Vec3& centre, double ra
     const Vec3 point = a + t * along;
     const int h = 3 * shell.triangle_of_facet(claim.facet) + claim.side;
     const Edge& edge = topology.edges[topology.edge_of[h]];
-    contacts.push_back({point, direction(point, centre, facet.normal),
-                        radius - (centre - point).norm(), facet.element, Feature::Edge});
-    if (one_sided) {
-      carriers_.push_back({topology.edge_normal(edge), edge.on_rim()});
-    }
+    contacts.push_back(
+        contact_at(point, facet.normal, centre, radius, facet.element, Feature::Edge));
+    if (turns_)
+      contacts.back().turn =
+          turn_of(contacts.back(), radius, along * along.transpose() / along.squaredNorm());
+    if (one_sided) carriers_.push_back({topology.edge_normal(edge), edge.on_rim()});
   }
   for (const VertexClaim& claim : vertices_) {
     const Vec3& point = shell.vertices()[claim.vertex];
     const Facet& facet = shell.facets()[claim.facet];
-    contacts.push_back({point, direction(point, centre, facet.normal),
-                        radius - (centre - point).norm(), facet.element, Feature::Vertex});
+    contacts.push_back(
+        contact_at(point, facet.normal, centre, radius, facet.element, Feature::Vertex));
+    if (turns_) contacts.back().turn = turn_of(contacts.back(), radius, Mat3::Zero());
     if (one_sided)
       carriers_.push_back(
           {topology.vertex_normal[claim.vertex], bool(topology.vertex_on_rim[claim.vertex])});
@@ -304,6 +307,7 @@ void Query::keep_one_side(const Shell& shell, const Vec3& centre, double radius)
   }
   Contact out = contacts[nearest];
   out.normal = -out.normal;
+  out.turn = -out.turn;
   out.depth = 2 * radius - out.depth;
   contacts.assign(1, out);
 }

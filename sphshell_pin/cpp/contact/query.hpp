@@ -9,6 +9,8 @@
 
 namespace sphshell {
 
+using Mat3 = Eigen::Matrix3d;
+
 enum class Method : int { Facets = 0, Elements = 1, Smooth = 2 };
 enum class Feature : std::uint8_t { Face = 0, Edge = 1, Vertex = 2 };
 
@@ -21,6 +23,8 @@ struct Contact {
   // Of its force: below zero at a pass between contacts that flow together; where they are nearly
   // one, a little below one.
   double weight = 1;
+  // Where asked for: derivative of weight * normal with respect to the sphere's centre [1/m].
+  Mat3 turn;
 
   double energy_weight() const { return weight > 0 ? 1 : weight; }
 };
@@ -35,6 +39,9 @@ class Query {
   // The contacts of the sphere (centre in the shell's frame [m]); valid until the next call.
   const std::vector<Contact>& find(const Shell& shell, const Vec3& centre, double radius,
                                    Method method);
+
+  // Also find how the normals turn as the sphere moves; not for the method "elements".
+  void want_turns() { turns_ = true; }
 
   std::vector<Contact> contacts;
 
@@ -79,6 +86,7 @@ class Query {
     int root, merged;  // a row that it is joined to, that it is one contact with; or itself
     Vec3 normal;       // of all that is merged into it
     double depth;
+    Mat3 turn;
   };
   // In place of the planar face that carries a contact.
   static constexpr int kSharp = -2, kCurved = -1;
@@ -116,7 +124,7 @@ class Query {
   void keep_one_side(const Shell& shell, const Vec3& centre, double radius);
   void remove_dropped();
 
-  bool follow_;
+  bool follow_, turns_ = false;
   std::vector<int> reached_;  // facets whose box meets the ball of radius + margin_ round anchor_
   const Shell* followed_ = nullptr;
   double followed_radius_ = 0, margin_ = -1;

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "shell/shell.hpp"
+#include "contact/query.hpp"
 
 namespace sphshell {
 
@@ -75,6 +75,21 @@ inline Vec3 direction(const Vec3& point, const Vec3& centre, const Vec3& if_equa
   const Vec3 d = centre - point;
   const double length = d.norm();
   return length > 0 ? Vec3(d / length) : if_equal;
+}
+
+// The contact at a point of the shell; `if_equal`: its normal where the centre is there too.
+inline Contact contact_at(const Vec3& point, const Vec3& if_equal, const Vec3& centre,
+                          double radius, int element, Feature feature) {
+  return {point, direction(point, centre, if_equal), radius - (centre - point).norm(), element,
+          feature};
+}
+
+// How the normal turns with the centre, where the contact point follows it by `slide` (3, 3).
+inline Mat3 turn_of(const Contact& contact, double radius, const Mat3& slide) {
+  const double distance = radius - contact.depth;
+  if (!(distance > 0)) return Mat3::Zero();
+  const Vec3& n = contact.normal;
+  return (Mat3::Identity() - n * n.transpose() - slide) / distance;
 }
 
 }  // namespace sphshell

@@ -97,6 +97,7 @@ void Query::claim_flat(const Shell& shell, const Shadow& shadow, const Vec3& cen
   contacts.push_back({centre - shadow.height * facet.normal,
                       shadow.height < 0 ? Vec3(-facet.normal) : facet.normal,
                       radius - std::abs(shadow.height), facet.element, Feature::Face});
+  if (turns_) contacts.back().turn.setZero();
   carrier_face_.push_back(facet.planar_face);
   if (shell.side() != Side::Both) carriers_.push_back({facet.normal, false});
 }
@@ -114,8 +115,9 @@ void Query::claim_curved(const Shell& shell, const Shadow& shadow, const Vec3& c
     return;
   if ((centre - foot.point).squaredNorm() >= radius * radius) return;
   const Vec3 outward = patch.along_u(foot.u, foot.v).cross(patch.along_v(foot.u, foot.v));
-  const Contact contact = {foot.point, direction(foot.point, centre, outward.normalized()),
-                           radius - (centre - foot.point).norm(), facet.element, Feature::Face};
+  Contact contact =
+      contact_at(foot.point, outward.normalized(), centre, radius, facet.element, Feature::Face);
+  if (turns_) contact.turn = turn_of(contact, radius, slide_of(patch, foot.u, foot.v, centre));
   if (minimum) {
     add_minimum(shell, contact, kCurved, {outward, false});
   } else {
@@ -174,8 +176,8 @@ void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, dou
   }
   const bool pass = summit ? steepest <= tolerance : exits_.size() >= 2;
   if (!minimum && !pass) return;
-  const Contact contact = {point, direction(point, centre, facet.normal),
-                           radius - (centre - point).norm(), facet.element, Feature::Edge};
+  Contact contact = contact_at(point, facet.normal, centre, radius, facet.element, Feature::Edge);
+  if (turns_) contact.turn = turn_of(contact, radius, slide_of(side, t, centre));
   const Carrier carrier = {topology.edge_normal(edge), edge.on_rim()};
   if (minimum) add_minimum(shell, contact, sharp || !bent ? kSharp : kCurved, carrier);
   if (pass) add_pass(contact, carrier, sharp, exits_);
@@ -223,8 +225,9 @@ void Query::claim_vertex(const Shell& shell, int f, int k, const Vec3& centre, d
     }
   }
   if (!minimum && falling[false] < joined[false] + 2 && falling[true] < joined[true] + 2) return;
-  const Contact contact = {facet.corner[k], direction(facet.corner[k], centre, facet.normal),
-                           radius - from.norm(), facet.element, Feature::Vertex};
+  Contact contact =
+      contact_at(facet.corner[k], facet.normal, centre, radius, facet.element, Feature::Vertex);
+  if (turns_) contact.turn = turn_of(contact, radius, Mat3::Zero());
   const Carrier carrier = {topology.vertex_normal[vertex], bool(topology.vertex_on_rim[vertex])};
   if (minimum)
     add_minimum(shell, contact, sharp || !bent ? kSharp : kCurved, carrier);
@@ -249,8 +252,10 @@ void Query::claim_nearest(const Shell& shell, const Vec3& centre, double radius)
     if (distance >= nearest) continue;
     nearest = distance;
     const Vec3 outward = patch.along_u(at.u, at.v).cross(patch.along_v(at.u, at.v));
-    contact = {at.point, direction(at.point, centre, outward.normalized()), radius - distance,
-               facet.element, Feature::Face};
+    contact =
+        contact_at(at.point, outward.normalized(), centre, radius, facet.element, Feature::Face);
+    // The foot slides ahead of the centre without bound here, as good as not at all.
+    if (turns_) contact.turn = turn_of(contact, radius, Mat3::Zero());
     carrier = {outward, false};
   }
   if (nearest < radius) add_minimum(shell, contact, kCurved, carrier);

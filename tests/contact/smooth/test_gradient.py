@@ -1,0 +1,106 @@
+"""The derivative of the force with respect to the sphere's position, against differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sphshell_pin import ImpactLaw, Shell
+from sphshell_pin.contact.contact_set import Feature
+from sphshell_pin.errors import InvalidParameter
+from tests import meshes
+from tests.contact.smooth.surfaces import SURFACES, can, shell_of
+
+LAW = ImpactLaw(2.0, exponent=1.5)
+STEP = 1e-5
+
+
+def differences(shell: Shell, center, radius: float, method: str):
+    """Central differences (3, 3) of the force, None where other features take over."""
+
+    def look(move):
+        found = shell.contacts(center + move, radius, method=method)
+        merged = found.weight != 1
+        return found.force(LAW), sorted(zip(found.element, found.feature, merged, strict=True))
+
+    out, here = np.zeros((3, 3)), look(np.zeros(3))[1]
+    for k in range(3):
+        ahead, behind = look(STEP * np.eye(3)[k]), look(-STEP * np.eye(3)[k])
+        if ahead[1] != here or behind[1] != here:
+            return None
+        out[:, k] = (ahead[0] - behind[0]) / (2 * STEP)
+    return out
+
+
+def assert_gradient(shell: Shell, centers, radius: float, method: str = "smooth"):
+    """All gradients are right; returns the features and weights that were met."""
+    met = set()
+    for center in centers:
+        found = shell.contacts(center, radius, method=method, gradient=True)
+        exact = differences(shell, np.asarray(center, dtype=float), radius, method)
+        if len(found) == 0 or exact is None:
+            continue
+        gradient = found.force_gradient(LAW)
+        assert np.abs(gradient - gradient.T).max() <= 1e-9 * np.abs(gradient).max()
+        assert np.abs(gradient - exact).max() <= 2e-6 * np.abs(exact).max(), list(center)
+        signs = np.sign(found.weight)
+        met |= {(Feature(f), float(w)) for f, w in zip(found.feature, signs, strict=True)}
+    return met
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_on_curved_surfaces(name: str) -> None:
+    centers, _ = SURFACES[name].probes(60, 0.04, seed=3)
+    assert assert_gradient(shell_of(name, 0.6), centers, 1.0) >= {(Feature.FACE, 1.0)}
+
+
+def test_on_a_sphere() -> None:
+    """Closed form: outside a ball of radius R the force turns with the centre."""
+    center = np.array([0.21, 0.33, 4.9])
+    distance = np.linalg.norm(center)
+    found = shell_of("dome", 0.15).contacts(center, 1.0, gradient=True)
+    depth, n = 5.0 - distance, center / distance
+    across = np.eye(3) - np.outer(n, n)
+    exact = LAW.normal_force(depth) / distance * across
+    exact -= LAW.normal_stiffness(depth) * np.outer(n, n)
+    assert np.abs(found.force_gradient(LAW) - exact).max() <= 1e-5 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("method", ["smooth", "facets"])
+def test_round_a_cube(method: str) -> None:
+    rng = np.random.default_rng(1)
+    centers = rng.uniform(-1.3, 1.3, (400, 3))
+    met = assert_gradient(Shell(*meshes.cube(2.0), side="outside"), centers, 0.4, method)
+    assert {feature for feature, _ in met} == set(Feature)
+
+
+def test_at_curved_edges() -> None:
+    vertices, triangles, normals = can()
+    shell = Shell(vertices, triangles, normals=normals)
+    turn, tilt = np.random.default_rng(2).uniform([0, 0.1], [2 * np.pi, 1.5], (60, 2)).T
+    out = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+    normal = np.sin(tilt)[:, None] * out + np.cos(tilt)[:, None] * [0, 0, 1]
+    assert (Feature.EDGE, 1.0) in assert_gradient(shell, 2 * out + 0.95 * normal, 1.0)
+
+
+def test_at_a_pass() -> None:
+    shell = Shell(*meshes.v_groove(np.radians(5), size=8.0, cells=2), crease_angle=0.01)
+    x, y, z = np.random.default_rng(3).uniform([-0.1, -1, 0.94], [0.1, 1, 0.99], (60, 3)).T
+    met = assert_gradient(shell, np.stack([x, y, z], axis=1), 1.0)
+    assert (Feature.EDGE, -1.0) in met
+
+
+def test_pushed_back_through() -> None:
+    """The centre behind a one-sided shell: the force leads out, and grows with the way out."""
+    vertices, elements, normals = SURFACES["dome"].mesh(0.6)
+    shell = Shell(vertices, elements, normals=normals, side="outside")
+    points, outward = SURFACES["dome"].points(np.random.default_rng(4), 30)
+    assert_gradient(shell, points - 0.1 * outward, 1.0)
+
+
+def test_gradient_is_asked_for() -> None:
+    shell = shell_of("dome", 0.6)
+    with pytest.raises(InvalidParameter, match="gradient=True"):
+        shell.contacts([0, 0, 4.9], 1.0).force_gradient(LAW)
+    with pytest.raises(InvalidParameter, match="elements"):
+        shell.contacts([0, 0, 4.9], 1.0, method="elements", gradient=True)
