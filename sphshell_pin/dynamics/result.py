@@ -232,7 +232,11 @@ class Result:
             ("slip_velocity", "m/s", log.slip_velocity_world),
         ):
             columns |= {f"{label}_{a} [{unit}]": vectors[:, i] for i, a in enumerate("xyz")}
-        return columns | {"element": log.element, "feature": log.feature}
+        return columns | {
+            "element": log.element,
+            "feature": log.feature,
+            "number": log.number,
+        }
 
     def plot(self) -> Figure:
         """Return an overview figure: forces, depth and energy over time."""

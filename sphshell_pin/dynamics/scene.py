@@ -86,7 +86,12 @@ class SceneContacts:
     With k contacts: `pair` (k,) index into scene.pairs; `point_world`, `normal_world` (k, 3) from
     the shell to the sphere; `depth` (k,) [m]; `normal_force` (k,) [N]; `friction_force_world`
     (k, 3) on the sphere [N]; `slip_velocity_world` (k, 3) of the sphere's surface against the
-    shell [m/s]; `element` (k,), `feature` (k,) as in ContactSet.
+    shell [m/s]; `element` (k,), `feature` (k,) as in ContactSet; `number` (k,): in a run a contact
+    keeps its number, which no other of its pair had or will have, while it moves over elements and
+    smooth edges; at a single state it is the place in the list of its pair.
+
+    At a pass, where contacts flow together, `normal_force` is negative: the contacts push less
+    than they would one by one.
     """
 
     pair: NDArray[np.int32]
@@ -98,6 +103,7 @@ class SceneContacts:
     slip_velocity_world: Array
     element: NDArray[np.int32]
     feature: NDArray[np.uint8]
+    number: NDArray[np.int32]
 
     def __len__(self) -> int:
         """Return the number of contacts."""
@@ -110,7 +116,7 @@ class SceneContacts:
 
     @classmethod
     def columns_from_rows(cls, rows: Array) -> dict[str, NDArray[Any]]:
-        """Split the core's rows (k, 17) into this class's columns."""
+        """Split the core's rows (k, 18) into this class's columns."""
         return {
             "pair": rows[:, 0].astype(np.int32),
             "point_world": rows[:, 1:4],
@@ -121,11 +127,12 @@ class SceneContacts:
             "slip_velocity_world": rows[:, 12:15],
             "element": rows[:, 15].astype(np.int32),
             "feature": rows[:, 16].astype(np.uint8),
+            "number": rows[:, 17].astype(np.int32),
         }
 
     @classmethod
     def from_rows(cls, rows: Array) -> SceneContacts:
-        """Build from the core's rows (k, 17)."""
+        """Build from the core's rows (k, 18)."""
         return cls(**{k: read_only(c) for k, c in cls.columns_from_rows(rows).items()})
 
 

@@ -261,7 +261,7 @@ class Shell(Topology):
         if gradient and number is Method.ELEMENTS:
             raise InvalidParameter("gradient", gradient, "is not known with method 'elements'")
         found = self.core_for(method).contacts(centre, radius, int(number), bool(gradient))
-        point, normal, depth, element, feature, weight, turn = map(read_only, found)
+        point, normal, depth, element, feature, weight, turn = (read_only(c) for c in found)
         return ContactSet(
             point=point,
             normal=normal,

@@ -24,7 +24,7 @@ struct Contact {
   // one, a little below one.
   double weight = 1;
   // Where asked for: derivative of weight * normal with respect to the sphere's centre [1/m].
-  Mat3 turn;
+  Mat3 turn = Mat3::Zero();
 
   double energy_weight() const { return weight > 0 ? 1 : weight; }
 };
@@ -86,7 +86,7 @@ class Query {
     int root, merged;  // a row that it is joined to, that it is one contact with; or itself
     Vec3 normal;       // of all that is merged into it
     double depth;
-    Mat3 turn;
+    Mat3 turn = Mat3::Zero();
   };
   // In place of the planar face that carries a contact.
   static constexpr int kSharp = -2, kCurved = -1;

@@ -9,6 +9,7 @@ Scene::Scene(const pinocchio::Model& model, std::vector<Pair> pairs)
     : body_(model),
       pairs_(std::move(pairs)),
       queries_(pairs_.size(), Query(true)),
+      trackers_(pairs_.size()),
       states_(pairs_.size()),
       external_(static_cast<std::size_t>(model.njoints), pinocchio::Force::Zero()) {
   for (const Pair& pair : pairs_) {
@@ -26,7 +27,8 @@ void Scene::need_velocity_of(int joint) {
   needs_velocity_ = true;
 }
 
-void Scene::evaluate(const VectorX& q, const VectorX& v, bool audit, std::vector<ContactRow>* log) {
+void Scene::evaluate(const VectorX& q, const VectorX& v, bool audit, std::vector<ContactRow>* log,
+                     bool accepted) {
   touching_ = false;
   powers_ = Powers();
   if (needs_velocity_ || log != nullptr)
@@ -42,12 +44,15 @@ void Scene::evaluate(const VectorX& q, const VectorX& v, bool audit, std::vector
                                  ? pair.placement_j
                                  : body_.world_from_joint(pair.joint_j) * pair.placement_j;
     const std::vector<Contact>& contacts = find(pair, queries_[k], world_from_j);
+    const std::vector<int>* numbers = nullptr;
+    if (accepted) numbers = &trackers_[k].follow(contacts, pair.radius);
     if (contacts.empty()) continue;
     if (!cleared) {
       for (int j : pushed_) external_[j].setZero();
       cleared = touching_ = true;
     }
-    for (const Contact& contact : contacts) {
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      const Contact& contact = contacts[i];
       const bool in_world = pair.source != nullptr;
       const Vec3 point = in_world ? contact.point : world_from_j.act(contact.point);
       const Vec3 normal =
@@ -77,7 +82,8 @@ void Scene::evaluate(const VectorX& q, const VectorX& v, bool audit, std::vector
                         {f.friction.x(), f.friction.y(), f.friction.z()},
                         {f.slip.x(), f.slip.y(), f.slip.z()},
                         double(contact.element),
-                        double(contact.feature)});
+                        double(contact.feature),
+                        double(numbers ? (*numbers)[i] : int(i))});
     }
   }
 }

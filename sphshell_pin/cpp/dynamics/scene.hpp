@@ -8,6 +8,7 @@
 
 #include "contact/laws.hpp"
 #include "contact/query.hpp"
+#include "contact/tracker.hpp"
 #include "dynamics/multibody.hpp"
 
 namespace sphshell {
@@ -50,8 +51,9 @@ struct Powers {
 
 // Columns of one logged contact.
 struct ContactRow {
-  static constexpr int kColumns = 17;
-  double pair, point[3], normal[3], depth, normal_force, friction[3], slip[3], element, feature;
+  static constexpr int kColumns = 18;
+  double pair, point[3], normal[3], depth, normal_force, friction[3], slip[3], element, feature,
+      number;
 };
 static_assert(sizeof(ContactRow) == ContactRow::kColumns * sizeof(double));
 
@@ -60,7 +62,9 @@ class Scene {
   Scene(const pinocchio::Model& model, std::vector<Pair> pairs);
 
   // Contact forces at (q, v). Powers, and velocities where no law needs them, only with `audit`.
-  void evaluate(const VectorX& q, const VectorX& v, bool audit, std::vector<ContactRow>* log);
+  // `accepted`: the state is the next one of a run, and contacts go on from those of the last.
+  void evaluate(const VectorX& q, const VectorX& v, bool audit, std::vector<ContactRow>* log,
+                bool accepted = false);
   // The acceleration at the state of the last evaluate().
   const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau);
 
@@ -84,6 +88,7 @@ class Scene {
   Multibody body_;
   std::vector<Pair> pairs_;
   std::vector<Query> queries_;
+  std::vector<ContactTracker> trackers_;
   std::vector<PairState> states_;
   Forces external_;
   std::vector<int> pushed_;  // joints whose entry in external_ is not zero

@@ -102,7 +102,7 @@ Simulation::Status Simulation::advance(double wall_seconds) {
 
 // Forces at the state, the losses up to it, and a row of the record where one is due.
 void Simulation::evaluate(bool record) {
-  scene_.evaluate(state_.q, state_.v, true, record ? &record_.contacts : nullptr);
+  scene_.evaluate(state_.q, state_.v, true, record ? &record_.contacts : nullptr, true);
   if (!integrator_->gathers_losses()) {
     const Powers& now = scene_.powers();
     if (step_ > 0) {

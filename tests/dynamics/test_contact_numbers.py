@@ -1,0 +1,58 @@
+"""A contact keeps its number over elements and smooth edges, and no other gets it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from tests import meshes
+
+RADIUS = 0.01
+
+
+def ball(shell: sp.Shell, start, gravity=(0.0, 0.0, -9.81), velocity=None, duration=0.5):
+    """Run of a ball without rotation, from `start` (3,)."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.05, RADIUS), pin.SE3.Identity())
+    model.addFrame(pin.Frame("tip", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    model.gravity.linear = np.array(gravity)
+    scene = sp.Scene(model)
+    law = sp.ImpactLaw(1e4, exponent=1.0, damping=2.0)
+    scene.add_contact(sp.Sphere(RADIUS, "tip"), shell, law=law)
+    run = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4))
+    return run.run(start, np.zeros(3) if velocity is None else velocity, duration)
+
+
+def test_one_number_over_many_elements() -> None:
+    vertices, elements = meshes.icosphere(4)
+    bowl = sp.Shell(0.04 * vertices, elements, side="inside")
+    turn = np.radians(40)
+    start = 0.03003 * np.array([np.sin(turn), 0.002, -np.cos(turn)])
+    log = ball(bowl, start).contacts
+    assert len(np.unique(log.element)) > 10
+    ids, counts = np.unique(log.number[log.t > 0.01], return_counts=True)
+    assert len(ids) == 1
+    assert counts[0] > 4000
+
+
+def test_a_new_touch_is_a_new_contact() -> None:
+    plate = sp.Shell(*meshes.grid_plate(4, 4, size=0.2))
+    result = ball(plate, [0.01, 0.02, 0.015], duration=0.4)
+    touches = [e for e in result.events if e.kind == "touch"]
+    assert len(touches) >= 2
+    assert np.array_equal(np.unique(result.contacts.number), np.arange(len(touches)))
+
+
+@pytest.mark.parametrize("cells", [1, 4])
+def test_two_walls_two_numbers(cells: int) -> None:
+    vertices, triangles = meshes.v_groove(np.radians(40), size=0.2, cells=cells)
+    height = (RADIUS - 3.2e-5) / np.cos(np.radians(40))
+    result = ball(sp.Shell(vertices, triangles), [1e-6, -0.05, height], velocity=[0, 0.1, 0])
+    log = result.contacts
+    left = log.normal_world[:, 0] > 0
+    assert len(np.unique(log.number[left & (log.t > 0.05)])) == 1
+    assert len(np.unique(log.number[~left & (log.t > 0.05)])) == 1
+    assert not set(log.number[left]) & set(log.number[~left])
