@@ -16,7 +16,17 @@ from numpy.typing import NDArray
 
 from benchmarks.query import RADIUS as QUERY_RADIUS
 from benchmarks.query import query_contestant
-from benchmarks.surfaces import Mesh, icosphere, on_torus, torus, touching_centres, wavy_sheet
+from benchmarks.surfaces import (
+    SHEET,
+    Mesh,
+    icosphere,
+    on_sheet,
+    on_torus,
+    sheet,
+    torus,
+    touching_centres,
+    wavy_sheet,
+)
 from benchmarks.timing import machine, median_us, one_core, ratio, take_turns
 from sphshell_pin import Shell
 
@@ -76,6 +86,12 @@ def torus_places(rng: np.random.Generator) -> tuple[Array, Array]:
     return on_torus(RING, TUBE, *rng.uniform(0, 2 * np.pi, (2, PLACES)))
 
 
+def sheet_places(rng: np.random.Generator) -> tuple[Array, Array]:
+    clear = SHEET - 1.3  # of the borders
+    points, normals = on_sheet(*rng.uniform(-clear, clear, (2, PLACES)))
+    return RADIUS * points, normals
+
+
 def balls() -> list[Mesh]:
     return [icosphere(level, BALL) for level in (2, 3, 4, 5, 6)]
 
@@ -84,10 +100,16 @@ def tori() -> list[Mesh]:
     return [torus(RING, TUBE, side * RADIUS) for side in (1.0, 0.5, 0.25, 0.125, 0.0625)]
 
 
+def sheets() -> list[Mesh]:
+    meshes = [sheet(side) for side in (1.2, 0.6, 0.3, 0.15, 0.075)]
+    return [Mesh(RADIUS * m.vertices, m.triangles, m.normals) for m in meshes]
+
+
 SURFACES = {
     "bowl: inside a sphere, R = 4 r": Surface(balls, ball_places, inside=True),
     "dome: outside a sphere, R = 4 r": Surface(balls, ball_places, inside=False),
     "inside a torus, R = 6 r and 3 r": Surface(tori, torus_places, inside=True),
+    "on a wavy sheet": Surface(sheets, sheet_places, inside=False),
 }
 RULES = {
     "smooth, exact normals": Rule("smooth", True, "#2f6fde", "o"),
@@ -184,15 +206,39 @@ def print_cost(rounds: int) -> None:
             print(f"  {method:25s} {median_us(t)}   {ratio(t, times['facets'])} x")
 
 
+def print_equal_error(rows: list[Row], rounds: int) -> None:
+    """Print what an error of flat elements costs with curved ones: elements, and time."""
+    name, flat = "dome: outside a sphere, R = 4 r", "facets"
+    finest = [r for r in rows if (r.surface, r.rule) == (name, flat)][-1]
+    curved = [r for r in rows if (r.surface, r.rule) == (name, "smooth, exact normals")]
+    enough = next(r for r in curved if r.mean <= finest.mean)
+    points, normals = ball_places(np.random.default_rng(1))
+    centres = np.tile(points + (RADIUS - DEPTH) * normals, (20, 1))
+    contestants = {}
+    for row, method in ((finest, "facets"), (enough, "smooth")):
+        mesh = next(m for m in balls() if len(m.triangles) == row.triangles)
+        shell = Shell(mesh.vertices, mesh.triangles, normals=mesh.normals)
+        contestants[method] = query_contestant(shell, centres, method)
+    times = take_turns(contestants, rounds)
+    print(
+        f"Dome, mean error of the force at most {finest.mean:.1e}\n"
+        f"  facets {finest.triangles:8d} triangles   {median_us(times['facets'])}\n"
+        f"  smooth {enough.triangles:8d} triangles   {median_us(times['smooth'])}   "
+        f"error {enough.mean:.1e}\n"
+        f"  {finest.triangles / enough.triangles:.0f} times fewer, "
+        f"{ratio(times['facets'], times['smooth'])} x faster"
+    )
+
+
 def figure_of(rows: list[Row]) -> Any:
     """Draw mean force errors as lines, up to the largest as bands, one panel per surface."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+    figure = Figure(figsize=(9.0, 8.6), layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(1, len(SURFACES), sharey=True)
-    for axis, name in zip(panels, SURFACES, strict=True):
+    panels = figure.subplots(2, 2, sharex=True, sharey=True)
+    for axis, name in zip(panels.ravel(), SURFACES, strict=True):
         for label, rule in RULES.items():
             found = [r for r in rows if (r.surface, r.rule) == (name, label)]
             side, mean, largest = np.array([(r.side, r.mean, r.largest) for r in found]).T
@@ -204,21 +250,21 @@ def figure_of(rows: list[Row]) -> Any:
                 side, mean, look, color=rule.color, marker=rule.marker, label=label,
                 markersize=8 if look == "--" else 5, markerfacecolor=fill,
             )  # fmt: skip
-        for exponent in (2, 3, 4):
-            guide = np.array([0.28, 1.2])
-            fall = 3e-5 * (guide / guide[1]) ** exponent
+        for exponent in (2, 4):
+            guide = np.array([0.35, 1.2])
+            fall = 1e-6 * (guide / guide[1]) ** exponent
             axis.loglog(guide, fall, color="#6b7280", linestyle=":", linewidth=1)
             axis.annotate(
                 f"order {exponent} ", (guide[0], fall[0]), color="#6b7280", fontsize=8,
                 ha="right", va="center",
             )  # fmt: skip
         axis.set_title(name, fontsize=10)
-        axis.set_xlabel("mean side of the elements / r")
         axis.grid(True, which="major", color="#e5e7eb")
         axis.set_axisbelow(True)
-    panels[0].set_ylabel("error of the force / force (line: mean, band: to the largest)")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(RULES), frameon=False)
+    figure.supxlabel("mean side of the elements / r", fontsize=10)
+    figure.supylabel("error of the force / force (line: mean, band: to the largest)", fontsize=10)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(RULES), frameon=False)
     return figure
 
 
@@ -234,6 +280,7 @@ def main() -> None:
     print(machine())
     rows = [row for name, surface in SURFACES.items() for row in measure(name, surface)]
     print_table(rows)
+    print_equal_error(rows, rounds=15)
     print_cost(rounds=15)
     figure_of(rows).savefig(out, dpi=110)
     print(f"wrote {out}")

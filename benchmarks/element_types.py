@@ -17,7 +17,7 @@ from math import factorial, prod
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.surfaces import Mesh, icosphere, on_torus, torus, wavy_sheet
+from benchmarks.surfaces import SHEET, Mesh, icosphere, on_sheet, on_torus, sheet, torus
 from benchmarks.timing import one_core, ratio, take_turns
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ Net = dict[Control, Array]
 DEPTH, EXPONENT = 0.04, 1.5  # of a sphere of radius 1, and the law of its force
 SIDES = (0.6, 0.3, 0.15)  # of the elements, about
 PLACES, NEAR, CLEAR = 2000, 8, 1.3  # of spheres; nearest triangles tried; distance to borders
-BALL, RING, TUBE, SHEET, WAVE = 4.0, 6.0, 3.0, 4.0, 0.3
+BALL, RING, TUBE = 4.0, 6.0, 3.0
 PAIRS, BLOCK, ROUNDS = 20_000, 2000, 9  # of an element and a centre, timed; a block fits the cache
 ORDERS = (0, 1, 1, 2, 2, 2)  # of x, x_u, x_v, x_uu, x_uv, x_vv, where u = b1 and v = b2
 TYPES = {  # and the numbers they store beside their corners
@@ -330,30 +330,6 @@ def ball_places(rng: np.random.Generator) -> tuple[Array, Array]:
 
 def torus_places(rng: np.random.Generator) -> tuple[Array, Array]:
     return on_torus(RING, TUBE, *rng.uniform(0, 2 * np.pi, (2, PLACES)))
-
-
-def on_sheet(x: Array, y: Array) -> tuple[Array, Array]:
-    """Return points (n, 3) of a wavy sheet and their upward unit normals (n, 3)."""
-    p, q, r = 0.7 * x + 0.3, 0.6 * y, 0.5 * x - 0.8 * y
-    z = WAVE * (np.sin(p) * np.cos(q) + 0.2 * np.sin(r))
-    by_x = WAVE * (0.7 * np.cos(p) * np.cos(q) + 0.1 * np.cos(r))
-    by_y = WAVE * (-0.6 * np.sin(p) * np.sin(q) - 0.16 * np.cos(r))
-    normals = np.c_[-by_x, -by_y, np.ones(len(x))]
-    return np.c_[x, y, z], normals / np.linalg.norm(normals, axis=1)[:, None]
-
-
-def sheet(side: float) -> Mesh:
-    """Return a sheet with moved vertices and random diagonals, like `torus`."""
-    rng, cells = np.random.default_rng(1), round(1.15 * 2 * SHEET / side)
-    vertices, triangles = wavy_sheet(cells, 2 * SHEET)
-    x, y, _ = vertices.T
-    inner = np.maximum(np.abs(x), np.abs(y)) < SHEET * (1 - 1e-9)
-    x, y = (k + inner * rng.uniform(-0.4, 0.4, len(k)) * SHEET / cells for k in (x, y))
-    (a, b, c), (_, _, d) = (half.T for half in np.split(triangles, 2))
-    first = rng.random(len(a)) < 0.5
-    halves = np.where(first, [a, b, c], [a, b, d]), np.where(first, [a, c, d], [b, c, d])
-    points, normals = on_sheet(x, y)
-    return Mesh(points, np.hstack(halves).T.astype(np.int32), normals)
 
 
 def sheet_places(rng: np.random.Generator) -> tuple[Array, Array]:

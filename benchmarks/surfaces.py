@@ -109,3 +109,31 @@ def torus(ring: float, tube: float, side: float) -> Mesh:
     )
     triangles = np.concatenate([half.T for half in halves]).astype(np.int32)
     return Mesh(vertices, triangles, normals)
+
+
+# A sheet over [-SHEET, SHEET]^2, with hills and saddles, for a sphere of radius one.
+SHEET, WAVE = 4.0, 0.3
+
+
+def on_sheet(x: Array, y: Array) -> tuple[Array, Array]:
+    """Return points (n, 3) of a wavy sheet and their upward unit normals (n, 3)."""
+    p, q, r = 0.7 * x + 0.3, 0.6 * y, 0.5 * x - 0.8 * y
+    z = WAVE * (np.sin(p) * np.cos(q) + 0.2 * np.sin(r))
+    by_x = WAVE * (0.7 * np.cos(p) * np.cos(q) + 0.1 * np.cos(r))
+    by_y = WAVE * (-0.6 * np.sin(p) * np.sin(q) - 0.16 * np.cos(r))
+    normals = np.c_[-by_x, -by_y, np.ones(len(x))]
+    return np.c_[x, y, z], normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
+def sheet(side: float) -> Mesh:
+    """Return a sheet with moved vertices and random diagonals, like `torus`."""
+    rng, cells = np.random.default_rng(1), round(1.15 * 2 * SHEET / side)
+    vertices, triangles = wavy_sheet(cells, 2 * SHEET)
+    x, y, _ = vertices.T
+    inner = np.maximum(np.abs(x), np.abs(y)) < SHEET * (1 - 1e-9)
+    x, y = (k + inner * rng.uniform(-0.4, 0.4, len(k)) * SHEET / cells for k in (x, y))
+    (a, b, c), (_, _, d) = (half.T for half in np.split(triangles, 2))
+    first = rng.random(len(a)) < 0.5
+    halves = np.where(first, [a, b, c], [a, b, d]), np.where(first, [a, c, d], [b, c, d])
+    points, normals = on_sheet(x, y)
+    return Mesh(points, np.hstack(halves).T.astype(np.int32), normals)
