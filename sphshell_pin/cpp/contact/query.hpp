@@ -1,7 +1,9 @@
 // Where a sphere touches a shell.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -59,7 +61,24 @@ class Query {
   // Where the centre's projection on a facet's plane falls.
   struct Shadow {
     int facet;
-    double height, outside[3], lean;  // above the plane; beyond each side; how far it may be [m]
+    double height;                 // above the plane [m]
+    double inward[3], length2[3];  // within side k by inward / sqrt(length2) [m]
+    double opening;                // NormalCone::tan_opening
+    double lean;                   // as far beyond the facet it may be [m]
+
+    // The centre stands over a contact along a normal that leans at most by the opening, so its
+    // shadow falls within `lean` of the feature that holds the contact.
+    void allow(double bulge, double tolerance) {
+      lean = opening >= kAnyOpening ? std::numeric_limits<double>::infinity()
+                                    : bulge + tolerance + (std::abs(height) + bulge) * opening;
+    }
+
+    bool beyond(int k) const {
+      return inward[k] < 0 && inward[k] * inward[k] > lean * lean * length2[k];
+    }
+    bool near_side(int k) const {
+      return inward[k] <= 0 || inward[k] * inward[k] <= lean * lean * length2[k];
+    }
   };
   struct Carrier {
     Vec3 outward;  // pseudo-normal of the feature that carries a contact

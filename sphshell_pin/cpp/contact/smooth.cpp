@@ -50,38 +50,35 @@ void Query::claim_on_patches(const Shell& shell, const Vec3& centre, double radi
   over_.clear();
   for (int f : near_) {
     const Facet& facet = shell.facets()[f];
-    // The centre stands over a contact along a normal that leans at most by the opening of the
-    // facet's cone, so its shadow falls within `lean` of the feature that holds the contact.
     Shadow shadow;
     shadow.facet = f;
     shadow.height = facet.normal.dot(centre - facet.corner[0]);
-    const double opening = surface.cones()[f].tan_opening;
-    shadow.lean =
-        opening >= kAnyOpening
-            ? std::numeric_limits<double>::infinity()
-            : surface.bulge() + tolerance + (std::abs(shadow.height) + surface.bulge()) * opening;
+    shadow.opening = surface.cones()[f].tan_opening;
+    shadow.allow(surface.bulge(), tolerance);
     for (int k = 0; k < 3; ++k) {
       const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
-      const double inward = facet.normal.dot(edge.cross(centre - facet.corner[k]));
-      shadow.outside[k] = -inward / edge.norm();
+      shadow.inward[k] = facet.normal.dot(edge.cross(centre - facet.corner[k]));
+      shadow.length2[k] = edge.squaredNorm();
     }
-    if (std::max({shadow.outside[0], shadow.outside[1], shadow.outside[2]}) > shadow.lean) continue;
+    if (shadow.beyond(0) || shadow.beyond(1) || shadow.beyond(2)) continue;
     for (int line = 0; line < int(sizeof(CurvedFacet)); line += 64)
       prefetch(reinterpret_cast<const char*>(&surface.facets()[f]) + line);
     over_.push_back(shadow);
   }
-  for (const Shadow& shadow : over_) {
+  for (Shadow& shadow : over_) {
     const Facet& facet = shell.facets()[shadow.facet];
     const CurvedFacet& curved = surface.facets()[shadow.facet];
+    shadow.allow(curved.bulge, tolerance);
+    if (shadow.beyond(0) || shadow.beyond(1) || shadow.beyond(2)) continue;
     if (curved.flat)
       claim_flat(shell, shadow, centre, radius, tolerance);
     else
       claim_curved(shell, shadow, centre, radius);
     for (int k = 0; k < 3; ++k) {
-      if (curved.owned.twin[k] != kNotMine && shadow.outside[k] >= -shadow.lean)
+      if (curved.owned.twin[k] != kNotMine && shadow.near_side(k))
         claim_edge(shell, shadow.facet, k, centre, radius, tolerance);
-      if (curved.owned.vertex[k] >= 0 && shadow.outside[k] >= -shadow.lean &&
-          shadow.outside[previous_corner(k)] >= -shadow.lean &&
+      if (curved.owned.vertex[k] >= 0 && shadow.near_side(k) &&
+          shadow.near_side(previous_corner(k)) &&
           (centre - facet.corner[k]).squaredNorm() < radius * radius)
         claim_vertex(shell, shadow.facet, k, centre, radius, tolerance);
     }

@@ -367,7 +367,8 @@ void CurvedShell::build_cones(const Shell& shell) {
     double largest = facets_[f].middle.norm();
     for (const auto& side : facets_[f].lift)
       for (const Vec3& lift : side) largest = std::max(largest, lift.norm());
-    bulge_ = std::max(bulge_, largest * 8 / 9);
+    facets_[f].bulge = largest * 8 / 9;
+    bulge_ = std::max(bulge_, facets_[f].bulge);
   }
 }
 

@@ -42,8 +42,9 @@ struct CubicPatch {
 struct CurvedFacet {
   Vec3 lift[3][2];
   Vec3 middle;
-  Owned owned;  // as Facet::owned, where coplanar neighbours may still be curved
-  bool flat;    // no lift: the exact flat facet
+  double bulge;  // at most this far from the flat facet [m]
+  Owned owned;   // as Facet::owned, where coplanar neighbours may still be curved
+  bool flat;     // no lift: the exact flat facet
 
   CubicPatch patch(const Facet& f) const;
   // Side k as a curve from its corner at t = 0 to the next at t = 1.
@@ -64,7 +65,7 @@ class CurvedShell {
 
   const LargeArray<CurvedFacet>& facets() const { return facets_; }  // in the order of the tree
   const LargeArray<NormalCone>& cones() const { return cones_; }
-  double bulge() const { return bulge_; }  // farthest from the flat triangles [m]
+  double bulge() const { return bulge_; }  // the largest of them [m]
   // Tangents of the edges that leave vertex i, beside Topology::neighbours.
   const std::vector<Vec3>& tangents() const { return tangents_; }
   const std::vector<Vec3>& normals() const { return normals_; }  // per corner, 3 triangle + k
