@@ -135,7 +135,7 @@ def _touch_of(pair: ContactPair, data: pin.Data) -> _Touch | None:
     if pair.sphere is None or pair.shell is None:
         return None
     centre = pose_i.translation
-    at = pair.shell.closest_points(pose_j.actInv(centre)[None])
+    at = pair.shell.closest_points(pose_j.actInv(centre)[None], method=pair.method)
     distance = float(at.distances[0])
     signed = {"both": abs(distance), "outside": distance, "inside": -distance}[pair.shell.side]
     point = pose_j.act(at.points[0])

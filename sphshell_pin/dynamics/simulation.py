@@ -163,7 +163,7 @@ class Simulation:
         pin.forwardKinematics(self.scene.model, data, q0)
         centre = (data.oMi[pair.joint_i] * pair.sphere_placement).translation
         local = (data.oMi[pair.joint_j] * pair.shell_placement).actInv(centre)
-        distance = float(pair.shell.closest_points(local[None]).distances[0])
+        distance = float(pair.shell.closest_points(local[None], method=pair.method).distances[0])
         return pair.sphere.radius - (distance if pair.shell.side == "outside" else -distance)
 
     def _gather(self, core: _core.Simulation, blocks: list[dict[str, NDArray[Any]]]) -> Result:

@@ -32,8 +32,8 @@ class ClosestPoints:
     Attributes
     ----------
     points : (n, 3) on the surface [m]
-    normals : (n, 3) unit, of the element, or the mean one of the edge or vertex; on the side the
-        winding makes the outer one
+    normals : (n, 3) unit, along the way from there to the point, or with flat elements that of the
+        element, or the mean one of the edge or vertex; on the side the winding makes the outer one
     distances : (n,) [m], negative behind the surface
     elements : (n,) row of shell.elements
     """
@@ -327,12 +327,20 @@ class Shell(Topology):
         core: _core.Shell = self.core
         return core
 
-    def closest_points(self, points: npt.ArrayLike, threads: int | None = 1) -> ClosestPoints:
+    def closest_points(
+        self, points: npt.ArrayLike, threads: int | None = 1, method: str = "smooth"
+    ) -> ClosestPoints:
         """Project points (n, 3) [m] of the shell's frame on the surface.
 
-        Raises InvalidParameter if the points are out of range.
+        On that of the method "smooth", or else on the flat elements. Raises InvalidParameter if
+        the points are out of range, NameNotFound if the method is unknown.
         """
-        found = self.core.closest_points(check_points("points", points), thread_count(threads))
+        from sphshell_pin.contact.contact_set import Method
+
+        smooth = Method.from_name(method) is Method.SMOOTH
+        places = check_points("points", points)
+        core = self.core_for(method)
+        found = core.closest_points(places, smooth, thread_count(threads))
         return ClosestPoints(*(read_only(column) for column in found))
 
     def transformed(self, placement: Any = None, scale: float = 1.0) -> Shell:

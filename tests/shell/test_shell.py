@@ -187,7 +187,7 @@ def test_contacts_over_the_middle_of_a_face(shell):
 
 
 def test_closest_points(shell):
-    found = shell.closest_points([[0.5, 0.5, 1.5], [0.5, 0.5, 0.9]])
+    found = shell.closest_points([[0.5, 0.5, 1.5], [0.5, 0.5, 0.9]], method="facets")
     assert found.points == pytest.approx(np.array([[0.5, 0.5, 1.0]] * 2))
     assert found.normals == pytest.approx(np.array([[0, 0, 1.0]] * 2))
     assert found.distances == pytest.approx([0.5, -0.1])

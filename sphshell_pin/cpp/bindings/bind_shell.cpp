@@ -85,15 +85,32 @@ auto contacts_batch(const Shell& shell, const Points& centres, const Doubles& ra
   return nb::make_tuple(to_array(std::move(depth)), to_array(std::move(count)));
 }
 
-auto closest_points(const Shell& shell, const Points& points, int threads) {
+// The place of the curved surface beside that of the flat one: the deepest contact of a sphere that
+// reaches it.
+SurfacePoint on_curved(const Shell& shell, const Vec3& point, SurfacePoint at, Query& query) {
+  const double reach = std::abs(at.distance) + 1.01 * shell.curved()->bulge();
+  const auto& found = query.find(shell, point, reach + 1e-9 * shell.size(), Method::Smooth);
+  if (found.empty()) return at;
+  const Vec3 from = point - found.front().point;
+  const bool behind = found.front().normal.dot(at.normal) < 0;
+  at.normal = behind ? Vec3(-found.front().normal) : found.front().normal;
+  at.point = found.front().point;
+  at.distance = from.dot(at.normal) < 0 ? -from.norm() : from.norm();
+  at.element = found.front().element;
+  return at;
+}
+
+auto closest_points(const Shell& shell, const Points& points, bool smooth, int threads) {
   const std::size_t n = points.shape(0);
   std::vector<double> point(3 * n), normal(3 * n), distance(n);
   std::vector<int> element(n);
   {
     nb::gil_scoped_release release;
     in_parallel(n, threads, [&](std::size_t begin, std::size_t end) {
+      Query query;
       for (std::size_t i = begin; i < end; ++i) {
-        const SurfacePoint at = shell.closest_point(row(points, i));
+        SurfacePoint at = shell.closest_point(row(points, i));
+        if (smooth) at = on_curved(shell, row(points, i), at, query);
         std::copy_n(at.point.data(), 3, &point[3 * i]);
         std::copy_n(at.normal.data(), 3, &normal[3 * i]);
         distance[i] = at.distance;
@@ -140,7 +157,8 @@ void bind_shell(nanobind::module_& m) {
            nb::arg("gradient") = false)
       .def("contacts_batch", &contacts_batch, nb::arg("centers"), nb::arg("radii"),
            nb::arg("method"), nb::arg("threads"))
-      .def("closest_points", &closest_points, nb::arg("points"), nb::arg("threads") = 1)
+      .def("closest_points", &closest_points, nb::arg("points"), nb::arg("smooth"),
+           nb::arg("threads") = 1)
       .def_prop_ro("num_elements", &Shell::num_elements)
       .def_prop_ro("num_patches", [](const Shell& s) { return s.topology().num_patches; })
       .def_prop_ro(

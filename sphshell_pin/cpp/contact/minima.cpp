@@ -120,6 +120,7 @@ int Query::minimum_below(const Shell& shell, const Vec3& centre, const Pass& pas
   int best = -1, best_here = -1;
   double nearest = std::numeric_limits<double>::infinity(), nearest_here = nearest;
   for (std::size_t i = 0; i < minima; ++i) {
+    if (rows_[i].contact.depth < pass.contact.depth - same) continue;  // no way down ends higher
     const Vec3 way = rows_[i].contact.point - end;
     double distance = way.norm();
     if (!flat) {
