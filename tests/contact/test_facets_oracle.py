@@ -82,7 +82,7 @@ def test_closest_points(name: str) -> None:
     shell = shell_of((vertices, elements))
     corners, _ = corners_of(vertices, elements)
     points = np.array(list(positions(vertices, elements, 0.8, 50, seed=1)))
-    closest = shell.closest_points(points)
+    closest = shell.closest_points(points, method="facets")
     for k, point in enumerate(points):
         distance = float(norm(point - closest_on_triangles(point, corners)).min())
         assert abs(abs(closest.distances[k]) - distance) <= 1e-12

@@ -140,28 +140,50 @@ inline Vec3 downhill(const CubicPatch& patch, const PatchPoint& at, const Vec3& 
   return std::cos(angle) * e1 + std::sin(angle) * e2;
 }
 
-// The parameter at which the distance from x to a side is stationary, near the foot on its chord.
-// False where that lies beyond the side's ends. `summit`: it is the farthest place, not the
-// nearest.
-inline bool foot_on_side(const CubicCurve& side, const Vec3& x, double& t, bool& summit) {
+// The parameter of the place of a side nearest to x, near the foot on its chord. False where that
+// lies beyond the side's ends, or is the farthest.
+inline bool foot_on_side(const CubicCurve& side, const Vec3& x, double& t) {
   const Vec3 d = side.point(1) - side.c0;
   t = std::clamp((x - side.c0).dot(d) / d.squaredNorm(), 0.0, 1.0);
-  bool settled = false;
+  bool settled = false, convex = false;
   for (int i = 0; i < kMostIterations && !settled; ++i) {
     const Vec3 tangent = side.tangent(t);
     const Vec3 r = side.point(t) - x;
     const double first = tangent.squaredNorm();
     const double full = first + r.dot(side.second(t));
-    summit = full < 0;
-    double step = -r.dot(tangent) / (std::abs(full) > 1e-3 * first ? full : first);
+    convex = full > 0;
+    double step = -r.dot(tangent) / (full > 1e-3 * first ? full : first);
     settled = std::abs(step) < kSettled;
     step = std::clamp(step, -0.5, 0.5);
     t += step;
     if (t < -1 || t > 2) return false;
   }
-  if (!settled || t < -kOverlap || t > 1 + kOverlap) return false;
+  if (!settled || !convex || t < -kOverlap || t > 1 + kOverlap) return false;
   t = std::clamp(t, 0.0, 1.0);
   return true;
+}
+
+// The parameter of the place of a side nearest to x, its ends included.
+inline double nearest_on_side(const CubicCurve& side, const Vec3& x) {
+  constexpr int kParts = 4;
+  double best = 0, least = (side.c0 - x).squaredNorm();
+  const auto try_at = [&](double t) {
+    const double distance2 = (side.point(t) - x).squaredNorm();
+    if (distance2 < least) best = t, least = distance2;
+  };
+  for (int i = 1; i <= kParts; ++i) try_at(double(i) / kParts);
+  double t = best;
+  for (int i = 0; i < kMostIterations; ++i) {
+    const Vec3 tangent = side.tangent(t), r = side.point(t) - x;
+    const double first = tangent.squaredNorm(), full = first + r.dot(side.second(t));
+    const double step = -r.dot(tangent) / (full > 1e-3 * first ? full : first);
+    const double next = std::clamp(t + std::clamp(step, -0.25, 0.25), 0.0, 1.0);
+    const bool settled = std::abs(next - t) < kSettled;
+    t = next;
+    if (settled) break;
+  }
+  try_at(t);
+  return best;
 }
 
 }  // namespace sphshell

@@ -1,12 +1,12 @@
 // Contacts that flow together: the sphere counts a piece of surface inside it once.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
+#include "contact/feet.hpp"
 #include "contact/query.hpp"
+#include "contact/regions.hpp"
 #include "shell/curved.hpp"
-#include "shell/triangle.hpp"
 
 namespace sphshell {
 namespace {
@@ -14,40 +14,9 @@ namespace {
 // Two minima are one contact where the pass between them is no more than this share of its depth
 // below both: what that changes of the force is the square of it. Between curved elements, which
 // meet at small angles that nobody meant, the share is larger.
-constexpr double kShallow = 1e-4, kShallowOnPatch = 1e-2;
+constexpr double kShallow = 1e-4, kShallowBent = 1e-2;
 // ... and their normals differ from its by no more than this [rad].
 constexpr double kAlike = 0.03;
-
-// Where one ends who goes from facet to facet over the flat elements, each time to the nearest.
-Vec3 walk_down(const Shell& shell, const Vec3& centre, int facet) {
-  const auto closest = [&](int f) {
-    return closest_on_triangle(centre, shell.facets()[f].corner, shell.facets()[f].normal);
-  };
-  ClosestPoint at = closest(facet);
-  for (bool moved = true; moved;) {
-    moved = false;
-    const int from = facet;
-    const auto visit = [&](int f) {
-      if (f == from) return;
-      const ClosestPoint other = closest(f);
-      if ((other.point - centre).squaredNorm() >= (at.point - centre).squaredNorm()) return;
-      at = other;
-      facet = f;
-      moved = true;
-    };
-    const int t = shell.triangle_of_facet(from), feature = at.feature;
-    if (feature >= 4) {
-      for (int c : shell.curved()->corners_of(shell.triangles()[t][feature - 4]))
-        visit(triangle_of(c));
-    } else if (feature >= 1) {
-      const Topology& topology = shell.topology();
-      const Edge& edge = topology.edges[topology.edge_of[3 * t + feature - 1]];
-      for (int i = 0; i < edge.count; ++i)
-        visit(triangle_of(shell.facet_half_edge(topology.incidence[edge.begin + i])));
-    }
-  }
-  return at.point;
-}
 
 }  // namespace
 
@@ -56,39 +25,10 @@ Vec3 walk_down(const Shell& shell, const Vec3& centre, int facet) {
 // the surface has inside a sphere smaller by s, summed over s. Where a minimum ends it meets a
 // pass, with the same depth and normal, so neither the potential nor the force jumps.
 void Query::join_minima(const Shell& shell, const Vec3& centre, double radius) {
-  const double same = 1e-8 * radius;
-  // Deepest first; then one contact per place.
-  std::vector<int>& order = by_x_;
-  order.resize(contacts.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int i, int j) {
-    const Contact &a = contacts[i], &b = contacts[j];
-    return a.depth != b.depth ? a.depth > b.depth : a.element < b.element;
-  });
-  std::vector<int>& kept = at_point_;
-  kept.clear();
-  for (int i : order) {
-    const bool known = std::any_of(kept.begin(), kept.end(), [&](int j) {
-      return (contacts[j].point - contacts[i].point).squaredNorm() <= same * same;
-    });
-    if (!known) kept.push_back(i);
-  }
-  rows_.clear();
-  for (int i : kept) {
-    Row row;
-    row.contact = contacts[i];
-    row.carrier = carriers_.empty() ? Carrier{Vec3::Zero(), false} : carriers_[i];
-    row.face = carrier_face_[i];
-    row.root = row.merged = static_cast<int>(rows_.size());
-    row.normal = row.contact.normal;
-    row.depth = row.contact.depth;
-    row.turn = row.contact.turn;
-    rows_.push_back(row);
-  }
-  const std::size_t minima = rows_.size();
-  if (minima > 1) {
-    join_over_passes(shell, centre, minima, same);
-    drop_twins(shell, minima, radius);
+  list_minima(1e-8 * radius);
+  if (rows_.size() > 1) {
+    list_links(shell, centre, radius);
+    join_over_links(shell, centre, radius);
   }
   contacts.clear();
   const bool one_sided = !carriers_.empty();
@@ -108,123 +48,176 @@ void Query::join_minima(const Shell& shell, const Vec3& centre, double radius) {
   }
 }
 
-// The minimum that a leg leads to, -1 if none. Over flat elements one walks down, and takes what is
-// nearest to where that ends. On a curved patch all is close together and the leg's direction
-// tells; only from a crease may it lead to another patch.
-int Query::minimum_below(const Shell& shell, const Vec3& centre, const Pass& pass, const Leg& leg,
-                         std::size_t minima, double same) const {
-  const bool flat = shell.curved()->facets()[leg.facet].flat;
-  const Vec3 end = flat ? walk_down(shell, centre, leg.facet) : pass.contact.point;
-  const std::vector<int>& patch = shell.topology().patch;
-  const int here = patch[shell.facets()[leg.facet].element];
-  int best = -1, best_here = -1;
-  double nearest = std::numeric_limits<double>::infinity(), nearest_here = nearest;
-  for (std::size_t i = 0; i < minima; ++i) {
-    if (rows_[i].contact.depth < pass.contact.depth - same) continue;  // no way down ends higher
-    const Vec3 way = rows_[i].contact.point - end;
-    double distance = way.norm();
-    if (!flat) {
-      const double along = way.dot(leg.direction);
-      if (distance <= same || along < 0.3 * distance) continue;
-      distance += 20 * (distance - along);
+// One row per place, deepest first.
+void Query::list_minima(double same) {
+  std::vector<int>& order = by_x_;
+  order.resize(contacts.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto x = [&](int i) { return contacts[i].point.x(); };
+  std::sort(order.begin(), order.end(), [&](int i, int j) { return x(i) < x(j); });
+  const auto deeper = [&](int i, int j) {
+    const Contact &a = contacts[i], &b = contacts[j];
+    return a.depth != b.depth       ? a.depth > b.depth
+           : a.feature != b.feature ? a.feature < b.feature
+                                    : a.element < b.element;
+  };
+  dropped_.assign(contacts.size(), 0);
+  for (std::size_t a = 0; a < order.size(); ++a)
+    for (std::size_t b = a + 1; b < order.size() && x(order[b]) - x(order[a]) <= same; ++b) {
+      const int i = order[a], j = order[b];
+      if ((contacts[i].point - contacts[j].point).squaredNorm() <= same * same)
+        dropped_[deeper(i, j) ? j : i] = 1;
     }
-    if (distance < nearest) nearest = distance, best = static_cast<int>(i);
-    if (distance < nearest_here && patch[rows_[i].contact.element] == here)
-      nearest_here = distance, best_here = static_cast<int>(i);
+  std::sort(order.begin(), order.end(), deeper);
+  rows_.clear();
+  for (int i : order) {
+    if (dropped_[i]) continue;
+    const Contact& contact = contacts[i];
+    const Carrier carrier = carriers_.empty() ? Carrier{Vec3::Zero(), false} : carriers_[i];
+    rows_.push_back({contact, carrier, holder_[i], static_cast<int>(rows_.size()), contact.normal,
+                     contact.depth, contact.turn});
   }
-  return flat || (pass.sharp && best_here < 0) ? best : best_here;
 }
 
-// Highest pass first, as water rises: it joins what is not joined yet (Kruskal).
-void Query::join_over_passes(const Shell& shell, const Vec3& centre, std::size_t minima,
-                             double same) {
-  std::sort(passes_.begin(), passes_.end(), [](const Pass& a, const Pass& b) {
-    return a.contact.depth != b.contact.depth ? a.contact.depth > b.contact.depth
-                                              : a.contact.element < b.contact.element;
+// The facets in reach, and where those that share a side touch inside the sphere.
+void Query::list_links(const Shell& shell, const Vec3& centre, double radius) {
+  const Topology& topology = shell.topology();
+  const CurvedShell& surface = *shell.curved();
+  nodes_.assign(reached_.begin(), reached_.end());
+  std::sort(nodes_.begin(), nodes_.end());
+  links_.clear();
+  for (std::size_t i = 0; i < saddles_.size(); ++i)
+    links_.push_back({saddles_[i].pass.depth, static_cast<int>(nodes_.size() + i),
+                      node_of(saddles_[i].pass.facet), -1, static_cast<int>(i), 0});
+  for (int f : nodes_) {
+    const Facet& facet = shell.facets()[f];
+    const CurvedFacet& curved = surface.facets()[f];
+    const double reach = radius + (curved.flat ? 0 : curved.bulge);
+    if (std::abs(facet.normal.dot(centre - facet.corner[0])) >= reach) continue;
+    for (int k = 0; k < 3; ++k) {
+      const int h = 3 * shell.triangle_of_facet(f) + k;
+      const Edge& edge = topology.edges[topology.edge_of[h]];
+      if (edge.count == 1) continue;
+      // Every other facet is linked to the first of those at the edge.
+      int first = f;
+      for (int i = 0; i < edge.count; ++i)
+        first =
+            std::min(first, triangle_of(shell.facet_half_edge(topology.incidence[edge.begin + i])));
+      if (first == f) continue;
+      const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
+      double t = std::clamp((centre - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
+      double distance = (facet.corner[k] + t * d - centre).norm();
+      if (distance >= reach) continue;
+      if (node_of(first) < 0) continue;
+      if (!curved.flat) {
+        const CubicCurve side = curved.side(facet, k);
+        t = nearest_on_side(side, centre);
+        distance = (side.point(t) - centre).norm();
+      }
+      if (distance >= radius) continue;
+      const Vec3 point = curved.side(facet, k).point(t);
+      links_.push_back({radius - distance, node_of(f, point), node_of(first, point), f, k, t});
+    }
+  }
+}
+
+int Query::node_of(int facet) const {
+  const auto at = std::lower_bound(nodes_.begin(), nodes_.end(), facet);
+  return at != nodes_.end() && *at == facet ? static_cast<int>(at - nodes_.begin()) : -1;
+}
+
+// A facet with a saddle is two nodes: one below it on either side.
+int Query::node_of(int facet, const Vec3& point) const {
+  for (std::size_t i = 0; i < saddles_.size(); ++i)
+    if (saddles_[i].pass.facet == facet &&
+        (point - saddles_[i].pass.contact.point).dot(saddles_[i].downhill) > 0)
+      return static_cast<int>(nodes_.size() + i);
+  return node_of(facet);
+}
+
+// Highest link first, as water rises (Kruskal).
+void Query::join_over_links(const Shell& shell, const Vec3& centre, double radius) {
+  std::sort(links_.begin(), links_.end(), [](const Link& a, const Link& b) {
+    return a.depth != b.depth   ? a.depth > b.depth
+           : a.facet != b.facet ? a.facet < b.facet
+                                : a.side < b.side;
   });
-  const auto find = [&](int i, int Row::* link) {
-    while (rows_[i].*link != i) i = rows_[i].*link;
+  parent_.resize(nodes_.size() + saddles_.size());
+  std::iota(parent_.begin(), parent_.end(), 0);
+  deepest_.assign(parent_.size(), -1);
+  const auto find = [&](int i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
   };
-  for (const Pass& pass : passes_) {
-    const Contact& at = pass.contact;
-    // A minimum here is about to end, or is none: it and the pass cancel.
-    int here_too = -1, joined = 0;
-    for (std::size_t i = 0; i < minima && here_too < 0; ++i)
-      if ((rows_[i].contact.point - at.point).squaredNorm() <= same * same)
-        here_too = static_cast<int>(i);
-    int first = here_too;
-    for (int leg = pass.first_leg; leg < pass.last_leg; ++leg) {
-      const int here = minimum_below(shell, centre, pass, legs_[leg], minima, same);
-      if (here < 0) continue;
-      if (first < 0) {
-        first = here;
-        continue;
-      }
-      int a = find(first, &Row::root), b = find(here, &Row::root);
-      if (a == b) continue;
-      if (a > b) std::swap(a, b);  // the deeper one stays
-      rows_[b].root = a;
-      if (first == here_too && rows_[first].merged == first) {
-        rows_[first].merged = find(here, &Row::merged);
-        first = here;
-        continue;
-      }
-      const bool meant = pass.sharp || shell.curved()->facets()[legs_[leg].facet].flat;
-      const double share = meant ? kShallow : kShallowOnPatch;
-      const auto near = [&](const Contact& minimum) {
-        return minimum.depth - at.depth < share * at.depth &&
-               (minimum.normal - at.normal).squaredNorm() < kAlike * kAlike;
-      };
-      int m = find(first, &Row::merged), n = find(here, &Row::merged);
-      if (m > n) std::swap(m, n);
-      if (!near(rows_[first].contact) || !near(rows_[here].contact) || !near(rows_[m].contact) ||
-          !near(rows_[n].contact)) {
-        ++joined;
-        continue;
-      }
-      rows_[n].merged = m;
-      rows_[m].depth += rows_[n].depth - at.depth;
-      rows_[m].normal += rows_[n].normal - at.normal;
-      rows_[m].turn += rows_[n].turn - at.turn;
+  const auto end_of = [&](int row) {
+    while (rows_[row].merged != row) row = rows_[row].merged;
+    return row;
+  };
+  // The shallower of two minima ends at a pass.
+  const auto join = [&](int deeper, int shallower, const Row& pass, bool bent) {
+    const Row &a = rows_[deeper], &b = rows_[shallower];
+    if (pass.contact.depth >= b.contact.depth) {
+      rows_[shallower].merged = deeper;
+      return;
     }
-    if (joined == 0) continue;
-    Row row;
-    row.contact = at;
-    row.contact.weight = -joined;
-    row.contact.turn *= -joined;
-    row.carrier = pass.carrier;
-    row.face = kSharp;
-    row.root = row.merged = static_cast<int>(rows_.size());
-    row.normal = at.normal;
-    row.depth = at.depth;
+    const double share = bent ? kShallowBent : kShallow;
+    const auto near = [&](const Row& row) {
+      return row.contact.depth - pass.contact.depth < share * pass.contact.depth &&
+             (row.contact.normal - pass.contact.normal).squaredNorm() < kAlike * kAlike;
+    };
+    if (near(a) && near(b)) {
+      Row& whole = rows_[end_of(deeper)];
+      whole.depth += b.depth - pass.contact.depth;
+      whole.normal += b.normal - pass.contact.normal;
+      whole.turn += b.turn - pass.contact.turn;
+      rows_[shallower].merged = deeper;
+      return;
+    }
+    Row row = pass;
+    row.merged = static_cast<int>(rows_.size());
+    row.contact.weight = -1;
+    row.contact.turn *= -1;
     rows_.push_back(row);
+  };
+  // Two minima on one element that no saddle parts are one.
+  const int minima = static_cast<int>(rows_.size());
+  for (int i = 0; i < minima; ++i) {
+    int& deepest = deepest_[node_of(rows_[i].facet, rows_[i].contact.point)];
+    if (deepest < 0)
+      deepest = i;
+    else
+      rows_[i].merged = deepest;
+  }
+  for (const Link& link : links_) {
+    const int a = find(link.a), b = find(link.b);
+    if (a == b) continue;
+    const int i = deepest_[a], j = deepest_[b];
+    parent_[b] = a;
+    if (i >= 0 && j >= 0)
+      join(std::min(i, j), std::max(i, j), pass_at(shell, link, centre, radius),
+           link.facet < 0 || !shell.curved()->facets()[link.facet].flat);
+    deepest_[a] = i < 0 ? j : j < 0 ? i : std::min(i, j);
   }
 }
 
-// Minima on one smooth patch that no pass joins though they lie within one contact disc (radius
-// sqrt(r^2 - distance^2)): the pass was lost to round-off, and the deepest counts.
-void Query::drop_twins(const Shell& shell, std::size_t minima, double radius) {
-  const std::vector<int>& patch = shell.topology().patch;
-  for (std::size_t i = 1; i < minima; ++i) {
-    const Row& row = rows_[i];
-    if (row.root != static_cast<int>(i) || row.face == kSharp) continue;
-    for (std::size_t j = 0; j < i; ++j) {
-      const Row& deeper = rows_[j];
-      if (deeper.merged != static_cast<int>(j) || deeper.face == kSharp) continue;
-      if (std::min(row.face, deeper.face) != kCurved && row.face != deeper.face) continue;
-      const double distance = radius - deeper.contact.depth;
-      const double apart2 = (deeper.contact.point - row.contact.point).squaredNorm();
-      if (patch[deeper.contact.element] != patch[row.contact.element] ||
-          apart2 >= radius * radius - distance * distance)
-        continue;
-      const bool alone = std::none_of(rows_.begin(), rows_.begin() + minima, [&](const Row& r) {
-        return &r != &row && r.root == static_cast<int>(i);
-      });
-      if (alone) rows_[i].merged = static_cast<int>(j);
-      break;
-    }
-  }
+Query::Row Query::pass_at(const Shell& shell, const Link& link, const Vec3& centre,
+                          double radius) const {
+  if (link.facet < 0) return saddles_[link.side].pass;
+  const Topology& topology = shell.topology();
+  const Facet& facet = shell.facets()[link.facet];
+  const CubicCurve side = shell.curved()->facets()[link.facet].side(facet, link.side);
+  const bool vertex = link.t == 0 || link.t == 1;
+  Contact contact = contact_at(side.point(link.t), facet.normal, centre, radius, facet.element,
+                               vertex ? Feature::Vertex : Feature::Edge);
+  if (turns_)
+    contact.turn =
+        turn_of(contact, radius, vertex ? Mat3(Mat3::Zero()) : slide_of(side, link.t, centre));
+  const int h = 3 * shell.triangle_of_facet(link.facet) + link.side;
+  const Edge& edge = topology.edges[topology.edge_of[h]];
+  return {contact,        {topology.edge_normal(edge), edge.on_rim()},
+          link.facet,     0,
+          contact.normal, contact.depth,
+          contact.turn};
 }
 
 }  // namespace sphshell

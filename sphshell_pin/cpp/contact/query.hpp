@@ -85,30 +85,27 @@ class Query {
     bool rim;      // on the border of an open sheet: no inside there
   };
 
-  // A way down from a pass.
-  struct Leg {
-    Vec3 direction;
-    int facet;  // that it enters
-  };
-  // A place from which the distance falls in several directions, legs_[first_leg .. last_leg).
-  struct Pass {
-    Contact contact;
-    Carrier carrier;
-    bool sharp;  // at a crease, a rim or a vertex of one
-    int first_leg, last_leg;
-  };
-  // A minimum, or a pass that counts.
+  // A minimum of the distance, or a pass between two.
   struct Row {
     Contact contact;
     Carrier carrier;
-    int face;          // carrier_face_
-    int root, merged;  // a row that it is joined to, that it is one contact with; or itself
-    Vec3 normal;       // of all that is merged into it
+    int facet;    // that holds it
+    int merged;   // the row that it is one contact with, or itself
+    Vec3 normal;  // of all that is merged into it
     double depth;
     Mat3 turn = Mat3::Zero();
   };
-  // In place of the planar face that carries a contact.
-  static constexpr int kSharp = -2, kCurved = -1;
+  struct Saddle {
+    Row pass;
+    Vec3 downhill;  // one of the two ways
+  };
+  // Where two facets of nodes_ touch: nearest to the centre on their common side; or, with
+  // facet -1, the saddle number `side`.
+  struct Link {
+    double depth;
+    int a, b, facet, side;
+    double t;
+  };
 
   void find_facets(const Shell& shell, const Vec3& centre, double radius);
   void find_smooth(const Shell& shell, const Vec3& centre, double radius);
@@ -126,15 +123,14 @@ class Query {
   void claim_vertex(const Shell& shell, int facet, int corner, const Vec3& centre, double radius,
                     double tolerance);
   void claim_nearest(const Shell& shell, const Vec3& centre, double radius);
-  void add_minimum(const Shell& shell, const Contact& contact, int carrier_face,
-                   const Carrier& carrier);
-  void add_pass(const Contact& contact, const Carrier& carrier, bool sharp,
-                const std::vector<Leg>& exits);
+  void add_minimum(const Shell& shell, const Contact& contact, int facet, const Carrier& carrier);
   void join_minima(const Shell& shell, const Vec3& centre, double radius);
-  void join_over_passes(const Shell& shell, const Vec3& centre, std::size_t minima, double same);
-  int minimum_below(const Shell& shell, const Vec3& centre, const Pass& pass, const Leg& leg,
-                    std::size_t minima, double same) const;
-  void drop_twins(const Shell& shell, std::size_t minima, double radius);
+  void list_minima(double same);
+  void list_links(const Shell& shell, const Vec3& centre, double radius);
+  void join_over_links(const Shell& shell, const Vec3& centre, double radius);
+  Row pass_at(const Shell& shell, const Link& link, const Vec3& centre, double radius) const;
+  int node_of(int facet) const;
+  int node_of(int facet, const Vec3& point) const;
   void collect_claims(const Shell& shell, const Vec3& centre, double radius, double tolerance);
   void drop_claims_of_neighbours(const Shell& shell);
   void claims_to_contacts(const Shell& shell, const Vec3& centre, double radius);
@@ -158,10 +154,12 @@ class Query {
   std::vector<char> dropped_;      // beside `contacts`
   std::vector<Carrier> carriers_;  // beside `contacts`, for one-sided shells only
   std::vector<Shadow> over_;
-  std::vector<int> carrier_face_;  // beside `contacts`: a planar face, kSharp or kCurved
-  std::vector<Pass> passes_;
-  std::vector<Leg> legs_, exits_;
+  std::vector<int> holder_;  // beside `contacts`: the facet that holds it
+  std::vector<Saddle> saddles_;
   std::vector<Row> rows_;
+  std::vector<int> nodes_;             // facets
+  std::vector<int> parent_, deepest_;  // per node, and then per saddle: of its piece
+  std::vector<Link> links_;
 };
 
 }  // namespace sphshell

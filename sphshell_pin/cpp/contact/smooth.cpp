@@ -30,9 +30,8 @@ std::pair<double, double> on_side(int k, double t) {
 void Query::find_smooth(const Shell& shell, const Vec3& centre, double radius) {
   const double tolerance = kTolerance * (shell.size() + radius);
   carriers_.clear();
-  carrier_face_.clear();
-  passes_.clear();
-  legs_.clear();
+  holder_.clear();
+  saddles_.clear();
   claim_on_patches(shell, centre, radius, tolerance);
   if (contacts.empty()) claim_nearest(shell, centre, radius);
   if (contacts.empty()) return;
@@ -40,9 +39,8 @@ void Query::find_smooth(const Shell& shell, const Vec3& centre, double radius) {
   if (shell.side() != Side::Both) keep_one_side(shell, centre, radius);
 }
 
-// Every minimum of the distance, and every pass from one to another: a place where the distance
-// falls on two sides and rises between them (Milnor, Morse Theory (1963), for piecewise smooth
-// surfaces). Whether a vertex or an edge is one is decided from the directions that leave it.
+// Every minimum of the distance. Whether a vertex or an edge holds one is decided from the elements
+// that meet there.
 void Query::claim_on_patches(const Shell& shell, const Vec3& centre, double radius,
                              double tolerance) {
   const CurvedShell& surface = *shell.curved();
@@ -95,7 +93,7 @@ void Query::claim_flat(const Shell& shell, const Shadow& shadow, const Vec3& cen
                       shadow.height < 0 ? Vec3(-facet.normal) : facet.normal,
                       radius - std::abs(shadow.height), facet.element, Feature::Face});
   if (turns_) contacts.back().turn.setZero();
-  carrier_face_.push_back(facet.planar_face);
+  holder_.push_back(shadow.facet);
   if (shell.side() != Side::Both) carriers_.push_back({facet.normal, false});
 }
 
@@ -115,12 +113,12 @@ void Query::claim_curved(const Shell& shell, const Shadow& shadow, const Vec3& c
   Contact contact =
       contact_at(foot.point, outward.normalized(), centre, radius, facet.element, Feature::Face);
   if (turns_) contact.turn = turn_of(contact, radius, slide_of(patch, foot.u, foot.v, centre));
-  if (minimum) {
-    add_minimum(shell, contact, kCurved, {outward, false});
-  } else {
-    const Vec3 leg = downhill(patch, foot, centre);
-    add_pass(contact, {outward, false}, false, {{leg, shadow.facet}, {-leg, shadow.facet}});
-  }
+  if (minimum)
+    add_minimum(shell, contact, shadow.facet, {outward, false});
+  else
+    saddles_.push_back(
+        {{contact, {outward, false}, shadow.facet, 0, contact.normal, contact.depth, contact.turn},
+         downhill(patch, foot, centre)});
 }
 
 void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, double radius,
@@ -128,61 +126,34 @@ void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, dou
   const Facet& facet = shell.facets()[f];
   const CubicCurve side = shell.curved()->facets()[f].side(facet, k);
   double t = 0;
-  bool summit = false;
-  if (!foot_on_side(side, centre, t, summit)) return;
-  const Vec3 point = side.point(t);
+  if (!foot_on_side(side, centre, t)) return;
+  const Vec3 point = side.point(t), along = side.tangent(t).normalized();
   if ((centre - point).squaredNorm() >= radius * radius) return;
-  const Topology& topology = shell.topology();
-  const Edge& edge = topology.edges[topology.edge_of[3 * shell.triangle_of_facet(f) + k]];
-  const bool sharp = edge.kind != EdgeClass::Smooth;
-  // Two elements that meet here claim their feet a little beyond the edge, so a pass is one with
-  // that much to spare: where it leads to nowhere new it does not count.
-  const double spare = 4 * kOverlap * (facet.corner[next_corner(k)] - facet.corner[k]).norm();
-  std::size_t sides = 0;
-  double steepest = -1;
-  bool convex = true, bent = false;
-  exits_.clear();
-  const Vec3 along = side.tangent(t).normalized();
-  const auto look = [&](int h) {
+  const auto rises = [&](int h) {
     const Facet& other = shell.facets()[triangle_of(h)];
-    const bool same_way = other.corner[side_of(h)] == facet.corner[k];
-    const Vec3 inward = inward_of(shell, h, same_way ? t : 1 - t, along);
-    const double fall = (centre - point).dot(inward);
     const CurvedFacet& beyond = shell.curved()->facets()[triangle_of(h)];
-    bent = bent || !beyond.flat;
-    steepest = sides == 0 ? fall : std::max(steepest, fall);
-    ++sides;
-    if (fall <= -spare) return;
-    exits_.push_back({inward, triangle_of(h)});
+    const double s = other.corner[side_of(h)] == facet.corner[k] ? t : 1 - t;
+    const double fall = (centre - point).dot(inward_of(shell, h, s, along));
+    if (fall > tolerance) return false;
     // Where the element goes on level, its curvature decides.
-    if (fall > spare || beyond.flat || !convex) return;
-    const auto [u, v] = on_side(side_of(h), same_way ? t : 1 - t);
-    convex = is_convex_at(beyond.patch(other), u, v, centre);
+    const double level = 4 * kOverlap * (facet.corner[next_corner(k)] - facet.corner[k]).norm();
+    if (fall < -level || beyond.flat) return true;
+    const auto [u, v] = on_side(side_of(h), s);
+    return is_convex_at(beyond.patch(other), u, v, centre);
   };
   const int code = shell.curved()->facets()[f].owned.twin[k];
-  look(3 * f + k);
-  if (code >= 0) look(code);
+  if (!rises(3 * f + k) || (code >= 0 && !rises(code))) return;
   if (code <= kManifold) {
-    sides = 0;
-    exits_.clear();
-    for (int h : shell.half_edges_of(kManifold - code)) look(h);
+    const std::vector<int>& all = shell.half_edges_of(kManifold - code);
+    if (!std::all_of(all.begin(), all.end(), rises)) return;
   }
-  const bool minimum = !summit && convex && steepest <= tolerance;
-  if (summit && steepest <= tolerance) {
-    exits_ = {{along, f}, {-along, f}};
-  }
-  const bool pass = summit ? steepest <= tolerance : exits_.size() >= 2;
-  if (!minimum && !pass) return;
   Contact contact = contact_at(point, facet.normal, centre, radius, facet.element, Feature::Edge);
   if (turns_) contact.turn = turn_of(contact, radius, slide_of(side, t, centre));
-  const Carrier carrier = {topology.edge_normal(edge), edge.on_rim()};
-  if (minimum) add_minimum(shell, contact, sharp || !bent ? kSharp : kCurved, carrier);
-  if (pass) add_pass(contact, carrier, sharp, exits_);
+  const Topology& topology = shell.topology();
+  const Edge& edge = topology.edges[topology.edge_of[3 * shell.triangle_of_facet(f) + k]];
+  add_minimum(shell, contact, f, {topology.edge_normal(edge), edge.on_rim()});
 }
 
-// The directions downhill from a vertex, seen as a circle, make arcs; their number is that of the
-// falling edges less that of the elements between two of them (both ends falling, so is all
-// between: their angle is below 180 degrees). No arc: a minimum; two or more: a pass.
 void Query::claim_vertex(const Shell& shell, int f, int k, const Vec3& centre, double radius,
                          double tolerance) {
   const CurvedShell& surface = *shell.curved();
@@ -190,46 +161,28 @@ void Query::claim_vertex(const Shell& shell, int f, int k, const Vec3& centre, d
   const Facet& facet = shell.facets()[f];
   const int vertex = surface.facets()[f].owned.vertex[k];
   const Vec3 from = centre - facet.corner[k];
-  const bool sharp = topology.vertex_sharp[vertex];
-  // Nearly level edges count as falling, or as rising: a pass is what is one either way.
-  const auto falls = [&](const Vec3& tangent, bool if_level) {
-    const double fall = from.dot(tangent), spare = 4 * kOverlap * tangent.squaredNorm();
-    return if_level ? fall > -spare : fall > spare;
-  };
-  bool minimum = true, bent = false;
-  std::size_t falling[2] = {0, 0}, joined[2] = {0, 0};
-  for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i) {
-    const Vec3& tangent = surface.tangents()[i];
-    for (bool level : {false, true}) falling[level] += falls(tangent, level);
-    minimum = minimum && from.dot(tangent) <= tolerance * tangent.norm();
-  }
-  if (!minimum && falling[true] < 2) return;
-  exits_.clear();
+  // No direction between two edges leads lower than both: their angle is below 180 degrees.
+  for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i)
+    if (from.dot(surface.tangents()[i]) > tolerance * surface.tangents()[i].norm()) return;
   for (int c : surface.corners_of(vertex)) {
     const Facet& other = shell.facets()[triangle_of(c)];
     const CurvedFacet& curved = surface.facets()[triangle_of(c)];
-    const int j = side_of(c), last = previous_corner(j);
-    const Vec3 out = curved.side(other, j).tangent(0), in = -curved.side(other, last).tangent(1);
-    bent = bent || !curved.flat;
-    if (minimum) {
-      if (!falls(out, true) || !falls(in, true) || curved.flat) continue;
-      const auto [u, v] = on_side(j, 0);
-      if (!is_convex_at(curved.patch(other), u, v, centre)) return;
-    } else {
-      for (bool level : {false, true}) joined[level] += falls(out, level) && falls(in, level);
-      if (falls(out, true)) exits_.push_back({out.normalized(), triangle_of(c)});
-      if (falls(in, true)) exits_.push_back({in.normalized(), triangle_of(c)});
-    }
+    if (curved.flat) continue;
+    const int j = side_of(c);
+    const Vec3 out = curved.side(other, j).tangent(0);
+    const Vec3 in = curved.side(other, previous_corner(j)).tangent(1);
+    const auto level = [&](const Vec3& tangent) {
+      return std::abs(from.dot(tangent)) < 4 * kOverlap * tangent.squaredNorm();
+    };
+    if (!level(out) || !level(in)) continue;
+    const auto [u, v] = on_side(j, 0);
+    if (!is_convex_at(curved.patch(other), u, v, centre)) return;
   }
-  if (!minimum && falling[false] < joined[false] + 2 && falling[true] < joined[true] + 2) return;
   Contact contact =
       contact_at(facet.corner[k], facet.normal, centre, radius, facet.element, Feature::Vertex);
   if (turns_) contact.turn = turn_of(contact, radius, Mat3::Zero());
-  const Carrier carrier = {topology.vertex_normal[vertex], bool(topology.vertex_on_rim[vertex])};
-  if (minimum)
-    add_minimum(shell, contact, sharp || !bent ? kSharp : kCurved, carrier);
-  else
-    add_pass(contact, carrier, sharp, exits_);
+  add_minimum(shell, contact, f,
+              {topology.vertex_normal[vertex], bool(topology.vertex_on_rim[vertex])});
 }
 
 // Where the centre is nearly as far from a whole piece of the surface, as in a socket of the
@@ -239,6 +192,7 @@ void Query::claim_nearest(const Shell& shell, const Vec3& centre, double radius)
   double nearest = radius;
   Contact contact{};
   Carrier carrier{};
+  int holder = -1;
   for (int f : near_) {
     const Facet& facet = shell.facets()[f];
     const Vec3 flat = closest_on_triangle(centre, facet.corner, facet.normal).point;
@@ -248,6 +202,7 @@ void Query::claim_nearest(const Shell& shell, const Vec3& centre, double radius)
     const double distance = (at.point - centre).norm();
     if (distance >= nearest) continue;
     nearest = distance;
+    holder = f;
     const Vec3 outward = patch.along_u(at.u, at.v).cross(patch.along_v(at.u, at.v));
     contact =
         contact_at(at.point, outward.normalized(), centre, radius, facet.element, Feature::Face);
@@ -255,21 +210,14 @@ void Query::claim_nearest(const Shell& shell, const Vec3& centre, double radius)
     if (turns_) contact.turn = turn_of(contact, radius, Mat3::Zero());
     carrier = {outward, false};
   }
-  if (nearest < radius) add_minimum(shell, contact, kCurved, carrier);
+  if (nearest < radius) add_minimum(shell, contact, holder, carrier);
 }
 
-void Query::add_minimum(const Shell& shell, const Contact& contact, int carrier_face,
+void Query::add_minimum(const Shell& shell, const Contact& contact, int facet,
                         const Carrier& carrier) {
   contacts.push_back(contact);
-  carrier_face_.push_back(carrier_face);
+  holder_.push_back(facet);
   if (shell.side() != Side::Both) carriers_.push_back(carrier);
-}
-
-void Query::add_pass(const Contact& contact, const Carrier& carrier, bool sharp,
-                     const std::vector<Leg>& exits) {
-  const int begin = static_cast<int>(legs_.size());
-  legs_.insert(legs_.end(), exits.begin(), exits.end());
-  passes_.push_back({contact, carrier, sharp, begin, static_cast<int>(legs_.size())});
 }
 
 }  // namespace sphshell
