@@ -18,26 +18,22 @@ constexpr int kMostIterations = 20;
 // A foot counts this far outside its element; what two elements claim is then told apart.
 constexpr double kOverlap = 1e-9;
 
-struct PatchPoint {
-  double u, v;
-  Vec3 point;
-};
-
-enum class Stationary { Minimum, Saddle };
-
-// The foot of x on the curved element, by Newton's method on |x - p(u, v)|^2 / 2 from the foot on
-// the flat one. False where it lies outside, or is of another kind. `convex` tells whether the
-// distance is where the search ended.
-inline bool foot_on_patch(const Facet& facet, const CubicPatch& patch, const Vec3& x,
-                          Stationary kind, PatchPoint& out, bool& convex) {
+// The foot of x on the flat facet, moved into it: far from the element the cubic says nothing about
+// the surface.
+inline std::pair<double, double> start_on(const Facet& facet, const Vec3& x) {
   const Vec3 e1 = facet.corner[1] - facet.corner[0], e2 = facet.corner[2] - facet.corner[0];
   const Vec3 d = x - facet.corner[0];
   const double a = e1.dot(e1), b = e1.dot(e2), c = e2.dot(e2), p = d.dot(e1), q = d.dot(e2);
   const double area2 = a * c - b * b;
-  double u = (c * p - b * q) / area2, v = (a * q - b * p) / area2;
-  // Start inside: far from the element the cubic says nothing about the surface.
-  u = std::clamp(u, 0.0, 1.0);
-  v = std::clamp(v, 0.0, 1.0 - u);
+  const double u = std::clamp((c * p - b * q) / area2, 0.0, 1.0);
+  return {u, std::clamp((a * q - b * p) / area2, 0.0, 1.0 - u)};
+}
+
+// A foot of x on the curved element, by Newton's method on |x - p(u, v)|^2 / 2. False where it lies
+// outside, or is of another kind. `convex` tells whether the distance is where the search ended.
+inline bool foot_on_patch(const CubicPatch& patch, const Vec3& x, std::pair<double, double> start,
+                          Stationary kind, PatchPoint& out, bool& convex) {
+  auto [u, v] = start;
   bool settled = false;
   convex = false;
   for (int i = 0; i < kMostIterations && !settled; ++i) {
@@ -140,11 +136,9 @@ inline Vec3 downhill(const CubicPatch& patch, const PatchPoint& at, const Vec3& 
   return std::cos(angle) * e1 + std::sin(angle) * e2;
 }
 
-// The parameter of the place of a side nearest to x, near the foot on its chord. False where that
-// lies beyond the side's ends, or is the farthest.
+// The parameter of a place of a side nearest to x, by Newton's method from t. False where that lies
+// beyond the side's ends, or is the farthest.
 inline bool foot_on_side(const CubicCurve& side, const Vec3& x, double& t) {
-  const Vec3 d = side.point(1) - side.c0;
-  t = std::clamp((x - side.c0).dot(d) / d.squaredNorm(), 0.0, 1.0);
   bool settled = false, convex = false;
   for (int i = 0; i < kMostIterations && !settled; ++i) {
     const Vec3 tangent = side.tangent(t);

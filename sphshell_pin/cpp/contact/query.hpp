@@ -13,6 +13,13 @@ namespace sphshell {
 
 using Mat3 = Eigen::Matrix3d;
 
+// A place of a curved element, and what the distance is there.
+struct PatchPoint {
+  double u, v;
+  Vec3 point;
+};
+enum class Stationary { Minimum, Saddle };
+
 enum class Method : int { Facets = 0, Elements = 1, Smooth = 2 };
 enum class Feature : std::uint8_t { Face = 0, Edge = 1, Vertex = 2 };
 
@@ -120,6 +127,8 @@ class Query {
   void claim_curved(const Shell& shell, const Shadow& shadow, const Vec3& centre, double radius);
   void claim_edge(const Shell& shell, int facet, int side, const Vec3& centre, double radius,
                   double tolerance);
+  void claim_on_side(const Shell& shell, int facet, int side, double t, const Vec3& centre,
+                     double radius, double tolerance);
   void claim_vertex(const Shell& shell, int facet, int corner, const Vec3& centre, double radius,
                     double tolerance);
   void claim_nearest(const Shell& shell, const Vec3& centre, double radius);
@@ -155,6 +164,7 @@ class Query {
   std::vector<Carrier> carriers_;  // beside `contacts`, for one-sided shells only
   std::vector<Shadow> over_;
   std::vector<int> holder_;  // beside `contacts`: the facet that holds it
+  std::vector<std::pair<PatchPoint, Stationary>> feet_;
   std::vector<Saddle> saddles_;
   std::vector<Row> rows_;
   std::vector<int> nodes_;             // facets

@@ -77,11 +77,15 @@ inline Vec3 direction(const Vec3& point, const Vec3& centre, const Vec3& if_equa
   return length > 0 ? Vec3(d / length) : if_equal;
 }
 
-// The contact at a point of the shell; `if_equal`: its normal where the centre is there too.
-inline Contact contact_at(const Vec3& point, const Vec3& if_equal, const Vec3& centre,
-                          double radius, int element, Feature feature) {
-  return {point, direction(point, centre, if_equal), radius - (centre - point).norm(), element,
-          feature};
+// The contact at a point of the shell; `outward`: there, where the centre is as good as at it.
+inline Contact contact_at(const Vec3& point, const Vec3& outward, const Vec3& centre, double radius,
+                          int element, Feature feature) {
+  const Vec3 from = centre - point;
+  const double distance = from.norm();
+  const Vec3 normal = distance > 1e-9 * radius ? Vec3(from / distance)
+                      : from.dot(outward) < 0  ? Vec3(-outward)
+                                               : outward;
+  return {point, normal, radius - distance, element, feature};
 }
 
 // How the normal turns with the centre, where the contact point follows it by `slide` (3, 3).

@@ -25,6 +25,16 @@ std::pair<double, double> on_side(int k, double t) {
   return k == 0 ? std::pair(t, 0.0) : k == 1 ? std::pair(1 - t, t) : std::pair(0.0, 1 - t);
 }
 
+// True where an element may bend as much as the sphere: its bulge is about an eighth of the square
+// of its side by its radius of curvature.
+bool is_bent(const Shell& shell, int f, double radius) {
+  const Facet& facet = shell.facets()[f];
+  double length2 = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k)
+    length2 = std::min(length2, (facet.corner[next_corner(k)] - facet.corner[k]).squaredNorm());
+  return 16 * shell.curved()->facets()[f].bulge * radius > length2;
+}
+
 }  // namespace
 
 void Query::find_smooth(const Shell& shell, const Vec3& centre, double radius) {
@@ -101,32 +111,68 @@ void Query::claim_curved(const Shell& shell, const Shadow& shadow, const Vec3& c
                          double radius) {
   const Facet& facet = shell.facets()[shadow.facet];
   const CubicPatch patch = shell.curved()->facets()[shadow.facet].patch(facet);
+  // One foot; or several, and saddles, where the element bends more than the sphere.
+  feet_.clear();
   PatchPoint foot;
   bool convex;
-  const bool minimum = foot_on_patch(facet, patch, centre, Stationary::Minimum, foot, convex);
-  // A saddle needs a surface that is more curved than the sphere.
-  if (!minimum &&
-      (convex || !foot_on_patch(facet, patch, centre, Stationary::Saddle, foot, convex)))
-    return;
-  if ((centre - foot.point).squaredNorm() >= radius * radius) return;
-  const Vec3 outward = patch.along_u(foot.u, foot.v).cross(patch.along_v(foot.u, foot.v));
-  Contact contact =
-      contact_at(foot.point, outward.normalized(), centre, radius, facet.element, Feature::Face);
-  if (turns_) contact.turn = turn_of(contact, radius, slide_of(patch, foot.u, foot.v, centre));
-  if (minimum)
-    add_minimum(shell, contact, shadow.facet, {outward, false});
-  else
-    saddles_.push_back(
-        {{contact, {outward, false}, shadow.facet, 0, contact.normal, contact.depth, contact.turn},
-         downhill(patch, foot, centre)});
+  const auto look_from = [&](const std::pair<double, double>& start, Stationary kind) {
+    if (!foot_on_patch(patch, centre, start, kind, foot, convex)) return;
+    for (const auto& [known, of] : feet_)
+      if (std::abs(known.u - foot.u) + std::abs(known.v - foot.v) < 1e-6) return;
+    feet_.push_back({foot, kind});
+  };
+  look_from(start_on(facet, centre), Stationary::Minimum);
+  if (is_bent(shell, shadow.facet, radius))
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; i + j < 4; ++j)
+        for (Stationary kind : {Stationary::Minimum, Stationary::Saddle})
+          look_from({i / 3.0, j / 3.0}, kind);
+  for (const auto& [at, kind] : feet_) {
+    if ((centre - at.point).squaredNorm() >= radius * radius) continue;
+    const Vec3 outward = patch.along_u(at.u, at.v).cross(patch.along_v(at.u, at.v));
+    Contact contact =
+        contact_at(at.point, outward.normalized(), centre, radius, facet.element, Feature::Face);
+    if (turns_) contact.turn = turn_of(contact, radius, slide_of(patch, at.u, at.v, centre));
+    if (kind == Stationary::Minimum)
+      add_minimum(shell, contact, shadow.facet, {outward, false});
+    else
+      saddles_.push_back({{contact,
+                           {outward, false},
+                           shadow.facet,
+                           0,
+                           contact.normal,
+                           contact.depth,
+                           contact.turn},
+                          downhill(patch, at, centre)});
+  }
 }
 
 void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, double radius,
                        double tolerance) {
   const Facet& facet = shell.facets()[f];
   const CubicCurve side = shell.curved()->facets()[f].side(facet, k);
-  double t = 0;
-  if (!foot_on_side(side, centre, t)) return;
+  const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
+  double t = std::clamp((centre - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
+  if (!is_bent(shell, f, radius)) {
+    if (foot_on_side(side, centre, t)) claim_on_side(shell, f, k, t, centre, radius, tolerance);
+    return;
+  }
+  double known[5];
+  int count = 0;
+  for (int i = 0; i < 5; ++i) {
+    t = 0.25 * i;
+    if (!foot_on_side(side, centre, t)) continue;
+    const auto same = [&](double other) { return std::abs(other - t) < 1e-6; };
+    if (std::any_of(known, known + count, same)) continue;
+    known[count++] = t;
+    claim_on_side(shell, f, k, t, centre, radius, tolerance);
+  }
+}
+
+void Query::claim_on_side(const Shell& shell, int f, int k, double t, const Vec3& centre,
+                          double radius, double tolerance) {
+  const Facet& facet = shell.facets()[f];
+  const CubicCurve side = shell.curved()->facets()[f].side(facet, k);
   const Vec3 point = side.point(t), along = side.tangent(t).normalized();
   if ((centre - point).squaredNorm() >= radius * radius) return;
   const auto rises = [&](int h) {

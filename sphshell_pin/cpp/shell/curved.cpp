@@ -289,7 +289,11 @@ void CurvedShell::lift_middles(const Shell& shell) {
       const Vec3& q = shell.vertices()[shell.triangles()[c / 3][c % 3]];
       continuation.add(k, q, normals_[c], along, square);
     }
-    if (square > 0) rise[f] = along / square;
+    // Neighbours whose normals contradict it must not pull an element away from its own sides.
+    double most = 0;
+    for (const auto& side : facets_[f].lift)
+      for (const Vec3& lift : side) most = std::max(most, lift.norm());
+    if (square > 0) rise[f] = std::clamp(along / square, -most, most);
   }
   for (std::size_t f = 0; f < facets_.size(); ++f)
     facets_[f].middle += rise[f] * shell.facets()[f].normal;
