@@ -79,46 +79,66 @@ void Query::list_minima(double same) {
   }
 }
 
-// The facets in reach, and where those that share a side touch inside the sphere.
+// The facets in reach, and an upper bound of the depth at which those that share a side touch.
 void Query::list_links(const Shell& shell, const Vec3& centre, double radius) {
   const Topology& topology = shell.topology();
-  const CurvedShell& surface = *shell.curved();
-  nodes_.assign(reached_.begin(), reached_.end());
+  nodes_.clear();
+  const Vec3 local = centre - shell.origin();
+  for (int f : reached_) {
+    // The ball of a cone holds the whole element.
+    const NormalCone& cone = shell.curved()->cones()[f];
+    const Vec3 middle(cone.middle[0], cone.middle[1], cone.middle[2]);
+    const double reach = (radius + cone.reach) * (1 + 1e-6) + 1e-6 * shell.size();
+    if ((local - middle).squaredNorm() < reach * reach) nodes_.push_back(f);
+  }
   std::sort(nodes_.begin(), nodes_.end());
   links_.clear();
   for (std::size_t i = 0; i < saddles_.size(); ++i)
-    links_.push_back({saddles_[i].pass.depth, static_cast<int>(nodes_.size() + i),
+    links_.push_back({saddles_[i].pass.depth, true, static_cast<int>(nodes_.size() + i),
                       node_of(saddles_[i].pass.facet), -1, static_cast<int>(i), 0});
   for (int f : nodes_) {
     const Facet& facet = shell.facets()[f];
-    const CurvedFacet& curved = surface.facets()[f];
-    const double reach = radius + (curved.flat ? 0 : curved.bulge);
+    const CurvedFacet& curved = shell.curved()->facets()[f];
+    const double reach = radius + curved.bulge;
     if (std::abs(facet.normal.dot(centre - facet.corner[0])) >= reach) continue;
     for (int k = 0; k < 3; ++k) {
-      const int h = 3 * shell.triangle_of_facet(f) + k;
-      const Edge& edge = topology.edges[topology.edge_of[h]];
-      if (edge.count == 1) continue;
-      // Every other facet is linked to the first of those at the edge.
-      int first = f;
-      for (int i = 0; i < edge.count; ++i)
-        first =
-            std::min(first, triangle_of(shell.facet_half_edge(topology.incidence[edge.begin + i])));
-      if (first == f) continue;
+      const int code = curved.owned.twin[k];
+      if (code == kBoundary || (code == kNotMine && !curved.flat)) continue;
       const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
-      double t = std::clamp((centre - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
-      double distance = (facet.corner[k] + t * d - centre).norm();
+      const double t = std::clamp((centre - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
+      const double distance = (facet.corner[k] + t * d - centre).norm();
       if (distance >= reach) continue;
-      if (node_of(first) < 0) continue;
-      if (!curved.flat) {
-        const CubicCurve side = curved.side(facet, k);
-        t = nearest_on_side(side, centre);
-        distance = (side.point(t) - centre).norm();
+      const auto link_to = [&](int other) {
+        links_.push_back({reach - distance, curved.flat, f, other, f, k, t});
+      };
+      if (code >= 0) {
+        link_to(triangle_of(code));
+      } else if (code <= kManifold) {
+        for (int h : shell.half_edges_of(kManifold - code))
+          if (triangle_of(h) != f) link_to(triangle_of(h));
+      } else {
+        // Between two facets of a plane nobody decides about the side.
+        const Edge& edge = topology.edges[topology.edge_of[3 * shell.triangle_of_facet(f) + k]];
+        for (int i = 0; i < edge.count; ++i) {
+          const int g = triangle_of(shell.facet_half_edge(topology.incidence[edge.begin + i]));
+          if (g > f && shell.facets()[g].planar_face == facet.planar_face) link_to(g);
+        }
       }
-      if (distance >= radius) continue;
-      const Vec3 point = curved.side(facet, k).point(t);
-      links_.push_back({radius - distance, node_of(f, point), node_of(first, point), f, k, t});
     }
   }
+}
+
+// Puts the place of a link in place of its bound; false where the sphere does not reach it.
+bool Query::settle(const Shell& shell, Link& link, const Vec3& centre, double radius) const {
+  const Facet& facet = shell.facets()[link.facet];
+  const CubicCurve side = shell.curved()->facets()[link.facet].side(facet, link.side);
+  if (!link.exact) link.t = nearest_on_side(side, centre);
+  const Vec3 point = side.point(link.t);
+  link.depth = radius - (point - centre).norm();
+  link.exact = true;
+  link.a = node_of(link.a, point);
+  link.b = node_of(link.b, point);
+  return link.depth > 0 && link.a >= 0 && link.b >= 0;
 }
 
 int Query::node_of(int facet) const {
@@ -137,11 +157,6 @@ int Query::node_of(int facet, const Vec3& point) const {
 
 // Highest link first, as water rises (Kruskal).
 void Query::join_over_links(const Shell& shell, const Vec3& centre, double radius) {
-  std::sort(links_.begin(), links_.end(), [](const Link& a, const Link& b) {
-    return a.depth != b.depth   ? a.depth > b.depth
-           : a.facet != b.facet ? a.facet < b.facet
-                                : a.side < b.side;
-  });
   parent_.resize(nodes_.size() + saddles_.size());
   std::iota(parent_.begin(), parent_.end(), 0);
   deepest_.assign(parent_.size(), -1);
@@ -188,14 +203,37 @@ void Query::join_over_links(const Shell& shell, const Vec3& centre, double radiu
     else
       rows_[i].merged = deepest;
   }
-  for (const Link& link : links_) {
+  // Bounds are made exact only where they come up first, and no more once all is joined.
+  const auto lower = [](const Link& a, const Link& b) {
+    return a.depth != b.depth   ? a.depth < b.depth
+           : a.facet != b.facet ? a.facet > b.facet
+                                : a.side > b.side;
+  };
+  int pieces = 0;
+  for (int row : deepest_) pieces += row >= 0;
+  for (Link& link : links_)
+    if (link.exact && link.facet >= 0 && !settle(shell, link, centre, radius)) link.depth = -1;
+  std::make_heap(links_.begin(), links_.end(), lower);
+  while (pieces > 1 && !links_.empty()) {
+    std::pop_heap(links_.begin(), links_.end(), lower);
+    Link link = links_.back();
+    links_.pop_back();
+    if (link.depth <= 0) break;
+    if (!link.exact) {
+      if (!settle(shell, link, centre, radius)) continue;
+      links_.push_back(link);
+      std::push_heap(links_.begin(), links_.end(), lower);
+      continue;
+    }
     const int a = find(link.a), b = find(link.b);
     if (a == b) continue;
     const int i = deepest_[a], j = deepest_[b];
     parent_[b] = a;
-    if (i >= 0 && j >= 0)
+    if (i >= 0 && j >= 0) {
+      --pieces;
       join(std::min(i, j), std::max(i, j), pass_at(shell, link, centre, radius),
            link.facet < 0 || !shell.curved()->facets()[link.facet].flat);
+    }
     deepest_[a] = i < 0 ? j : j < 0 ? i : std::min(i, j);
   }
 }

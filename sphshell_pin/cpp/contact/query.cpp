@@ -82,18 +82,19 @@ void Query::gather(const Shell& shell, const LargeArray<NormalCone>& cones, doub
     prefetch(all + first);
     prefetch(all + first + 3);
   });
-  keep_in_cone(shell, cones, centre, radius, margin + bulge);
+  keep_in_cone(shell, cones, centre, radius, margin, bulge);
 }
 
 // Leaves in near_ the facets that may hold a contact: the centre may stand inside the cone of
 // normals of the features that they decide about (Johnson and Cohen 2001), wherever it is within
 // the margin and however far within it the element bulges from its triangle.
 void Query::keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones,
-                         const Vec3& centre, double radius, double margin) {
+                         const Vec3& centre, double radius, double margin, double bulge) {
   const Facet* facets = shell.facets().data();
   const Vec3 local = centre - shell.origin();
   const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
-  const float slack = 1e-6f * (float(shell.size()) + float(radius)) + 1.000001f * float(margin);
+  const float near = 1e-6f * (float(shell.size()) + float(radius)) + 1.000001f * float(margin);
+  const float slack = near + 1.000001f * float(bulge);
   near_.clear();
   for (int f : reached_) {
     const NormalCone& cone = cones[f];
@@ -101,7 +102,8 @@ void Query::keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones
     const float height = std::abs(x * cone.axis[0] + y * cone.axis[1] + z * cone.axis[2]);
     const float allowed = cone.reach + slack + (height + slack) * cone.tan_opening;
     const float square = x * x + y * y + z * z;
-    const float farthest = float(radius) * 1.000001f + cone.reach + slack;
+    // The ball of a cone holds all of a bent element.
+    const float farthest = float(radius) * 1.000001f + cone.reach + near;
     if (square * 0.999999f > farthest * farthest) continue;
     if (square * 0.999999f - height * height > allowed * allowed) continue;
     prefetch(&facets[f]);

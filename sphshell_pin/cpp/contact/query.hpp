@@ -106,10 +106,11 @@ class Query {
     Row pass;
     Vec3 downhill;  // one of the two ways
   };
-  // Where two facets of nodes_ touch: nearest to the centre on their common side; or, with
-  // facet -1, the saddle number `side`.
+  // Where two facets touch: nearest to the centre on their common side, or above a bound of it; or,
+  // with facet -1, the saddle number `side`. a, b: facets, and once exact their nodes.
   struct Link {
     double depth;
+    bool exact;
     int a, b, facet, side;
     double t;
   };
@@ -120,7 +121,7 @@ class Query {
   void gather(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
               const Vec3& centre, double radius);
   void keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones, const Vec3& centre,
-                    double radius, double margin);
+                    double radius, double margin, double bulge);
   void claim_on_patches(const Shell& shell, const Vec3& centre, double radius, double tolerance);
   void claim_flat(const Shell& shell, const Shadow& shadow, const Vec3& centre, double radius,
                   double tolerance);
@@ -136,6 +137,7 @@ class Query {
   void join_minima(const Shell& shell, const Vec3& centre, double radius);
   void list_minima(double same);
   void list_links(const Shell& shell, const Vec3& centre, double radius);
+  bool settle(const Shell& shell, Link& link, const Vec3& centre, double radius) const;
   void join_over_links(const Shell& shell, const Vec3& centre, double radius);
   Row pass_at(const Shell& shell, const Link& link, const Vec3& centre, double radius) const;
   int node_of(int facet) const;

@@ -1,6 +1,7 @@
 // Contacts with curved elements: what is stationary about the distance to a surface of patches.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -25,14 +26,17 @@ std::pair<double, double> on_side(int k, double t) {
   return k == 0 ? std::pair(t, 0.0) : k == 1 ? std::pair(1 - t, t) : std::pair(0.0, 1 - t);
 }
 
-// True where an element may bend as much as the sphere: its bulge is about an eighth of the square
-// of its side by its radius of curvature.
-bool is_bent(const Shell& shell, int f, double radius) {
+// True where an element that the sphere reaches may bend as much as it: its bulge is about an
+// eighth of the square of its side by its radius of curvature.
+bool is_bent(const Shell& shell, int f, const Vec3& centre, double radius) {
   const Facet& facet = shell.facets()[f];
+  const double bulge = shell.curved()->facets()[f].bulge;
   double length2 = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 3; ++k)
     length2 = std::min(length2, (facet.corner[next_corner(k)] - facet.corner[k]).squaredNorm());
-  return 16 * shell.curved()->facets()[f].bulge * radius > length2;
+  if (16 * bulge * radius <= length2) return false;
+  const Vec3 flat = closest_on_triangle(centre, facet.corner, facet.normal).point;
+  return (flat - centre).squaredNorm() < (radius + bulge) * (radius + bulge);
 }
 
 }  // namespace
@@ -122,11 +126,15 @@ void Query::claim_curved(const Shell& shell, const Shadow& shadow, const Vec3& c
     feet_.push_back({foot, kind});
   };
   look_from(start_on(facet, centre), Stationary::Minimum);
-  if (is_bent(shell, shadow.facet, radius))
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; i + j < 4; ++j)
-        for (Stationary kind : {Stationary::Minimum, Stationary::Saddle})
-          look_from({i / 3.0, j / 3.0}, kind);
+  constexpr std::pair<double, double> kStarts[] = {
+      {0, 0}, {1, 0}, {0, 1}, {0.5, 0}, {0, 0.5}, {0.5, 0.5}, {1.0 / 3, 1.0 / 3}};
+  const auto convex_at = [&](const std::pair<double, double>& at) {
+    return is_convex_at(patch, at.first, at.second, centre);
+  };
+  if (is_bent(shell, shadow.facet, centre, radius) &&
+      !std::all_of(std::begin(kStarts), std::end(kStarts), convex_at))
+    for (const auto& start : kStarts)
+      for (Stationary kind : {Stationary::Minimum, Stationary::Saddle}) look_from(start, kind);
   for (const auto& [at, kind] : feet_) {
     if ((centre - at.point).squaredNorm() >= radius * radius) continue;
     const Vec3 outward = patch.along_u(at.u, at.v).cross(patch.along_v(at.u, at.v));
@@ -153,7 +161,10 @@ void Query::claim_edge(const Shell& shell, int f, int k, const Vec3& centre, dou
   const CubicCurve side = shell.curved()->facets()[f].side(facet, k);
   const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
   double t = std::clamp((centre - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
-  if (!is_bent(shell, f, radius)) {
+  const auto convex_at = [&](double at) {
+    return side.tangent(at).squaredNorm() + (side.point(at) - centre).dot(side.second(at)) > 0;
+  };
+  if (!is_bent(shell, f, centre, radius) || (convex_at(0) && convex_at(0.5) && convex_at(1))) {
     if (foot_on_side(side, centre, t)) claim_on_side(shell, f, k, t, centre, radius, tolerance);
     return;
   }
@@ -242,7 +253,7 @@ void Query::claim_nearest(const Shell& shell, const Vec3& centre, double radius)
   for (int f : near_) {
     const Facet& facet = shell.facets()[f];
     const Vec3 flat = closest_on_triangle(centre, facet.corner, facet.normal).point;
-    if ((flat - centre).norm() > nearest + surface.bulge()) continue;
+    if ((flat - centre).norm() > nearest + surface.facets()[f].bulge) continue;
     const CubicPatch patch = surface.facets()[f].patch(facet);
     const PatchPoint at = nearest_on_patch(patch, centre);
     const double distance = (at.point - centre).norm();
