@@ -1,0 +1,250 @@
+"""Spheres on surfaces that others made: what every answer must be, how it changes, what it costs.
+
+1500 spheres touch each file of the corpus, of radii from a fifth of to twenty mean sides;
+SPHSHELL_SPHERES=10000 takes more. Skipped where the corpus is absent.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from sphshell_pin import Shell
+from sphshell_pin.contact.contact_set import ContactSet, Method
+from sphshell_pin.errors import SphshellError
+from tests.contact.helpers import energy, force_sum
+from tests.contact.smooth.surfaces import mean_edge
+from tests.shell.surfaces import DATA
+from tests.shell.test_corpus import FILES, load
+
+Array = NDArray[np.float64]
+
+COUNT = int(os.environ.get("SPHSHELL_SPHERES", "1500"))
+WALKS = COUNT // 10
+SUFFIXES = (".stl", ".obj", ".ply", ".off")
+
+# Not understood yet. In the first lot elements cross, overlap or fold over; in the second the
+# larger spheres lie on elements that bend far more than they do.
+CROSSED = "the potential of some spheres jumps, by up to the whole of a contact's"
+BENT = "the potential of some of the larger spheres jumps"
+
+
+def cases(known: dict[str, str]):
+    """All files, those in `known` (name: reason) expected to fail."""
+    marks = {name: pytest.mark.xfail(strict=True, reason=why) for name, why in known.items()}
+    return [pytest.param(name, marks=marks.get(name, ())) for name in FILES]
+
+
+@dataclass(frozen=True)
+class Spheres:
+    """n spheres that reach at least `reach` (n,) deep, as a place of the surface is that near."""
+
+    shell: Shell
+    centers: Array
+    radii: Array
+    reach: Array
+
+    def find(self, i: int, move: Array | float = 0.0) -> ContactSet:
+        """Contacts of sphere i, its centre moved."""
+        return self.shell.contacts(self.centers[i] + move, self.radii[i], method="smooth")
+
+    def cost(self, i: int) -> float:
+        """Seconds of the query of sphere i."""
+        core, radius = self.shell.core_for("smooth"), float(self.radii[i])
+        start = time.perf_counter()
+        core.contacts(self.centers[i], radius, int(Method.SMOOTH))
+        return time.perf_counter() - start
+
+
+def places(shell: Shell, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    """Places (n, 3) on the curved elements, with the normals of the flat ones; half of them as the
+    area is, half as the elements are; a tenth at corners, a tenth on sides."""
+    corners = shell.vertices[shell.triangles]
+    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(spans, axis=1)
+    by_area = rng.choice(len(areas), count, p=areas / areas.sum())
+    chosen = np.where(rng.random(count) < 0.5, by_area, rng.integers(len(areas), size=count))
+    weights, kind = rng.dirichlet([1.0, 1.0, 1.0], count), rng.random(count)
+    weights[kind < 0.1] = np.eye(3)[rng.integers(3, size=(kind < 0.1).sum())]
+    weights[(kind > 0.1) & (kind < 0.2), rng.integers(3)] = 0.0
+    weights /= weights.sum(axis=1, keepdims=True)
+    w, u, v = weights.T
+    # Bernstein's polynomials of the control points, as `core.lifts` has them.
+    sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
+    lifts = shell.core_for("smooth").lifts[chosen]
+    point = np.einsum("nk,nkx->nx", weights, corners[chosen])
+    point += np.einsum("bn,nbx->nx", np.stack([*sides, 6 * u * v * w]), lifts)
+    return point, shell.triangle_normals[chosen]
+
+
+@cache
+def spheres(name: str) -> Spheres:
+    """COUNT of them: most along a normal, a tenth deep, a tenth in a random direction."""
+    shell, rng = load(name), np.random.default_rng(0)
+    side = mean_edge(shell.vertices, shell.triangles)
+    radii = side * np.exp(rng.uniform(np.log(0.2), np.log(20.0), COUNT))
+    point, normal = places(shell, rng, COUNT)
+    normal = normal * rng.choice([-1.0, 1.0], (COUNT, 1))
+    share, kind = np.exp(rng.uniform(np.log(1e-4), np.log(0.2), COUNT)), rng.random(COUNT)
+    share[kind < 0.1] = rng.uniform(0.2, 1.0, (kind < 0.1).sum())
+    askew = (kind > 0.1) & (kind < 0.2)
+    normal[askew] = rng.normal(size=(askew.sum(), 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    centers = point + ((1 - share) * radii)[:, None] * normal
+    return Spheres(shell, centers, radii, share * radii)
+
+
+@cache
+def answers(name: str) -> list[ContactSet]:
+    return [spheres(name).find(i) for i in range(COUNT)]
+
+
+def faults(found: ContactSet, center: Array, radius: float) -> list[str]:
+    """What is wrong with a contact set, whatever the surface."""
+    columns = (found.point, found.normal, found.depth, found.weight)
+    if not all(np.isfinite(column).all() for column in columns):
+        return ["not finite"]
+    wrong = []
+    if not ((found.depth > 0) & (found.depth <= radius)).all():
+        wrong.append("depth")
+    if np.abs(np.linalg.norm(found.normal, axis=1) - 1.0).max(initial=0) > 1e-12:
+        wrong.append("normal")
+    feet = found.point + (radius - found.depth)[:, None] * found.normal
+    if np.abs(feet - center).max(initial=0) > 1e-9 * radius:
+        wrong.append("point")
+    # One, and nearly one where minima are merged; a pass joins a whole number of pieces.
+    whole = (found.weight < 0) & (found.weight == np.round(found.weight))
+    if not (whole | (np.abs(found.weight - 1.0) < 1e-2)).all():
+        wrong.append("weight")
+    if len(found) and np.where(found.weight > 0, 1.0, found.weight).sum() < 1:
+        wrong.append("fewer than one piece")
+    # The deepest piece counts in full.
+    if len(found) and not energy(found) > (1 - 1e-9) * found.depth.max() ** 2.5 / 2.5:
+        wrong.append("potential")
+    return wrong
+
+
+def test_the_corpus_is_known() -> None:
+    """Every mesh file loads, as `FILES` has it, or is refused in one sentence."""
+    if not DATA.exists():
+        pytest.skip(f"the corpus of other people's surfaces is absent: {DATA}")
+    refused = {}
+    for path in sorted(p for p in DATA.iterdir() if p.suffix.lower() in SUFFIXES):
+        try:
+            Shell.from_file(path, unit="mm")
+        except SphshellError as error:
+            refused[path.name] = str(error)
+        assert path.name in FILES or path.name in refused
+    assert not [said for said in refused.values() if len(said) > 300 or "\n" in said]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_answers_are_sane(name: str) -> None:
+    """Finite; unit normals; depths in (0, r]; points at r - depth; no piece counts for nothing."""
+    some = spheres(name)
+    wrong = {
+        i: why
+        for i, found in enumerate(answers(name))
+        if (why := faults(found, some.centers[i], some.radii[i]))
+    }
+    assert not wrong
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_nothing_is_missed(name: str) -> None:
+    """The deepest contact is as deep as the place of the surface that the sphere was put on."""
+    some = spheres(name)
+    deepest = np.array([found.depth.max(initial=0.0) for found in answers(name)])
+    missed = (some.reach - deepest) / some.radii
+    assert not {int(i): float(missed[i]) for i in np.flatnonzero(~(missed <= 1e-6))}
+
+
+def change(before: ContactSet, after: ContactSet, move: Array) -> tuple[float, float, float]:
+    """Potential that the forces do not account for, potential, and largest force times move."""
+    v0, v1, f0, f1 = energy(before), energy(after), force_sum(before), force_sum(after)
+    size = max(sum(abs(c.weight) * c.depth**1.5) for c in (before, after))
+    return abs(v1 - v0 + (f0 + f1) @ move / 2), max(v0, v1), size * float(np.linalg.norm(move))
+
+
+def jump(before: ContactSet, after: ContactSet, move: Array) -> float:
+    """Jump of the potential between two centres that are near each other, as a share of it."""
+    lost, potential, most = change(before, after, move)
+    return max(lost - most, 0.0) / potential if potential > 0 else 0.0
+
+
+BESIDE = {
+    "trimesh_featuretype.STL": CROSSED,
+    "trimesh_joined_tetrahedra.obj": CROSSED,
+    "manifold_openscad-nonmanifold-crash.obj": CROSSED,
+}
+
+
+@pytest.mark.parametrize("name", cases(BESIDE))
+def test_potential_beside_each_sphere(name: str) -> None:
+    """A centre 1e-9 r further has the same potential; many stand exactly over sides and corners."""
+    some, rng, jumps = spheres(name), np.random.default_rng(1), {}
+    for i, found in enumerate(answers(name)):
+        move = rng.normal(size=3)
+        move *= 1e-9 * some.radii[i] / np.linalg.norm(move)
+        share = jump(found, some.find(i, move), move)
+        if not share <= 1e-6:
+            jumps[i] = share
+    assert not jumps
+
+
+def steepest(some: Spheres, i: int, move: Array) -> tuple[Array, Array]:
+    """The two centres 1e-9 r apart, from that of sphere i to `move` further, between which the
+    potential changes most beside what the forces account for, by halving; as moves."""
+    start, end = np.zeros(3), move
+    first, last = some.find(i, start), some.find(i, end)
+    while np.linalg.norm(end - start) > 1e-9 * some.radii[i]:
+        middle = (start + end) / 2
+        found = some.find(i, middle)
+        if change(first, found, middle - start)[0] > change(found, last, end - middle)[0]:
+            end, last = middle, found
+        else:
+            start, first = middle, found
+    return start, end
+
+
+ALONG = dict.fromkeys(
+    ("bladex_upper.stl", "c3d_fandisk.obj", "c3d_stanford-bunny.obj", "fcpw_dragon.obj"), BENT
+) | dict.fromkeys(BESIDE, CROSSED)
+
+
+@pytest.mark.parametrize("name", cases(ALONG))
+def test_potential_along_walks(name: str) -> None:
+    """Over a tenth of its radius a sphere crosses many borders; the potential jumps at none."""
+    some, rng, jumps = spheres(name), np.random.default_rng(2), {}
+    for i in range(WALKS):
+        move = rng.normal(size=3)
+        move *= 0.1 * some.radii[i] / np.linalg.norm(move)
+        start, end = steepest(some, i, move)
+        share = jump(some.find(i, start), some.find(i, end), end - start)
+        if not share <= 1e-6:
+            jumps[i] = share
+    assert not jumps
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_no_query_is_slow(name: str) -> None:
+    """None takes much more than those that reach about as many elements."""
+    some = spheres(name)
+    middles = some.shell.vertices[some.shell.triangles].mean(axis=1)
+    reached = [
+        np.count_nonzero(((middles - center) ** 2).sum(axis=1) < radius**2)
+        for center, radius in zip(some.centers, some.radii, strict=True)
+    ]
+    sizes = np.floor(np.log2(1 + np.array(reached))).astype(int)
+    costs = np.array([some.cost(i) for i in range(COUNT)])
+    for size in np.unique(sizes):
+        alike = np.flatnonzero(sizes == size)
+        median = np.median(costs[alike])
+        for i in alike[costs[alike] > 30 * median]:
+            assert min(some.cost(int(i)) for _ in range(10)) < 60 * median, int(i)
