@@ -19,6 +19,7 @@ from benchmarks.query import query_contestant
 from benchmarks.surfaces import (
     SHEET,
     Mesh,
+    ball_places,
     icosphere,
     on_sheet,
     on_torus,
@@ -76,10 +77,8 @@ class Row:
     direction: float
 
 
-def ball_places(rng: np.random.Generator) -> tuple[Array, Array]:
-    normals = rng.normal(size=(PLACES, 3))
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return BALL * normals, normals
+def on_ball(rng: np.random.Generator) -> tuple[Array, Array]:
+    return ball_places(BALL, rng, PLACES)
 
 
 def torus_places(rng: np.random.Generator) -> tuple[Array, Array]:
@@ -106,8 +105,8 @@ def sheets() -> list[Mesh]:
 
 
 SURFACES = {
-    "bowl: inside a sphere, R = 4 r": Surface(balls, ball_places, inside=True),
-    "dome: outside a sphere, R = 4 r": Surface(balls, ball_places, inside=False),
+    "bowl: inside a sphere, R = 4 r": Surface(balls, on_ball, inside=True),
+    "dome: outside a sphere, R = 4 r": Surface(balls, on_ball, inside=False),
     "inside a torus, R = 6 r and 3 r": Surface(tori, torus_places, inside=True),
     "on a wavy sheet": Surface(sheets, sheet_places, inside=False),
 }
@@ -212,7 +211,7 @@ def print_equal_error(rows: list[Row], rounds: int) -> None:
     finest = [r for r in rows if (r.surface, r.rule) == (name, flat)][-1]
     curved = [r for r in rows if (r.surface, r.rule) == (name, "smooth, exact normals")]
     enough = next(r for r in curved if r.mean <= finest.mean)
-    points, normals = ball_places(np.random.default_rng(1))
+    points, normals = on_ball(np.random.default_rng(1))
     centres = np.tile(points + (RADIUS - DEPTH) * normals, (20, 1))
     contestants = {}
     for row, method in ((finest, "facets"), (enough, "smooth")):

@@ -17,7 +17,16 @@ from math import factorial, prod
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.surfaces import SHEET, Mesh, icosphere, on_sheet, on_torus, sheet, torus
+from benchmarks.surfaces import (
+    SHEET,
+    Mesh,
+    ball_places,
+    icosphere,
+    on_sheet,
+    on_torus,
+    sheet,
+    torus,
+)
 from benchmarks.timing import one_core, ratio, take_turns
 
 Array = NDArray[np.float64]
@@ -322,10 +331,8 @@ def ball(side: float) -> Mesh:
     return icosphere(round(np.log2(1.16 * BALL / side)), BALL)
 
 
-def ball_places(rng: np.random.Generator) -> tuple[Array, Array]:
-    normals = rng.normal(size=(PLACES, 3))
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return BALL * normals, normals
+def on_ball(rng: np.random.Generator) -> tuple[Array, Array]:
+    return ball_places(BALL, rng, PLACES)
 
 
 def torus_places(rng: np.random.Generator) -> tuple[Array, Array]:
@@ -338,8 +345,8 @@ def sheet_places(rng: np.random.Generator) -> tuple[Array, Array]:
 
 Places = Callable[[np.random.Generator], tuple[Array, Array]]
 SURFACES: dict[str, tuple[Callable[[float], Mesh], Places, int]] = {
-    "dome: outside a sphere, R = 4": (ball, ball_places, 1),
-    "bowl: inside a sphere, R = 4": (ball, ball_places, -1),
+    "dome: outside a sphere, R = 4": (ball, on_ball, 1),
+    "bowl: inside a sphere, R = 4": (ball, on_ball, -1),
     "inside a torus, R = 6 and 3": (lambda side: torus(RING, TUBE, side / 1.15), torus_places, -1),
     "on a wavy sheet": (sheet, sheet_places, 1),
 }

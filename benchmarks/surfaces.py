@@ -79,6 +79,13 @@ def icosphere(level: int, radius: float) -> Mesh:
     return Mesh(radius * vertices, triangles.astype(np.int32), vertices)
 
 
+def ball_places(radius: float, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    """Return random points (n, 3) of a sphere [m] and their outward unit normals (n, 3)."""
+    normals = rng.normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return radius * normals, normals
+
+
 def on_torus(ring: float, tube: float, along: Array, around: Array) -> tuple[Array, Array]:
     """Return points (n, 3) of a torus round z [m] and their outward unit normals (n, 3)."""
     out = np.c_[np.cos(along), np.sin(along), np.zeros(len(along))]

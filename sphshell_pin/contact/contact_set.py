@@ -45,7 +45,8 @@ class ContactSet:
     With k contacts: `point` (k, 3) on the shell [m]; `normal` (k, 3) unit, from the shell to the
     sphere's centre; `depth` (k,) > 0 [m]; `element` (k,) row of shell.elements (of an edge or a
     vertex, one of those that share it); `patch` (k,) smooth piece of the surface; `feature` (k,)
-    values of Feature; `weight` (k,) by which a contact's force counts: 1, but -1 at a pass, a place
+    values of Feature; `weight` (k,) by which a contact's force counts: 1 (to 0.001 where
+    neighbours' contacts are nearly one and were merged), but -1 at a pass, a place
     where contacts flow together (method "smooth" only, where the sphere reaches a concave crease
     between them); `turn` (k, 3, 3), if asked for: derivative of weight * normal with respect to
     the centre [1/m].

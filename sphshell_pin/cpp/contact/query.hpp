@@ -30,7 +30,7 @@ struct Contact {
   int element;
   Feature feature;
   // Of its force: below zero at a pass between contacts that flow together; where they are nearly
-  // one, a little below one.
+  // one and were merged, nearly one.
   double weight = 1;
   // Where asked for: derivative of weight * normal with respect to the sphere's centre [1/m].
   Mat3 turn = Mat3::Zero();

@@ -1,4 +1,4 @@
-// Contacts with curved elements: what is stationary about the distance to a surface of patches.
+// Contacts with curved elements: minima of the distance, and saddles within an element.
 #include <algorithm>
 #include <cmath>
 #include <iterator>
