@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
 
 if TYPE_CHECKING:
+    from sphshell_pin.contact import BristleFriction as BristleFriction
     from sphshell_pin.contact import ContactSet as ContactSet
     from sphshell_pin.contact import CoulombFriction as CoulombFriction
     from sphshell_pin.contact import Feature as Feature
@@ -18,9 +19,12 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import ImpactLaw as ImpactLaw
     from sphshell_pin.contact import Sphere as Sphere
     from sphshell_pin.contact import contact_wrench as contact_wrench
+    from sphshell_pin.dynamics import Adaptive as Adaptive
     from sphshell_pin.dynamics import CartesianImpedance as CartesianImpedance
     from sphshell_pin.dynamics import GravityCompensation as GravityCompensation
+    from sphshell_pin.dynamics import Implicit as Implicit
     from sphshell_pin.dynamics import JointPD as JointPD
+    from sphshell_pin.dynamics import LinearlyImplicitEuler as LinearlyImplicitEuler
     from sphshell_pin.dynamics import Result as Result
     from sphshell_pin.dynamics import RungeKutta4 as RungeKutta4
     from sphshell_pin.dynamics import Scene as Scene
@@ -32,6 +36,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
+    "Adaptive": "dynamics",
+    "BristleFriction": "contact",
     "CartesianImpedance": "dynamics",
     "ContactSet": "contact",
     "CoulombFriction": "contact",
@@ -39,7 +45,9 @@ _HOME = {
     "GravityCompensation": "dynamics",
     "HuntCrossleyLaw": "contact",
     "ImpactLaw": "contact",
+    "Implicit": "dynamics",
     "JointPD": "dynamics",
+    "LinearlyImplicitEuler": "dynamics",
     "Result": "dynamics",
     "RungeKutta4": "dynamics",
     "Scene": "dynamics",

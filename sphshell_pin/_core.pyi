@@ -69,17 +69,28 @@ class NormalLaw:
     def force(self, depth: float, gap_rate: float) -> float: ...
     def energy(self, depth: float) -> float: ...
 
-class CoulombLaw:
-    def __init__(
-        self, mu_static: float, mu_dynamic: float, v_static: float, v_dynamic: float
-    ) -> None: ...
+class FrictionLaw:
+    @staticmethod
+    def two_velocity(
+        mu_static: float, mu_dynamic: float, v_static: float, v_dynamic: float
+    ) -> FrictionLaw: ...
+    @staticmethod
+    def bristle(
+        mu_static: float,
+        mu_dynamic: float,
+        stiffness: float,
+        damping: float,
+        v_stribeck: float,
+        torsional: bool,
+    ) -> FrictionLaw: ...
     def coefficient(self, speed: float) -> float: ...
 
 def contact_force(
-    law: NormalLaw, friction: CoulombLaw | None, depth: float, normal: _Doubles, relative: _Doubles
+    law: NormalLaw, friction: FrictionLaw | None, depth: float, normal: _Doubles, relative: _Doubles
 ) -> tuple[float, _Doubles, _Doubles]: ...
 
 class Pair:
+    relaxation: float
     def __init__(
         self,
         name: str,
@@ -92,13 +103,20 @@ class Pair:
         source: Callable[[pin.SE3, pin.SE3], tuple[_Doubles, _Doubles, _Doubles]] | None,
         method: int,
         law: NormalLaw,
-        friction: CoulombLaw | None,
+        friction: FrictionLaw | None,
     ) -> None: ...
 
 class Scene:
     def __init__(self, model: pin.Model, pairs: Sequence[Pair]) -> None: ...
     def external_forces(self, q: _Doubles, v: _Doubles) -> pin.StdVec_Force: ...
     def contacts(self, q: _Doubles, v: _Doubles) -> _Doubles: ...
+    def contact_derivatives(self, q: _Doubles, v: _Doubles) -> tuple[_Doubles, _Doubles]: ...
+    @property
+    def bristle_size(self) -> int: ...
+    def rates(self, q: _Doubles, v: _Doubles, z: _Doubles, tau: _Doubles) -> _Doubles: ...
+    def rate_jacobian(
+        self, q: _Doubles, v: _Doubles, z: _Doubles, tau: _Doubles, repeat: int = 1
+    ) -> _Doubles: ...
 
 class Controller: ...
 
@@ -144,12 +162,14 @@ class Simulation:
         q0: _Doubles,
         v0: _Doubles,
         *,
-        runge_kutta: bool,
+        integrator: int,
         dt: float,
+        rtol: float,
+        atol: float,
         duration: float,
         start_time: float,
         control_dt: float,
-        record_every: int,
+        record_dt: float,
     ) -> None: ...
     def advance(self, wall_seconds: float) -> int: ...
     def take(self) -> dict[str, NDArray[Any]]: ...
@@ -163,6 +183,14 @@ class Simulation:
     def v(self) -> _Doubles: ...
     @property
     def steps(self) -> int: ...
+    @property
+    def full(self) -> bool: ...
+    @property
+    def rejected(self) -> int: ...
+    @property
+    def evaluations(self) -> int: ...
+    @property
+    def last_step(self) -> float: ...
     @property
     def wall_time(self) -> float: ...
     @property

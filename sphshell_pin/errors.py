@@ -159,7 +159,7 @@ class SimulationDiverged(SphshellError, ArithmeticError):
         """Say when and why the run had to stop."""
         super().__init__(
             f"the simulation diverged at t = {t:.6g} s: {why}; reduce dt, or the stiffness and "
-            "damping"
+            "damping, or take the integrator Implicit"
         )
         self.t = t
         self.result = result

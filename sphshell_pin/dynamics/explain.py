@@ -10,7 +10,14 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_moved_mass
-from sphshell_pin.contact import CoulombFriction, HuntCrossleyLaw, ImpactLaw, NormalLaw
+from sphshell_pin.contact import (
+    BristleFriction,
+    CoulombFriction,
+    Friction,
+    HuntCrossleyLaw,
+    ImpactLaw,
+    NormalLaw,
+)
 from sphshell_pin.dynamics.models import unit_warning
 from sphshell_pin.dynamics.scene import ContactPair, Scene
 from sphshell_pin.dynamics.sources import checked_source
@@ -82,12 +89,8 @@ class Explanation:
 def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explanation:
     """Work out the explanation of `scene` at q (nq,), v (nv,), for a step of `dt` [s]."""
     model = scene.model
-    data = model.createData()
-    pin.forwardKinematics(model, data, q, v)
-    pin.computeJointJacobians(model, data, q)
     check_moved_mass(model)
-    pin.crba(model, data, q)
-    mass_matrix = np.triu(data.M) + np.triu(data.M, 1).T
+    data, mass_matrix = _mass_at(scene, q, v)
     gravity = float(np.linalg.norm(model.gravity.linear))
     pairs = []
     warnings: list[str] = []
@@ -110,8 +113,35 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     absent = ["joint limits, joint friction and contact between other pairs of bodies"]
     if scene.lock:
         absent.append(f"motion of the locked joints {', '.join(scene.lock)}")
-    absent.append("passage through a shell within one step: keep dt below radius / speed")
     return Explanation(tuple(modelled), tuple(absent), tuple(pairs), recommended, tuple(warnings))
+
+
+def relaxation_times(scene: Scene, q: Array) -> list[float]:
+    """Return in what time [s] the bristles of each pair give way beyond their limit.
+
+    A fiftieth of the shortest impact that the pair's law can stop (its depth would reach the
+    radius): friction then follows a slip that turns round within an impact.
+    """
+    data, mass_matrix = _mass_at(scene, q, np.zeros(scene.model.nv))
+    times = []
+    for pair in scene.pairs:
+        figures = _explain_pair(scene, pair, data, mass_matrix, np.zeros(scene.model.nv), 0.0)
+        limit, e = figures.depth_limit_speed, pair.law.exponent
+        shortest = 1e-3
+        if math.isfinite(limit) and pair.sphere is not None:
+            shortest = 2 * pair.sphere.radius / limit * _duration_integral(e)
+        times.append(min(0.02 * shortest, 2e-5))
+    return times
+
+
+def _mass_at(scene: Scene, q: Array, v: Array) -> tuple[pin.Data, Array]:
+    """Return the data with placements and Jacobians, and the mass matrix (nv, nv)."""
+    model = scene.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, q, v)
+    pin.computeJointJacobians(model, data, q)
+    pin.crba(model, data, q)
+    return data, np.triu(data.M) + np.triu(data.M, 1).T
 
 
 @dataclass(frozen=True)
@@ -209,9 +239,20 @@ def _impact_times(law: NormalLaw, mass: float, speed: float, depth: float, load:
     return min(times)
 
 
-def _slip_time(friction: CoulombFriction | None, slip_mass: float, load: float) -> float:
-    """Return 20 times the decay time [s] of slow slip, where friction acts like a damper."""
-    if friction is None or not friction.mu_static or not load > 0 or not math.isfinite(slip_mass):
+def _slip_time(friction: Friction | None, slip_mass: float, load: float) -> float:
+    """Return the time scale [s] of slow slip.
+
+    20 times its decay where friction acts like a damper; half a period of a bristle's oscillation,
+    or 20 times its decay.
+    """
+    if not math.isfinite(slip_mass):
+        return math.inf
+    if isinstance(friction, BristleFriction):
+        times = [math.pi * math.sqrt(slip_mass / friction.stiffness)]
+        if friction.damping:
+            times.append(20 * slip_mass / friction.damping)
+        return min(times)
+    if not isinstance(friction, CoulombFriction) or not friction.mu_static or not load > 0:
         return math.inf
     return 20 * slip_mass * friction.v_static / (1.5 * friction.mu_static * load)
 
@@ -220,7 +261,7 @@ def _point_jacobian(scene: Scene, data: pin.Data, joint: int, point: Array) -> A
     """Jacobian (3, nv) of the velocity of the world point `point` as fixed to `joint`."""
     if joint == 0:
         return np.zeros((3, scene.model.nv))
-    jacobian = pin.getJointJacobian(scene.model, data, joint, pin.WORLD)
+    jacobian = pin.getJointJacobian(scene.model, data, joint, pin.WORLD).reshape(6, -1)
     moved: Array = jacobian[:3] - pin.skew(point) @ jacobian[3:]
     return moved
 
@@ -244,15 +285,24 @@ def _ingredients(pair: ContactPair) -> tuple[str, ...]:
             f"'{pair.frame}'"
         )
     lines.append(f"normal force: {_law_text(pair.law)}")
-    if pair.friction is None:
-        lines.append("no friction: no tangential force is computed")
-    else:
-        f = pair.friction
-        lines.append(
-            f"friction: coefficient {f.mu_static:g} at {f.v_static:g} m/s, {f.mu_dynamic:g} from "
-            f"{f.v_dynamic:g} m/s; creeps under load"
-        )
+    lines.append(_friction_text(pair.friction))
     return tuple(lines)
+
+
+def _friction_text(friction: Friction | None) -> str:
+    if isinstance(friction, CoulombFriction):
+        return (
+            f"friction: coefficient {friction.mu_static:g} at {friction.v_static:g} m/s, "
+            f"{friction.mu_dynamic:g} from {friction.v_dynamic:g} m/s; creeps under load"
+        )
+    if isinstance(friction, BristleFriction):
+        spin = ", and against spin" if friction.torsional else ""
+        return (
+            f"friction: coefficient {friction.mu_static:g} at rest, {friction.mu_dynamic:g} beyond "
+            f"{friction.v_stribeck:g} m/s; sticks with {friction.stiffness:.4g} N/m, damping "
+            f"{friction.damping:.4g} N s/m{spin}; the stretch is a state of the contact"
+        )
+    return "no friction: no tangential force is computed"
 
 
 def _law_text(law: NormalLaw) -> str:

@@ -6,7 +6,7 @@ import coal
 import pinocchio as pin
 
 from sphshell_pin.checks import check_type
-from sphshell_pin.contact import CoulombFriction, NormalLaw, Sphere
+from sphshell_pin.contact import Friction, NormalLaw, Sphere
 from sphshell_pin.dynamics.models import find_frame, frame_on_joint
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.errors import InvalidParameter
@@ -17,7 +17,7 @@ def add_pairs(
     scene: Scene,
     geometry_model: pin.GeometryModel,
     law: NormalLaw | None,
-    friction: CoulombFriction | None,
+    friction: Friction | None,
 ) -> None:
     """Add a contact to `scene` for every collision pair of a sphere and something else."""
     check_type(

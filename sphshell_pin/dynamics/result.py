@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-EVENT_KINDS = ("touch", "lift_off", "deep")
+EVENT_KINDS = ("touch", "lift_off", "deep", "through")
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ class ContactLog(SceneContacts):
 class Event:
     """Something that happened at time `t` [s] to the pair called `pair`.
 
-    `kind`: "touch", "lift_off", or "deep" (the depth passed half the sphere's radius).
+    `kind`: "touch", "lift_off", "deep" (the depth passed half the sphere's radius) or "through"
+    (the sphere's centre was pushed through the shell; it is pushed back).
     """
 
     t: float
@@ -58,8 +59,9 @@ class Event:
 class EnergyAudit:
     """Where the energy is and where it went, (n,) [J] at the result's rows.
 
-    `kinetic` and `potential` (gravity) of the model, `elastic` of the contacts; since the start:
-    `damping_loss` and `friction_loss` of the contacts, `control_work` of the controller.
+    `kinetic` and `potential` (gravity) of the model, `elastic` of the contacts, stretched bristles
+    included; since the start: `damping_loss` and `friction_loss` of the contacts, `control_work` of
+    the controller.
     """
 
     kinetic: Array

@@ -22,7 +22,7 @@ from sphshell_pin.checks import (
     check_vector,
     read_only,
 )
-from sphshell_pin.contact import CoulombFriction, Method, NormalLaw, Sphere
+from sphshell_pin.contact import Friction, Method, NormalLaw, Sphere
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.laws import check_law
 from sphshell_pin.dynamics.models import check_no_mimic, find_frame, reduced_model, unit_warning
@@ -56,7 +56,7 @@ class ContactPair:
     placement: pin.SE3
     shell_placement: pin.SE3
     law: NormalLaw
-    friction: CoulombFriction | None
+    friction: Friction | None
     method: str
     sphere: Sphere | None = None
     shell: Shell | None = None
@@ -178,7 +178,7 @@ class Scene:
         frame: str = "universe",
         placement: pin.SE3 | None = None,
         law: NormalLaw | None = None,
-        friction: CoulombFriction | None = None,
+        friction: Friction | None = None,
         method: str | None = None,
         name: str | None = None,
     ) -> ContactPair:
@@ -227,7 +227,7 @@ class Scene:
         frame_i: str,
         frame_j: str,
         law: NormalLaw | None = None,
-        friction: CoulombFriction | None = None,
+        friction: Friction | None = None,
         name: str | None = None,
     ) -> ContactPair:
         """Let the user's own routine say where two bodies touch (gears, cams, ...).
@@ -267,7 +267,7 @@ class Scene:
         model: pin.Model,
         geometry_model: pin.GeometryModel,
         law: NormalLaw | None = None,
-        friction: CoulombFriction | None = None,
+        friction: Friction | None = None,
     ) -> Scene:
         """Build a scene from the active collision pairs of a geometry model.
 
@@ -289,6 +289,23 @@ class Scene:
         """
         q, v = self.check_state(q, v)
         return self.core.external_forces(q, v)
+
+    def contact_derivatives(self, q: Any, v: Any = None) -> tuple[Array, Array]:
+        """Return the derivatives (nv, nv) of the generalised contact force by q and by v.
+
+        That force is the sum of J^T f over the joints, with f the `external_forces` at q (nq,),
+        v (nv,) (default: at rest) and J the joints' Jacobians. The first is taken in the tangent
+        space of q, along which pinocchio.integrate moves; units are those of force [N] or torque
+        [N m] per [m] or [rad], and per [m/s] or [rad/s]. Where nothing touches both are zero.
+
+        They are analytic and exact where contacts go on; where one comes, goes or changes its
+        feature they are those of one side. Approximate: with the method "elements" each normal
+        keeps its direction in the shell; contacts of a source, which does not say how they move,
+        stay where they are in frame j, and their depth changes by the motion of body i at the
+        point along the normal. Bristles are not stretched, as in `external_forces`.
+        """
+        q, v = self.check_state(q, v)
+        return self.core.contact_derivatives(q, v)
 
     def contacts(self, q: Any, v: Any = None) -> SceneContacts:
         """Return all contacts with their forces at q (nq,), v (nv,) (default: at rest)."""

@@ -19,15 +19,16 @@ from sphshell_pin.checks import (
     check_not_negative,
     check_positive,
 )
+from sphshell_pin.contact import BristleFriction
 from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callable
-from sphshell_pin.dynamics.integrators import Integrator, RungeKutta4, SemiImplicitEuler
+from sphshell_pin.dynamics.integrators import Integrator, SemiImplicitEuler
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.errors import DeepStart, Interrupted, InvalidParameter, SimulationDiverged
 
 Array = NDArray[np.float64]
 
-_FINISHED, _DIVERGED = 1, 2
+_DIVERGED, _STUCK = 2, 3
 # Python looks up this often [s] while the compiled loop runs: progress, Ctrl-C.
 _GLANCE = 0.05
 _MOST_STEPS = 2.0**31 - 1
@@ -42,9 +43,12 @@ class Simulation:
         if not isinstance(scene, Scene):
             raise InvalidParameter("scene", type(scene).__name__, "must be a sphshell_pin.Scene")
         integrator = SemiImplicitEuler() if integrator is None else integrator
-        if not isinstance(integrator, SemiImplicitEuler | RungeKutta4):
+        if not isinstance(integrator, Integrator):
             raise InvalidParameter(
-                "integrator", integrator, "must be SemiImplicitEuler(dt) or RungeKutta4(dt)"
+                "integrator",
+                integrator,
+                "must be Adaptive(rtol), Implicit(rtol), SemiImplicitEuler(dt), RungeKutta4(dt) or "
+                "LinearlyImplicitEuler(dt)",
             )
         self.scene = scene
         self.integrator = integrator
@@ -66,41 +70,43 @@ class Simulation:
         `controller`: None, a controller of this package, or a callable
         tau(t, q, v, contacts) -> (nv,). Torques are held for `control_dt` [s]; by default a
         callable is asked once a step, a controller of this package at every stage of the step.
-        Rows are recorded every `record_dt` [s] (default: every step); `progress` is called a few
-        times a second with the share done. The same input gives the same bits.
+        (With Adaptive and Implicit a callable is asked at every stage too, unless control_dt says
+        otherwise.) Rows are recorded every `record_dt` [s] (default: every step); `progress` is
+        called a few times a second with the share done. The same input gives the same bits.
 
         Raises InvalidParameter for wrong sizes and values, DeepStart for a sphere that starts
         deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.
         """
-        dt = self.integrator.dt
+        dt = self._dt
         q0, v0 = self.scene.check_state(q0, v0)
         duration = check_not_negative("duration", duration, "s")
         self._check_start(q0)
         core_controller, hold = self._bind(controller, control_dt, q0)
         t0 = check_finite("t0", t0)
-        if np.spacing(abs(t0) + duration) > 1e-3 * dt:
+        if np.spacing(abs(t0) + duration) > 1e-3 * (dt or 1e-6):
             raise InvalidParameter(
                 "t0, duration",
                 (t0, duration),
-                f"must be small enough to count steps of dt = {dt!r} s",
+                f"must be small enough to count steps of {dt or 1e-6!r} s",
             )
         check_moved_mass(self.scene.model)
-        every = 1
+        record = 0.0
         if record_dt is not None:
-            steps = check_positive("record_dt", record_dt, "s") / dt
-            every = round(min(max(steps, 1.0), _MOST_STEPS))
+            record = min(check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
         core = _core.Simulation(
             self.scene.model,
-            [pair.to_core() for pair in self.scene.pairs],
+            self._core_pairs(q0),
             core_controller,
             q0,
             v0,
-            runge_kutta=isinstance(self.integrator, RungeKutta4),
+            integrator=self.integrator.code,
             dt=dt,
+            rtol=getattr(self.integrator, "rtol", 0.0),
+            atol=getattr(self.integrator, "atol", 0.0),
             duration=duration,
             start_time=t0,
             control_dt=hold,
-            record_every=every,
+            record_dt=record,
         )
         blocks: list[dict[str, NDArray[Any]]] = []
         status = 0
@@ -108,7 +114,8 @@ class Simulation:
             with _CtrlC() as ctrl_c:
                 while not status:
                     status = core.advance(_GLANCE)
-                    blocks.append(core.take())
+                    if status or core.full:
+                        blocks.append(core.take())
                     if progress is not None:
                         progress(core.progress)
                     if ctrl_c.pressed and not status:
@@ -119,12 +126,31 @@ class Simulation:
         result = self._gather(core, blocks)
         if status == _DIVERGED:
             raise SimulationDiverged(core.time, _why(core, self.scene), result)
+        if status == _STUCK:
+            reason = (
+                f"the error stays too large however short the step (tried {core.last_step:.1e} s)"
+            )
+            raise SimulationDiverged(core.time, reason, result)
         return result
+
+    def _core_pairs(self, q0: Array) -> list[_core.Pair]:
+        pairs = [pair.to_core() for pair in self.scene.pairs]
+        if any(isinstance(pair.friction, BristleFriction) for pair in self.scene.pairs):
+            from sphshell_pin.dynamics.explain import relaxation_times
+
+            for pair, time in zip(pairs, relaxation_times(self.scene, q0), strict=True):
+                pair.relaxation = time
+        return pairs
+
+    @property
+    def _dt(self) -> float:
+        """The fixed step [s], or 0 where the error decides."""
+        return float(getattr(self.integrator, "dt", 0.0))
 
     def _bind(
         self, controller: Controller | Callback | None, control_dt: float | None, q0: Array
     ) -> tuple[_core.Controller | None, float]:
-        dt = self.integrator.dt
+        dt = self._dt
         if control_dt is not None and check_positive("control_dt", control_dt, "s") < dt:
             raise InvalidParameter("control_dt", control_dt, f"must not be below dt = {dt!r} s")
         if controller is None:
@@ -179,7 +205,9 @@ class Simulation:
             "wall_time": core.wall_time,
             "real_time_factor": simulated / core.wall_time if core.wall_time > 0 else math.inf,
             "duration": simulated,
-            "dt": self.integrator.dt,
+            "rejected": core.rejected,
+            "evaluations": core.evaluations,
+            "dt": self._dt or (simulated / core.steps if core.steps else 0.0),
             "integrator": type(self.integrator).__name__,
             "pairs": figures,
         }

@@ -97,9 +97,7 @@ def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -
             controller.to_core(scene, q0)
     run = scenario.run
     with blamed_on(path, "run"):
-        euler = run.integrator == "semi-implicit-euler"
-        stepper = sp.SemiImplicitEuler(dt=run.dt) if euler else sp.RungeKutta4(dt=run.dt)
-        simulation = sp.Simulation(scene, integrator=stepper)
+        simulation = sp.Simulation(scene, integrator=_build_integrator(run))
     figures = {
         figure: load_function(where, path, f"figures.{figure}")
         for figure, where in scenario.figures.items()
@@ -122,7 +120,8 @@ def explain_built(built: Built) -> Any:
     """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
     run = built.scenario.run
     # The recommended step is the first-order stepper's: no other is judged by it.
-    dt = run.dt if run.integrator == "semi-implicit-euler" else None
+    first_order = run.integrator == "semi-implicit-euler"
+    dt = built.simulation.integrator.dt if first_order else None
     return built.scene.explain(built.q0, built.v0, dt)
 
 
@@ -242,9 +241,29 @@ def _build_law(law: schema.Law) -> Any:
 
 
 def _build_friction(friction: schema.Friction) -> Any:
-    if isinstance(friction, schema.NoFriction):
-        return None
-    return sp.CoulombFriction(**friction.model_dump(exclude={"type"}))
+    values = friction.model_dump(exclude={"type"})
+    match friction:
+        case schema.Coulomb():
+            return sp.CoulombFriction(**values)
+        case schema.Bristle():
+            return sp.BristleFriction(**values)
+        case _:
+            return None
+
+
+_INTEGRATORS = {
+    "semi-implicit-euler": sp.SemiImplicitEuler,
+    "runge-kutta-4": sp.RungeKutta4,
+    "linearly-implicit-euler": sp.LinearlyImplicitEuler,
+    "adaptive": sp.Adaptive,
+    "implicit": sp.Implicit,
+}
+
+
+def _build_integrator(run: schema.RunSection) -> Any:
+    given = {k: getattr(run, k) for k in ("dt", "rtol", "atol")}
+    chosen: Any = _INTEGRATORS[run.integrator]
+    return chosen(**{k: v for k, v in given.items() if v is not None})
 
 
 def _build_controller(

@@ -7,7 +7,7 @@ them when it stands alone, `robot/name` as soon as there are several robots.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -203,7 +203,19 @@ class Coulomb(Section):
     v_dynamic: Positive = 1.0
 
 
-Friction = Annotated[NoFriction | Coulomb, Field(discriminator="type")]
+class Bristle(Section):
+    """Friction that sticks: spring [N/m] and damper [N s/m] below the limit, Stribeck speed [m/s]."""
+
+    type: Literal["bristle"]
+    mu_static: NotNegative
+    mu_dynamic: NotNegative
+    stiffness: Positive
+    damping: NotNegative = 0.0
+    v_stribeck: Positive = 0.01
+    torsional: bool = False
+
+
+Friction = Annotated[NoFriction | Coulomb | Bristle, Field(discriminator="type")]
 
 
 class SphereSection(Section):
@@ -301,15 +313,34 @@ Controller = Annotated[
 ]
 
 
+FixedStep = Literal["semi-implicit-euler", "runge-kutta-4", "linearly-implicit-euler"]
+ErrorControlled = Literal["adaptive", "implicit"]
+
+
 class RunSection(Section):
-    """How long and how finely to simulate [s]; `recording_speed` 0.1 films in slow motion."""
+    """How long and how finely to simulate [s]; `recording_speed` 0.1 films in slow motion.
+
+    `dt` belongs to integrators with fixed steps, `rtol` and `atol` to the others.
+    """
 
     duration: Positive
-    dt: Positive = 1e-4
-    integrator: Literal["semi-implicit-euler", "runge-kutta-4"] = "semi-implicit-euler"
+    dt: Positive | None = None
+    rtol: Positive | None = None
+    atol: Positive | None = None
+    integrator: FixedStep | ErrorControlled = "semi-implicit-euler"
     control_dt: Positive | None = None
     record_dt: Positive | None = None
     recording_speed: Positive = 1.0
+
+    @model_validator(mode="after")
+    def check_steps(self) -> RunSection:
+        """Refuse a step where the error decides, and a tolerance where it does not."""
+        if self.integrator in get_args(ErrorControlled):
+            if self.dt is not None:
+                raise ValueError(f"{self.integrator} takes rtol and atol, not dt")
+        elif self.rtol is not None or self.atol is not None:
+            raise ValueError(f"{self.integrator} takes dt, not rtol and atol")
+        return self
 
 
 class Expected(Section):

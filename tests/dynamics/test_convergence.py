@@ -56,7 +56,7 @@ def rolling(integrator, steps: int, damping: float = 20.0, friction=SMOOTH_FRICT
 
 @pytest.mark.parametrize(("integrator", "order"), STEPPERS)
 def test_order_of_a_ball_rolling_on_a_plate(integrator, order: int) -> None:
-    steps = 200 if order == 1 else 25
+    steps = 200 if order == 1 else 50
     runs = [rolling(integrator, steps * k) for k in (1, 2, 4)]
     seen = order_of(runs[0][0], [r for _, r in runs])
     assert seen == pytest.approx(order, abs=0.25)
@@ -77,7 +77,7 @@ def test_order_with_both_bodies_tumbling(integrator, order: int) -> None:
 @pytest.mark.parametrize("friction", [None, SMOOTH_FRICTION])
 @pytest.mark.parametrize("damping", [0.0, 20.0])
 def test_energy_residual_falls_at_the_order(integrator, order, friction, damping) -> None:
-    steps = 200 if order == 1 else 25
+    steps = 200 if order == 1 else 50
     audits = [rolling(integrator, steps * k, damping, friction)[1].energy for k in (1, 2, 4)]
     residual = [float(np.abs(a.residual[-1])) for a in audits]
     scale = float(audits[-1].kinetic[0])

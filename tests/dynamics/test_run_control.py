@@ -59,7 +59,7 @@ def bouncing(integrator=None) -> Simulation:
 
 def test_a_diverging_run_keeps_what_it_computed() -> None:
     """Explicit damping with dt kd / m = 1e4 multiplies the speed at every step."""
-    sim = Simulation(on_plate(slider(), LAW), SemiImplicitEuler(dt=1e-2))
+    sim = Simulation(Scene(slider()), SemiImplicitEuler(dt=1e-2))
     controller = JointPD(kp=np.zeros(1), kd=np.full(1, 1e6), q_ref=np.array([0.5]))
     with pytest.raises(SimulationDiverged) as caught:
         sim.run(np.array([0.5]), np.array([0.1]), 100.0, controller)

@@ -1,7 +1,7 @@
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 
-#include "contact/laws.hpp"
+#include "contact/friction.hpp"
 
 namespace nb = nanobind;
 
@@ -23,22 +23,46 @@ void bind_contact(nb::module_& m) {
            })
       .def("energy",
            [](const NormalLaw& law, double depth) { return depth > 0 ? law.energy(depth) : 0.0; });
-  nb::class_<CoulombLaw>(m, "CoulombLaw")
-      .def(
-          "__init__",
-          [](CoulombLaw* law, double mu_static, double mu_dynamic, double v_static,
-             double v_dynamic) {
-            new (law) CoulombLaw{true, mu_static, mu_dynamic, v_static, v_dynamic};
+  nb::class_<FrictionLaw>(m, "FrictionLaw")
+      .def_static(
+          "two_velocity",
+          [](double mu_static, double mu_dynamic, double v_static, double v_dynamic) {
+            FrictionLaw law;
+            law.kind = FrictionLaw::Kind::TwoVelocity;
+            law.mu_static = mu_static;
+            law.mu_dynamic = mu_dynamic;
+            law.v_static = v_static;
+            law.v_dynamic = v_dynamic;
+            return law;
           },
           nb::arg("mu_static"), nb::arg("mu_dynamic"), nb::arg("v_static"), nb::arg("v_dynamic"))
-      .def("coefficient",
-           [](const CoulombLaw& law, double speed) { return speed * law.over_speed(speed); });
+      .def_static(
+          "bristle",
+          [](double mu_static, double mu_dynamic, double stiffness, double damping,
+             double v_stribeck, bool torsional) {
+            FrictionLaw law;
+            law.kind = FrictionLaw::Kind::Bristle;
+            law.mu_static = mu_static;
+            law.mu_dynamic = mu_dynamic;
+            law.stiffness = stiffness;
+            law.damping = damping;
+            law.v_static = v_stribeck;
+            law.torsional = torsional;
+            return law;
+          },
+          nb::arg("mu_static"), nb::arg("mu_dynamic"), nb::arg("stiffness"), nb::arg("damping"),
+          nb::arg("v_stribeck"), nb::arg("torsional"))
+      .def("coefficient", &FrictionLaw::coefficient, nb::arg("speed"));
   m.def(
       "contact_force",
-      [](const NormalLaw& law, const CoulombLaw* friction, double depth, const Vec3& normal,
+      [](const NormalLaw& law, const FrictionLaw* friction, double depth, const Vec3& normal,
          const Vec3& relative) {
-        const ContactForce f =
-            contact_force(law, friction ? *friction : CoulombLaw(), depth, normal, relative);
+        Meeting<double> meeting;
+        meeting.depth = depth;
+        meeting.normal = normal;
+        meeting.relative = relative;
+        const ContactForce<double> f =
+            contact_force(law, friction ? *friction : FrictionLaw(), 0.0, 1.0, meeting);
         return nb::make_tuple(f.normal, f.friction, f.slip);
       },
       nb::arg("law"), nb::arg("friction").none(), nb::arg("depth"), nb::arg("normal"),

@@ -3,9 +3,11 @@
 #include <memory>
 
 #include "bindings/arrays.hpp"
+#include "dynamics/linearization.hpp"
 #include "dynamics/simulation.hpp"
 
 #include <nanobind/eigen/dense.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
@@ -51,7 +53,7 @@ ContactSource make_source(nb::object find) {
 std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matrix4d& placement_i,
                                 int joint_j, const Eigen::Matrix4d& placement_j, double radius,
                                 std::shared_ptr<Shell> shell, nb::object source, int method,
-                                const NormalLaw& law, const CoulombLaw* friction) {
+                                const NormalLaw& law, const FrictionLaw* friction) {
   auto pair = std::make_unique<Pair>();
   pair->name = std::move(name);
   pair->joint_i = joint_i;
@@ -81,9 +83,10 @@ class PythonController : public Controller {
     nb::gil_scoped_acquire acquire;
     callable_.reset();
   }
+  bool differentiable() const override { return false; }
   void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override {
     std::vector<ContactRow> rows;
-    scene.evaluate(q, v, true, &rows);
+    scene.log(q, v, rows);
     nb::gil_scoped_acquire acquire;
     tau = nb::cast<VectorX>(callable_(t, q, v, rows_to_array(std::move(rows))));
   }
@@ -120,6 +123,12 @@ nb::dict to_dict(Record record, int nq, int nv) {
   return out;
 }
 
+// At a state of its own, no part of a run: bristles are not stretched.
+void evaluate_alone(Scene& scene, const VectorX& q, const VectorX& v) {
+  scene.restart();
+  scene.evaluate(q, v, VectorX::Zero(scene.bristle_size()));
+}
+
 nb::list summaries(const Simulation& simulation) {
   nb::list out;
   for (const PairSummary& s : simulation.summaries()) {
@@ -141,10 +150,11 @@ nb::list summaries(const Simulation& simulation) {
 
 void bind_dynamics(nanobind::module_& m) {
   using namespace sphshell;
-  nb::class_<Pair>(m, "Pair").def(
-      nb::new_(&make_pair), nb::arg("name"), nb::arg("joint_i"), nb::arg("placement_i"),
-      nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("shell").none(),
-      nb::arg("source").none(), nb::arg("method"), nb::arg("law"), nb::arg("friction").none());
+  nb::class_<Pair>(m, "Pair")
+      .def_rw("relaxation", &Pair::relaxation)
+      .def(nb::new_(&make_pair), nb::arg("name"), nb::arg("joint_i"), nb::arg("placement_i"),
+           nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("shell").none(),
+           nb::arg("source").none(), nb::arg("method"), nb::arg("law"), nb::arg("friction").none());
 
   nb::class_<Scene>(m, "Scene")
       .def(
@@ -155,16 +165,48 @@ void bind_dynamics(nanobind::module_& m) {
           nb::arg("model"), nb::arg("pairs"))
       .def("external_forces",
            [](Scene& scene, const VectorX& q, const VectorX& v) {
-             scene.evaluate(q, v, false, nullptr);
+             evaluate_alone(scene, q, v);
              const Forces none(scene.touching() ? 0 : scene.external().size(),
                                pinocchio::Force::Zero());
              return to_python(scene.touching() ? scene.external() : none);
            })
-      .def("contacts", [](Scene& scene, const VectorX& q, const VectorX& v) {
-        std::vector<ContactRow> rows;
-        scene.evaluate(q, v, true, &rows);
-        return rows_to_array(std::move(rows));
-      });
+      .def("contacts",
+           [](Scene& scene, const VectorX& q, const VectorX& v) {
+             std::vector<ContactRow> rows;
+             evaluate_alone(scene, q, v);
+             scene.log(q, v, rows);
+             return rows_to_array(std::move(rows));
+           })
+      .def("contact_derivatives",
+           [](Scene& scene, const VectorX& q, const VectorX& v) {
+             Linearization linearization(scene);
+             evaluate_alone(scene, q, v);
+             MatrixX by_q, by_v;
+             linearization.forces(q, v, by_q, by_v);
+             return std::pair(by_q, by_v);
+           })
+      .def_prop_ro("bristle_size", &Scene::bristle_size)
+      .def("rates",
+           [](Scene& scene, const VectorX& q, const VectorX& v, const VectorX& z,
+              const VectorX& tau) {
+             scene.restart();
+             scene.evaluate(q, v, z);
+             VectorX out(v.size() + z.size());
+             out << scene.acceleration(q, v, tau), scene.bristle_rates();
+             return out;
+           })
+      .def(
+          "rate_jacobian",
+          [](Scene& scene, const VectorX& q, const VectorX& v, const VectorX& z, const VectorX& tau,
+             int repeat) {
+            Linearization linearization(scene);
+            scene.restart();
+            scene.evaluate(q, v, z);
+            MatrixX jacobian;
+            for (int i = 0; i < repeat; ++i) linearization.rates(q, v, z, tau, jacobian);
+            return jacobian;
+          },
+          nb::arg("q"), nb::arg("v"), nb::arg("z"), nb::arg("tau"), nb::arg("repeat") = 1);
 
   nb::class_<Controller>(m, "Controller");
   nb::class_<GravityCompensation, Controller>(m, "GravityCompensation")
@@ -212,15 +254,25 @@ void bind_dynamics(nanobind::module_& m) {
       .def(
           "__init__",
           [](Simulation* self, nb::handle model, const std::vector<const Pair*>& pairs,
-             std::shared_ptr<Controller> controller, VectorX q0, VectorX v0, bool runge_kutta,
-             double dt, double duration, double start_time, double control_dt, int record_every) {
-            new (self) Simulation(model_of(model), copies(pairs),
-                                  {dt, duration, start_time, control_dt, record_every, runge_kutta},
-                                  std::move(controller), std::move(q0), std::move(v0));
+             std::shared_ptr<Controller> controller, VectorX q0, VectorX v0, int integrator,
+             double dt, double rtol, double atol, double duration, double start_time,
+             double control_dt, double record_dt) {
+            RunSettings settings;
+            settings.integrator = static_cast<Integrator>(integrator);
+            settings.dt = dt;
+            settings.rtol = rtol;
+            settings.atol = atol;
+            settings.duration = duration;
+            settings.start_time = start_time;
+            settings.control_dt = control_dt;
+            settings.record_dt = record_dt;
+            new (self) Simulation(model_of(model), copies(pairs), settings, std::move(controller),
+                                  std::move(q0), std::move(v0));
           },
           nb::arg("model"), nb::arg("pairs"), nb::arg("controller").none(), nb::arg("q0"),
-          nb::arg("v0"), nb::kw_only(), nb::arg("runge_kutta"), nb::arg("dt"), nb::arg("duration"),
-          nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_every"))
+          nb::arg("v0"), nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"),
+          nb::arg("atol"), nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"),
+          nb::arg("record_dt"))
       .def("advance",
            [](Simulation& self, double wall_seconds) {
              nb::gil_scoped_release release;
@@ -236,6 +288,10 @@ void bind_dynamics(nanobind::module_& m) {
       .def_prop_ro("q", &Simulation::q)
       .def_prop_ro("v", &Simulation::v)
       .def_prop_ro("steps", &Simulation::steps)
+      .def_prop_ro("full", &Simulation::full)
+      .def_prop_ro("rejected", &Simulation::rejected)
+      .def_prop_ro("evaluations", &Simulation::evaluations)
+      .def_prop_ro("last_step", &Simulation::last_step)
       .def_prop_ro("wall_time", &Simulation::wall_time)
       .def_prop_ro("summaries", &summaries);
 }

@@ -1,7 +1,7 @@
-// Normal force and friction of one contact, from depth and relative velocity.
+// Normal force of one contact, from depth and gap rate. Templated, so that automatic
+// differentiation gives the slopes of what the simulation runs.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Core>
@@ -9,23 +9,31 @@
 namespace sphshell {
 
 using Vec3 = Eigen::Vector3d;
+template <class S>
+using Vector3 = Eigen::Matrix<S, 3, 1>;
 
 // STEP of ADAMS: a cubic from h0 at x0 to h1 at x1, constant outside.
-inline double step(double x, double x0, double h0, double x1, double h1) {
-  const double u = std::clamp((x - x0) / (x1 - x0), 0.0, 1.0);
+template <class S>
+S step(const S& x, double x0, double h0, double x1, double h1) {
+  if (x <= x0) return S(h0);
+  if (x >= x1) return S(h1);
+  const S u = (x - x0) / (x1 - x0);
   return h0 + (h1 - h0) * u * u * (3 - 2 * u);
 }
 
-inline double power(double x, double exponent) {
+template <class S>
+S power(const S& x, double exponent) {
+  using std::pow, std::sqrt;
   if (exponent == 1) return x;
-  if (exponent == 1.5) return x * std::sqrt(x);
+  if (exponent == 1.5) return x * sqrt(x);
   if (exponent == 2) return x * x;
-  return std::pow(x, exponent);
+  return pow(x, exponent);
 }
 
+template <class S>
 struct NormalForce {
-  double total;    // >= 0 [N]
-  double elastic;  // its part that derives from the potential [N]
+  S total;    // >= 0 [N]
+  S elastic;  // its part that derives from the potential [N]
 };
 
 // IMPACT: max(0, k depth^e - STEP(depth, 0, 0, d, c) gap_rate);
@@ -41,13 +49,17 @@ struct NormalLaw {
   bool needs_rate() const { return damping > 0; }
 
   // depth > 0 [m]; gap_rate = n . v_rel [m/s], negative while closing.
-  NormalForce force(double depth, double gap_rate) const {
-    const double elastic = stiffness * power(depth, exponent);
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+    const S elastic = stiffness * power(depth, exponent);
     if (!needs_rate()) return {elastic, elastic};
-    const double total = kind == Kind::Impact
-                             ? elastic - step(depth, 0, 0, full_damping_depth, damping) * gap_rate
-                             : elastic * (1 - damping * gap_rate);
-    return {std::max(0.0, total), elastic};
+    S total = elastic;
+    if (kind == Kind::Impact)
+      total -= step(depth, 0, 0, full_damping_depth, damping) * gap_rate;
+    else
+      total -= elastic * damping * gap_rate;
+    if (total < 0) total = S(0);
+    return {total, elastic};
   }
 
   // Potential of the elastic part [J].
@@ -55,46 +67,5 @@ struct NormalLaw {
     return stiffness * power(depth, exponent) * depth / (exponent + 1);
   }
 };
-
-// ADAMS's two-velocity Coulomb law.
-struct CoulombLaw {
-  bool active = false;
-  double mu_static = 0, mu_dynamic = 0;
-  double v_static = 1, v_dynamic = 2;  // [m/s]
-
-  // coefficient / slip speed [s/m]: finite at rest, so that no direction is divided by zero.
-  double over_speed(double speed) const {
-    const double x = speed / v_static;
-    if (x < 1) return mu_static * (3 - x * x) / (2 * v_static);
-    return step(speed, v_static, mu_static, v_dynamic, mu_dynamic) / speed;
-  }
-};
-
-struct ContactForce {
-  double normal = 0;             // [N], below zero where the weight is
-  double damping_power = 0;      // lost by the normal damping [W]
-  double friction_power = 0;     // lost by friction [W]
-  Vec3 friction = Vec3::Zero();  // on the sphere [N]
-  Vec3 slip = Vec3::Zero();      // tangential velocity of the sphere against the shell [m/s]
-};
-
-// relative: velocity of the sphere's body against the shell's, both at the contact point [m/s];
-// weight: that of the contact, by which all of the force is multiplied.
-inline ContactForce contact_force(const NormalLaw& law, const CoulombLaw& friction, double depth,
-                                  const Vec3& normal, const Vec3& relative, double weight = 1) {
-  ContactForce out;
-  const double gap_rate = normal.dot(relative);
-  NormalForce push = law.force(depth, gap_rate);
-  push.total *= weight, push.elastic *= weight;
-  out.normal = push.total;
-  out.damping_power = -(push.total - push.elastic) * gap_rate;
-  out.slip = relative - gap_rate * normal;
-  if (friction.active) {
-    const double speed = out.slip.norm();
-    out.friction = -push.total * friction.over_speed(speed) * out.slip;
-    out.friction_power = -out.friction.dot(out.slip);
-  }
-  return out;
-}
 
 }  // namespace sphshell

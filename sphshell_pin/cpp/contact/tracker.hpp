@@ -1,79 +1,59 @@
 // Which contact goes on from which, from one accepted step to the next.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <vector>
 
 #include "contact/query.hpp"
 
 namespace sphshell {
 
-// Contacts keep their number while they move over elements and smooth edges, in the shell's frame,
-// and while they move less in a step than the radius of their contact disc, sqrt(r^2 - (r - d)^2).
+// A contact keeps its number, and its slot in the state, while it moves over elements and smooth
+// edges, in the shell's frame. It goes on from the nearest place that it can have come from: within
+// the radius of the disc of contact, sqrt(r^2 - (r - d)^2), or within reach of the centre's motion.
 class ContactTracker {
  public:
-  ContactTracker() {
-    for (auto* list : {&known_, &next_}) list->reserve(64);
-    links_.reserve(256);
-  }
-
-  // Numbers beside the contacts; radius 0: of no sphere, any distance is near.
-  const std::vector<int>& follow(const std::vector<Contact>& contacts, double radius) {
-    next_.clear();
-    for (const Contact& c : contacts)
-      next_.push_back({c.point, reach(c, radius), c.weight < 0, -1});
-    links_.clear();
-    for (std::size_t i = 0; i < known_.size(); ++i)
-      for (std::size_t j = 0; j < next_.size(); ++j) {
-        const double apart = (known_[i].point - next_[j].point).norm();
-        if (known_[i].pass == next_[j].pass && apart < std::max(known_[i].reach, next_[j].reach))
-          links_.push_back({apart, static_cast<int>(i), static_cast<int>(j)});
-      }
-    // Nearest first, each once.
-    std::sort(links_.begin(), links_.end(), [](const Link& a, const Link& b) {
-      return a.apart != b.apart ? a.apart < b.apart
-             : a.from != b.from ? a.from < b.from
-                                : a.to < b.to;
-    });
-    for (const Link& link : links_) {
-      Place &from = known_[link.from], &to = next_[link.to];
-      if (from.number < 0 || to.number >= 0) continue;
-      to.number = from.number;
-      from.number = -1;
-    }
-    numbers_.clear();
-    for (Place& place : next_) {
-      if (place.number < 0) place.number = count_++;
-      numbers_.push_back(place.number);
-    }
-    known_.swap(next_);
-    return numbers_;
-  }
-
- private:
   struct Place {
-    Vec3 point;
-    double reach;
+    Vec3 point, normal;  // the normal points where the sphere is pushed
+    double depth, reach;
     bool pass;
     int number;
+    bool taken = false;  // by a contact of the last match()
   };
+
+  ContactTracker();
+
+  // Beside the contacts: their places, by index. The known ones come first, then those that were
+  // new in this step. A contact whose sphere's centre was pushed through the shell is turned, so
+  // that it is pushed back. radius 0: of no sphere, any distance is near.
+  const std::vector<int>& match(std::vector<Contact>& contacts, const Vec3& centre, double radius);
+  // The contacts last matched are the known ones from now on, in their order.
+  void accept(const std::vector<Contact>& contacts, const Vec3& centre, double radius);
+  // Forgets what was new since the last accept().
+  void restart() { places_.resize(known_), count_ = next_number_; }
+
+  const std::vector<Place>& places() const { return places_; }
+  std::size_t known() const { return known_; }
+  // True where the centre may have come to the other side of the shell.
+  bool deep() const { return deep_; }
+  // True where a contact of the last match() was turned.
+  bool pushed_through() const { return pushed_through_; }
+
+ private:
   struct Link {
     double apart;
     int from, to;
   };
 
-  static double reach(const Contact& contact, double radius) {
-    if (radius == 0) return std::numeric_limits<double>::infinity();
-    const double distance = radius - contact.depth;
-    return std::sqrt(std::max(0.0, radius * radius - distance * distance));
-  }
+  static double disc(const Contact& contact, double radius);
+  void keep_side(Contact& contact, const Place& place, double radius);
 
-  std::vector<Place> known_, next_;
+  std::vector<Place> places_, next_;
+  std::size_t known_ = 0;
+  Vec3 centre_ = Vec3::Zero();
+  bool deep_ = false, pushed_through_ = false;
   std::vector<Link> links_;
-  std::vector<int> numbers_;
-  int count_ = 0;
+  std::vector<int> at_;
+  int count_ = 0, next_number_ = 0;
 };
 
 }  // namespace sphshell

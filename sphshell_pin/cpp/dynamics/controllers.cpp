@@ -100,4 +100,9 @@ void CartesianImpedance::torque(Scene& scene, double t, const VectorX& q, const 
   tau.array() *= s_.actuated.array();
 }
 
+double CartesianImpedance::next_kink(double t) const {
+  const auto next = std::upper_bound(s_.times.begin(), s_.times.end(), t);
+  return next == s_.times.end() ? std::numeric_limits<double>::infinity() : *next;
+}
+
 }  // namespace sphshell

@@ -1,6 +1,7 @@
 // Joint torques from the state.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -15,6 +16,11 @@ class Controller {
   virtual void prepare(Scene&) {}
   // Writes the torques; the scene's contacts have been evaluated at (q, v).
   virtual void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) = 0;
+  // The torques are differenced by implicit integrators: cheap, and smooth between next_kink()s.
+  virtual bool differentiable() const { return true; }
+  virtual bool follows_time() const { return false; }
+  // The next time at which the torques bend or jump.
+  virtual double next_kink(double /*t*/) const { return std::numeric_limits<double>::infinity(); }
 };
 
 // `actuated` is 1 where a joint's velocity is driven, else 0 (a free-floating base or object).
@@ -59,6 +65,8 @@ class CartesianImpedance : public Controller {
   explicit CartesianImpedance(ImpedanceSettings settings, int num_joints);
   void prepare(Scene& scene) override;
   void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override;
+  bool follows_time() const override { return s_.times.size() > 1; }
+  double next_kink(double t) const override;
 
  private:
   ImpedanceSettings s_;

@@ -1,8 +1,10 @@
 #include "dynamics/multibody.hpp"
 
 #include <algorithm>
+#include <pinocchio/algorithm/aba-derivatives.hpp>
 #include <pinocchio/algorithm/aba.hpp>
 #include <pinocchio/algorithm/energy.hpp>
+#include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
@@ -10,6 +12,8 @@
 
 namespace sphshell {
 namespace {
+
+constexpr double kDifference = 1e-5;  // step of central differences in q [m or rad]
 
 void find_curved(const pinocchio::JointModel& joint, std::vector<CurvedSegment>& out) {
   if (const auto* whole = boost::get<pinocchio::JointModelComposite>(&joint)) {
@@ -22,6 +26,13 @@ void find_curved(const pinocchio::JointModel& joint, std::vector<CurvedSegment>&
   if (kind == "JointModelFreeFlyer") add(Group::Rigid);
   if (kind == "JointModelSpherical") add(Group::Rotation);
   if (kind == "JointModelPlanar") add(Group::Planar);
+}
+
+// True where each subtree's joints have consecutive numbers, as Pinocchio's derivatives need them.
+bool depth_first(const pinocchio::Model& model) {
+  for (int j = 1; j < model.njoints; ++j)
+    if (model.subtrees[j].back() - j + 1 != model.subtrees[j].size()) return false;
+  return true;
 }
 
 }  // namespace
@@ -64,6 +75,70 @@ const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const
   return pinocchio::aba(model_, data_, q, v, tau, external);
 }
 
+void Multibody::acceleration_derivatives(const VectorX& q, const VectorX& v, const VectorX& tau,
+                                         Eigen::Ref<MatrixX> by_q, Eigen::Ref<MatrixX> by_v,
+                                         Eigen::Ref<MatrixX> by_tau) {
+  if (!differences_) {
+    pinocchio::computeABADerivatives(model_, data_, q, v, tau, by_q, by_v, by_tau);
+    return;
+  }
+  by_q.setZero();
+  by_v.setZero();
+  by_tau.setZero();
+  for (int m = 0; m < model_.nv; ++m)
+    for (const double sign : {1.0, -1.0}) {
+      step_.setZero();
+      step_[m] = sign * kDifference;
+      integrate(q, step_, moved_);
+      by_q.col(m) += sign / (2 * kDifference) * acceleration(moved_, v, tau);
+      // The acceleration is quadratic in v and linear in tau: any step is exact.
+      step_ = v;
+      step_[m] += sign;
+      by_v.col(m) += sign / 2 * acceleration(q, step_, tau);
+      step_ = tau;
+      step_[m] += sign;
+      by_tau.col(m) += sign / 2 * acceleration(q, v, step_);
+    }
+}
+
+void Multibody::want_derivatives() {
+  turning_.clear();
+  step_.setLinSpaced(model_.nv, 0.2, 0.7);  // anywhere but at a special place
+  moved_ = pinocchio::neutral(model_);
+  const VectorX q = pinocchio::integrate(model_, moved_, step_);
+  for (int j = 1; j < model_.njoints; ++j) {
+    const int nv = model_.nvs[j];
+    TurningAxes axes{j, Matrix6X::Zero(6, nv * nv)};
+    turn_axes(q, axes);
+    if (axes.by_q.cwiseAbs().maxCoeff() > 1e-6) turning_.push_back(axes);
+  }
+  differences_ = !turning_.empty() || !depth_first(model_);
+}
+
+void Multibody::turn_axes(const VectorX& q, TurningAxes& axes) {
+  const int nv = model_.nvs[axes.joint], first = model_.idx_vs[axes.joint];
+  axes.by_q.setZero();
+  for (int m = 0; m < nv; ++m)
+    for (const double sign : {1.0, -1.0}) {
+      step_.setZero();
+      step_[first + m] = sign * kDifference;
+      integrate(q, step_, moved_);
+      auto& data = data_.joints[axes.joint];
+      model_.joints[axes.joint].calc(data, moved_);
+      axes.by_q.middleCols(nv * m, nv) += sign / (2 * kDifference) * data.S().matrix();
+    }
+}
+
+void Multibody::place_axes(const VectorX& q) {
+  for (TurningAxes& axes : turning_)
+    if (std::binary_search(needed_.begin(), needed_.end(), axes.joint)) turn_axes(q, axes);
+  using Step =
+      pinocchio::impl::JointJacobiansForwardStep<double, 0, pinocchio::JointCollectionDefaultTpl,
+                                                 VectorX, Matrix6X>;
+  for (int j : needed_)
+    Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, data_.J));
+}
+
 const VectorX& Multibody::gravity(const VectorX& q) {
   return pinocchio::computeGeneralizedGravity(model_, data_, q);
 }
@@ -78,6 +153,32 @@ void Multibody::integrate(const VectorX& q, const VectorX& step, VectorX& out) c
 
 void Multibody::difference(const VectorX& q0, const VectorX& q1, VectorX& out) const {
   pinocchio::difference(model_, q0, q1, out);
+}
+
+void Multibody::sizes(const VectorX& q, VectorX& out) const {
+  out.setOnes(model_.nv);
+  for (int j = 1; j < model_.njoints; ++j) {
+    const auto& joint = model_.joints[j];
+    if (joint.nq() == joint.nv())
+      out.segment(joint.idx_v(), joint.nv()) = q.segment(joint.idx_q(), joint.nq()).cwiseAbs();
+  }
+  for (const CurvedSegment& s : curved_) {
+    if (s.group == CurvedSegment::Group::Rigid)
+      out.segment<3>(s.index_v).setConstant(q.segment<3>(s.index_q).norm());
+    if (s.group == CurvedSegment::Group::Planar)
+      out.segment<2>(s.index_v).setConstant(q.segment<2>(s.index_q).norm());
+  }
+}
+
+void Multibody::speeds(const VectorRef& v, VectorX& out) const {
+  out = v.cwiseAbs();
+  const auto together = [&](int i, int n) {
+    out.segment(i, n).setConstant(v.segment(i, n).norm());
+  };
+  for (const CurvedSegment& s : curved_) {
+    together(s.index_v, s.group == CurvedSegment::Group::Planar ? 2 : 3);
+    if (s.group == CurvedSegment::Group::Rigid) together(s.index_v + 3, 3);
+  }
 }
 
 double Multibody::kinetic_energy(const VectorX& q, const VectorX& v) {

@@ -8,6 +8,8 @@
 namespace sphshell {
 
 using VectorX = Eigen::VectorXd;
+using MatrixX = Eigen::MatrixXd;
+using Matrix6X = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 using VectorRef = Eigen::Ref<const VectorX>;
 using Forces = std::vector<pinocchio::Force>;
 
@@ -16,6 +18,12 @@ using Forces = std::vector<pinocchio::Force>;
 struct CurvedSegment {
   enum class Group { Rotation, Planar, Rigid } group;
   int index_v, index_q;
+};
+
+// A joint whose axes turn in its own frame as it moves: composite, universal, spherical ZYX, ...
+struct TurningAxes {
+  int joint;
+  Matrix6X by_q;  // in the joint's frame: column k + nv m, of axis k with respect to coordinate m
 };
 
 // A constant model with the scratch that its algorithms write: one per thread.
@@ -31,23 +39,46 @@ class Multibody {
   const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau);
   const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
                               const Forces& external);
+  // Derivatives (nv, nv) of acceleration(q, v, tau), with respect to q in its tangent space, v and
+  // tau. Pinocchio's derivatives leave out how axes turn, and want joints in depth-first order: for
+  // other models they are central differences, right to nine digits.
+  void acceleration_derivatives(const VectorX& q, const VectorX& v, const VectorX& tau,
+                                Eigen::Ref<MatrixX> by_q, Eigen::Ref<MatrixX> by_v,
+                                Eigen::Ref<MatrixX> by_tau);
+  // Placements, and axes in the world and how they turn, of the joints that were asked for.
+  void place_axes(const VectorX& q);
+  // To be called before both.
+  void want_derivatives();
+
   const VectorX& gravity(const VectorX& q);
   // Torque that holds the bias forces and opposes `external`: rnea(q, v, 0, external).
   const VectorX& bias(const VectorX& q, const VectorX& v, const Forces& external);
   void integrate(const VectorX& q, const VectorX& step, VectorX& out) const;
   void difference(const VectorX& q0, const VectorX& q1, VectorX& out) const;
+  // By which errors of coordinates and velocities are measured, per velocity component: lengths of
+  // positions from the origin, 1 for turns; lengths of the vectors that components belong to.
+  void sizes(const VectorX& q, VectorX& out) const;
+  void speeds(const VectorRef& v, VectorX& out) const;
   double kinetic_energy(const VectorX& q, const VectorX& v);
   double potential_energy(const VectorX& q);
 
   const pinocchio::SE3& world_from_joint(int joint) const { return data_.oMi[joint]; }
   const pinocchio::Motion& velocity(int joint) const { return data_.v[joint]; }
+  // Of place_axes(): one column per velocity, linear part first, about the world's origin.
+  const Matrix6X& axes() const { return data_.J; }
+  const std::vector<TurningAxes>& turning() const { return turning_; }
   const pinocchio::Model& model() const { return model_; }
   const std::vector<CurvedSegment>& curved() const { return curved_; }
 
  private:
+  void turn_axes(const VectorX& q, TurningAxes& axes);
+
   pinocchio::Model model_;
   pinocchio::Data data_;
   VectorX zero_;
+  std::vector<TurningAxes> turning_;
+  bool differences_ = false;
+  VectorX step_, moved_;  // scratch of the differences
   std::vector<CurvedSegment> curved_;
   std::vector<int> needed_;  // joints, parents first
 };

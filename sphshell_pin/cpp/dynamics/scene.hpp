@@ -1,14 +1,16 @@
 // The contact pairs of a multibody model, and the forces they exert at a state.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "contact/laws.hpp"
+#include "contact/friction.hpp"
 #include "contact/query.hpp"
 #include "contact/tracker.hpp"
+#include "dynamics/bristles.hpp"
 #include "dynamics/multibody.hpp"
 
 namespace sphshell {
@@ -31,22 +33,40 @@ struct Pair {
   ContactSource source;
   Method method = Method::Facets;
   NormalLaw law;
-  CoulombLaw friction;
+  FrictionLaw friction;
+  double relaxation = 2e-5;  // in which bristles give way beyond their limit [s]
 
-  bool needs_velocity() const { return law.needs_rate() || friction.active; }
+  bool needs_velocity() const { return law.needs_rate() || friction.active(); }
 };
 
 // One pair at one state.
 struct PairState {
-  int count = 0;
+  int count = 0;            // of contacts, passes not counted
+  int pieces = 0;           // of contacts, less passes: changes where a depth goes through zero
+  int clamped = 0;          // of them, how many the law's clamp holds at no force
   double depth = 0;         // largest [m]
   double normal_force = 0;  // sum [N]
+  bool pushed_through = false;
+  SE3 world_from_j = SE3::Identity();
+  Vec3 centre = Vec3::Zero();  // of the sphere, in the shell's frame [m]
+
+  // Forgets what the contacts sum up to.
+  void clear() { count = pieces = clamped = 0, depth = normal_force = 0; }
 };
 
-// Losses of all pairs at one state, and what is stored in them.
+// Of all pairs at one state: what their damping and friction take, and what is stored in them.
 struct Powers {
   double damping = 0, friction = 0;  // [W]
-  double elastic = 0;                // [J]
+  double elastic = 0, bristles = 0;  // [J]
+};
+
+// A contact at work.
+struct ActiveContact {
+  int pair, slot, number;   // slot: of its bristle in the state, or -1
+  Contact contact;          // in the shell's frame, or of a source, in the world
+  Vec3 point;               // in the world
+  Meeting<double> meeting;  // in the world
+  ContactForce<double> force;
 };
 
 // Columns of one logged contact.
@@ -57,14 +77,38 @@ struct ContactRow {
 };
 static_assert(sizeof(ContactRow) == ContactRow::kColumns * sizeof(double));
 
+// How far a sphere came from where a step began, in all evaluations since, and whether it touched.
+struct Excursion {
+  Vec3 from = Vec3::Zero();  // centre in the shell's frame
+  double moved = 0;          // [m]
+  bool touched = false;
+};
+
 class Scene {
  public:
   Scene(const pinocchio::Model& model, std::vector<Pair> pairs);
 
-  // Contact forces at (q, v). Powers, and velocities where no law needs them, only with `audit`.
-  // `accepted`: the state is the next one of a run, and contacts go on from those of the last.
-  void evaluate(const VectorX& q, const VectorX& v, bool audit, std::vector<ContactRow>* log,
-                bool accepted = false);
+  // Contact forces at (q, v), with the bristles z (3 per slot, in the shells' frames). `numbered`:
+  // contacts are told apart even where no force asks for it.
+  void evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool numbered = false);
+  // The state of the last evaluate() is the next of a run, and contacts go on from it. Slots are
+  // dealt anew: z is put in their order.
+  void accept(VectorX& z);
+  // Rows of the contacts at (q, v), where the forces were last evaluated.
+  void log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows);
+  // A step starts anew from the accepted state: forgets the contacts that it has met since.
+  void restart();
+
+  // Size of z. Slots of contacts to come are part of it.
+  int bristle_size() const { return bristles_.size(); }
+  // Of the last evaluate() (bristle_size) [m/s].
+  const VectorX& bristle_rates() const { return bristle_rates_; }
+  // Bristles give way no faster than this [s]: explicit fixed steps ask for it.
+  void relax_in(double time) { relaxation_ = time; }
+  double relaxation(const Pair& pair) const { return std::max(relaxation_, pair.relaxation); }
+  // Contacts know how their normals turn, from the next evaluate() on.
+  void want_turns();
+
   // The acceleration at the state of the last evaluate().
   const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau);
 
@@ -72,27 +116,41 @@ class Scene {
   void need_velocity_of(int joint);
 
   bool touching() const { return touching_; }
+  const std::vector<ActiveContact>& active() const { return active_; }
   // Per joint, in its frame and about its origin; holds old values unless touching().
   const Forces& external() const { return external_; }
   const std::vector<PairState>& states() const { return states_; }
+  const std::vector<Excursion>& excursions() const { return excursions_; }
   const Powers& powers() const { return powers_; }
   const std::vector<Pair>& pairs() const { return pairs_; }
   Multibody& body() { return body_; }
   const Multibody& body() const { return body_; }
 
  private:
-  const std::vector<Contact>& find(const Pair& pair, Query& query, const SE3& world_from_j);
-  void apply(int joint, const Vec3& point_world, const Vec3& force_world);
+  void add(std::size_t k, const Contact& contact, int slot, int number);
+  void exert(const VectorX& z);
+  std::vector<Contact>& find(std::size_t k);
+  void meet(ActiveContact& active, const VectorX& z);
+  Vec3 turning(const ActiveContact& active, const Vec3& stretch) const;
+  void push(const ActiveContact& active);
+  void apply(int joint, const Vec3& point_world, const Vec3& force_world, const Vec3& moment_world);
+  Vec3 relative_velocity(const Pair& pair, const Vec3& point_world) const;
   Vec3 velocity_at(int joint, const Vec3& point_world) const;
+  Vec3 spin_of(int joint) const;
 
   Multibody body_;
   std::vector<Pair> pairs_;
   std::vector<Query> queries_;
   std::vector<ContactTracker> trackers_;
   std::vector<PairState> states_;
+  std::vector<Excursion> excursions_;
+  std::vector<ActiveContact> active_;
   Forces external_;
   std::vector<int> pushed_;  // joints whose entry in external_ is not zero
   Powers powers_;
+  Bristles bristles_;
+  VectorX bristle_rates_;
+  double relaxation_ = 0;
   bool touching_ = false;
   bool needs_velocity_ = false;
 };

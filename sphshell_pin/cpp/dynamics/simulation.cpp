@@ -1,17 +1,41 @@
 #include "dynamics/simulation.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <utility>
+
+#include "dynamics/integrators/explicit.hpp"
+#include "dynamics/integrators/implicit.hpp"
 
 namespace sphshell {
 namespace {
 
 constexpr std::size_t kRowsPerCall = 4096;
 constexpr std::size_t kContactsPerCall = 16384;
+// Of the steps that stand in for a fixed one.
+constexpr double kFineTolerance = 1e-6;
+constexpr int kMostFineSteps = 1000000;
+constexpr double kFirstStep = 1e-5;  // [s]
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::unique_ptr<Stepper> make_stepper(Integrator integrator, Scene& scene) {
+  switch (integrator) {
+    case Integrator::RungeKutta4:
+      return std::make_unique<RungeKutta4>();
+    case Integrator::LinearlyImplicitEuler:
+      return std::make_unique<LinearlyImplicitEuler>(scene);
+    case Integrator::Adaptive:
+      return std::make_unique<DormandPrince>();
+    case Integrator::Implicit:
+      return std::make_unique<Rodas>(scene);
+    default:
+      return std::make_unique<SemiImplicitEuler>();
+  }
 }
 
 }  // namespace
@@ -21,20 +45,30 @@ Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, R
     : settings_(settings),
       scene_(model, std::move(pairs)),
       controller_(std::move(controller)),
+      chart_(scene_, *this),
+      stepper_(make_stepper(settings.integrator, scene_)),
+      guard_(scene_),
       tau_(VectorX::Zero(model.nv)),
+      pieces_(scene_.pairs().size(), 0),
+      clamped_(scene_.pairs().size(), 0),
       summaries_(scene_.pairs().size()),
+      normal_force_(scene_.pairs().size(), 0),
       touching_(scene_.pairs().size(), 0),
-      deep_(scene_.pairs().size(), 0) {
-  if (settings_.runge_kutta)
-    integrator_ = std::make_unique<RungeKutta4>(scene_.body());
-  else
-    integrator_ = std::make_unique<SemiImplicitEuler>(scene_.body());
+      deep_(scene_.pairs().size(), 0),
+      through_(scene_.pairs().size(), 0) {
   if (controller_) controller_->prepare(scene_);
-  state_ = {settings_.start_time, std::move(q0), std::move(v0)};
-  // The last step is shortened to end at the duration; a hair's breadth is not a step.
-  const double ratio = settings_.duration / settings_.dt;
-  steps_ = std::lround(std::ceil(ratio - 1e-9 - 4e-16 * ratio));
-  last_dt_ = settings_.duration - settings_.dt * double(steps_ - 1);
+  state_.t = settings_.start_time;
+  state_.q = std::move(q0);
+  state_.v = std::move(v0);
+  state_.z.setZero(scene_.bristle_size());
+  next_ = between_ = state_;
+  set_fine(false);
+  if (settings_.dt > 0) {
+    // The last step is shortened to end at the duration; a hair's breadth is not a step.
+    const double ratio = settings_.duration / settings_.dt;
+    grid_steps_ = std::lround(std::ceil(ratio - 1e-9 - 4e-16 * ratio));
+  }
+  proposal_ = std::min(kFirstStep, settings_.duration);
   reserve();
 }
 
@@ -51,9 +85,12 @@ void Simulation::reserve() {
   record_.events.reserve(256);
 }
 
+bool Simulation::full() const {
+  return record_.t.size() >= kRowsPerCall || record_.contacts.size() * 2 > kContactsPerCall ||
+         record_.events.size() > 128;
+}
+
 Record Simulation::take() {
-  // A callback that threw in the middle of an evaluation leaves contacts without a row.
-  record_.contacts.resize(record_.contact_row.size());
   Record out;
   std::swap(out, record_);
   reserve();
@@ -62,88 +99,292 @@ Record Simulation::take() {
 
 Simulation::Status Simulation::advance(double wall_seconds) {
   if (finished_) return Status::Finished;
-  const auto start = std::chrono::steady_clock::now();
+  const auto start_of_call = std::chrono::steady_clock::now();
   Status status = Status::Running;
+  if (!started_) start();
   int pause = 15;
-  for (int checked = 0;; ++checked) {
-    const bool last = step_ == steps_;
-    const bool record = last || step_ % settings_.record_every == 0;
-    const bool full = record_.t.size() == kRowsPerCall ||
-                      record_.contacts.size() * 2 > kContactsPerCall || record_.events.size() > 128;
-    if (full) break;
+  for (int checked = 0; status == Status::Running; ++checked) {
+    if (full()) break;
     if ((checked & pause) == pause) {
-      const double elapsed = seconds_since(start);
+      const double elapsed = seconds_since(start_of_call);
       if (elapsed > wall_seconds) break;
       if (elapsed > 1e-3 * (checked + 1)) pause = 0;  // slow steps: look at the clock at each
     }
-    const double dt = last ? 0 : step_ + 1 == steps_ ? last_dt_ : settings_.dt;
-    evaluate(record);
-    note_pairs(dt);
-    if (last) {
-      finished_ = true;
-      status = Status::Finished;
-      break;
-    }
-    hold_torques();
-    integrator_->step(*this, dt, state_, ledger_);
-    ++step_;
-    state_.t = settings_.start_time +
-               (step_ == steps_ ? settings_.duration : double(step_) * settings_.dt);
-    // Not-a-number fails every comparison.
-    if (!(state_.v.squaredNorm() < 1e24) || !(state_.q.squaredNorm() < 1e24)) {
-      finished_ = true;
-      status = Status::Diverged;
-      break;
-    }
+    status = at_end() ? Status::Finished : step();
   }
-  wall_time_ += seconds_since(start);
+  finished_ = status != Status::Running;
+  wall_time_ += seconds_since(start_of_call);
   return status;
 }
 
-// Forces at the state, the losses up to it, and a row of the record where one is due.
-void Simulation::evaluate(bool record) {
-  scene_.evaluate(state_.q, state_.v, true, record ? &record_.contacts : nullptr, true);
-  if (!integrator_->gathers_losses()) {
-    const Powers& now = scene_.powers();
-    if (step_ > 0) {
-      const double dt = step_ == steps_ ? last_dt_ : settings_.dt;
-      ledger_.damping += 0.5 * dt * (last_.damping + now.damping);
-      ledger_.friction += 0.5 * dt * (last_.friction + now.friction);
-    }
-    last_ = now;
-  }
-  if (!record) return;
-  record_.contact_row.resize(record_.contacts.size(), double(rows_));
-  write_row();
+void Simulation::start() {
+  started_ = true;
+  scene_.evaluate(state_.q, state_.v, state_.z, true);
+  std::swap(state_, next_);
+  state_.t = next_.t;
+  keep(false);
+  steps_ = 0;
+  write_row(state_);
+  next_row_ = 1;
 }
 
-void Simulation::write_row() {
-  record_.t.push_back(state_.t);
-  record_.q.insert(record_.q.end(), state_.q.data(), state_.q.data() + state_.q.size());
-  record_.v.insert(record_.v.end(), state_.v.data(), state_.v.data() + state_.v.size());
-  const double elastic = scene_.powers().elastic;
-  const double kinetic = scene_.body().kinetic_energy(state_.q, state_.v);
-  const double potential = scene_.body().potential_energy(state_.q);
-  for (double e : {kinetic, potential, elastic, ledger_.damping, ledger_.friction, ledger_.control})
+double Simulation::end_of_step() const {
+  const double end = settings_.duration;
+  if (settings_.dt > 0)
+    return settings_.start_time +
+           (grid_ + 1 >= grid_steps_ ? end : double(grid_ + 1) * settings_.dt);
+  double next = end;
+  if (controller_) {
+    if (settings_.control_dt > 0) next = std::min(next, next_control_);
+    next = std::min(next, controller_->next_kink(state_.t) - settings_.start_time);
+  }
+  return settings_.start_time + next;
+}
+
+Simulation::Status Simulation::step() {
+  hold_torques();
+  const double end = end_of_step();
+  Status status = Status::Running;
+  if (settings_.dt == 0) {
+    status = controlled_step(*stepper_, end);
+  } else {
+    if (fine_ || !fixed_step(end)) {
+      set_fine(true);
+      if (!fine_stepper_)
+        fine_stepper_ = make_stepper(settings_.integrator == Integrator::LinearlyImplicitEuler
+                                         ? Integrator::Implicit
+                                         : Integrator::Adaptive,
+                                     scene_);
+      for (int i = 0; status == Status::Running && state_.t < end; ++i)
+        status = i < kMostFineSteps ? controlled_step(*fine_stepper_, end) : Status::Stuck;
+      // Back to fixed steps when they would do.
+      if (proposal_ > 0.5 * settings_.dt) set_fine(false);
+    }
+    ++grid_;
+    ++steps_;
+    const long every =
+        settings_.record_dt > 0 ? std::max(1L, std::lround(settings_.record_dt / settings_.dt)) : 1;
+    if (status == Status::Running && (grid_ % every == 0 || at_end())) write_row(state_);
+  }
+  // Not-a-number fails every comparison.
+  if (!(state_.v.squaredNorm() < 1e24) || !(state_.q.squaredNorm() < 1e24)) return Status::Diverged;
+  return status;
+}
+
+void Simulation::set_fine(bool fine) {
+  fine_ = fine;
+  const bool is_explicit = settings_.integrator == Integrator::SemiImplicitEuler ||
+                           settings_.integrator == Integrator::RungeKutta4;
+  scene_.relax_in(is_explicit && !fine ? settings_.dt : 0);
+}
+
+// False where the step would carry a sphere too far: it is not made.
+bool Simulation::fixed_step(double end) {
+  chart_.begin(state_);
+  stepper_->begin(chart_);
+  stepper_->step(chart_, end - state_.t, next_);
+  next_.t = end;
+  stepper_->complete(chart_, next_);
+  if (guard_.allowed(scene_, state_, next_) < 1) {
+    scene_.restart();
+    scene_.evaluate(state_.q, state_.v, state_.z);
+    proposal_ = std::min(proposal_, 0.1 * (end - state_.t));
+    last_error_ = 1;
+    return false;
+  }
+  keep(stepper_->leaves_work());
+  return true;
+}
+
+// One accepted step whose size the error decides, up to `end` at most.
+Simulation::Status Simulation::controlled_step(Stepper& stepper, double end) {
+  const double left = end - state_.t;
+  const double shortest = 8 * std::numeric_limits<double>::epsilon() * std::abs(end);
+  // No short step is left over at the end.
+  double h = proposal_ > 0.95 * left ? left : std::min(proposal_, 0.5 * left);
+  h = std::min(std::max(h, 4 * shortest), left);
+  const double order = stepper.order_of_error();
+  chart_.begin(state_);
+  stepper.begin(chart_);
+  bool rejected = false;
+  double error = 0;
+  for (;;) {
+    if (h < shortest && h < left) {
+      proposal_ = h;
+      return Status::Stuck;
+    }
+    attempt(stepper, h);
+    error = error_of(stepper);
+    // At the resolution of time an error is round-off.
+    if (!(error <= 1) && !(h <= 4 * shortest && std::isfinite(error))) {
+      ++rejected_;
+      rejected = true;
+      h *= error < 1e300 ? std::clamp(0.9 * std::pow(error, -1 / order), 0.1, 0.9) : 0.1;
+      continue;
+    }
+    next_.t = h == left ? end : state_.t + h;
+    stepper.complete(chart_, next_);
+    const double allowed = guard_.allowed(scene_, state_, next_);
+    if (allowed < 1) {
+      h *= std::clamp(0.95 * allowed, 0.01, 0.9);
+      continue;
+    }
+    break;
+  }
+  // PI control (Gustafsson 1991).
+  double factor = 0.9 * std::pow(std::max(error, 1e-10), -0.7 / order) *
+                  std::pow(std::max(last_error_, 1e-10), 0.4 / order);
+  factor = std::clamp(factor, 0.2, rejected ? 1.0 : 5.0);
+  const double tried = h;
+  if (meets_event()) {
+    h = step_to_event(stepper, h);
+    last_error_ = 1;
+  } else {
+    last_error_ = std::max(error, 1e-4);
+  }
+  // A step cut short by `end` says nothing against the one proposed.
+  proposal_ = h == left && factor * tried < proposal_ && error < 0.5 ? proposal_ : factor * tried;
+  if (settings_.dt == 0) record_within(stepper);
+  keep(false);
+  return Status::Running;
+}
+
+void Simulation::attempt(Stepper& stepper, double h) {
+  scene_.restart();
+  stepper.step(chart_, h, next_);
+}
+
+// The largest error of the state, against the tolerance of each part.
+double Simulation::error_of(const Stepper& stepper) {
+  const bool fine = settings_.dt > 0;
+  const double rtol = fine ? kFineTolerance : settings_.rtol;
+  const double atol = fine ? 1e-2 * kFineTolerance : settings_.atol;
+  const VectorX& error = stepper.error();
+  const VectorX& y = stepper.end();
+  const int nv = chart_.nv();
+  if (!y.allFinite() || !error.allFinite()) return std::numeric_limits<double>::infinity();
+  double worst = 0;
+  scene_.body().sizes(state_.q, sizes_);
+  for (int i = 0; i < nv; ++i)
+    worst = std::max(worst, std::abs(error[i]) / (atol + rtol * sizes_[i]));
+  scene_.body().speeds(y.segment(nv, nv), sizes_);
+  for (int i = 0; i < nv; ++i)
+    worst = std::max(worst, std::abs(error[nv + i]) / (atol + rtol * sizes_[i]));
+  for (const ActiveContact& active : scene_.active()) {
+    if (active.slot < 0) continue;
+    const FrictionLaw& friction = scene_.pairs()[active.pair].friction;
+    const Vec3 z = y.segment<3>(2 * nv + 3 * active.slot);
+    const double limit = friction.mu_static * active.force.normal / friction.stiffness;
+    const double e = error.segment<3>(2 * nv + 3 * active.slot).norm();
+    worst = std::max(worst, e / (1e-6 * atol + rtol * (z.norm() + limit)));
+  }
+  return worst;
+}
+
+// A depth or the clamp of a law went through zero: there the motion has a kink.
+bool Simulation::meets_event() const {
+  for (std::size_t k = 0; k < pieces_.size(); ++k) {
+    const PairState& now = scene_.states()[k];
+    if (now.pieces != pieces_[k] || now.clamped != clamped_[k]) return true;
+  }
+  return false;
+}
+
+// Bisects for the shortest step, to round-off, that meets the event; makes it.
+double Simulation::step_to_event(Stepper& stepper, double h) {
+  const double resolution =
+      4 * std::numeric_limits<double>::epsilon() * std::max(std::abs(state_.t), h);
+  double before = 0, after = h;
+  while (after - before > resolution) {
+    const double middle = 0.5 * (before + after);
+    attempt(stepper, middle);
+    scene_.evaluate(next_.q, next_.v, next_.z);
+    (meets_event() ? after : before) = middle;
+  }
+  attempt(stepper, after);
+  next_.t = after == h ? next_.t : state_.t + after;
+  stepper.complete(chart_, next_);
+  return after;
+}
+
+// Makes next_, at which the forces are evaluated, the state.
+void Simulation::keep(bool leaves_work) {
+  const Powers now = scene_.powers();
+  const double h = next_.t - state_.t;
+  if (leaves_work) {
+    next_.ledger.damping += 0.5 * h * (last_.damping + now.damping);
+    next_.ledger.friction += 0.5 * h * (last_.friction + now.friction);
+  }
+  last_ = now;
+  scene_.accept(next_.z);
+  std::swap(state_, next_);
+  guard_.begin(scene_);
+  note_pairs(h);
+  if (settings_.dt == 0) ++steps_;
+}
+
+// Rows within the step to next_, and at its end.
+void Simulation::record_within(Stepper& stepper) {
+  const double end = settings_.start_time + settings_.duration;
+  if (settings_.record_dt > 0) {
+    bool moved = false;
+    for (;; ++next_row_) {
+      const double t = settings_.start_time + double(next_row_) * settings_.record_dt;
+      if (t >= next_.t || t >= end) break;
+      stepper.interpolate((t - state_.t) / (next_.t - state_.t), interpolated_);
+      chart_.finish(t, interpolated_, between_);
+      scene_.evaluate(between_.q, between_.v, between_.z, true);
+      write_row(between_);
+      moved = true;
+    }
+    if (moved) scene_.evaluate(next_.q, next_.v, next_.z);
+    const double t = settings_.start_time + double(next_row_) * settings_.record_dt;
+    if (next_.t < std::min(t, end)) return;
+    ++next_row_;
+  }
+  scene_.evaluate(next_.q, next_.v, next_.z, true);
+  write_row(next_);
+}
+
+// The scene's forces are those at the state.
+void Simulation::write_row(const State& state) {
+  scene_.log(state.q, state.v, record_.contacts);
+  record_.contact_row.resize(record_.contacts.size(), double(rows_));
+  record_.t.push_back(state.t);
+  record_.q.insert(record_.q.end(), state.q.data(), state.q.data() + state.q.size());
+  record_.v.insert(record_.v.end(), state.v.data(), state.v.data() + state.v.size());
+  const Powers& powers = scene_.powers();
+  const double kinetic = scene_.body().kinetic_energy(state.q, state.v);
+  const double potential = scene_.body().potential_energy(state.q);
+  const Ledger& ledger = state.ledger;
+  for (double e : {kinetic, potential, powers.elastic + powers.bristles, ledger.damping,
+                   ledger.friction - powers.bristles, ledger.control})
     record_.energy.push_back(e);
   ++rows_;
 }
 
-void Simulation::note_pairs(double dt) {
+void Simulation::note_pairs(double h) {
+  const auto event = [&](std::size_t k, Event::Kind kind) {
+    record_.events.push_back({state_.t, static_cast<int>(k), kind});
+  };
   for (std::size_t k = 0; k < summaries_.size(); ++k) {
     const PairState& now = scene_.states()[k];
     PairSummary& summary = summaries_[k];
+    pieces_[k] = now.pieces;
+    clamped_[k] = now.clamped;
+    if (touching_[k]) summary.contact_time += h;
+    summary.impulse += 0.5 * h * (normal_force_[k] + now.normal_force);
+    normal_force_[k] = now.normal_force;
     const bool touching = now.count > 0;
     if (touching != bool(touching_[k])) {
-      record_.events.push_back(
-          {state_.t, int(k), touching ? Event::Kind::Touch : Event::Kind::LiftOff});
+      event(k, touching ? Event::Kind::Touch : Event::Kind::LiftOff);
       touching_[k] = touching;
       deep_[k] = 0;
       if (touching) ++summary.touches;
     }
+    if (now.pushed_through && !through_[k]) event(k, Event::Kind::Through);
+    through_[k] = now.pushed_through;
     if (!touching) continue;
-    summary.contact_time += dt;
-    summary.impulse += dt * now.normal_force;
     if (now.normal_force > summary.peak_force)
       summary.peak_force = now.normal_force, summary.peak_force_time = state_.t;
     if (now.depth > summary.max_depth)
@@ -151,19 +392,16 @@ void Simulation::note_pairs(double dt) {
     const double radius = scene_.pairs()[k].radius;
     if (radius > 0 && now.depth > 0.5 * radius && !deep_[k]) {
       deep_[k] = 1;
-      record_.events.push_back({state_.t, int(k), Event::Kind::Deep});
+      event(k, Event::Kind::Deep);
     }
   }
-}
-
-void Simulation::contacts(const VectorX& q, const VectorX& v) {
-  scene_.evaluate(q, v, true, nullptr);
 }
 
 // Torques that are held over control_dt change at the start of a step, never inside one.
 void Simulation::hold_torques() {
   if (!controller_ || settings_.control_dt == 0) return;
-  const double elapsed = state_.t - settings_.start_time + 1e-6 * settings_.dt;
+  const double hair = settings_.dt > 0 ? 1e-6 * settings_.dt : 1e-9 * settings_.control_dt;
+  const double elapsed = state_.t - settings_.start_time + hair;
   if (elapsed < next_control_) return;
   next_control_ = (std::floor(elapsed / settings_.control_dt) + 1) * settings_.control_dt;
   controller_->torque(scene_, state_.t, state_.q, state_.v, tau_);
@@ -173,5 +411,11 @@ const VectorX& Simulation::torque(double t, const VectorX& q, const VectorX& v) 
   if (controller_ && settings_.control_dt == 0) controller_->torque(scene_, t, q, v, tau_);
   return tau_;
 }
+
+bool Simulation::follow_state() const {
+  return controller_ && settings_.control_dt == 0 && controller_->differentiable();
+}
+
+bool Simulation::follow_time() const { return follow_state() && controller_->follows_time(); }
 
 }  // namespace sphshell

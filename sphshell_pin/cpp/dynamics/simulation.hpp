@@ -6,19 +6,30 @@
 #include <vector>
 
 #include "dynamics/controllers.hpp"
-#include "dynamics/integrators.hpp"
+#include "dynamics/guard.hpp"
+#include "dynamics/integrators/stepper.hpp"
 
 namespace sphshell {
 
+enum class Integrator : int {
+  SemiImplicitEuler = 0,
+  RungeKutta4 = 1,
+  LinearlyImplicitEuler = 2,
+  Adaptive = 3,
+  Implicit = 4
+};
+
 struct RunSettings {
-  double dt = 1e-4, duration = 0, start_time = 0;  // [s]
+  Integrator integrator = Integrator::SemiImplicitEuler;
+  double dt = 0;                        // of a fixed step [s]; 0: the error decides
+  double rtol = 0, atol = 0;            // per step, of the state
+  double duration = 0, start_time = 0;  // [s]
   double control_dt = 0;  // hold the torques this long [s]; 0: evaluate at every stage
-  int record_every = 1;   // steps between recorded rows
-  bool runge_kutta = false;
+  double record_dt = 0;   // between recorded rows [s]; 0: every step
 };
 
 struct Event {
-  enum class Kind : int { Touch = 0, LiftOff = 1, Deep = 2 };
+  enum class Kind : int { Touch = 0, LiftOff = 1, Deep = 2, Through = 3 };
   double t;
   int pair;
   Kind kind;
@@ -44,53 +55,78 @@ struct Record {
   std::vector<Event> events;
 };
 
-class Simulation : private Derivative {
+class Simulation : private Torques {
  public:
-  enum class Status : int { Running = 0, Finished = 1, Diverged = 2 };
+  enum class Status : int { Running = 0, Finished = 1, Diverged = 2, Stuck = 3 };
 
   Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, RunSettings settings,
              std::shared_ptr<Controller> controller, VectorX q0, VectorX v0);
 
   // Runs for about `wall_seconds` of wall-clock time, or until the records of this call are full.
   Status advance(double wall_seconds);
+  // No more rows fit: advance() returns at once until take() is called.
+  bool full() const;
   // Hands over what was recorded since the last call.
   Record take();
 
-  double progress() const { return settings_.duration > 0 ? double(step_) / steps_ : 1.0; }
+  double progress() const {
+    return settings_.duration > 0 ? (state_.t - settings_.start_time) / settings_.duration : 1.0;
+  }
   double time() const { return state_.t; }
   const VectorX& q() const { return state_.q; }
   const VectorX& v() const { return state_.v; }
-  long steps() const { return step_; }
+  long steps() const { return steps_; }
+  long rejected() const { return rejected_; }
+  long evaluations() const { return chart_.evaluations(); }
+  double last_step() const { return proposal_; }   // [s]
   double wall_time() const { return wall_time_; }  // spent in advance() [s]
   const std::vector<PairSummary>& summaries() const { return summaries_; }
   const pinocchio::Model& model() const { return scene_.body().model(); }
 
  private:
-  void contacts(const VectorX& q, const VectorX& v) override;
   const VectorX& torque(double t, const VectorX& q, const VectorX& v) override;
-  Scene& scene() override { return scene_; }
+  bool follow_state() const override;
+  bool follow_time() const override;
 
   void reserve();
+  void start();
+  Status step();
+  bool fixed_step(double end);
+  void set_fine(bool fine);
+  Status controlled_step(Stepper& stepper, double end);
+  void attempt(Stepper& stepper, double h);
+  double error_of(const Stepper& stepper);
+  bool meets_event() const;
+  double step_to_event(Stepper& stepper, double h);
+  void keep(bool leaves_work);
   void hold_torques();
-  void evaluate(bool record);
-  void note_pairs(double dt);
-  void write_row();
+  void note_pairs(double h);
+  void record_within(Stepper& stepper);
+  void write_row(const State& state);
+  double end_of_step() const;
+  bool at_end() const { return state_.t >= settings_.start_time + settings_.duration; }
 
   RunSettings settings_;
   Scene scene_;
   std::shared_ptr<Controller> controller_;
-  std::unique_ptr<Integrator> integrator_;
-  State state_;
-  VectorX tau_;
-  Ledger ledger_;
+  Chart chart_;
+  std::unique_ptr<Stepper> stepper_;
+  // For what a fixed step cannot resolve: a sphere that would pass through a shell in one.
+  std::unique_ptr<Stepper> fine_stepper_;
+  Guard guard_;
+  State state_, next_, between_;
+  VectorX tau_, sizes_, interpolated_;
   Powers last_;
+  std::vector<int> pieces_, clamped_;  // of each pair at state_
   Record record_;
   std::vector<PairSummary> summaries_;
-  std::vector<char> touching_, deep_;
-  long step_ = 0, steps_ = 0, rows_ = 0;
-  double last_dt_ = 0, wall_time_ = 0;
-  double next_control_ = 0;  // when held torques change next, since the start [s]
-  bool finished_ = false;
+  std::vector<double> normal_force_;
+  std::vector<char> touching_, deep_, through_;
+  long grid_ = 0, grid_steps_ = 0, steps_ = 0, rejected_ = 0, rows_ = 0, next_row_ = 0;
+  double wall_time_ = 0;
+  double next_control_ = 0;               // when held torques change next, since the start [s]
+  double proposal_ = 0, last_error_ = 1;  // of the next step [s]; of the last one
+  bool started_ = false, finished_ = false, fine_ = false;
 };
 
 }  // namespace sphshell

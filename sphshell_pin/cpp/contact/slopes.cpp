@@ -1,0 +1,136 @@
+#include "contact/slopes.hpp"
+
+#include "contact/dual.hpp"
+
+namespace sphshell {
+namespace {
+
+// The law's outputs and their derivatives in axes that turn with the normal.
+struct LawSlopes {
+  Vec3 force, moment, rate;  // force and moment on the sphere but for the weight
+  struct By {
+    Vec3 depth, spin;
+    Mat3 relative, stretch;
+  } force_by, moment_by, rate_by;
+};
+
+template <int N>
+void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
+  for (int i = 0; i < 3; ++i) {
+    value[i] = x[i].value;
+    by.depth[i] = x[i].slope[0];
+    by.relative.row(i) = x[i].slope.template segment<3>(1);
+    if constexpr (N == 8) {
+      by.spin[i] = x[i].slope[4];
+      by.stretch.row(i) = x[i].slope.template segment<3>(5);
+    }
+  }
+  if constexpr (N != 8) by.spin.setZero(), by.stretch.setZero();
+}
+
+// Seeds: depth, relative velocity and, of 8, spin and stretch. The normal needs none, as a law does
+// not change with the axes it is written in.
+template <int N>
+void differentiate(const NormalLaw& law, const FrictionLaw& friction, double radius,
+                   double relaxation, const Meeting<double>& at, LawSlopes& out) {
+  using S = Dual<N>;
+  Meeting<S> m;
+  m.depth = S::seed(at.depth, 0);
+  for (int i = 0; i < 3; ++i) {
+    m.normal[i] = at.normal[i];
+    m.relative[i] = S::seed(at.relative[i], 1 + i);
+    if constexpr (N == 8) m.bristle[i] = S::seed(at.bristle[i], 5 + i);
+  }
+  if constexpr (N == 8) m.spin = S::seed(at.spin, 4);
+  const ContactForce<S> f = contact_force(law, friction, radius, relaxation, m);
+  read<N>(f.normal * m.normal + f.friction, out.force, out.force_by);
+  read<N>(f.torsion * m.normal, out.moment, out.moment_by);
+  read<N>(f.bristle_rate, out.rate, out.rate_by);
+}
+
+// The rate of the bristle's turning with the normal, added to `out`; see Scene::turning.
+void add_turning(const ContactSite& site, const Mat3& normal_by_place,
+                 const Eigen::RowVector3d& weight_by_place, ContactSlopes& out) {
+  const Contact& contact = site.contact;
+  const Vec3 spin = site.twist.tail<3>();
+  const Mat3 normal_rate_by_velocity = contact.turn / contact.weight;
+  const Vec3 normal_rate =
+      normal_rate_by_velocity * (site.twist.head<3>() + spin.cross(site.place));
+  const Mat3 n = cross_matrix(contact.normal), by_velocity = n * normal_rate_by_velocity;
+  const Vec3 turning = contact.normal.cross(normal_rate);
+  const Mat3 by_place = by_velocity * cross_matrix(spin) -
+                        cross_matrix(normal_rate) * normal_by_place -
+                        turning * weight_by_place / contact.weight;
+  const Mat3 against_stretch = -cross_matrix(site.stretch);
+  out.rate_by_place += against_stretch * by_place;
+  out.rate_by_twist.leftCols<3>() += against_stretch * by_velocity;
+  out.rate_by_twist.rightCols<3>() -= against_stretch * by_velocity * cross_matrix(site.place);
+  out.rate_by_stretch += cross_matrix(turning);
+}
+
+}  // namespace
+
+void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double relaxation,
+                    const ContactSite& site, ContactSlopes& out) {
+  const Contact& contact = site.contact;
+  const Vec3 &n = contact.normal, &point = contact.point, spin = site.twist.tail<3>();
+  const double weight = contact.weight;
+
+  // How the contact follows its place.
+  Mat3 normal_by = Mat3::Zero(), point_by = Mat3::Zero();
+  Eigen::RowVector3d depth_by = -n.transpose(), weight_by = Eigen::RowVector3d::Zero();
+  if (site.follows) {
+    weight_by = n.transpose() * contact.turn;
+    normal_by = (contact.turn - n * weight_by) / weight;
+    depth_by *= std::abs(weight);
+    point_by = Mat3::Identity() + n * depth_by - (site.radius - contact.depth) * normal_by;
+  }
+
+  Meeting<double> m;
+  m.depth = contact.depth;
+  m.normal = n;
+  m.relative = site.twist.head<3>() + spin.cross(point);
+  m.spin = n.dot(spin);
+  m.bristle = site.stretch;
+  LawSlopes at;
+  if (friction.has_state())
+    differentiate<8>(law, friction, site.radius, relaxation, m, at);
+  else
+    differentiate<4>(law, friction, site.radius, relaxation, m, at);
+
+  // The turning of the normal is a rotation of all vectors of the law, and what is left of their
+  // change goes through its slopes.
+  const Mat3 turned_by = cross_matrix(n) * normal_by;
+  const Mat3 relative_by = cross_matrix(spin) * point_by + cross_matrix(m.relative) * turned_by;
+  const Mat3 stretch_by = cross_matrix(m.bristle) * turned_by;
+  const Eigen::RowVector3d spin_by = spin.transpose() * normal_by;
+  const auto by_place = [&](const Vec3& value, const LawSlopes::By& by) -> Mat3 {
+    return by.depth * depth_by + by.relative * relative_by + by.spin * spin_by +
+           by.stretch * stretch_by - cross_matrix(value) * turned_by;
+  };
+  const Mat3 arm = cross_matrix(point);
+  const auto by_twist = [&](const LawSlopes::By& by) -> Matrix36 {
+    Matrix36 all;
+    all << by.relative, by.spin * n.transpose() - by.relative * arm;
+    return all;
+  };
+
+  const Vec3 force = weight * at.force;
+  const Mat3 force_by_place = at.force * weight_by + weight * by_place(at.force, at.force_by);
+  const Matrix36 force_by_twist = weight * by_twist(at.force_by);
+  out.wrench << force, point.cross(force) + weight * at.moment;
+  out.by_place.topRows<3>() = force_by_place;
+  out.by_place.bottomRows<3>() = arm * force_by_place - cross_matrix(force) * point_by +
+                                 at.moment * weight_by + weight * by_place(at.moment, at.moment_by);
+  out.by_twist.topRows<3>() = force_by_twist;
+  out.by_twist.bottomRows<3>() = arm * force_by_twist + weight * by_twist(at.moment_by);
+  if (!friction.has_state()) return;
+  out.by_stretch.topRows<3>() = weight * at.force_by.stretch;
+  out.by_stretch.bottomRows<3>() = weight * (arm * at.force_by.stretch + at.moment_by.stretch);
+  out.rate_by_place = by_place(at.rate, at.rate_by);
+  out.rate_by_twist = by_twist(at.rate_by);
+  out.rate_by_stretch = at.rate_by.stretch;
+  if (site.follows) add_turning(site, normal_by, weight_by, out);
+}
+
+}  // namespace sphshell

@@ -1,0 +1,48 @@
+// How the wrench of one contact, and the rate of its bristle, change with the relative motion.
+#pragma once
+
+#include "contact/friction.hpp"
+#include "contact/query.hpp"
+
+namespace sphshell {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;  // a twist or a wrench, linear part first
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Matrix63 = Eigen::Matrix<double, 6, 3>;
+using Matrix36 = Eigen::Matrix<double, 3, 6>;
+
+inline Mat3 cross_matrix(const Vec3& x) {
+  Mat3 out;
+  out << 0, -x[2], x[1], x[2], 0, -x[0], -x[1], x[0], 0;
+  return out;
+}
+
+// A contact and the motion of the sphere's body against the shell; all in the shell's frame, twists
+// and wrenches about its origin.
+struct ContactSite {
+  Contact contact;
+  // What the contact follows: the sphere's centre. Of a contact source, which does not say how its
+  // contacts follow, the contact point, and the contact itself stays where it is.
+  Vec3 place;
+  bool follows;
+  double radius;  // of the sphere [m]
+  Vector6 twist;
+  Vec3 stretch;  // of the bristle [m]
+};
+
+struct ContactSlopes {
+  Vector6 wrench;     // on the sphere's body
+  Matrix63 by_place;  // of the wrench
+  Matrix6 by_twist;
+  Matrix63 by_stretch;
+  Mat3 rate_by_place;  // of the bristle's rate
+  Matrix36 rate_by_twist;
+  Mat3 rate_by_stretch;
+};
+
+// Exact, but that the contact's turn is held where the bristle turns with the normal: what that
+// leaves out is of the order of the stretch times the square of the curvature.
+void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double relaxation,
+                    const ContactSite& site, ContactSlopes& out);
+
+}  // namespace sphshell

@@ -1,0 +1,91 @@
+#include "contact/tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace sphshell {
+namespace {
+
+// The centre can pass a sheet within a step only from deeper than this share of the radius: a step
+// moves it by a quarter of the radius at most.
+constexpr double kDeep = 0.5;
+
+}  // namespace
+
+ContactTracker::ContactTracker() {
+  for (auto* list : {&places_, &next_}) list->reserve(64);
+  links_.reserve(256);
+  at_.reserve(64);
+}
+
+double ContactTracker::disc(const Contact& contact, double radius) {
+  if (radius == 0) return std::numeric_limits<double>::infinity();
+  const double distance = radius - contact.depth;
+  return std::sqrt(std::max(0.0, radius * radius - distance * distance));
+}
+
+const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, const Vec3& centre,
+                                              double radius) {
+  at_.assign(contacts.size(), -1);
+  pushed_through_ = false;
+  // On a concave surface a contact moves farther than the centre.
+  const double moved = 4 * (centre - centre_).norm();
+  links_.clear();
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    places_[i].taken = false;
+    for (std::size_t j = 0; j < contacts.size(); ++j) {
+      const Contact& c = contacts[j];
+      if (places_[i].pass != (c.weight < 0)) continue;
+      const double apart = (places_[i].point - c.point).norm();
+      if (apart < std::max({places_[i].reach, disc(c, radius), moved}))
+        links_.push_back({apart, static_cast<int>(i), static_cast<int>(j)});
+    }
+  }
+  // Nearest first, each once.
+  std::sort(links_.begin(), links_.end(), [](const Link& a, const Link& b) {
+    return a.apart != b.apart ? a.apart < b.apart
+           : a.from != b.from ? a.from < b.from
+                              : a.to < b.to;
+  });
+  for (const Link& link : links_) {
+    Place& place = places_[link.from];
+    if (place.taken || at_[link.to] >= 0) continue;
+    place.taken = true;
+    at_[link.to] = link.from;
+    keep_side(contacts[link.to], place, radius);
+  }
+  for (std::size_t j = 0; j < contacts.size(); ++j) {
+    if (at_[j] >= 0) continue;
+    const Contact& c = contacts[j];
+    at_[j] = static_cast<int>(places_.size());
+    places_.push_back({c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, count_++});
+  }
+  return at_;
+}
+
+void ContactTracker::keep_side(Contact& c, const Place& place, double radius) {
+  if (radius == 0 || place.depth < kDeep * radius || c.normal.dot(place.normal) >= 0) return;
+  c.normal = -c.normal;
+  c.depth = 2 * radius - c.depth;
+  c.turn = -c.turn;
+  pushed_through_ = true;
+}
+
+void ContactTracker::accept(const std::vector<Contact>& contacts, const Vec3& centre,
+                            double radius) {
+  next_.clear();
+  deep_ = false;
+  for (std::size_t j = 0; j < contacts.size(); ++j) {
+    const Contact& c = contacts[j];
+    next_.push_back(
+        {c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, places_[at_[j]].number});
+    deep_ = deep_ || (radius > 0 && c.depth > kDeep * radius);
+  }
+  places_.swap(next_);
+  known_ = places_.size();
+  next_number_ = count_;
+  centre_ = centre;
+}
+
+}  // namespace sphshell

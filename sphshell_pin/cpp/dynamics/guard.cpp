@@ -1,0 +1,95 @@
+#include "dynamics/guard.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "shell/curved.hpp"
+
+namespace sphshell {
+namespace {
+
+constexpr double kApart = 1.0 / 16, kTouching = 0.25;  // shares of the radius
+// A touch on a shorter way than this share of the radius may be missed.
+constexpr double kSeen = 1e-3;
+// A chord is not taken for the path where something turns by more than this in a step [rad].
+constexpr double kTurn = 0.5;
+constexpr int kMostChords = 64;
+
+}  // namespace
+
+void Guard::begin(const Scene& scene) {
+  for (std::size_t k = 0; k < known_.size(); ++k) {
+    known_[k].centre = scene.states()[k].centre;
+    known_[k].touching = scene.states()[k].count > 0;
+  }
+}
+
+double Guard::allowed(Scene& scene, const State& from, const State& to) {
+  double share = std::numeric_limits<double>::infinity();
+  const double h = to.t - from.t;
+  const double turned =
+      h * std::max(from.v.lpNorm<Eigen::Infinity>(), to.v.lpNorm<Eigen::Infinity>());
+  for (std::size_t k = 0; k < known_.size(); ++k) {
+    const Pair& pair = scene.pairs()[k];
+    if (!pair.shell) continue;
+    Known& known = known_[k];
+    const Excursion& excursion = scene.excursions()[k];
+    // In and out again within a step: what the stages saw of it is not the motion.
+    const bool skipped = excursion.touched && !known.touching && scene.states()[k].count == 0 &&
+                         excursion.moved > kSeen * pair.radius;
+    if (skipped) share = std::min(share, 0.5);
+    double moved = excursion.moved;
+    const double slack = pair.radius * (known.touching ? kTouching : kApart);
+    if (turned > kTurn) moved = std::max(moved, path(scene, k, from, to));
+    if (moved <= slack) continue;
+    const double limit = slack + (known.touching ? 0 : gap(pair, known));
+    share = std::min(share, limit / moved);
+  }
+  if (turned > kTurn) scene.body().kinematics(to.q, to.v);
+  return share;
+}
+
+// A lower bound of the gap at the begin of the step; the distance is looked up where the one known
+// is worn out.
+double Guard::gap(const Pair& pair, Known& known) const {
+  double distance = known.distance - (known.centre - known.anchor).norm();
+  if (known.distance < 0 || distance < std::max(2 * pair.radius, 0.5 * known.distance)) {
+    known.anchor = known.centre;
+    known.distance = std::abs(pair.shell->closest_point(known.centre).distance);
+    if (pair.method == Method::Smooth && pair.shell->curved() != nullptr)
+      known.distance -= pair.shell->curved()->bulge();
+    distance = known.distance;
+  }
+  return std::max(0.0, distance - pair.radius);
+}
+
+// Length of the centre's path in the shell's frame, by chords.
+double Guard::path(Scene& scene, std::size_t k, const State& from, const State& to) {
+  const Pair& pair = scene.pairs()[k];
+  Multibody& body = scene.body();
+  const double h = to.t - from.t;
+  const auto turned =
+      std::max(from.v.lpNorm<Eigen::Infinity>(), to.v.lpNorm<Eigen::Infinity>()) * h;
+  const int chords =
+      static_cast<int>(std::min<double>(kMostChords, std::ceil(turned / (0.5 * kTurn))));
+  q_.resize(from.q.size());
+  Vec3 last = known_[k].centre;
+  double length = 0;
+  for (int i = 1; i <= chords; ++i) {
+    const double share = double(i) / chords;
+    u_ = share * h * (from.v + 0.5 * share * (to.v - from.v));
+    body.integrate(from.q, u_, q_);
+    body.kinematics(q_);
+    SE3 shell = pair.placement_j;
+    if (pair.joint_j != 0) shell = body.world_from_joint(pair.joint_j) * shell;
+    Vec3 centre = pair.placement_i.translation();
+    if (pair.joint_i != 0) centre = body.world_from_joint(pair.joint_i).act(centre);
+    centre = shell.actInv(centre);
+    length += (centre - last).norm();
+    last = centre;
+  }
+  return length;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,123 @@
+#include "dynamics/integrators/chart.hpp"
+
+#include <cmath>
+
+namespace sphshell {
+namespace {
+
+using Group = CurvedSegment::Group;
+using Vec2 = Eigen::Vector2d;
+
+Eigen::Matrix3d rotation(const Vec3& angle) {
+  const double a = angle.norm();
+  return a > 0 ? Eigen::AngleAxisd(a, angle / a).toRotationMatrix() : Eigen::Matrix3d::Identity();
+}
+
+// The rate of u where exp(u) turns with the angular velocity w, in turning axes.
+Vec3 angle_rate(const Vec3& u, const Vec3& w) {
+  const double a2 = u.squaredNorm();
+  const double half = 0.5 * std::sqrt(a2);
+  const double c = a2 > 1e-6 ? (1 - half / std::tan(half)) / a2 : 1.0 / 12 + a2 / 720;
+  const Vec3 once = u.cross(w);
+  return w + 0.5 * once + c * u.cross(once);
+}
+
+}  // namespace
+
+Chart::Chart(Scene& scene, Torques& torques)
+    : scene_(scene),
+      torques_(torques),
+      nv_(scene.body().model().nv),
+      q_(scene.body().model().nq),
+      v_(nv_),
+      u_(nv_) {}
+
+void Chart::begin(const State& origin) {
+  origin_ = &origin;
+  scene_.restart();
+}
+
+void Chart::place(const VectorX& y, VectorX& q, VectorX& v) const {
+  u_ = y.head(nv_);
+  scene_.body().integrate(origin_->q, u_, q);
+  v = y.segment(nv_, nv_);
+  for (const CurvedSegment& s : scene_.body().curved()) {
+    const int i = s.index_v, k = s.index_q;
+    if (s.group == Group::Rigid) {
+      const Eigen::Quaterniond axes(Eigen::Map<const Eigen::Vector4d>(origin_->q.data() + k + 3));
+      q.segment<3>(k) = origin_->q.segment<3>(k) + axes * Vec3(u_.segment<3>(i));
+      v.segment<3>(i) = (rotation(-u_.segment<3>(i + 3)) * v.segment<3>(i)).eval();
+    } else if (s.group == Group::Planar) {
+      Eigen::Matrix2d axes;
+      axes << origin_->q[k + 2], -origin_->q[k + 3], origin_->q[k + 3], origin_->q[k + 2];
+      q.segment<2>(k) = origin_->q.segment<2>(k) + axes * u_.segment<2>(i);
+      v.segment<2>(i) = (Eigen::Rotation2Dd(-u_[i + 2]) * Vec2(v.segment<2>(i))).eval();
+    }
+  }
+}
+
+// All but the rate of u, at (q, v); what turns is still counted in turning axes.
+const VectorX& Chart::fill(double t, const VectorX& q, const VectorX& v, VectorX& out) {
+  ++evaluations_;
+  const VectorX& tau = torques_.torque(t, q, v);
+  out.resize(size());
+  out.segment(nv_, nv_) = scene_.acceleration(q, v, tau);
+  for (const CurvedSegment& s : scene_.body().curved()) {
+    const int i = s.index_v, a = nv_ + i;
+    if (s.group == Group::Rigid) {
+      out.segment<3>(a) += v.segment<3>(i + 3).cross(v.segment<3>(i));
+    } else if (s.group == Group::Planar) {
+      out[a] -= v[i + 2] * v[i + 1];
+      out[a + 1] += v[i + 2] * v[i];
+    }
+  }
+  out.segment(2 * nv_, nz()) = scene_.bristle_rates();
+  const Powers& powers = scene_.powers();
+  out.tail<kWork>() << powers.damping, powers.friction, tau.dot(v);
+  return tau;
+}
+
+void Chart::rate_at_origin(VectorX& out) {
+  torque_ = fill(origin_->t, origin_->q, origin_->v, out);
+  out.head(nv_) = origin_->v;
+}
+
+void Chart::rate(double t, const VectorX& y, VectorX& out) {
+  place(y, q_, v_);
+  z_ = y.segment(2 * nv_, nz());
+  scene_.evaluate(q_, v_, z_);
+  fill(t, q_, v_, out);
+  out.head(nv_) = y.segment(nv_, nv_);
+  for (const CurvedSegment& s : scene_.body().curved()) {
+    const int i = s.index_v;
+    if (s.group == Group::Rigid) {
+      const Vec3 u = y.segment<3>(i + 3), w = y.segment<3>(nv_ + i + 3);
+      out.segment<3>(i + 3) = angle_rate(u, w);
+      out.segment<3>(nv_ + i) = (rotation(u) * out.segment<3>(nv_ + i)).eval();
+    } else if (s.group == Group::Rotation) {
+      out.segment<3>(i) = angle_rate(y.segment<3>(i), y.segment<3>(nv_ + i));
+    } else {
+      out.segment<2>(nv_ + i) =
+          (Eigen::Rotation2Dd(y[i + 2]) * Vec2(out.segment<2>(nv_ + i))).eval();
+    }
+  }
+}
+
+void Chart::start(VectorX& y) const {
+  const Ledger& l = origin_->ledger;
+  y.resize(size());
+  y.head(nv_).setZero();
+  y.segment(nv_, nv_) = origin_->v;
+  y.segment(2 * nv_, nz()) = origin_->z;
+  y.tail<kWork>() << l.damping, l.friction, l.control;
+}
+
+void Chart::finish(double t, const VectorX& y, State& out) const {
+  out.t = t;
+  place(y, out.q, out.v);
+  out.z = y.segment(2 * nv_, nz());
+  const auto work = y.tail<kWork>();
+  out.ledger = {work[0], work[1], work[2]};
+}
+
+}  // namespace sphshell

@@ -1,0 +1,200 @@
+#include "dynamics/integrators/implicit.hpp"
+
+#include <cmath>
+
+namespace sphshell {
+namespace {
+
+using Group = CurvedSegment::Group;
+using Mat3 = Eigen::Matrix3d;
+
+Mat3 skew(const Vec3& x) {
+  Mat3 out;
+  out << 0, -x.z(), x.y(), x.z(), 0, -x.x(), -x.y(), x.x(), 0;
+  return out;
+}
+
+// Of a step in a difference quotient.
+constexpr double kDifference = 1e-7;
+
+}  // namespace
+
+void ImplicitStepper::begin(Chart& chart) {
+  nv_ = chart.nv();
+  nz_ = chart.nz();
+  const int n = 2 * nv_ + nz_;
+  chart.start(start_);
+  chart.rate_at_origin(rate_);
+  const State& from = chart.origin();
+  torque_ = chart.torque_at_origin();
+  linearization_.rates(from.q, from.v, from.z, torque_, rates_);
+  rate_of_time_.setZero(n);
+  if (chart.torques().follow_state()) linearize_torques(chart);
+  if (chart.torques().follow_time()) add_time(chart);
+  jacobian_.setZero(n, n);
+  jacobian_.bottomRows(nv_ + nz_) = rates_;
+  jacobian_.block(0, nv_, nv_, nv_).setIdentity();
+  to_chart(chart);
+}
+
+// Torques come from the controller as they are; how they answer the state is differenced.
+void ImplicitStepper::linearize_torques(Chart& chart) {
+  const State& from = chart.origin();
+  Multibody& body = chart.scene().body();
+  torque_by_state_.resize(nv_, 2 * nv_);
+  u_.setZero(nv_);
+  q_.resize(from.q.size());
+  for (int k = 0; k < nv_; ++k) {
+    u_[k] = kDifference;
+    body.integrate(from.q, u_, q_);
+    u_[k] = 0;
+    body.kinematics(q_, from.v);
+    torque_by_state_.col(k) = (chart.torques().torque(from.t, q_, from.v) - torque_) / kDifference;
+  }
+  v_ = from.v;
+  for (int k = 0; k < nv_; ++k) {
+    const double change = kDifference * std::max(1.0, std::abs(from.v[k]));
+    v_[k] += change;
+    body.kinematics(from.q, v_);
+    torque_by_state_.col(nv_ + k) = (chart.torques().torque(from.t, from.q, v_) - torque_) / change;
+    v_[k] = from.v[k];
+  }
+  body.kinematics(from.q, from.v);
+  rates_.topLeftCorner(nv_, 2 * nv_).noalias() += linearization_.inverse_mass() * torque_by_state_;
+}
+
+void ImplicitStepper::add_time(Chart& chart) {
+  const State& from = chart.origin();
+  const double change = 1e-6;
+  column_ = (chart.torques().torque(from.t + change, from.q, from.v) - torque_) / change;
+  rate_of_time_.segment(nv_, nv_) = linearization_.inverse_mass() * column_;
+}
+
+// What was found for v and the tangent of q, for the coordinates of the chart.
+void ImplicitStepper::to_chart(Chart& chart) {
+  const VectorX& v = chart.origin().v;
+  for (const CurvedSegment& s : chart.scene().body().curved()) {
+    const int i = s.index_v, w = nv_ + i;
+    if (s.group == Group::Rotation) jacobian_.block<3, 3>(i, i) = -0.5 * skew(v.segment<3>(i));
+    if (s.group == Group::Rigid) {
+      const Vec3 linear = v.segment<3>(i), spin = v.segment<3>(i + 3);
+      const Vec3 acceleration = rate_.segment<3>(w);
+      // The body sees its linear velocity turn as it turns.
+      jacobian_.block(nv_, i + 3, nv_ + nz_, 3) +=
+          (jacobian_.block(nv_, w, nv_ + nz_, 3) * skew(linear)).eval();
+      jacobian_.block<3, 3>(w, i + 3) += skew(spin) * skew(linear) - skew(acceleration);
+      jacobian_.block<3, 3>(w, w) += skew(spin);
+      jacobian_.block<3, 3>(w, w + 3) -= skew(linear);
+      jacobian_.block<3, 3>(i + 3, i + 3) = -0.5 * skew(spin);
+    } else if (s.group == Group::Planar) {
+      // As above, with one axis of rotation: J x = spin x.
+      const Eigen::Vector2d linear = v.segment<2>(i), acceleration = rate_.segment<2>(w);
+      const double spin = v[i + 2];
+      Eigen::Matrix2d turn;
+      turn << 0, -1, 1, 0;
+      jacobian_.block(nv_, i + 2, nv_ + nz_, 1) -=
+          (jacobian_.block(nv_, w, nv_ + nz_, 2) * (turn * linear)).eval();
+      jacobian_.block<2, 1>(w, i + 2) += turn * acceleration - spin * (turn * (turn * linear));
+      jacobian_.block<2, 2>(w, w) += spin * turn;
+      jacobian_.block<2, 1>(w, w + 2) += turn * linear;
+    }
+  }
+}
+
+void ImplicitStepper::factorise(double gamma_h) {
+  matrix_ = -jacobian_;
+  matrix_.diagonal().array() += 1 / gamma_h;
+  lu_.compute(matrix_);
+}
+
+void ImplicitStepper::solve(VectorX& x) const {
+  const int n = 2 * nv_ + nz_;
+  x.head(n) = lu_.solve(x.head(n)).eval();
+  x.tail<Chart::kWork>().setZero();
+}
+
+void LinearlyImplicitEuler::step(Chart& chart, double h, State& out) {
+  factorise(h);
+  const int n = static_cast<int>(rate_of_time_.size());
+  VectorX& change = error_;
+  change = rate_;
+  change.head(n) += h * rate_of_time_;
+  solve(change);
+  y_ = start_ + change;
+  // The torque acts over the mean of both velocities.
+  const int nv = chart.nv();
+  y_.tail<Chart::kWork>() = start_.tail<Chart::kWork>();
+  y_.tail<1>()[0] +=
+      0.5 * h * chart.torque_at_origin().dot(start_.segment(nv, nv) + y_.segment(nv, nv));
+  chart.finish(chart.origin().t + h, y_, out);
+}
+
+void Rodas::step(Chart& chart, double h, State& out) {
+  static constexpr double kGamma = 0.25;
+  static constexpr double kNode[kStages] = {0, 0.386, 0.21, 0.63, 1, 1};
+  static constexpr double kTime[kStages] = {0.25, -0.1043, 0.1035, -0.0362, 0, 0};
+  static constexpr double kA[kStages][5] = {
+      {},
+      {1.544},
+      {0.9466785280815826, 0.2557011698983284},
+      {3.314825187068521, 2.896124015972201, 0.9986419139977817},
+      {1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950},
+      {1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1}};
+  static constexpr double kC[kStages][5] = {
+      {},
+      {-5.6688},
+      {-2.430093356833875, -0.2063599157091915},
+      {-0.1073529058151375, -9.594562251023355, -20.47028614809616},
+      {7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160},
+      {8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136,
+       -6.058818238834054}};
+  h_ = h;
+  factorise(kGamma * h);
+  const double t = chart.origin().t;
+  const int n = static_cast<int>(rate_of_time_.size());
+  for (int i = 0; i < kStages; ++i) {
+    stage_ = start_;
+    for (int j = 0; j < i; ++j)
+      if (kA[i][j] != 0) stage_ += kA[i][j] * g_[j];
+    if (i > 0)
+      chart.rate(t + kNode[i] * h, stage_, g_[i]);
+    else
+      g_[0] = rate_;
+    for (int j = 0; j < i; ++j) g_[i] += kC[i][j] / h * g_[j];
+    g_[i].head(n) += h * kTime[i] * rate_of_time_;
+    solve(g_[i]);
+  }
+  error_ = g_[kStages - 1];
+  y_ = stage_ + error_;
+  chart.finish(t + h, y_, out);
+}
+
+// The powers of stiff contacts are smooth on the motion but not at the stages: Simpson's rule.
+void Rodas::complete(Chart& chart, State& out) {
+  const double t = chart.origin().t;
+  power_[0] = rate_.tail<Chart::kWork>();
+  interpolate(0.5, middle_);
+  chart.rate(t + 0.5 * h_, middle_, rate_at_stage_);
+  power_[1] = rate_at_stage_.tail<Chart::kWork>();
+  chart.rate(t + h_, y_, rate_at_stage_);
+  power_[2] = rate_at_stage_.tail<Chart::kWork>();
+  y_.tail<Chart::kWork>() += h_ / 6 * (power_[0] + 4 * power_[1] + power_[2]);
+  chart.finish(t + h_, y_, out);
+}
+
+void Rodas::interpolate(double theta, VectorX& y) const {
+  static constexpr double kD[2][5] = {{10.12623508344586, -7.487995877610167, -34.80091861555747,
+                                       -7.992771707568823, 1.025137723295662},
+                                      {-0.6762803392801253, 6.087714651680015, 16.43084320892478,
+                                       24.76722511418386, -6.594389125716872}};
+  const double rest = 1 - theta;
+  y = rest * start_ + theta * y_;
+  for (int j = 0; j < 5; ++j) y += theta * rest * (kD[0][j] + theta * kD[1][j]) * g_[j];
+  // The integral of the parabola through the powers.
+  const double square = theta * theta / 2, cube = theta * theta * theta / 3;
+  y.tail<Chart::kWork>() = start_.tail<Chart::kWork>() +
+                           h_ * ((theta - 3 * square + 2 * cube) * power_[0] +
+                                 4 * (square - cube) * power_[1] + (2 * cube - square) * power_[2]);
+}
+
+}  // namespace sphshell

@@ -1,0 +1,131 @@
+#include "dynamics/linearization.hpp"
+
+namespace sphshell {
+namespace {
+
+// The displacement of a place that goes with a displacement of its body.
+Matrix36 velocity_at(const Vec3& place) {
+  Matrix36 out;
+  out << Mat3::Identity(), -cross_matrix(place);
+  return out;
+}
+
+}  // namespace
+
+Linearization::Linearization(Scene& scene) : scene_(scene) {
+  scene.want_turns();
+  scene.body().want_derivatives();
+  const pinocchio::Model& model = scene.body().model();
+  for (const Pair& pair : scene.pairs()) chains_.emplace_back(model, pair.joint_j, pair.joint_i);
+  force_.setZero(model.nv);
+  column_.setZero(model.nv);
+  inverse_mass_.setZero(model.nv, model.nv);
+  is_loaded_.assign(static_cast<std::size_t>(model.nv), 0);
+  loaded_.reserve(is_loaded_.size());
+}
+
+void Linearization::forces(const VectorX& q, const VectorX& v, MatrixX& by_q, MatrixX& by_v) {
+  force_.setZero(v.size());
+  add_contacts(q, v, nullptr);
+  by_q = by_q_;
+  by_v = by_v_;
+}
+
+void Linearization::rates(const VectorX& q, const VectorX& v, const VectorX& z, const VectorX& tau,
+                          MatrixX& jacobian) {
+  Multibody& body = scene_.body();
+  const Eigen::Index nv = v.size();
+  jacobian.setZero(nv + z.size(), 2 * nv + z.size());
+  auto by_q = jacobian.topLeftCorner(nv, nv), by_v = jacobian.block(0, nv, nv, nv);
+  force_ = tau;
+  if (scene_.touching()) add_contacts(q, v, &jacobian);
+  // The contact forces are torques like others: their derivatives pass through the inertia.
+  body.acceleration_derivatives(q, v, force_, by_q, by_v, inverse_mass_);
+  if (!scene_.touching()) return;
+  for (int m : loaded_)
+    for (int k : loaded_) {
+      by_q.col(m) += by_q_(k, m) * inverse_mass_.col(k);
+      by_v.col(m) += by_v_(k, m) * inverse_mass_.col(k);
+    }
+  for (const ActiveContact& active : scene_.active()) {
+    if (active.slot < 0) continue;
+    for (int i = 0; i < 3; ++i) {
+      auto column = jacobian.col(2 * nv + 3 * active.slot + i).head(nv);
+      column_.setZero();
+      for (int k : loaded_) column_ += column[k] * inverse_mass_.col(k);
+      column = column_;
+    }
+  }
+}
+
+// Fills by_q_ and by_v_, adds to force_, and where there is a jacobian writes what bristles have in
+// it, of the acceleration as generalised forces.
+void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* jacobian) {
+  const Eigen::Index nv = v.size();
+  by_q_.setZero(nv, nv);
+  by_v_.setZero(nv, nv);
+  for (int k : loaded_) is_loaded_[k] = 0;
+  loaded_.clear();
+  if (!scene_.touching()) return;
+  scene_.body().place_axes(q);
+  const std::vector<ActiveContact>& active = scene_.active();
+  for (std::size_t first = 0, next; first < active.size(); first = next) {
+    const int p = active[first].pair;
+    const Pair& pair = scene_.pairs()[p];
+    Chain& chain = chains_[p];
+    chain.place(scene_.body(), scene_.states()[p].world_from_j, v);
+    Sum sum{Vector6::Zero(), Matrix6::Zero(), Matrix6::Zero()};
+    for (next = first; next < active.size() && active[next].pair == p; ++next) {
+      const ContactSite site = site_of(active[next], chain.twist());
+      contact_slopes(pair.law, pair.friction, scene_.relaxation(pair), site, slopes_);
+      sum.wrench += slopes_.wrench;
+      sum.by_displacement += slopes_.by_place * velocity_at(site.place);
+      sum.by_twist += slopes_.by_twist;
+      if (jacobian && active[next].slot >= 0) add_bristle(active[next], site, chain, *jacobian);
+    }
+    chain.add_force(sum.wrench, force_, by_q_);
+    for (int m = 0; m < chain.size(); ++m) {
+      const Vector6 by_v = sum.by_twist * chain.axes().col(m);
+      const Vector6 by_q =
+          sum.by_displacement * chain.axes().col(m) + sum.by_twist * chain.twist_by_q().col(m);
+      const int column = chain.velocity(m);
+      for (int k = 0; k < chain.size(); ++k) {
+        by_q_(chain.velocity(k), column) += chain.axes().col(k).dot(by_q);
+        by_v_(chain.velocity(k), column) += chain.axes().col(k).dot(by_v);
+      }
+      if (!is_loaded_[column]) loaded_.push_back(column);
+      is_loaded_[column] = 1;
+    }
+  }
+}
+
+void Linearization::add_bristle(const ActiveContact& active, const ContactSite& site,
+                                const Chain& chain, MatrixX& jacobian) {
+  const Eigen::Index nv = force_.size(), z = 3 * active.slot;
+  const Matrix36 by_displacement = slopes_.rate_by_place * velocity_at(site.place);
+  auto rate = jacobian.middleRows<3>(nv + z);
+  for (int m = 0; m < chain.size(); ++m) {
+    const int k = chain.velocity(m);
+    const auto axis = chain.axes().col(m);
+    rate.col(k) = by_displacement * axis + slopes_.rate_by_twist * chain.twist_by_q().col(m);
+    rate.col(nv + k) = slopes_.rate_by_twist * axis;
+    jacobian.block<1, 3>(k, 2 * nv + z) = axis.transpose() * slopes_.by_stretch;
+  }
+  rate.middleCols<3>(2 * nv + z) = slopes_.rate_by_stretch;
+}
+
+ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& twist) const {
+  const Pair& pair = scene_.pairs()[active.pair];
+  const PairState& state = scene_.states()[active.pair];
+  const auto& turn = state.world_from_j.rotation();
+  ContactSite site{active.contact, state.centre, !pair.source, pair.radius, twist, Vec3::Zero()};
+  if (pair.source) {
+    site.contact.point = state.world_from_j.actInv(active.contact.point);
+    site.contact.normal = turn.transpose() * active.contact.normal;
+    site.place = site.contact.point;
+  }
+  if (active.slot >= 0) site.stretch = turn.transpose() * active.meeting.bristle;
+  return site;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,130 @@
+"""Run the hard cases, print their table, and write docs/hard_cases.md.
+
+python -m tests.hard_cases [--quick] [--only WORD] [--write]
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import itertools
+import sys
+import time
+from pathlib import Path
+
+from tests.hard_cases.verdict import CASES, Case, Verdict, failed
+
+# In the order of the page. A module's docstring is the text above its table.
+MODULES = (
+    "analytic_impact",
+    "analytic_rolling",
+    "analytic_surfaces",
+    "analytic_energy",
+    "shots",
+    "weak",
+    "extremes",
+    "resting",
+    "starts",
+    "repeats",
+)
+PAGE = Path(__file__).parents[2] / "docs" / "hard_cases.md"
+INTRODUCTION = """\
+# Hard cases
+
+Every run below is compared with a closed form, or with a bound that physics sets. `error` is the
+relative difference, or where the law says zero the figure itself. The quick cases run with the
+tests. `python -m tests.hard_cases --write` ran all of them and wrote this page; `--quick` leaves
+out the slow ones, and `--only WORD` runs those whose name or module has the word.
+"""
+COLUMNS = ("case", "what is tried", "law", "expected", "measured", "error", "bound", "verdict")
+
+
+def collect() -> list[Case]:
+    """Import the modules and return their cases in the order of MODULES."""
+    names = [f"{__package__ or 'tests.hard_cases'}.{name}" for name in MODULES]
+    for name in names:
+        importlib.import_module(name)
+    return sorted(CASES, key=lambda known: names.index(known.module))
+
+
+def run(chosen: Case) -> list[Verdict]:
+    """Run a case; an error of its run is a verdict, too."""
+    try:
+        return chosen.run()
+    except Exception as problem:
+        return [failed(chosen.name, problem)]
+
+
+def shown(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.7g}"
+
+
+def row(verdict: Verdict) -> tuple[str, ...]:
+    return (
+        verdict.case,
+        verdict.tried,
+        verdict.law,
+        shown(verdict.expected),
+        shown(verdict.measured),
+        f"{verdict.error:.1e}",
+        f"{verdict.bound:.0e}",
+        "ok" if verdict.ok else "FAILS",
+    )
+
+
+def line(cells: tuple[str, ...]) -> str:
+    """Return a row of a Markdown table; nothing in it is markup."""
+    plain = str.maketrans({mark: f"\\{mark}" for mark in "\\|*_`<"})
+    return f"| {' | '.join(cell.translate(plain) for cell in cells)} |"
+
+
+def table(verdicts: list[Verdict]) -> str:
+    rule = "|".join(["", *(["---"] * len(COLUMNS)), ""])
+    return "\n".join([line(COLUMNS), rule, *(line(row(verdict)) for verdict in verdicts)])
+
+
+def page(results: list[tuple[Case, list[Verdict]]]) -> str:
+    """Return docs/hard_cases.md: a section for each module."""
+    parts = [INTRODUCTION]
+    for module, group in itertools.groupby(results, key=lambda result: result[0].module):
+        heading, _, text = (importlib.import_module(module).__doc__ or "").strip().partition(".")
+        verdicts = [verdict for _, found in group for verdict in found]
+        parts += [part for part in (f"## {heading}", text.strip(), table(verdicts)) if part]
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def main() -> int:
+    """Run, print and write; return 1 where a case fails."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.hard_cases", description=(__doc__ or "").partition("\n")[0]
+    )
+    parser.add_argument("--quick", action="store_true", help="leave out the slow cases")
+    parser.add_argument("--only", metavar="WORD", help="cases whose name or module has the word")
+    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
+    options = parser.parse_args()
+    if options.write and (options.quick or options.only):
+        parser.error("--write needs all cases: leave out --quick and --only")
+    results = []
+    for known in collect():
+        if options.only and options.only not in f"{known.module} {known.name}":
+            continue
+        if options.quick and known.slow:
+            continue
+        begin = time.perf_counter()
+        verdicts = run(known)
+        print(f"{known.name} ({time.perf_counter() - begin:.1f} s)", flush=True)
+        for verdict in verdicts:
+            name, tried, _, expected, measured, error, bound, word = row(verdict)
+            figures = f"{expected:>13.30s} {measured:>13.40s} {error:>8s} <= {bound:>5s} {word}"
+            print(f"  {name:34.34s} {tried:52.52s} {figures}", flush=True)
+        results.append((known, verdicts))
+    if options.write:
+        PAGE.write_text(page(results), encoding="utf-8")
+        print(f"wrote {PAGE}")
+    wrong = sum(not verdict.ok for _, verdicts in results for verdict in verdicts)
+    print(f"{sum(len(verdicts) for _, verdicts in results)} verdicts, {wrong} of them fail")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

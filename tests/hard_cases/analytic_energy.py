@@ -1,0 +1,220 @@
+"""Energy and momentum. Nothing may be gained: not in long swings, and not by fast spin.
+
+A free body without forces keeps its kinetic energy and its angular momentum `L`. If it is round
+about one axis, its motion is known: the axis goes round `L` at `|L| / I_1`, and the body turns
+about the axis at `(1 - I_3 / I_1) w_3` against that (Landau and Lifshitz, *Mechanics*, 35).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+import sphshell_pin as sp
+from benchmarks import swing
+from tests import models
+from tests.hard_cases import surfaces
+from tests.hard_cases.analytic_impact import (
+    BY_TOLERANCE,
+    FIXED,
+    falls,
+    order_by_step,
+    order_by_tolerance,
+)
+from tests.hard_cases.balls import (
+    GRAVITY,
+    MASS,
+    PRECISE,
+    RADIUS,
+    bristle,
+    free_ball,
+    scene_of,
+    spring,
+    state,
+    velocities,
+)
+from tests.hard_cases.verdict import Verdict, at_most, case, compare
+from tests.oracle.mechanics import total_momentum
+
+Array = NDArray[np.float64]
+SPIN = 300.0  # [rad/s]
+SWINGS = 100
+
+
+def drift(scene: sp.Scene, swings: int = SWINGS) -> tuple[float, float]:
+    """Return the drift over so many swings and the largest change, both over a swing's energy.
+
+    The drift is the change of the mean from the first to the last swing.
+    """
+    period = swing.closed_forms()[1]
+    simulation = sp.Simulation(scene, sp.Adaptive(1e-10))
+    start = swing.start(float(swing.AZIMUTHS[0]))
+    result = simulation.run(start, None, swings * period, record_dt=period / 200)
+    changes = swing.energy_changes(result)
+    return float(changes[-200:].mean() - changes[:200].mean()), float(np.abs(changes).max())
+
+
+def of_energy(tried: str, figures: tuple[float, float], largest: float) -> list[Verdict]:
+    return [
+        at_most("drift of energy / that of a swing", tried, "0", figures[0], 1e-8),
+        at_most("largest change of energy", tried, "0", figures[1], largest),
+    ]
+
+
+@case("100 swings in a bowl")
+def swings() -> list[Verdict]:
+    tried = "100 swings from 40 deg, R = 4 r, h / r = 0.15, Adaptive(1e-10)"
+    return of_energy(tried, drift(swing.mesh_scene(swing.bowl(0.15))), 1e-6)
+
+
+@case("swings in the exact bowl", slow=True)
+def exact_swings() -> list[Verdict]:
+    """What the surface has no part in: a contact source is called at every evaluation."""
+    tried = "20 swings, the surface by its formula (contact source)"
+    return of_energy(tried, drift(swing.exact_scene(), 20), 1e-8)
+
+
+def free_body(moments: tuple[float, float, float]) -> pin.Model:
+    model = models.empty(gravity=0.0)
+    inertia = pin.Inertia(1.0, np.zeros(3), np.diag(moments))
+    models.add_body(model, "body", pin.JointModelFreeFlyer(), inertia=inertia)
+    return model
+
+
+def rotation(vector: Array) -> Array:
+    turn: Array = pin.exp3(vector)
+    return turn
+
+
+def top_error(integrator: object) -> float:
+    """Return how far a free symmetric top is from its closed form after 0.1 s [rad]."""
+    first, third, end = 3e-5, 5e-5, 0.1
+    spin = SPIN * np.array([0.6, 0.0, 0.8])
+    q0, v0 = state(np.zeros(3), [1.0, 2.0, 3.0], spin)
+    scene = sp.Scene(free_body((first, first, third)))
+    q = sp.Simulation(scene, integrator).run(q0, v0, end).q[-1]
+    momentum = np.array([first, first, third]) * spin
+    about_axis = np.array([0.0, 0.0, (1 - third / first) * spin[2]])
+    exact = rotation(momentum / first * end) @ rotation(about_axis * end)
+    return float(np.linalg.norm(pin.log3(exact.T @ pin.Quaternion(q[3:7]).matrix())))
+
+
+@case("order of the steppers with a free top")
+def top() -> list[Verdict]:
+    verdicts = []
+    tried, name = "symmetric top, 300 rad/s, 0.1 s, against its closed form", "order of {}"
+    for integrator, order in FIXED:
+        steps = (2e-4, 1e-4) if order == 4 else (1e-6, 5e-7)
+        seen = order_by_step(top_error, integrator, steps)
+        title = name.format(integrator.__name__)
+        verdicts.append(compare(title, tried, "error ~ dt^p", order, seen, 0.1, scale=1.0))
+    for integrator, span in BY_TOLERANCE:
+        power, last = order_by_tolerance(top_error, integrator, span)
+        title = f"{integrator.__name__}, rtol {span[0]:g} to {span[1]:g}"
+        verdicts += [
+            falls(title, tried, power),
+            at_most(f"{integrator.__name__}({span[1]:g}) [rad]", tried, "0", last, 1e2 * span[1]),
+        ]
+    return verdicts
+
+
+# What energy and momentum of a tumbling body may change by.
+DEFAULTS = (
+    (sp.RungeKutta4(), 1e-8),
+    (sp.Adaptive(1e-9), 1e-8),
+    (sp.Implicit(1e-7), 1e-7),
+)
+FIRST_ORDER = (sp.SemiImplicitEuler, sp.LinearlyImplicitEuler)
+
+
+def tumbling(integrator: object, duration: float = 0.5) -> tuple[Array, float]:
+    """Return the energy at the rows and the change of momentum of a free body, both relative."""
+    model = free_body((3e-5, 2e-5, 4e-5))
+    q0, v0 = state(np.zeros(3), [1.0, 0.0, 0.0], SPIN * np.array([2.0, -1.5, 1.66]) / 3.0)
+    result = sp.Simulation(sp.Scene(model), integrator).run(q0, v0, duration)
+    energy = result.energy.kinetic
+    before, after = (total_momentum(model, result.q[row], result.v[row]).angular for row in (0, -1))
+    lost = np.linalg.norm(after - before) / np.linalg.norm(before)
+    return energy / energy[0] - 1, float(lost)
+
+
+@case("tumbling at 300 rad/s")
+def free_tumbling() -> list[Verdict]:
+    """The explicit Euler gains, the implicit one loses, both in proportion to spin^2 dt."""
+    verdicts = []
+    body = "free body of three moments"
+    for integrator, bound in DEFAULTS:
+        energy, momentum = tumbling(integrator)
+        tried = f"{body}, 0.5 s, {integrator}"
+        verdicts += [
+            at_most("change of energy", tried, "0", np.abs(energy).max(), bound),
+            at_most("change of angular momentum", tried, "0", momentum, bound),
+        ]
+    for kind in FIRST_ORDER:
+        seen = order_by_step(
+            lambda stepper: np.abs(tumbling(stepper, 0.05)[0]).max(), kind, (1e-6, 5e-7)
+        )
+        title, tried = f"order of the energy, {kind.__name__}", f"{body}, 0.05 s"
+        verdicts.append(compare(title, tried, "change ~ spin^2 dt", 1.0, seen, 0.1, scale=1.0))
+    implicit = sp.LinearlyImplicitEuler()
+    gain = float(tumbling(implicit)[0].max())
+    verdicts.append(at_most("gain of energy", f"{body}, 0.5 s, {implicit}", "none", gain, 1e-12))
+    return verdicts
+
+
+@case("a fast spin under a rolling ball")
+def spinning_ball() -> list[Verdict]:
+    """A ball that rolls on while it spins about the vertical: neither changes."""
+    verdicts = []
+    law = spring(1e5)
+    depth = law.depth_at(MASS * GRAVITY)
+    speed = 0.1
+    for integrator, bound in (
+        (sp.SemiImplicitEuler(), 1e-8),
+        (sp.RungeKutta4(), 1e-8),
+        (sp.LinearlyImplicitEuler(), 1e-8),
+        (sp.Adaptive(1e-9), 1e-8),
+        (sp.Implicit(1e-7), 1e-7),
+    ):
+        scene = scene_of(surfaces.plate(), law, bristle(0.3, 1e5))
+        spin = [0.0, speed / (RADIUS - depth), SPIN]
+        q0, v0 = state([-0.5, 0.0, RADIUS - depth], [speed, 0.0, 0.0], spin)
+        result = sp.Simulation(scene, integrator).run(q0, v0, 2.0, record_dt=0.1)
+        seen = velocities(result)
+        tried = f"0.1 m/s, {SPIN:g} rad/s about the vertical, 2 s, {integrator}"
+        turn = np.abs(result.v[:, 5] / SPIN - 1).max()
+        verdicts += [
+            at_most("change of speed", tried, "0", np.abs(seen[:, 0] / speed - 1).max(), bound),
+            at_most("change of spin", tried, "0", turn, bound),
+        ]
+    return verdicts
+
+
+@case("a fast ball put on a turntable")
+def on_turntable() -> list[Verdict]:
+    """Friction between the two only takes: their energy never rises."""
+    verdicts = []
+    law = spring(1e5)
+    for integrator in (sp.RungeKutta4(2e-5), PRECISE, sp.Implicit(1e-7)):
+        model = free_ball()
+        disc = pin.Inertia(1.0, np.zeros(3), 1e-2 * np.eye(3))
+        models.add_body(model, "table", pin.JointModelRUBZ(), inertia=disc)
+        friction = bristle(0.3, 1e5)
+        scene = scene_of(surfaces.plate(), law, friction, model=model, frame="table")
+        spin = SPIN * np.array([0.5, 0.5, math.sqrt(0.5)])
+        q0, v0 = state([0.1, 0.0, RADIUS - law.depth_at(MASS * GRAVITY)], np.zeros(3), spin)
+        simulation = sp.Simulation(scene, integrator)
+        result = simulation.run(np.append(q0, [1.0, 0.0]), np.append(v0, 6.0), 1.0)
+        energy = result.energy.kinetic + result.energy.potential + result.energy.elastic
+        energy = energy - result.energy.potential[0]
+        gain = float((energy - np.minimum.accumulate(energy)).max() / energy[0])
+        residual = float(np.abs(result.energy.residual).max() / energy[0])
+        tried = f"tilted spin of {SPIN:g} rad/s, table at 6 rad/s, 1 s, {integrator}"
+        verdicts += [
+            at_most("largest rise of energy", tried, "0", gain, 1e-8),
+            at_most("residual of the energy", tried, "0", residual, 1e-8),
+        ]
+    return verdicts

@@ -1,0 +1,211 @@
+"""Impacts. A ball of 10 mm and 50 g meets a flat plate; no gravity but for the bouncing ball.
+
+Undamped, `F = k depth^e` gives back all energy; the largest depth is
+`((e + 1) m v^2 / (2 k))^(1 / (e + 1))` and the time of touch `2 I depth / v` with
+`I = sqrt(pi) Gamma(1 + 1/(e+1)) / Gamma(1/2 + 1/(e+1))`; for Hertz's e = 3/2 that is
+2.943 depth / v (Johnson, *Contact Mechanics*, 11.24). Times are those of the events.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+import sphshell_pin as sp
+from tests import models
+from tests.hard_cases import surfaces
+from tests.hard_cases.balls import (
+    GRAVITY,
+    MASS,
+    RADIUS,
+    event_times,
+    free_ball,
+    scene_of,
+    state,
+    velocities,
+)
+from tests.hard_cases.verdict import Verdict, case, compare
+from tests.oracle.laws import hunt_crossley_restitution
+
+PRECISE = sp.Adaptive(1e-9)
+GAP = 1e-4
+STEEL = sp.ImpactLaw.hertz(RADIUS, 2.1e11, 0.3, 2.1e11, 0.3)
+FIXED = ((sp.SemiImplicitEuler, 1), (sp.LinearlyImplicitEuler, 1), (sp.RungeKutta4, 4))
+BY_TOLERANCE = ((sp.Adaptive, (1e-4, 1e-9)), (sp.Implicit, (1e-3, 1e-7)))
+
+
+@dataclass(frozen=True)
+class Impact:
+    """When the ball touched and how long [s], its largest depth [m], speed back over speed."""
+
+    touch: float
+    duration: float
+    depth: float
+    restitution: float
+
+
+def impact(law: sp.ImpactLaw | sp.HuntCrossleyLaw, speed: float, expected: float) -> Impact:
+    """Shoot the ball at the plate; `expected` [s] is about how long it stays in touch."""
+    scene = scene_of(surfaces.plate(), law, model=free_ball(gravity=0.0))
+    q0, v0 = state([0.1, 0.03, RADIUS + GAP], [0.0, 0.0, -speed], [0.0, 0.0, 0.0])
+    duration = GAP / speed + 2 * expected
+    result = sp.Simulation(scene, PRECISE).run(q0, v0, duration, record_dt=expected / 4000)
+    (touch,), (left,) = event_times(result, "touch"), event_times(result, "lift_off")
+    back = float(velocities(result)[-1, 2])
+    return Impact(touch, left - touch, float(RADIUS - result.q[:, 2].min()), back / speed)
+
+
+def touch_time(exponent: float, depth: float, speed: float) -> float:
+    share = 1 / (exponent + 1)
+    integral = math.sqrt(math.pi) * math.gamma(1 + share) / math.gamma(0.5 + share)
+    return 2 * integral * depth / speed
+
+
+@case("impact without damping")
+def undamped() -> list[Verdict]:
+    verdicts = []
+    soft = sp.ImpactLaw(1e5, 1.0)
+    for title, law, speed in (
+        ("spring", soft, 1.0),
+        ("Hertz, steel", STEEL, 0.1),
+        ("Hertz, steel", STEEL, 10.0),
+        ("exponent 2.2", sp.ImpactLaw(1e9, 2.2), 1.0),
+    ):
+        e = law.exponent
+        depth = ((e + 1) * MASS * speed**2 / (2 * law.stiffness)) ** (1 / (e + 1))
+        duration = touch_time(e, depth, speed)
+        seen = impact(law, speed, duration)
+        tried = f"{title}, {speed:g} m/s"
+        verdicts += [
+            compare("time of the touch", tried, "gap / v", GAP / speed, seen.touch, 1e-6),
+            compare("time in touch", tried, "2 I depth / v", duration, seen.duration, 1e-6),
+            compare(
+                "largest depth",
+                tried,
+                "((e + 1) m v^2 / (2 k))^(1 / (e + 1))",
+                depth,
+                seen.depth,
+                1e-6,
+            ),
+            compare("restitution", tried, "1", 1.0, seen.restitution, 1e-6),
+        ]
+    return verdicts
+
+
+@case("impact of Hunt and Crossley")
+def hunt_crossley() -> list[Verdict]:
+    verdicts = []
+    for wanted, speed in ((0.9, 0.5), (0.5, 0.5), (0.5, 5.0), (0.1, 1.0)):
+        # The dissipation gives `wanted` at 0.5 m/s; at other speeds restitution is another.
+        law = sp.ImpactLaw.hertz(RADIUS, 1e9, 0.3, 1e9, 0.3, restitution=wanted, speed=0.5)
+        expected = hunt_crossley_restitution(speed, law.dissipation)
+        about = touch_time(1.5, (1.25 * MASS * speed**2 / law.stiffness) ** 0.4, speed)
+        seen = impact(law, speed, 3 * about)
+        tried = f"b = {law.dissipation:.4g} s/m, {speed:g} m/s"
+        formula = "x - ln(1 + x) = -y - ln(1 - y), x = b v, y = b v'"
+        verdicts.append(
+            compare("restitution", tried, formula, expected, seen.restitution, 1e-6, scale=1.0)
+        )
+    return verdicts
+
+
+def bounce(t: float, height: float, stiffness: float) -> tuple[float, float]:
+    """Height [m] over the touch and speed [m/s] at `t` of a ball let go at `height`, undamped."""
+    omega, speed = math.sqrt(stiffness / MASS), math.sqrt(2 * GRAVITY * height)
+    flight = 2 * speed / GRAVITY
+    touch = 2 * (math.pi - math.atan(speed * omega / GRAVITY)) / omega
+    since = (t + flight / 2) % (flight + touch)
+    if since <= flight:
+        return speed * since - 0.5 * GRAVITY * since**2, speed - GRAVITY * since
+    angle, sag = omega * (since - flight), GRAVITY / omega**2
+    depth = sag * (1 - math.cos(angle)) + speed / omega * math.sin(angle)
+    return -depth, -(sag * omega * math.sin(angle) + speed * math.cos(angle))
+
+
+def bouncing_error(integrator: object) -> float:
+    """Return the error after five bounces, in the sixth flight, over the height of fall."""
+    height, stiffness, end = 0.02, 1e4, 0.75
+    model = models.slider(GRAVITY, MASS)
+    scene = scene_of(surfaces.plate(), sp.ImpactLaw(stiffness, 1.0), model=model)
+    result = sp.Simulation(scene, integrator).run([RADIUS + height], None, end)
+    z, speed = bounce(end, height, stiffness)
+    fall = math.sqrt(2 * GRAVITY * height)
+    return math.hypot((result.q[-1, 0] - RADIUS - z) / height, (result.v[-1, 0] - speed) / fall)
+
+
+def oscillation_error(integrator: object) -> float:
+    """Return the error of a ball that bobs on a spring without leaving it, over its amplitude."""
+    stiffness, end = 1e4, 0.05
+    omega, sag = math.sqrt(stiffness / MASS), MASS * GRAVITY / stiffness
+    start = 0.8 * sag
+    model = models.slider(GRAVITY, MASS)
+    scene = scene_of(surfaces.plate(), sp.ImpactLaw(stiffness, 1.0), model=model)
+    result = sp.Simulation(scene, integrator).run([RADIUS - sag + start], None, end)
+    z, speed = start * math.cos(omega * end), -start * omega * math.sin(omega * end)
+    return math.hypot(
+        (result.q[-1, 0] - RADIUS + sag - z) / start, (result.v[-1, 0] - speed) / (start * omega)
+    )
+
+
+def order_by_step(
+    error: Callable[[object], float], integrator: type, steps: Sequence[float]
+) -> float:
+    """Return the order seen between the last two steps [s]."""
+    coarse, fine = (error(integrator(dt)) for dt in steps)
+    return math.log(coarse / fine) / math.log(steps[0] / steps[1])
+
+
+def order_by_tolerance(
+    error: Callable[[object], float], integrator: type, span: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the power of the tolerance with which the error falls, and the last error."""
+    tolerances = np.geomspace(*span, 6)
+    errors = [error(integrator(float(rtol))) for rtol in tolerances]
+    return float(np.polyfit(np.log(tolerances), np.log(errors), 1)[0]), errors[-1]
+
+
+def falls(name: str, tried: str, power: float) -> Verdict:
+    """Return the verdict on a power of the tolerance; a higher one is no fault."""
+    law = "error ~ rtol^p, p about 0.8 to 1, or better"
+    return Verdict(name, tried, law, ">= 0.8", power, max(0.0, 0.8 - power), 0.05)
+
+
+@case("order of the fixed steps")
+def fixed_orders() -> list[Verdict]:
+    verdicts = []
+    for integrator, order in FIXED:
+        steps = (1e-4, 5e-5) if order == 4 else (1e-5, 5e-6)
+        seen = order_by_step(oscillation_error, integrator, steps)
+        name, tried = integrator.__name__, "ball that bobs on a spring, m z'' = -m g + k depth"
+        verdicts.append(
+            compare(f"order of {name}", tried, "error ~ dt^p", order, seen, 0.1, scale=1.0)
+        )
+    return verdicts
+
+
+@case("error against tolerance")
+def tolerances() -> list[Verdict]:
+    verdicts = []
+    for integrator, span in BY_TOLERANCE:
+        for tried, error in (
+            ("ball that bobs on a spring", oscillation_error),
+            ("five bounces on a spring", bouncing_error),
+        ):
+            power, last = order_by_tolerance(error, integrator, span)
+            name = f"{integrator.__name__}, rtol {span[0]:g} to {span[1]:g}"
+            verdicts += [
+                falls(name, tried, power),
+                compare(
+                    f"{integrator.__name__}({span[1]:g})",
+                    tried,
+                    "closed form of flights and touches" if error is bouncing_error else "cosine",
+                    0.0,
+                    last,
+                    1e2 * span[1],
+                    scale=1.0,
+                ),
+            ]
+    return verdicts

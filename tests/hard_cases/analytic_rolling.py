@@ -1,0 +1,278 @@
+"""Rolling and sliding on flat walls. A solid ball, r = 10 mm, m = 50 g, I = 2/5 m r^2.
+
+One point counts for both bodies, the contact point on the shell: the lever of friction about the
+centre is `r - depth`, and `b = I / (m (r - depth)^2)` stands where a hard ball has 2/5. The depths
+are large enough for the difference to show where the law says b.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+import sphshell_pin as sp
+from benchmarks.swing import ball_model
+from sphshell_pin.dynamics import Result
+from tests import models
+from tests.hard_cases import surfaces
+from tests.hard_cases.balls import (
+    GRAVITY,
+    INERTIA,
+    MASS,
+    PRECISE,
+    RADIUS,
+    beta,
+    bristle,
+    free_ball,
+    scene_of,
+    spring,
+    state,
+    tilted,
+    turned,
+    velocities,
+)
+from tests.hard_cases.verdict import Verdict, at_most, case, compare
+
+Array = NDArray[np.float64]
+SOFT = spring(1e5)
+
+
+def coulomb(mu: float) -> sp.CoulombFriction:
+    return sp.CoulombFriction(mu, mu, 1e-3, 2e-3)
+
+
+@case("incline")
+def incline() -> list[Verdict]:
+    verdicts = []
+    for degrees, mu, make in (
+        (5, 0.3, bristle),
+        (30, 0.5, bristle),
+        (30, 0.5, coulomb),
+        (30, 0.1, bristle),
+        (30, 0.1, coulomb),
+        (60, 0.2, bristle),
+    ):
+        angle = math.radians(degrees)
+        depth = SOFT.depth_at(MASS * GRAVITY * math.cos(angle))
+        b = beta(depth)
+        rolls = mu >= b / (1 + b) * math.tan(angle)
+        if rolls:
+            expected, law = GRAVITY * math.sin(angle) / (1 + b), "g sin A / (1 + b), 5/7 g sin A"
+        else:
+            expected = GRAVITY * (math.sin(angle) - mu * math.cos(angle))
+            law = "g (sin A - mu cos A)"
+        slope, friction = tilted(angle), make(mu)
+        scene = scene_of(surfaces.plate(), SOFT, friction, placement=slope)
+        rest = np.zeros(3)
+        q0, v0 = state(slope.act(np.array([-0.5, 0.0, RADIUS - depth])), rest, rest)
+        result = sp.Simulation(scene, PRECISE).run(q0, v0, 0.2, record_dt=0.1)
+        along = velocities(result) @ slope.rotation[:, 0]
+        tried = f"A = {degrees} deg, mu = {mu:g}, {type(friction).__name__}"
+        name = "rolling acceleration" if rolls else "sliding acceleration"
+        seen = (along[2] - along[1]) / (result.t[2] - result.t[1])
+        verdicts.append(compare(name, tried, law, expected, seen, 1e-6))
+    return verdicts
+
+
+@case("from sliding to rolling")
+def sliding_to_rolling() -> list[Verdict]:
+    verdicts = []
+    speed, mu = 0.5, 0.2
+    depth = SOFT.depth_at(MASS * GRAVITY)
+    b = beta(depth)
+    for make in (bristle, coulomb):
+        scene = scene_of(surfaces.plate(), SOFT, make(mu))
+        q0, v0 = state([-0.5, 0.0, RADIUS - depth], [speed, 0.0, 0.0], [0.0, 0.0, 0.0])
+        slide = speed / (mu * GRAVITY * (1 + 1 / b))
+        result = sp.Simulation(scene, PRECISE).run(q0, v0, 2.5 * slide, record_dt=slide / 4)
+        along = velocities(result)[:, 0]
+        # The line of the slide, through a quarter and a half of it, meets the speed of rolling.
+        pace = (along[1] - along[2]) / (result.t[2] - result.t[1])
+        seen = result.t[1] + (along[1] - along[-1]) / pace
+        tried = f"v0 = {speed:g} m/s, mu = {mu:g}, {make.__name__}"
+        law = "v0 b / ((1 + b) mu g), 2 v0 / (7 mu g)"
+        verdicts += [
+            compare("end of the slide", tried, law, slide, seen, 1e-4),
+            compare(
+                "speed of rolling", tried, "v0 / (1 + b), 5/7 v0", speed / (1 + b), along[-1], 1e-6
+            ),
+        ]
+    return verdicts
+
+
+TABLE_INERTIA = 1e4  # [kg m^2]: the ball does not slow the table
+
+
+@case("turntable")
+def turntable() -> list[Verdict]:
+    verdicts = []
+    depth = SOFT.depth_at(MASS * GRAVITY)
+    b = beta(depth)
+    up = np.array([0.0, 0.0, 1.0])
+    for turn in (2 * math.pi, 20.0):
+        model = free_ball()
+        heavy = pin.Inertia(1.0, np.zeros(3), TABLE_INERTIA * np.eye(3))
+        models.add_body(model, "table", pin.JointModelRUBZ(), inertia=heavy)
+        scene = scene_of(surfaces.plate(), SOFT, bristle(0.5), model=model, frame="table")
+        place, velocity = np.array([0.1, 0.0, RADIUS - depth]), np.array([0.0, 0.1, 0.0])
+        slip = velocity - turn * np.cross(up, place)
+        q0, v0 = state(place, velocity, np.cross(up, slip) / (RADIUS - depth))
+        duration = 4 * math.pi / turn * (1 + 1 / b)
+        result = sp.Simulation(scene, PRECISE).run(
+            np.append(q0, [1.0, 0.0]), np.append(v0, turn), duration, record_dt=duration / 200
+        )
+        along = velocities(result)[50:]
+        angle = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+        seen = (angle[-1] - angle[0]) / (result.t[-1] - result.t[50]) / turn
+        law = "b / (1 + b), 2/7 (Weckesser, Am. J. Phys. 65 (1997) 736)"
+        tried = f"table at {turn:.3g} rad/s, two orbits"
+        verdicts.append(compare("orbit / table", tried, law, b / (1 + b), seen, 1e-5))
+    return verdicts
+
+
+@case("V-groove")
+def v_groove() -> list[Verdict]:
+    """Both contact points are at rest: the ball turns about the line through them.
+
+    Its distance from the centre is h = (r - depth) sin(half angle), and each wall carries
+    m g cos A / (2 sin(half angle)).
+    """
+    verdicts = []
+    for half, degrees in ((45, 20), (30, 20), (60, 10)):
+        angle, opening = math.radians(degrees), math.radians(half)
+        depth = SOFT.depth_at(MASS * GRAVITY * math.cos(angle) / (2 * math.sin(opening)))
+        h = (RADIUS - depth) * math.sin(opening)
+        expected = GRAVITY * math.sin(angle) / (1 + INERTIA / (MASS * h**2))
+        # The groove runs along y: turn it into x, then let it fall.
+        slope = tilted(angle) * pin.SE3(pin.utils.rotate("z", -math.pi / 2), np.zeros(3))
+        scene = scene_of(surfaces.groove(opening), SOFT, bristle(1.0), placement=slope)
+        rest = np.zeros(3)
+        height = (RADIUS - depth) / math.sin(opening)
+        q0, v0 = state(slope.act(np.array([0.0, -0.5, height])), rest, rest)
+        result = sp.Simulation(scene, PRECISE).run(q0, v0, 0.2, record_dt=0.1)
+        along = velocities(result) @ slope.rotation[:, 1]
+        tried = f"walls at {half} deg from the middle, A = {degrees} deg"
+        law = "g sin A / (1 + 2 r^2 / (5 h^2)), h = (r - depth) sin(half angle)"
+        seen = (along[2] - along[1]) / (result.t[2] - result.t[1])
+        verdicts.append(compare("rolling acceleration", tried, law, expected, seen, 1e-6))
+    return verdicts
+
+
+ECCENTRIC, TOP_SPIN, TOP_TILT = 0.002, 150.0, 0.3
+TOP_MU = 0.1
+
+
+def jellett(result: Result) -> tuple[Array, Array]:
+    """Return -L . a at the rows [kg m^2/s], as it is and without the part of the changing depth.
+
+    L is about the centre of mass, a leads from there to the contact; that part is the integral of
+    L_z d(height).
+    """
+    quaternions, height = result.q[:, 3:7], result.q[:, 2]
+    axis = turned(quaternions, np.tile([0.0, 0.0, 1.0], (len(height), 1)))
+    momentum = turned(quaternions, INERTIA * result.v[:, 3:6])
+    momentum_z = momentum[:, 2]
+    invariant = momentum_z * height - ECCENTRIC * (momentum * axis).sum(axis=1)
+    by_depth = 0.5 * (momentum_z[1:] + momentum_z[:-1]) * np.diff(height)
+    return invariant, invariant - np.append(0.0, np.cumsum(by_depth))
+
+
+def run_top(friction: sp.BristleFriction | sp.CoulombFriction) -> Result:
+    """Spin the eccentric sphere about the vertical, its centre of mass at rest."""
+    model, law = models.empty(GRAVITY), spring(1e6)
+    inertia = pin.Inertia(MASS, np.array([0.0, 0.0, -ECCENTRIC]), INERTIA * np.eye(3))
+    models.add_body(model, "ball", pin.JointModelFreeFlyer(), inertia=inertia)
+    scene = scene_of(surfaces.plate(), law, friction, model=model)
+    turn = pin.utils.rotate("x", TOP_TILT)
+    spin = turn.T @ [0.0, 0.0, TOP_SPIN]
+    height = RADIUS - law.depth_at(MASS * GRAVITY)
+    q0, v0 = state([0.0, 0.0, height], -np.cross(spin, [0.0, 0.0, -ECCENTRIC]), spin)
+    q0[3:7] = pin.Quaternion(turn).coeffs()
+    return sp.Simulation(scene, PRECISE).run(q0, v0, 2.0, record_dt=2e-4)
+
+
+def tilts(result: Result) -> Array:
+    """Return the angles of the axis from the vertical [rad]."""
+    angles: Array = np.arccos(1 - 2 * (result.q[:, 3:5] ** 2).sum(axis=1))
+    return angles
+
+
+@case("tippe top")
+def tippe_top() -> list[Verdict]:
+    """A sphere whose centre of mass is off its centre, spun up, slides and stands on its head.
+
+    L' = a x F and the symmetry of the inertia give (L . a)' = L_z height' for any force F at the
+    contact: zero at constant depth. It rises while it slides; how friction sticks plays no part.
+    """
+    law = "-L . a constant (Jellett 1872; Gray and Nickel, Am. J. Phys. 68 (2000) 821)"
+    runs = {make.__name__: run_top(make(TOP_MU)) for make in (bristle, coulomb)}
+    verdicts = []
+    for name, result in runs.items():
+        raw, corrected = jellett(result)
+        end = math.degrees(tilts(result)[-1])
+        tried = f"{TOP_SPIN:g} rad/s, {name}; the tilt grew from 17 to {end:.0f} deg"
+        verdicts += [
+            at_most("Jellett's invariant", tried, law, np.abs(raw / raw[0] - 1).max(), 1e-4),
+            at_most(
+                "... with the change of depth",
+                tried,
+                "-L . a - integral of L_z d(height) constant",
+                np.abs(corrected / corrected[0] - 1).max(),
+                1e-7,
+            ),
+        ]
+    after = [float(tilts(result)[len(result.t) // 2]) for result in runs.values()]
+    tried = "tilt after 1 s [rad], bristles against CoulombFriction"
+    verdicts.append(compare("same slide", tried, "both push with mu N", after[1], after[0], 1e-3))
+    return verdicts
+
+
+MU_SLOPE, OF_CONE = 0.5, 0.9
+
+
+def creep(integrator: object, friction: object, duration: float) -> float:
+    """Return the mean speed [m/s] in the second half, down a slope at 0.9 of the cone of friction.
+
+    The sphere cannot turn: it would roll.
+    """
+    slope = tilted(math.atan(OF_CONE * MU_SLOPE))
+    model = ball_model()
+    scene = scene_of(surfaces.plate(), SOFT, friction, model=model, placement=slope)
+    depth = SOFT.depth_at(MASS * GRAVITY * slope.rotation[2, 2])
+    q0 = slope.act(np.array([0.0, 0.0, RADIUS - depth]))
+    result = sp.Simulation(scene, integrator).run(q0, None, duration, record_dt=duration / 2)
+    return float(np.linalg.norm(result.q[2] - result.q[1]) / (duration / 2))
+
+
+@case("stands on a slope")
+def stands() -> list[Verdict]:
+    friction = bristle(MU_SLOPE, stiffness=1e5, mass=MASS)
+    steppers = (sp.Adaptive(1e-6), sp.Implicit(1e-6), sp.LinearlyImplicitEuler(1e-3))
+    tried = "slope of 0.9 mu_s, 60 s, BristleFriction, {}"
+    return [
+        at_most(
+            "creep [m/s], last 30 s",
+            tried.format(stepper),
+            "0",
+            creep(stepper, friction, 60.0),
+            1e-9,
+        )
+        for stepper in steppers
+    ]
+
+
+@case("creeps on a slope")
+def creeps() -> list[Verdict]:
+    verdicts = []
+    for v_static in (1e-2, 1e-3):
+        friction = sp.CoulombFriction(MU_SLOPE, MU_SLOPE, v_static, 2 * v_static)
+        # (3 x - x^3) / 2 = c has the root x = 2 sin(asin(c) / 3).
+        expected = v_static * 2 * math.sin(math.asin(OF_CONE) / 3)
+        tried = f"slope of 0.9 mu_s, CoulombFriction, v_static = {v_static:g} m/s"
+        law = "mu_s (3 x - x^3) / 2 = tan A, x = s / v_static"
+        seen = creep(PRECISE, friction, 1.0)
+        verdicts.append(compare("creep [m/s]", tried, law, expected, seen, 1e-6))
+    return verdicts

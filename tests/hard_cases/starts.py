@@ -1,0 +1,180 @@
+"""Starts and postures on the verge.
+
+A start in overlap, a path that overlaps by 1e-12 m, a finger that presses along its own length, a
+joint at its limit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import sphshell_pin as sp
+from sphshell_pin import robots
+from tests import models
+from tests.hard_cases.verdict import Verdict, at_most, case, compare
+
+RADIUS, MASS = 0.01, 0.1
+# Audit of a run: energy from nowhere, of the energy exchanged.
+AUDIT = 1e-4
+
+
+def leaving_speed(depth: float, exponent: float, integrator: Any) -> tuple[float, float]:
+    """Let go of a ball in overlap; return its speed after it, and sqrt(2 E / m).
+
+    E = k depth^(e + 1) / (e + 1); the law is such that the speed is 1 m/s.
+    """
+    law = sp.ImpactLaw(0.5 * (exponent + 1) * MASS / depth ** (exponent + 1), exponent)
+    plate = models.plate(20 * RADIUS)
+    scene = models.on_plate(models.slider(0.0, MASS), law, radius=RADIUS, shell=plate)
+    start = np.array([RADIUS - depth])
+    found = (RADIUS - start[0]) / depth
+    result = sp.Simulation(scene, integrator).run(start, duration=4 * depth, record_dt=depth)
+    # The depth that was reached is that of the rounded height.
+    return float(result.v[-1, 0]), found ** (0.5 * (exponent + 1))
+
+
+@case("starts in overlap")
+def overlaps() -> list[Verdict]:
+    verdicts = []
+    law = "leaves with sqrt(2 E / m)"
+    for share in (1e-6, 1e-3, 0.1, 0.49):
+        depth = share * RADIUS
+        fine = 1e-9 * depth
+        for integrator, what, bound in (
+            (sp.Adaptive(rtol=1e-8, atol=fine), "Adaptive(1e-8, 1e-9 depth)", 1e-6),
+            (sp.Implicit(rtol=1e-6, atol=fine), "Implicit(1e-6, 1e-9 depth)", 1e-4),
+            (sp.RungeKutta4(1e-3 * depth), "RungeKutta4(depth / 1000 speed)", 1e-6),
+            (sp.SemiImplicitEuler(1e-3 * depth), "SemiImplicitEuler(depth / 1000 speed)", 2e-3),
+        ):
+            pairs = [leaving_speed(depth, e, integrator) for e in (1.0, 1.5, 2.2)]
+            found, right = max(pairs, key=lambda pair: abs(pair[0] - pair[1]))
+            tried = f"{what}, {share:g} r, worst of e = 1, 1.5, 2.2"
+            verdicts.append(compare("overlap", tried, law, right, found, bound))
+    return verdicts
+
+
+GRAZE = 1e-12
+STIFFNESS = 1e6
+
+
+def graze(integrator: Any, friction: Any) -> tuple[float, float]:
+    """Fly along a plate, 1e-12 m deep in it, at 1 m/s; return speeds away and along [m/s]."""
+    law = sp.ImpactLaw(STIFFNESS, 1.0)
+    model = models.empty(gravity=0.0)
+    inertia = pin.Inertia.FromSphere(MASS, RADIUS)
+    models.add_body(model, "ball", pin.JointModelTranslation(), inertia=inertia)
+    plate = models.plate(0.5)
+    scene = models.on_plate(model, law, friction, radius=RADIUS, shell=plate)
+    q, v = np.array([-0.1, 0.01, RADIUS - GRAZE]), np.array([1.0, 0.0, 0.0])
+    result = sp.Simulation(scene, integrator).run(q, v, 0.2, record_dt=0.1)
+    if not np.isfinite(result.q).all():
+        return math.nan, math.nan
+    return float(result.v[-1, 2]), float(result.v[-1, 0])
+
+
+@case("flight along a plate, 1e-12 m deep")
+def grazing() -> list[Verdict]:
+    """The impulse is that of a quarter of an oscillation, m d sqrt(k / m)."""
+    form = GRAZE * math.sqrt(STIFFNESS / MASS)
+    verdicts = []
+    for integrator, allowed in (
+        (sp.RungeKutta4(1e-5), 0.01),
+        (sp.SemiImplicitEuler(1e-5), 0.05),
+        (sp.Adaptive(rtol=1e-6, atol=1e-15), 0.01),
+        (sp.Adaptive(), 1.0),
+        (sp.Implicit(), 1.0),
+        (sp.LinearlyImplicitEuler(1e-3), 1.0),
+    ):
+        for friction, mu in ((None, 0.0), (sp.CoulombFriction(0.5, 0.4, 0.01, 0.1), 0.4)):
+            away, along = graze(integrator, friction)
+            tried = f"{integrator}, friction {mu:g}"
+            law = "leaves with d sqrt(k / m)" if allowed < 1 else "d sqrt(k / m) at most"
+            over = abs(away / form - 1) if allowed < 1 else max(away / form - 1, -away / form)
+            verdicts.append(Verdict("graze", tried, law, form, away, over, allowed))
+            # Rounding of a speed of 1 m/s hides what friction takes.
+            slowed = abs(1 - along - mu * away)
+            law = "slowed by mu of that"
+            verdicts.append(at_most("graze", tried, law, slowed, 0.1 * form + 1e-14))
+    return verdicts
+
+
+def finger_scene(press: float, friction: Any = None) -> sp.Scene:
+    """Return a straight finger along z, its tip `press` [m] deep in a level wall over it."""
+    model = robots.load("three_link_finger").model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, np.zeros(3))
+    tip = data.oMf[model.getFrameId("tip")].translation
+    scene = sp.Scene(model)
+    scene.add_contact(
+        sp.Sphere(RADIUS, "tip"),
+        models.plate(0.3),
+        placement=pin.SE3(np.eye(3), np.array([0.0, 0.0, tip[2] + RADIUS - press])),
+        law=sp.HuntCrossleyLaw(1e5, 1.0, 1.0),
+        friction=friction,
+        name="tip-wall",
+    )
+    return scene
+
+
+def stretched(integrator: Any, start: float, friction: Any) -> tuple[float, float]:
+    """Press a finger that is bent by `start` [rad] a joint along its length on a wall.
+
+    Return the residual of the energy, of what is exchanged and stored, and the largest joint angle
+    at the end. At zero the
+    press is in the singular direction: no torque answers it, and the mass along it has no bound.
+    """
+    scene = finger_scene(1e-4, friction)
+    controller = sp.CartesianImpedance(
+        "tip", [[0.0, 0.0, 0.2]], stiffness=100.0, damping=1.0, joint_damping=0.01
+    )
+    q = np.full(3, start)
+    result = sp.Simulation(scene, integrator).run(
+        q, duration=0.5, controller=controller, record_dt=1e-3
+    )
+    finite = np.isfinite(result.q).all() and np.isfinite(result.v).all()
+    energy = result.energy
+    residual = np.abs(energy.residual).max() / (energy.exchanged + energy.elastic.max())
+    return float(residual) if finite else math.nan, float(np.abs(result.q[-1]).max())
+
+
+@case("finger that presses along its own length")
+def singular() -> list[Verdict]:
+    verdicts = []
+    friction = sp.CoulombFriction(0.3, 0.25, 0.005, 0.05)
+    for integrator, bound in (
+        (sp.Adaptive(), AUDIT),
+        (sp.Implicit(), AUDIT),
+        (sp.RungeKutta4(1e-5), AUDIT),
+        (sp.SemiImplicitEuler(1e-5), 1e-2),
+    ):
+        for start in (0.0, 1e-6, 0.05):
+            residual, angle = stretched(integrator, start, friction)
+            tried = f"{type(integrator).__name__}, joints bent by {start:g} rad"
+            law = "energy audit, of what is exchanged and stored"
+            verdicts.append(at_most("singular posture", tried, law, residual, bound))
+            law = "stays within a turn [rad]"
+            verdicts.append(at_most("singular posture", tried, law, angle, math.pi))
+    return verdicts
+
+
+@case("joint driven past its limit")
+def limits() -> list[Verdict]:
+    """Limits are not modelled: that is said, and the joint goes on."""
+    model = robots.load("three_link_finger").model
+    scene = sp.Scene(model)
+    q = np.array([0.2, 0.6, 0.4])
+    beyond = np.array([0.2, -0.3, 0.4])
+    said = any("joint limits" in line for line in scene.explain(q).not_modelled)
+    verdicts = [at_most("joint limit", "explain", "says not modelled", float(not said), 0)]
+    for integrator in (sp.Adaptive(), sp.Implicit(), sp.SemiImplicitEuler(1e-4)):
+        result = sp.Simulation(scene, integrator).run(
+            q, duration=2.0, controller=sp.JointPD(0.5, 0.01, beyond), record_dt=2.0
+        )
+        tried = f"{type(integrator).__name__}, limit {model.lowerPositionLimit[1]:g} rad"
+        angle = float(result.q[-1, 1])
+        verdicts.append(compare("joint limit", tried, "goes on [rad]", -0.3, angle, 1e-3))
+    return verdicts

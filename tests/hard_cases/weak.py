@@ -1,0 +1,96 @@
+"""Laws that are too weak.
+
+A ball hits a law that cannot stop it within its radius. Scene.explain says so before the run; in
+the run the sphere keeps the side it came from, so that the law pushes it back until its centre is a
+radius beyond the sheet, where contact ends.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+import sphshell_pin as sp
+from tests import models
+from tests.hard_cases.verdict import Verdict, at_most, case, compare
+
+RADIUS, MASS, SPEED = 0.01, 0.2, 3.0
+
+
+def weak_scene(depth: float, solid: bool) -> sp.Scene:
+    """Return a scene whose linear law would stop the ball at `depth` [m], without end."""
+    law = sp.ImpactLaw(MASS * (SPEED / depth) ** 2, 1.0)
+    if not solid:
+        shell = models.plate(20 * RADIUS)
+        return models.on_plate(models.slider(0.0, MASS), law, radius=RADIUS, shell=shell)
+    side = 20 * RADIUS
+    shell = sp.Shell.from_geometry(coal.Box(side, side, side), side="outside")
+    placement = pin.SE3(np.eye(3), np.array([0.01 * side, 0.02 * side, -side / 2]))
+    model = models.slider(0.0, MASS)
+    return models.on_plate(model, law, radius=RADIUS, shell=shell, placement=placement)
+
+
+def shoot(scene: sp.Scene, depth: float, above: bool, integrator: Any) -> sp.Result:
+    """Shoot the ball from 1.5 r above or below; until it would be clear again."""
+    way = 1.0 if above else -1.0
+    q, v = np.array([1.5 * RADIUS * way]), np.array([-SPEED * way])
+    duration = (1.5 * RADIUS + math.pi * depth) / SPEED
+    return sp.Simulation(scene, integrator).run(q, v, duration)
+
+
+def expected_speed(depth: float) -> float:
+    """Return the speed away from the sheet [m/s] at the end: negative if it went through.
+
+    Contact ends at depth 2 r, and with it the spring's energy there.
+    """
+    if depth < 2 * RADIUS:
+        return SPEED
+    return -SPEED * math.sqrt(1 - (2 * RADIUS / depth) ** 2)
+
+
+def warns(depth: float) -> Verdict:
+    """Return whether it is said before the run."""
+    scene = weak_scene(depth, solid=False)
+    told = scene.explain(np.array([1.5 * RADIUS]), np.array([-SPEED])).warnings
+    warned = any("cannot stop the sphere" in warning for warning in told)
+    tried = f"depth {depth / RADIUS:g} r"
+    return at_most("weak law", tried, "explain warns of it", float(not warned), 0)
+
+
+def judge(integrator: Any, depth: float, solid: bool, above: bool, bound: float) -> list[Verdict]:
+    """Return the events of the run, and the speed after it."""
+    scene = weak_scene(depth, solid)
+    tried = f"{type(integrator).__name__}, depth {depth / RADIUS:g} r, "
+    tried += "solid" if solid else f"sheet from {'above' if above else 'below'}"
+    result = shoot(scene, depth, above, integrator)
+    due = {"touch", "deep"} if solid else {"touch", "deep", "through"}
+    missing = sorted(due - {event.kind for event in result.events})
+    law = f"events {', '.join(sorted(due))}"
+    found = ", ".join(f"no {kind}" for kind in missing) or "all"
+    speed = float(result.v[-1, 0]) * (1.0 if above else -1.0)
+    right = expected_speed(depth)
+    moved = "comes back as fast" if right > 0 else "goes through, v^2 - k (2 r)^2 / m left"
+    return [
+        Verdict("weak law", tried, law, "all", found, len(missing), 0),
+        compare("weak law", tried, moved, right, speed, bound),
+    ]
+
+
+@case("laws that cannot stop the sphere")
+def weak() -> list[Verdict]:
+    depths = (1.5 * RADIUS, 3 * RADIUS)
+    verdicts = [warns(depth) for depth in depths]
+    for integrator, bound in (
+        (sp.Adaptive(), 1e-4),
+        (sp.Implicit(), 1e-2),
+        (sp.RungeKutta4(1e-4), 1e-2),
+        (sp.SemiImplicitEuler(1e-4), 0.1),
+    ):
+        for depth in depths:
+            for solid, above in ((False, True), (False, False), (True, True)):
+                verdicts += judge(integrator, depth, solid, above, bound)
+    return verdicts
