@@ -118,10 +118,9 @@ def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -
 
 def explain_built(built: Built) -> Any:
     """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
-    run = built.scenario.run
+    stepper = built.simulation.integrator
     # The recommended step is the first-order stepper's: no other is judged by it.
-    first_order = run.integrator == "semi-implicit-euler"
-    dt = built.simulation.integrator.dt if first_order else None
+    dt = stepper.dt if isinstance(stepper, sp.SemiImplicitEuler) else None
     return built.scene.explain(built.q0, built.v0, dt)
 
 

@@ -204,7 +204,7 @@ class Coulomb(Section):
 
 
 class Bristle(Section):
-    """Friction that sticks: spring [N/m] and damper [N s/m] below the limit, Stribeck speed [m/s]."""
+    """Friction that sticks: spring [N/m], damper [N s/m], Stribeck's speed [m/s]."""
 
     type: Literal["bristle"]
     mu_static: NotNegative

@@ -42,8 +42,8 @@ def resting_depth(
     radius = float(np.clip(20 * depth, 1e-5, 10.0))
     scene = on_plate(models.slider(gravity, mass), damped(mass, stiffness, depth), radius)
     duration = 40 * math.sqrt(mass / stiffness)
-    if hasattr(integrator, "dt"):
-        duration = max(duration, 50 * integrator.dt)
+    # Long enough for tens of steps, however short the time scale.
+    duration = max(duration, 50 * getattr(integrator, "dt", 2e-4))
     q = np.array([radius - start * depth])
     result = sp.Simulation(scene, integrator).run(q, duration=duration, record_dt=duration)
     # A step that moves by less than half a bit does not move: so much of the way may be left.
