@@ -58,6 +58,10 @@ class UnitWarning(UserWarning):
     """A shell is so large beside its sphere or robot that its unit was probably taken wrongly."""
 
 
+class WeakLawWarning(UserWarning):
+    """A law is so weak that the sphere's centre is expected to be pushed through the shell."""
+
+
 class InvalidShell(SphshellError, ValueError):
     """Vertices or elements from which no surface can be made."""
 

@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 DEFAULT_SPEED = 0.1
 # Steps in the shortest time scale: enough for a few percent with either stepper.
 STEPS_PER_SCALE = 30
+# Of the bristles' relaxation time [s].
+LONGEST_RELAXATION = 2e-5
 
 
 @dataclass(frozen=True)
@@ -90,13 +92,11 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     """Work out the explanation of `scene` at q (nq,), v (nv,), for a step of `dt` [s]."""
     model = scene.model
     check_moved_mass(model)
-    data, mass_matrix = _mass_at(scene, q, v)
     gravity = float(np.linalg.norm(model.gravity.linear))
-    pairs = []
+    pairs = explain_pairs(scene, q, v)
     warnings: list[str] = []
-    for pair in scene.pairs:
-        pairs.append(_explain_pair(scene, pair, data, mass_matrix, v, gravity))
-        warnings += _warnings_of(scene, pair, pairs[-1])
+    for pair, figures in zip(scene.pairs, pairs, strict=True):
+        warnings += _warnings_of(scene, pair, figures)
     scales = [p.shortest_time for p in pairs if math.isfinite(p.shortest_time)]
     recommended = _round_down(min(scales) / STEPS_PER_SCALE) if scales else 1e-3
     if dt is not None and dt > 1.0001 * recommended:
@@ -113,25 +113,37 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     absent = ["joint limits, joint friction and contact between other pairs of bodies"]
     if scene.lock:
         absent.append(f"motion of the locked joints {', '.join(scene.lock)}")
-    return Explanation(tuple(modelled), tuple(absent), tuple(pairs), recommended, tuple(warnings))
+    return Explanation(tuple(modelled), tuple(absent), pairs, recommended, tuple(warnings))
 
 
-def relaxation_times(scene: Scene, q: Array) -> list[float]:
-    """Return in what time [s] the bristles of each pair give way beyond their limit.
+def explain_pairs(scene: Scene, q: Array, v: Array) -> tuple[PairExplanation, ...]:
+    """Work out the explanation of each pair of `scene` at q (nq,), v (nv,)."""
+    data, mass_matrix = _mass_at(scene, q, v)
+    gravity = float(np.linalg.norm(scene.model.gravity.linear))
+    return tuple(_explain_pair(scene, pair, data, mass_matrix, v, gravity) for pair in scene.pairs)
+
+
+def relaxation_time(pair: ContactPair, figures: PairExplanation) -> float:
+    """Return in what time [s] the bristles of a pair give way beyond their limit.
 
     A fiftieth of the shortest impact that the pair's law can stop (its depth would reach the
     radius): friction then follows a slip that turns round within an impact.
     """
-    data, mass_matrix = _mass_at(scene, q, np.zeros(scene.model.nv))
-    times = []
-    for pair in scene.pairs:
-        figures = _explain_pair(scene, pair, data, mass_matrix, np.zeros(scene.model.nv), 0.0)
-        limit, e = figures.depth_limit_speed, pair.law.exponent
-        shortest = 1e-3
-        if math.isfinite(limit) and pair.sphere is not None:
-            shortest = 2 * pair.sphere.radius / limit * _duration_integral(e)
-        times.append(min(0.02 * shortest, 2e-5))
-    return times
+    limit = figures.depth_limit_speed
+    if pair.sphere is None or not math.isfinite(limit):
+        return LONGEST_RELAXATION
+    shortest = 2 * pair.sphere.radius / limit * _duration_integral(pair.law.exponent)
+    return min(0.02 * shortest, LONGEST_RELAXATION)
+
+
+def weakness(pair: ContactPair, figures: PairExplanation) -> str | None:
+    """Say so where the law of a pair cannot stop the sphere."""
+    if pair.sphere is None or not figures.impact_depth >= pair.sphere.radius:
+        return None
+    return (
+        f"contact '{pair.name}': at {figures.approach_speed:.3g} m/s the depth would reach the "
+        "radius: the law cannot stop the sphere, make it stiffer"
+    )
 
 
 def _mass_at(scene: Scene, q: Array, v: Array) -> tuple[pin.Data, Array]:
@@ -329,11 +341,9 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
     if sentence:
         out.append(f"{where}: {sentence}")
     out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
-    if figures.impact_depth >= radius:
-        out.append(
-            f"{where}: at {figures.approach_speed:.3g} m/s the depth would reach the radius: the "
-            "law cannot stop the sphere, make it stiffer"
-        )
+    weak = weakness(pair, figures)
+    if weak is not None:
+        out.append(weak)
     elif figures.resting_depth > 0.1 * radius:
         out.append(
             f"{where}: at rest the depth is {figures.resting_depth / radius:.0%} of the radius: "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import signal
 import threading
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -19,12 +20,17 @@ from sphshell_pin.checks import (
     check_not_negative,
     check_positive,
 )
-from sphshell_pin.contact import BristleFriction
 from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callable
 from sphshell_pin.dynamics.integrators import Integrator, SemiImplicitEuler
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.scene import Scene
-from sphshell_pin.errors import DeepStart, Interrupted, InvalidParameter, SimulationDiverged
+from sphshell_pin.errors import (
+    DeepStart,
+    Interrupted,
+    InvalidParameter,
+    SimulationDiverged,
+    WeakLawWarning,
+)
 
 Array = NDArray[np.float64]
 
@@ -74,6 +80,8 @@ class Simulation:
         otherwise.) Rows are recorded every `record_dt` [s] (default: every step); `progress` is
         called a few times a second with the share done. The same input gives the same bits.
 
+        A law that cannot stop its sphere earns a WeakLawWarning.
+
         Raises InvalidParameter for wrong sizes and values, DeepStart for a sphere that starts
         deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.
         """
@@ -95,7 +103,7 @@ class Simulation:
             record = min(check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
         core = _core.Simulation(
             self.scene.model,
-            self._core_pairs(q0),
+            self._core_pairs(q0, v0),
             core_controller,
             q0,
             v0,
@@ -133,13 +141,18 @@ class Simulation:
             raise SimulationDiverged(core.time, reason, result)
         return result
 
-    def _core_pairs(self, q0: Array) -> list[_core.Pair]:
+    def _core_pairs(self, q0: Array, v0: Array) -> list[_core.Pair]:
+        """Build the C++ twins of the pairs; a law that cannot stop its sphere earns a warning."""
         pairs = [pair.to_core() for pair in self.scene.pairs]
-        if any(isinstance(pair.friction, BristleFriction) for pair in self.scene.pairs):
-            from sphshell_pin.dynamics.explain import relaxation_times
+        if pairs:
+            from sphshell_pin.dynamics.explain import explain_pairs, relaxation_time, weakness
 
-            for pair, time in zip(pairs, relaxation_times(self.scene, q0), strict=True):
-                pair.relaxation = time
+            figures = explain_pairs(self.scene, q0, v0)
+            for pair, core, figure in zip(self.scene.pairs, pairs, figures, strict=True):
+                core.relaxation = relaxation_time(pair, figure)
+                weak = weakness(pair, figure)
+                if weak is not None:
+                    warnings.warn(weak, WeakLawWarning, stacklevel=3)
         return pairs
 
     @property

@@ -7,6 +7,7 @@ import csv
 import json
 import os
 import tempfile
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -21,6 +22,7 @@ from sphshell_pin.errors import (
     ResultError,
     SimulationDiverged,
     SphshellError,
+    WeakLawWarning,
 )
 from sphshell_pin.scenario.build import Built, build
 from sphshell_pin.scenario.figures import Verdict, check_expectations, judge, measure_energy
@@ -127,15 +129,17 @@ def simulate(
     """Run without writing; return the result, and why it ended early (None: it did not)."""
     run = built.scenario.run
     try:
-        result = built.simulation.run(
-            built.q0,
-            built.v0,
-            run.duration,
-            built.controller,
-            run.control_dt,
-            record_dt=run.record_dt,
-            progress=progress,
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", WeakLawWarning)  # explain_built tells it
+            result = built.simulation.run(
+                built.q0,
+                built.v0,
+                run.duration,
+                built.controller,
+                run.control_dt,
+                record_dt=run.record_dt,
+                progress=progress,
+            )
     except (Interrupted, SimulationDiverged) as error:
         return error.result, error
     return result, None
