@@ -109,7 +109,7 @@ def explain(
 ) -> None:
     """Say what a scenario models: time scales, expected depths, a fitting dt, warnings.
 
-    Example: sphshell-pin explain ball_on_turntable --dt 1e-4
+    Example: sphshell-pin explain fingertip_on_blade --dt 1e-3
     """
     with _faults(context):
         from sphshell_pin.scenario import build, explain_built

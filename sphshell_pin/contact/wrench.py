@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_finite, check_type, check_vector
-from sphshell_pin.contact.friction import CoulombFriction, check_friction
+from sphshell_pin.contact.friction import CoulombFriction
 from sphshell_pin.contact.laws import NormalLaw, check_law
 from sphshell_pin.errors import InvalidParameter
 
@@ -28,7 +28,8 @@ def contact_wrench(
     `point` (3,) [m] and `normal` (3,) (unit, from j to i) in the world; `depth` [m], no force
     where it is not positive; `motion_i`, `motion_j`: spatial velocities of the bodies in the world
     frame, about the world origin (data.oMi[j].act(data.v[j])). Both wrenches are pinocchio.Force
-    in the world about the world origin, equal and opposite.
+    in the world about the world origin, equal and opposite. A BristleFriction raises
+    InvalidParameter: its force depends on how the contact came about, which a scene remembers.
     """
     place = check_vector("point", point, 3)
     direction = check_vector("normal", normal, 3)
@@ -37,7 +38,9 @@ def contact_wrench(
     for name, motion in (("motion_i", motion_i), ("motion_j", motion_j)):
         check_type(name, motion, pin.Motion, "must be a pinocchio.Motion")
     check_law(law)
-    check_friction(friction)
+    if friction is not None:
+        without = "must be a CoulombFriction or None: bristles need a scene, which remembers them"
+        check_type("friction", friction, CoulombFriction, without)
     if check_finite("depth", depth) <= 0:
         return pin.Force.Zero(), pin.Force.Zero()
     relative = (motion_i - motion_j).linear + np.cross((motion_i - motion_j).angular, place)

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 # Speed of approach to judge by, where neither v nor a fall tells one [m/s].
 DEFAULT_SPEED = 0.1
-# Steps in the shortest time scale: enough for a few percent with either stepper.
+# Steps in the shortest time scale: enough for a few percent with fixed steps.
 STEPS_PER_SCALE = 30
 # Of the bristles' relaxation time [s].
 LONGEST_RELAXATION = 2e-5

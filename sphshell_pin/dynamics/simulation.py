@@ -145,13 +145,19 @@ class Simulation:
         """Build the C++ twins of the pairs; a law that cannot stop its sphere earns a warning."""
         pairs = [pair.to_core() for pair in self.scene.pairs]
         if pairs:
-            from sphshell_pin.dynamics.explain import explain_pairs, relaxation_time, weakness
+            from sphshell_pin.dynamics.explain import (
+                DEFAULT_SPEED,
+                explain_pairs,
+                relaxation_time,
+                weakness,
+            )
 
             figures = explain_pairs(self.scene, q0, v0)
             for pair, core, figure in zip(self.scene.pairs, pairs, figures, strict=True):
                 core.relaxation = relaxation_time(pair, figure)
                 weak = weakness(pair, figure)
-                if weak is not None:
+                # Of a sphere at rest in touch no speed is known to judge by.
+                if weak is not None and figure.approach_speed != DEFAULT_SPEED:
                     warnings.warn(weak, WeakLawWarning, stacklevel=3)
         return pairs
 

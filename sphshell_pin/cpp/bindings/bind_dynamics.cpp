@@ -83,7 +83,7 @@ class PythonController : public Controller {
     nb::gil_scoped_acquire acquire;
     callable_.reset();
   }
-  bool differentiable() const override { return false; }
+  bool follows_time() const override { return true; }
   void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override {
     std::vector<ContactRow> rows;
     scene.log(q, v, rows);

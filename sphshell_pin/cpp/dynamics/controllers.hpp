@@ -16,8 +16,7 @@ class Controller {
   virtual void prepare(Scene&) {}
   // Writes the torques; the scene's contacts have been evaluated at (q, v).
   virtual void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) = 0;
-  // The torques are differenced by implicit integrators: cheap, and smooth between next_kink()s.
-  virtual bool differentiable() const { return true; }
+  // Implicit integrators difference the torques by the state, and if they follow it, by time.
   virtual bool follows_time() const { return false; }
   // The next time at which the torques bend or jump.
   virtual double next_kink(double /*t*/) const { return std::numeric_limits<double>::infinity(); }

@@ -84,6 +84,12 @@ void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool 
   exert(z);
 }
 
+void Scene::revisit(const VectorX& q, const VectorX& v, const VectorX& z) {
+  if (active_.empty()) return;
+  if (needs_velocity_) body_.kinematics(q, v);
+  exert(z);
+}
+
 void Scene::accept(VectorX& z) {
   if (bristles_.any()) bristles_.begin();
   std::size_t next = 0;

@@ -91,6 +91,8 @@ class Scene {
   // Contact forces at (q, v), with the bristles z (3 per slot, in the shells' frames). `numbered`:
   // contacts are told apart even where no force asks for it.
   void evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool numbered = false);
+  // The same with another velocity, at the placements of the last evaluate().
+  void revisit(const VectorX& q, const VectorX& v, const VectorX& z);
   // The state of the last evaluate() is the next of a run, and contacts go on from it. Slots are
   // dealt anew: z is put in their order.
   void accept(VectorX& z);

@@ -226,6 +226,7 @@ Simulation::Status Simulation::controlled_step(Stepper& stepper, double end) {
     stepper.complete(chart_, next_);
     const double allowed = guard_.allowed(scene_, state_, next_);
     if (allowed < 1) {
+      ++rejected_;
       h *= std::clamp(0.95 * allowed, 0.01, 0.9);
       continue;
     }
@@ -382,14 +383,15 @@ void Simulation::note_pairs(double h) {
       deep_[k] = 0;
       if (touching) ++summary.touches;
     }
-    if (now.pushed_through && !through_[k]) event(k, Event::Kind::Through);
-    through_[k] = now.pushed_through;
+    const double radius = scene_.pairs()[k].radius;
+    const bool through = now.pushed_through || (radius > 0 && now.depth > radius);
+    if (through && !through_[k]) event(k, Event::Kind::Through);
+    through_[k] = through;
     if (!touching) continue;
     if (now.normal_force > summary.peak_force)
       summary.peak_force = now.normal_force, summary.peak_force_time = state_.t;
     if (now.depth > summary.max_depth)
       summary.max_depth = now.depth, summary.max_depth_time = state_.t;
-    const double radius = scene_.pairs()[k].radius;
     if (radius > 0 && now.depth > 0.5 * radius && !deep_[k]) {
       deep_[k] = 1;
       event(k, Event::Kind::Deep);
@@ -413,7 +415,7 @@ const VectorX& Simulation::torque(double t, const VectorX& q, const VectorX& v) 
 }
 
 bool Simulation::follow_state() const {
-  return controller_ && settings_.control_dt == 0 && controller_->differentiable();
+  return controller_ && settings_.control_dt == 0;
 }
 
 bool Simulation::follow_time() const { return follow_state() && controller_->follows_time(); }

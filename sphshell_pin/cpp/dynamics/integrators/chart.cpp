@@ -82,6 +82,12 @@ void Chart::rate_at_origin(VectorX& out) {
   out.head(nv_) = origin_->v;
 }
 
+const VectorX& Chart::bristle_rates_at(const VectorRef& v) {
+  v_ = v;
+  scene_.revisit(origin_->q, v_, origin_->z);
+  return scene_.bristle_rates();
+}
+
 void Chart::rate(double t, const VectorX& y, VectorX& out) {
   place(y, q_, v_);
   z_ = y.segment(2 * nv_, nz());

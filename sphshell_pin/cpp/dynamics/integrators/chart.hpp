@@ -24,7 +24,7 @@ class Torques {
  public:
   virtual ~Torques() = default;
   virtual const VectorX& torque(double t, const VectorX& q, const VectorX& v) = 0;
-  // What a linearization may vary: false where torques are held, or are somebody's own routine.
+  // What a linearization has to vary: false where torques are held.
   virtual bool follow_state() const = 0;
   virtual bool follow_time() const = 0;
 };
@@ -51,6 +51,8 @@ class Chart {
   // The rate at y = (0, v, z, work) of the origin.
   void rate_at_origin(VectorX& out);
   const VectorX& torque_at_origin() const { return torque_; }
+  // The rates of the bristles at the origin's place, with another velocity.
+  const VectorX& bristle_rates_at(const VectorRef& v);
   // y at the origin.
   void start(VectorX& y) const;
   // y as a state at time t.

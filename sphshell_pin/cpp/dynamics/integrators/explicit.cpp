@@ -12,6 +12,10 @@ void SemiImplicitEuler::step(Chart& chart, double h, State& out) {
   chart.start(y_);
   y_.segment(nv, all - nv - Chart::kWork) += h * rate_.segment(nv, all - nv - Chart::kWork);
   y_.head(nv) = h * y_.segment(nv, nv);
+  // Bristles are springs: they move like positions, with the new velocity.
+  if (chart.nz() > 0)
+    y_.segment(2 * nv, chart.nz()) =
+        chart.origin().z + h * chart.bristle_rates_at(y_.segment(nv, nv));
   // The torque acts over the mean of both velocities.
   y_[all - 1] +=
       h * (rate_[all - 1] + 0.5 * h * chart.torque_at_origin().dot(rate_.segment(nv, nv)));

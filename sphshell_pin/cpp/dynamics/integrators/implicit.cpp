@@ -107,9 +107,10 @@ void ImplicitStepper::factorise(double gamma_h) {
   lu_.compute(matrix_);
 }
 
-void ImplicitStepper::solve(VectorX& x) const {
+void ImplicitStepper::solve(VectorX& x) {
   const int n = 2 * nv_ + nz_;
-  x.head(n) = lu_.solve(x.head(n)).eval();
+  solution_ = lu_.solve(x.head(n));
+  x.head(n) = solution_;
   x.tail<Chart::kWork>().setZero();
 }
 

@@ -17,7 +17,7 @@ class ImplicitStepper : public Stepper {
  protected:
   void factorise(double gamma_h);
   // In place; work is no part of the system.
-  void solve(VectorX& x) const;
+  void solve(VectorX& x);
 
   VectorX start_, rate_, rate_of_time_;
 
@@ -29,7 +29,7 @@ class ImplicitStepper : public Stepper {
   Linearization linearization_;
   Eigen::MatrixXd rates_, jacobian_, matrix_, torque_by_state_;
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
-  VectorX q_, v_, torque_, column_, u_;
+  VectorX q_, v_, torque_, column_, u_, solution_;
   int nv_ = 0, nz_ = 0;
 };
 

@@ -1,0 +1,207 @@
+"""The cases of benchmarks.work_precision: what moves, how it is judged, with which settings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+import sphshell_pin as sp
+from benchmarks import swing
+from benchmarks.step import RADIUS, START, panda, tip_position
+from sphshell_pin.dynamics import Result
+from sphshell_pin.dynamics.integrators import Integrator
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A run, and its settings from coarse to fine.
+
+    `figures` reads dimensionless vectors (n, k) off the rows of a result: the error is the largest
+    length of the difference of one of them. Fixed steps divide `record_dt` [s]. `references` are
+    two methods of different kinds; a result is judged by the one that is not of its own.
+    """
+
+    name: str
+    title: str
+    judged: str  # what the error is of, and against what
+    scene: sp.Scene
+    controller: Any
+    q0: Array
+    v0: Array | None
+    duration: float
+    record_dt: float
+    figures: Callable[[Result], list[Array]]
+    references: tuple[Integrator, Integrator]
+    integrators: tuple[Integrator, ...]
+    quick_dt: float  # --quick makes no shorter steps
+
+    def run(self, integrator: Integrator, duration: float | None = None) -> Result:
+        duration = self.duration if duration is None else duration
+        simulation = sp.Simulation(self.scene, integrator)
+        return simulation.run(self.q0, self.v0, duration, self.controller, record_dt=self.record_dt)
+
+
+def decades(kind: Callable[[float], Integrator], *exponents: float) -> tuple[Integrator, ...]:
+    return tuple(kind(10.0**-e) for e in exponents)
+
+
+def steps(kind: Callable[[float], Integrator], *dts: float) -> tuple[Integrator, ...]:
+    return tuple(kind(dt) for dt in dts)
+
+
+def bowl() -> Case:
+    """Two swings of a ball without friction in a bowl of curved elements, h / r = 0.15."""
+    amplitude = swing.ARM * math.sin(swing.ANGLE)
+    return Case(
+        name="bowl swing",
+        title="Ball swings in a bowl",
+        judged="error of position / amplitude",
+        scene=swing.mesh_scene(swing.bowl(0.15)),
+        controller=None,
+        q0=swing.start(float(swing.AZIMUTHS[0])),
+        v0=None,
+        duration=0.72,
+        record_dt=0.02,
+        figures=lambda result: [result.q / amplitude],
+        references=(sp.Adaptive(1e-12), sp.RungeKutta4(2e-5)),
+        integrators=(
+            *steps(sp.SemiImplicitEuler, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),
+            *steps(sp.RungeKutta4, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4),
+            *steps(sp.LinearlyImplicitEuler, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5),
+            *decades(sp.Adaptive, 2, 3, 4, 5, 6, 7, 8),
+            *decades(sp.Implicit, 2, 3, 4, 5, 6, 7, 8),
+        ),
+        quick_dt=1e-4,
+    )
+
+
+# Steel on steel: Hertz's law, 20 N press 1.1 um deep, where the stiffness is 2.7e7 N/m.
+YOUNG, POISSON = 210e9, 0.3  # [Pa]
+STEEL = sp.ImpactLaw.hertz(RADIUS, YOUNG, POISSON, YOUNG, POISSON, restitution=0.9, speed=0.1)
+PRESS, SPEED, LEAD_IN = 20.0, 0.05, 0.055  # [N], [m/s], [s]
+FAST_CREEP, SLOW_CREEP = 1e-4, 1e-5  # v_static [m/s]
+
+
+def press(v_static: float = SLOW_CREEP, duration: float = 0.4) -> Case:
+    """A Panda presses a steel ball on a steel plate, holds still, then slides.
+
+    Below the limit regularised Coulomb friction creeps; under half of the largest force at
+    0.35 v_static, with the slow one 3.5 um/s. Explicit methods are stable up to a step that is
+    proportional to it.
+    """
+    law, friction = STEEL, sp.CoulombFriction(0.3, 0.25, v_static, 1e-2)
+    scene = panda()
+    tip = tip_position(scene, START)
+    placement = pin.SE3(np.eye(3), tip - [0, 0, RADIUS - law.depth_at(PRESS)])
+    plate = sp.Shell(
+        0.3 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2, 3]]
+    )
+    scene.add_contact(
+        sp.Sphere(RADIUS, TIP), plate, placement=placement, law=law, friction=friction
+    )
+    controller = sp.CartesianImpedance(
+        TIP,
+        [[0, 0, 0], [0, 0.03, 0]],
+        stiffness=1000.0,
+        damping=60.0,
+        normal_force=PRESS,
+        shell=plate,
+        placement=placement,
+        speed=SPEED,
+        lead_in=LEAD_IN,
+        rotational_stiffness=30.0,
+        rotational_damping=2.0,
+        posture_stiffness=2.0,
+        joint_damping=0.5,
+    )
+    way = SPEED * (duration - LEAD_IN)
+
+    def figures(result: Result) -> list[Array]:
+        log = result.contacts
+        force = np.zeros((len(result.t), 3))
+        np.add.at(force, log.row, log.normal_force[:, None] * log.normal_world)
+        np.add.at(force, log.row, log.friction_force_world)
+        tips = np.array([tip_position(scene, q) for q in result.q])
+        return [force / PRESS, tips / way]
+
+    return Case(
+        name=f"press, v_static {v_static * 1e6:g} um/s",
+        title="Panda slides steel on steel",
+        judged="error of force / 20 N, of position / way",
+        scene=scene,
+        controller=controller,
+        q0=START,
+        v0=None,
+        duration=duration,
+        record_dt=0.01,
+        figures=figures,
+        references=(sp.Adaptive(1e-10), sp.Implicit(1e-9)),
+        integrators=(
+            *steps(sp.SemiImplicitEuler, 1e-4, 5e-5, 2.5e-5, 2e-5, 1e-5, 5e-6, 2.5e-6, 2e-6, 1e-6),
+            *steps(sp.RungeKutta4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2.5e-6),
+            *steps(sp.LinearlyImplicitEuler, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5),
+            *decades(sp.Adaptive, 3, 4, 5, 6, 7),
+            *decades(sp.Implicit, 2, 3, 4, 4.5, 5, 5.5, 6, 7, 8),
+        ),
+        quick_dt=2e-6,
+    )
+
+
+TIP = "panda_hand_tcp"
+BELT_SPEED, SPRING, BLOCK = 0.02, 1000.0, 1.0  # [m/s], [N/m], [kg]
+MU_STATIC, MU_DYNAMIC = 0.5, 0.3
+CONTACT = 1e6  # stiffness of the contact and of its bristles [N/m]: they give by 5 um
+
+
+def stick_slip() -> Case:
+    """A block on a spring rides on a belt and slips back, six times in two seconds.
+
+    The belt is a plate that slides, too heavy to be slowed; the block does not turn.
+    """
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, 0.0, -swing.GRAVITY])
+    bodies = (
+        ("block", pin.JointModelTranslation(), pin.Inertia.FromSphere(BLOCK, 0.01)),
+        ("belt", pin.JointModelPX(), pin.Inertia(1e8, np.zeros(3), np.eye(3))),
+    )
+    for name, joint, inertia in bodies:
+        index = model.addJoint(0, joint, pin.SE3.Identity(), f"{name}_joint")
+        model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
+        model.addFrame(pin.Frame(name, index, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    damping = math.sqrt(CONTACT * BLOCK)  # half of the critical one
+    law = sp.ImpactLaw(CONTACT, 1.0, damping, 1e-7)
+    friction = sp.BristleFriction(MU_STATIC, MU_DYNAMIC, CONTACT, damping, v_stribeck=0.01)
+    scene = sp.Scene(model)
+    plate = sp.Shell([[-1, -0.1, 0], [1, -0.1, 0], [1, 0.1, 0], [-1, 0.1, 0]], [[0, 1, 2, 3]])
+    scene.add_contact(sp.Sphere(0.01, "block"), plate, "belt", law=law, friction=friction)
+    weight = BLOCK * swing.GRAVITY
+    stretch = MU_STATIC * weight / SPRING
+    return Case(
+        name="stick-slip",
+        title="Block sticks and slips on a belt",
+        judged="error of position / stretch of the spring",
+        scene=scene,
+        controller=sp.JointPD([SPRING, 0, 0, 0], 0.0, np.zeros(4), gravity_compensation=False),
+        q0=np.array([0.0, 0.0, 0.01 - law.depth_at(weight), 0.0]),
+        v0=np.array([BELT_SPEED, 0.0, 0.0, BELT_SPEED]),
+        duration=2.0,
+        record_dt=0.01,
+        figures=lambda result: [result.q[:, :1] / stretch],
+        references=(sp.Adaptive(1e-10), sp.Implicit(1e-9)),
+        integrators=(
+            *steps(sp.SemiImplicitEuler, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6),
+            *steps(sp.RungeKutta4, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),
+            *steps(sp.LinearlyImplicitEuler, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5),
+            *decades(sp.Adaptive, 2, 3, 4, 5, 6, 7, 8),
+            *decades(sp.Implicit, 2, 3, 4, 5, 6, 7, 8),
+        ),
+        quick_dt=2e-5,
+    )

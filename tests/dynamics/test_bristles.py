@@ -1,0 +1,321 @@
+"""Friction that sticks: against closed forms, conserved quantities, and other meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin import _core
+from tests import meshes, models
+
+R = 0.05
+G = 9.81
+K = 1e5  # stiffness of the normal law, and of bristles [N/m]
+DEPTH = G / K  # of 1 kg at rest
+FIVE = [
+    sp.SemiImplicitEuler(1e-4),
+    sp.RungeKutta4(1e-4),
+    sp.LinearlyImplicitEuler(1e-4),
+    sp.Adaptive(1e-7),
+    sp.Implicit(1e-6),
+]
+every = pytest.mark.parametrize("integrator", FIVE, ids=lambda i: type(i).__name__)
+ACCURATE = sp.Adaptive(1e-9)
+
+
+def one_quad(size: float = 4.0) -> sp.Shell:
+    return sp.Shell(*meshes.grid_plate(size=size, quads=True))
+
+
+def block(friction: sp.BristleFriction, shell: sp.Shell | None = None, **more) -> sp.Scene:
+    """1 kg that slides without turning."""
+    model = models.empty()
+    models.add_body(model, "ball", pin.JointModelTranslation())
+    law = models.linear_law(K, 300.0)
+    scene = sp.Scene(model)
+    scene.add_contact(sp.Sphere(R, "ball"), shell or one_quad(), law=law, friction=friction, **more)
+    return scene
+
+
+def run(scene: sp.Scene, integrator, q, v=None, duration=1.0, **more) -> sp.Result:
+    q = np.asarray(q, dtype=float)
+    v = np.zeros(scene.model.nv) if v is None else np.asarray(v, dtype=float)
+    return sp.Simulation(scene, integrator).run(q, v, duration, **more)
+
+
+def pushed(force):
+    """Push along x with `force`(t) [N]."""
+    return lambda t, q, v, contacts: np.array([force(t), 0.0, 0.0])
+
+
+REST = [0.0, 0.0, R - DEPTH]
+
+
+@every
+@pytest.mark.parametrize("damping", [0.0, 2.0, 300.0])
+def test_below_the_limit_nothing_creeps(integrator, damping: float) -> None:
+    """A third of mu N, at once: x = X (1 - exp(-c t / 2m) cos(w t + ...)), X = F / k, for ever."""
+    scene = block(sp.BristleFriction(0.6, 0.6, K, damping))
+    rows = run(
+        scene, integrator, REST, None, 1.0, controller=pushed(lambda t: 0.2 * G), record_dt=5e-3
+    )
+    expected = 0.2 * G / K
+    x = rows.q[:, 0]
+    assert x.max() < 2.02 * expected
+    assert x.min() > -0.02 * expected
+    if damping == 300.0:
+        assert x[100:] == pytest.approx(expected, rel=1e-5)
+
+
+def ramped(rate: float = 4.0) -> sp.Result:
+    friction = sp.BristleFriction(0.5, 0.3, K, 300.0, v_stribeck=0.05)
+    scene = block(friction)
+    push = pushed(lambda t: rate * G * t)
+    return run(scene, sp.Adaptive(1e-7), REST, None, 0.2, controller=push, record_dt=2e-4)
+
+
+def test_break_away_and_stribeck() -> None:
+    """It holds up to mu_static N, and slides with mu(s) N."""
+    rows = ramped()
+    log = rows.contacts
+    force = np.linalg.norm(log.friction_force_world, axis=1) / log.normal_force
+    slip = np.linalg.norm(log.slip_velocity_world, axis=1)
+    assert force.max() == pytest.approx(0.5, rel=2e-3)
+    assert log.t[np.argmax(force)] == pytest.approx(0.5 / 4.0, rel=0.02)
+    before = log.t < 0.12
+    assert log.t[before].size > 100
+    assert rows.q[before.nonzero()[0], 0].max() < 1.02 * 0.5 * G / K
+    sliding = slip > 0.01
+    mu = 0.3 + 0.2 * np.exp(-((slip[sliding] / 0.05) ** 2))
+    assert sliding.sum() > 50
+    assert force[sliding] == pytest.approx(mu, rel=1e-6)
+    assert force[-1] == pytest.approx(0.3, rel=1e-5)
+
+
+@every
+def test_a_slide_ends_where_coulomb_says(integrator) -> None:
+    """v^2 / (2 mu g), and it stays there, but for the stretch mu g m / k."""
+    scene = block(sp.BristleFriction(0.3, 0.3, K, 300.0))
+    rows = run(scene, integrator, REST, [0.5, 0, 0], 0.5, record_dt=1e-2)
+    assert rows.q[-1, 0] == pytest.approx(0.5**2 / (2 * 0.3 * G), abs=2.5 * 0.3 * G / K + 4e-5)
+    assert abs(rows.v[-1, 0]) < 1e-8
+
+
+@pytest.mark.parametrize("method", ["smooth", "facets"])
+def test_borders_of_elements_are_not_felt(method: str) -> None:
+    """A ball that slides and then rolls over 800 triangles, and over one square."""
+    ends = []
+    for shell in (one_quad(2.0), sp.Shell(*meshes.random_plate(800, seed=4, size=2.0))):
+        scene = sp.Scene(models.ball(radius=R))
+        friction = sp.BristleFriction(0.2, 0.15, K, 30.0, torsional=True)
+        law = models.linear_law(K, 300.0)
+        scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, method=method)
+        q = models.free_q([-0.2, 0.03, R - DEPTH])
+        rows = run(scene, ACCURATE, q, [0.8, 0.3, 0, 0.0, -4.0, 20.0], 0.6, record_dt=0.05)
+        ends.append(rows)
+    assert np.abs(ends[0].q - ends[1].q).max() < 1e-9
+    assert np.abs(ends[0].v - ends[1].v).max() < 1e-8
+    assert len(np.unique(ends[1].contacts.element)) > 5
+
+
+def turntable(friction: sp.BristleFriction) -> sp.Scene:
+    """A heavy disc on a hinge along z, and a block on it that moves freely in the world."""
+    model = models.empty()
+    hub = pin.Inertia(1e3, np.zeros(3), 1e6 * np.eye(3))
+    models.add_body(model, "disc", pin.JointModelRZ(), inertia=hub)
+    models.add_body(model, "ball", pin.JointModelTranslation())
+    scene = sp.Scene(model)
+    law = models.linear_law(K, 300.0)
+    shell = sp.Shell(*meshes.random_plate(300, seed=2, size=2.0))
+    scene.add_contact(sp.Sphere(R, "ball"), shell, frame="disc", law=law, friction=friction)
+    return scene
+
+
+@every
+def test_a_block_rides_on_a_turntable(integrator) -> None:
+    """w^2 x < mu g: a circle, in step with the disc, for as many turns as one likes."""
+    scene = turntable(sp.BristleFriction(0.5, 0.5, K, 300.0))
+    w, x = 3.0, 0.3
+    rows = run(
+        scene, integrator, [0.0, x, 0.0, R - DEPTH], [w, 0.0, w * x, 0.0], 4.2, record_dt=0.1
+    )
+    angle = rows.q[:, 0]
+    c, s = np.cos(angle), np.sin(angle)
+    along = c * rows.q[:, 1] + s * rows.q[:, 2]
+    across = -s * rows.q[:, 1] + c * rows.q[:, 2]
+    stretch = w**2 * x / K  # one kilogram
+    # Methods of order 1 see the centre leave the circle along its tangent: w^2 x dt / 2 a second.
+    first_order = not isinstance(integrator, sp.RungeKutta4 | sp.Adaptive | sp.Implicit)
+    drift = 0.6 * w**2 * x * 1e-4 * rows.t if first_order else 0 * rows.t
+    assert (np.abs(along - x) < 2.5 * stretch + drift).all()
+    assert (np.abs(across) < 2.5 * stretch + drift).all()
+    if not first_order:
+        assert along[20:] == pytest.approx(x + stretch, abs=2e-8)
+
+
+def test_rates_do_not_know_the_turn_of_the_shell() -> None:
+    """A block on a cart on the disc: whatever the disc's angle and speed, the bristle sees none."""
+    model = models.empty()
+    joint = models.add_body(model, "disc", pin.JointModelRZ())
+    models.add_body(model, "ball", pin.JointModelTranslation(), joint)
+    friction = _core.FrictionLaw.bristle(0.5, 0.3, K, 30.0, 0.01, False)
+    shell = sp.Shell(*meshes.random_plate(300, seed=2, size=2.0))
+    scene = sp.Scene(model)
+    law, bristle = models.linear_law(K, 300.0), sp.BristleFriction(0.5, 0.3, K, 30.0)
+    assert bristle.core.coefficient(0.02) == friction.coefficient(0.02)
+    scene.add_contact(sp.Sphere(R, "ball"), shell, frame="disc", law=law, friction=bristle)
+    core = _core.Scene(scene.model, [pair.to_core() for pair in scene.pairs])
+    z = np.zeros(core.bristle_size)
+    z[:3] = [3e-5, -1e-5, 0.0]
+    rates = []
+    for angle, speed in ((0.0, 0.0), (1.3, 0.0), (0.4, 20.0)):
+        q, v = np.array([angle, 0.2, 0.1, R - DEPTH]), np.array([speed, 1e-3, 2e-3, 0.0])
+        rates.append(core.rates(q, v, z, np.zeros(4))[4:])
+    assert np.abs(rates[0][:2]) == pytest.approx([1e-3, 2e-3], rel=1e-9)
+    assert rates[1] == pytest.approx(rates[0], abs=1e-12)
+    assert rates[2] == pytest.approx(rates[0], abs=1e-12)
+
+
+def crossing(angle: float, record_dt: float, method: str = "smooth") -> sp.Result:
+    """A block slides, and sticks at last, over a groove whose walls rise by `angle` [rad]."""
+    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
+    friction = sp.BristleFriction(0.4, 0.3, 1e4, 50.0)
+    model = models.empty()
+    models.add_body(model, "ball", pin.JointModelTranslation())
+    scene = sp.Scene(model)
+    law = sp.ImpactLaw(1e4, 1.0, 100.0, 2e-3)  # its damping sets in softly: no kink of its own
+    scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, method=method)
+    height = R / np.cos(angle) + 0.02 * np.tan(angle) - G / 1e4
+    v = [0.4, 0.03, -0.4 * np.tan(angle)]
+    return run(scene, sp.Adaptive(1e-8), [-0.02, 0.1, height], v, 0.15, record_dt=record_dt)
+
+
+def largest_jump(rows: sp.Result) -> float:
+    """Of the sum of friction forces between rows [N]."""
+    force = np.zeros((len(rows.t), 3))
+    np.add.at(force, rows.contacts.row, rows.contacts.friction_force_world)
+    return float(np.linalg.norm(np.diff(force[5:], axis=0), axis=1).max())
+
+
+@pytest.mark.parametrize("degrees", [1.0, 5.0, 12.0])
+def test_friction_is_continuous_where_contacts_part_and_join(degrees: float) -> None:
+    angle = np.radians(degrees)
+    coarse, fine = (crossing(angle, dt) for dt in (2e-4, 2.5e-5))
+    passes = np.bincount(fine.contacts.row[fine.contacts.normal_force < 0], minlength=1)
+    both = np.bincount(fine.contacts.row).max() > 1
+    assert passes.sum() > 0 or both
+    assert largest_jump(fine) < 0.4 * largest_jump(coarse)
+    assert largest_jump(fine) < 0.02 * 0.4 * G
+    assert np.abs(fine.energy.residual).max() < 1e-6 * fine.energy.exchanged
+
+
+def test_momentum_is_kept_where_contacts_part_and_join() -> None:
+    """The impulse of all logged forces and of gravity is the change of momentum."""
+    rows = crossing(np.radians(5.0), 2.5e-5)
+    log = rows.contacts
+    force = np.zeros((len(rows.t), 3))
+    total = log.normal_force[:, None] * log.normal_world + log.friction_force_world
+    np.add.at(force, log.row, total)
+    force[:, 2] -= G
+    impulse = (np.diff(rows.t)[:, None] * (force[1:] + force[:-1]) / 2).sum(axis=0)
+    assert impulse == pytest.approx(rows.v[-1] - rows.v[0], abs=2e-4)
+
+
+def test_lift_off_forgets() -> None:
+    """At every touch the bristle begins unstretched, whatever it held when it left."""
+    scene = sp.Scene(models.ball(radius=R))
+    friction = sp.BristleFriction(0.5, 0.5, 1e4)
+    law = models.linear_law(1e4, 3.0)
+    scene.add_contact(sp.Sphere(R, "ball"), one_quad(), law=law, friction=friction)
+    v = [1.0, 0.3, -1.0, 5.0, 8.0, 1.0]
+    rows = run(scene, ACCURATE, models.free_q([0, 0, R + 0.01]), v, 1.2)
+    log = rows.contacts
+    numbers = np.unique(log.number)
+    touches = [e.t for e in rows.events if e.kind == "touch"]
+    assert len(numbers) == len(touches) > 3
+    for number in numbers:
+        first = np.nonzero(log.number == number)[0][0]
+        assert log.t[first] == pytest.approx(touches[int(number)], abs=1e-12)
+        assert np.linalg.norm(log.friction_force_world[first]) < 1e-6
+
+
+DEEP = 1e-3
+
+
+def drill(*joints: pin.JointModel, mu: float = 0.4) -> sp.Scene:
+    """A ball held at a depth of 1 mm, on `joints`."""
+    model = models.empty(0.0)
+    place = pin.SE3(np.eye(3), np.array([0.0, 0.0, R - DEEP]))
+    light = pin.Inertia(1e-9, np.zeros(3), 1e-12 * np.eye(3))
+    parent = 0
+    for i, joint in enumerate(joints[:-1]):
+        parent = models.add_body(model, f"b{i}", joint, parent, placement=place, inertia=light)
+        place = pin.SE3.Identity()
+    lump = pin.Inertia.FromSphere(1.0, R)
+    models.add_body(model, "ball", joints[-1], parent, placement=place, inertia=lump)
+    scene = sp.Scene(model)
+    friction = sp.BristleFriction(mu, mu, 1e6, 0.0, torsional=True)
+    law = models.linear_law(1e4)
+    scene.add_contact(sp.Sphere(R, "ball"), one_quad(), law=law, friction=friction)
+    return scene
+
+
+INERTIA = 0.4 * R**2
+LOAD = 1e4 * DEEP
+LEVER = 3 * np.pi / 16 * np.sqrt(R * DEEP)
+
+
+@every
+def test_a_spin_dies_out_at_the_moment_limit(integrator) -> None:
+    """M = 3 pi / 16 mu N a: w0 - M t / I; then it sticks, and swings in its bristle."""
+    rate = 0.4 * LOAD * LEVER / INERTIA
+    w0 = 0.05 * rate
+    rows = run(drill(pin.JointModelRZ()), integrator, [0.0], [w0], 0.1, record_dt=1e-3)
+    sliding = (rows.t > 2e-3) & (rows.t < 0.045)
+    late = rows.t > 0.055
+    stretch = 0.4 * LOAD / 1e6 / LEVER  # [rad]
+    swing = stretch * np.sqrt(1e6 * LEVER**2 / INERTIA)
+    assert rows.v[sliding, 0] == pytest.approx(w0 - rate * rows.t[sliding], abs=1.5 * swing)
+    slope = np.polyfit(rows.t[sliding], rows.v[sliding, 0], 1)[0]
+    assert slope == pytest.approx(-rate, rel=2e-3)
+    assert np.ptp(rows.q[late, 0]) < 2.1 * stretch
+    assert np.abs(rows.v[late, 0]).max() < 1.1 * swing
+
+
+def test_force_and_moment_share_the_limit() -> None:
+    """Both act against w = v + rho spin n, with mu N together: while sliding they keep its way."""
+    scene = drill(pin.JointModelPX(), pin.JointModelRZ())
+    rows = run(scene, sp.Adaptive(1e-9), [0.0, 0.0], [0.5, 30.0], 0.02, record_dt=1e-4)
+    force = np.diff(rows.v[:, 0]) / np.diff(rows.t)
+    moment = np.diff(rows.v[:, 1]) / np.diff(rows.t) * INERTIA
+    limit = 0.4 * LOAD
+    late = slice(20, 100)
+    whole = (force / limit) ** 2 + (moment / (limit * LEVER)) ** 2
+    assert whole[late] == pytest.approx(1.0, rel=2e-3)
+    v = 0.5 * (rows.v[1:] + rows.v[:-1])
+    assert (moment / force)[late] == pytest.approx((LEVER**2 * v[:, 1] / v[:, 0])[late], rel=1e-2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_energy_of_random_rolls(seed: int) -> None:
+    """Friction gives nothing back: less than what a bristle holds, where contacts join."""
+    rng = np.random.default_rng(seed)
+    vertices, triangles = meshes.dome(cells=10, size=1.0, radius=1.0)
+    height = 0.02 * np.sin(9 * vertices[:, 0]) * np.cos(7 * vertices[:, 1])
+    shell = sp.Shell(vertices * [1, 1, -1] + height[:, None] * [0, 0, 1], triangles)
+    scene = sp.Scene(models.ball(radius=R))
+    friction = sp.BristleFriction(0.3, 0.25, 1e4, 20.0, torsional=bool(seed % 2))
+    law = models.linear_law(1e4, 30.0)
+    scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, method="smooth")
+    q = models.free_q([*rng.uniform(-0.1, 0.1, 2), 0.0])
+    top = max(0.0, -float(shell.closest_points(q[None, :3]).distances[0]))
+    q[2] = 0.1 + top
+    v = np.concatenate([rng.uniform(-0.5, 0.5, 3), rng.uniform(-10, 10, 3)])
+    rows = run(scene, sp.Adaptive(1e-8), q, v, 0.6)
+    assert len(rows.contacts.t) > 100
+    energy = rows.energy
+    held = 0.5 * (0.3 * 5 * G) ** 2 / 1e4  # of a bristle at five times the weight
+    assert np.diff(energy.friction_loss).min() > -0.05 * held
+    assert np.abs(energy.residual).max() < 1e-5 * energy.exchanged

@@ -1,0 +1,343 @@
+"""Error-controlled runs: rows, held torques, kinks, and what the arguments may be."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter, ScenarioError
+from sphshell_pin.scenario.build import build
+from tests import meshes, models
+from tests.scenario import files
+
+R = 0.05
+ROOT = Path(__file__).parents[2]
+CONTROLLED = [sp.Adaptive(1e-7), sp.Implicit(1e-6)]
+both = pytest.mark.parametrize("integrator", CONTROLLED, ids=["Adaptive", "Implicit"])
+BRISTLE = sp.BristleFriction(0.4, 0.3, 1e4, 20.0)
+
+
+def bouncing() -> sp.Scene:
+    return models.on_plate(models.ball(), models.linear_law(4000.0, 20.0), BRISTLE)
+
+
+START = models.free_q([0.1, -0.05, R + 0.01]), np.array([1.0, 0.3, -0.2, 10.0, -20.0, 5.0])
+
+
+def run(scene: sp.Scene, integrator, q, v=None, duration=0.1, **more) -> sp.Result:
+    return sp.Simulation(scene, integrator).run(q, v, duration, **more)
+
+
+@both
+@pytest.mark.parametrize("record_dt", [1e-2, 1 / 300, 7e-4])
+def test_rows_stand_at_exact_multiples(integrator, record_dt: float) -> None:
+    t = run(bouncing(), integrator, *START, 0.2, record_dt=record_dt).t
+    grid = np.arange(len(t) - 1) * record_dt
+    assert np.array_equal(t[:-1], grid)
+    assert t[-1] == 0.2
+    # One row in every interval, and no second one a round-off before the end.
+    assert 1e-9 < t[-1] - t[-2] <= record_dt * (1 + 1e-12)
+
+
+@both
+def test_no_row_stands_a_round_off_before_the_end(integrator) -> None:
+    # 2 / 30 in doubles lies below 0.0666666667, and 1e-3 k below some of its decimals.
+    duration = np.nextafter(3 * 0.02, 1.0)
+    t = run(models_free(), integrator, np.zeros(1), None, duration, record_dt=0.02).t
+    assert len(t) == 4
+
+
+def models_free() -> sp.Scene:
+    return sp.Scene(models.slider())
+
+
+@both
+def test_recording_does_not_change_the_motion(integrator) -> None:
+    whole = run(bouncing(), integrator, *START, 0.4)
+    assert len(whole.events) > 2
+    for record_dt in (1e-4, 3e-3, 5.0):
+        rows = run(bouncing(), integrator, *START, 0.4, record_dt=record_dt)
+        assert np.array_equal(rows.q[-1], whole.q[-1])
+        assert np.array_equal(rows.v[-1], whole.v[-1])
+        assert rows.events == whole.events
+        for name in ("damping_loss", "friction_loss", "control_work"):
+            assert getattr(rows.energy, name)[-1] == getattr(whole.energy, name)[-1]
+        assert rows.stats["steps"] == whole.stats["steps"]
+
+
+@both
+def test_dense_rows_lie_on_the_motion(integrator) -> None:
+    """Against a much finer run; the dense output is of order 4, or of 3 with Rodas."""
+    rows = run(bouncing(), integrator, *START, 0.15, record_dt=1e-3)
+    fine = run(bouncing(), sp.Adaptive(1e-11), *START, 0.15, record_dt=1e-3)
+    assert np.array_equal(rows.t, fine.t)
+    assert np.abs(rows.q - fine.q).max() < 2e-5
+    assert np.abs(rows.v - fine.v).max() < 2e-3
+    assert np.linalg.norm(rows.q[:, 3:], axis=1) == pytest.approx(1.0, abs=1e-12)
+
+
+@both
+def test_few_rows(integrator) -> None:
+    assert np.array_equal(run(bouncing(), integrator, *START, 0.1, record_dt=1.0).t, [0.0, 0.1])
+    nothing = run(bouncing(), integrator, *START, 0.0)
+    assert np.array_equal(nothing.t, [0.0])
+    assert np.array_equal(nothing.q[0], START[0])
+
+
+@both
+def test_a_later_start_is_the_same_motion(integrator) -> None:
+    early = run(bouncing(), integrator, *START, 0.3, record_dt=1e-2)
+    late = run(bouncing(), integrator, *START, 0.3, record_dt=1e-2, t0=7.0)
+    assert late.t == pytest.approx(early.t + 7.0, abs=1e-14)
+    assert late.q == pytest.approx(early.q, abs=1e-6)
+    assert [e.kind for e in late.events] == [e.kind for e in early.events]
+
+
+@both
+@pytest.mark.parametrize("t0", [0.0, 0.1, 3.7, 1e3])
+def test_held_torques(integrator, t0: float) -> None:
+    """Called once a period, held in between: the speed is the sum of what was given."""
+    calls = []
+
+    def controller(t, q, v, contacts):
+        calls.append((t, float(v[0])))
+        return np.array([float(len(calls))])
+
+    scene = sp.Scene(models.slider(gravity=0.0, mass=2.0))
+    rows = run(scene, integrator, [0.0], None, 0.1, controller=controller, control_dt=7e-3, t0=t0)
+    periods = np.arange(15)
+    assert [t for t, _ in calls] == pytest.approx(t0 + 7e-3 * periods, abs=1e-12)
+    speeds = 7e-3 * np.cumsum(periods) / 2.0
+    assert [v for _, v in calls] == pytest.approx(speeds, abs=1e-10)
+    assert rows.v[-1, 0] == pytest.approx(speeds[-1] + (0.1 - 14 * 7e-3) * 15 / 2.0, abs=1e-10)
+
+
+FAR = """
+import sys
+sys.path.insert(0, {root!r})
+import numpy as np
+import sphshell_pin as sp
+from tests import models
+{body}
+print("done", len(rows.t))
+"""
+HELD = """
+calls = []
+def hold(t, q, v, contacts):
+    calls.append(t)
+    return np.zeros(1)
+scene = sp.Scene(models.slider())
+rows = sp.Simulation(scene, sp.{integrator}).run([0.0], None, 0.02, hold, 1e-3, t0=1e6)
+assert len(calls) == 20, len(calls)
+"""
+KINK = """
+way = np.array([[0.3, 0.0, 0.3], [0.3, 0.05, 0.3], [0.3, 0.05, 0.35]])
+impedance = sp.CartesianImpedance("ball", way, 100.0, 10.0, speed=0.5, lead_in=0.42)
+scene = sp.Scene(models.arm())
+rows = sp.Simulation(scene, sp.{integrator}).run(models.ARM_Q, None, 0.6, impedance, t0=0.09)
+"""
+
+
+@pytest.mark.parametrize("integrator", ["Adaptive()", "Implicit()"])
+@pytest.mark.parametrize("body", [HELD, KINK], ids=["held torques, t0 = 1e6", "kink at t0 = 0.09"])
+def test_round_off_of_time_does_not_hang_the_run(body: str, integrator: str) -> None:
+    """0.09 + (0.42 - 0.09) < 0.42, and 1e6 + k 1e-3 is off by more than 1e-9 of the period."""
+    program = FAR.format(root=str(ROOT), body=body.format(integrator=integrator))
+    try:
+        said = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, timeout=8, check=False
+        )
+    except subprocess.TimeoutExpired:
+        pytest.fail("the run makes steps of no length for ever")
+    assert "done" in said.stdout, said.stderr
+
+
+@both
+def test_path_kinks(integrator) -> None:
+    """A path's corners are met by a step: the same motion as with a tolerance far finer."""
+    way = np.array([[0.3, 0.0, 0.3], [0.3, 0.05, 0.3], [0.3, 0.05, 0.35]])
+    impedance = sp.CartesianImpedance("ball", way, 100.0, 10.0, speed=0.5, lead_in=0.1)
+    scene = sp.Scene(models.arm())
+    rows = run(scene, integrator, models.ARM_Q, None, 0.5, controller=impedance)
+    fine = run(scene, sp.Adaptive(1e-11), models.ARM_Q, None, 0.5, controller=impedance)
+    assert rows.q[-1] == pytest.approx(fine.q[-1], abs=2e-6)
+    for kink in (0.1, 0.2, 0.3):
+        assert np.abs(rows.t - kink).min() < 1e-15
+    assert rows.stats["steps"] < 4000
+
+
+@both
+def test_a_callable_is_asked_at_stages(integrator) -> None:
+    """A spring of one's own, at every stage: cos(w t) to the tolerance."""
+    scene = sp.Scene(models.slider(gravity=0.0, mass=2.0))
+    rows = run(scene, integrator, [0.1], None, 1.0, controller=lambda t, q, v, c: -50.0 * q)
+    assert rows.q[-1, 0] == pytest.approx(0.1 * np.cos(5.0), abs=1e-5)
+    # Five radians of a cosine: a method of order 4 takes a hundred steps or two.
+    assert rows.stats["steps"] < 1000
+
+
+@both
+def test_a_start_in_touch_and_at_rest(integrator) -> None:
+    scene = models.on_plate(models.ball(), models.linear_law(4000.0, 20.0), BRISTLE)
+    depth = 9.81 / 4000.0
+    q = models.free_q([0.0, 0.0, R - depth])
+    rows = run(scene, integrator, q, None, 2.0)
+    assert [(e.t, e.kind) for e in rows.events] == [(0.0, "touch")]
+    assert rows.q[-1] == pytest.approx(q, abs=1e-9)
+    assert rows.stats["steps"] < 3000
+
+
+@both
+def test_nothing_at_all(integrator) -> None:
+    """No contact pair, no gravity: straight on, in few steps."""
+    scene = sp.Scene(models.ball(gravity=0.0))
+    v = np.array([1.0, -2.0, 0.5, 0.0, 0.0, 0.0])
+    rows = run(scene, integrator, models.free_q([0, 0, 1]), v, 100.0)
+    assert rows.q[-1, :3] == pytest.approx([100.0, -200.0, 51.0], rel=1e-12)
+    assert rows.stats["steps"] < 60
+    still = run(scene, integrator, models.free_q([0, 0, 1]), None, 100.0)
+    assert np.array_equal(still.q[-1], models.free_q([0, 0, 1]))
+
+
+@both
+def test_a_graze_without_load_does_not_chatter(integrator) -> None:
+    """At depth 0 the sign of the depth is round-off."""
+    scene = models.on_plate(models.ball(gravity=0.0), models.linear_law(4000.0), BRISTLE)
+    q = models.free_q([-0.2, 0.01, R])
+    rows = run(scene, integrator, q, np.array([0.3, 0.1, 0, 3.0, 1.0, 2.0]), 1.0)
+    assert rows.q[-1, :3] == pytest.approx([0.1, 0.11, R], abs=1e-9)
+    assert rows.stats["steps"] < 3000
+
+
+@both
+def test_events_are_sorted_and_exact(integrator) -> None:
+    """The first touch of a falling ball: g t^2 / 2 + v t = gap."""
+    rows = run(bouncing(), integrator, *START, 0.5)
+    times = [e.t for e in rows.events]
+    assert times == sorted(times)
+    drop = ((0.2**2 + 2 * 9.81 * 0.01) ** 0.5 - 0.2) / 9.81
+    assert times[0] == pytest.approx(drop, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", [sp.Adaptive, sp.Implicit])
+@pytest.mark.parametrize("rtol", [0, -1e-3, float("nan"), float("inf"), 1, "fine", None, [1e-3]])
+def test_wrong_rtol(kind, rtol) -> None:
+    with pytest.raises(InvalidParameter, match="rtol"):
+        kind(rtol)
+
+
+@pytest.mark.parametrize("kind", [sp.Adaptive, sp.Implicit])
+def test_a_tolerance_is_no_step(kind) -> None:
+    with pytest.raises(TypeError, match="dt"):
+        kind(dt=1e-3)
+    with pytest.raises(InvalidParameter, match="atol"):
+        kind(1e-6, -1.0)
+
+
+def scenario(run_keys: str, friction: str = "") -> str:
+    text = files.DROP.replace("dt = 1e-4\n", run_keys)
+    return text.replace("\n[run]", f"{friction}\n[run]")
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ('integrator = "adaptive"\ndt = 1e-4\n', "adaptive takes rtol and atol, not dt"),
+        ('integrator = "implicit"\ndt = 1e-4\n', "implicit takes rtol and atol, not dt"),
+        ("rtol = 1e-4\n", "semi-implicit-euler takes dt, not rtol and atol"),
+        ('integrator = "adaptive"\nrtol = 1\n', "rtol"),
+        ('integrator = "adaptive"\nrtol = -1e-3\n', "rtol"),
+        ('integrator = "adaptiv"\n', "adaptive"),
+    ],
+)
+def test_scenario_refuses(tmp_path: Path, keys: str, said: str) -> None:
+    with pytest.raises(ScenarioError, match=said) as caught:
+        build(files.write(tmp_path, scenario(keys)))
+    assert len(str(caught.value).splitlines()) <= 2
+
+
+def test_scenario_reads_bristles(tmp_path: Path) -> None:
+    keys = "mu_static = 0.4, mu_dynamic = 0.3, stiffness = 2e4, damping = 3.0, torsional = true"
+    friction = f'friction = {{ type = "bristle", {keys} }}\n'
+    built = build(
+        files.write(tmp_path, scenario('integrator = "implicit"\nrtol = 1e-4\n', friction))
+    )
+    assert built.scene.pairs[0].friction == sp.BristleFriction(0.4, 0.3, 2e4, 3.0, torsional=True)
+    assert built.simulation.integrator == sp.Implicit(1e-4)
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0, 1.0), (0.5, 0, 0), (0, 1.5, 0.3)])
+def test_bristles_of_a_source_hold_whatever_its_frames(turn) -> None:
+    """The same plane on a frame turned any way: F / k stretches the bristle, and it sticks."""
+    model = models.empty()
+    models.add_body(model, "ball", pin.JointModelTranslation())
+    base = pin.SE3(pin.utils.rpyToMatrix(*turn), np.zeros(3))
+    model.addFrame(pin.Frame("base", 0, 0, base, pin.FrameType.OP_FRAME))
+    model.gravity.linear = np.array([2.0, 1.0, -9.81])
+    scene = sp.Scene(model)
+
+    def find(pose_i, pose_j):
+        x, y, z = pose_i.translation
+        return [[x, y, 0.0]], [[0.0, 0.0, 1.0]], [R - z]
+
+    law, friction = models.linear_law(1e5, 300.0), sp.BristleFriction(0.6, 0.6, 1e5, 300.0)
+    scene.add_contact_source(find, "ball", "base", law, friction, name="plane")
+    rows = run(scene, sp.Implicit(1e-6), [0.0, 0.0, R - 9.81e-5], None, 0.2)
+    assert rows.q[-1, :2] == pytest.approx([2e-5, 1e-5], rel=1e-3)
+
+
+def zoo() -> sp.Scene:
+    """Free flyer on a chain of a planar, a spherical and a composite joint; the tip touches."""
+    model = models.empty()
+    lump = pin.Inertia(1.0, np.array([0.02, 0.01, 0.03]), np.diag([0.02, 0.03, 0.04]))
+    out = pin.SE3(np.eye(3), np.array([0.05, 0.02, 0.1]))
+    mixed = pin.JointModelComposite(pin.JointModelRX())
+    mixed.addJoint(pin.JointModelRUBY(), pin.SE3(np.eye(3), np.array([0.0, 0.03, 0.0])))
+    parent = 0
+    for i, joint in enumerate(
+        (pin.JointModelFreeFlyer(), pin.JointModelPlanar(), pin.JointModelSpherical(), mixed)
+    ):
+        parent = models.add_body(model, f"b{i}", joint, parent, placement=out, inertia=lump)
+    scene = sp.Scene(model)
+    shell = sp.Shell(*meshes.grid_plate(size=20, quads=True))
+    scene.add_contact(sp.Sphere(R, "b3"), shell, law=models.linear_law(1e4, 20.0), friction=BRISTLE)
+    return scene
+
+
+def zoo_start(scene: sp.Scene) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(3)
+    q = pin.integrate(scene.model, pin.neutral(scene.model), rng.uniform(-0.4, 0.4, scene.model.nv))
+    data = scene.model.createData()
+    pin.framesForwardKinematics(scene.model, data, q)
+    tip = data.oMf[scene.model.getFrameId("b3")].translation[2]
+    q[2] += R - 2e-3 - tip
+    return q, rng.uniform(-2.0, 2.0, scene.model.nv)
+
+
+def test_all_kinds_of_joints_agree() -> None:
+    scene = zoo()
+    q, v = zoo_start(scene)
+    explicit = run(scene, sp.Adaptive(1e-11), q, v, 0.1)
+    implicit = run(scene, sp.Implicit(1e-9), q, v, 0.1)
+    assert len(explicit.contacts.depth) > 10
+    apart = pin.difference(scene.model, explicit.q[-1], implicit.q[-1])
+    assert np.abs(apart).max() < 1e-7
+    assert np.abs(explicit.energy.residual).max() < 1e-7 * explicit.energy.exchanged
+
+
+def test_runge_kutta_keeps_its_order_on_all_kinds_of_joints() -> None:
+    scene = zoo()
+    q, v = zoo_start(scene)
+    q[2] += 1.0  # free: a touch inside a step would cost the order
+    fine = run(scene, sp.Adaptive(1e-12), q, v, 0.1)
+    errors = []
+    for dt in (4e-3, 2e-3):
+        rows = run(scene, sp.RungeKutta4(dt), q, v, 0.1)
+        errors.append(np.abs(pin.difference(scene.model, fine.q[-1], rows.q[-1])).max())
+    assert 3.6 < np.log2(errors[0] / errors[1]) < 4.6
