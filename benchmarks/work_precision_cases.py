@@ -44,6 +44,7 @@ class Case:
     quick_dt: float  # --quick makes no shorter steps
 
     def run(self, integrator: Integrator, duration: float | None = None) -> Result:
+        """Run for `duration` [s], the case's own unless given."""
         duration = self.duration if duration is None else duration
         simulation = sp.Simulation(self.scene, integrator)
         return simulation.run(self.q0, self.v0, duration, self.controller, record_dt=self.record_dt)
@@ -57,8 +58,13 @@ def steps(kind: Callable[[float], Integrator], *dts: float) -> tuple[Integrator,
     return tuple(kind(dt) for dt in dts)
 
 
+def rectangle(x: float, y: float) -> sp.Shell:
+    """Return the flat plate z = 0 of |x|, |y| up to these."""
+    return sp.Shell([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]], [[0, 1, 2, 3]])
+
+
 def bowl() -> Case:
-    """Two swings of a ball without friction in a bowl of curved elements, h / r = 0.15."""
+    """Let a ball without friction swing twice in a bowl of curved elements, h / r = 0.15."""
     amplitude = swing.ARM * math.sin(swing.ANGLE)
     return Case(
         name="bowl swing",
@@ -83,30 +89,35 @@ def bowl() -> Case:
     )
 
 
+TIP = "panda_hand_tcp"
 # Steel on steel: Hertz's law, 20 N press 1.1 um deep, where the stiffness is 2.7e7 N/m.
 YOUNG, POISSON = 210e9, 0.3  # [Pa]
 STEEL = sp.ImpactLaw.hertz(RADIUS, YOUNG, POISSON, YOUNG, POISSON, restitution=0.9, speed=0.1)
 PRESS, SPEED, LEAD_IN = 20.0, 0.05, 0.055  # [N], [m/s], [s]
 FAST_CREEP, SLOW_CREEP = 1e-4, 1e-5  # v_static [m/s]
 
+PRESS_SETTINGS = (
+    *steps(sp.SemiImplicitEuler, 1e-4, 5e-5, 2.5e-5, 2e-5, 1e-5, 5e-6, 2.5e-6, 2e-6, 1e-6),
+    *steps(sp.RungeKutta4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2.5e-6),
+    *steps(sp.LinearlyImplicitEuler, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5),
+    *decades(sp.Adaptive, 3, 4, 5, 6, 7),
+    *decades(sp.Implicit, 2, 3, 4, 4.5, 5, 5.5, 6, 7, 8),
+)
+
 
 def press(v_static: float = SLOW_CREEP, duration: float = 0.4) -> Case:
-    """A Panda presses a steel ball on a steel plate, holds still, then slides.
+    """Let a Panda press a steel ball on a steel plate, hold still, then slide.
 
-    Below the limit regularised Coulomb friction creeps; under half of the largest force at
-    0.35 v_static, with the slow one 3.5 um/s. Explicit methods are stable up to a step that is
-    proportional to it.
+    Regularised Coulomb friction creeps where it should stick: under half of its largest force at
+    0.35 v_static. Up to v_static it is a damper of 1.5 mu N / v_static, and an explicit method is
+    stable only with steps in proportion to v_static.
     """
     law, friction = STEEL, sp.CoulombFriction(0.3, 0.25, v_static, 1e-2)
     scene = panda()
     tip = tip_position(scene, START)
     placement = pin.SE3(np.eye(3), tip - [0, 0, RADIUS - law.depth_at(PRESS)])
-    plate = sp.Shell(
-        0.3 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2, 3]]
-    )
-    scene.add_contact(
-        sp.Sphere(RADIUS, TIP), plate, placement=placement, law=law, friction=friction
-    )
+    ball, plate = sp.Sphere(RADIUS, TIP), rectangle(0.3, 0.3)
+    scene.add_contact(ball, plate, placement=placement, law=law, friction=friction)
     controller = sp.CartesianImpedance(
         TIP,
         [[0, 0, 0], [0, 0.03, 0]],
@@ -144,25 +155,18 @@ def press(v_static: float = SLOW_CREEP, duration: float = 0.4) -> Case:
         record_dt=0.01,
         figures=figures,
         references=(sp.Adaptive(1e-10), sp.Implicit(1e-9)),
-        integrators=(
-            *steps(sp.SemiImplicitEuler, 1e-4, 5e-5, 2.5e-5, 2e-5, 1e-5, 5e-6, 2.5e-6, 2e-6, 1e-6),
-            *steps(sp.RungeKutta4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2.5e-6),
-            *steps(sp.LinearlyImplicitEuler, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5),
-            *decades(sp.Adaptive, 3, 4, 5, 6, 7),
-            *decades(sp.Implicit, 2, 3, 4, 4.5, 5, 5.5, 6, 7, 8),
-        ),
+        integrators=PRESS_SETTINGS,
         quick_dt=2e-6,
     )
 
 
-TIP = "panda_hand_tcp"
 BELT_SPEED, SPRING, BLOCK = 0.02, 1000.0, 1.0  # [m/s], [N/m], [kg]
 MU_STATIC, MU_DYNAMIC = 0.5, 0.3
 CONTACT = 1e6  # stiffness of the contact and of its bristles [N/m]: they give by 5 um
 
 
 def stick_slip() -> Case:
-    """A block on a spring rides on a belt and slips back, six times in two seconds.
+    """Let a block on a spring ride on a belt and slip back, six times in two seconds.
 
     The belt is a plate that slides, too heavy to be slowed; the block does not turn.
     """
@@ -180,8 +184,8 @@ def stick_slip() -> Case:
     law = sp.ImpactLaw(CONTACT, 1.0, damping, 1e-7)
     friction = sp.BristleFriction(MU_STATIC, MU_DYNAMIC, CONTACT, damping, v_stribeck=0.01)
     scene = sp.Scene(model)
-    plate = sp.Shell([[-1, -0.1, 0], [1, -0.1, 0], [1, 0.1, 0], [-1, 0.1, 0]], [[0, 1, 2, 3]])
-    scene.add_contact(sp.Sphere(0.01, "block"), plate, "belt", law=law, friction=friction)
+    ball = sp.Sphere(0.01, "block")
+    scene.add_contact(ball, rectangle(1.0, 0.1), "belt", law=law, friction=friction)
     weight = BLOCK * swing.GRAVITY
     stretch = MU_STATIC * weight / SPRING
     return Case(

@@ -75,10 +75,11 @@ class Simulation:
 
         `controller`: None, a controller of this package, or a callable
         tau(t, q, v, contacts) -> (nv,). Torques are held for `control_dt` [s]; by default a
-        callable is asked once a step, a controller of this package at every stage of the step.
-        (With Adaptive and Implicit a callable is asked at every stage too, unless control_dt says
-        otherwise.) Rows are recorded every `record_dt` [s] (default: every step); `progress` is
-        called a few times a second with the share done. The same input gives the same bits.
+        callable is asked once a fixed step, a controller of this package at every stage of it.
+        Adaptive and Implicit ask at every stage, and Implicit 2 nv + 2 times more a step, at states
+        nearby: a callable with a memory needs control_dt. Rows are recorded every `record_dt` [s]
+        (default: every step); `progress` is called a few times a second with the share done. The
+        same input gives the same bits.
 
         A law that cannot stop its sphere earns a WeakLawWarning.
 

@@ -7,7 +7,7 @@ them when it stands alone, `robot/name` as soon as there are several robots.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -313,8 +313,7 @@ Controller = Annotated[
 ]
 
 
-FixedStep = Literal["semi-implicit-euler", "runge-kutta-4", "linearly-implicit-euler"]
-ErrorControlled = Literal["adaptive", "implicit"]
+ERROR_CONTROLLED = ("adaptive", "implicit")
 
 
 class RunSection(Section):
@@ -327,7 +326,9 @@ class RunSection(Section):
     dt: Positive | None = None
     rtol: Positive | None = None
     atol: Positive | None = None
-    integrator: FixedStep | ErrorControlled = "semi-implicit-euler"
+    integrator: Literal[
+        "semi-implicit-euler", "runge-kutta-4", "linearly-implicit-euler", "adaptive", "implicit"
+    ] = "semi-implicit-euler"
     control_dt: Positive | None = None
     record_dt: Positive | None = None
     recording_speed: Positive = 1.0
@@ -335,7 +336,7 @@ class RunSection(Section):
     @model_validator(mode="after")
     def check_steps(self) -> RunSection:
         """Refuse a step where the error decides, and a tolerance where it does not."""
-        if self.integrator in get_args(ErrorControlled):
+        if self.integrator in ERROR_CONTROLLED:
             if self.dt is not None:
                 raise ValueError(f"{self.integrator} takes rtol and atol, not dt")
         elif self.rtol is not None or self.atol is not None:

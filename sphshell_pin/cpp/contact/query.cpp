@@ -213,6 +213,7 @@ void Query::claims_to_contacts(const Shell& shell, const Vec3& centre, double ra
     if (turns_)
       contacts.back().turn =
           turn_of(contacts.back(), radius, along * along.transpose() / along.squaredNorm());
+    contacts.back().rim = edge.on_rim();
     if (one_sided) carriers_.push_back({topology.edge_normal(edge), edge.on_rim()});
   }
   for (const VertexClaim& claim : vertices_) {
@@ -221,6 +222,7 @@ void Query::claims_to_contacts(const Shell& shell, const Vec3& centre, double ra
     contacts.push_back(
         contact_at(point, facet.normal, centre, radius, facet.element, Feature::Vertex));
     if (turns_) contacts.back().turn = turn_of(contacts.back(), radius, Mat3::Zero());
+    contacts.back().rim = topology.vertex_on_rim[claim.vertex];
     if (one_sided)
       carriers_.push_back(
           {topology.vertex_normal[claim.vertex], bool(topology.vertex_on_rim[claim.vertex])});

@@ -34,6 +34,7 @@ struct Contact {
   double weight = 1;
   // Where asked for: derivative of weight * normal with respect to the sphere's centre [1/m].
   Mat3 turn = Mat3::Zero();
+  bool rim = false;  // on the border of an open sheet: there it has no sides
 
   double energy_weight() const { return weight > 0 ? 1 : weight; }
 };

@@ -273,6 +273,7 @@ void Query::claim_nearest(const Shell& shell, const Vec3& centre, double radius)
 void Query::add_minimum(const Shell& shell, const Contact& contact, int facet,
                         const Carrier& carrier) {
   contacts.push_back(contact);
+  contacts.back().rim = carrier.rim;
   holder_.push_back(facet);
   if (shell.side() != Side::Both) carriers_.push_back(carrier);
 }

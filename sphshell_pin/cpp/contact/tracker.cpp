@@ -59,13 +59,15 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
     if (at_[j] >= 0) continue;
     const Contact& c = contacts[j];
     at_[j] = static_cast<int>(places_.size());
-    places_.push_back({c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, count_++});
+    places_.push_back({c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, c.rim, count_++});
   }
   return at_;
 }
 
 void ContactTracker::keep_side(Contact& c, const Place& place, double radius) {
   if (radius == 0 || place.depth < kDeep * radius || c.normal.dot(place.normal) >= 0) return;
+  // Round a border the normal may turn by any angle in a step, and comes to no other side.
+  if (c.rim || place.rim) return;
   c.normal = -c.normal;
   c.depth = 2 * radius - c.depth;
   c.turn = -c.turn;
@@ -79,7 +81,7 @@ void ContactTracker::accept(const std::vector<Contact>& contacts, const Vec3& ce
   for (std::size_t j = 0; j < contacts.size(); ++j) {
     const Contact& c = contacts[j];
     next_.push_back(
-        {c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, places_[at_[j]].number});
+        {c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, c.rim, places_[at_[j]].number});
     deep_ = deep_ || (radius > 0 && c.depth > kDeep * radius);
   }
   places_.swap(next_);

@@ -15,7 +15,7 @@ class ContactTracker {
   struct Place {
     Vec3 point, normal;  // the normal points where the sphere is pushed
     double depth, reach;
-    bool pass;
+    bool pass, rim;
     int number;
     bool taken = false;  // by a contact of the last match()
   };
@@ -28,6 +28,8 @@ class ContactTracker {
   const std::vector<int>& match(std::vector<Contact>& contacts, const Vec3& centre, double radius);
   // The contacts last matched are the known ones from now on, in their order.
   void accept(const std::vector<Contact>& contacts, const Vec3& centre, double radius);
+  // Without contacts, the centre is all there is to remember.
+  void move_to(const Vec3& centre) { centre_ = centre; }
   // Forgets what was new since the last accept().
   void restart() { places_.resize(known_), count_ = next_number_; }
 

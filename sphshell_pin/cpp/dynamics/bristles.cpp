@@ -1,5 +1,6 @@
 #include "dynamics/bristles.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace sphshell {
@@ -58,17 +59,25 @@ void Bristles::deal(std::size_t k, const std::vector<Contact>& contacts, const s
   const auto point_of_contact = [&](std::size_t i) -> const Vec3& { return contacts[i].point; };
   const auto point_of_place = [&](std::size_t p) -> const Vec3& { return places[p].point; };
 
+  // A contact is the twin of one pass only.
+  used_.clear();
+  const auto is_used = [&](int place) {
+    return std::find(used_.begin(), used_.end(), place) != used_.end();
+  };
+
   // Where a contact parts in two, a minimum and the pass to it come to be together, with equal and
   // opposite force: both begin as the contact that they part from, and nothing jumps.
   for (std::size_t pass = 0; pass < contacts.size(); ++pass) {
     if (contacts[pass].weight > 0 || at[pass] < known) continue;
     const int twin = nearest(
         contacts[pass].point, contacts.size(),
-        [&](std::size_t i) { return contacts[i].weight > 0 && at[i] >= known; }, point_of_contact);
+        [&](std::size_t i) { return contacts[i].weight > 0 && at[i] >= known && !is_used(at[i]); },
+        point_of_contact);
     const int parent = nearest(
         contacts[pass].point, contacts.size(),
         [&](std::size_t i) { return contacts[i].weight > 0 && at[i] < known; }, point_of_contact);
     if (twin < 0 || parent < 0) continue;
+    used_.push_back(at[twin]);
     const Vec3 x = dealt_[begin + parent];
     for (std::size_t i : {pass, static_cast<std::size_t>(twin)})
       dealt_[begin + i] += torsional ? x : flattened(x, contacts[i].normal);
@@ -78,11 +87,15 @@ void Bristles::deal(std::size_t k, const std::vector<Contact>& contacts, const s
     if (!places[pass].pass || places[pass].taken) continue;
     const int twin = nearest(
         places[pass].point, known,
-        [&](std::size_t p) { return !places[p].pass && !places[p].taken; }, point_of_place);
+        [&](std::size_t p) {
+          return !places[p].pass && !places[p].taken && !is_used(static_cast<int>(p));
+        },
+        point_of_place);
     const int heir = nearest(
         places[pass].point, contacts.size(), [&](std::size_t i) { return contacts[i].weight > 0; },
         point_of_contact);
     if (twin < 0 || heir < 0) continue;
+    used_.push_back(twin);
     const Vec3 left = stretch(k, twin, z) - stretch(k, pass, z);
     dealt_[begin + heir] += torsional ? left : flattened(left, contacts[heir].normal);
   }

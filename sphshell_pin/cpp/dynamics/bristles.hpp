@@ -40,6 +40,7 @@ class Bristles {
   std::vector<int> first_, next_;  // of each pair, and behind the last
   std::vector<Vec3> dealt_;
   std::vector<char> has_;
+  std::vector<int> used_;
 };
 
 }  // namespace sphshell

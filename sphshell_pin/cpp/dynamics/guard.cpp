@@ -14,7 +14,7 @@ constexpr double kApart = 1.0 / 16, kTouching = 0.25;  // shares of the radius
 constexpr double kSeen = 1e-3;
 // A chord is not taken for the path where something turns by more than this in a step [rad].
 constexpr double kTurn = 0.5;
-constexpr int kMostChords = 64;
+constexpr double kMostTurned = 16;
 
 }  // namespace
 
@@ -41,6 +41,7 @@ double Guard::allowed(Scene& scene, const State& from, const State& to) {
     if (skipped) share = std::min(share, 0.5);
     double moved = excursion.moved;
     const double slack = pair.radius * (known.touching ? kTouching : kApart);
+    if (turned > kMostTurned) share = std::min(share, kMostTurned / turned);
     if (turned > kTurn) moved = std::max(moved, path(scene, k, from, to));
     if (moved <= slack) continue;
     const double limit = slack + (known.touching ? 0 : gap(pair, known));
@@ -71,8 +72,7 @@ double Guard::path(Scene& scene, std::size_t k, const State& from, const State& 
   const double h = to.t - from.t;
   const auto turned =
       std::max(from.v.lpNorm<Eigen::Infinity>(), to.v.lpNorm<Eigen::Infinity>()) * h;
-  const int chords =
-      static_cast<int>(std::min<double>(kMostChords, std::ceil(turned / (0.5 * kTurn))));
+  const int chords = static_cast<int>(std::ceil(std::min(turned, kMostTurned) / (0.5 * kTurn)));
   q_.resize(from.q.size());
   Vec3 last = known_[k].centre;
   double length = 0;

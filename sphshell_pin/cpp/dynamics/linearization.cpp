@@ -119,11 +119,7 @@ ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& t
   const PairState& state = scene_.states()[active.pair];
   const auto& turn = state.world_from_j.rotation();
   ContactSite site{active.contact, state.centre, !pair.source, pair.radius, twist, Vec3::Zero()};
-  if (pair.source) {
-    site.contact.point = state.world_from_j.actInv(active.contact.point);
-    site.contact.normal = turn.transpose() * active.contact.normal;
-    site.place = site.contact.point;
-  }
+  if (pair.source) site.place = site.contact.point;
   if (active.slot >= 0) site.stretch = turn.transpose() * active.meeting.bristle;
   return site;
 }

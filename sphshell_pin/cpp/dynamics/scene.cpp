@@ -99,6 +99,7 @@ void Scene::accept(VectorX& z) {
     excursions_[k].from = states_[k].centre;
     ContactTracker& tracker = trackers_[k];
     if (contacts.empty() && tracker.places().empty()) {
+      tracker.move_to(states_[k].centre);
       if (bristles_.any()) bristles_.deal_none(k);
       continue;
     }
@@ -153,6 +154,11 @@ std::vector<Contact>& Scene::find(std::size_t k) {
     pair.source(pair.joint_i == 0 ? pair.placement_i
                                   : body_.world_from_joint(pair.joint_i) * pair.placement_i,
                 state.world_from_j, query.contacts);
+    // As a shell's: in the frame of body j.
+    for (Contact& contact : query.contacts) {
+      contact.point = state.world_from_j.actInv(contact.point);
+      contact.normal = state.world_from_j.rotation().transpose() * contact.normal;
+    }
     state.centre.setZero();
     return query.contacts;
   }
@@ -171,8 +177,8 @@ void Scene::meet(ActiveContact& active, const VectorX& z) {
   const auto& turn = world_from_j.rotation();
   Meeting<double>& m = active.meeting;
   m.depth = contact.depth;
-  active.point = pair.source ? contact.point : world_from_j.act(contact.point);
-  m.normal = pair.source ? contact.normal : Vec3(turn * contact.normal);
+  active.point = world_from_j.act(contact.point);
+  m.normal = turn * contact.normal;
   m.relative.setZero();
   if (pair.needs_velocity()) m.relative = relative_velocity(pair, active.point);
   if (pair.friction.torsional) m.spin = m.normal.dot(spin_of(pair.joint_i) - spin_of(pair.joint_j));

@@ -63,7 +63,7 @@ struct Powers {
 // A contact at work.
 struct ActiveContact {
   int pair, slot, number;   // slot: of its bristle in the state, or -1
-  Contact contact;          // in the shell's frame, or of a source, in the world
+  Contact contact;          // in the frame of the shell, or of a source, that of body j
   Vec3 point;               // in the world
   Meeting<double> meeting;  // in the world
   ContactForce<double> force;

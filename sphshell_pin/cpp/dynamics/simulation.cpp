@@ -23,6 +23,9 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+// Of the numbers near t.
+double spacing(double t) { return std::numeric_limits<double>::epsilon() * std::abs(t); }
+
 std::unique_ptr<Stepper> make_stepper(Integrator integrator, Scene& scene) {
   switch (integrator) {
     case Integrator::RungeKutta4:
@@ -62,6 +65,7 @@ Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, R
   state_.v = std::move(v0);
   state_.z.setZero(scene_.bristle_size());
   next_ = between_ = state_;
+  next_control_ = settings_.start_time;
   set_fine(false);
   if (settings_.dt > 0) {
     // The last step is shortened to end at the duration; a hair's breadth is not a step.
@@ -129,16 +133,12 @@ void Simulation::start() {
 }
 
 double Simulation::end_of_step() const {
-  const double end = settings_.duration;
+  double end = settings_.start_time + settings_.duration;
   if (settings_.dt > 0)
-    return settings_.start_time +
-           (grid_ + 1 >= grid_steps_ ? end : double(grid_ + 1) * settings_.dt);
-  double next = end;
-  if (controller_) {
-    if (settings_.control_dt > 0) next = std::min(next, next_control_);
-    next = std::min(next, controller_->next_kink(state_.t) - settings_.start_time);
-  }
-  return settings_.start_time + next;
+    return grid_ + 1 >= grid_steps_ ? end : settings_.start_time + double(grid_ + 1) * settings_.dt;
+  if (controller_ && settings_.control_dt > 0) end = std::min(end, next_control_);
+  if (controller_) end = std::min(end, controller_->next_kink(state_.t));
+  return end;
 }
 
 Simulation::Status Simulation::step() {
@@ -180,6 +180,7 @@ void Simulation::set_fine(bool fine) {
 
 // False where the step would carry a sphere too far: it is not made.
 bool Simulation::fixed_step(double end) {
+  kink_ = std::numeric_limits<double>::infinity();
   chart_.begin(state_);
   stepper_->begin(chart_);
   stepper_->step(chart_, end - state_.t, next_);
@@ -199,7 +200,12 @@ bool Simulation::fixed_step(double end) {
 // One accepted step whose size the error decides, up to `end` at most.
 Simulation::Status Simulation::controlled_step(Stepper& stepper, double end) {
   const double left = end - state_.t;
-  const double shortest = 8 * std::numeric_limits<double>::epsilon() * std::abs(end);
+  const double shortest = 8 * spacing(end);
+  if (left <= spacing(end)) {
+    state_.t = end;
+    return Status::Running;
+  }
+  if (controller_) kink_ = controller_->next_kink(state_.t);
   // No short step is left over at the end.
   double h = proposal_ > 0.95 * left ? left : std::min(proposal_, 0.5 * left);
   h = std::min(std::max(h, 4 * shortest), left);
@@ -328,19 +334,24 @@ void Simulation::keep(bool leaves_work) {
 void Simulation::record_within(Stepper& stepper) {
   const double end = settings_.start_time + settings_.duration;
   if (settings_.record_dt > 0) {
+    // The end is a row, and none stands a round-off before it.
+    const double last = end - 1e-9 * settings_.record_dt;
     bool moved = false;
     for (;; ++next_row_) {
       const double t = settings_.start_time + double(next_row_) * settings_.record_dt;
-      if (t >= next_.t || t >= end) break;
+      if (t >= next_.t || t >= last) break;
       stepper.interpolate((t - state_.t) / (next_.t - state_.t), interpolated_);
       chart_.finish(t, interpolated_, between_);
       scene_.evaluate(between_.q, between_.v, between_.z, true);
       write_row(between_);
       moved = true;
     }
-    if (moved) scene_.evaluate(next_.q, next_.v, next_.z);
+    if (moved) {
+      scene_.restart();
+      scene_.evaluate(next_.q, next_.v, next_.z);
+    }
     const double t = settings_.start_time + double(next_row_) * settings_.record_dt;
-    if (next_.t < std::min(t, end)) return;
+    if (next_.t < (t < last ? t : end)) return;
     ++next_row_;
   }
   scene_.evaluate(next_.q, next_.v, next_.z, true);
@@ -402,21 +413,22 @@ void Simulation::note_pairs(double h) {
 // Torques that are held over control_dt change at the start of a step, never inside one.
 void Simulation::hold_torques() {
   if (!controller_ || settings_.control_dt == 0) return;
-  const double hair = settings_.dt > 0 ? 1e-6 * settings_.dt : 1e-9 * settings_.control_dt;
-  const double elapsed = state_.t - settings_.start_time + hair;
-  if (elapsed < next_control_) return;
-  next_control_ = (std::floor(elapsed / settings_.control_dt) + 1) * settings_.control_dt;
+  // The grid of fixed steps need not hold the control times to the last bit.
+  const double hair = settings_.dt > 0 ? std::max(1e-6 * settings_.dt, 4 * spacing(state_.t)) : 0;
+  if (state_.t + hair < next_control_) return;
+  while (next_control_ <= state_.t + hair)
+    next_control_ = settings_.start_time + double(++controls_) * settings_.control_dt;
   controller_->torque(scene_, state_.t, state_.q, state_.v, tau_);
 }
 
 const VectorX& Simulation::torque(double t, const VectorX& q, const VectorX& v) {
+  // The stages at the end of a step that ends at a kink belong to what comes before it.
+  if (t >= kink_) t = std::nextafter(kink_, -std::numeric_limits<double>::infinity());
   if (controller_ && settings_.control_dt == 0) controller_->torque(scene_, t, q, v, tau_);
   return tau_;
 }
 
-bool Simulation::follow_state() const {
-  return controller_ && settings_.control_dt == 0;
-}
+bool Simulation::follow_state() const { return controller_ && settings_.control_dt == 0; }
 
 bool Simulation::follow_time() const { return follow_state() && controller_->follows_time(); }
 

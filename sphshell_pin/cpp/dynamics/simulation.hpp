@@ -1,6 +1,7 @@
 // One run: the loop over the steps, and what it writes down.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -124,8 +125,10 @@ class Simulation : private Torques {
   std::vector<char> touching_, deep_, through_;
   long grid_ = 0, grid_steps_ = 0, steps_ = 0, rejected_ = 0, rows_ = 0, next_row_ = 0;
   double wall_time_ = 0;
-  double next_control_ = 0;               // when held torques change next, since the start [s]
-  double proposal_ = 0, last_error_ = 1;  // of the next step [s]; of the last one
+  double next_control_ = 0;  // when held torques change next [s]
+  long controls_ = 0;
+  double kink_ = std::numeric_limits<double>::infinity();  // of the torques, next in time [s]
+  double proposal_ = 0, last_error_ = 1;                   // of the next step [s]; of the last one
   bool started_ = false, finished_ = false, fine_ = false;
 };
 

@@ -54,7 +54,8 @@ class Rodas : public ImplicitStepper {
  private:
   static constexpr int kStages = 6;
   VectorX g_[kStages], stage_, rate_at_stage_, middle_;
-  Eigen::Vector3d power_[3];  // at the start, the middle and the end
+  Eigen::Vector3d power_[3] = {Vec3::Zero(), Vec3::Zero(),
+                               Vec3::Zero()};  // at the start, the middle and the end
   double h_ = 0;
 };
 
