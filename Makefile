@@ -8,13 +8,15 @@ CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 OUT ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench lint format clean
+.PHONY: help demo test bench hard-cases work-precision lint format clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
 
 # make lint   check style and types; make format mends the style
 # make bench  print what contact costs, as ratios
+# make hard-cases      run every hard case and write docs/hard_cases.md
+# make work-precision  print error against computing time of the integrators, draw the figure
 # make clean  remove everything that was built
 
 $(BIN)/python:
@@ -41,6 +43,12 @@ test: $(VENV)/.test
 $(VENV)/.bench: $(VENV)/.test
 	$(BIN)/python -m pip install -q -e '.[bench]'
 	@touch $@
+
+hard-cases: $(VENV)/.test
+	$(BIN)/python -m tests.hard_cases --write
+
+work-precision: $(VENV)/.test
+	$(BIN)/python -m benchmarks.work_precision --write
 
 bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks
