@@ -20,10 +20,11 @@ from tests.hard_cases.targets import Array, all_targets, crossings, sweep, windi
 from tests.hard_cases.verdict import Verdict, at_most, case
 
 FIXED = ("SemiImplicitEuler", "RungeKutta4", "LinearlyImplicitEuler")
-# Energy that may be gained: this share, and with explicit fixed steps besides a (step / depth)^b,
+# Energy that may be gained: this share (the steps that stand in for fixed ones have a tolerance of
+# their own, 1e-6 each), and with explicit fixed steps besides a (step / depth)^b,
 # as the sphere flies into the sheet for up to a step before a force acts on it. Of 1620 shots the
 # worst gains 0.6 of it. A step longer than r / 4 is cut.
-GAIN = 1e-3
+GAIN = 2e-3
 STEP_GAIN = {"SemiImplicitEuler": (2.0, 1), "RungeKutta4": (0.5, 2)}
 LONGEST = 0.25
 
@@ -134,7 +135,9 @@ def fly(number: int, shot: Shot, integrator: Any, tally: Tally) -> None:
     if not (np.isfinite(result.q).all() and np.isfinite(result.v).all()):
         tally.broken.append(number)
         return
-    if not any(event.kind == "touch" for event in result.events):
+    touched = any(event.kind == "touch" for event in result.events)
+    at, flown = positions(result)
+    if not touched and 0 < _until_touch(shot, at[0], flown[0]) < shot.duration:
         (tally.missed_grazes if shot.grazes else tally.lost).append(number)
     starts, ends, bridge = path(shot, result)
     through = crossings(starts, ends, shot.aim.corners)

@@ -53,21 +53,25 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
     if (place.taken || at_[link.to] >= 0) continue;
     place.taken = true;
     at_[link.to] = link.from;
-    keep_side(contacts[link.to], place, radius);
+    // What a stage met on its way says nothing of the side.
+    if (link.from < static_cast<int>(known_)) keep_side(contacts[link.to], place, radius);
   }
   for (std::size_t j = 0; j < contacts.size(); ++j) {
     if (at_[j] >= 0) continue;
     const Contact& c = contacts[j];
     at_[j] = static_cast<int>(places_.size());
-    places_.push_back({c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, c.rim, count_++});
+    places_.push_back(
+        {c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, c.rim, c.feature, count_++});
   }
   return at_;
 }
 
 void ContactTracker::keep_side(Contact& c, const Place& place, double radius) {
   if (radius == 0 || place.depth < kDeep * radius || c.normal.dot(place.normal) >= 0) return;
-  // Round a border the normal may turn by any angle in a step, and comes to no other side.
-  if (c.rim || place.rim) return;
+  // Round a border the normal may turn by any angle in a step, and comes to no other side; nor does
+  // it round the edge of a thin body.
+  const bool on_faces = c.feature == Feature::Face && place.feature == Feature::Face;
+  if (c.rim || place.rim || (place.depth <= radius && !on_faces)) return;
   c.normal = -c.normal;
   c.depth = 2 * radius - c.depth;
   c.turn = -c.turn;
@@ -80,8 +84,8 @@ void ContactTracker::accept(const std::vector<Contact>& contacts, const Vec3& ce
   deep_ = false;
   for (std::size_t j = 0; j < contacts.size(); ++j) {
     const Contact& c = contacts[j];
-    next_.push_back(
-        {c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, c.rim, places_[at_[j]].number});
+    next_.push_back({c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, c.rim, c.feature,
+                     places_[at_[j]].number});
     deep_ = deep_ || (radius > 0 && c.depth > kDeep * radius);
   }
   places_.swap(next_);

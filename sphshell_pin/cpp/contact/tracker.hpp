@@ -16,6 +16,7 @@ class ContactTracker {
     Vec3 point, normal;  // the normal points where the sphere is pushed
     double depth, reach;
     bool pass, rim;
+    Feature feature;
     int number;
     bool taken = false;  // by a contact of the last match()
   };
