@@ -197,7 +197,9 @@ def test_round_the_rim_without_being_turned(integrator, beside: float) -> None:
     depth = rows.stats["pairs"][rows.pairs[0]]["max_depth"]
     assert depth <= (1 - beside) * R * (1 + 1e-9)
     # k r^2 / 2 is what the contact holds at most; pushed the wrong way it would hold four times it.
-    assert np.abs(rows.energy.residual).max() < 0.5 * 100.0 * R**2
+    first_order = isinstance(integrator, sp.SemiImplicitEuler | sp.LinearlyImplicitEuler)
+    share = 1.0 if first_order else 0.2
+    assert np.abs(rows.energy.residual).max() < share * 0.5 * 100.0 * R**2
 
 
 def test_round_the_rim_after_having_been_pushed_past() -> None:
