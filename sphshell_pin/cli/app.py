@@ -1,0 +1,118 @@
+"""The application: what every command shares. Heavy imports wait inside the commands."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+app = typer.Typer(
+    name="sphshell-pin",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+# Exit codes: 1 an expectation was missed, 2 an error, 130 interrupted (as shells have it).
+MISSED, ERROR, INTERRUPTED = 1, 2, 130
+ScenarioArgument = Annotated[
+    str, typer.Argument(help="Name of a shipped scenario, or path of a .toml file.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a value; may be given several times."),
+]
+DtOption = Annotated[float | None, typer.Option(help="Time step \\[s] in place of run.dt.")]
+
+
+@app.callback()
+def options(
+    context: typer.Context,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+) -> None:
+    """Exact contact of spheres with CAD surfaces, for Pinocchio's robots.
+
+    Example: sphshell-pin run fingertip_on_blade
+    """
+    context.obj = debug
+
+
+def main() -> None:
+    """Run the command line."""
+    app()
+
+
+@contextlib.contextmanager
+def faults(context: typer.Context) -> Iterator[None]:
+    """Turn faults into one sentence on stderr and an exit code, unless --debug asks for more."""
+    debug = bool(context.find_root().obj)
+    try:
+        yield
+    except (typer.Exit, typer.Abort):
+        raise
+    except KeyboardInterrupt as error:
+        typer.echo(f"interrupted{f': {error}' if str(error) else ''}", err=True)
+        raise typer.Exit(INTERRUPTED) from None
+    except Exception as error:
+        from sphshell_pin.errors import SphshellError
+
+        if debug:
+            raise
+        known = isinstance(error, SphshellError)
+        # Any other fault is a defect, or comes from the user's routines: say where to look.
+        told = str(error) if known else f"{type(error).__name__}: {error}"
+        told = ", ".join([told, *getattr(error, "__notes__", ())])
+        typer.echo(f"error: {told}{'' if known else ' (see it with --debug)'}", err=True)
+        raise typer.Exit(ERROR) from None
+
+
+def changes_of(set_: list[str] | None, dt: float | None, duration: float | None) -> dict[str, str]:
+    """Return the values that --set, --dt and --duration change, by dotted key."""
+    from sphshell_pin.errors import InvalidParameter
+
+    changes: dict[str, str] = {}
+    for one in set_ or []:
+        key, equals, value = one.partition("=")
+        if not equals or not key:
+            raise InvalidParameter("--set", one, "must be KEY=VALUE, for instance run.dt=1e-4")
+        changes[key.strip()] = value.strip()
+    if dt is not None:
+        changes["run.dt"] = repr(dt)
+    if duration is not None:
+        changes["run.duration"] = repr(duration)
+    return changes
+
+
+def make_table(*columns: str) -> Table:
+    """Return an empty table; all columns but the first are numbers."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD)
+    for i, column in enumerate(columns):
+        table.add_column(column, overflow="fold", justify="left" if i == 0 else "right")
+    return table
+
+
+def terminal(*, err: bool = False) -> Any:
+    """Return the console of stdout, or of stderr."""
+    from rich.console import Console
+
+    # A pipe has no width of its own: tables would fold at 80 columns.
+    stream = sys.stderr if err else sys.stdout
+    return Console(stderr=err, soft_wrap=not err, width=None if stream.isatty() else 120)
+
+
+def plain(text: str) -> str:
+    """Return `text` so that rich prints its brackets as they are."""
+    from rich.markup import escape
+
+    return escape(text)

@@ -1,0 +1,158 @@
+"""Commands that build a scenario: run and explain."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sphshell_pin.cli.app import (
+    ERROR,
+    INTERRUPTED,
+    MISSED,
+    DtOption,
+    ScenarioArgument,
+    SetOption,
+    app,
+    changes_of,
+    faults,
+    make_table,
+    plain,
+    terminal,
+)
+
+if TYPE_CHECKING:
+    from sphshell_pin.scenario import RunReport
+
+# A share of the exchanged energy that no sound run loses or gains.
+SUSPICIOUS_RESIDUAL = 0.05
+
+
+@app.command()
+def run(
+    *,
+    context: typer.Context,
+    scenario: ScenarioArgument,
+    out: Annotated[
+        Path | None, typer.Option(help="Results folder.", show_default="results/<scenario>")
+    ] = None,
+    dt: DtOption = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Time to simulate \\[s] in place of run.duration.")
+    ] = None,
+    recording: Annotated[
+        bool, typer.Option("--recording/--no-recording", help="Write recording.html.")
+    ] = True,
+    set_: SetOption = None,
+) -> None:
+    """Run a scenario and write its results folder.
+
+    Example: sphshell-pin run fingertip_on_blade --duration 2 --set controller.normal_force=8
+    """
+    with faults(context):
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        from sphshell_pin.scenario import build, explain_built, run_built
+
+        changes = changes_of(set_, dt, duration)
+        built = build(scenario, changes)
+        bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeRemainingColumn(),
+            console=terminal(err=True),
+            transient=True,
+            disable=not sys.stderr.isatty(),
+        )
+        for warning in explain_built(built).warnings:
+            typer.echo(f"warning: {warning}", err=True)
+        with bar:
+            task = bar.add_task(built.name, total=1.0)
+            report = run_built(
+                built,
+                out,
+                recording=recording,
+                progress=lambda fraction: bar.update(task, completed=fraction),
+            )
+        _print_report(report)
+        code = _exit_code(report, changed=bool(changes))
+    raise typer.Exit(code)
+
+
+@app.command()
+def explain(
+    context: typer.Context, scenario: ScenarioArgument, dt: DtOption = None, set_: SetOption = None
+) -> None:
+    """Say what a scenario models: time scales, expected depths, a fitting dt, warnings.
+
+    Example: sphshell-pin explain fingertip_on_blade --dt 1e-3
+    """
+    with faults(context):
+        from sphshell_pin.scenario import build, explain_built
+
+        built = build(scenario, changes_of(set_, dt, None))
+        console = terminal()
+        console.print(f"[bold]{built.name}[/bold]: {plain(built.scenario.title)}")
+        console.print(str(explain_built(built)), markup=False, highlight=False)
+
+
+def _exit_code(report: RunReport, *, changed: bool) -> int:
+    from sphshell_pin.errors import Interrupted, SimulationDiverged
+
+    if report.stopped is not None:
+        hint = ""
+        if isinstance(report.stopped, SimulationDiverged):
+            hint = "; sphshell-pin explain, with the same --set, names a fitting dt"
+        typer.echo(f"{report.stopped}{hint}\npartial results are in {report.folder}", err=True)
+        return INTERRUPTED if isinstance(report.stopped, Interrupted) else ERROR
+    if all(verdict.met for verdict in report.verdicts):
+        return 0
+    if changed:
+        typer.echo("the scenario was changed: missed expectations are not counted", err=True)
+        return 0
+    return MISSED
+
+
+def _print_report(report: RunReport) -> None:
+    from sphshell_pin.scenario.figures import measure_energy
+
+    console = terminal()
+    stats, title = report.result.stats, report.built.scenario.title
+    console.print(f"[bold]{report.built.name}[/bold]: {plain(title)}", highlight=False)
+    table = make_table(
+        "contact", "duration", "touches", "peak force", "mean force", "largest depth"
+    )
+    for name, pair in stats["pairs"].items():
+        table.add_row(
+            plain(name),
+            f"{pair['contact_time']:.4g} s",
+            f"{pair['touches']}",
+            f"{pair['peak_force']:.4g} N",
+            f"{pair['mean_force']:.4g} N",
+            f"{pair['max_depth'] * 1e3:.4g} mm",
+        )
+    console.print(table)
+    energy = measure_energy(report.result)
+    console.print(
+        f"energy residual   {energy['residual']:.3g} J, {energy['relative_residual']:.2g} of the "
+        f"{energy['exchanged']:.3g} J exchanged\n"
+        f"real-time factor  {stats['real_time_factor']:.3g} ({stats['duration']:.4g} s simulated "
+        f"in {stats['wall_time']:.3g} s, {stats['steps']} steps of {stats['dt']:g} s)",
+        highlight=False,
+    )
+    if energy["relative_residual"] > SUSPICIOUS_RESIDUAL:
+        typer.echo("warning: the energy does not add up: reduce dt (see explain)", err=True)
+    if report.verdicts:
+        expected = make_table("figure", "expected", "measured", "verdict")
+        for verdict in report.verdicts:
+            mark = "[green]as expected[/green]" if verdict.met else "[red]missed[/red]"
+            measured = f"{verdict.measured:.6g}"
+            expected.add_row(plain(verdict.figure), verdict.expected, measured, mark)
+        console.print(expected)
+    names = ", ".join(file.name for file in report.files)
+    console.print(f"files in {report.folder}: {names}", markup=False, highlight=False)
+    for note in report.notes:
+        typer.echo(note, err=True)
