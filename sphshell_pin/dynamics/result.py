@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import tempfile
@@ -41,6 +42,13 @@ class ContactLog(SceneContacts):
         keep = self.pair == pair
         return ContactLog(**{f.name: getattr(self, f.name)[keep] for f in fields(self)})
 
+    def at_row(self, row: int) -> SceneContacts:
+        """Return the contacts of one of the result's rows."""
+        first, last = np.searchsorted(self.row, (row, row + 1))
+        return SceneContacts(
+            **{f.name: getattr(self, f.name)[first:last] for f in fields(SceneContacts)}
+        )
+
 
 @dataclass(frozen=True)
 class Event:
@@ -72,9 +80,9 @@ class EnergyAudit:
     control_work: Array
 
     @property
-    def residual(self) -> Array:
-        """Energy that appeared from nowhere since the start (n,) [J]: the integration's error."""
-        total = (
+    def total(self) -> Array:
+        """Energy stored and lost, less the work of the controller (n,) [J]: it should not change."""
+        return (
             self.kinetic
             + self.potential
             + self.elastic
@@ -82,7 +90,11 @@ class EnergyAudit:
             + self.friction_loss
             - self.control_work
         )
-        return total - total[:1]
+
+    @property
+    def residual(self) -> Array:
+        """Energy that appeared from nowhere since the start (n,) [J]: the integration's error."""
+        return self.total - self.total[:1]
 
     @property
     def exchanged(self) -> float:
@@ -91,14 +103,26 @@ class EnergyAudit:
         Sum over kinetic, potential and elastic energy of what each moved up and down in total
         between rows, halved, plus losses and the work of the controller.
         """
-        moved = sum(
-            float(np.abs(np.diff(e)).sum()) for e in (self.kinetic, self.potential, self.elastic)
-        )
-        spent = sum(
-            float(np.abs(np.diff(e)).sum())
-            for e in (self.damping_loss, self.friction_loss, self.control_work)
-        )
-        return 0.5 * (moved + spent)
+        until = self.exchanged_until
+        return float(until[-1]) if len(until) else 0.0
+
+    @property
+    def exchanged_until(self) -> Array:
+        """The same from the start until each row (n,) [J]."""
+        parts = np.array([getattr(self, f.name) for f in fields(self)])
+        steps = np.abs(np.diff(parts, axis=1, prepend=parts[:, :1])).sum(axis=0)
+        return np.asarray(0.5 * np.cumsum(steps))
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The scenario that ran: `scenario`, a shipped name or a path, with all its `settings`.
+
+    The settings, as JSON knows them, are those of the run, changed ones included.
+    """
+
+    scenario: str
+    settings: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -108,7 +132,7 @@ class Result:
     `t` (n,) [s], `q` (n, nq), `v` (n, nv) at the recorded rows; `pairs` the names of the contact
     pairs; `contacts` the contact log; `events` in order of time; `energy` the audit; `stats`
     steps, wall time and figures of each pair over all steps, recorded or not; `scene` that ran
-    (None after load).
+    (None after load); `origin` the scenario it came from (None without one).
     """
 
     t: Array
@@ -120,6 +144,7 @@ class Result:
     energy: EnergyAudit
     stats: dict[str, Any]
     scene: Scene | None = None
+    origin: Origin | None = None
 
     @classmethod
     def from_blocks(
@@ -155,8 +180,12 @@ class Result:
             scene=scene,
         )
 
-    def save(self, path: str | PathLike[str]) -> Path:
-        """Write everything but the scene to a compressed .npz file, whole or not at all."""
+    def save(self, path: str | PathLike[str], *, home: str | PathLike[str] | None = None) -> Path:
+        """Write everything but the scene to a compressed .npz file, whole or not at all.
+
+        A scenario's file is told relative to the folder `home`, where the results will stay
+        (default: that of `path`).
+        """
         target = Path(path)
         arrays: dict[str, NDArray[Any]] = {"t": self.t, "q": self.q, "v": self.v}
         for part in ("contacts", "energy"):
@@ -167,6 +196,7 @@ class Result:
             "pairs": self.pairs,
             "stats": self.stats,
             "events": [[e.t, e.pair, e.kind] for e in self.events],
+            "origin": _told(self.origin, Path(target.parent if home is None else home)),
         }
         arrays["header"] = np.array(json.dumps(header))
         part_file = None
@@ -200,6 +230,7 @@ class Result:
                 events=tuple(Event(*e) for e in header["events"]),
                 energy=EnergyAudit(**energy),
                 stats=header["stats"],
+                origin=_found(header.get("origin"), Path(path).parent),
             )
         except OSError as error:
             raise ResultError(
@@ -246,3 +277,27 @@ class Result:
 
         figure: Figure = plot_result(self)
         return figure
+
+
+def _told(origin: Origin | None, home: Path) -> dict[str, Any] | None:
+    """Return what a file in the folder `home` says of `origin`."""
+    if origin is None:
+        return None
+    told: dict[str, Any] = {"scenario": origin.scenario, "settings": origin.settings}
+    if Path(origin.scenario).suffix == ".toml":
+        # Results and scenario may move together, or the results alone: both ways are told.
+        told["path"] = os.path.abspath(origin.scenario)
+        # Another drive has no relative path.
+        with contextlib.suppress(ValueError):
+            told["scenario"] = Path(os.path.relpath(told["path"], home.absolute())).as_posix()
+    return told
+
+
+def _found(told: dict[str, Any] | None, home: Path) -> Origin | None:
+    """Return the origin that a file in the folder `home` tells."""
+    if told is None:
+        return None
+    if "path" not in told:
+        return Origin(told["scenario"], told["settings"])
+    near = Path(os.path.normpath(home.absolute() / told["scenario"]))
+    return Origin(str(near if near.exists() else told["path"]), told["settings"])

@@ -86,37 +86,7 @@ class Simulation:
         Raises InvalidParameter for wrong sizes and values, DeepStart for a sphere that starts
         deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.
         """
-        dt = self._dt
-        q0, v0 = self.scene.check_state(q0, v0)
-        duration = check_not_negative("duration", duration, "s")
-        self._check_start(q0)
-        core_controller, hold = self._bind(controller, control_dt, q0)
-        t0 = check_finite("t0", t0)
-        if np.spacing(abs(t0) + duration) > 1e-3 * (dt or 1e-6):
-            raise InvalidParameter(
-                "t0, duration",
-                (t0, duration),
-                f"must be small enough to count steps of {dt or 1e-6!r} s",
-            )
-        check_moved_mass(self.scene.model)
-        record = 0.0
-        if record_dt is not None:
-            record = min(check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
-        core = _core.Simulation(
-            self.scene.model,
-            self._core_pairs(q0, v0),
-            core_controller,
-            q0,
-            v0,
-            integrator=self.integrator.code,
-            dt=dt,
-            rtol=getattr(self.integrator, "rtol", 0.0),
-            atol=getattr(self.integrator, "atol", 0.0),
-            duration=duration,
-            start_time=t0,
-            control_dt=hold,
-            record_dt=record,
-        )
+        core = self.to_core(q0, v0, duration, controller, control_dt, record_dt=record_dt, t0=t0)
         blocks: list[dict[str, NDArray[Any]]] = []
         status = 0
         try:
@@ -133,16 +103,62 @@ class Simulation:
             blocks.append(core.take())
             raise Interrupted(core.time, self._gather(core, blocks)) from None
         result = self._gather(core, blocks)
-        if status == _DIVERGED:
-            raise SimulationDiverged(core.time, _why(core, self.scene), result)
-        if status == _STUCK:
-            reason = (
-                f"the error stays too large however short the step (tried {core.last_step:.1e} s)"
-            )
+        reason = why_ended(status, core, self.scene)
+        if reason is not None:
             raise SimulationDiverged(core.time, reason, result)
         return result
 
-    def _core_pairs(self, q0: Array, v0: Array) -> list[_core.Pair]:
+    def to_core(
+        self,
+        q0: Any,
+        v0: Any,
+        duration: float,
+        controller: Controller | Callback | None,
+        control_dt: float | None,
+        *,
+        record_dt: float | None,
+        t0: float = 0.0,
+    ) -> _core.Simulation:
+        """Check what `run` takes, which see, and return the compiled run, not yet started."""
+        dt = self._dt
+        q0, v0 = self.scene.check_state(q0, v0)
+        duration = check_not_negative("duration", duration, "s")
+        self._check_start(q0)
+        core_controller, hold = self._bind(controller, control_dt, q0)
+        t0 = check_finite("t0", t0)
+        if np.spacing(abs(t0) + duration) > 1e-3 * (dt or 1e-6):
+            raise InvalidParameter(
+                "t0, duration",
+                (t0, duration),
+                f"must be small enough to count steps of {dt or 1e-6!r} s",
+            )
+        check_moved_mass(self.scene.model)
+        record = 0.0
+        if record_dt is not None:
+            record = min(check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
+        return _core.Simulation(
+            self.scene.model,
+            self.core_pairs(q0, v0),
+            core_controller,
+            q0,
+            v0,
+            integrator=self.integrator.code,
+            dt=dt,
+            rtol=getattr(self.integrator, "rtol", 0.0),
+            atol=getattr(self.integrator, "atol", 0.0),
+            duration=duration,
+            start_time=t0,
+            control_dt=hold,
+            record_dt=record,
+        )
+
+    def core_controller(
+        self, controller: Controller | Callback | None, q: Array
+    ) -> _core.Controller | None:
+        """Return the C++ twin of a controller that `run` takes, started at q (nq,)."""
+        return self._bind(controller, None, q)[0]
+
+    def core_pairs(self, q0: Array, v0: Array) -> list[_core.Pair]:
         """Build the C++ twins of the pairs; a law that cannot stop its sphere earns a warning."""
         pairs = [pair.to_core() for pair in self.scene.pairs]
         if pairs:
@@ -159,7 +175,7 @@ class Simulation:
                 weak = weakness(pair, figure)
                 # Of a sphere at rest in touch no speed is known to judge by.
                 if weak is not None and figure.approach_speed != DEFAULT_SPEED:
-                    warnings.warn(weak, WeakLawWarning, stacklevel=3)
+                    warnings.warn(weak, WeakLawWarning, stacklevel=4)
         return pairs
 
     @property
@@ -261,7 +277,14 @@ class _CtrlC:
         self.pressed = True
 
 
-def _why(core: _core.Simulation, scene: Scene) -> str:
+def why_ended(status: int, core: _core.Simulation, scene: Scene) -> str | None:
+    """Say why the compiled run cannot go on after `status`; None where it can, or has finished."""
+    if status == _STUCK:
+        return f"the error stays too large however short the step (tried {core.last_step:.1e} s)"
+    return _runaway(core, scene) if status == _DIVERGED else None
+
+
+def _runaway(core: _core.Simulation, scene: Scene) -> str:
     """Say which joint ran away first."""
     if not np.abs(np.asarray(core.q)).max(initial=0.0) < _FARTHEST:
         return "a joint's position grew beyond all bounds"

@@ -35,6 +35,8 @@ class Assembly:
     """Start velocity (nv,)."""
     lock: tuple[str, ...]
     """Joints to lock at their place in q0."""
+    loaded: tuple[Any, ...] = ()
+    """The robots as they were loaded, one LoadedRobot for each table."""
 
 
 @contextmanager
@@ -53,8 +55,12 @@ def to_se3(placement: Placement) -> Any:
     return pin.SE3(pin.rpy.rpyToMatrix(*np.deg2rad(placement.rpy_deg)), np.array(placement.xyz))
 
 
-def assemble(scenario: Scenario, path: Path) -> Assembly:
+def assemble(
+    scenario: Scenario, path: Path, loaded: Mapping[tuple[object, ...], Any] | None = None
+) -> Assembly:
     """Load all robots of `scenario` and append them into one model under its gravity.
+
+    `loaded` are robots at hand, by the `origin` of their table.
 
     Raises
     ------
@@ -71,10 +77,12 @@ def assemble(scenario: Scenario, path: Path) -> Assembly:
     starts: list[tuple[str, Array, Array]] = []
     lock: list[str] = []
     labels: set[str] = set()
+    taken: list[Any] = []
     for i, section in enumerate(scenario.robot):
         key = item_key("robot", scenario.robot, i)
         with blamed_on(path, key):
-            robot = _load(robots, section, path)
+            robot = (loaded or {}).get(origin(section)) or _load(robots, section, path)
+        taken.append(robot)
         model, geometry = robot.model.copy(), robot.visual_model.copy()
         q, v = _start(model, robot.q0, section, path, key)
         for j, joint in enumerate(section.lock):
@@ -104,7 +112,12 @@ def assemble(scenario: Scenario, path: Path) -> Assembly:
     for name, q_joint, v_joint in starts:
         j = base.getJointId(name)
         q0[_span_q(base, j)], v0[_span_v(base, j)] = q_joint, v_joint
-    return Assembly(base, visual, q0, v0, tuple(lock))
+    return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken))
+
+
+def origin(section: RobotSection) -> tuple[object, ...]:
+    """Return what tells robots of one scenario's folder apart before they start and are placed."""
+    return section.name, section.urdf, tuple(section.package_dirs), section.free_flyer
 
 
 def reduce_visual(assembly: Assembly) -> Any:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
-import inspect
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -20,14 +18,23 @@ from sphshell_pin.dynamics.controllers import Controller
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError, UnitWarning
 from sphshell_pin.scenario import schema
 from sphshell_pin.scenario.bodies import (
+    Assembly,
     assemble,
     blamed_on,
     by_joint,
+    origin,
     reduce_visual,
     restrict,
     to_se3,
 )
-from sphshell_pin.scenario.reading import find_scenario, item_key, read_scenario
+from sphshell_pin.scenario.functions import load_function
+from sphshell_pin.scenario.knobs import check_knobs
+from sphshell_pin.scenario.reading import (
+    change_scenario,
+    find_scenario,
+    item_key,
+    read_scenario,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -46,12 +53,26 @@ class Built:
     simulation: sp.Simulation
     visual_model: Any
     """pinocchio.GeometryModel of the scene's model."""
+    assembly: Assembly
+    """The robots as one model; the same object as before where a rebuild could keep it."""
+    shells: Mapping[str, sp.Shell]
+    """The surfaces by name; the same objects as before where a rebuild could keep them."""
+    functions: Mapping[str, Callable[..., Any]]
+    """The user's own functions by "file.py:function", loaded once."""
     figures: Mapping[str, Callable[[Any, Any], float]]
     """The scenario's own figures: functions of (result, scene)."""
 
 
-def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -> Built:
+def build(
+    name: str | PathLike[str],
+    changes: Mapping[str, str] | None = None,
+    *,
+    reuse: Built | None = None,
+) -> Built:
     """Build the scenario called `name` (shipped, or a path), with `changes` by dotted key.
+
+    Robots, shells and functions of `reuse`, built of the same file before, are taken over where
+    their tables are the same.
 
     Raises
     ------
@@ -64,12 +85,50 @@ def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -
     """
     path = find_scenario(name)
     scenario = read_scenario(path, changes)
-    assembly = assemble(scenario, path)
+    check_knobs(scenario, path, ranges=not changes)
+    return build_scenario(
+        scenario, path, reuse if reuse is not None and reuse.path == path else None
+    )
+
+
+def rebuild(built: Built, changes: Mapping[str, str]) -> Built:
+    """Build the scenario of `built` with more values changed; its file is not read again.
+
+    What the changes leave alone is the same object as before: `shells`, `assembly`,
+    `visual_model`, `functions`. `built` stays as it is.
+
+    Raises
+    ------
+    ScenarioError
+        A key or a value is wrong; the text names it and what would be valid.
+    """
+    scenario = change_scenario(built.scenario, changes, built.path)
+    check_knobs(scenario, built.path, ranges=False)
+    return build_scenario(scenario, built.path, built)
+
+
+def build_scenario(scenario: schema.Scenario, path: Path, reuse: Built | None = None) -> Built:
+    """Build a scenario that is already read; `path` is its file, which others stand beside.
+
+    Robots, shells and functions of `reuse` are taken over where their tables are the same.
+    """
+    assembly = _assemble(scenario, path, reuse)
+    functions = {} if reuse is None else dict(reuse.functions)
+
+    def load(where: str, key: str) -> Callable[..., Any]:
+        if where not in functions:
+            functions[where] = load_function(where, path, key)
+        return functions[where]
+
     with blamed_on(path, "robot"):
         q_lock = assembly.q0 if assembly.lock else None
         scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock)
     shells = {
-        section.name: (_build_shell(section, path, item_key("shell", scenario.shell, i)), section)
+        section.name: (
+            _kept_shell(section, reuse)
+            or _build_shell(section, path, item_key("shell", scenario.shell, i)),
+            section,
+        )
         for i, section in enumerate(scenario.shell)
     }
     if len(shells) < len(scenario.shell):
@@ -79,7 +138,7 @@ def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -
         _add_contact(scene, contact, shells, path, key)
     for i, source in enumerate(scenario.source):
         key = item_key("source", scenario.source, i)
-        find = load_function(source.find, path, f"{key}.find")
+        find = load(source.find, f"{key}.find")
         with blamed_on(path, key):
             scene.add_contact_source(
                 find,
@@ -90,7 +149,7 @@ def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -
                 name=source.name,
             )
     q0, v0 = restrict(assembly.model, scene.model, assembly.q0, assembly.v0)
-    controller = _build_controller(scenario.controller, scene, q0, shells, path)
+    controller = _build_controller(scenario.controller, scene, q0, shells, path, load)
     if isinstance(controller, Controller):
         with blamed_on(path, "controller"):
             # A wrong frame or joint is told now, not when the run starts.
@@ -99,9 +158,12 @@ def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -
     with blamed_on(path, "run"):
         simulation = sp.Simulation(scene, integrator=_build_integrator(run))
     figures = {
-        figure: load_function(where, path, f"figures.{figure}")
-        for figure, where in scenario.figures.items()
+        figure: load(where, f"figures.{figure}") for figure, where in scenario.figures.items()
     }
+    if reuse is not None and assembly.visual_model is reuse.assembly.visual_model:
+        visual = reuse.visual_model
+    else:
+        visual = reduce_visual(assembly)
     return Built(
         path.stem,
         path,
@@ -111,9 +173,36 @@ def build(name: str | PathLike[str], changes: Mapping[str, str] | None = None) -
         v0,
         controller,
         simulation,
-        reduce_visual(assembly),
+        visual,
+        assembly,
+        {name: shell for name, (shell, _) in shells.items()},
+        functions,
         figures,
     )
+
+
+def _assemble(scenario: schema.Scenario, path: Path, reuse: Built | None) -> Assembly:
+    if reuse is None:
+        return assemble(scenario, path)
+    if reuse.scenario.robot != scenario.robot:
+        loaded = zip(map(origin, reuse.scenario.robot), reuse.assembly.loaded, strict=True)
+        return assemble(scenario, path, dict(loaded))
+    if reuse.scenario.gravity == scenario.gravity:
+        return reuse.assembly
+    model = reuse.assembly.model.copy()
+    model.gravity.linear = np.array(scenario.gravity)
+    return replace(reuse.assembly, model=model)
+
+
+def _kept_shell(section: schema.ShellSection, reuse: Built | None) -> sp.Shell | None:
+    """Return the shell of the same table in `reuse`; where it stands is no part of a shell."""
+    if reuse is None:
+        return None
+    for old in reuse.scenario.shell:
+        stands = {"frame": section.frame, "placement": section.placement}
+        if old.model_copy(update=stands) == section:
+            return reuse.shells[old.name]
+    return None
 
 
 def explain_built(built: Built) -> Any:
@@ -122,40 +211,6 @@ def explain_built(built: Built) -> Any:
     # The recommended step is the first-order stepper's: no other is judged by it.
     dt = stepper.dt if isinstance(stepper, sp.SemiImplicitEuler) else None
     return built.scene.explain(built.q0, built.v0, dt)
-
-
-def load_function(where: str, path: Path, key: str) -> Callable[..., Any]:
-    """Return the function that "file.py:function" names, the file relative to the scenario's.
-
-    Raises
-    ------
-    ScenarioError
-        No such file or function, or the file cannot be run.
-    """
-    file_name, colon, function = where.rpartition(":")
-    if not colon or not file_name.endswith(".py") or not function:
-        raise ScenarioError(path, key, 'must be "file.py:function"', where)
-    file = path.parent / file_name
-    if not file.is_file():
-        raise ScenarioError(path, key, f"no such file: {file}", where)
-    spec = importlib.util.spec_from_file_location(f"sphshell_pin_scenario_{file.stem}", file)
-    if spec is None or spec.loader is None:
-        raise ScenarioError(path, key, f"python cannot load {file}", where)
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise ScenarioError(path, key, f"{file} fails: {type(error).__name__}: {error}") from error
-    found = getattr(module, function, None)
-    if not callable(found):
-        valid = [
-            name
-            for name, one in inspect.getmembers(module, inspect.isfunction)
-            if one.__module__ == module.__name__ and not name.startswith("_")
-        ]
-        with blamed_on(path, key):
-            raise NameNotFound("function", function, str(file), valid)
-    return found  # type: ignore[no-any-return]
 
 
 def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
@@ -271,13 +326,14 @@ def _build_controller(
     q0: Array,
     shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
     path: Path,
+    load: Callable[[str, str], Callable[..., Any]],
 ) -> Any:
     with blamed_on(path, "controller"):
         match section:
             case schema.GravityCompensationSection():
                 return sp.GravityCompensation()
             case schema.PythonSection():
-                return load_function(section.function, path, "controller.function")
+                return load(section.function, "controller.function")
             case schema.JointPDSection():
                 return sp.JointPD(
                     _gain(scene.model, section.kp, path, "controller.kp"),

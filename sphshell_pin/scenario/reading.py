@@ -16,10 +16,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from sphshell_pin.errors import NameNotFound, ScenarioError
-from sphshell_pin.scenario.schema import Scenario
-
-LISTS = ("robot", "shell", "contact", "source")
-"""Tables of which there may be several."""
+from sphshell_pin.scenario.schema import LISTS, Scenario
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -59,9 +56,63 @@ def read_scenario(path: str | PathLike[str], changes: Mapping[str, str] | None =
     ScenarioError
         Unreadable file, wrong TOML, or a key or value that no scenario may have.
     """
-    data = _read_toml(path)
-    for key, text in (changes or {}).items():
-        _change(data, key, _parse_value(text), path)
+    scenario = parse_scenario(_read_text(path), path)
+    return change_scenario(scenario, changes, path) if changes else scenario
+
+
+def parse_scenario(text: str, path: str | PathLike[str]) -> Scenario:
+    """Read and check the scenario that `text` says; `path` is the file it belongs to.
+
+    Raises
+    ------
+    ScenarioError
+        Wrong TOML, or a key or value that no scenario may have.
+    """
+    try:
+        return _validated(tomllib.loads(text), path)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(path, "", f"is not valid TOML: {error}") from None
+
+
+def change_scenario(
+    scenario: Scenario, changes: Mapping[str, str], path: str | PathLike[str]
+) -> Scenario:
+    """Return `scenario`, read from `path`, with more values changed as `read_scenario` does.
+
+    Raises
+    ------
+    ScenarioError
+        A key or a value that no scenario may have.
+    """
+    data = scenario.model_dump(exclude_unset=True)
+    for key, text in changes.items():
+        _change(data, key, _parse_value(text), path, scenario)
+    return _validated(data, path)
+
+
+def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> tuple[Any, str]:
+    """Return the value at a dotted key of `scenario`, and the key with all names spelt out.
+
+    Raises
+    ------
+    ScenarioError
+        The scenario, read from `path`, has no such key.
+    """
+    data = scenario.model_dump()
+    node, last, trail = _descend(data, key, path)
+    numbers = [str(i) for i in range(len(node))] if isinstance(node, list) else []
+    if last not in (numbers or node):
+        named = [_item_name(item) for item in node if isinstance(item, dict)] if numbers else node
+        known = [one for one in named if one] or numbers
+        near = difflib.get_close_matches(last, known, n=1)
+        hint = f"did you mean '{near[0]}'? " if near else ""
+        raise ScenarioError(
+            path, key, f"the scenario has no '{last}' there; {hint}there are: {_listed(known)}"
+        )
+    return node[int(last)] if isinstance(node, list) else node[last], ".".join([*trail, last])
+
+
+def _validated(data: dict[str, Any], path: str | PathLike[str]) -> Scenario:
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
@@ -76,15 +127,13 @@ def item_key(table: str, items: Sequence[Any], index: int) -> str:
     return f"{table}.{name}" if name and names.count(name) == 1 else f"{table}[{index}]"
 
 
-def _read_toml(path: str | PathLike[str]) -> dict[str, Any]:
+def _read_text(path: str | PathLike[str]) -> str:
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise ScenarioError(path, "", f"cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise ScenarioError(path, "", "is not a text file in UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(path, "", f"is not valid TOML: {error}") from None
 
 
 def _parse_value(text: str) -> Any:
@@ -94,25 +143,22 @@ def _parse_value(text: str) -> Any:
         return text
 
 
-def _change(data: dict[str, Any], key: str, value: Any, path: str | PathLike[str]) -> None:
-    """Put `value` in place of the one at the dotted `key`; names of list items may hold dots."""
-    rest, node = key, data
-    while True:
-        if isinstance(node, list):
-            heads = {_item_name(item): item for item in node if isinstance(item, dict)}
-            heads |= {str(i): item for i, item in enumerate(node)}
-        else:
-            heads = node
-        head = next((h for h in heads if rest.startswith(f"{h}.")), None)
-        if head is None:
-            break
-        if not isinstance(heads[head], dict | list):
-            raise ScenarioError(path, key, f"'{head}' is a value, it holds no further keys", value)
-        single = node is data and head in LISTS and isinstance(heads[head], dict)
-        rest, node = rest[len(head) + 1 :], heads[head]
-        # A table alone is a list of one: its name may stand in the key as in a list's.
-        if single and (name := _item_name(node)) not in node:
-            rest = rest.removeprefix(f"{name}.")
+def _change(
+    data: dict[str, Any], key: str, value: Any, path: str | PathLike[str], scenario: Scenario
+) -> None:
+    """Put `value` in place of the one at the dotted `key`; names of list items may hold dots.
+
+    `data` is what the file of `scenario` gives.
+    """
+    node, rest, _ = _descend(data, key, path)
+    whole, _, index = key.rpartition(".")
+    if index.isdecimal() and not isinstance(node, list):
+        # One number of a list that stands at its default.
+        default, _ = look_up(scenario, whole, path)
+        if isinstance(default, list):
+            _change(data, whole, list(default), path, scenario)
+            _change(data, key, value, path, scenario)
+            return
     if isinstance(node, list):
         if rest.isdecimal() and int(rest) < len(node):
             node[int(rest)] = value
@@ -126,6 +172,51 @@ def _change(data: dict[str, Any], key: str, value: Any, path: str | PathLike[str
         if not isinstance(node, dict):
             raise ScenarioError(path, key, f"'{table}' holds no further keys", value)
     node[last] = value
+
+
+def _descend(
+    data: dict[str, Any], key: str, path: str | PathLike[str]
+) -> tuple[Any, str, list[str]]:
+    """Follow the dotted `key` as far as `data` goes: the table or list, the rest, the way there."""
+    rest, trail = key, list[str]()
+    node: Any = data
+    while True:
+        if isinstance(node, list):
+            heads = {_item_name(item): item for item in node if isinstance(item, dict)}
+            heads |= {str(i): item for i, item in enumerate(node)}
+        else:
+            heads = node
+        head = next((h for h in heads if h and rest.startswith(f"{h}.")), None)
+        if head is None:
+            alone = isinstance(node, list) and len(node) == 1 and trail[-1] in LISTS
+            if not alone or rest.split(".")[0] not in _keys_of(trail[-1]):
+                return node, rest, trail
+            # The name of a table alone may be left out of the key.
+            node, trail = node[0], [*trail, _spelt_out(node, "0")]
+            continue
+        if not isinstance(heads[head], dict | list):
+            raise ScenarioError(path, key, f"'{head}' is a value, it holds no further keys")
+        single = node is data and head in LISTS and isinstance(heads[head], dict)
+        trail = [*trail, _spelt_out(node, head)]
+        rest, node = rest[len(head) + 1 :], heads[head]
+        # A table alone is a list of one: its name may stand in the key as in a list's.
+        if single and (name := _item_name(node)) not in node:
+            rest = rest.removeprefix(f"{name}.")
+
+
+def _spelt_out(node: Any, head: str) -> str:
+    """Return the name of the item that `head` is the index of, where that name tells it."""
+    if not isinstance(node, list) or not head.isdecimal() or not isinstance(node[0], dict):
+        return head
+    names = [_item_name(item) for item in node]
+    name = names[int(head)] if int(head) < len(names) else ""
+    return name if name and names.count(name) == 1 else head
+
+
+def _keys_of(table: str) -> Iterable[str]:
+    """Return the keys that a table of a list of LISTS may have."""
+    (section,) = _arguments(Scenario.model_fields[table].annotation)
+    return section.model_fields  # type: ignore[no-any-return]
 
 
 def _item_name(item: Mapping[str, Any]) -> str:

@@ -9,13 +9,14 @@ import os
 import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from sphshell_pin.dynamics.result import Origin
 from sphshell_pin.errors import (
     Interrupted,
     MissingExtra,
@@ -26,6 +27,7 @@ from sphshell_pin.errors import (
 )
 from sphshell_pin.scenario.build import Built, build
 from sphshell_pin.scenario.figures import Verdict, check_expectations, judge, measure_energy
+from sphshell_pin.scenario.reading import shipped_scenarios
 
 RECORDING = "recording.html"
 STOPPED = "stopped"
@@ -141,8 +143,17 @@ def simulate(
                 progress=progress,
             )
     except (Interrupted, SimulationDiverged) as error:
+        error.result = replace(error.result, origin=origin_of(built))
         return error.result, error
-    return result, None
+    return replace(result, origin=origin_of(built)), None
+
+
+def origin_of(built: Built) -> Origin:
+    """Return what a Result says of the scenario that it came from."""
+    shipped = shipped_scenarios().get(built.name)
+    scenario = built.name if shipped == built.path else str(built.path.absolute())
+    settings = _plain(built.scenario.model_dump(mode="json"))
+    return Origin(scenario, settings)
 
 
 def prepare_folder(out: str | PathLike[str]) -> tuple[Path, list[Path]]:
@@ -195,7 +206,7 @@ def _write_all(
             desk, attic = Path(scratch) / "new", Path(scratch) / "old"
             desk.mkdir()
             attic.mkdir()
-            result.save(desk / "run.npz")
+            result.save(desk / "run.npz", home=folder)
             write_contacts(desk / "contacts.csv", result)
             _write_summary(desk / "summary.json", built, result, verdicts, stopped)
             files = [desk / name for name in ("run.npz", "contacts.csv", "summary.json")]
@@ -305,7 +316,7 @@ def _write_summary(
             "coal": coal.__version__,
             "numpy": np.__version__,
         },
-        "settings": built.scenario.model_dump(mode="json"),
+        "settings": result.origin.settings,
     }
     text = json.dumps(_plain(summary), indent=2, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")

@@ -14,6 +14,9 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Lengths3 = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+LISTS = ("robot", "shell", "contact", "source", "knob")
+"""Tables of which there may be several."""
+
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=3)]
 
@@ -344,6 +347,17 @@ class RunSection(Section):
         return self
 
 
+class KnobSection(Section):
+    """A number to turn while the scenario is looked at; what is left out follows from the key."""
+
+    key: str
+    label: str | None = None
+    unit: str | None = None
+    min: float | None = None
+    max: float | None = None
+    log: bool | None = None
+
+
 class Expected(Section):
     """One expected figure: `value` within `rtol` (relative) plus `atol`, or a range."""
 
@@ -393,6 +407,7 @@ class Scenario(Section):
     source: list[SourceSection] = []
     controller: Controller = NoController()
     run: RunSection
+    knob: list[KnobSection] = []
     figures: dict[str, str] = {}
     expect: dict[str, Expected] = {}
 
@@ -402,5 +417,4 @@ class Scenario(Section):
         """Read `[robot]` as the list of one that `[[robot]]` would have been."""
         if not isinstance(data, dict):
             return data
-        lists = ("robot", "shell", "contact", "source")
-        return {k: [v] if k in lists and isinstance(v, dict) else v for k, v in data.items()}
+        return {k: [v] if k in LISTS and isinstance(v, dict) else v for k, v in data.items()}

@@ -17,6 +17,7 @@ from sphshell_pin import _core
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.corner_normals import settle_normals, unit_normals
 from sphshell_pin.shell.health import Place, ShellHealth
+from sphshell_pin.shell.joints import settle_joints
 from sphshell_pin.shell.orientation import Borders, Oriented, find_borders, orient, split_elements
 from sphshell_pin.shell.polygons import Polygons, examine_quads, triangle_shapes, without_area
 from sphshell_pin.shell.raw import Floats, Ints, Mask, RawSurface, raw_surface
@@ -51,6 +52,8 @@ class CleanedSurface:
     normals : (t, 3, 3) unit normal per triangle corner, or None
     source_element : (m,) index of the input element each came from
     health : what was found and done
+    element_face : (m,) row in `face_names` of the CAD face each element lies on, or None
+    face_names : of the CAD faces
     """
 
     vertices: Floats
@@ -60,6 +63,8 @@ class CleanedSurface:
     normals: Floats | None
     source_element: Ints
     health: ShellHealth
+    element_face: Ints | None = None
+    face_names: tuple[str, ...] = ()
 
 
 def clean(vertices: object, polygons: object, normals: object = None) -> CleanedSurface:
@@ -98,7 +103,7 @@ def clean_surface(raw: RawSurface) -> CleanedSurface:
     # Those merged into another vertex are counted there.
     found["unused_vertices"] = len(raw.vertices) - found["welded_vertices"] - len(used)
     oriented = replace(oriented, polygons=oriented.polygons.with_corners(compact))
-    return _assemble(oriented, vertices[used], table, found)
+    return _with_faces(_assemble(oriented, vertices[used], table, found), raw)
 
 
 def take_surface(raw: RawSurface) -> CleanedSurface:
@@ -130,7 +135,7 @@ def take_surface(raw: RawSurface) -> CleanedSurface:
         "cleaned": False,
     }
     table = unit_normals(raw, found)
-    return _assemble(as_given, raw.vertices, table, found, turn_normals=False)
+    return _with_faces(_assemble(as_given, raw.vertices, table, found, turn_normals=False), raw)
 
 
 def box_diagonal(points: Floats) -> float:
@@ -344,6 +349,17 @@ def _assemble(
     return CleanedSurface(
         vertices, elements, triangles, split.element, normals, polygons.source, health
     )
+
+
+def _with_faces(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
+    """With the CAD faces of the input, if it has any."""
+    if raw.faces is None:
+        return surface
+    faces = raw.faces[surface.source_element]
+    normals = surface.normals
+    if normals is not None:
+        normals = settle_joints(normals, surface.triangles, faces[surface.triangle_element])
+    return replace(surface, normals=normals, element_face=faces, face_names=raw.face_names)
 
 
 def _holes(borders: Borders, component_area: Floats) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import math
 import os
 
 from sphshell_pin.errors import InvalidParameter, InvalidShell, UnitMissing
+from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions, require_kernel
 from sphshell_pin.shell.cleaning import CleanedSurface, box_diagonal, clean_surface
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers import READERS, read_shl, reader_for
@@ -15,7 +16,7 @@ Scale = str | float | None
 
 
 def load_surface(
-    path: str | os.PathLike[str], unit: str | None, scale: Scale
+    path: str | os.PathLike[str], unit: str | None, scale: Scale, cad: CadOptions
 ) -> tuple[CleanedSurface, str, float]:
     """Read and clean a surface file: in metres, the unit taken, metres per file unit.
 
@@ -26,11 +27,15 @@ def load_surface(
     UnitMissing
         If `unit` is not stated where the format has none.
     InvalidParameter
-        If unit, scale or suffix is unknown.
+        If unit, scale or suffix is unknown, or an option is out of range or not for this format.
+    NameNotFound
+        If a body or face is not in the file.
     ShellFileError
         If the file is missing, empty, truncated or damaged.
+    MissingExtra
+        If the library that reads CAD files is not installed.
     """
-    raw, taken, factor = _load_raw(path, unit, scale)
+    raw, taken, factor = _load_raw(path, unit, scale, cad)
     try:
         return clean_surface(raw), taken, factor
     except InvalidShell as error:
@@ -38,22 +43,30 @@ def load_surface(
 
 
 def _load_raw(
-    path: str | os.PathLike[str], unit: str | None, scale: Scale
+    path: str | os.PathLike[str], unit: str | None, scale: Scale, cad: CadOptions
 ) -> tuple[RawSurface, str, float]:
     if unit is not None:
         metres_per_unit(unit)  # an unknown unit is said before a long file is read
     number = _check_scale(scale)
     file, suffix = reader_for(path)
+    if suffix not in CAD_SUFFIXES:
+        cad.check_unused(suffix)
     if suffix == ".shl":
         return _load_shl(file, unit, scale, number)
     if isinstance(scale, str):
         raise InvalidParameter("scale", scale, f"must be a number for {suffix} files (no SCALE)")
+    notes = [] if number == 1.0 else [f"scaled by {number:.6g} as asked"]
+    if suffix in CAD_SUFFIXES:
+        require_kernel(f"reading {suffix} files")
+        from sphshell_pin.shell.cad.surface import read_cad
+
+        raw, taken, factor = read_cad(file, unit, cad)
+        return raw.scaled(number).noting(*notes), taken, factor * number
     raw = READERS[suffix](file)
     if unit is None:
         size = box_diagonal(raw.vertices[raw.corners.ravel()])
         raise UnitMissing(file, size, METRES_PER_UNIT)
     factor = metres_per_unit(unit) * number
-    notes = [] if number == 1.0 else [f"scaled by {number:.6g} as asked"]
     return raw.scaled(factor).noting(*notes), unit, factor
 
 

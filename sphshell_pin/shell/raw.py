@@ -31,6 +31,8 @@ class RawSurface:
     corners : (c,) vertex index of every corner
     normals : (c, 3) one per corner, or None
     notes : sentences a reader has to say about the file
+    faces : (m,) row in `face_names` of the CAD face each polygon lies on, or None
+    face_names : of the CAD faces
     """
 
     vertices: Floats
@@ -38,6 +40,8 @@ class RawSurface:
     corners: Ints
     normals: Floats | None = None
     notes: tuple[str, ...] = ()
+    faces: Ints | None = None
+    face_names: tuple[str, ...] = ()
 
     @property
     def num_polygons(self) -> int:

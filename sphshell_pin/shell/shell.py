@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -73,6 +74,10 @@ class Shell(Topology):
     triangles : (t, 3); triangle_element : (t,) element of each
     normals : (t, 3, 3) per triangle corner, or None
     source_element : (m,) index of the input element each came from
+    element_face : (m,) row in `face_names` of the CAD face each element lies on, or None; within
+        a face and across tangent joints edges are smooth, whatever the crease angle, unless that is
+        0
+    face_names : of the CAD faces
     box : (2, 3) lowest and highest corner [m]; size : its diagonal [m]
     health : ShellHealth; source : path of the file, or None; unit : its unit, or None
     core : the compiled surface that queries run on
@@ -91,6 +96,8 @@ class Shell(Topology):
     triangle_element: Ints
     normals: Floats | None
     source_element: Ints
+    element_face: Ints | None
+    face_names: tuple[str, ...]
     box: Floats
 
     def __init__(
@@ -119,20 +126,35 @@ class Shell(Topology):
         unit: str | None = None,
         scale: str | float | None = None,
         *,
+        chord_error: float | None = None,
+        bodies: Sequence[str] | None = None,
+        faces: Sequence[str | int] | None = None,
+        sew: float | None = None,
         side: str = "both",
         crease_angle: float = CREASE_ANGLE,
         name: str | None = None,
     ) -> Shell:
-        """Load a surface file: .stl, .obj, .ply, .off or ADAMS's .shl.
+        """Load a surface file: a mesh, ADAMS's .shl, or CAD.
+
+        Meshes are .stl, .obj, .ply and .off; CAD files are .step, .stp, .iges, .igs, .brep and
+        .brp, which need the extra `cad`. Their trimmed faces become triangles with exact normals.
 
         Parameters
         ----------
         path : the file; its suffix names the format
         unit : unit of length of its numbers ("m", "mm", "cm", "in", "ft", ...). It must be stated,
-            except for .shl files, which carry metres per file unit (SCALE)
+            except for .shl files, which carry metres per file unit (SCALE), and for STEP and IGES,
+            which carry a unit: another one that is stated is taken instead, with a UnitWarning
         scale : of a .shl file: "apply" its SCALE (default where no unit is stated), "ignore" it
             (default otherwise), or a number to use instead; of other files a number by which the
             surface is made larger. `health` says which was used
+        chord_error : of CAD: largest distance between the flat elements and the exact surface [m],
+            1e-3 of the box diagonal unless given; `health` says what was measured
+        bodies : of CAD: names of the bodies to take; all unless given
+        faces : of CAD: names of the faces to take, or their numbers in the file (from 1); all
+            unless given
+        sew : of CAD: faces whose borders are nearer than this are joined [m], 0 joins none; unless
+            given, within up to 1e-4 of the box diagonal, if that closes gaps
         side, crease_angle, name : as of Shell; the name is the file's unless given
 
         Raises
@@ -140,14 +162,21 @@ class Shell(Topology):
         ShellFileError
             If the file is missing, empty, truncated or damaged.
         InvalidParameter
-            If the unit is missing or unknown, or suffix, scale, side or crease_angle is.
+            If the unit is missing or unknown, or suffix, scale, side or crease_angle is, or an
+            option is out of range or does not belong to the format.
+        NameNotFound
+            If no body or face has a name; the message lists the valid ones.
         InvalidShell
             If the file holds no element with an area.
+        MissingExtra
+            If the library that reads CAD files is not installed.
         """
+        from sphshell_pin.shell.cad import CadOptions
         from sphshell_pin.shell.loading import load_surface
 
         check_options(crease_angle, side)
-        surface, taken_unit, factor = load_surface(path, unit, scale)
+        options = CadOptions(chord_error, bodies, faces, sew)
+        surface, taken_unit, factor = load_surface(path, unit, scale, options)
         found = surface.health.labelled(source=str(path), unit=taken_unit, scale=factor)
         called = Path(path).stem if name is None else name
         shell = cls.__new__(cls)
@@ -218,6 +247,10 @@ class Shell(Topology):
         self.triangle_element = read_only(np.array(surface.triangle_element, np.int32))
         self.source_element = read_only(np.array(surface.source_element, np.int32))
         self.normals = None if surface.normals is None else read_only(surface.normals.copy())
+        self.element_face = None
+        if surface.element_face is not None:
+            self.element_face = read_only(np.array(surface.element_face, np.int32))
+        self.face_names = tuple(surface.face_names)
         # Without cleaning there may be vertices no element uses.
         in_use = np.bincount(self.triangles.ravel(), minlength=len(self.vertices)) > 0
         corners = self.vertices[in_use]
@@ -225,8 +258,19 @@ class Shell(Topology):
         self.size = float(np.linalg.norm(self.box[1] - self.box[0]))
         self.health: ShellHealth = surface.health.labelled(name=self.name, size=self.size)
         self.core = _core.Shell(
-            self.vertices, self.triangles, self.triangle_element, crease_angle, SIDES.index(side)
+            self.vertices,
+            self.triangles,
+            self.triangle_element,
+            crease_angle,
+            SIDES.index(side),
+            *self._joints(),
         )
+
+    def _joints(self) -> tuple[Ints | None, Floats | None]:
+        """CAD face of each triangle (t,) and corner normals (3 t, 3), which say what is smooth."""
+        if self.element_face is None or self.normals is None or self.crease_angle == 0.0:
+            return None, None
+        return self.element_face[self.triangle_element], self.normals.reshape(-1, 3)
 
     def contacts(
         self,
@@ -371,6 +415,8 @@ class Shell(Topology):
             triangle_element=self.triangle_element,
             normals=None if self.normals is None else self.normals @ rotation.T,
             source_element=self.source_element,
+            element_face=self.element_face,
+            face_names=self.face_names,
             health=self.health.moved(scale, rotation, translation),
         )
         shell = type(self).__new__(type(self))

@@ -73,7 +73,7 @@ def test_a_failing_writer_leaves_the_earlier_files(built, tmp_path, monkeypatch)
     run_built(built, out, recording=False)
     before = {path.name: path.read_bytes() for path in out.iterdir()}
 
-    def half(self, path):
+    def half(self, path, **_):
         Path(path).write_bytes(b"half")
         raise OSError(28, "No space left on device")
 

@@ -1,5 +1,6 @@
 #include "bindings/interop.hpp"
 
+#include <limits>
 #include <memory>
 
 #include "bindings/arrays.hpp"
@@ -273,15 +274,30 @@ void bind_dynamics(nanobind::module_& m) {
           nb::arg("v0"), nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"),
           nb::arg("atol"), nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"),
           nb::arg("record_dt"))
-      .def("advance",
-           [](Simulation& self, double wall_seconds) {
-             nb::gil_scoped_release release;
-             return static_cast<int>(self.advance(wall_seconds));
-           })
+      .def(
+          "advance",
+          [](Simulation& self, double wall_seconds, double until) {
+            nb::gil_scoped_release release;
+            return static_cast<int>(self.advance(wall_seconds, until));
+          },
+          nb::arg("wall_seconds"), nb::arg("until") = std::numeric_limits<double>::infinity())
+      .def(
+          "change",
+          [](Simulation& self, const std::vector<const Pair*>& pairs,
+             std::shared_ptr<Controller> controller) {
+            self.change(copies(pairs), std::move(controller));
+          },
+          nb::arg("pairs"), nb::arg("controller").none())
+      .def("push", &Simulation::push, nb::arg("joint"), nb::arg("point"), nb::arg("force_world"))
       .def("take",
            [](Simulation& self) {
              const auto& model = self.model();
              return to_dict(self.take(), model.nq, model.nv);
+           })
+      .def("snapshot",
+           [](Simulation& self) {
+             const auto& model = self.model();
+             return to_dict(self.snapshot(), model.nq, model.nv);
            })
       .def_prop_ro("progress", &Simulation::progress)
       .def_prop_ro("time", &Simulation::time)

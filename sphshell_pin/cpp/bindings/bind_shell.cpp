@@ -17,17 +17,29 @@
 namespace sphshell {
 namespace {
 
+std::vector<Vec3> rows(const Points& table) {
+  std::vector<Vec3> out(table.shape(0));
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = row(table, i);
+  return out;
+}
+
 std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& triangles,
-                                  const Ints& element, double crease_angle, int side) {
-  std::vector<Vec3> points(vertices.shape(0));
-  for (std::size_t i = 0; i < points.size(); ++i) points[i] = row(vertices, i);
+                                  const Ints& element, double crease_angle, int side,
+                                  const std::optional<Ints>& face,
+                                  const std::optional<Points>& normals) {
+  std::vector<Vec3> points = rows(vertices);
   std::vector<Triangle> corners(triangles.shape(0));
   for (std::size_t t = 0; t < corners.size(); ++t)
     corners[t] = {triangles(t, 0), triangles(t, 1), triangles(t, 2)};
   std::vector<int> owner(element.data(), element.data() + element.shape(0));
+  CadFaces cad;
+  if (face && normals) {
+    cad.face.assign(face->data(), face->data() + face->shape(0));
+    cad.normals = rows(*normals);
+  }
   nb::gil_scoped_release release;
   return std::make_shared<Shell>(std::move(points), std::move(corners), std::move(owner),
-                                 crease_angle, static_cast<Side>(side));
+                                 crease_angle, static_cast<Side>(side), cad);
 }
 
 auto contacts(const Shell& shell, const Vec3& centre, double radius, int method, bool turns) {
@@ -141,16 +153,13 @@ void bind_shell(nanobind::module_& m) {
   using namespace sphshell;
   nb::class_<Shell>(m, "Shell")
       .def(nb::new_(&make_shell), nb::arg("vertices"), nb::arg("triangles"),
-           nb::arg("triangle_element"), nb::arg("crease_angle"), nb::arg("side"))
+           nb::arg("triangle_element"), nb::arg("crease_angle"), nb::arg("side"),
+           nb::arg("face").none() = nb::none(), nb::arg("normals").none() = nb::none())
       .def(
           "curve",
           [](Shell& shell, std::optional<Points> normals) {
-            std::vector<Vec3> corners;
-            if (normals)
-              for (std::size_t i = 0; i < normals->shape(0); ++i)
-                corners.push_back(row(*normals, i));
             // Under the GIL: two threads may ask for the first curved query at once.
-            shell.curve(std::move(corners));
+            shell.curve(normals ? rows(*normals) : std::vector<Vec3>());
           },
           nb::arg("normals").none())
       .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"),

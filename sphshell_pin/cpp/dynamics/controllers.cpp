@@ -51,6 +51,7 @@ void CartesianImpedance::torque(Scene& scene, double t, const VectorX& q, const 
 
   // The target moves along straight pieces of the path; time may also step back (inner stages).
   const std::vector<double>& times = s_.times;
+  t -= late_;
   while (segment_ + 2 < times.size() && t >= times[segment_ + 1]) ++segment_;
   while (segment_ > 0 && t < times[segment_]) --segment_;
   const std::size_t i = segment_, j = std::min(i + 1, times.size() - 1);
@@ -101,8 +102,25 @@ void CartesianImpedance::torque(Scene& scene, double t, const VectorX& q, const 
 }
 
 double CartesianImpedance::next_kink(double t) const {
-  const auto next = std::upper_bound(s_.times.begin(), s_.times.end(), t);
-  return next == s_.times.end() ? std::numeric_limits<double>::infinity() : *next;
+  const auto next = std::upper_bound(s_.times.begin(), s_.times.end(), t - late_);
+  return next == s_.times.end() ? std::numeric_limits<double>::infinity() : *next + late_;
+}
+
+// The orientation held stays, and the target stays where it is on the path.
+void CartesianImpedance::take_over(const Controller& before, double t) {
+  const auto* other = dynamic_cast<const CartesianImpedance*>(&before);
+  if (!other || other->s_.times.size() != s_.times.size()) return;
+  hold_ = other->hold_;
+  started_ = other->started_;
+  if (s_.times.size() < 2) return;
+  const std::vector<double>&now = s_.times, &then = other->s_.times;
+  const double at = std::clamp(t - other->late_, then.front(), then.back());
+  const auto next = std::upper_bound(then.begin() + 1, then.end() - 1, at);
+  const std::size_t j = std::min<std::size_t>(next - then.begin(), now.size() - 1);
+  const std::size_t i = j > 0 ? j - 1 : 0;
+  const double span = then[j] - then[i];
+  const double u = span > 0 ? (at - then[i]) / span : 0;
+  late_ = t - (now[i] + u * (now[j] - now[i]));
 }
 
 }  // namespace sphshell

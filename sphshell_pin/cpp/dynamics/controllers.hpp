@@ -16,6 +16,8 @@ class Controller {
   virtual void prepare(Scene&) {}
   // Writes the torques; the scene's contacts have been evaluated at (q, v).
   virtual void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) = 0;
+  // Takes the place of `before` at time t, in the middle of a run: goes on from where that is.
+  virtual void take_over(const Controller& /*before*/, double /*t*/) {}
   // Implicit integrators difference the torques by the state, and if they follow it, by time.
   virtual bool follows_time() const { return false; }
   // The next time at which the torques bend or jump.
@@ -64,12 +66,14 @@ class CartesianImpedance : public Controller {
   explicit CartesianImpedance(ImpedanceSettings settings, int num_joints);
   void prepare(Scene& scene) override;
   void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override;
+  void take_over(const Controller& before, double t) override;
   bool follows_time() const override { return s_.times.size() > 1; }
   double next_kink(double t) const override;
 
  private:
   ImpedanceSettings s_;
   std::size_t segment_ = 0;
+  double late_ = 0;  // the path is followed so much later than its times say [s]
   bool started_ = false;
   Eigen::Matrix3d hold_;  // orientation at the start
   Forces opposed_;

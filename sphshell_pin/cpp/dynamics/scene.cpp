@@ -36,6 +36,11 @@ Scene::Scene(const pinocchio::Model& model, std::vector<Pair> pairs)
   active_.reserve(64);
 }
 
+void Scene::change(std::vector<Pair> pairs) {
+  pairs_ = std::move(pairs);
+  for (const Pair& pair : pairs_) needs_velocity_ = needs_velocity_ || pair.needs_velocity();
+}
+
 void Scene::need_velocity_of(int joint) {
   body_.need(joint);
   needs_velocity_ = true;

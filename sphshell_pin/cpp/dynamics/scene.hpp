@@ -88,6 +88,9 @@ class Scene {
  public:
   Scene(const pinocchio::Model& model, std::vector<Pair> pairs);
 
+  // The same pairs with other laws, friction of the same kind, radii and relaxation.
+  void change(std::vector<Pair> pairs);
+
   // Contact forces at (q, v), with the bristles z (3 per slot, in the shells' frames). `numbered`:
   // contacts are told apart even where no force asks for it.
   void evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool numbered = false);

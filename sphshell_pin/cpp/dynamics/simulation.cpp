@@ -12,8 +12,6 @@
 namespace sphshell {
 namespace {
 
-constexpr std::size_t kRowsPerCall = 4096;
-constexpr std::size_t kContactsPerCall = 16384;
 // Of the steps that stand in for a fixed one.
 constexpr double kFineTolerance = 1e-6;
 constexpr int kMostFineSteps = 1000000;
@@ -76,39 +74,15 @@ Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, R
   reserve();
 }
 
-void Simulation::reserve() {
-  const auto& model = scene_.body().model();
-  record_.t.reserve(kRowsPerCall);
-  record_.q.reserve(kRowsPerCall * static_cast<std::size_t>(model.nq));
-  record_.v.reserve(kRowsPerCall * static_cast<std::size_t>(model.nv));
-  record_.energy.reserve(kRowsPerCall * Record::kEnergies);
-  if (!scene_.pairs().empty()) {
-    record_.contacts.reserve(kContactsPerCall);
-    record_.contact_row.reserve(kContactsPerCall);
-  }
-  record_.events.reserve(256);
-}
-
-bool Simulation::full() const {
-  return record_.t.size() >= kRowsPerCall || record_.contacts.size() * 2 > kContactsPerCall ||
-         record_.events.size() > 128;
-}
-
-Record Simulation::take() {
-  Record out;
-  std::swap(out, record_);
-  reserve();
-  return out;
-}
-
-Simulation::Status Simulation::advance(double wall_seconds) {
+Simulation::Status Simulation::advance(double wall_seconds, double until) {
+  until_ = until;
   if (finished_) return Status::Finished;
   const auto start_of_call = std::chrono::steady_clock::now();
   Status status = Status::Running;
   if (!started_) start();
   int pause = 15;
   for (int checked = 0; status == Status::Running; ++checked) {
-    if (full()) break;
+    if (full() || state_.t >= until) break;
     if ((checked & pause) == pause) {
       const double elapsed = seconds_since(start_of_call);
       if (elapsed > wall_seconds) break;
@@ -136,6 +110,7 @@ double Simulation::end_of_step() const {
   double end = settings_.start_time + settings_.duration;
   if (settings_.dt > 0)
     return grid_ + 1 >= grid_steps_ ? end : settings_.start_time + double(grid_ + 1) * settings_.dt;
+  end = std::min(end, until_);
   if (controller_ && settings_.control_dt > 0) end = std::min(end, next_control_);
   if (controller_) end = std::min(end, controller_->next_kink(state_.t));
   return end;
@@ -330,86 +305,6 @@ void Simulation::keep(bool leaves_work) {
   if (settings_.dt == 0) ++steps_;
 }
 
-// Rows within the step to next_, and at its end.
-void Simulation::record_within(Stepper& stepper) {
-  const double end = settings_.start_time + settings_.duration;
-  if (settings_.record_dt > 0) {
-    // The end is a row, and none stands a round-off before it.
-    const double last = end - 1e-9 * settings_.record_dt;
-    bool moved = false;
-    for (;; ++next_row_) {
-      const double t = settings_.start_time + double(next_row_) * settings_.record_dt;
-      if (t >= next_.t || t >= last) break;
-      stepper.interpolate((t - state_.t) / (next_.t - state_.t), interpolated_);
-      chart_.finish(t, interpolated_, between_);
-      scene_.evaluate(between_.q, between_.v, between_.z, true);
-      write_row(between_);
-      moved = true;
-    }
-    if (moved) {
-      scene_.restart();
-      scene_.evaluate(next_.q, next_.v, next_.z);
-    }
-    const double t = settings_.start_time + double(next_row_) * settings_.record_dt;
-    if (next_.t < (t < last ? t : end)) return;
-    ++next_row_;
-  }
-  scene_.evaluate(next_.q, next_.v, next_.z, true);
-  write_row(next_);
-}
-
-// The scene's forces are those at the state.
-void Simulation::write_row(const State& state) {
-  scene_.log(state.q, state.v, record_.contacts);
-  record_.contact_row.resize(record_.contacts.size(), double(rows_));
-  record_.t.push_back(state.t);
-  record_.q.insert(record_.q.end(), state.q.data(), state.q.data() + state.q.size());
-  record_.v.insert(record_.v.end(), state.v.data(), state.v.data() + state.v.size());
-  const Powers& powers = scene_.powers();
-  const double kinetic = scene_.body().kinetic_energy(state.q, state.v);
-  const double potential = scene_.body().potential_energy(state.q);
-  const Ledger& ledger = state.ledger;
-  for (double e : {kinetic, potential, powers.elastic + powers.bristles, ledger.damping,
-                   ledger.friction - powers.bristles, ledger.control})
-    record_.energy.push_back(e);
-  ++rows_;
-}
-
-void Simulation::note_pairs(double h) {
-  const auto event = [&](std::size_t k, Event::Kind kind) {
-    record_.events.push_back({state_.t, static_cast<int>(k), kind});
-  };
-  for (std::size_t k = 0; k < summaries_.size(); ++k) {
-    const PairState& now = scene_.states()[k];
-    PairSummary& summary = summaries_[k];
-    pieces_[k] = now.pieces;
-    clamped_[k] = now.clamped;
-    if (touching_[k]) summary.contact_time += h;
-    summary.impulse += 0.5 * h * (normal_force_[k] + now.normal_force);
-    normal_force_[k] = now.normal_force;
-    const bool touching = now.count > 0;
-    if (touching != bool(touching_[k])) {
-      event(k, touching ? Event::Kind::Touch : Event::Kind::LiftOff);
-      touching_[k] = touching;
-      deep_[k] = 0;
-      if (touching) ++summary.touches;
-    }
-    const double radius = scene_.pairs()[k].radius;
-    const bool through = now.pushed_through || (radius > 0 && now.depth > radius);
-    if (through && !through_[k]) event(k, Event::Kind::Through);
-    through_[k] = through;
-    if (!touching) continue;
-    if (now.normal_force > summary.peak_force)
-      summary.peak_force = now.normal_force, summary.peak_force_time = state_.t;
-    if (now.depth > summary.max_depth)
-      summary.max_depth = now.depth, summary.max_depth_time = state_.t;
-    if (radius > 0 && now.depth > 0.5 * radius && !deep_[k]) {
-      deep_[k] = 1;
-      event(k, Event::Kind::Deep);
-    }
-  }
-}
-
 // Torques that are held over control_dt change at the start of a step, never inside one.
 void Simulation::hold_torques() {
   if (!controller_ || settings_.control_dt == 0) return;
@@ -425,11 +320,43 @@ const VectorX& Simulation::torque(double t, const VectorX& q, const VectorX& v) 
   // The stages at the end of a step that ends at a kink belong to what comes before it.
   if (t >= kink_) t = std::nextafter(kink_, -std::numeric_limits<double>::infinity());
   if (controller_ && settings_.control_dt == 0) controller_->torque(scene_, t, q, v, tau_);
-  return tau_;
+  return push_.active() ? push_.added(scene_.body(), q, v, tau_) : tau_;
 }
 
-bool Simulation::follow_state() const { return controller_ && settings_.control_dt == 0; }
+bool Simulation::follow_state() const {
+  return push_.active() || (controller_ && settings_.control_dt == 0);
+}
 
-bool Simulation::follow_time() const { return follow_state() && controller_->follows_time(); }
+bool Simulation::follow_time() const {
+  return controller_ && settings_.control_dt == 0 && controller_->follows_time();
+}
+
+void Simulation::push(int joint, const Vec3& point, const Vec3& force_world) {
+  scene_.need_velocity_of(joint);
+  push_.set(joint, point, force_world);
+}
+
+void Simulation::change(std::vector<Pair> pairs, std::shared_ptr<Controller> controller) {
+  if (!started_) start();
+  scene_.restart();
+  scene_.evaluate(state_.q, state_.v, state_.z, true);
+  const double before = scene_.powers().elastic;
+  scene_.change(std::move(pairs));
+  if (controller && controller != controller_) {
+    controller->prepare(scene_);
+    if (controller_) controller->take_over(*controller_, state_.t);
+    controller_ = std::move(controller);
+    next_control_ = state_.t;
+  }
+  scene_.evaluate(state_.q, state_.v, state_.z, true);
+  // Whoever turns a stiffness up loads the spring.
+  state_.ledger.control += scene_.powers().elastic - before;
+  last_ = scene_.powers();
+  scene_.accept(state_.z);
+  guard_.begin(scene_);
+  note_pairs(0);
+  proposal_ = std::min(proposal_, kFirstStep);
+  last_error_ = 1;
+}
 
 }  // namespace sphshell

@@ -9,6 +9,7 @@
 #include "dynamics/controllers.hpp"
 #include "dynamics/guard.hpp"
 #include "dynamics/integrators/stepper.hpp"
+#include "dynamics/push.hpp"
 
 namespace sphshell {
 
@@ -63,12 +64,22 @@ class Simulation : private Torques {
   Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, RunSettings settings,
              std::shared_ptr<Controller> controller, VectorX q0, VectorX v0);
 
-  // Runs for about `wall_seconds` of wall-clock time, or until the records of this call are full.
-  Status advance(double wall_seconds);
+  // Runs for about `wall_seconds` of wall-clock time, to the first step that ends at the time
+  // `until` or later, or until the records of this call are full.
+  Status advance(double wall_seconds, double until = std::numeric_limits<double>::infinity());
   // No more rows fit: advance() returns at once until take() is called.
   bool full() const;
   // Hands over what was recorded since the last call.
   Record take();
+  // The state where the run stands as the only row of a record; what was recorded stays.
+  Record snapshot();
+
+  // From now on the same pairs have other laws, friction (of the same kind) and radii, and the
+  // controller is another, unless null. The energy this brings counts as the controller's work.
+  void change(std::vector<Pair> pairs, std::shared_ptr<Controller> controller);
+  // From now on a force [N] in the world acts at a point of the joint's frame; zero ends it. Its
+  // work counts as the controller's.
+  void push(int joint, const Vec3& point, const Vec3& force_world);
 
   double progress() const {
     return settings_.duration > 0 ? (state_.t - settings_.start_time) / settings_.duration : 1.0;
@@ -115,6 +126,7 @@ class Simulation : private Torques {
   // For what a fixed step cannot resolve: a sphere that would pass through a shell in one.
   std::unique_ptr<Stepper> fine_stepper_;
   Guard guard_;
+  Push push_;
   State state_, next_, between_;
   VectorX tau_, sizes_, interpolated_;
   Powers last_;
@@ -125,7 +137,8 @@ class Simulation : private Torques {
   std::vector<char> touching_, deep_, through_;
   long grid_ = 0, grid_steps_ = 0, steps_ = 0, rejected_ = 0, rows_ = 0, next_row_ = 0;
   double wall_time_ = 0;
-  double next_control_ = 0;  // when held torques change next [s]
+  double until_ = std::numeric_limits<double>::infinity();  // where advance() stops [s]
+  double next_control_ = 0;                                 // when held torques change next [s]
   long controls_ = 0;
   double kink_ = std::numeric_limits<double>::infinity();  // of the torques, next in time [s]
   double proposal_ = 0, last_error_ = 1;                   // of the next step [s]; of the last one

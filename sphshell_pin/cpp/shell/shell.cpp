@@ -11,13 +11,13 @@
 namespace sphshell {
 
 Shell::Shell(std::vector<Vec3> vertices, std::vector<Triangle> triangles, std::vector<int> element,
-             double crease_angle, Side side)
+             double crease_angle, Side side, const CadFaces& cad)
     : vertices_(std::move(vertices)),
       triangles_(std::move(triangles)),
       element_(std::move(element)),
       crease_angle_(crease_angle),
       side_(side),
-      topology_(vertices_, triangles_, element_, crease_angle),
+      topology_(vertices_, triangles_, element_, crease_angle, cad),
       bvh_(vertices_, triangles_, order_) {
   size_ = bounds(vertices_, triangles_).diagonal().norm();
   facet_of_.resize(order_.size());

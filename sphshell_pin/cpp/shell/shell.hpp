@@ -63,7 +63,7 @@ class Shell {
  public:
   // element: per triangle, non-decreasing from 0; crease_angle [rad].
   Shell(std::vector<Vec3> vertices, std::vector<Triangle> triangles, std::vector<int> element,
-        double crease_angle, Side side);
+        double crease_angle, Side side, const CadFaces& cad = {});
 
   SurfacePoint closest_point(const Vec3& point) const;
 

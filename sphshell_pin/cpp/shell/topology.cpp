@@ -15,6 +15,9 @@ namespace {
 // this share of the box and of its distance from the origin. A real bump, however low, is kept.
 constexpr double kPlanarTolerance = 16 * std::numeric_limits<double>::epsilon();
 
+// Normals of two CAD faces that were made equal where they join may have been rounded since [rad].
+constexpr double kSameNormal = 1e-6;
+
 // Consecutive labels of the sets, in the order of first appearance.
 std::vector<int> labels(DisjointSets& sets, std::size_t size, int& count) {
   std::vector<int> label(size, -1), out(size);
@@ -124,7 +127,7 @@ void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Tri
 }
 
 void classify_edges(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-                    double crease_angle, Topology& out) {
+                    double crease_angle, const CadFaces& cad, Topology& out) {
   for (Edge& edge : out.edges) {
     if (edge.count == 1) continue;  // boundary already
     if (edge.count > 2) {
@@ -143,7 +146,8 @@ void classify_edges(const std::vector<Vec3>& vertices, const std::vector<Triangl
     const double angle = std::atan2(m.cross(n).norm(), m.dot(n));
     const bool convex = (far - vertices[edge.first_vertex]).dot(m) <= 0;
     edge.angle = convex ? angle : -angle;
-    const bool smooth = out.planar_face[t] == out.planar_face[u] || angle < crease_angle;
+    const bool smooth = out.planar_face[t] == out.planar_face[u] ||
+                        (cad.face.empty() ? angle < crease_angle : cad.smooth(h, g));
     edge.kind = smooth ? EdgeClass::Smooth : EdgeClass::Crease;
   }
 }
@@ -200,12 +204,21 @@ Eigen::AlignedBox3d bounds(const std::vector<Vec3>& vertices,
   return box;
 }
 
+bool CadFaces::smooth(int h, int g) const {
+  const int t = triangle_of(h), u = triangle_of(g);
+  if (face[t] == face[u]) return true;
+  const auto same = [&](int i, int j) {
+    return (normals[i] - normals[j]).squaredNorm() < kSameNormal * kSameNormal;
+  };
+  return same(h, 3 * u + next_corner(side_of(g))) && same(3 * t + next_corner(side_of(h)), g);
+}
+
 Topology::Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-                   const std::vector<int>& element, double crease_angle) {
+                   const std::vector<int>& element, double crease_angle, const CadFaces& cad) {
   build_edges(triangles, *this);
   build_planar_faces(vertices, triangles, element,
                      kPlanarTolerance * coordinate_scale(vertices, triangles), *this);
-  classify_edges(vertices, triangles, crease_angle, *this);
+  classify_edges(vertices, triangles, crease_angle, cad, *this);
   build_patches(element, *this);
   build_vertices(vertices, triangles, *this);
 }

@@ -34,7 +34,18 @@ struct Edge {
   bool on_rim() const { return kind == EdgeClass::Boundary || kind == EdgeClass::NonManifold; }
 };
 
-// Everything about the surface that follows from vertices, triangles and the crease angle alone.
+// What CAD knows of the joints between its faces; empty where the surface came without.
+struct CadFaces {
+  std::vector<int> face;      // per triangle
+  std::vector<Vec3> normals;  // unit, per triangle corner; equal across a tangent joint
+
+  // Whether the edge between half-edges h and g, wound alike, is smooth: it lies within a face, or
+  // both faces have the same normals at its ends.
+  bool smooth(int h, int g) const;
+};
+
+// Everything about the surface that follows from vertices, triangles, the crease angle, and CAD's
+// faces where they are known: those say what is smooth, whatever the angle.
 struct Topology {
   std::vector<Edge> edges;
   std::vector<int> incidence;        // half-edges, grouped by edge
@@ -58,7 +69,7 @@ struct Topology {
 
   // crease_angle [rad]; triangles of one element are contiguous in `element`.
   Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-           const std::vector<int>& element, double crease_angle);
+           const std::vector<int>& element, double crease_angle, const CadFaces& cad = {});
 };
 
 }  // namespace sphshell

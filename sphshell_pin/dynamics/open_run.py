@@ -1,0 +1,181 @@
+"""A run without an end: it goes on when asked to, and takes changes and pushes on its way."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.checks import check_not_negative, check_vector
+from sphshell_pin.dynamics.controllers import Callback, Controller
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
+from sphshell_pin.dynamics.simulation import Simulation, why_ended
+from sphshell_pin.errors import FrameNotFound, InvalidParameter, WeakLawWarning
+
+Array = NDArray[np.float64]
+
+# The compiled loop wants an end [s]; steps of a microsecond can be counted so far.
+_FOR_EVER = 1e6
+
+
+class OpenRun:
+    """A run of `simulation` from q0 (nq,), v0 (nv,) that is advanced piece by piece.
+
+    The parameters are those of `Simulation.run`; rows are recorded every `record_dt` [s]. The
+    pieces are of one run: bristles, contact numbers and the energy audit go on from one to the
+    next, and with fixed steps the motion is the same, bit for bit, however it is cut.
+
+    Attributes
+    ----------
+    simulation : the one it runs; its scene is that of the last `change`
+    ended : why the run cannot go on, one sentence; None while it can
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        q0: Any,
+        v0: Any = None,
+        controller: Controller | Callback | None = None,
+        control_dt: float | None = None,
+        *,
+        record_dt: float,
+        t0: float = 0.0,
+    ) -> None:
+        self.simulation = simulation
+        self.ended: str | None = None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", WeakLawWarning)  # Scene.explain tells it
+            self._core = simulation.to_core(
+                q0, v0, _FOR_EVER, controller, control_dt, record_dt=record_dt, t0=t0
+            )
+        self._controller = controller
+        self._rows = 0
+        self._start = self.snapshot()
+
+    @property
+    def scene(self) -> Scene:
+        """The scene that runs."""
+        return self.simulation.scene
+
+    @property
+    def time(self) -> float:
+        """Where the run stands [s]."""
+        return float(self._core.time)
+
+    def advance(self, duration: float, wall: float = math.inf) -> Result:
+        """Go on for `duration` [s], or until `wall` [s] of computing are over.
+
+        Returns the rows recorded meanwhile, maybe none. Fixed steps end at the first one beyond,
+        the others exactly there. After the run has `ended` it stands still.
+
+        Raises InvalidParameter if duration or wall is negative.
+        """
+        until = self.time + check_not_negative("duration", duration, "s")
+        left = wall if wall == math.inf else check_not_negative("wall", wall, "s")
+        blocks: list[dict[str, NDArray[Any]]] = []
+        before = self._core.wall_time
+        while self.ended is None:
+            status = self._core.advance(left - (self._core.wall_time - before), until)
+            self.ended = why_ended(status, self._core, self.scene)
+            blocks.append(self._core.take())
+            if self.time >= until or self._core.wall_time - before >= left:
+                break
+        rows = self._result(blocks or [self._core.take()], first=self._rows)
+        self._rows += len(rows.t)
+        return rows
+
+    def snapshot(self) -> Result:
+        """Return the state where the run stands, as a result of one row."""
+        return self._result([self._core.snapshot()])
+
+    @property
+    def residual(self) -> float:
+        """Energy that has appeared from nowhere since the start [J]."""
+        now, start = self.snapshot().energy, self._start.energy
+        return float(now.total[0] - start.total[0])
+
+    def change(self, scene: Scene, controller: Controller | Callback | None = None) -> bool:
+        """Go on with the laws, friction and radii of `scene`, and with `controller` unless None.
+
+        The scene must have the same model and the same pairs otherwise; what this adds to the
+        elastic energy counts as work of the controller. Returns False, and changes nothing, where
+        the scenes differ in more than that: then start another OpenRun from `snapshot()`.
+        """
+        if not _alike(self.scene, scene):
+            return False
+        simulation = Simulation(scene, self.simulation.integrator)
+        q, v = np.array(self._core.q), np.array(self._core.v)
+        core_controller = None
+        if controller is not None and controller is not self._controller:
+            core_controller = simulation.core_controller(controller, q)
+            self._controller = controller
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", WeakLawWarning)
+            pairs = simulation.core_pairs(q, v)
+        self._core.change(pairs, core_controller)
+        self.simulation = simulation
+        return True
+
+    def push(self, frame: str, force_world: Any) -> None:
+        """Push at the origin of `frame` with a force (3,) [N] in the world, from now on.
+
+        A push replaces the one before; zeros end it. Its work counts as the controller's.
+
+        Raises
+        ------
+        FrameNotFound
+            The model has no such frame.
+        InvalidParameter
+            The frame is fixed to the world, or the force is no three numbers.
+        """
+        model = self.scene.model
+        if not model.existFrame(frame):
+            raise FrameNotFound(frame, [one.name for one in model.frames])
+        where = model.frames[model.getFrameId(frame)]
+        if where.parentJoint == 0:
+            raise InvalidParameter("frame", frame, "is fixed to the world: nothing would move")
+        force = check_vector("force_world", force_world, 3, " [N]")
+        self._core.push(where.parentJoint, where.placement.translation, force)
+
+    def _result(self, blocks: list[dict[str, NDArray[Any]]], first: int = 0) -> Result:
+        # The core counts rows from the start of the run, a result from its own first one.
+        for block in blocks:
+            block["contact_row"] = block["contact_row"] - first
+        names = tuple(pair.name for pair in self.scene.pairs)
+        return Result.from_blocks(blocks, names, {}, self.scene)
+
+
+def contacts_of(row: Result) -> SceneContacts:
+    """Return the contacts of a result of one row."""
+    log = row.contacts
+    return SceneContacts(**{name: getattr(log, name) for name in SceneContacts.__annotations__})
+
+
+def _alike(before: Scene, after: Scene) -> bool:
+    """Whether two scenes differ in laws, friction of one kind and radii alone."""
+    same_model = before.model is after.model or before.model == after.model
+    pairs = list(zip(before.pairs, after.pairs, strict=False))
+    return (
+        same_model and len(before.pairs) == len(after.pairs) and all(_same_place(*p) for p in pairs)
+    )
+
+
+def _same_place(a: ContactPair, b: ContactPair) -> bool:
+    return (
+        (a.joint_i, a.joint_j, a.method, a.name) == (b.joint_i, b.joint_j, b.method, b.name)
+        and a.shell is b.shell
+        and a.find is b.find
+        and type(a.friction) is type(b.friction)
+        and _equal(a.sphere_placement, b.sphere_placement)
+        and _equal(a.shell_placement, b.shell_placement)
+    )
+
+
+def _equal(a: pin.SE3 | None, b: pin.SE3 | None) -> bool:
+    return a is b or (a is not None and b is not None and a == b)

@@ -1,0 +1,254 @@
+"""A scenario that keeps running while somebody turns its knobs and pushes its bodies."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.checks import check_not_negative, check_vector
+from sphshell_pin.dynamics.open_run import OpenRun, contacts_of
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.scene import Scene, SceneContacts
+from sphshell_pin.errors import NameNotFound, SphshellError
+from sphshell_pin.scenario.build import Built, rebuild
+from sphshell_pin.scenario.knobs import Knob, knobs_of
+from sphshell_pin.scenario.player import Rows
+
+Array = npt.NDArray[np.float64]
+
+# Between the rows for a chart [s].
+ROW_DT = 5e-3
+
+
+class LiveRun:
+    """Plays the scenario of `built` from its start on, without an end.
+
+    It is a player, as the live page wants one. Knobs of laws, friction, radii and the controller
+    act on the run under way; with others it starts anew, from where it is if it can. A run that
+    cannot go on says why in `ended`, and waits for `reset` or another value.
+
+    Raises what `Simulation.run` raises of a start that cannot be.
+    """
+
+    duration: float | None = None
+
+    def __init__(self, built: Built) -> None:
+        self.built = built
+        self.title = built.scenario.title or built.name
+        self.start = 0.0
+        self._begin(built.q0, built.v0, 0.0, built.controller)
+
+    def _begin(self, q: Array, v: Array, t: float, controller: Any) -> None:
+        self._run = OpenRun(
+            self.built.simulation,
+            q,
+            v,
+            controller,
+            self.built.scenario.run.control_dt,
+            record_dt=ROW_DT,
+            t0=t,
+        )
+        self._fault: str | None = None
+        self._push_end = math.inf
+        self._row = self._run.snapshot()
+        self._total = float(self._row.energy.total[0])
+        self._exchanged = 0.0
+
+    @property
+    def scene(self) -> Scene:
+        """The scene that runs; another object after some changes."""
+        return self._run.scene
+
+    @property
+    def visual_model(self) -> Any:
+        """pinocchio.GeometryModel of the scene's model."""
+        return self.built.visual_model
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._run.time
+
+    @property
+    def q(self) -> Array:
+        """Configuration (nq,)."""
+        q: Array = self._row.q[0]
+        return q
+
+    @property
+    def v(self) -> Array:
+        """Velocity (nv,)."""
+        v: Array = self._row.v[0]
+        return v
+
+    @property
+    def contacts(self) -> SceneContacts:
+        """The contacts at `q`, `v`, with their forces."""
+        return contacts_of(self._row)
+
+    @property
+    def residual(self) -> float:
+        """Energy that appeared from nowhere since the start [J]: the integration's error."""
+        return float(self._row.energy.total[0] - self._total)
+
+    @property
+    def exchanged(self) -> float:
+        """Energy that changed form since the start [J], the scale of `residual`."""
+        return self._exchanged
+
+    @property
+    def ended(self) -> str | None:
+        """Why the run cannot go on, one sentence; None while it can."""
+        return self._fault or self._run.ended
+
+    @property
+    def knobs(self) -> tuple[Knob, ...]:
+        """The knobs of the scenario, with the values they stand at."""
+        return knobs_of(self.built)
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Frames that can be pushed, one of each moving body; those with a sphere first."""
+        model = self.scene.model
+        spheres = {pair.joint_i: pair.frame_i for pair in self.scene.pairs if pair.joint_i}
+        names = dict(spheres)
+        for frame in model.frames:
+            if frame.type == pin.FrameType.BODY and frame.parentJoint:
+                names.setdefault(frame.parentJoint, frame.name)
+        for joint in range(1, model.njoints):
+            if model.existFrame(model.names[joint]):
+                names.setdefault(joint, model.names[joint])
+        return tuple(names.values())
+
+    def advance(self, duration: float, wall: float = math.inf) -> Rows:
+        """Go on for `duration` [s], or until `wall` [s] of computing are over; return the rows.
+
+        A fault of the scenario's own routines ends the run as a divergence does.
+        """
+        until = self.time + check_not_negative("duration", duration, "s")
+        pieces = []
+        if self._push_end <= until:
+            pieces.append(self._advance(max(self._push_end - self.time, 0.0), wall))
+            if self.time >= self._push_end:
+                self._end_push()
+        if self.time < until:
+            pieces.append(self._advance(until - self.time, wall))
+        return _joined(pieces, len(self.scene.pairs))
+
+    def _advance(self, duration: float, wall: float) -> Rows:
+        pairs = len(self.scene.pairs)
+        if self.ended is not None:
+            return Rows.empty(pairs)
+        try:
+            rows = self._run.advance(duration, wall)
+            now = self._run.snapshot()
+        except Exception as error:
+            said = str(error) if isinstance(error, SphshellError) else repr(error)
+            self._fault = ", ".join([said, *getattr(error, "__notes__", ())])
+            return Rows.empty(pairs)
+        self._exchanged += _exchanged(self._row, rows, now)
+        self._row = now
+        log = rows.contacts
+        return Rows.of(
+            rows.t,
+            pairs,
+            log.row,
+            log.pair,
+            log.normal_force,
+            log.friction_force_world,
+            log.depth,
+        )
+
+    def reset(self) -> None:
+        """Start anew, with the knobs as they stand."""
+        built = self.built
+        self._begin(built.q0, built.v0, 0.0, built.controller)
+
+    def change(self, key: str, value: float) -> None:
+        """Set the number at the dotted `key` of the scenario.
+
+        Raises
+        ------
+        ScenarioError
+            There is no such key, or the value is out of its range; the run goes on as it was.
+        """
+        before = self.built
+        after = rebuild(before, {key: repr(float(value))})
+        same = {
+            name: getattr(before.scenario, name) == getattr(after.scenario, name)
+            for name in ("robot", "shell", "controller", "run")
+        }
+        controller = None if same["controller"] and same["shell"] else after.controller
+        if same["robot"] and same["run"] and self._fault is None and self._run.ended is None:
+            try:
+                if self._run.change(after.scene, controller):
+                    self.built = after
+                    self._row = self._run.snapshot()
+                    return
+                # Other weights or places: from here on, under them.
+                self.built = after
+                self._begin(self.q, self.v, self.time, after.controller)
+                return
+            except SphshellError:
+                self.built = before
+                raise
+        self.built = after
+        try:
+            self.reset()
+        except SphshellError:
+            self.built = before
+            self.reset()
+            raise
+
+    def push(self, body: str, force_world: npt.ArrayLike, seconds: float) -> None:
+        """Push at the origin of the frame `body` with a force (3,) [N] in the world for a time [s].
+
+        Raises
+        ------
+        NameNotFound
+            There is no such body.
+        InvalidParameter
+            The force is no three numbers, or the time is negative.
+        """
+        if body not in self.bodies:
+            raise NameNotFound("body", body, "the scene", self.bodies)
+        force = check_vector("force_world", force_world, 3, " [N]")
+        seconds = check_not_negative("seconds", seconds, "s")
+        self._run.push(body, force)
+        self._push_end = self.time + seconds
+
+    def seek(self, t: float) -> None:
+        """Refuse: what has not happened yet cannot be shown.
+
+        Raises
+        ------
+        SphshellError
+            Always.
+        """
+        raise SphshellError(f"a live run cannot go to t = {t!r} s: only a finished run can")
+
+    def _end_push(self) -> None:
+        self._run.push(self.bodies[0], np.zeros(3))
+        self._push_end = math.inf
+
+
+def _exchanged(before: Result, rows: Result, now: Result) -> float:
+    """Energy that changed form from one state over rows to the next [J]."""
+    columns = [
+        np.concatenate([getattr(one.energy, name) for one in (before, rows, now)])
+        for name in before.energy.__annotations__
+    ]
+    return 0.5 * float(np.abs(np.diff(columns, axis=1)).sum())
+
+
+def _joined(pieces: list[Rows], pairs: int) -> Rows:
+    if len(pieces) == 1:
+        return pieces[0]
+    if not pieces:
+        return Rows.empty(pairs)
+    names = ("t", "normal_force", "friction_force", "depth")
+    return Rows(*(np.concatenate([getattr(one, name) for one in pieces]) for name in names))

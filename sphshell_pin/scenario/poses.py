@@ -1,0 +1,201 @@
+"""How a robot stands to press: a posture that can move its tip, the way there, what it weighs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.scenario.tips import Tip
+
+Array = npt.NDArray[np.float64]
+
+# Mobility along the way of approach, as a part of the best one, below which a posture is singular.
+_MOBILE = 0.05
+# How far joints are bent out of a singular posture [rad or m], in turn, and how often it is tried.
+_BENDS = (0.3, 0.6, 0.9)
+_TRIES = 40
+# Of the smallest joint coordinate to the limit that it leaves, as a part of its range.
+_MARGIN = 0.02
+
+
+@dataclass(frozen=True)
+class Stance:
+    """A robot at the start, seen from its tip; vectors and points in the world."""
+
+    model: Any
+    """pinocchio.Model without the joints that do not move the tip."""
+    q: Array
+    """Configuration of the whole robot (nq,)."""
+    lock: tuple[str, ...]
+    """Joints that do not move the tip."""
+    origin: Array
+    """Of the tip's frame (3,) [m]."""
+    centre: Array
+    """Of the tip's sphere (3,) [m]."""
+    approach: Array
+    """Unit (3,): where the tip presses."""
+    slide: Array | None
+    """Unit (3,) across the approach: where the tip moves best; None where it cannot."""
+    mass: float
+    """Effective mass along the approach [kg]."""
+    slide_mass: float
+    """Effective mass along the slide [kg]; that along the approach where there is none."""
+    inertia: float
+    """Mean effective inertia about the tip [kg m^2]; 0 with fewer than six joints."""
+    joint_inertia: Array
+    """Diagonal of the mass matrix (nv,), of the joints that move."""
+    force: float
+    """Largest push along the approach that the joints' effort limits allow [N]; inf if unknown."""
+    reach: float
+    """From the tip to the farthest joint that moves it [m]."""
+    bent: bool
+    """Whether the posture had to be bent out of a singular one, or into its limits."""
+
+
+def take_stance(model: Any, q: Array, tip: Tip, approach: Array | None) -> Stance:
+    """Return how the robot stands with its tip near the configuration q (nq,).
+
+    `approach` (3,) is where the tip shall press; by default down, or where it moves best if it
+    cannot move down. A posture in which it cannot move is bent a little, always in the same way.
+    """
+    lock = _joints_aside(model, tip)
+    inside = _into_limits(model, q)
+    rng = np.random.default_rng(0)
+    moving = [j for j in range(1, model.njoints) if model.names[j] not in lock]
+    best, best_score = _stance(model, inside, lock, tip, approach)
+    for bend in _BENDS:
+        if best_score >= _MOBILE:
+            break
+        for _ in range(_TRIES):
+            step = np.zeros(model.nv)
+            for j in moving:
+                joint = model.joints[j]
+                step[joint.idx_v : joint.idx_v + joint.nv] = rng.uniform(-bend, bend, joint.nv)
+            bent = _into_limits(model, pin.integrate(model, inside, step))
+            one, score = _stance(model, bent, lock, tip, approach)
+            if score > best_score:
+                best, best_score = one, score
+    return replace(best, bent=not np.array_equal(best.q, q))
+
+
+def _joints_aside(model: Any, tip: Tip) -> tuple[str, ...]:
+    """Return the joints that do not move the tip; none are left aside of a robot that floats."""
+    parent = int(model.frames[model.getFrameId(tip.frame)].parentJoint)
+    chain = set(model.supports[parent])
+    return tuple(model.names[j] for j in range(1, model.njoints) if j not in chain)
+
+
+def _into_limits(model: Any, q: Array) -> Array:
+    """Return q with every joint of one coordinate inside its limits."""
+    inside = np.array(q, dtype=float)
+    for j in range(1, model.njoints):
+        joint = model.joints[j]
+        if joint.nq != 1:
+            continue
+        low = model.lowerPositionLimit[joint.idx_q]
+        high = model.upperPositionLimit[joint.idx_q]
+        if np.isfinite(low) and np.isfinite(high) and low < high:
+            room = _MARGIN * (high - low)
+            if not low <= inside[joint.idx_q] <= high:
+                inside[joint.idx_q] = np.clip(inside[joint.idx_q], low + room, high - room)
+    return inside
+
+
+def _stance(
+    model: Any, q: Array, lock: tuple[str, ...], tip: Tip, approach: Array | None
+) -> tuple[Stance, float]:
+    """Return the stance at q, and its mobility along the approach as a part of the best one."""
+    reduced = pin.buildReducedModel(model, [model.getJointId(name) for name in lock], q)
+    short = _coordinates(model, reduced, q)
+    data = reduced.createData()
+    pin.computeJointJacobians(reduced, data, short)
+    pin.updateFramePlacements(reduced, data)
+    pin.crba(reduced, data, short)
+    mass_matrix = np.triu(data.M) + np.triu(data.M, 1).T
+    frame = reduced.getFrameId(tip.frame)
+    pose = data.oMf[frame]
+    centre = pose.act(tip.offset)
+    local = pin.getFrameJacobian(reduced, data, frame, pin.LOCAL_WORLD_ALIGNED)
+    linear = local[:3] - pin.skew(centre - pose.translation) @ local[3:]
+    mobility = linear @ np.linalg.solve(mass_matrix, linear.T)
+    values, axes = np.linalg.eigh(mobility)
+    top = max(float(values[-1]), 1e-300)
+    if approach is None:
+        approach = np.array([0.0, 0.0, -1.0])
+        if approach @ mobility @ approach < _MOBILE * top:
+            approach = _roomier(reduced, short, linear, mass_matrix, _upright(axes[:, -1]))
+    along = float(approach @ mobility @ approach)
+    across = np.eye(3) - np.outer(approach, approach)
+    sideways, slides = np.linalg.eigh(across @ mobility @ across)
+    slide = None
+    if sideways[-1] > _MOBILE * top:
+        slide = _roomier(reduced, short, linear, mass_matrix, _upright(slides[:, -1]))
+    pushes = np.abs(linear.T @ approach)
+    limits = np.array(reduced.upperEffortLimit)
+    limited = (pushes > 1e-9) & np.isfinite(limits) & (limits > 0)
+    joints = [np.asarray(one.translation) for one in list(data.oMi)[1:]]
+    inertia = 0.0
+    if reduced.nv >= 6:
+        turning = local[3:] @ np.linalg.solve(mass_matrix, local[3:].T)
+        inertia = 3.0 / float(np.trace(turning))
+    stance = Stance(
+        model=reduced,
+        q=q,
+        lock=lock,
+        origin=np.array(pose.translation),
+        centre=centre,
+        approach=approach,
+        slide=slide,
+        mass=1 / max(along, 1e-9),
+        slide_mass=1 / max(float(sideways[-1]) if slide is not None else along, 1e-9),
+        inertia=inertia,
+        joint_inertia=np.diag(mass_matrix).copy(),
+        force=float(np.min(limits[limited] / pushes[limited])) if limited.any() else np.inf,
+        reach=max((float(np.linalg.norm(centre - one)) for one in joints), default=0.0),
+        bent=False,
+    )
+    # Where the tip can slide, both ways count: a stretched arm slides sideways at best.
+    usable = min(along, float(sideways[-1])) if reduced.nv > 1 else along
+    return stance, usable / top
+
+
+def _coordinates(model: Any, reduced: Any, q: Array) -> Array:
+    short = pin.neutral(reduced)
+    for j in range(1, reduced.njoints):
+        to, source = reduced.joints[j], model.joints[model.getJointId(reduced.names[j])]
+        short[to.idx_q : to.idx_q + to.nq] = q[source.idx_q : source.idx_q + source.nq]
+    return short
+
+
+def _upright(axis: Array) -> Array:
+    """Return `axis` along the nearest coordinate axis, where it nearly is one, and not downward."""
+    k = int(np.argmax(np.abs(axis)))
+    if abs(axis[k]) > 0.97:
+        straight = np.zeros(3)
+        straight[k] = 1.0
+        return straight
+    return axis * np.sign(axis[k])
+
+
+def _roomier(model: Any, q: Array, linear: Array, mass_matrix: Array, axis: Array) -> Array:
+    """Return `axis` or its opposite: the way along which the joints are farther from limits."""
+    rates = np.linalg.solve(mass_matrix, linear.T @ axis)
+    rooms = []
+    for sign in (1.0, -1.0):
+        room = np.inf
+        for j in range(1, model.njoints):
+            joint = model.joints[j]
+            rate = sign * rates[joint.idx_v]
+            if joint.nq != 1 or abs(rate) < 1e-9 * np.abs(rates).max():
+                continue
+            limit = (model.upperPositionLimit if rate > 0 else model.lowerPositionLimit)[
+                joint.idx_q
+            ]
+            if np.isfinite(limit):
+                room = min(room, abs(limit - q[joint.idx_q]) / abs(rate))
+        rooms.append(room)
+    return axis if rooms[0] >= rooms[1] else -axis

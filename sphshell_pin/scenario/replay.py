@@ -1,0 +1,218 @@
+"""A finished run, played again in the scene that it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sphshell_pin.dynamics.result import Origin, Result
+from sphshell_pin.dynamics.scene import Scene, SceneContacts
+from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
+from sphshell_pin.scenario.build import Built, build, build_scenario
+from sphshell_pin.scenario.player import Rows
+from sphshell_pin.scenario.reading import shipped_scenarios
+from sphshell_pin.scenario.schema import Scenario
+
+Array = npt.NDArray[np.float64]
+
+# What moves the bodies, and what judges the outcome, is not needed to show them.
+UNSHOWN = ("controller", "figures", "expect", "knob")
+HOW = "give its scenario with --scenario (in Python: scenario=...)"
+
+
+class Replay:
+    """Plays the rows of a Result: a player whose motion is known already.
+
+    `result` is a Result or the path of one that was saved. The scene and its visual model are
+    built from the scenario it came from, with the settings of the run; `scenario`, a shipped name
+    or a path, takes its place. A Result of one's own scene is played in that scene.
+
+    Raises
+    ------
+    ResultError
+        Nothing says which scene ran, or the scenario's robot or contacts are not those of the run.
+    SphshellError
+        The result cannot be read, or `scenario` cannot be built.
+    """
+
+    def __init__(
+        self,
+        result: Result | str | PathLike[str],
+        scenario: str | PathLike[str] | None = None,
+    ) -> None:
+        self.result = result if isinstance(result, Result) else Result.load(result)
+        self._name = "the result" if isinstance(result, Result) else str(Path(result))
+        built = self._build(scenario)
+        if built is not None:
+            self.scene: Scene = built.scene
+            self.visual_model: Any = built.visual_model
+            self.title = built.scenario.title or built.name
+        elif self.result.scene is not None:
+            self.scene, self.visual_model = self.result.scene, None
+            self.title = "A finished run"
+        else:
+            raise ResultError(self._name, f"does not say which scene it came from: {HOW}")
+        self._check()
+        # A run that diverged is shown up to where its numbers end.
+        state = np.hstack((self.result.q, self.result.v))
+        unsound = np.flatnonzero(~np.isfinite(state).all(axis=1))
+        self._count = int(unsound[0]) if len(unsound) else len(state)
+        if not self._count:
+            raise ResultError(self._name, "has no row of finite numbers to show")
+        self._rows = self._all_rows()
+        self._residual = self.result.energy.residual
+        self._exchanged = self.result.energy.exchanged_until
+        self._time, self._row, self._told = self.start, 0, 0
+
+    knobs: tuple[Any, ...] = ()
+    bodies: tuple[str, ...] = ()
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._time
+
+    @property
+    def start(self) -> float:
+        """Time of the first row [s]."""
+        return float(self.result.t[0])
+
+    @property
+    def duration(self) -> float:
+        """Simulated time from the first row to the last [s]."""
+        return float(self.result.t[self._count - 1] - self.result.t[0])
+
+    @property
+    def row(self) -> int:
+        """The recorded row that is shown: the last one that is not later than `time`."""
+        return self._row
+
+    @property
+    def q(self) -> Array:
+        """Configuration (nq,)."""
+        q: Array = self.result.q[self._row]
+        return q
+
+    @property
+    def v(self) -> Array:
+        """Velocity (nv,)."""
+        v: Array = self.result.v[self._row]
+        return v
+
+    @property
+    def contacts(self) -> SceneContacts:
+        """The contacts of the row that is shown."""
+        return self.result.contacts.at_row(self._row)
+
+    @property
+    def residual(self) -> float:
+        """Energy that appeared from nowhere since the start [J]."""
+        return float(self._residual[self._row])
+
+    @property
+    def exchanged(self) -> float:
+        """Energy that changed form since the start [J]."""
+        return float(self._exchanged[self._row])
+
+    @property
+    def ended(self) -> str | None:
+        """Why it cannot go on: at the last row, that it is the last."""
+        return "The recorded run ends here." if self._row == self._count - 1 else None
+
+    def advance(self, duration: float, wall: float = np.inf) -> Rows:
+        """Go `duration` [s] on, to the end at most; return the rows passed on the way.
+
+        Nothing is computed: `wall`, the time that a player may take, is not used up.
+        """
+        self._go_to(self._time + max(0.0, float(duration)))
+        passed = self._rows.select(slice(self._told, self._row + 1))
+        self._told = max(self._told, self._row + 1)
+        return passed
+
+    def seek(self, t: float) -> None:
+        """Go to time `t` [s], or to the end that is nearer."""
+        t = float(t)
+        if not np.isfinite(t):
+            raise InvalidParameter("t", t, "must be a time [s]")
+        self._go_to(t)
+        self._told = self._row
+
+    def reset(self) -> None:
+        """Go back to the first row."""
+        self._told = 0
+        self._go_to(self.start)
+
+    def change(self, key: str, value: float) -> None:
+        """Refuse: a finished run has nothing to turn."""
+        raise InvalidParameter(key, value, "cannot be changed: this is a finished run")
+
+    def push(self, body: str, force_world: Any, seconds: float) -> None:
+        """Refuse: a finished run cannot be pushed."""
+        raise InvalidParameter("body", body, "cannot be pushed: this is a finished run")
+
+    def _go_to(self, t: float) -> None:
+        self._time = min(max(t, self.start), self.start + self.duration)
+        after = np.searchsorted(self.result.t[: self._count], self._time, side="right")
+        self._row = max(0, int(after) - 1)
+
+    def _all_rows(self) -> Rows:
+        log = self.result.contacts
+        own = log.row < self._count
+        return Rows.of(
+            self.result.t[: self._count],
+            len(self.result.pairs),
+            log.row[own],
+            log.pair[own],
+            log.normal_force[own],
+            log.friction_force_world[own],
+            log.depth[own],
+        )
+
+    def _build(self, scenario: str | PathLike[str] | None) -> Built | None:
+        if scenario is not None:
+            return build(scenario)
+        origin = self.result.origin
+        return None if origin is None else _build_again(origin, self._name)
+
+    def _check(self) -> None:
+        """Refuse a scene in which these rows mean nothing."""
+        model = self.scene.model
+        ran, now = (self.result.q.shape[1], self.result.v.shape[1]), (model.nq, model.nv)
+        if ran != now:
+            raise ResultError(
+                self._name,
+                f"its model had nq = {ran[0]}, nv = {ran[1]}, that of the scenario has "
+                f"nq = {now[0]}, nv = {now[1]}: the robot or its locked joints have changed since",
+            )
+        names = tuple(pair.name for pair in self.scene.pairs)
+        if names != tuple(self.result.pairs):
+            raise ResultError(
+                self._name,
+                f"its contacts were {', '.join(self.result.pairs) or 'none'}, the scenario has "
+                f"{', '.join(names) or 'none'}: it is another scenario, or has changed since",
+            )
+
+
+def _build_again(origin: Origin, name: str) -> Built:
+    """Build the scenario of `origin` with its settings; `name` is the result's."""
+    path = Path(origin.scenario)
+    if path.suffix != ".toml":
+        shipped = shipped_scenarios()
+        if origin.scenario not in shipped:
+            raise ResultError(name, f"its scenario '{origin.scenario}' is not shipped: {HOW}")
+        path = shipped[origin.scenario]
+    settings: Mapping[str, Any] = {k: v for k, v in origin.settings.items() if k not in UNSHOWN}
+    try:
+        return build_scenario(Scenario.model_validate(settings), path)
+    except SphshellError as fault:
+        gone = "" if path.exists() else f"{path} is no longer there, and "
+        why = f"{gone}its scenario cannot be built again ({fault}): {HOW}"
+        raise ResultError(name, why) from fault
+    except ValueError as fault:
+        why = f"its settings are none that this version knows: {HOW}"
+        raise ResultError(name, why) from fault

@@ -1,0 +1,104 @@
+"""Where a robot carries its sphere: known fingertips and feet, or the end of its only limb."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sphshell_pin.errors import FrameNotFound, SphshellError
+
+Array = npt.NDArray[np.float64]
+
+# Words in the names of frames that mark the end of a limb, in the order of trust.
+_END_WORDS = ("tcp", "tip", "tool", "ee_link", "eef", "end_effector", "foot", "feet")
+
+
+@dataclass(frozen=True)
+class Tip:
+    """A sphere on a robot: `radius` [m], centre `offset` (3,) [m] in `frame`; how it is known."""
+
+    frame: str
+    radius: float
+    offset: Array
+    said: str
+
+
+def find_tips(
+    robot: Any, *, shipped: str | None, frame: str | None, radius: float | None
+) -> list[Tip]:
+    """Return the spheres of `robot` (a LoadedRobot) to put on a surface.
+
+    One for a robot with a fixed base, all feet of one that floats. `shipped` is the name of a
+    shipped robot; `frame` and `radius` [m] are what the user gave.
+
+    Raises
+    ------
+    FrameNotFound
+        The robot has no such frame.
+    SphshellError
+        Which frame or which radius cannot be found out.
+    """
+    known = _known(robot, shipped)
+    if frame is not None:
+        names = [one.name for one in robot.model.frames]
+        if frame not in names:
+            raise FrameNotFound(frame, names)
+        found = [one for one in known if one.frame == frame]
+        return [_sized(found[0] if found else Tip(frame, 0.0, np.zeros(3), ""), radius)]
+    if known:
+        chosen = known if floats(robot.model) else known[:1]
+        return [_sized(one, radius) for one in chosen]
+    return [_sized(Tip(one, 0.0, np.zeros(3), said), radius) for one, said in _ends(robot.model)]
+
+
+def floats(model: Any) -> bool:
+    """Whether the root of the robot is free to move in space."""
+    return model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
+
+
+def _known(robot: Any, shipped: str | None) -> list[Tip]:
+    robots = importlib.import_module("sphshell_pin.robots")
+    if shipped in robots.TIPS:
+        spheres, said = robots.fingertips(shipped), "a fingertip this package knows of"
+    else:
+        spheres, said = robots.end_spheres(robot), "the sphere of its collision geometry"
+    return [Tip(one.frame, one.radius, np.array(one.offset), said) for one in spheres]
+
+
+def _sized(tip: Tip, radius: float | None) -> Tip:
+    if radius is not None:
+        # A centre that stands one radius before the frame goes on touching it.
+        touching = tip.radius and abs(np.linalg.norm(tip.offset) - tip.radius) < 1e-9
+        offset = tip.offset * (radius / tip.radius) if touching else tip.offset
+        return Tip(tip.frame, radius, offset, tip.said)
+    if not tip.radius:
+        raise SphshellError(
+            f"frame '{tip.frame}' carries no sphere that is known: say its radius in metres, for "
+            "a fingertip --radius 0.012"
+        )
+    return tip
+
+
+def _ends(model: Any) -> list[tuple[str, str]]:
+    """Return the frames at the ends of the limbs that may be meant, and why."""
+    leaves = set(range(1, model.njoints)) - {int(one) for one in model.parents}
+    carriers = {int(one.parentFrame) for one in model.frames}
+    names = [
+        one.name
+        for i, one in enumerate(model.frames)
+        if int(one.parentJoint) in leaves and i not in carriers
+    ]
+    if len(names) == 1:
+        return [(names[0], "the only end of the robot")]
+    for word in _END_WORDS:
+        found = [name for name in names if word in name.lower()]
+        if len(found) == 1 or (found and floats(model)):
+            return [(name, f"an end of the robot called '{word}'") for name in found]
+    raise SphshellError(
+        f"the robot has several ends: say which frame carries the sphere with --frame, for "
+        f"instance one of {', '.join(names[:8]) or ', '.join(f.name for f in model.frames)}"
+    )

@@ -1,0 +1,166 @@
+"""A run in pieces: against the same run in one, and against closed forms of pushes and changes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.errors import FrameNotFound, InvalidParameter
+from tests import models
+
+G = 9.81
+R = 0.05
+FIXED = [sp.SemiImplicitEuler(1e-4), sp.RungeKutta4(1e-4), sp.LinearlyImplicitEuler(1e-4)]
+CONTROLLED = [sp.Adaptive(1e-9), sp.Implicit(1e-8)]
+fixed = pytest.mark.parametrize("integrator", FIXED, ids=lambda i: type(i).__name__)
+every = pytest.mark.parametrize("integrator", FIXED + CONTROLLED, ids=lambda i: type(i).__name__)
+
+PLATE = models.plate()
+BRISTLES = sp.BristleFriction(0.6, 0.5, 1e5, 100.0)
+
+
+def sliding_ball(friction=models.FRICTION) -> sp.Scene:
+    return models.on_plate(models.ball(), models.LAW, friction)
+
+
+def opened(scene: sp.Scene, integrator, q, v, **more) -> OpenRun:
+    return OpenRun(sp.Simulation(scene, integrator), q, v, record_dt=1e-3, **more)
+
+
+@fixed
+@pytest.mark.parametrize("friction", [models.FRICTION, BRISTLES], ids=["coulomb", "bristle"])
+def test_pieces_are_the_run_in_one(integrator, friction) -> None:
+    q, v = models.free_q([0.0, 0.0, R - 1e-3]), np.array([0.3, 0.1, 0.0, 0.0, 2.0, 0.0])
+    whole = sp.Simulation(sliding_ball(friction), integrator).run(q, v, 0.2, record_dt=1e-3)
+    run = opened(sliding_ball(friction), integrator, q, v)
+    pieces = [run.advance(piece) for piece in (0.0301, 0.07, 0.0005, 0.0994)]
+    last = run.snapshot()
+    np.testing.assert_array_equal(last.q[0], whole.q[-1])
+    np.testing.assert_array_equal(last.v[0], whole.v[-1])
+    np.testing.assert_array_equal(np.concatenate([one.t for one in pieces]), whole.t)
+    for name in ("number", "depth", "friction_force_world"):
+        joined = np.concatenate([getattr(one.contacts, name) for one in pieces])
+        np.testing.assert_array_equal(joined, getattr(whole.contacts, name))
+    times = np.concatenate([one.contacts.t for one in pieces])
+    np.testing.assert_array_equal(times, whole.contacts.t)
+    assert run.residual == pytest.approx(whole.energy.residual[-1], abs=1e-12)
+
+
+@every
+def test_a_piece_ends_where_it_was_asked_to(integrator) -> None:
+    run = opened(sliding_ball(), integrator, models.free_q([0.0, 0.0, R + 0.05]), None)
+    run.advance(0.0123)
+    step = getattr(integrator, "dt", 0.0)
+    assert 0.0123 - 1e-12 <= run.time < 0.0123 + step + 1e-12
+    assert run.snapshot().q[0, 2] == pytest.approx(R + 0.05 - 0.5 * G * run.time**2, abs=step)
+
+
+@every
+def test_a_push_gives_its_impulse_and_its_work(integrator) -> None:
+    """From rest, a force F for a time T moves 1 kg at F T, and its work is (F T)^2 / 2."""
+    scene = models.on_plate(models.ball(gravity=0.0), models.LAW)
+    run = opened(scene, integrator, models.free_q([0.0, 0.0, 1.0]), None)
+    run.push("ball", [3.0, 0.0, -4.0])
+    run.advance(0.1)
+    run.push("ball", np.zeros(3))
+    pushed = run.time
+    run.advance(0.05)
+    row = run.snapshot()
+    np.testing.assert_allclose(row.v[0, :3], pushed * np.array([3.0, 0.0, -4.0]), rtol=1e-9)
+    np.testing.assert_allclose(row.v[0, 3:], 0.0, atol=1e-12)
+    assert row.energy.control_work[0] == pytest.approx(0.5 * (5.0 * pushed) ** 2, rel=1e-9)
+    assert abs(run.residual) < 1e-9
+
+
+@every
+def test_a_push_off_the_centre_turns_an_arm(integrator) -> None:
+    """One hinge about z, arm L: the angular acceleration is F L / I."""
+    model = models.empty(gravity=0.0)
+    inertia = models.pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.1, 0.2]))
+    tip = models.pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.0]))
+    models.add_body(model, "arm", models.pin.JointModelRZ(), inertia=inertia, frame=tip)
+    run = OpenRun(sp.Simulation(sp.Scene(model), integrator), [0.0], record_dt=1e-3)
+    run.push("arm", [0.0, 1.0, 0.0])
+    run.advance(0.01)
+    # The force keeps its direction in the world: cos(angle) is 1 to 1e-7 here.
+    assert run.snapshot().v[0, 0] == pytest.approx(0.4 / 0.2 * run.time, rel=1e-6)
+
+
+@every
+def test_a_change_of_stiffness_is_booked_and_gives_the_new_rest(integrator) -> None:
+    def scene(stiffness: float) -> sp.Scene:
+        law = models.linear_law(stiffness, 2.0 * np.sqrt(stiffness))
+        return models.on_plate(models.ball(), law, shell=PLATE)
+
+    run = opened(scene(2e4), integrator, models.free_q([0.0, 0.0, R - G / 2e4]), None)
+    run.advance(0.05)
+    assert run.change(scene(1e4))
+    jumped = run.snapshot()
+    depth = jumped.contacts.depth[0]
+    # Half the stiffness at the same depth holds half the energy: the change took it away.
+    assert jumped.energy.control_work[0] == pytest.approx(-0.5 * 1e4 * depth**2, rel=1e-6)
+    run.advance(0.4)
+    assert run.snapshot().contacts.depth[0] == pytest.approx(G / 1e4, rel=1e-3)
+    assert abs(run.residual) < 1e-3 * G * (G / 1e4)
+
+
+def test_a_stretched_bristle_outlives_a_change() -> None:
+    """A block on a slope hangs on its bristle; another normal law must not let it slip."""
+    tilt = 0.3
+
+    def scene(stiffness: float) -> sp.Scene:
+        model = models.empty(gravity=0.0)
+        model.gravity.linear = G * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
+        models.add_body(model, "ball", models.pin.JointModelTranslation())
+        law = models.linear_law(stiffness, 300.0)
+        return models.on_plate(model, law, sp.BristleFriction(0.8, 0.8, 1e5, 300.0), shell=PLATE)
+
+    depth = G * np.cos(tilt) / 1e5
+    run = opened(scene(1e5), sp.Adaptive(1e-9), [0.0, 0.0, R - depth], None)
+    run.advance(0.5)
+    held = run.snapshot().q[0, 0]
+    assert held == pytest.approx(G * np.sin(tilt) / 1e5, rel=1e-6)
+    assert run.change(scene(2e5))
+    run.advance(0.5)
+    assert run.snapshot().q[0, 0] == pytest.approx(held, rel=1e-6)
+
+
+def test_another_scene_is_not_taken_for_a_change() -> None:
+    run = opened(sliding_ball(), FIXED[0], models.free_q([0.0, 0.0, R]), None)
+    elsewhere = models.on_plate(models.ball(), models.LAW, models.FRICTION)  # its own plate
+    assert not run.change(elsewhere)
+    assert not run.change(models.on_plate(models.ball(mass=2.0), models.LAW, models.FRICTION))
+    run.advance(0.01)
+    assert run.ended is None
+
+
+def test_a_run_that_diverges_says_so_and_stands_still() -> None:
+    run = OpenRun(
+        sp.Simulation(models.on_plate(models.ball(), models.LAW), sp.SemiImplicitEuler(1e-3)),
+        models.free_q([0.0, 0.0, 9.0]),
+        controller=lambda t, q, v, contacts: np.full(6, 1e30 if t > 0.01 else 0.0),
+        record_dt=1e-3,
+    )
+    run.advance(0.1)
+    assert run.ended is not None
+    assert "joint" in run.ended
+    stood = run.time
+    run.advance(0.1)
+    assert run.time == stood
+
+
+@pytest.mark.parametrize(
+    ("frame", "force", "fault", "says"),
+    [
+        ("bal", [1, 0, 0], FrameNotFound, "no frame 'bal'"),
+        ("universe", [1, 0, 0], InvalidParameter, "fixed to the world"),
+        ("ball", [1, 0], InvalidParameter, "force_world"),
+        ("ball", [1, 0, np.nan], InvalidParameter, "force_world"),
+    ],
+)
+def test_a_push_that_cannot_be(frame: str, force: list[float], fault: type, says: str) -> None:
+    run = opened(sliding_ball(), FIXED[0], models.free_q([0.0, 0.0, R]), None)
+    with pytest.raises(fault, match=says):
+        run.push(frame, force)

@@ -1,0 +1,173 @@
+"""Knobs say what may be turned; a rebuilt scenario differs in what was turned and in no more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sphshell_pin.errors import ScenarioError
+from sphshell_pin.scenario import build, knobs_of, rebuild, shipped_scenarios
+from tests.scenario.files import DROP, write
+
+STIFFNESS = "contact.ball-plate.law.stiffness"
+
+
+def knob(key: str, more: str = "") -> str:
+    """Return the table of a knob."""
+    return f'\n[[knob]]\nkey = "{key}"\n{more}\n'
+
+
+def the_knob(folder, key, more=""):
+    """Build the example with one knob and return that."""
+    (found,) = knobs_of(build(write(folder, DROP + knob(key, more))))
+    return found
+
+
+def test_what_is_left_out_follows_from_the_key(tmp_path):
+    found = the_knob(tmp_path, STIFFNESS)
+    assert (found.low, found.value, found.high) == pytest.approx((1e5, 1e6, 1e7), rel=1e-12)
+    assert found.log
+    assert not found.restart
+    assert (found.label, found.unit) == ("stiffness", "N/m^1.5")
+
+
+def test_what_is_given_stands(tmp_path):
+    found = the_knob(
+        tmp_path, STIFFNESS, 'label = "k"\nunit = "x"\nmin = 9e5\nmax = 2e6\nlog = true'
+    )
+    assert (found.label, found.unit, found.low, found.high) == ("k", "x", 9e5, 2e6)
+    assert found.log
+
+
+@pytest.mark.parametrize(
+    ("key", "more", "unit", "value", "restart"),
+    [
+        ("contact.ball-plate.sphere.radius", "", "m", 0.012, False),
+        ("contact.sphere.radius", "", "m", 0.012, False),
+        ("contact.0.law.damping", "", "N s/m", 20.0, False),
+        ("contact.ball-plate.law.exponent", "", "", 1.5, False),
+        ("contact.ball-plate.law.full_damping_depth", "", "m", 1e-4, False),
+        ("gravity.2", "min = -20\nmax = 0", "m/s^2", -9.81, False),
+        ("robot.ball.start.root_joint.2", "", "", 0.0125, True),
+        ("shell.plate.placement.xyz.2", "min = -1\nmax = 0", "m", -0.01, True),
+        ("shell.plate.placement.rpy_deg.0", "min = -9\nmax = 9", "deg", 0.0, True),
+        ("run.dt", "", "s", 1e-4, True),
+    ],
+)
+def test_any_number_may_be_a_knob(key, more, unit, value, restart, tmp_path):
+    found = the_knob(tmp_path, key, more)
+    assert (found.unit, found.value, found.restart) == (unit, value, restart)
+    assert found.low <= value <= found.high
+    assert found.label
+
+
+def test_several_contacts_are_told_apart():
+    labels = [one.label for one in knobs_of(build("allegro_hand_object"))]
+    assert len(set(labels)) == len(labels)
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        (knob("contact.ball-plate.law.stifness"), r"no 'stifness'.*did you mean 'stiffness'"),
+        (knob("contact.tip.law.stiffness"), r"there are: ball-plate"),
+        (knob("shell.plate.side"), r"shell\.plate\.side: is not a number"),
+        (knob("run.rtol"), r"run\.rtol: is not a number"),
+        (knob("contact.ball-plate.law"), r"is not a number"),
+        (knob(STIFFNESS) + knob(STIFFNESS), r"knob\[1\]\.key: is a knob already"),
+        (knob(STIFFNESS) + knob("contact.0.law.stiffness"), r"is a knob already"),
+        (knob(STIFFNESS, "min = 2e6\nmax = 3e6"), r"outside its range 2e\+06 to 3e\+06"),
+        (knob(STIFFNESS, "min = 3e6\nmax = 2e6"), r"min 3e\+06 must be less than max 2e\+06"),
+        (knob(STIFFNESS, "min = 0\nmax = 2e6\nlog = true"), r"min must be positive with log"),
+        (knob("gravity.2"), r"needs min and max, as 'gravity.2' is not positive"),
+        (knob(STIFFNESS, "mim = 3"), r"did you mean 'min'"),
+    ],
+)
+def test_a_wrong_knob_is_told_when_the_scenario_is_built(text, match, tmp_path):
+    with pytest.raises(ScenarioError, match=match) as caught:
+        build(write(tmp_path, DROP + text))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_value_set_from_outside_widens_the_range(tmp_path):
+    path = write(tmp_path, DROP + knob(STIFFNESS, "min = 9e5\nmax = 2e6"))
+    (found,) = knobs_of(build(path, {STIFFNESS: "5e6"}))
+    assert (found.low, found.value, found.high) == (9e5, 5e6, 5e6)
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_shipped_knobs_hold_over_their_range(name):
+    built = build(name)
+    knobs = knobs_of(built)
+    assert knobs
+    for one in knobs:
+        assert one.low <= one.value <= one.high
+        for value in (one.low, one.high):
+            turned = rebuild(built, {one.key: repr(value)})
+            (again,) = (k for k in knobs_of(turned) if k.key == one.key)
+            assert again.value == pytest.approx(value, rel=1e-12)
+
+
+def test_a_rebuild_keeps_what_did_not_change(tmp_path):
+    built = build(write(tmp_path))
+    turned = rebuild(built, {STIFFNESS: "2e6", "contact.ball-plate.sphere.radius": "0.01"})
+    assert turned.shells["plate"] is built.shells["plate"]
+    assert turned.scene.pairs[0].shell is built.scene.pairs[0].shell
+    assert turned.assembly is built.assembly
+    assert turned.visual_model is built.visual_model
+    assert turned.scene.pairs[0].law.stiffness == 2e6
+    assert turned.scene.pairs[0].sphere.radius == 0.01
+    # What was there before is as it was.
+    assert built.scene.pairs[0].law.stiffness == 1e6
+    assert built.scenario.contact[0].law.stiffness == 1e6
+
+
+def test_changes_add_up(tmp_path):
+    once = rebuild(build(write(tmp_path)), {STIFFNESS: "2e6"})
+    twice = rebuild(once, {"gravity.2": "-3.7"})
+    assert twice.scene.pairs[0].law.stiffness == 2e6
+    np.testing.assert_array_equal(twice.scene.model.gravity.linear, [0, 0, -3.7])
+    np.testing.assert_array_equal(once.scene.model.gravity.linear, [0, 0, -9.81])
+    assert twice.visual_model is once.visual_model
+
+
+def test_a_rebuild_makes_anew_what_changed(tmp_path):
+    built = build(write(tmp_path))
+    larger = rebuild(built, {"shell.plate.magnify": "2"})
+    assert larger.shells["plate"].size == pytest.approx(2 * built.shells["plate"].size, rel=1e-12)
+    moved = rebuild(built, {"shell.plate.placement.xyz.2": "-0.02"})
+    assert moved.shells["plate"] is built.shells["plate"]
+    assert moved.scene.pairs[0].placement.translation[2] == -0.02
+    started = rebuild(built, {"robot.start": "{ root_joint = [0, 0, 0.5, 0, 0, 0, 1] }"})
+    assert started.q0[2] == 0.5
+
+
+def test_a_rebuild_moves_as_a_fresh_build_does(tmp_path):
+    path, changes = write(tmp_path), {STIFFNESS: "3e5", "contact.0.law.damping": "5"}
+    fresh, turned = build(path, changes), rebuild(build(path), changes)
+    runs = [one.simulation.run(one.q0, one.v0, 0.05) for one in (fresh, turned)]
+    np.testing.assert_array_equal(runs[0].q, runs[1].q)
+
+
+def test_a_refused_change_leaves_the_scenario_alone(tmp_path):
+    built = build(write(tmp_path))
+    with pytest.raises(ScenarioError, match=r"contact\.ball-plate\.law\.stiffness"):
+        rebuild(built, {STIFFNESS: "-1"})
+    assert rebuild(built, {}).scenario == built.scenario
+
+
+def test_build_reuses_what_another_build_of_the_file_made(tmp_path):
+    path = write(tmp_path)
+    built = build(path)
+    again = build(path, {STIFFNESS: "2e6"}, reuse=built)
+    assert again.shells["plate"] is built.shells["plate"]
+    assert again.assembly is built.assembly
+    other = build(write(tmp_path, name="other.toml"), reuse=built)
+    assert other.shells["plate"] is not built.shells["plate"]
+
+
+def test_the_users_functions_are_loaded_once(tmp_path):
+    built = build("gear_contact")
+    turned = rebuild(built, {"source.gears.law.stiffness": "1e9"})
+    assert turned.controller is built.controller
+    assert turned.scene.pairs[0].find is built.scene.pairs[0].find

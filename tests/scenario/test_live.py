@@ -1,0 +1,119 @@
+"""A scenario that goes on while it is changed: what a page relies on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.live import LiveRun
+from tests.scenario.files import DROP, write
+
+LAW = "contact.ball-plate.law"
+G = 9.81
+
+
+@pytest.fixture
+def live(tmp_path) -> LiveRun:
+    return LiveRun(build(write(tmp_path)))
+
+
+def weight(live: LiveRun) -> float:
+    return float(live.scene.model.inertias[1].mass) * G
+
+
+def settle(live: LiveRun, seconds: float = 1.0) -> None:
+    for _ in range(round(seconds * 50)):
+        live.advance(0.02)
+
+
+def test_it_goes_on_beyond_the_duration_of_the_file(live: LiveRun) -> None:
+    rows = live.advance(0.3)
+    assert live.time == pytest.approx(0.3, abs=2e-4)
+    assert live.ended is None
+    assert live.duration is None
+    assert rows.normal_force.shape == (61, 1)
+
+
+def test_the_ball_comes_to_rest_under_its_weight(live: LiveRun) -> None:
+    settle(live)
+    assert live.contacts.normal_force.sum() == pytest.approx(weight(live), rel=1e-3)
+    assert abs(live.residual) < 1e-2 * live.exchanged  # of an order-1 integrator
+
+
+def test_a_knob_acts_on_the_run_under_way(live: LiveRun) -> None:
+    settle(live)
+    time = live.time
+    live.change(f"{LAW}.stiffness", 1e5)
+    assert live.time == time
+    settle(live, 3.0)
+    # Ten times softer, k depth^1.5.
+    assert live.contacts.depth[0] == pytest.approx((weight(live) / 1e5) ** (2 / 3), rel=1e-3)
+    assert live.built.scenario.contact[0].law.stiffness == 1e5
+
+
+def test_gravity_goes_on_from_where_the_run_is(live: LiveRun) -> None:
+    settle(live)
+    time, q = live.time, live.q.copy()
+    live.change("gravity.2", -5.0)
+    assert live.time == time
+    np.testing.assert_array_equal(live.q, q)
+    settle(live)
+    mass = float(live.scene.model.inertias[1].mass)
+    assert live.contacts.normal_force.sum() == pytest.approx(5.0 * mass, rel=1e-3)
+
+
+def test_what_only_a_start_can_use_starts_anew(live: LiveRun) -> None:
+    live.advance(0.2)
+    live.change("robot.ball.start.root_joint.2", 0.05)
+    assert live.time == 0.0
+    assert live.q[2] == 0.05
+
+
+def test_a_value_that_cannot_be_changes_nothing(live: LiveRun) -> None:
+    live.advance(0.1)
+    before = live.built
+    for key, value in ((f"{LAW}.stiffness", -1.0), ("contact.none.law.stiffness", 1.0)):
+        with pytest.raises(ScenarioError):
+            live.change(key, value)
+    with pytest.raises(SphshellError, match="depth"):
+        live.change("robot.ball.start.root_joint.2", -0.001)
+    assert live.built is before
+    live.advance(0.1)
+    assert live.ended is None
+
+
+def test_a_push_moves_the_ball_for_its_time_only(live: LiveRun) -> None:
+    live.change("gravity.2", 0.0)
+    start = live.v.copy()
+    live.push("ball", [0.5, 0.0, 0.0], 0.1)
+    live.advance(0.05)
+    live.advance(0.3)
+    mass = float(live.scene.model.inertias[1].mass)
+    assert live.v[0] - start[0] == pytest.approx(0.5 * 0.1 / mass, rel=2e-3)
+    assert abs(live.residual) < 1e-9
+
+
+def test_an_unknown_body_is_named_with_those_there_are(live: LiveRun) -> None:
+    assert "ball" in live.bodies
+    with pytest.raises(NameNotFound, match="ball"):
+        live.push("bal", [1.0, 0.0, 0.0], 0.1)
+
+
+def test_a_fault_of_the_users_own_function_ends_the_run_until_it_is_reset(tmp_path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "def tau(t, q, v, contacts):\n"
+        "    if t > 0.02:\n        raise ValueError('no more')\n    return 0 * v\n"
+    )
+    text = DROP.replace("[run]", '[controller]\ntype = "python"\nfunction = "mine.py:tau"\n\n[run]')
+    live = LiveRun(build(write(tmp_path, text)))
+    live.advance(0.1)
+    assert live.ended is not None
+    assert "no more" in live.ended
+    stood = live.time
+    live.advance(0.1)
+    assert live.time == stood
+    live.reset()
+    assert live.time == 0.0
+    assert live.ended is None

@@ -1,0 +1,175 @@
+"""A finished run is played again: from its file, in the scene that it came from."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import ResultError, SphshellError
+from sphshell_pin.scenario import build, run_built
+from sphshell_pin.scenario.replay import Replay
+from tests.scenario.files import DROP, write
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A scenario and the results of a changed run of it."""
+    home = tmp_path_factory.mktemp("drop")
+    changes = {"contact.ball-plate.sphere.radius": "0.011", "run.record_dt": "1e-3"}
+    run_built(build(write(home), changes), home / "out", recording=False)
+    return home
+
+
+@pytest.fixture
+def replay(folder):
+    return Replay(folder / "out" / "run.npz")
+
+
+def test_it_stands_at_the_row_of_its_time(replay):
+    result = replay.result
+    assert replay.time == result.t[0]
+    assert replay.duration == pytest.approx(0.05)
+    touched = result.contacts.row[0]
+    replay.seek(result.t[touched] + 1e-9)
+    np.testing.assert_array_equal(replay.q, result.q[touched])
+    np.testing.assert_array_equal(replay.v, result.v[touched])
+    # The log is that of the model: what the scene finds at the row is what was recorded.
+    found = replay.scene.contacts(replay.q, replay.v)
+    np.testing.assert_allclose(replay.contacts.depth, found.depth, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(replay.contacts.point_world, found.point_world, atol=1e-12)
+
+
+def test_steps_add_up_to_the_whole(replay):
+    passed = [replay.advance(0.0007, 1.0) for _ in range(80)]
+    result = replay.result
+    np.testing.assert_array_equal(np.concatenate([rows.t for rows in passed]), result.t)
+    force = np.concatenate([rows.normal_force for rows in passed])[:, 0]
+    by_hand = [result.contacts.normal_force[result.contacts.row == r].sum() for r in range(51)]
+    np.testing.assert_allclose(force, by_hand)
+    assert force.max() > 0
+    assert replay.ended
+    assert len(replay.advance(1.0, 1.0)) == 0
+    replay.reset()
+    assert replay.ended is None
+    assert replay.time == 0.0
+    assert len(replay.advance(0.0, 1.0)) == 1
+
+
+def test_the_clock_stops_at_both_ends(replay):
+    replay.seek(-5.0)
+    assert replay.time == 0.0
+    replay.seek(99.0)
+    assert replay.time == replay.result.t[-1]
+    with pytest.raises(SphshellError):
+        replay.seek(float("nan"))
+
+
+def test_energy_goes_with_the_row(replay):
+    energy = replay.result.energy
+    assert replay.exchanged == 0.0
+    replay.seek(99.0)
+    assert replay.residual == energy.residual[-1]
+    assert replay.exchanged == pytest.approx(energy.exchanged)
+    # Until it first touches, it changes potential into kinetic energy, seen from both sides.
+    replay.seek(0.01)
+    lost = energy.potential[0] - energy.potential[replay.row]
+    assert replay.exchanged == pytest.approx(0.5 * (energy.kinetic[replay.row] + lost), rel=1e-12)
+
+
+def test_the_settings_are_those_of_the_run(replay, folder):
+    assert replay.scene.pairs[0].sphere.radius == 0.011
+    assert replay.title == "a ball falls on a box"
+    # The file may change or go: the results hold what ran.
+    (folder / "drop.toml").rename(folder / "gone.toml")
+    try:
+        assert Replay(folder / "out" / "run.npz").scene.pairs[0].sphere.radius == 0.011
+    finally:
+        (folder / "gone.toml").rename(folder / "drop.toml")
+
+
+def test_results_and_scenario_may_move_together(tmp_path):
+    home = tmp_path / "here"
+    home.mkdir()
+    (home / "vertices.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    primitive = 'primitive = { type = "box", size = [0.2, 0.2, 0.02] }'
+    write(home, DROP.replace(primitive, 'file = "vertices.obj"\nunit = "m"\nside = "both"'))
+    run_built(build(home / "drop.toml"), home / "out", recording=False)
+    origin = sp.Result.load(home / "out" / "run.npz").origin
+    assert origin.scenario == str(home / "drop.toml")
+    # The results alone still find the scenario where it is.
+    shutil.copytree(home / "out", tmp_path / "alone")
+    Replay(tmp_path / "alone" / "run.npz")
+    # The whole folder moves.
+    home.rename(tmp_path / "there")
+    moved = Replay(tmp_path / "there" / "out" / "run.npz")
+    assert moved.result.origin.scenario == str(tmp_path / "there" / "drop.toml")
+    assert moved.scene.pairs[0].shell.elements.shape[0] == 1
+    with pytest.raises(ResultError, match=r"--scenario") as told:
+        Replay(tmp_path / "alone" / "run.npz")
+    assert "drop.toml is no longer there" in str(told.value)
+    Replay(tmp_path / "alone" / "run.npz", scenario=tmp_path / "there" / "drop.toml")
+
+
+def test_a_shipped_scenario_is_found_by_its_name(tmp_path):
+    report = run_built(
+        build("sphere_on_shell", {"run.duration": "0.01"}), tmp_path, recording=False
+    )
+    assert report.result.origin.scenario == "sphere_on_shell"
+    assert Replay(tmp_path / "run.npz").visual_model is not None
+    lost = dataclasses.replace(
+        report.result, origin=dataclasses.replace(report.result.origin, scenario="lost")
+    )
+    with pytest.raises(ResultError, match=r"'lost' is not shipped.*--scenario"):
+        Replay(lost)
+
+
+def test_a_file_of_an_older_version_loads(folder, tmp_path):
+    with np.load(folder / "out" / "run.npz") as file:
+        arrays = dict(file)
+    header = json.loads(str(arrays["header"]))
+    del header["origin"]
+    np.savez(tmp_path / "old.npz", **(arrays | {"header": np.array(json.dumps(header))}))
+    assert sp.Result.load(tmp_path / "old.npz").origin is None
+    with pytest.raises(ResultError, match=r"old.npz: does not say .*--scenario"):
+        Replay(tmp_path / "old.npz")
+    assert Replay(tmp_path / "old.npz", scenario=folder / "drop.toml").duration > 0
+
+
+def test_a_scenario_of_another_robot_is_refused(folder):
+    with pytest.raises(ResultError, match=r"had nq = 7, nv = 6, that .* has nq"):
+        Replay(folder / "out" / "run.npz", scenario="fingertip_on_blade")
+
+
+def test_a_scenario_of_other_contacts_is_refused(folder, tmp_path):
+    other = write(tmp_path, DROP.replace("ball-plate", "ball-table"))
+    with pytest.raises(ResultError, match="were ball-plate, the scenario has ball-table"):
+        Replay(folder / "out" / "run.npz", scenario=other)
+
+
+def test_a_finished_run_has_nothing_to_turn(replay):
+    assert replay.knobs == () == replay.bodies
+    with pytest.raises(SphshellError, match="finished"):
+        replay.change("contact.ball-plate.law.stiffness", 1.0)
+    with pytest.raises(SphshellError, match="finished"):
+        replay.push("ball", np.zeros(3), 1.0)
+
+
+def test_a_scene_of_ones_own_is_played_where_it_ran():
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "z")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    model.addBodyFrame("ball", joint, pin.SE3.Identity(), 0)
+    floor = sp.Shell([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], elements=[[0, 1, 2, 3]])
+    scene = sp.Scene(model)
+    scene.add_contact(sp.Sphere(0.1, frame="ball"), floor, law=sp.ImpactLaw(1e5, 1.5, 10.0, 1e-3))
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(np.array([0.12]), duration=0.1)
+    replay = Replay(result)
+    assert replay.scene is scene
+    with pytest.raises(ResultError, match="does not say"):
+        Replay(dataclasses.replace(result, scene=None))

@@ -1,0 +1,95 @@
+"""CAD faces say what is smooth: a coarse fillet stays one patch, a crease between faces is one."""
+
+from __future__ import annotations
+
+import itertools
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import Shell
+from sphshell_pin.shell.cleaning import clean_surface
+from sphshell_pin.shell.raw import raw_surface
+
+SMOOTH, CREASE = 0, 1
+SLACK = 0.005  # [rad] by which the tangent plane misses the round's normal
+
+
+def bent_sheet(crease_angle: float = np.deg2rad(10.0)) -> Shell:
+    """Return a quarter round of radius 1 in strips of 30 degrees, with two planes.
+
+    One plane is tangent to it, but for SLACK, the other meets it at a right angle.
+    """
+    vertices, elements, normals, face = [], [], [], []
+
+    def add(corners, corner_normals, number: int) -> None:
+        first = len(vertices)
+        vertices.extend(corners)
+        normals.extend(corner_normals)
+        elements.append([first, first + 1, first + 2, first + 3])
+        face.append(number)
+
+    def on(angle: float, z: float) -> list[float]:
+        return [np.cos(angle), np.sin(angle), z]
+
+    angles = np.linspace(0.0, np.pi / 2, 4)
+    for a, b in itertools.pairwise(angles):
+        corners = [on(a, 0.0), on(b, 0.0), on(b, 1.0), on(a, 1.0)]
+        add(corners, [[x, y, 0.0] for x, y, _ in corners], 0)
+    tilted = [np.sin(SLACK), np.cos(SLACK), 0.0]
+    add([[0, 1, 0], [-1, 1, 0], [-1, 1, 1], [0, 1, 1]], [tilted] * 4, 1)
+    add([[1, 0, 0], [1, 0, 1], [2, 0, 1], [2, 0, 0]], [[0.0, 1.0, 0.0]] * 4, 2)
+    raw = raw_surface(np.array(vertices, float), np.array(elements), np.array(normals))
+    names = ("round", "tangent", "other")
+    surface = clean_surface(replace(raw, faces=np.array(face, np.int32), face_names=names))
+    shell = Shell.__new__(Shell)
+    shell._set(surface, crease_angle, "both", "bent", None, None)
+    return shell
+
+
+def kind_of(shell: Shell, x: float, y: float) -> int:
+    """Class of the edge that stands upright at (x, y)."""
+    ends = shell.vertices[shell.edge_vertices]
+    here = np.abs(ends[:, :, :2] - [x, y]).max(axis=(1, 2)) < 1e-9
+    (found,) = np.flatnonzero(here)
+    return int(shell.edge_class[found])
+
+
+def test_joints_are_smooth_where_faces_are_tangent_and_nowhere_else() -> None:
+    shell = bent_sheet()
+    for angle in (np.pi / 6, np.pi / 3):
+        assert kind_of(shell, np.cos(angle), np.sin(angle)) == SMOOTH  # 30 degrees, within a face
+    assert kind_of(shell, 0.0, 1.0) == SMOOTH
+    assert kind_of(shell, 1.0, 0.0) == CREASE
+    patch = dict(zip(shell.element_face, shell.element_patch, strict=True))
+    assert patch[0] == patch[1] != patch[2]
+    assert shell.face_names == ("round", "tangent", "other")
+
+
+def test_a_crease_angle_of_zero_leaves_every_element_flat() -> None:
+    assert bent_sheet(crease_angle=0.0).num_patches == 5
+
+
+def test_tangent_faces_share_their_normals_and_others_keep_theirs() -> None:
+    shell = bent_sheet()
+    corner = {tuple(v): [] for v in np.round(shell.vertices, 9)}
+    for triangle, normals in zip(shell.triangles, shell.normals, strict=True):
+        for v, n in zip(triangle, normals, strict=True):
+            corner[tuple(np.round(shell.vertices[v], 9))].append(n)
+    joint, crease = np.array(corner[(0.0, 1.0, 0.0)]), np.array(corner[(1.0, 0.0, 0.0)])
+    assert np.ptp(joint, axis=0).max() == 0.0
+    # Midway between both.
+    np.testing.assert_allclose(joint[0], [np.sin(SLACK / 2), np.cos(SLACK / 2), 0.0], atol=1e-9)
+    assert np.linalg.norm(crease[0] - crease[-1]) == pytest.approx(np.sqrt(2.0))
+
+
+def test_faces_go_with_a_shell_that_is_moved_or_stored() -> None:
+    shell = bent_sheet()
+    place = pin.SE3(pin.utils.rpyToMatrix(0.1, 0.2, 0.3), np.array([1.0, 2.0, 3.0]))
+    for other in (shell.transformed(place, 2.0), pickle.loads(pickle.dumps(shell))):
+        np.testing.assert_array_equal(other.element_face, shell.element_face)
+        np.testing.assert_array_equal(other.edge_class, shell.edge_class)
+        assert other.face_names == shell.face_names
