@@ -134,6 +134,7 @@ class Query {
   void claim_vertex(const Shell& shell, int facet, int corner, const Vec3& centre, double radius,
                     double tolerance);
   void claim_nearest(const Shell& shell, const Vec3& centre, double radius);
+  static Carrier carrier_at(const Shell& shell, int f, const PatchPoint& at, const Vec3& outward);
   void add_minimum(const Shell& shell, const Contact& contact, int facet, const Carrier& carrier);
   void join_minima(const Shell& shell, const Vec3& centre, double radius);
   void list_minima(double same);

@@ -265,9 +265,30 @@ void Query::claim_nearest(const Shell& shell, const Vec3& centre, double radius)
         contact_at(at.point, outward.normalized(), centre, radius, facet.element, Feature::Face);
     // The foot slides ahead of the centre without bound here, as good as not at all.
     if (turns_) contact.turn = turn_of(contact, radius, Mat3::Zero());
-    carrier = {outward, false};
+    carrier = carrier_at(shell, f, at, outward);
   }
   if (nearest < radius) add_minimum(shell, contact, holder, carrier);
+}
+
+// What tells outside from inside at a place of facet f: its own normal `outward`, but on a side or
+// in a corner those of all elements that meet there.
+Query::Carrier Query::carrier_at(const Shell& shell, int f, const PatchPoint& at,
+                                 const Vec3& outward) {
+  constexpr double kBorder = 1e-6;
+  const Topology& topology = shell.topology();
+  const int t = shell.triangle_of_facet(f);
+  const bool on[3] = {at.v < kBorder, at.u + at.v > 1 - kBorder, at.u < kBorder};
+  for (int k = 0; k < 3; ++k) {
+    if (!on[k] || !on[previous_corner(k)]) continue;
+    const int vertex = shell.triangles()[t][k];
+    return {topology.vertex_normal[vertex], bool(topology.vertex_on_rim[vertex])};
+  }
+  for (int k = 0; k < 3; ++k) {
+    if (!on[k]) continue;
+    const Edge& edge = topology.edges[topology.edge_of[3 * t + k]];
+    return {topology.edge_normal(edge), edge.on_rim()};
+  }
+  return {outward, false};
 }
 
 void Query::add_minimum(const Shell& shell, const Contact& contact, int facet,
