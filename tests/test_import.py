@@ -18,6 +18,7 @@ HEAVY = (
     "pandas",
     "tornado",
     "zmq",
+    "OCP",
 )
 
 

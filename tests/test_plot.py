@@ -44,7 +44,7 @@ def without_contact():
     return a_result(np.arange(5.0), q)
 
 
-def test_the_three_figures_are_written_and_not_blank(tmp_path):
+def test_the_figures_are_written_and_not_blank(tmp_path):
     from PIL import Image
 
     scene, result = ball_on_plate()
@@ -53,6 +53,7 @@ def test_the_three_figures_are_written_and_not_blank(tmp_path):
         "force_and_depth.png",
         "energy.png",
         "contact_path.png",
+        "contact_map.png",
     ]
     for path in paths:
         pixels = np.asarray(Image.open(path).convert("L"))
@@ -108,7 +109,7 @@ def test_a_single_instant_of_contact_is_drawn(tmp_path):
     scene, _ = ball_on_plate()
     q = np.tile(ball_configuration([0, 0, 0.05]), (2, 1))
     result = a_result([0, 1], q, [{"row": 1, "point_world": [0.1, 0.2, 0.0]}], ("ball",))
-    assert len(save_figures(result, tmp_path, scene)) == 3
+    assert len(save_figures(result, tmp_path, scene)) == 4
     assert len(save_figures(result, tmp_path)) == 3
 
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from sphshell_pin.view.notebook import RecordingView
+
 Array = NDArray[np.float64]
 
 EVENT_KINDS = ("touch", "lift_off", "deep", "through")
@@ -81,7 +83,7 @@ class EnergyAudit:
 
     @property
     def total(self) -> Array:
-        """Energy stored and lost, less the work of the controller (n,) [J]: it should not change."""
+        """Energy stored and lost, less the controller's work (n,) [J]: it should not change."""
         return (
             self.kinetic
             + self.potential
@@ -271,12 +273,42 @@ class Result:
             "number": log.number,
         }
 
-    def plot(self) -> Figure:
-        """Return an overview figure: forces, depth and energy over time."""
+    def plot(self, kind: str = "overview", scene: Scene | None = None) -> Figure:
+        """Return a figure, which a notebook shows.
+
+        `kind` is "overview" (forces, depth and energy over time), "force" (force and depth of each
+        pair), "energy" (the audit), "path" (of the contacts on their shells) or "map" (the impulse
+        that each element took). The last two need a scene: `scene`, or the one that ran, or that of
+        the scenario the result came from; without any, the path is drawn in the world.
+
+        Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where
+        there is no scene for the map or the scenario cannot be built again.
+        """
         from sphshell_pin.plot import plot_result
 
-        figure: Figure = plot_result(self)
+        figure: Figure = plot_result(self, kind, scene)
         return figure
+
+    def view(
+        self,
+        scene: Scene | None = None,
+        visual_model: Any = None,
+        *,
+        speed: float | None = None,
+        height: int = 480,
+    ) -> RecordingView:
+        """Return the recording of this result, which a notebook shows `height` [pixels] high.
+
+        It is drawn in `scene` (default: the one that ran, or that of the scenario the result came
+        from) with `visual_model` (a pinocchio.GeometryModel, default: the scenario's; without one
+        the joints are drawn). `speed` seconds of simulated time pass in one second (default: as the
+        scenario has it, or 1). `.save(path)` writes the page.
+
+        Raises ResultError without a scene, MissingExtra without meshcat.
+        """
+        from sphshell_pin.view.notebook import view_result
+
+        return view_result(self, scene, visual_model, speed=speed, height=height)
 
 
 def _told(origin: Origin | None, home: Path) -> dict[str, Any] | None:

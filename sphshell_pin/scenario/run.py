@@ -41,6 +41,7 @@ RESULTS = (
     "force_and_depth.png",
     "energy.png",
     "contact_path.png",
+    "contact_map.png",
     RECORDING,
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -10,11 +11,14 @@ import numpy as np
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
     FloatArray,
+    Move,
+    mover,
     on_top,
     pose,
     rod,
     rotation_to,
     set_object,
+    show,
     sphere,
 )
 
@@ -118,18 +122,23 @@ class ArrowPool:
             if kind == "components"
             else {"total": TOTAL_COLOR}
         )
-        self._arrows = []
-        self._points = []
+        self._arrows: list[tuple[Move, Move]] = []
+        self._points: list[Move] = []
+        self._arrow_nodes, self._point_nodes = [], []
         for index in range(size):
             for name, color in colors.items():
                 node = visualizer[f"{name}_{index}"]
                 set_object(node["shaft"], rod(1.0, 1.0), on_top(color), order=10)
                 set_object(node["head"], rod(2.6, 0.0), on_top(color), order=10)
-                self._arrows.append(node)
+                self._arrows.append((mover(node["shaft"]), mover(node["head"])))
+                self._arrow_nodes.append(node)
             point = visualizer[f"point_{index}"]
             set_object(point, sphere(1.0, 20), on_top(POINT_COLOR), order=11)
-            self._points.append(point)
+            self._points.append(mover(point))
+            self._point_nodes.append(point)
         self._where = np.zeros((size, 3))
+        # Where a hidden arrow waits: most of a pool does, in most frames.
+        self._waiting: list[FloatArray | None] = [None] * len(self._arrows)
         self._shown: set[int] = set()
         self._directions = np.tile(np.array([0.0, 0.0, 1.0]), (len(self._arrows), 1))
         self.update(None, ArrowScale())
@@ -141,7 +150,7 @@ class ArrowPool:
         if contacts is not None and rows:
             row_of_slot = self._slots(contacts, rows)
         per_slot = len(self._arrows) // self.size if self.size else 0
-        for slot, point in enumerate(self._points):
+        for slot, place_point in enumerate(self._points):
             forces = np.zeros((per_slot, 3))
             size = HIDDEN_SCALE
             row = row_of_slot.get(slot)
@@ -149,10 +158,20 @@ class ArrowPool:
                 self._where[slot] = contacts.point_world[row]
                 forces = self._forces(contacts, row)
                 size = 1.3 * self._width
-            point.set_transform(pose(np.eye(3), self._where[slot], size))
+            place_point(pose(np.eye(3), self._where[slot], size))
             for part in range(per_slot):
                 self._place_arrow(per_slot * slot + part, slot, forces[part], scale)
         self._shown = set(row_of_slot)
+
+    def show_arrows(self, on: bool) -> None:
+        """Show or hide the arrows, whatever forces there are."""
+        for node in self._arrow_nodes:
+            show(node, on)
+
+    def show_points(self, on: bool) -> None:
+        """Show or hide the contact points."""
+        for node in self._point_nodes:
+            show(node, on)
 
     def _slots(self, contacts: ContactColumns, rows: list[int]) -> dict[int, int]:
         """Return the row that each slot shows: a contact keeps its slot while it moves little.
@@ -190,25 +209,27 @@ class ArrowPool:
         return np.stack((normal, friction))
 
     def _place_arrow(self, arrow: int, contact: int, force: FloatArray, scale: ArrowScale) -> None:
-        size = float(np.linalg.norm(force))
+        size = math.sqrt(force @ force)
         length = min(size * scale.metres_per_newton, scale.longest)
         start = self._where[contact]
-        shaft_node, head_node = self._arrows[arrow]["shaft"], self._arrows[arrow]["head"]
+        place_shaft, place_head = self._arrows[arrow]
         if length <= 0.05 * self._width:
             # A hidden arrow keeps its last direction, so that it does not swing as it grows back.
-            hidden = pose(rotation_to(self._directions[arrow]), start, HIDDEN_SCALE)
-            shaft_node.set_transform(hidden)
-            head_node.set_transform(hidden)
+            hidden = self._waiting[arrow]
+            if hidden is None or not np.array_equal(hidden[:3, 3], start):
+                hidden = pose(rotation_to(self._directions[arrow]), start, HIDDEN_SCALE)
+                self._waiting[arrow] = hidden
+            place_shaft(hidden)
+            place_head(hidden)
             return
+        self._waiting[arrow] = None
         direction = self._directions[arrow] = force / size
         turn = rotation_to(direction)
         # The head keeps its shape; an arrow too short for it shrinks as a whole.
         head = min(HEAD_LENGTH * self._width, 0.6 * length)
         width = head / HEAD_LENGTH
         shaft = length - head
-        shaft_node.set_transform(
-            pose(turn, start + 0.5 * shaft * direction, np.array([width, shaft, width]))
-        )
-        head_node.set_transform(
+        place_shaft(pose(turn, start + 0.5 * shaft * direction, np.array([width, shaft, width])))
+        place_head(
             pose(turn, start + (shaft + 0.5 * head) * direction, np.array([width, head, width]))
         )

@@ -2,44 +2,45 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, ContactColumns
-from sphshell_pin.view.camera import View, look, set_surroundings
+from sphshell_pin.view.bodies import (
+    DrawnShell,
+    DrawnSphere,
+    ShellKey,
+    SphereKey,
+    shell_key,
+    sphere_key,
+)
+from sphshell_pin.view.camera import REACH, View, look, set_surroundings
 from sphshell_pin.view.nodes import (
     FloatArray,
-    line_segments,
     material,
     node_name,
-    on_top,
     require_meshcat,
     set_object,
-    sphere,
+    show,
     triangle_mesh,
 )
 from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot, check_geometry_model
-from sphshell_pin.view.surface import draw_shell, great_circles, tube
+from sphshell_pin.view.surface import tube
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from sphshell_pin.dynamics.scene import Scene
 
-SPHERE_COLOR = 0x2F6FDE
 TRAIL_COLOR = 0x8E1B8E
 
 
-class _Placed:
-    """A node that hangs on a joint: `offset` in the joint's frame."""
-
-    def __init__(self, node: Any, joint: int, offset: pin.SE3) -> None:
-        self.node = node
-        self.joint = joint
-        self.offset = offset
+Part = Literal["robot", "spheres", "arrows", "points", "wireframe", "patches", "trails"]
+PARTS: tuple[Part, ...] = get_args(Part)
+"""What `Display.show` can show and hide; all but "patches" are shown at first."""
 
 
 class Display:
@@ -78,10 +79,12 @@ class Display:
             view = choose_view(scene, neutral[None, :], visual_model=visual_model)
         self.view = view
         self.arrow_scale = ArrowScale() if arrow_scale is None else arrow_scale
-        self._placed: list[_Placed] = []
-        self._shell_nodes: dict[int, Any] = {}
+        self._hidden: set[Part] = {"patches"}
+        self._shells: dict[ShellKey, DrawnShell] = {}
+        self._spheres: dict[SphereKey, DrawnSphere] = {}
         self._draw_shells()
         self._draw_spheres()
+        self._visual_model = visual_model
         self._robot = self._make_robot(visual_model)
         self._arrows = ArrowPool(
             self.visualizer["contacts"], pool, 0.0026 * self.view.distance, arrows
@@ -98,11 +101,17 @@ class Display:
                 "q", configuration.shape, f"must have the shape ({self._model.nq},)"
             )
         pin.forwardKinematics(self._model, self._data, configuration)
-        self._robot.update(self._data, configuration)
-        for placed in self._placed:
-            where = self._data.oMi[placed.joint] * placed.offset
-            placed.node.set_transform(where.homogeneous)
+        self._robot.update(self._data)
+        for shell in self._shells.values():
+            shell.update(self._data)
+        for ball in self._spheres.values():
+            ball.update(self._data)
         self._arrows.update(contacts, self.arrow_scale)
+
+    @property
+    def data(self) -> pin.Data:
+        """The joints' placements of the last `update`."""
+        return self._data
 
     @property
     def trail_width(self) -> float:
@@ -120,66 +129,78 @@ class Display:
         path = path[np.append(True, steps > 1e-3 * self.trail_width)]
         if len(path) < 2:
             return None
-        parent = self.visualizer if pair is None else self._shell_nodes[pair]
-        node = parent["trail"][node_name(name)]
+        node = self.trail_node(pair)[node_name(name)]
         vertices, triangles = tube(path, self.trail_width)
         set_object(node, triangle_mesh(vertices, triangles), material("MeshBasic", TRAIL_COLOR))
         return node
 
+    def trail_node(self, pair: int | None = None) -> Any:
+        """Return the parent node of trails: on the shell of a `pair`, or in the world."""
+        if pair is None:
+            return self.visualizer["trail"]
+        return self._shells[shell_key(self.scene.pairs[pair])].node["trail"]
+
+    def replace_scene(self, scene: Scene, visual_model: pin.GeometryModel | None) -> None:
+        """Take `scene`, whose model has the same joints, for the one shown; draw what differs.
+
+        Shells and spheres may be others, or sit elsewhere; `update` then places them.
+        """
+        self.scene = scene
+        if scene.model is not self._model:
+            self._model, self._data = scene.model, scene.model.createData()
+        if {shell_key(pair) for pair in scene.pairs if pair.shell} != set(self._shells):
+            self.visualizer["shells"].delete()
+            self._draw_shells()
+        if {sphere_key(pair) for pair in scene.pairs if pair.sphere} != set(self._spheres):
+            self.visualizer["spheres"].delete()
+            self._draw_spheres()
+        if visual_model is not self._visual_model:
+            self._visual_model = visual_model
+            self.visualizer["robot"].delete()
+            self._robot = self._make_robot(visual_model)
+            show(self.visualizer["robot"], "robot" not in self._hidden)
+
+    def show(self, part: Part, on: bool) -> None:
+        """Show or hide one part of the picture; see PARTS."""
+        if part not in PARTS:
+            raise InvalidParameter("part", part, f"must be one of {', '.join(PARTS)}")
+        self._hidden = self._hidden - {part} if on else self._hidden | {part}
+        if part == "arrows":
+            self._arrows.show_arrows(on)
+        elif part == "points":
+            self._arrows.show_points(on)
+        elif part in ("robot", "spheres"):
+            show(self.visualizer[part], on)
+        else:
+            for shell in self._shells.values():
+                self._show_of_shell(shell, part, on)
+
+    def _show_of_shell(self, shell: DrawnShell, part: Part, on: bool) -> None:
+        if part == "patches":
+            shell.show_patches(on)
+        else:
+            show(shell.node["elements" if part == "wireframe" else "trail"], on)
+
     def _draw_shells(self) -> None:
-        drawn: dict[tuple[int, int, bytes, bool], Any] = {}
-        for index, pair in enumerate(self.scene.pairs):
-            if pair.shell is None:
-                continue
-            place = pair.shell_placement.homogeneous.tobytes()
-            curved = pair.method == "smooth"
-            key = (id(pair.shell), pair.joint_j, place, curved)
-            if key not in drawn:
-                node = self.visualizer["shells"][f"{len(drawn)}_{node_name(pair.shell.name)}"]
-                draw_shell(node, pair.shell, len(drawn), curved=curved)
-                self._placed.append(_Placed(node, pair.joint_j, pair.shell_placement))
-                drawn[key] = node
-            self._shell_nodes[index] = drawn[key]
+        self._shells.clear()
+        for pair in self.scene.pairs:
+            if pair.shell is not None and shell_key(pair) not in self._shells:
+                drawn = DrawnShell(self.visualizer["shells"], pair, len(self._shells))
+                self._shells[shell_key(pair)] = drawn
+                for part in ("wireframe", "trails"):
+                    if part in self._hidden:
+                        self._show_of_shell(drawn, part, False)
+                if "patches" not in self._hidden:
+                    drawn.show_patches(True)
 
     def _draw_spheres(self) -> None:
-        drawn: set[tuple[int, bytes, float]] = set()
+        self._spheres.clear()
         for pair in self.scene.pairs:
-            if pair.sphere is None:
-                continue
-            radius = pair.sphere.radius
-            key = (pair.joint_i, pair.sphere_placement.homogeneous.tobytes(), radius)
-            if key in drawn:
-                continue
-            node = self.visualizer["spheres"][f"{len(drawn)}_{node_name(pair.name)}"]
-            set_object(
-                node["ball"],
-                sphere(radius, 48),
-                # Pulled forward a little: robots draw their own fingertip of the same radius.
-                material(
-                    "MeshPhong",
-                    SPHERE_COLOR,
-                    0.6,
-                    side=0,
-                    depthWrite=False,
-                    shininess=60,
-                    polygonOffset=True,
-                    polygonOffsetFactor=-2.0,
-                    polygonOffsetUnits=-2.0,
-                ),
-                order=5,
-            )
-            # A faint disc through whatever hides the sphere: it often sits inside a hand.
-            set_object(node["ghost"], sphere(radius, 24), on_top(SPHERE_COLOR, 0.25), order=4)
-            # Three great circles, so that one sees a ball spin.
-            set_object(
-                node["circles"],
-                line_segments(*great_circles(1.003 * radius)),
-                material("LineBasic", 0x0D2C66, 0.8),
-                "LineSegments",
-                order=6,
-            )
-            self._placed.append(_Placed(node, pair.joint_i, pair.sphere_placement))
-            drawn.add(key)
+            if pair.sphere is not None and sphere_key(pair) not in self._spheres:
+                drawn = DrawnSphere(self.visualizer["spheres"], pair, len(self._spheres))
+                self._spheres[sphere_key(pair)] = drawn
+        if "spheres" in self._hidden:
+            show(self.visualizer["spheres"], False)
 
     def _make_robot(self, visual_model: pin.GeometryModel | None) -> GeometryRobot | SkeletonRobot:
         if visual_model is not None and len(visual_model.geometryObjects):
@@ -189,7 +210,8 @@ class Display:
             for pair in self.scene.pairs
             if pair.sphere is not None
         ]
-        drawn = {placed.joint for placed in self._placed}
+        drawn = {one.joint for one in self._spheres.values()}
+        drawn |= {one.joint for one in self._shells.values()}
         return SkeletonRobot(self.visualizer, self._model, 0.5 * self.view.distance, tips, drawn)
 
 
@@ -199,10 +221,12 @@ def choose_view(
     points_world: FloatArray | None = None,
     normals_world: FloatArray | None = None,
     visual_model: pin.GeometryModel | None = None,
+    reach: float = REACH,
 ) -> View:
     """Choose a camera for the `configurations` (n, nq) and the contacts seen in them, world [m].
 
-    Without contacts the spheres are where things happen; without spheres, the joints. Raises
+    Without contacts the spheres are where things happen; without spheres, the joints. What is
+    farther away than `reach` times the size of that need not be in the picture. Raises
     InvalidParameter for a `visual_model` that does not hang on the scene's joints.
     """
     model, data = scene.model, scene.model.createData()
@@ -237,7 +261,7 @@ def choose_view(
     if touched and normals_world is not None:
         mean = normals_world.mean(axis=0)
         normal = mean / max(float(np.linalg.norm(mean)), 1e-9)
-    return View.of(action, np.array(around).reshape(-1, 3), normal, min(radii, default=0.02))
+    return View.of(action, np.array(around).reshape(-1, 3), normal, min(radii, default=0.02), reach)
 
 
 def _geometry_boxes(

@@ -5,7 +5,8 @@ Every object is a three.js JSON description, sent to any `meshcat.Visualizer` as
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from sphshell_pin.errors import MissingExtra
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.integer[Any]]
 Json = dict[str, Any]
+Move = Callable[[FloatArray], object]
 
 # Never zero: a transform with a zero scale cannot be decomposed, and its node is lost for good.
 HIDDEN_SCALE = 1e-6
@@ -143,6 +145,21 @@ def set_object(
     visualizer.window.send(Command({"type": "set_object", "path": path, "object": data}))
 
 
+def mover(visualizer: Any) -> Move:
+    """Return the routine that places the visualizer's node at a homogeneous matrix (4, 4).
+
+    A window that knows a shorter way than one command per matrix offers it as `mover(path)`.
+    """
+    short = getattr(visualizer.window, "mover", None)
+    move: Move = visualizer.set_transform if short is None else short(visualizer.path.lower())
+    return move
+
+
+def show(visualizer: Any, on: bool) -> None:
+    """Show or hide the visualizer's node and all below it."""
+    visualizer.set_property("visible", bool(on))
+
+
 def set_camera(visualizer: Any, camera: Mapping[str, Any]) -> None:
     """Replace the page's camera by the three.js `camera` description."""
     node = visualizer["/Cameras/default/rotated"]
@@ -158,16 +175,29 @@ def node_name(name: str) -> str:
 
 def pose(rotation: FloatArray, translation: FloatArray, scale: FloatArray | float = 1.0) -> Any:
     """Homogeneous (4, 4) of `rotation` (3, 3) times diag(`scale`), and `translation` (3,) [m]."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation * np.broadcast_to(np.asarray(scale, dtype=float), 3)
+    matrix = np.zeros((4, 4))
+    np.multiply(rotation, scale, out=matrix[:3, :3])
     matrix[:3, 3] = translation
+    matrix[3, 3] = 1.0
     return matrix
 
 
 def rotation_to(direction: FloatArray) -> FloatArray:
     """Return a rotation (3, 3) that takes y, the axis of three.js's cylinders, to `direction`."""
-    y = direction / np.linalg.norm(direction)
-    helper = np.eye(3)[int(np.argmin(np.abs(y)))]
-    x = np.cross(y, helper)
-    x /= np.linalg.norm(x)
-    return np.column_stack((x, y, np.cross(x, y)))
+    # Plain numbers: for three of them NumPy takes ten times as long, in every frame of every arrow.
+    x, y, z = direction.tolist()
+    length = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / length, y / length, z / length
+    # Across: the direction times the axis that is least along it.
+    least = min(abs(x), abs(y), abs(z))
+    if abs(x) == least:
+        across = (0.0, z, -y)
+    elif abs(y) == least:
+        across = (-z, 0.0, x)
+    else:
+        across = (y, -x, 0.0)
+    length = math.sqrt(1.0 - least * least)
+    a, b, c = across[0] / length, across[1] / length, across[2] / length
+    return np.array(
+        ((a, x, b * z - c * y), (b, y, c * x - a * z), (c, z, a * y - b * x)),
+    )

@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.view.collada import take_out_numbers
 from sphshell_pin.view.nodes import HIDDEN_SCALE, FloatArray, Json, require_meshcat, typed_array
+from sphshell_pin.view.stl import pack_facets
 
 # A mesh file this long may well be used by several links: it is stored once.
 SHARED_TEXT = 20_000
@@ -30,7 +32,7 @@ class FilmWindow:
     def __init__(self) -> None:
         self.frame: int | None = None
         self._commands: dict[tuple[str, str, str], Json] = {}
-        self._texts: dict[str, str] = {}
+        self._texts: dict[str, Json] = {}
         self._frames: dict[str, dict[int, list[float]]] = {}
         self._switches: dict[str, tuple[FloatArray, list[bool]]] = {}
 
@@ -56,6 +58,8 @@ class FilmWindow:
         self._switches[visualizer.path.lower()] = (times, visible)
 
     def _share(self, data: Json) -> Json:
+        from umsgpack import Ext
+
         def shared(value: Any) -> Any:
             if isinstance(value, dict):
                 return {key: shared(item) for key, item in value.items()}
@@ -63,8 +67,17 @@ class FilmWindow:
                 return [shared(item) for item in value]
             if isinstance(value, str) and len(value) > SHARED_TEXT:
                 name = hashlib.sha256(value.encode()).hexdigest()[:16]
-                self._texts[name] = value
+                if name not in self._texts:
+                    text, numbers = take_out_numbers(value)
+                    told = {"type": "text", "name": name, "text": text, "numbers": numbers}
+                    self._texts[name] = told
                 return {"$text": name}
+            if isinstance(value, Ext) and len(value.data) > SHARED_TEXT:
+                name = hashlib.sha256(value.data).hexdigest()[:16]
+                facets = None if name in self._texts else pack_facets(value.data)
+                if facets is not None:
+                    self._texts[name] = {"type": "text", "name": name, "facets": facets}
+                return {"$text": name} if name in self._texts else value
             return value
 
         result: Json = shared(data)
@@ -95,7 +108,6 @@ class FilmWindow:
                 "values": visible,
             }
             moving.append(_clip(path, [track], times))
-        texts = [{"type": "text", "name": name, "text": t} for name, t in self._texts.items()]
         kinds = ("set_object", "set_transform", "set_property", "set_target")
         scene = sorted(self._commands.values(), key=lambda data: kinds.index(data["type"]))
         # The clips are loaded at rest; the page starts them once it has drawn the first frame.
@@ -105,7 +117,7 @@ class FilmWindow:
             "animations": moving,
             "options": {"play": False, "repetitions": 1},
         }
-        return [*texts, *scene, *stills, *([animation] if moving else [])]
+        return [*self._texts.values(), *scene, *stills, *([animation] if moving else [])]
 
 
 def _clip(path: str, tracks: list[Json], times: FloatArray) -> Json:
@@ -170,7 +182,6 @@ def render_page(
     for command in commands:
         data = umsgpack.packb(command)
         packed += struct.pack("<I", len(data)) + data
-    scene = base64.b64encode(gzip.compress(bytes(packed), compresslevel=6, mtime=0)).decode()
     rows = "".join(
         f'<div><span class="swatch" style="background:{html.escape(color)}"></span>'
         f"{html.escape(text)}</div>"
@@ -181,9 +192,13 @@ def render_page(
         "title": html.escape(title),
         "legend": rows,
         "clock": json.dumps(clock),
-        "viewer": viewer.read_text(encoding="utf-8").replace("</script", "<\\/script"),
-        "scene": scene,
+        "viewer": _compressed(viewer.read_bytes()),
+        "scene": _compressed(bytes(packed)),
     }
     page = Path(__file__).with_name("recording.html").read_text(encoding="utf-8")
     pieces = page.split("@@")
     return "".join(parts[piece] if index % 2 else piece for index, piece in enumerate(pieces))
+
+
+def _compressed(data: bytes) -> str:
+    return base64.b64encode(gzip.compress(data, compresslevel=9, mtime=0)).decode()

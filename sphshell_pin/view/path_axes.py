@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene import Scene
     from sphshell_pin.shell.shell import Shell
 
+INK = "#101418"
 MOST_STEPS = 20_000
 MOST_FILLED = 60_000
 
@@ -58,6 +59,7 @@ def draw_paths(
     length_factor, unit = reading_unit(size, "m")
     if group.shell is not None:
         _draw_shell(axis, group.shell, chosen, length_factor)
+    starts = np.array([path.points[0][chosen] for path in group.paths])
     segments, colors = [], []
     for path in group.paths:
         flat = path.points[:, chosen] * length_factor
@@ -67,16 +69,8 @@ def draw_paths(
             ends = np.stack((kept[:-1], kept[1:]), axis=1) if len(kept) > 1 else kept[[[0, 0]]]
             segments.append(flat[ends])
             colors.append(path.force[ends].mean(axis=1))
-        axis.plot(*flat[0], marker="o", markersize=5, color="#101418", zorder=4)
-        axis.annotate(
-            names[path.pair],
-            flat[0],
-            xytext=(6, 6),
-            textcoords="offset points",
-            fontsize=8,
-            bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.7},
-            zorder=5,
-        )
+        hidden = group.shell is not None and float(path.normals[0] @ toward_eye) < 0.0
+        _mark_start(axis, flat[0], names[path.pair], starts * length_factor, hidden=hidden)
     lines = LineCollection(
         list(np.concatenate(segments)), cmap="turbo", linewidths=2.4, capstyle="round", zorder=3
     )
@@ -95,6 +89,31 @@ def draw_paths(
     return lines
 
 
+def _mark_start(
+    axis: Any, place: FloatArray, name: str, starts: FloatArray, *, hidden: bool
+) -> None:
+    """Draw a dot at `place` (2,) and write `name` beside it, away from the other `starts` (k, 2).
+
+    A dot is hollow where the shell hides the touch.
+    """
+    fill = "white" if hidden else INK
+    axis.plot(*place, marker="o", markersize=5, color=INK, markerfacecolor=fill, zorder=4)
+    others = starts[(starts != place).any(axis=1)] - place
+    level = np.abs(others[:, 1]) < 0.5 * np.abs(others[:, 0])
+    right, left = others[level & (others[:, 0] > 0.0), 0], -others[level & (others[:, 0] < 0.0), 0]
+    to_left = right.min(initial=np.inf) < left.min(initial=np.inf)
+    axis.annotate(
+        f"{name} (behind)" if hidden else name,
+        place,
+        xytext=(-6 if to_left else 6, 6),
+        textcoords="offset points",
+        ha="right" if to_left else "left",
+        fontsize=8,
+        bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.7},
+        zorder=5,
+    )
+
+
 def _widen(axis: Any) -> None:
     """Give the narrow direction a third of the wide one, so that a straight path has a picture."""
     (left, right), (bottom, top) = axis.get_xlim(), axis.get_ylim()
@@ -110,6 +129,7 @@ def reading_unit(largest: float, base: str) -> tuple[float, str]:
     steps = {
         "m": ((1.0, 1.0, "m"), (1e-4, 1e3, "mm"), (1e-7, 1e6, "µm"), (0.0, 1e9, "nm")),
         "N": ((1e4, 1e-3, "kN"), (0.1, 1.0, "N"), (1e-4, 1e3, "mN"), (0.0, 1e6, "µN")),
+        "s": ((0.1, 1.0, "s"), (1e-4, 1e3, "ms"), (0.0, 1e6, "µs")),
         "J": (
             (1e4, 1e-3, "kJ"),
             (0.1, 1.0, "J"),

@@ -20,8 +20,9 @@ from sphshell_pin.view.arrows import (
     ArrowScale,
     largest_force,
 )
+from sphshell_pin.view.bodies import SPHERE_COLOR
 from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, spaced
-from sphshell_pin.view.display import SPHERE_COLOR, TRAIL_COLOR, Display, choose_view
+from sphshell_pin.view.display import TRAIL_COLOR, Display, choose_view
 from sphshell_pin.view.nodes import FloatArray, require_meshcat
 from sphshell_pin.view.page import FilmWindow, render_page
 
@@ -50,6 +51,34 @@ def write_recording(
 ) -> Path:
     """Write `result` as one self-contained HTML file at `path`, and return the path.
 
+    See `render_recording` for the rest; without a `title` the page is called as the file.
+
+    Raises what `render_recording` does, ResultError if the file cannot be written.
+    """
+    page = render_recording(
+        result,
+        scene,
+        visual_model,
+        fps=fps,
+        speed=speed,
+        title=title or Path(path).stem,
+        arrows=arrows,
+    )
+    return write_page(path, page)
+
+
+def render_recording(
+    result: Result,
+    scene: Scene,
+    visual_model: pin.GeometryModel | None = None,
+    *,
+    fps: float = 30,
+    speed: float = 1.0,
+    title: str = "A finished run",
+    arrows: ArrowKind = "components",
+) -> str:
+    """Return `result` as one self-contained HTML page.
+
     The page opens offline, plays, pauses and scrubs. `visual_model` is any geometry model of
     `scene.model`, visual or collision; without one the joints are drawn as a skeleton. `fps` [1/s]
     frames are kept per second of the page, `speed` seconds of simulated time pass in one second of
@@ -57,7 +86,7 @@ def write_recording(
     two frames, that touch at its peak. `arrows` is "components" (normal and friction) or "total".
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
-    positive or a geometry model that does not fit, ResultError if the file cannot be written.
+    positive or a geometry model that does not fit.
     """
     meshcat = require_meshcat()
     for name, value in (("fps", fps), ("speed", speed)):
@@ -100,14 +129,12 @@ def write_recording(
     window.frame = None
     trailed = _draw_trails(display, window, result, speed)
 
-    name = title or Path(path).stem
-    page = render_page(
+    return render_page(
         window.commands(times),
-        name,
+        title,
         _legend(scene, scale, arrows, shown, trailed),
         {"start": float(result.t[0]), "speed": float(speed), "digits": _digits(speed, fps)},
     )
-    return _write(Path(path), page)
 
 
 def choose_rows(
@@ -205,9 +232,9 @@ def _digits(speed: float, fps: float) -> int:
     return max(2, int(np.ceil(-np.log10(speed / fps))))
 
 
-def _write(path: Path, page: str) -> Path:
-    """Write `page` at `path`, whole or not at all."""
-    scratch = None
+def write_page(path: str | PathLike[str], page: str) -> Path:
+    """Write `page` at `path`, whole or not at all; ResultError if it cannot be."""
+    path, scratch = Path(path), None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, scratch = tempfile.mkstemp(dir=path.parent, suffix=".html.part")

@@ -6,6 +6,7 @@ import contextlib
 import io
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -13,7 +14,9 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
     FloatArray,
+    Move,
     material,
+    mover,
     node_name,
     pose,
     rod,
@@ -55,14 +58,33 @@ class GeometryRobot:
         from pinocchio.visualize import MeshcatVisualizer
 
         check_geometry_model(model, geometry_model)
-        self._viewer = MeshcatVisualizer(model, pin.GeometryModel(), geometry_model)
-        self._viewer.initViewer(viewer=visualizer, open=False)
+        viewer = MeshcatVisualizer(model, pin.GeometryModel(), geometry_model)
+        viewer.initViewer(viewer=visualizer, open=False)
         with contextlib.redirect_stdout(io.StringIO()):
-            self._viewer.loadViewerModel("robot")
+            viewer.loadViewerModel("robot")
+        self._model = model
+        self._geometry = geometry_model
+        self._placed = geometry_model.createData()
+        self._parts: list[tuple[Move, pin.SE3, FloatArray]] = []
+        for index, body in enumerate(geometry_model.geometryObjects):
+            node = visualizer[viewer.getViewerNodeName(body, pin.GeometryType.VISUAL)]
+            # A reference: it follows the update of all placements.
+            self._parts.append((mover(node), self._placed.oMg[index], _in_body(body)))
 
-    def update(self, data: pin.Data, q: FloatArray) -> None:
-        """Place all geometry at configuration `q` (nq,)."""
-        self._viewer.display(q)
+    def update(self, data: pin.Data) -> None:
+        """Place all geometry where forward kinematics left the joints in `data`."""
+        pin.updateGeometryPlacements(self._model, data, self._geometry, self._placed)
+        for move, where, in_body in self._parts:
+            move(where.homogeneous @ in_body)
+
+
+def _in_body(body: pin.GeometryObject) -> FloatArray:
+    """Return the matrix (4, 4) from what the loader draws to the geometry object's own frame."""
+    matrix = np.diag([*body.meshScale, 1.0])
+    if isinstance(body.geometry, coal.Plane | coal.Halfspace):
+        # The loader leaves a plane at the origin.
+        matrix[:3, 3] = body.geometry.d * body.geometry.n
+    return matrix
 
 
 class SkeletonRobot:
@@ -82,8 +104,8 @@ class SkeletonRobot:
         drawn: set[int],
     ) -> None:
         self._width = 0.012 * size
-        self._links: list[tuple[Any, int, int, FloatArray]] = []
-        self._axes: list[tuple[Any, int]] = []
+        self._links: list[tuple[Move, int, int, FloatArray]] = []
+        self._axes: list[tuple[Move, int]] = []
         root = visualizer["robot"]
         ends = [
             (model.parents[joint], joint, np.zeros(3), model.names[joint])
@@ -98,7 +120,7 @@ class SkeletonRobot:
         for start, end, offset, name in ends:
             node = root["links"][node_name(name)]
             set_object(node, rod(1.0, 1.0), material("MeshPhong", LINK_COLOR))
-            self._links.append((node, start, end, offset))
+            self._links.append((mover(node), start, end, offset))
         for joint in range(1, model.njoints):
             if joint in drawn or model.inertias[joint].mass == 0.0:
                 continue
@@ -113,18 +135,18 @@ class SkeletonRobot:
                 length = 5.0 * self._width
                 shape = np.array([self._width, length, self._width])
                 arm.set_transform(pose(rotation_to(direction), 0.5 * length * direction, shape))
-            self._axes.append((node, joint))
+            self._axes.append((mover(node), joint))
 
-    def update(self, data: pin.Data, q: FloatArray) -> None:
+    def update(self, data: pin.Data) -> None:
         """Place rods and axes where forward kinematics left the joints in `data`."""
-        for node, start, end, offset in self._links:
+        for move, start, end, offset in self._links:
             first = data.oMi[start].translation
             step = data.oMi[end].act(offset) - first
             length = float(np.linalg.norm(step))
             if length < self._width:
-                node.set_transform(pose(np.eye(3), first, HIDDEN_SCALE))
+                move(pose(np.eye(3), first, HIDDEN_SCALE))
                 continue
             shape = np.array([self._width, length, self._width])
-            node.set_transform(pose(rotation_to(step), first + 0.5 * step, shape))
-        for node, joint in self._axes:
-            node.set_transform(data.oMi[joint].homogeneous)
+            move(pose(rotation_to(step), first + 0.5 * step, shape))
+        for move, joint in self._axes:
+            move(data.oMi[joint].homogeneous)

@@ -13,6 +13,7 @@ from sphshell_pin.view.nodes import (
     material,
     set_object,
     triangle_mesh,
+    typed_array,
 )
 
 if TYPE_CHECKING:
@@ -106,6 +107,36 @@ def draw_shell(visualizer: Any, shell: Shell, index: int, *, curved: bool = Fals
             material("LineBasic", EDGE_COLOR, opacity),
             "LineSegments",
         )
+
+
+def draw_patches(visualizer: Any, shell: Shell, *, curved: bool = False) -> None:
+    """Draw `shell` below `visualizer` with a colour for each patch, as "patches"."""
+    if curved and len(shell.triangles) <= MOST_CURVED:
+        from sphshell_pin.shell.curved import curved_mesh
+
+        divisions = 6 if len(shell.triangles) <= MOST_FINELY_CURVED else 2
+        points, triangles, owner = curved_mesh(shell, divisions)
+    else:
+        points, triangles = np.asarray(shell.vertices), np.asarray(shell.triangles)
+        owner = np.arange(len(triangles), dtype=np.int32)
+    patch = np.asarray(shell.element_patch)[np.asarray(shell.triangle_element)][owner]
+    # A point of each patch for every point: colours, and the page's normals, end at patches.
+    keys = patch[:, None].astype(np.int64) * len(points) + triangles
+    unique, corners = np.unique(keys, return_inverse=True)
+    geometry = triangle_mesh(points[unique % len(points)], corners.reshape(-1, 3))
+    colors = patch_colors(int(patch.max(initial=0)) + 1)[unique // len(points)]
+    geometry["data"]["attributes"]["color"] = typed_array(colors)
+    look = material("MeshPhong", 0xFFFFFF, vertexColors=True, shininess=10)
+    look |= {"polygonOffset": True, "polygonOffsetFactor": 1.0, "polygonOffsetUnits": 1.0}
+    set_object(visualizer["patches"], geometry, look)
+
+
+def patch_colors(count: int) -> FloatArray:
+    """Return `count` colours (n, 3) from 0 to 1, calm ones, neighbours in number well apart."""
+    # Hues by the golden ratio: no two of any few in a row are close.
+    hue = (0.47 + 0.618033988749895 * np.arange(count)) % 1.0
+    ramp = np.abs((hue[:, None] * 6.0 + np.array([0.0, 4.0, 2.0])) % 6.0 - 3.0) - 1.0
+    return np.asarray(0.40 + 0.30 * np.clip(ramp, 0.0, 1.0))
 
 
 def great_circles(radius: float, points: int = 48) -> tuple[FloatArray, IntArray]:

@@ -23,6 +23,8 @@ def quad_shell(vertices, elements, name="shell", patches=None):
     patch = np.arange(len(elements)) if patches is None else np.asarray(patches)
     return SimpleNamespace(
         vertices=np.asarray(vertices, dtype=float),
+        elements=elements.astype(np.int32),
+        is_closed=False,
         triangles=triangles[order].astype(np.int32),
         triangle_element=element[order].astype(np.int32),
         box=np.array([np.min(vertices, axis=0), np.max(vertices, axis=0)]),
@@ -117,6 +119,7 @@ def a_result(t, q, rows=(), pairs=("tip",), **energy):
         energy=SimpleNamespace(**{**audit, "exchanged": 1.0, **energy}),
         stats={},
         scene=None,
+        origin=None,
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from sphshell_pin.view import write_recording
 from sphshell_pin.view.arrows import NORMAL_COLOR
-from sphshell_pin.view.display import SPHERE_COLOR
+from sphshell_pin.view.bodies import SPHERE_COLOR
 from tests.view.stand_ins import a_result, a_scene, ball_on_plate, contact_pair, plate
 
 pytestmark = pytest.mark.browser

@@ -45,7 +45,7 @@ def test_the_recording_holds_the_contact(run, tmp_path):
 
 def test_the_figures_are_drawn(run, tmp_path):
     scene, result = run
-    assert len(save_figures(result, tmp_path, scene)) == 3
+    assert len(save_figures(result, tmp_path, scene)) == 4
     figure = result.plot()
     assert len(figure.axes) == 4
     figure.canvas.draw()

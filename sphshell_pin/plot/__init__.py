@@ -1,0 +1,102 @@
+"""Figures of a Result: forces and depth, the energy audit, where the contacts were.
+
+Figures are made without pyplot: no window, no global state, any thread.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sphshell_pin.errors import NameNotFound, ResultError
+from sphshell_pin.plot.contact_map import QUANTITIES, plot_contact_map
+from sphshell_pin.plot.figure import NO_CONTACT, RESOLUTION
+from sphshell_pin.plot.over_time import (
+    MOST_PAIRS,
+    plot_energy,
+    plot_force_and_depth,
+    plot_overview,
+)
+from sphshell_pin.plot.paths import plot_contact_path
+from sphshell_pin.plot.scenes import scene_of
+from sphshell_pin.plot.series import MOST_POINTS, PairSeries
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.scene import Scene
+
+__all__ = [
+    "KINDS",
+    "MOST_PAIRS",
+    "MOST_POINTS",
+    "NO_CONTACT",
+    "QUANTITIES",
+    "PairSeries",
+    "plot_contact_map",
+    "plot_contact_path",
+    "plot_energy",
+    "plot_force_and_depth",
+    "plot_overview",
+    "plot_result",
+    "save_figures",
+]
+
+KINDS = ("overview", "force", "energy", "path", "map")
+
+
+def plot_result(result: Result, kind: str = "overview", scene: Scene | None = None) -> Any:
+    """Return one matplotlib Figure of `result`.
+
+    `kind` is one of KINDS: force, depth and energy over time ("overview"), force and depth of each
+    pair ("force"), the energy audit ("energy"), the contacts' path on their shells ("path"), the
+    impulse that each element took ("map"). The last two are drawn on the shells of `scene`
+    (default: the scene that ran, or that of the scenario the result came from).
+
+    Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where "map"
+    has no scene.
+    """
+    if kind not in KINDS:
+        raise NameNotFound("kind of figure", kind, "a result", KINDS)
+    if kind == "path":
+        return plot_contact_path(result, scene_of(result, scene))
+    if kind == "map":
+        return plot_contact_map(result, scene_of(result, scene))
+    over_time = {
+        "overview": plot_overview,
+        "force": plot_force_and_depth,
+        "energy": plot_energy,
+    }
+    return over_time[kind](result)
+
+
+def save_figures(
+    result: Result, folder: str | PathLike[str], scene: Scene | None = None
+) -> list[Path]:
+    """Write the figures of `result` as .png files into `folder`; return their paths.
+
+    They are force_and_depth, energy, contact_path and, of a result that touched a shell,
+    contact_map. Paths and map are drawn on the shells of `scene` (default: the scene that ran; a
+    loaded result has none: then the path is drawn in the world, and there is no map). Raises
+    MissingExtra without matplotlib, ResultError if a file cannot be written.
+    """
+    scene = result.scene if scene is None else scene
+    figures = {
+        "force_and_depth.png": plot_force_and_depth(result),
+        "energy.png": plot_energy(result),
+        "contact_path.png": plot_contact_path(result, scene),
+    }
+    touched = {int(pair) for pair in result.contacts.pair}
+    if scene is not None and any(scene.pairs[pair].shell is not None for pair in touched):
+        figures["contact_map.png"] = plot_contact_map(result, scene)
+    paths = []
+    for name, figure in figures.items():
+        path = Path(folder) / name
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            figure.savefig(path, dpi=RESOLUTION)
+        except OSError as fault:
+            raise ResultError(path, f"cannot be written ({fault.strerror})") from fault
+        paths.append(path)
+    return paths

@@ -1,0 +1,239 @@
+"""Figures over time: forces and depth, the energy audit, an overview of both."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sphshell_pin.plot.figure import NO_CONTACT, count, new_figure, say
+from sphshell_pin.plot.series import FloatArray, PairSeries, thinned
+from sphshell_pin.view.path_axes import reading_unit
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.result import Result
+
+NORMAL_COLOR = "#d4202a"
+FRICTION_COLOR = "#f08a00"
+DEPTH_COLOR = "#2f6fde"
+COUNT_COLOR = "#6b7280"
+COUNT_SHARE = 4.0  # the number of contacts takes up a quarter of its axis
+MOST_PAIRS = 8
+CONTROLLED = ("Adaptive", "Implicit")  # integrators that choose their steps
+
+
+def plot_overview(result: Result) -> Any:
+    """Return one Figure of force, depth, energy and its residual over time.
+
+    Raises MissingExtra without matplotlib.
+    """
+    figure = new_figure(12.5, 7.0)
+    axes = figure.subplots(2, 2, sharex=True)
+    series = [PairSeries.of(result, index) for index in range(len(result.pairs))]
+    touched = [pair for pair in series if pair.touches]
+    _draw_overview_forces(axes[0, 0], result, touched)
+    _draw_depths(axes[1, 0], result, touched)
+    _draw_energies(axes[0, 1], result)
+    _draw_residual(axes[1, 1], result)
+    for axis in axes[1]:
+        axis.set_xlabel("time [s]")
+    figure.suptitle(_headline(result), fontsize=11)
+    return figure
+
+
+def plot_force_and_depth(result: Result) -> Any:
+    """Return a Figure of normal and friction force and of depth over time, one pair after another.
+
+    Of more than eight pairs in touch, the eight with the largest peak force are drawn.
+    """
+    series = [PairSeries.of(result, index) for index in range(len(result.pairs))]
+    touched = sorted((pair for pair in series if pair.touches), key=lambda pair: -pair.peak)
+    shown = [pair for pair in series if pair in touched[:MOST_PAIRS]]
+    if len(shown) <= 1:
+        figure = new_figure(9.0, 6.5)
+        axes = figure.subplots(2, 1, sharex=True).reshape(1, 2)
+    else:
+        figure = new_figure(12.0, 1.2 + 2.1 * len(shown))
+        axes = figure.subplots(len(shown), 2, sharex=True, squeeze=False)
+    if not shown:
+        for axis, quantity in zip(axes[0], ("force", "largest depth"), strict=True):
+            say(axis, NO_CONTACT)
+            axis.set_ylabel(quantity)
+    largest = max((pair.peak for pair in shown), default=0.0)
+    for pair, (force, depth) in zip(shown, axes, strict=False):
+        _draw_forces(force, result, pair, largest)
+        _draw_depths(depth, result, [pair])
+        force.set_title(_pair_title(result, pair), fontsize=10, loc="left")
+    for axis in axes[-1, -1:] if len(shown) <= 1 else axes[-1]:
+        axis.set_xlabel("time [s]")
+    left_out = len(touched) - len(shown)
+    note = f" ({count(left_out, 'pair', 'pairs')} with smaller forces left out)" if left_out else ""
+    figure.suptitle(f"Contact force and depth{note}", fontsize=12)
+    return figure
+
+
+def plot_energy(result: Result) -> Any:
+    """Return a Figure of the energy audit and of its residual over time."""
+    figure = new_figure(10.0, 6.5)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    _draw_energies(upper, result)
+    _draw_residual(lower, result)
+    lower.set_xlabel("time [s]")
+    figure.suptitle("Energy audit", fontsize=12)
+    return figure
+
+
+def _line(axis: Any, t: FloatArray, values: FloatArray, **look: Any) -> None:
+    axis.plot(*thinned(t, values), **look)
+
+
+def _finish(axis: Any, legend: bool = True) -> None:
+    axis.grid(True, alpha=0.3, linewidth=0.6)
+    axis.margins(x=0.01)
+    if legend:
+        axis.legend(loc="best", fontsize=8, framealpha=0.85)
+
+
+def _headline(result: Result) -> str:
+    stats = result.stats
+    parts = [f"{float(result.t[-1] - result.t[0]):g} s simulated"] if len(result.t) else []
+    if "dt" in stats and "integrator" in stats:
+        kind = str(stats["integrator"])
+        step = "mean dt" if kind in CONTROLLED else "dt"
+        parts.append(f"{kind}, {step} = {float(stats['dt']):.3g} s")
+    if "steps" in stats:
+        parts.append(f"{int(stats['steps'])} steps")
+    return ", ".join(parts)
+
+
+def _pair_title(result: Result, pair: PairSeries) -> str:
+    stats = result.stats.get("pairs", {}).get(pair.name)
+    if not stats:
+        return pair.name
+    touches = count(int(stats["touches"]), "touch", "touches")
+    peak = float(stats["peak_force"])
+    # An impact may pass between two rows.
+    unseen = " (between the recorded rows)" if peak > 1.2 * pair.peak else ""
+    return (
+        f"{pair.name}: {float(stats['contact_time']):.3g} s in contact, {touches}, "
+        f"peak {peak:.4g} N{unseen}, mean {float(stats['mean_force']):.4g} N"
+    )
+
+
+def _draw_forces(axis: Any, result: Result, pair: PairSeries, largest: float) -> None:
+    factor, unit = reading_unit(largest, "N")
+    t = np.asarray(result.t)
+    _line(axis, t, pair.normal * factor, color=NORMAL_COLOR, linewidth=1.2, label="normal")
+    if np.any(pair.friction > 0.0):
+        _line(
+            axis, t, pair.friction * factor, color=FRICTION_COLOR, linewidth=1.2, label="friction"
+        )
+    axis.set_ylabel(f"force [{unit}]")
+    _finish(axis)
+
+
+def _draw_overview_forces(axis: Any, result: Result, touched: list[PairSeries]) -> None:
+    if len(touched) == 1:
+        _draw_forces(axis, result, touched[0], touched[0].peak)
+        axis.set_title(f"force of {touched[0].name}", fontsize=10)
+        return
+    curves = {pair.name: pair.normal for pair in touched}
+    _draw_curves(axis, result, curves, "normal force", "N", NORMAL_COLOR)
+
+
+def _draw_depths(axis: Any, result: Result, touched: list[PairSeries]) -> None:
+    curves = {pair.name: pair.depth for pair in touched}
+    _draw_curves(axis, result, curves, "largest depth", "m", DEPTH_COLOR)
+    if touched:
+        axis.set_ylim(bottom=0.0)
+    if len(touched) == 1 and touched[0].count.max() > 1.0:
+        _draw_count(axis, result, touched[0])
+
+
+def _draw_curves(
+    axis: Any,
+    result: Result,
+    curves: dict[str, FloatArray],
+    quantity: str,
+    symbol: str,
+    color: str,
+) -> None:
+    """Draw a quantity of every pair, by name; that of a single pair in `color`."""
+    if not curves:
+        say(axis, NO_CONTACT)
+        axis.set_ylabel(quantity)
+        return
+    factor, unit = reading_unit(max(float(values.max()) for values in curves.values()), symbol)
+    for name, values in curves.items():
+        look = {"color": color} if len(curves) == 1 else {"label": name}
+        _line(axis, np.asarray(result.t), values * factor, linewidth=1.1, **look)
+    axis.set_ylabel(f"{quantity} [{unit}]")
+    _finish(axis, legend=len(curves) > 1)
+
+
+def _draw_count(axis: Any, result: Result, pair: PairSeries) -> None:
+    """Draw, at the foot of `axis`, how many contacts share the load."""
+    beside = axis.twinx()
+    t, count = thinned(np.asarray(result.t), pair.count)
+    beside.fill_between(t, count, step="mid", color=COUNT_COLOR, alpha=0.15, linewidth=0.0)
+    # A line of its own: an area as narrow as a row would not be seen.
+    beside.step(t, count, where="mid", color=COUNT_COLOR, linewidth=0.7)
+    beside.margins(x=0.01)
+    most = int(pair.count.max())
+    beside.set_ylim(0.0, COUNT_SHARE * most)
+    beside.set_yticks(range(0, most + 1, -(-most // 4)))
+    beside.tick_params(colors=COUNT_COLOR, labelsize=8)
+    beside.set_ylabel("contacts at once", color=COUNT_COLOR, loc="bottom", fontsize=9)
+    # The depth is drawn on top.
+    axis.set_zorder(beside.get_zorder() + 1)
+    axis.patch.set_visible(False)
+
+
+def _draw_energies(axis: Any, result: Result) -> None:
+    curves = _energy_curves(result)
+    largest = max(float(np.abs(values).max(initial=0.0)) for values, _ in curves.values())
+    factor, unit = reading_unit(largest, "J")
+    for label, (values, style) in curves.items():
+        if np.any(values != 0.0):
+            t = np.asarray(result.t)
+            _line(axis, t, values * factor, linestyle=style, linewidth=1.2, label=label)
+    axis.set_ylabel(f"energy [{unit}]")
+    _finish(axis, legend=False)
+    if axis.get_legend_handles_labels()[0]:
+        # Beside the curves: these fill their axes, and cross wherever a legend might lie.
+        axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8, borderaxespad=0.0)
+
+
+def _energy_curves(result: Result) -> dict[str, tuple[FloatArray, str]]:
+    """Return the parts of the energy (n,) [J] and their line styles, by label."""
+    energy = result.energy
+    kinetic = np.asarray(energy.kinetic, dtype=float)
+    potential = np.asarray(energy.potential, dtype=float)
+    rest = {
+        # Only differences of potential energy mean anything.
+        "potential (change)": (potential - potential[:1], "-"),
+        "elastic": (np.asarray(energy.elastic), "-"),
+        "lost to damping": (np.asarray(energy.damping_loss), "--"),
+        "lost to friction": (np.asarray(energy.friction_loss), "--"),
+        "work of the controller": (np.asarray(energy.control_work), ":"),
+    }
+    moved = max(float(np.abs(values).max(initial=0.0)) for values, _ in rest.values())
+    moved = max(moved, float(np.ptp(kinetic)) if len(kinetic) else 0.0)
+    # A body that turns for ever would press all other curves flat.
+    if len(kinetic) and kinetic.min() > 3.0 * moved > 0.0:
+        return {"kinetic (change)": (kinetic - kinetic[0], "-"), **rest}
+    return {"kinetic": (kinetic, "-"), **rest}
+
+
+def _draw_residual(axis: Any, result: Result) -> None:
+    residual = np.asarray(result.energy.residual, dtype=float)
+    factor, unit = reading_unit(float(np.abs(residual).max(initial=0.0)), "J")
+    _line(axis, np.asarray(result.t), residual * factor, color="#444444", linewidth=1.0)
+    axis.set_ylabel(f"residual [{unit}]")
+    exchanged = float(result.energy.exchanged)
+    if exchanged > 0.0 and len(residual):
+        share = float(np.abs(residual).max()) / exchanged
+        axis.set_title(
+            f"largest residual {share:.2g} of the {exchanged:.3g} J exchanged", fontsize=9
+        )
+    _finish(axis, legend=False)

@@ -1,0 +1,111 @@
+"""Shells and spheres as a Display draws them: each once, hanging on a joint."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pinocchio as pin
+
+from sphshell_pin.view.nodes import (
+    line_segments,
+    material,
+    mover,
+    node_name,
+    on_top,
+    set_object,
+    show,
+    sphere,
+)
+from sphshell_pin.view.surface import draw_patches, draw_shell, great_circles
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.scene import ContactPair
+
+SPHERE_COLOR = 0x2F6FDE
+
+ShellKey = tuple[int, int, bytes, bool]
+SphereKey = tuple[int, bytes, float]
+
+
+def shell_key(pair: ContactPair) -> ShellKey:
+    """Return what tells the picture of one pair's shell from another's."""
+    place = pair.shell_placement.homogeneous.tobytes()
+    return id(pair.shell), pair.joint_j, place, pair.method == "smooth"
+
+
+def sphere_key(pair: ContactPair) -> SphereKey:
+    """Return what tells the picture of one pair's sphere from another's."""
+    radius = 0.0 if pair.sphere is None else pair.sphere.radius
+    return pair.joint_i, pair.sphere_placement.homogeneous.tobytes(), radius
+
+
+class DrawnShell:
+    """The shell of `pair`, drawn below `visualizer`; `index` numbers the shells of the scene."""
+
+    def __init__(self, visualizer: Any, pair: ContactPair, index: int) -> None:
+        shell = pair.shell
+        if shell is None:
+            raise ValueError("a pair without a shell")
+        self.shell = shell
+        self.joint = pair.joint_j
+        self.node = visualizer[f"{index}_{node_name(shell.name)}"]
+        self._curved = pair.method == "smooth"
+        self._offset = pair.shell_placement
+        self._coloured = False
+        draw_shell(self.node, shell, index, curved=self._curved)
+        self._move = mover(self.node)
+
+    def update(self, data: pin.Data) -> None:
+        """Place it where forward kinematics left its joint in `data`."""
+        self._move((data.oMi[self.joint] * self._offset).homogeneous)
+
+    def show_patches(self, on: bool) -> None:
+        """Give each patch a colour of its own; they are drawn when first asked for."""
+        if on and not self._coloured:
+            draw_patches(self.node, self.shell, curved=self._curved)
+            self._coloured = True
+        show(self.node["surface"], not on)
+        if self._coloured:
+            show(self.node["patches"], on)
+
+
+class DrawnSphere:
+    """The sphere of `pair`, drawn below `visualizer`; `index` numbers the spheres of the scene."""
+
+    def __init__(self, visualizer: Any, pair: ContactPair, index: int) -> None:
+        _, _, radius = sphere_key(pair)
+        self.joint = pair.joint_i
+        self._offset = pair.sphere_placement
+        node = visualizer[f"{index}_{node_name(pair.name)}"]
+        set_object(
+            node["ball"],
+            sphere(radius, 48),
+            # Pulled forward a little: robots draw their own fingertip of the same radius.
+            material(
+                "MeshPhong",
+                SPHERE_COLOR,
+                0.6,
+                side=0,
+                depthWrite=False,
+                shininess=60,
+                polygonOffset=True,
+                polygonOffsetFactor=-2.0,
+                polygonOffsetUnits=-2.0,
+            ),
+            order=5,
+        )
+        # A faint disc through whatever hides the sphere: it often sits inside a hand.
+        set_object(node["ghost"], sphere(radius, 24), on_top(SPHERE_COLOR, 0.25), order=4)
+        # Three great circles, so that one sees a ball spin.
+        set_object(
+            node["circles"],
+            line_segments(*great_circles(1.003 * radius)),
+            material("LineBasic", 0x0D2C66, 0.8),
+            "LineSegments",
+            order=6,
+        )
+        self._move = mover(node)
+
+    def update(self, data: pin.Data) -> None:
+        """Place it where forward kinematics left its joint in `data`."""
+        self._move((data.oMi[self.joint] * self._offset).homogeneous)

@@ -1,0 +1,71 @@
+"""The example scripts run as they stand, and come to what the books say."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "docs" / "examples"
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """Runs an example in an empty folder; returns its names, and checks the files it leaves."""
+    monkeypatch.chdir(tmp_path)
+
+    def run_example(name, files):
+        names = runpy.run_path(str(EXAMPLES / f"{name}.py"))
+        assert {path.name for path in tmp_path.iterdir()} == set(files)
+        for path in tmp_path.glob("*.png"):
+            assert path.read_bytes().startswith(b"\x89PNG")
+        return names
+
+    return run_example
+
+
+def test_every_example_is_tested():
+    assert {path.stem for path in EXAMPLES.glob("*.py")} == {
+        "01_ball_on_a_surface",
+        "02_own_loop",
+        "03_parameter_study",
+    }
+
+
+def test_a_ball_on_a_surface(run):
+    names = run("01_ball_on_a_surface", ["overview.png", "contact_map.png", "ball.html"])
+    result = names["result"]
+    # The first flight ends where free fall says.
+    assert result.contacts.t[0] == pytest.approx(
+        np.sqrt(2 * _height(names) / 9.81), abs=2 * np.diff(result.t).max()
+    )
+    assert np.abs(result.energy.residual).max() < 1e-5 * result.energy.exchanged
+
+
+def _height(names):
+    """How far the ball falls until it touches the bowl."""
+    x, y, z = names["q0"][:3]
+    gaps = np.linspace(0.0, z, 2001)
+    depth, _ = names["bowl"].contacts_batch(
+        np.column_stack((np.full(2001, x), np.full(2001, y), z - gaps)), np.full(2001, 0.012)
+    )
+    return float(gaps[np.argmax(depth > 0.0)])
+
+
+def test_a_loop_of_ones_own(run):
+    names = run("02_own_loop", ["own_loop.png"])
+    assert names["difference"] < 1e-12
+    assert names["force"][-1] > 1.0
+
+
+def test_a_parameter_study(run):
+    names = run("03_parameter_study", ["friction.png", "stiffness.png"])
+    mu, mass, k = names["coefficients"], names["mass"], names["stiffnesses"]
+    np.testing.assert_allclose(names["times"], 2.0 / (7.0 * mu * 9.81), rtol=0.01)
+    np.testing.assert_allclose(names["speeds"], 5.0 / 7.0, rtol=1e-3)
+    peaks = [one["peak_force"] for one in names["study"]]
+    np.testing.assert_allclose(peaks, np.sqrt(k * mass), rtol=0.03)
+    durations = [one["contact_time"] for one in names["study"]]
+    np.testing.assert_allclose(durations, np.pi * np.sqrt(mass / k), rtol=0.03)

@@ -1,0 +1,65 @@
+"""A result in a notebook: the recording as the value of a cell."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+import re
+
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.scenario import build, run_built
+from tests.scenario.files import DROP, write
+from tests.view.test_recording_in_browser import browser  # noqa: F401
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    """What was saved of a run, loaded again."""
+    home = tmp_path_factory.mktemp("drop")
+    text = DROP.replace("dt = 1e-4", "dt = 1e-4\nrecording_speed = 0.1")
+    run_built(build(write(home, text)), home / "out", recording=False)
+    return sp.Result.load(home / "out" / "run.npz")
+
+
+def test_a_loaded_result_shows_itself(result, tmp_path):
+    shown = result.view(height=321)
+    assert "<title>a ball falls on a box</title>" in shown.page
+    assert '"speed": 0.1' in shown.page
+    frame = shown._repr_html_()
+    assert 'height="321"' in frame
+    inside = html.unescape(re.fullmatch(r'<iframe srcdoc="([^"]*)".*</iframe>', frame)[1])
+    assert inside == shown.page
+    assert shown.save(tmp_path / "page.html").read_text() == shown.page
+    assert len(repr(shown)) < 100
+
+
+def test_a_result_without_a_scene_is_told(result):
+    lost = dataclasses.replace(result, origin=None)
+    with pytest.raises(ResultError, match=r"view\(scene=...\)"):
+        lost.view()
+    built = build("sphere_on_shell")
+    with pytest.raises(InvalidParameter, match="height"):
+        lost.view(built.scene, height=0)
+
+
+def test_a_loaded_result_is_mapped_on_the_shell_it_touched(result):
+    assert result.plot("map").axes[0].get_title() == "plate"
+    assert "on plate" in result.plot("path").axes[0].get_title()
+
+
+@pytest.mark.browser
+def test_the_frame_plays_in_a_page(result, tmp_path, browser):  # noqa: F811
+    page = tmp_path / "notebook.html"
+    page.write_text(f"<!DOCTYPE html><body>{result.view()._repr_html_()}</body>")
+    tab = browser.new_page()
+    complaints = []
+    tab.on("pageerror", lambda fault: complaints.append(str(fault)))
+    tab.goto(page.as_uri())
+    frame = tab.frames[1]
+    frame.wait_for_function("window.recording_ready", timeout=60_000)
+    frame.wait_for_function("viewer.animator.time > 0.1", timeout=20_000)
+    tab.close()
+    assert complaints == []
