@@ -38,6 +38,15 @@ TIPS: dict[str, tuple[tuple[str, float, tuple[float, float, float]], ...]] = {
 }
 
 
+# Postures to work in [rad], of arms whose reference posture is stretched out: the flange down.
+_FLANGE_DOWN = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
+WORKING: dict[str, tuple[float, ...]] = {
+    f"{arm}{kind}": _FLANGE_DOWN
+    for arm in ("ur3", "ur5", "ur10")
+    for kind in ("", "_limited", "_gripper")
+}
+
+
 class RobotError(SphshellError, ValueError):
     """A robot description that cannot be loaded."""
 
@@ -146,7 +155,13 @@ def fingertips(name: str) -> list[Sphere]:
 
     if name in TIPS:
         return [Sphere(radius, frame, np.array(offset)) for frame, radius, offset in TIPS[name]]
-    robot = load(name)
+    return end_spheres(load(name))
+
+
+def end_spheres(robot: LoadedRobot) -> list[Sphere]:
+    """Return the sphere collision geometries of the links of `robot` without a further joint."""
+    from sphshell_pin import Sphere
+
     parents = {int(parent) for parent in robot.model.parents}
     tips = []
     for geometry in robot.collision_model.geometryObjects:

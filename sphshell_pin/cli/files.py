@@ -7,13 +7,31 @@ from typing import Annotated, Any
 
 import typer
 
-from sphshell_pin.cli.app import app, faults, terminal
+from sphshell_pin.cli.app import app, faults, make_table, plain, terminal
+
+FORMATS = ".stl .obj .ply .off .shl, .step .iges .brep"
+
+ChordErrorOption = Annotated[
+    float | None,
+    typer.Option(help="Of CAD: largest distance of the elements from the exact surface \\[m]."),
+]
+BodyOption = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME", help="Of CAD: take this body; may be given several times."),
+]
+FaceOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME",
+        help="Of CAD: take this face, by name or number; may be given several times.",
+    ),
+]
 
 
 @app.command()
 def check(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="A surface file: .stl .obj .ply .off .shl")],
+    file: Annotated[Path, typer.Argument(help=f"A surface file: {FORMATS}")],
     unit: Annotated[
         str | None, typer.Option(help="Length unit of the file: mm, cm, m, inch, ...")
     ] = None,
@@ -24,6 +42,9 @@ def check(
         str | None,
         typer.Option(help="Use of the SCALE of a .shl file: apply, ignore, or a number instead."),
     ] = None,
+    chord_error: ChordErrorOption = None,
+    body: BodyOption = None,
+    face: FaceOption = None,
 ) -> None:
     """Print the health of a surface file: what was found in it, and what was repaired.
 
@@ -34,10 +55,80 @@ def check(
         from sphshell_pin.errors import SphshellError, UnitMissing
 
         try:
-            shell = Shell.from_file(file, unit, _number_or_word(scale), side=_side(side))
+            shell = Shell.from_file(
+                file,
+                unit,
+                _number_or_word(scale),
+                chord_error=chord_error,
+                bodies=body,
+                faces=_faces(face),
+                side=_side(side),
+            )
         except UnitMissing as error:
             raise SphshellError(f"the unit {error.must('--unit {}')}") from error
         terminal().print(str(shell.health), markup=False, highlight=False)
+
+
+@app.command()
+def convert(
+    context: typer.Context,
+    source: Annotated[Path, typer.Argument(help=f"The file to read: {FORMATS}")],
+    target: Annotated[Path, typer.Argument(help="The file to write; its suffix names the format.")],
+    unit_in: Annotated[
+        str | None, typer.Option(help="Length unit of the file to read; STEP and IGES state it.")
+    ] = None,
+    unit_out: Annotated[
+        str | None, typer.Option(help="Length unit of the file to write; the same unless given.")
+    ] = None,
+    chord_error: ChordErrorOption = None,
+    body: BodyOption = None,
+    face: FaceOption = None,
+) -> None:
+    """Write a surface file in another format, and measure how far apart the two are.
+
+    CAD becomes a mesh within the chord error, CAD to CAD keeps the exact surfaces, a mesh becomes
+    planar CAD faces.
+
+    Example: sphshell-pin convert blade.step blade.stl --chord-error 1e-4
+    """
+    with faults(context):
+        from sphshell_pin.errors import SphshellError, UnitMissing
+        from sphshell_pin.shell.converting import convert as convert_file
+
+        try:
+            done = convert_file(
+                source,
+                target,
+                unit_in,
+                unit_out,
+                chord_error=chord_error,
+                bodies=body,
+                faces=_faces(face),
+            )
+        except UnitMissing as error:
+            raise SphshellError(f"the unit {error.must('--unit-in {}')}") from error
+        rows = make_table("file", "unit", "holds", "size", "area")
+        for held in (done.source, done.target):
+            rows.add_row(
+                plain(str(held.path)),
+                held.unit,
+                f"{held.count} {held.kind}",
+                f"{held.size:.6g} m",
+                f"{held.area:.6g} m^2",
+            )
+        terminal().print(rows)
+        terminal().print(
+            f"deviation measured at {len(done.forth) + len(done.back)} points: "
+            f"largest {done.largest:.3g} m, root mean square {done.rms:.3g} m",
+            highlight=False,
+        )
+        for note in done.notes:
+            terminal().print(f"note: {note}", markup=False, highlight=False)
+
+
+def _faces(names: list[str] | None) -> list[str | int] | None:
+    """Return faces by name, or by number where the name is one."""
+    return None if names is None else [int(n) if n.isdecimal() else n for n in names]
 
 
 def _number_or_word(text: str | None) -> str | float | None:

@@ -224,7 +224,15 @@ def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell
             file = path.parent / section.file
             if not file.is_file():
                 raise SphshellError(f"no such surface file: {file}")
-            shell = sp.Shell.from_file(file, unit=section.unit, scale=section.scale, **options)
+            shell = sp.Shell.from_file(
+                file,
+                unit=section.unit,
+                scale=section.scale,
+                chord_error=section.chord_error,
+                bodies=section.bodies,
+                faces=section.faces,
+                **options,
+            )
         else:
             if section.chord_error is not None:
                 options["chord_error"] = section.chord_error

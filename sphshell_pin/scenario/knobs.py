@@ -67,7 +67,6 @@ _AXES = ("x", "y", "z")
 
 # Keys whose new value holds from the start only: a run under way keeps its state and its clock.
 _FROM_THE_START = ("robot", "shell", "run")
-_PATH_KEYS = ("speed", "lead_in", "path")
 
 
 @dataclass(frozen=True)
@@ -163,13 +162,8 @@ def _knob(section: KnobSection, scenario: Scenario, path: Path) -> Knob:
         high=high,
         log=log and low > 0,
         value=value,
-        restart=_restarts(key),
+        restart=key.partition(".")[0] in _FROM_THE_START,
     )
-
-
-def _restarts(key: str) -> bool:
-    table, _, rest = key.partition(".")
-    return table in _FROM_THE_START or (table == "controller" and rest.split(".")[0] in _PATH_KEYS)
 
 
 def _meaning(key: str, scenario: Scenario) -> tuple[str, str]:

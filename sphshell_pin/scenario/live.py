@@ -182,14 +182,15 @@ class LiveRun:
             name: getattr(before.scenario, name) == getattr(after.scenario, name)
             for name in ("robot", "shell", "controller", "run")
         }
-        controller = None if same["controller"] and same["shell"] else after.controller
-        if same["robot"] and same["run"] and self._fault is None and self._run.ended is None:
+        controller = None if same["controller"] else after.controller
+        goes_on = same["robot"] and same["shell"] and same["run"] and self.ended is None
+        if goes_on:
             try:
                 if self._run.change(after.scene, controller):
                     self.built = after
                     self._row = self._run.snapshot()
                     return
-                # Other weights or places: from here on, under them.
+                # Another gravity: from here on, under it.
                 self.built = after
                 self._begin(self.q, self.v, self.time, after.controller)
                 return

@@ -9,13 +9,12 @@ from sphshell_pin.errors import NameNotFound
 
 @dataclass(frozen=True)
 class Material:
-    """A material, with typical values: real parts scatter widely about them.
+    """A material, with typical values to start from: real parts scatter widely about them.
 
-    Moduli: Ashby, Materials Selection in Mechanical Design, table A; Gent, Engineering with
-    Rubber, for the two elastomers, whose Young's modulus follows from their hardness (50 and 20
-    Shore A). Friction on dry steel: Rabinowicz, Friction and Wear of Materials, and for the
-    elastomers and wood the CRC Handbook's ranges. Restitution of a ball on a thick steel plate at
-    about 1 m/s: Goldsmith, Impact, chapter 8.
+    Moduli are rounded handbook values (Ashby, Materials Selection in Mechanical Design); those of
+    the elastomers follow from their hardness, about 80 and 20 Shore A (Gent, Engineering with
+    Rubber). Friction on dry steel and restitution of a ball on a thick steel plate at about 1 m/s
+    are of the usual order and measured for no particular part.
     """
 
     name: str
@@ -37,7 +36,7 @@ MATERIALS: dict[str, Material] = {
         Material("aluminium", 7.0e10, 0.33, 0.80, 0.45, 0.75),
         Material("plastic", 2.5e9, 0.38, 0.80, 0.30, 0.80),
         Material("wood", 1.0e10, 0.35, 0.60, 0.40, 0.75),
-        Material("rubber", 2.5e6, 0.49, 0.70, 0.80, 0.85),
+        Material("rubber", 1.0e7, 0.49, 0.70, 0.80, 0.85),
         Material("silicone", 6.0e5, 0.49, 0.60, 0.70, 0.85),
     )
 }

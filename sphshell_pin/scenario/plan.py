@@ -10,9 +10,17 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.materials import Material, friction_between, restitution_between
 from sphshell_pin.scenario.poses import Stance
-from sphshell_pin.scenario.spots import Spot, find_spot, way_across
+from sphshell_pin.scenario.spots import (
+    Spot,
+    come_down,
+    find_spot,
+    spots_about,
+    touches_once,
+    way_across,
+)
 from sphshell_pin.scenario.tips import Tip
 
 Array = npt.NDArray[np.float64]
@@ -22,10 +30,14 @@ UP = np.array([0.0, 0.0, 1.0])
 
 # Of a tip at the start, as a part of its radius; of a body that falls, and of feet.
 TIP_GAP, FALL_GAP, FOOT_GAP = 0.02, 2.0, 0.1
+# How far from the middle a body falls, as a part of the surface's box.
+FALL_BESIDE = 0.1
+# How far friction and force may turn a tip that is to keep its orientation [rad].
+TIP_TURN = 0.02
 # Largest normal force by default [N], and in weights of the tip's effective mass.
 MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
-# The way across a surface: radii long, part of the robot's reach, radii a second.
-WAY_RADII, WAY_REACH, WAY_RATE = 10.0, 0.15, 3.0
+# The way across a surface: radii long at most, radii a second.
+WAY_RADII, WAY_RATE = 10.0, 3.0
 LEAD_IN = 0.5
 # How fast a drawn tip comes back to its way [rad/s], and how far friction may hold it behind, in
 # radii.
@@ -64,6 +76,8 @@ class Press:
     damping: float
     rotational_stiffness: float
     rotational_damping: float
+    even: bool
+    """Whether the sphere touches one face all along the way, so that the surface bears `force`."""
     posture_stiffness: tuple[float, ...]
     joint_damping: tuple[float, ...]
 
@@ -101,73 +115,104 @@ def plan_press(
     press: float | None,
     *,
     toward: Array | None = None,
+    inside: bool = False,
 ) -> Plan:
     """Plan a scenario in which a tip of a robot with a fixed base presses and slides.
 
-    `press` [N] is the normal force asked for; `toward` (3,) the side of the surface to touch.
+    `press` [N] is the normal force asked for; `toward` (3,) the side of the surface to touch, with
+    `inside` from its middle.
+
+    Raises
+    ------
+    SphshellError
+        The joints cannot push as hard as `press`.
     """
+    if press is not None and press > stance.force:
+        raise SphshellError(
+            f"the joints' effort limits allow a push of {_round(stance.force, 3):g} N along "
+            f"{_axis(stance.approach)}, not {press:g} N"
+        )
     gap = TIP_GAP * tip.radius
-    spot = find_spot(shell, tip.radius, gap, toward=toward)
-    turned = _turn(spot.normal, -stance.approach)
+    spot, turned, points, even = _place_to_press(shell, tip, stance, gap, toward, inside=inside)
     placement = pin.SE3(turned, stance.centre - turned @ spot.centre)
-    force = _round(_suitable_force(stance) if press is None else press)
+    force = _round(_suitable_force(stance, tip.radius, materials) if press is None else press)
     rate = _round(WAY_RATE * tip.radius)
-    way = _way(shell, spot, tip, stance, turned)
+    aside = turned.T @ (stance.origin - stance.centre)
+    # The tip's frame, which follows the way, need not stand in the sphere's centre.
+    way = points + aside - spot.normal * (spot.normal @ aside)
     contact = _contact(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
     softest = contact.mu_static * force / (TIP_LAG * tip.radius)
     stiffness = max(stance.slide_mass * TIP_RATE**2, softest)
     mass = math.sqrt(stance.mass * stance.slide_mass)
     length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
-    turning = stance.inertia * TIP_RATE**2
+    turning = 0.0
+    if stance.inertia:
+        moment = contact.mu_static * force * tip.radius
+        turning = max(stance.inertia * TIP_RATE**2, moment / TIP_TURN)
     spare = stance.model.nv > (6 if turning else 3)
     # The posture's pull may take a fiftieth of the normal force at the end of the way.
     pull = min(0.02 * force / (stance.mass * max(length, tip.radius)), 100.0) if spare else 0.0
     control = Press(
         force=force,
         way=way,
+        even=even,
         speed=rate,
         lead_in=LEAD_IN,
         stiffness=_round(stiffness),
         damping=_round(1.4 * math.sqrt(stiffness * mass)),
         rotational_stiffness=_round(turning),
-        rotational_damping=_round(1.4 * stance.inertia * TIP_RATE),
+        rotational_damping=_round(1.4 * math.sqrt(turning * stance.inertia)),
         posture_stiffness=tuple(_round(pull * one) for one in stance.joint_inertia),
-        joint_damping=tuple(_round(1.4 * math.sqrt(pull) * one) for one in stance.joint_inertia),
+        joint_damping=tuple(_round(0.7 * math.sqrt(pull) * one) for one in stance.joint_inertia),
     )
     why = [f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.said}"]
     why.append(
-        f"the surface's middle is {_mm(gap)} from the sphere, across the way it moves best: "
-        f"the tip presses along {_axis(stance.approach)}"
+        f"the surface's middle stands {_mm(gap)} before the sphere, which presses along "
+        f"{_axis(stance.approach)}"
     )
     if stance.bent:
-        why.append("the posture of the start was bent, as the tip could not move in the given one")
+        why.append("the joints were bent a little, as the tip could not move freely where it was")
     if stance.lock:
         why.append(f"{_count(len(stance.lock), 'joint')} that do not move the tip are locked")
     if press is None:
         why.append(
             f"normal force {force:g} N, for an effective mass of {stance.mass:.3g} kg at the tip"
         )
+    if not even:
+        why.append(
+            "the sphere touches edges or several sides at once, wherever it was tried: the force "
+            "on the surface will not be the one that presses"
+        )
     if len(way) < 2:
-        why.append("the tip stays where it is: there is no room to slide")
+        reason = "it has no room" if stance.inertia else "its joints cannot keep it from rolling"
+        why.append(f"the tip presses in one place and does not slide: {reason}")
     duration = math.ceil(10 * (LEAD_IN + length / rate + 0.5)) / 10
     return Plan((tip,), contact, control, duration, gap, placement, None, tuple(why))
 
 
 def plan_fall(
-    shell: Any, tip: Tip, centre: Array, root: Array, materials: tuple[Material, Material]
+    shell: Any,
+    tip: Tip,
+    centre: Array,
+    root: Array,
+    materials: tuple[Material, Material],
+    *,
+    inside: bool = False,
 ) -> Plan:
     """Plan a scenario in which a free body falls on the surface, which stands as its file says.
 
     `centre` (3,) [m] is the sphere's in the world when the root is at `root` (7,).
     """
     gap = FALL_GAP * tip.radius
-    spot = find_spot(shell, tip.radius, gap, toward=UP)
+    # Beside the middle: a ball in a bowl rolls then.
+    beside = FALL_BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
+    spot = find_spot(shell, tip.radius, gap, toward=UP, inside=inside, beside=beside)
     start = root.copy()
     start[:3] += spot.centre - centre
     speed = math.sqrt(2 * GRAVITY * gap)
     why = (
         f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.said}",
-        f"it falls {_mm(gap)} on the middle of the surface, at {speed:.2g} m/s",
+        f"it falls {_mm(gap)} beside the middle of the surface, at {speed:.2g} m/s",
     )
     contact = _contact(materials, speed, 0.005)
     return Plan((tip,), contact, None, 1.0, gap, pin.SE3.Identity(), start, why)
@@ -185,7 +230,7 @@ def plan_stand(
     """Plan a scenario in which a floating robot of `mass` [kg] stands on spheres.
 
     `centres` (k, 3) [m] are those of the `tips` in the world, `joint_inertia` [kg m^2] the
-    diagonal of the mass matrix of its motors, `leg` [m] the height of its root above the tips.
+    diagonal of the mass matrix of its motors, `leg` [m] the distance of its root from the tips.
     """
     gap = FOOT_GAP * min(tip.radius for tip in tips)
     place = _under(shell, centres, np.array([tip.radius for tip in tips]), gap)
@@ -215,6 +260,11 @@ def hertz_stiffness(radius: float, one: Material, other: Material) -> float:
     return 4 / 3 * math.sqrt(radius) / softness
 
 
+def bearable(radius: float, one: Material, other: Material) -> float:
+    """Return the load [N] that presses a sphere of `radius` [m] in by a fifteenth of it."""
+    return float(hertz_stiffness(radius, one, other) * (radius / 15) ** 1.5)
+
+
 def _contact(materials: tuple[Material, Material], speed: float, slip: float) -> Contact:
     static, dynamic = friction_between(*materials)
     return Contact(
@@ -228,33 +278,55 @@ def _contact(materials: tuple[Material, Material], speed: float, slip: float) ->
     )
 
 
-def _suitable_force(stance: Stance) -> float:
-    return min(MOST_FORCE, 0.1 * stance.force, MOST_WEIGHTS * stance.mass * GRAVITY)
+def _suitable_force(stance: Stance, radius: float, materials: tuple[Material, Material]) -> float:
+    weights = MOST_WEIGHTS * stance.mass * GRAVITY
+    return min(MOST_FORCE, 0.1 * stance.force, weights, bearable(radius, *materials))
 
 
-def _way(shell: Any, spot: Spot, tip: Tip, stance: Stance, turned: Array) -> Array:
-    """Return the way of the tip's frame, which need not stand in the sphere's centre."""
-    aside = turned.T @ (stance.origin - stance.centre)
-    aside = aside - spot.normal * (spot.normal @ aside)
-    points = spot.point[None]
-    if stance.slide is not None:
-        length = min(WAY_RADII * tip.radius, WAY_REACH * stance.reach)
-        points = way_across(shell, spot, turned.T @ stance.slide, length, 0.5 * tip.radius)
-    return points + aside
+def _place_to_press(
+    shell: Any, tip: Tip, stance: Stance, gap: float, toward: Array | None, *, inside: bool
+) -> tuple[Spot, Array, Array, bool]:
+    """Return a spot, how the shell is turned to face the tip, a way (k, 3) across; if it is even.
+
+    The first spot from the middle on where the sphere touches once all along the way; where there
+    is none, the middle.
+    """
+    first: tuple[Spot, Array, Array, bool] | None = None
+    for spot in spots_about(shell, tip.radius, gap, toward=toward, inside=inside):
+        turned = _turn(spot.normal, -stance.approach)
+        points = spot.point[None]
+        if stance.slide is not None and stance.inertia:
+            length = min(WAY_RADII * tip.radius, 0.8 * stance.room)
+            points = way_across(shell, spot, turned.T @ stance.slide, length, 0.5 * tip.radius)
+        first = first or (spot, turned, points, False)
+        # Beside an edge a way may be short, but not on a whole surface.
+        roomy = len(points) > 4 or len(first[2]) <= 4
+        if roomy and touches_once(shell, spot, points, tip.radius, 2 * gap):
+            return spot, turned, points, True
+    if first is None:
+        raise SphshellError("the surface has no spot to touch")
+    return first
 
 
 def _under(shell: Any, centres: Array, radii: Array, gap: float) -> Any:
-    """Return where the shell stands so that the nearest of the spheres has the `gap` [m] to it."""
+    """Return where the shell stands so that the nearest of the spheres has the `gap` [m] to it.
+
+    Its middle stands under the middle of the spheres; where none of them would then come down on
+    it, under the first one.
+    """
     spot = find_spot(shell, float(radii[0]), gap, toward=UP)
-    middle = np.array([*centres[:, :2].mean(axis=0), float((centres[:, 2] - radii).min()) - gap])
-    shift = middle - spot.point
-    for _ in range(50):
-        distances = shell.closest_points(centres - shift).distances - radii
-        over = float(np.abs(distances).min() if (distances > 0).all() else distances.min()) - gap
-        if abs(over) < 1e-3 * gap:
-            break
-        shift = shift + over * UP
-    return pin.SE3(np.eye(3), shift)
+    for anchor in (centres.mean(axis=0), centres[0]):
+        aside = anchor - spot.point
+        heights = []
+        for centre, radius in zip(centres, radii, strict=True):
+            above = centre - aside
+            above[2] = shell.box[1, 2] + 2 * (radius + gap)
+            down = come_down(shell, above, -UP, float(radius), gap).centre[2]
+            if down > shell.box[0, 2] - radius:
+                heights.append(centre[2] - down)
+        if heights:
+            return pin.SE3(np.eye(3), np.array([aside[0], aside[1], min(heights)]))
+    raise SphshellError("no foot comes down on the surface: it is too small")
 
 
 def _turn(source: Array, target: Array) -> Array:

@@ -9,12 +9,21 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.dynamics.models import find_frame, reduced_model
 from sphshell_pin.scenario.tips import Tip
 
 Array = npt.NDArray[np.float64]
 
+# How far a tip may slide, as a part of its reach.
+SLIDE = 0.15
 # Mobility along the way of approach, as a part of the best one, below which a posture is singular.
-_MOBILE = 0.05
+_MOBILE = 0.02
+# The same, which a posture that has to be bent shall reach.
+_EASY = 0.1
+# Of a slide: in how many steps it is tried, and the turn of a joint [rad] that would move the tip
+# by its reach, beyond which a posture is near a singular one.
+_SLIDE_STEPS = 20
+_FASTEST = 6.0
 # How far joints are bent out of a singular posture [rad or m], in turn, and how often it is tried.
 _BENDS = (0.3, 0.6, 0.9)
 _TRIES = 40
@@ -30,6 +39,8 @@ class Stance:
     """pinocchio.Model without the joints that do not move the tip."""
     q: Array
     """Configuration of the whole robot (nq,)."""
+    coordinates: Array
+    """Configuration of `model`."""
     lock: tuple[str, ...]
     """Joints that do not move the tip."""
     origin: Array
@@ -40,6 +51,8 @@ class Stance:
     """Unit (3,): where the tip presses."""
     slide: Array | None
     """Unit (3,) across the approach: where the tip moves best; None where it cannot."""
+    room: float
+    """How far the tip can slide without turning [m]; no farther is tried than `SLIDE` reaches."""
     mass: float
     """Effective mass along the approach [kg]."""
     slide_mass: float
@@ -59,16 +72,18 @@ class Stance:
 def take_stance(model: Any, q: Array, tip: Tip, approach: Array | None) -> Stance:
     """Return how the robot stands with its tip near the configuration q (nq,).
 
-    `approach` (3,) is where the tip shall press; by default down, or where it moves best if it
-    cannot move down. A posture in which it cannot move is bent a little, always in the same way.
+    `approach` (3,) is where the tip shall press; by default down, for a sphere before its frame as
+    the frame points, or where it moves best if it cannot move there. A posture in which it cannot
+    move is bent a little, always in the same way.
     """
     lock = _joints_aside(model, tip)
     inside = _into_limits(model, q)
     rng = np.random.default_rng(0)
     moving = [j for j in range(1, model.njoints) if model.names[j] not in lock]
     best, best_score = _stance(model, inside, lock, tip, approach)
-    for bend in _BENDS:
-        if best_score >= _MOBILE:
+    bends = _BENDS if best_score < _MOBILE else ()
+    for bend in bends:
+        if best_score >= _EASY:
             break
         for _ in range(_TRIES):
             step = np.zeros(model.nv)
@@ -79,12 +94,12 @@ def take_stance(model: Any, q: Array, tip: Tip, approach: Array | None) -> Stanc
             one, score = _stance(model, bent, lock, tip, approach)
             if score > best_score:
                 best, best_score = one, score
-    return replace(best, bent=not np.array_equal(best.q, q))
+    return _with_room(replace(best, bent=not np.array_equal(best.q, q)), tip)
 
 
 def _joints_aside(model: Any, tip: Tip) -> tuple[str, ...]:
     """Return the joints that do not move the tip; none are left aside of a robot that floats."""
-    parent = int(model.frames[model.getFrameId(tip.frame)].parentJoint)
+    parent = int(model.frames[find_frame(model, tip.frame)].parentJoint)
     chain = set(model.supports[parent])
     return tuple(model.names[j] for j in range(1, model.njoints) if j not in chain)
 
@@ -109,14 +124,14 @@ def _stance(
     model: Any, q: Array, lock: tuple[str, ...], tip: Tip, approach: Array | None
 ) -> tuple[Stance, float]:
     """Return the stance at q, and its mobility along the approach as a part of the best one."""
-    reduced = pin.buildReducedModel(model, [model.getJointId(name) for name in lock], q)
+    reduced = reduced_model(model, lock, q) if lock else model
     short = _coordinates(model, reduced, q)
     data = reduced.createData()
     pin.computeJointJacobians(reduced, data, short)
     pin.updateFramePlacements(reduced, data)
     pin.crba(reduced, data, short)
     mass_matrix = np.triu(data.M) + np.triu(data.M, 1).T
-    frame = reduced.getFrameId(tip.frame)
+    frame = find_frame(reduced, tip.frame)
     pose = data.oMf[frame]
     centre = pose.act(tip.offset)
     local = pin.getFrameJacobian(reduced, data, frame, pin.LOCAL_WORLD_ALIGNED)
@@ -125,7 +140,11 @@ def _stance(
     values, axes = np.linalg.eigh(mobility)
     top = max(float(values[-1]), 1e-300)
     if approach is None:
+        # A sphere before its frame is pressed as the frame points, else the frame would be dragged
+        # beside it.
         approach = np.array([0.0, 0.0, -1.0])
+        if tip.offset.any():
+            approach = pose.rotation @ tip.offset / np.linalg.norm(tip.offset)
         if approach @ mobility @ approach < _MOBILE * top:
             approach = _roomier(reduced, short, linear, mass_matrix, _upright(axes[:, -1]))
     along = float(approach @ mobility @ approach)
@@ -133,7 +152,7 @@ def _stance(
     sideways, slides = np.linalg.eigh(across @ mobility @ across)
     slide = None
     if sideways[-1] > _MOBILE * top:
-        slide = _roomier(reduced, short, linear, mass_matrix, _upright(slides[:, -1]))
+        slide = _upright(slides[:, -1])
     pushes = np.abs(linear.T @ approach)
     limits = np.array(reduced.upperEffortLimit)
     limited = (pushes > 1e-9) & np.isfinite(limits) & (limits > 0)
@@ -145,11 +164,13 @@ def _stance(
     stance = Stance(
         model=reduced,
         q=q,
+        coordinates=short,
         lock=lock,
         origin=np.array(pose.translation),
         centre=centre,
         approach=approach,
         slide=slide,
+        room=0.0,
         mass=1 / max(along, 1e-9),
         slide_mass=1 / max(float(sideways[-1]) if slide is not None else along, 1e-9),
         inertia=inertia,
@@ -163,8 +184,36 @@ def _stance(
     return stance, usable / top
 
 
+def _with_room(stance: Stance, tip: Tip) -> Stance:
+    """Return the stance with its slide turned to where there is more room, and how much."""
+    if stance.slide is None:
+        return stance
+    ways = [(_slide_room(stance, tip, sign * stance.slide), sign) for sign in (1.0, -1.0)]
+    room, sign = max(ways)
+    return replace(stance, slide=sign * stance.slide, room=room)
+
+
+def _slide_room(stance: Stance, tip: Tip, direction: Array) -> float:
+    """Return how far [m] the tip moves along `direction` before a limit or a singular posture."""
+    model = stance.model
+    data, frame = model.createData(), find_frame(model, tip.frame)
+    q = stance.coordinates
+    step = SLIDE * stance.reach / _SLIDE_STEPS
+    rows = 6 if model.nv >= 6 else 3
+    goal = np.concatenate([step * direction, np.zeros(3)])[:rows]
+    for k in range(_SLIDE_STEPS):
+        jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)[:rows]
+        turn, *_ = np.linalg.lstsq(jacobian, goal, rcond=1e-3)
+        q = pin.integrate(model, q, turn)
+        fast = np.abs(turn).max() > _FASTEST * step / stance.reach
+        astray = np.linalg.norm(jacobian @ turn - goal) > 0.1 * step
+        if fast or astray or not np.array_equal(_into_limits(model, q), q):
+            return k * step
+    return _SLIDE_STEPS * step
+
+
 def _coordinates(model: Any, reduced: Any, q: Array) -> Array:
-    short = pin.neutral(reduced)
+    short: Array = pin.neutral(reduced)
     for j in range(1, reduced.njoints):
         to, source = reduced.joints[j], model.joints[model.getJointId(reduced.names[j])]
         short[to.idx_q : to.idx_q + to.nq] = q[source.idx_q : source.idx_q + source.nq]
@@ -172,13 +221,14 @@ def _coordinates(model: Any, reduced: Any, q: Array) -> Array:
 
 
 def _upright(axis: Array) -> Array:
-    """Return `axis` along the nearest coordinate axis, where it nearly is one, and not downward."""
+    """Return `axis` along the nearest coordinate axis, where it nearly is one; its sign is free."""
     k = int(np.argmax(np.abs(axis)))
     if abs(axis[k]) > 0.97:
         straight = np.zeros(3)
         straight[k] = 1.0
         return straight
-    return axis * np.sign(axis[k])
+    upright: Array = axis * np.sign(axis[k])
+    return upright
 
 
 def _roomier(model: Any, q: Array, linear: Array, mass_matrix: Array, axis: Array) -> Array:

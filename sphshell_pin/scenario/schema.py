@@ -125,6 +125,8 @@ class ShellSection(Section):
     scale: Literal["apply", "ignore"] | Positive | None = None
     primitive: Primitive | None = None
     chord_error: Positive | None = None
+    bodies: Annotated[list[str], Field(min_length=1)] | None = None
+    faces: Annotated[list[str | int], Field(min_length=1)] | None = None
     segments: Count | None = None
     magnify: Positive = 1.0
     side: Literal["both", "outside", "inside"] = "both"
@@ -139,8 +141,10 @@ class ShellSection(Section):
             raise ValueError("give either file or primitive, not both")
         if self.file is None and (self.unit is not None or self.scale is not None):
             raise ValueError("unit and scale belong to a file; a primitive's sizes are in metres")
-        if self.file is not None and (self.chord_error is not None or self.segments is not None):
-            raise ValueError("chord_error and segments belong to a primitive, not to a file")
+        if self.file is None and (self.bodies is not None or self.faces is not None):
+            raise ValueError("bodies and faces belong to a CAD file, not to a primitive")
+        if self.file is not None and self.segments is not None:
+            raise ValueError("segments belong to a primitive, not to a file")
         return self
 
 

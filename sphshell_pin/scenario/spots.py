@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +14,12 @@ Array = npt.NDArray[np.float64]
 
 # A way across a surface ends before a turn this sharp from one of its points to the next.
 _SHARPEST = np.cos(np.deg2rad(35.0))
+# Of a contact's normal with the surface's, where a face is touched and not an edge.
+_ALIGNED = 0.98
+# How far from the middle other spots are looked for, as parts of half the box.
+_PARTS = (0.15, 0.35, 0.6)
+# Points at the end of a way that are left out, so that it ends before a rim and not on it.
+_SPARE = 2
 # Directions in which a way across is tried when the asked one is too short.
 _DIRECTIONS = 8
 
@@ -28,18 +36,70 @@ class Spot:
     """Of the sphere (3,) [m], whose gap to the surface is the one asked for."""
 
 
-def find_spot(shell: Any, radius: float, gap: float, *, toward: Array | None = None) -> Spot:
+def find_spot(
+    shell: Any,
+    radius: float,
+    gap: float,
+    *,
+    toward: Array | None = None,
+    inside: bool = False,
+    beside: Array | None = None,
+) -> Spot:
     """Return a spot in the middle of `shell` where a sphere of `radius` [m] has the `gap` [m].
 
     `toward` (3,) is the side to touch from; by default the broad side, and for a closed surface its
-    upper one where sides are alike. An open surface is touched from its hollow side.
+    upper one where sides are alike. A sheet is touched from its hollow side. With `inside` the
+    surface is touched from its middle. `beside` (3,) [m] moves the spot away from the middle.
     """
+    middle = shell.box.mean(axis=0) + (0.0 if beside is None else beside)
     if toward is None and _is_sheet(shell):
-        point, normal = _hollow_side(shell)
+        point, normal = _hollow_side(shell, middle)
+        start = point + max(float(np.linalg.norm(middle - point)), 2 * radius) * normal
+        axis = normal
     else:
         axis = _broad_axis(shell.box) if toward is None else np.asarray(toward, dtype=float)
-        point, normal = _first_hit(shell, axis)
-    return _with_room(shell, point, normal, radius, gap)
+        start = middle if inside else _above(shell, axis, middle)
+    return come_down(shell, start, -axis, radius, gap)
+
+
+def spots_about(
+    shell: Any, radius: float, gap: float, *, toward: Array | None = None, inside: bool = False
+) -> Iterator[Spot]:
+    """Yield spots as `find_spot` finds them: in the middle, then farther and farther from it."""
+    yield find_spot(shell, radius, gap, toward=toward, inside=inside)
+    half = 0.5 * (shell.box[1] - shell.box[0])
+    for part in _PARTS:
+        for signs in itertools.product((0, 1, -1), repeat=3):
+            if any(signs):
+                aside = part * half * np.array(signs)
+                yield find_spot(shell, radius, gap, toward=toward, inside=inside, beside=aside)
+
+
+def touches_once(shell: Any, spot: Spot, points: Array, radius: float, depth: float) -> bool:
+    """Whether a sphere pressed in by `depth` [m] at `points` (k, 3) touches a face, and once.
+
+    In a groove it rests on several sides, each with a force of its own; on an edge the force turns
+    with the smallest step aside. `points` lead away from `spot`.
+    """
+    first = np.cross(spot.normal, np.eye(3)[int(np.argmin(np.abs(spot.normal)))])
+    first /= np.linalg.norm(first)
+    second = np.cross(spot.normal, first)
+    for aside in (0.1 * radius, 0.5 * radius):
+        near = shell.closest_points(spot.point + aside * np.array([first, -first, second, -second]))
+        # Where it turns or ends, there is an edge or a hole.
+        turns = np.abs(near.normals @ spot.normal) < _SHARPEST
+        if turns.any() or np.abs(near.distances).max() > 0.3 * aside:
+            return False
+    normal = spot.normal
+    at = shell.closest_points(points)
+    for point, turned in zip(at.points, at.normals, strict=True):
+        before, normal = normal, turned if turned @ normal >= 0 else -turned
+        if before @ normal < _SHARPEST:
+            return False
+        contacts = shell.contacts(point + (radius - depth) * normal, radius)
+        if len(contacts) != 1 or contacts.normal[0] @ normal < _ALIGNED:
+            return False
+    return True
 
 
 def way_across(shell: Any, spot: Spot, direction: Array, length: float, spacing: float) -> Array:
@@ -74,7 +134,7 @@ def way_across(shell: Any, spot: Spot, direction: Array, length: float, spacing:
 
 def _walk(shell: Any, spot: Spot, direction: Array, steps: int, spacing: float) -> Array:
     points, normal = [spot.point], spot.normal
-    for _ in range(steps):
+    for _ in range(steps + _SPARE):
         at = shell.closest_points((points[-1] + spacing * direction)[None])
         point, turned = at.points[0], at.normals[0]
         turned = turned if turned @ normal >= 0 else -turned
@@ -85,7 +145,7 @@ def _walk(shell: Any, spot: Spot, direction: Array, steps: int, spacing: float) 
         normal = turned
         ahead = moved - normal * (normal @ moved)
         direction = ahead / np.linalg.norm(ahead)
-    return np.array(points)
+    return np.array(points[: max(1, len(points) - _SPARE)])
 
 
 def _is_sheet(shell: Any) -> bool:
@@ -106,34 +166,28 @@ def _broad_axis(box: Array) -> Array:
     return axis
 
 
-def _first_hit(shell: Any, axis: Array) -> tuple[Array, Array]:
-    """Return point and normal where a ray towards the middle, against `axis`, meets the shell."""
-    middle = shell.box.mean(axis=0)
-    triangles = shell.vertices[shell.triangles]
-    a = triangles[:, 0]
-    edge_1, edge_2 = triangles[:, 1] - a, triangles[:, 2] - a
-    ray = -axis
+def _above(shell: Any, axis: Array, middle: Array) -> Array:
+    """Return a place far out along `axis`, above the middle or, over a hole, beside it."""
+    corners = shell.vertices[shell.triangles]
+    a = corners[:, 0]
+    edge_1, edge_2 = corners[:, 1] - a, corners[:, 2] - a
     # Moeller and Trumbore, Fast Minimum Storage Ray/Triangle Intersection, 1997.
-    p = np.cross(ray, edge_2)
+    p = np.cross(axis, edge_2)
     volume = np.einsum("ij,ij->i", edge_1, p)
+    s = middle - a
     with np.errstate(divide="ignore", invalid="ignore"):
-        s = middle - a
         u = np.einsum("ij,ij->i", s, p) / volume
-        q = np.cross(s, edge_1)
-        v = (q @ ray) / volume
-        t = np.einsum("ij,ij->i", edge_2, q) / volume
-        hit = np.isfinite(t) & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
-    if hit.any():
-        at = shell.closest_points((middle + float(t[hit].min()) * ray)[None])
-    else:
-        at = shell.closest_points((middle + shell.size * axis)[None])
-    point, normal = at.points[0], at.normals[0]
-    return point, normal if normal @ axis >= 0 else -normal
+        v = (np.cross(s, edge_1) @ axis) / volume
+        met = bool(((u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)).any())
+    far: Array = middle + 2 * shell.size * axis
+    if not met:
+        beside = shell.closest_points(far[None]).points[0]
+        far = beside + axis * (axis @ (far - beside))
+    return far
 
 
-def _hollow_side(shell: Any) -> tuple[Array, Array]:
-    """Return the point of an open surface nearest to its middle, and the normal towards that."""
-    middle = shell.box.mean(axis=0)
+def _hollow_side(shell: Any, middle: Array) -> tuple[Array, Array]:
+    """Return the point of an open surface nearest to its `middle`, and the normal towards that."""
     at = shell.closest_points(middle[None])
     point, normal = at.points[0], at.normals[0]
     inward = float((middle - point) @ normal)
@@ -143,15 +197,19 @@ def _hollow_side(shell: Any) -> tuple[Array, Array]:
     return point, normal if inward >= 0 else -normal
 
 
-def _with_room(shell: Any, point: Array, normal: Array, radius: float, gap: float) -> Spot:
-    """Return the spot with the sphere lifted until nothing but the nearest point is close."""
-    wanted = radius + gap
-    centre = point + wanted * normal
-    for _ in range(200):
+def come_down(shell: Any, start: Array, way: Array, radius: float, gap: float) -> Spot:
+    """Return the spot that a sphere of `radius` [m] at `start` reaches along `way`, unit (3,).
+
+    No step is longer than what is free, so nothing is passed through.
+    """
+    wanted, centre = radius + gap, start
+    farthest = 2 * float(np.linalg.norm(start - shell.box.mean(axis=0))) + 2 * shell.size
+    for _ in range(500):
         at = shell.closest_points(centre[None])
-        missing = wanted - float(np.linalg.norm(centre - at.points[0]))
-        if missing <= 1e-3 * gap:
+        free = float(np.linalg.norm(centre - at.points[0])) - wanted
+        # Beside the surface it goes past.
+        if abs(free) <= 1e-3 * gap or float(way @ (centre - start)) > farthest:
             break
-        centre = centre + max(missing, 1e-3 * gap) * normal
+        centre = centre + free * way
     away = centre - at.points[0]
     return Spot(at.points[0], away / np.linalg.norm(away), centre)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sphshell_pin.errors import FrameNotFound, SphshellError
+from sphshell_pin.dynamics.models import find_frame
+from sphshell_pin.errors import SphshellError
 
 Array = npt.NDArray[np.float64]
 
@@ -44,9 +45,7 @@ def find_tips(
     """
     known = _known(robot, shipped)
     if frame is not None:
-        names = [one.name for one in robot.model.frames]
-        if frame not in names:
-            raise FrameNotFound(frame, names)
+        find_frame(robot.model, frame)
         found = [one for one in known if one.frame == frame]
         return [_sized(found[0] if found else Tip(frame, 0.0, np.zeros(3), ""), radius)]
     if known:
@@ -57,7 +56,7 @@ def find_tips(
 
 def floats(model: Any) -> bool:
     """Whether the root of the robot is free to move in space."""
-    return model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
+    return bool(model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer")
 
 
 def _known(robot: Any, shipped: str | None) -> list[Tip]:
@@ -66,7 +65,12 @@ def _known(robot: Any, shipped: str | None) -> list[Tip]:
         spheres, said = robots.fingertips(shipped), "a fingertip this package knows of"
     else:
         spheres, said = robots.end_spheres(robot), "the sphere of its collision geometry"
-    return [Tip(one.frame, one.radius, np.array(one.offset), said) for one in spheres]
+    model = robot.model
+    return [
+        Tip(one.frame, one.radius, np.array(one.offset), said)
+        for one in spheres
+        if int(model.frames[find_frame(model, one.frame)].parentJoint) > 0
+    ]
 
 
 def _sized(tip: Tip, radius: float | None) -> Tip:

@@ -117,3 +117,21 @@ def test_a_fault_of_the_users_own_function_ends_the_run_until_it_is_reset(tmp_pa
     live.reset()
     assert live.time == 0.0
     assert live.ended is None
+
+
+@pytest.mark.robots
+def test_another_path_speed_goes_on_from_where_the_tip_is() -> None:
+    """The target neither jumps nor turns back: the tip slides on, at the new speed."""
+    pytest.importorskip("example_robot_data", reason="needs the example-robot-data loaders")
+    live = LiveRun(build("fingertip_on_blade"))
+    live.advance(2.0)
+    before = live.contacts.point_world[0].copy()
+    live.change("controller.speed", 0.02)
+    assert live.time == pytest.approx(2.0, abs=1e-3)
+    live.advance(0.2)  # the change of speed has passed
+    first = live.contacts.point_world[0].copy()
+    assert np.linalg.norm(first - before) < 0.06 * 0.2
+    live.advance(0.5)
+    way = np.linalg.norm(live.contacts.point_world[0] - first)
+    assert way == pytest.approx(0.02 * 0.5, rel=0.15)  # as the crow flies
+    assert live.contacts.normal_force[0] == pytest.approx(5.0, rel=0.2)

@@ -1,0 +1,127 @@
+"""The command that writes a new scenario."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sphshell_pin.cli.app import app, faults, terminal
+
+if TYPE_CHECKING:
+    from sphshell_pin.scenario.new import NewScenario
+
+
+@app.command()
+def new(
+    context: typer.Context,
+    robot: Annotated[str, typer.Option(help="A shipped robot (sphshell-pin list), or a URDF.")],
+    surface: Annotated[
+        str,
+        typer.Option(help="A surface file, or one of: plane, box, sphere, cylinder, bowl."),
+    ] = "plane",
+    frame: Annotated[
+        str | None,
+        typer.Option(help="Frame that carries the sphere; by default a known tip or the only end."),
+    ] = None,
+    radius: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
+    ] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="Length unit of the surface file: mm, cm, m, inch, ...")
+    ] = None,
+    law: Annotated[
+        str | None,
+        typer.Option(
+            help="Material of the sphere: steel, aluminium, plastic, wood, rubber, silicone."
+        ),
+    ] = None,
+    against: Annotated[str, typer.Option(help="Material of the surface.")] = "steel",
+    press: Annotated[float | None, typer.Option(metavar="N", help="Normal force \\[N].")] = None,
+    place: Annotated[
+        str | None,
+        typer.Option(help="Where the surface is, seen from the tip: below, above, +x, -x, +y, -y."),
+    ] = None,
+    free_flyer: Annotated[
+        bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
+    ] = False,
+    package_dir: Annotated[
+        list[Path] | None,
+        typer.Option(help="Folder above the packages of the URDF's meshes; may be repeated."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The file to write; default: ROBOT_on_SURFACE.toml.")
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace the file if it is there already.")
+    ] = False,
+) -> None:
+    """Write a scenario: this robot, this surface, and values that work for their size.
+
+    Example: sphshell-pin new --robot panda --surface blade.stl --unit mm
+    """
+    with faults(context):
+        from sphshell_pin.errors import SphshellError, UnitMissing
+        from sphshell_pin.scenario.new import new_scenario
+
+        try:
+            made = new_scenario(
+                robot,
+                surface,
+                frame=frame,
+                radius=_length(radius),
+                unit=unit,
+                material=law,
+                against=against,
+                press=press,
+                place=place,
+                free_flyer=free_flyer,
+                package_dirs=package_dir or (),
+                out=out,
+                force=force,
+            )
+        except UnitMissing as error:
+            raise SphshellError(f"the unit {error.must('--unit {}')}") from error
+        _show(made)
+
+
+def _length(text: str | None) -> float | None:
+    """Return a length [m] written as a number, or as a number with its unit."""
+    if text is None:
+        return None
+    from sphshell_pin.errors import InvalidParameter
+    from sphshell_pin.units import metres_per_unit
+
+    found = re.fullmatch(r"\s*([0-9.+eE-]*[0-9.])\s*([a-zA-Zµ]*)\s*", text)
+    try:
+        number = float(found[1] if found else text)
+    except ValueError:
+        raise InvalidParameter("--radius", text, "must be a length: 0.012 (metres), 12mm") from None
+    return number * (metres_per_unit(found[2]) if found and found[2] else 1.0)
+
+
+def _show(made: NewScenario) -> None:
+    console = terminal()
+
+    def tell(text: str) -> None:
+        console.print(text, markup=False, highlight=False)
+
+    for section in made.built.scenario.shell:
+        if section.file is not None:
+            tell(f"{made.built.shells[section.name].health}\n")
+    tell(f"{made.explanation}\n")
+    tell("Chosen:")
+    for one in made.why:
+        tell(f"  {one}")
+    tell(f"\nWritten: {made.path}")
+    tell("Next:")
+    for command in ("run", "view"):
+        tell(f"  sphshell-pin {command} {_quoted(made.path)}")
+
+
+def _quoted(path: Path) -> str:
+    import shlex
+
+    return shlex.quote(str(path))

@@ -1,0 +1,111 @@
+"""What a browser may say: one JSON object a message, checked before anybody acts on it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+from sphshell_pin.errors import SphshellError
+
+LARGEST_MESSAGE = 16_384  # bytes
+LONGEST_TEXT = 200
+LARGEST_NUMBER = 1e12
+
+Event = dict[str, Any]
+
+
+class BadMessage(SphshellError, ValueError):
+    """A message that is no event; its text goes back to the browser that sent it."""
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise BadMessage("must be a number")
+    if not abs(value) <= LARGEST_NUMBER:
+        raise BadMessage(f"must be a number of at most {LARGEST_NUMBER:g} in size")
+    return float(value)
+
+
+def _not_negative(value: Any) -> float:
+    number = _number(value)
+    if number < 0.0:
+        raise BadMessage("must not be negative")
+    return number
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str) or len(value) > LONGEST_TEXT:
+        raise BadMessage(f"must be a text of at most {LONGEST_TEXT} characters")
+    return value
+
+
+def _switch(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise BadMessage("must be true or false")
+    return value
+
+
+def _direction(value: Any) -> list[float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise BadMessage("must be a list of three numbers")
+    numbers = [_number(one) for one in value]
+    length = math.hypot(*numbers)
+    if not length > 1e-9:
+        raise BadMessage("must have a length")
+    return [one / length for one in numbers]
+
+
+_Fields = dict[str, Callable[[Any], Any]]
+FIELDS: dict[str, _Fields] = {
+    "run": {"on": _switch},
+    "step": {"seconds": _not_negative},
+    "reset": {},
+    "speed": {"value": _not_negative},
+    "knob": {"key": _text, "value": _number},
+    "push": {
+        "body": _text,
+        "direction": _direction,
+        "newtons": _number,
+        "seconds": _not_negative,
+    },
+    "hold": {"body": _text, "direction": _direction, "newtons": _number},
+    "release": {},
+    "show": {"part": _text, "on": _switch},
+    "arrows": {"value": _not_negative},
+    "look": {},
+    "seek": {"t": _number},
+    "seen": {"frame": _number},
+}
+"""What each kind of event must say, and the check of each value."""
+
+
+def read_event(message: str | bytes) -> Event:
+    """Return the event that `message` is: {"type": kind, field: value, ...}.
+
+    Raises BadMessage, whose text says in one sentence what is wrong.
+    """
+    if not isinstance(message, str):
+        raise BadMessage("a message must be text, not bytes")
+    if len(message) > LARGEST_MESSAGE:
+        raise BadMessage(f"a message must not be longer than {LARGEST_MESSAGE} characters")
+    try:
+        data = json.loads(message)
+    except (ValueError, RecursionError):
+        raise BadMessage("a message must be JSON") from None
+    if not isinstance(data, dict):
+        raise BadMessage("a message must be a JSON object")
+    kind = data.get("type")
+    fields = FIELDS.get(kind) if isinstance(kind, str) else None
+    if fields is None:
+        raise BadMessage(f"type must be one of {', '.join(FIELDS)}")
+    event: Event = {"type": kind}
+    for name, check in fields.items():
+        if name not in data:
+            raise BadMessage(f"'{kind}' needs '{name}'")
+        try:
+            event[name] = check(data[name])
+        except BadMessage as fault:
+            raise BadMessage(f"'{name}' of '{kind}' {fault}") from None
+    return event

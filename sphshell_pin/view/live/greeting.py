@@ -1,0 +1,43 @@
+"""What a browser is told first: what there is to see, to turn and to push."""
+
+from __future__ import annotations
+
+import secrets
+from typing import TYPE_CHECKING
+
+from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR
+from sphshell_pin.view.live.picture import CONE_COLOR
+from sphshell_pin.view.nodes import Json
+
+if TYPE_CHECKING:
+    from sphshell_pin.view.live.player import Player
+
+SLOWEST, FASTEST = 0.01, 10.0  # speeds that the page offers
+STRIP_SECONDS = 6.0  # of the clock on the wall, that the strip shows at the speed of now
+
+_KNOB = ("key", "label", "unit", "low", "high", "log", "value")
+_COLORS = {"normal": NORMAL_COLOR, "friction": FRICTION_COLOR, "cone": CONE_COLOR}
+
+
+def greeting(player: Player, picture: str | None) -> Json:
+    """Return what does not change while `player` runs; `picture` is the page of the scene, if any.
+
+    Its "session" tells one run from the next on the same port.
+    """
+    return {
+        "session": secrets.token_hex(8),
+        "title": player.title,
+        "pairs": [pair.name for pair in player.scene.pairs],
+        "bodies": list(player.bodies),
+        "knobs": [
+            {name: getattr(knob, name) for name in _KNOB}
+            | {"restart": bool(getattr(knob, "restart", False))}
+            for knob in player.knobs
+        ],
+        "start": player.start,
+        "duration": player.duration,
+        "speeds": [SLOWEST, FASTEST],
+        "window": STRIP_SECONDS,
+        "picture": picture,
+        "colors": {name: f"#{color:06x}" for name, color in _COLORS.items()},
+    }

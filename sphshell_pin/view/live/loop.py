@@ -1,0 +1,392 @@
+"""The loop that keeps a scene moving in real time while browsers look at it and play with it."""
+
+from __future__ import annotations
+
+import atexit
+import math
+import threading
+import time
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sphshell_pin.checks import check_positive
+from sphshell_pin.errors import NameNotFound, SphshellError
+from sphshell_pin.view.live.events import BadMessage, Event
+from sphshell_pin.view.live.foreign import ForeignWindow, window_of
+from sphshell_pin.view.live.greeting import FASTEST, SLOWEST, STRIP_SECONDS, greeting
+from sphshell_pin.view.live.panel import Panel, Strip, list_contacts, rows_now
+from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown, frame_point
+from sphshell_pin.view.live.server import Server
+from sphshell_pin.view.live.window import LiveWindow
+from sphshell_pin.view.nodes import Json, require_meshcat
+
+if TYPE_CHECKING:
+    from sphshell_pin.view.live.player import Player
+
+FPS = 60.0
+PANEL_PERIOD = 0.05  # [s] between two states of the panel
+# Seconds of computing that a frame may take: what leaves 30 frames a second. Slower physics
+# lowers the real-time factor instead.
+BUDGET = 0.026
+STRIP_POINTS = 600
+LONGEST_STEP = 10.0  # simulated seconds of a single step
+RATE_WINDOW = 1.0  # [s] over which the real-time factor is measured
+
+
+class Live:
+    """A live page of `player`, served at `url` until `stop`.
+
+    `start` plays it in a thread of its own and returns; `run` plays it in the caller's until
+    `stop` or Ctrl-C. `visualizer` is an existing meshcat.Visualizer or pinocchio
+    MeshcatVisualizer: the scene is then drawn there, and the page shows its own controls round a
+    frame with that picture. `speed` is simulated seconds per second,
+    from 0.01 to 10. Not `running`, it waits for
+    the button; with `wait`, for the first browser.
+
+    Raises MissingExtra without meshcat, SphshellError where the port is taken, InvalidParameter
+    for a `speed` or a `visualizer` that is none.
+    """
+
+    def __init__(
+        self,
+        player: Player,
+        visualizer: Any = None,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        speed: float = 1.0,
+        running: bool = True,
+        wait: bool = False,
+    ) -> None:
+        meshcat = require_meshcat()
+        self.player = player
+        self.speed = min(max(check_positive("speed", speed), SLOWEST), FASTEST)
+        self.running = running
+        self.fault: Exception | None = None
+        """What stopped the run, where that was no end of its own."""
+        self._waiting = wait
+        self._window = LiveWindow()
+        self._foreign: ForeignWindow | None = None
+        if visualizer is not None:
+            self._foreign = ForeignWindow(window_of(visualizer))
+        self._panel = Panel()
+        self._strip = Strip()
+        self._strip_rows: list[Any] = []
+        self._clear_strip = True
+        self._factor = 1.0
+        self._pace: deque[tuple[float, float]] = deque()
+        self._holds: dict[object, Event] = {}
+        self._pushed: tuple[str, Any, float] | None = None
+        self._changed = True
+        self._knob_values = self._read_knobs()
+        self._next_panel = 0.0
+        self._simulated = 0.0
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+        # First of all the port: a picture takes time.
+        self.server = Server(self, host, port)
+        try:
+            canvas = meshcat.Visualizer(window=self._foreign or self._window)
+            self.picture = Picture(player, canvas)
+            url = None if self._foreign is None else self._foreign.url
+            self._panel.greet(greeting(player, url))
+            self.draw()
+        except BaseException:
+            self.server.stop()
+            raise
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return self.server.url
+
+    @property
+    def _spacing(self) -> float:
+        """Simulated time between two points of the strip [s]."""
+        return self.speed * STRIP_SECONDS / STRIP_POINTS
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated seconds per second, over the last second; 0 while it stands still."""
+        if len(self._pace) < 2:
+            return 0.0
+        (start, before), (end, now) = self._pace[0], self._pace[-1]
+        return (now - before) / (end - start) if end > start else 0.0
+
+    def start(self) -> Live:
+        """Play in a thread of its own, and return at once."""
+        if self._thread is None:
+            # A thread must not be inside the compiled loop when the interpreter goes down.
+            atexit.register(self.stop)
+            self._thread = threading.Thread(target=self._play, daemon=True, name="live-run")
+            self._thread.start()
+        return self
+
+    def stop(self) -> None:
+        """End the run and its page."""
+        atexit.unregister(self.stop)
+        self._stop.set()
+        self.server.arrived.set()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(5.0)
+        self.server.stop()
+
+    def run(self) -> None:
+        """Play here until `stop`, or until Ctrl-C, which ends it cleanly."""
+        try:
+            self._play()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self.stop()
+
+    def _repr_html_(self) -> str:
+        """Show the page in a notebook's cell."""
+        return f'<iframe src="{self.url}" style="width: 100%; height: 720px; border: 0"></iframe>'
+
+    def __enter__(self) -> Live:
+        return self.start()
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    # Frames
+
+    def _play(self) -> None:
+        due = last = time.perf_counter()
+        while not self._stop.is_set():
+            now = time.perf_counter()
+            self.frame(now - last)
+            last = now
+            due = max(due + 1.0 / FPS, time.perf_counter() - 1.0 / FPS)
+            idle = not self.running or self._waiting
+            # Standing still it only wakes for events, or to keep a late browser up to date.
+            left = (0.25 if idle and not self._changed else 0.0) + due - time.perf_counter()
+            if left > 0.0 and idle:
+                self.server.arrived.wait(left)
+            elif left > 0.0:
+                time.sleep(left)
+
+    def frame(self, wall: float) -> None:
+        """Handle what browsers said, go on by `wall` [s] at the speed chosen, and draw."""
+        watched = self.server.watched
+        for client, event in _newest(self.server.events()):
+            try:
+                self._handle(client, event)
+            except BadMessage as fault:
+                self.server.tell(client, str(fault))
+            except SphshellError as fault:
+                self.server.tell(client, str(fault))
+            except Exception as fault:
+                # Whatever a browser asks for, the run goes on.
+                self.server.tell(client, f"{type(fault).__name__}: {fault}")
+            self._changed = True
+            self._knob_values = self._read_knobs()
+        if self._waiting and watched:
+            self._waiting = False
+            wall = 0.0
+        if self.running and not self._waiting:
+            self._advance(self.speed * min(wall, 2.0 * BUDGET), BUDGET)
+        else:
+            self._pace.clear()
+        if watched or self._foreign is not None:
+            self.draw()
+
+    def draw(self) -> None:
+        """Bring the scene up to date for all browsers, and now and then the panel."""
+        now = time.perf_counter()
+        if self._changed and (self._foreign is None or self._foreign.due(now)):
+            self._changed = False
+            self.picture.update(self.player, self._push_shown())
+            self._window.commit()
+        if now >= self._next_panel:
+            self._next_panel = now + PANEL_PERIOD
+            self._panel.publish(self._state(), self._strip_rows, clear=self._clear_strip)
+            self._strip_rows, self._clear_strip = [], False
+        self.server.wake()
+
+    def scene_news(self, since: int) -> tuple[int, bytes | None]:
+        """Answer the server: what changed in the scene after frame `since`."""
+        return self._window.news(since)
+
+    def panel_news(self, since: int) -> tuple[int, list[str]]:
+        """Answer the server: what the panel says that is newer than `since`."""
+        return self._panel.news(since)
+
+    def _advance(self, duration: float, wall: float) -> None:
+        player = self.player
+        for event in self._holds.values():
+            self._push(event, 1.5 * duration)
+        before = player.time
+        try:
+            rows = player.advance(duration, wall)
+        except Exception as fault:
+            self.fault = fault
+            self.running = False
+            self._changed = True
+            return
+        self._changed = self._changed or duration > 0.0
+        if not len(rows.t) and player.time > before:
+            # In slow motion a frame is shorter than the time between two recorded rows.
+            rows = rows_now(player)
+        self._strip_rows += self._strip.add(rows, self._spacing)
+        self._strip_rows = self._strip_rows[-2 * STRIP_POINTS :]
+        self._simulated += player.time - before
+        now = time.perf_counter()
+        self._pace.append((now, self._simulated))
+        while self._pace[0][0] < now - RATE_WINDOW:
+            self._pace.popleft()
+        if player.ended is not None:
+            self.running = False
+
+    # Events
+
+    def _handle(self, client: object, event: Event) -> None:
+        player = self.player
+        match event["type"]:
+            case "run":
+                self._run(event["on"])
+            case "step":
+                self.running = False
+                self._waiting = False
+                self._check_can_go_on()
+                self._advance(min(event["seconds"], LONGEST_STEP), 20 * BUDGET)
+            case "reset":
+                self._reset()
+            case "speed":
+                self.speed = min(max(event["value"], SLOWEST), FASTEST)
+                self._pace.clear()
+            case "knob":
+                if event["key"] not in {knob.key for knob in player.knobs}:
+                    raise NameNotFound(
+                        "knob", event["key"], "this run", [knob.key for knob in player.knobs]
+                    )
+                before = player.time
+                player.change(event["key"], event["value"])
+                if player.time < before:  # it started anew
+                    self._start_strip()
+                    self.picture.clear()
+            case "push":
+                self._push(event, event["seconds"])
+            case "hold":
+                self._check_body(event["body"])
+                self._holds[client] = event
+            case "release":
+                self._holds.pop(client, None)
+            case "show":
+                if event["part"] not in LIVE_PARTS:
+                    raise NameNotFound("part", event["part"], "the picture", LIVE_PARTS)
+                self.picture.show(event["part"], event["on"])
+            case "arrows":
+                self.picture.magnify_arrows(min(max(event["value"], 1e-2), 1e2))
+            case "look":
+                self.picture.look()
+            case "seek":
+                self._seek(event["t"])
+
+    def _run(self, on: bool) -> None:
+        self._waiting = False
+        if on and self.player.ended is not None and self.player.duration is not None:
+            self._reset()
+        if on:
+            self._check_can_go_on()
+        self.running = on
+
+    def _check_can_go_on(self) -> None:
+        if self.fault is not None or self.player.ended is not None:
+            raise BadMessage(f"{self._why_ended()} Reset to start again.")
+
+    def _why_ended(self) -> str | None:
+        if self.fault is None:
+            return self.player.ended
+        known = isinstance(self.fault, SphshellError)
+        return str(self.fault) if known else f"{type(self.fault).__name__}: {self.fault}"
+
+    def _reset(self) -> None:
+        self.player.reset()
+        self.fault = None
+        self._pushed = None
+        self._start_strip()
+        self.picture.clear()
+
+    def _seek(self, t: float) -> None:
+        if self.player.duration is None:
+            raise BadMessage("only a finished run has a time to go to")
+        back = t < self.player.time
+        self._start_strip()
+        # Up to there from a little earlier, for the strip: nothing is computed anew.
+        span = STRIP_SECONDS * self.speed
+        self.player.seek(t - span)
+        rows = self.player.advance(max(0.0, t - self.player.time), BUDGET)
+        self._strip_rows = self._strip.add(rows, self._spacing)
+        self.player.seek(t)
+        if back:
+            self.picture.clear()
+
+    def _start_strip(self) -> None:
+        self._strip.clear()
+        self._strip_rows, self._clear_strip = [], True
+        self._pace.clear()
+
+    def _check_body(self, body: str) -> None:
+        if body not in self.player.bodies:
+            raise NameNotFound("body to push", body, "this run", self.player.bodies)
+
+    def _push(self, event: Event, seconds: float) -> None:
+        self._check_body(event["body"])
+        force = event["newtons"] * np.array(event["direction"])
+        self.player.push(event["body"], force, seconds)
+        if force.any():
+            self._pushed = event["body"], force, self.player.time + seconds
+
+    def _push_shown(self) -> PushShown | None:
+        if self._pushed is None or self.player.time > self._pushed[2]:
+            self._pushed = None
+            return None
+        body, force, _ = self._pushed
+        display = self.picture.display
+        point = frame_point(display.scene.model, display.data, body)
+        return None if point is None else PushShown.at(point, force)
+
+    # What the panel says
+
+    def _read_knobs(self) -> dict[str, float]:
+        return {knob.key: knob.value for knob in self.player.knobs}
+
+    def _state(self) -> Json:
+        player, contacts = self.player, self.player.contacts
+        listed = list_contacts(contacts, player.scene.pairs)
+        exchanged = player.exchanged
+        residual = player.residual
+        return {
+            "t": player.time,
+            "running": self.running and not self._waiting,
+            "speed": self.speed,
+            "factor": self.real_time_factor,
+            "contacts": listed,
+            "more": len(contacts) - len(listed),
+            "residual": residual,
+            "relative": abs(residual) / exchanged if exchanged > 0.0 else math.nan,
+            "exchanged": exchanged,
+            "ended": self._why_ended(),
+            "knobs": self._knob_values,
+            "show": self.picture.shown,
+            "arrows": self.picture.magnification,
+            "scale": str(self.picture.arrow_scale),
+        }
+
+
+def _newest(events: list[tuple[object, Event]]) -> list[tuple[object, Event]]:
+    """Keep of a slider's many values only the last, where the last one came."""
+    kept: list[tuple[object, Event]] = []
+    seen: set[tuple[Any, ...]] = set()
+    for client, event in reversed(events):
+        if event["type"] in ("knob", "speed", "arrows", "seek"):
+            key = (event["type"], event.get("key"))
+            if key in seen:
+                continue
+            seen.add(key)
+        kept.append((client, event))
+    return kept[::-1]

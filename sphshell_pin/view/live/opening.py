@@ -1,0 +1,134 @@
+"""From whatever there is to see to a live page: scenarios, built ones, results, players."""
+
+from __future__ import annotations
+
+import os
+import sys
+import webbrowser
+from collections.abc import Callable, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sphshell_pin.errors import InvalidParameter, SphshellError
+from sphshell_pin.view.live.greeting import FASTEST, SLOWEST
+from sphshell_pin.view.live.loop import Live
+
+if TYPE_CHECKING:
+    from sphshell_pin.view.live.player import Player
+
+RESULT = "run.npz"
+
+
+def preview(
+    what: Any,
+    visualizer: Any = None,
+    *,
+    changes: Mapping[str, str] | None = None,
+    scenario: str | PathLike[str] | None = None,
+    speed: float = 1.0,
+    paused: bool = False,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    open: bool = True,
+    told: Callable[[str], object] = print,
+) -> None:
+    """Show `what` in a live page until Ctrl-C.
+
+    Parameters
+    ----------
+    what
+        A scenario (name, path, or built), a finished run (Result, its file or results folder), or
+        any Player.
+    visualizer
+        An existing meshcat.Visualizer or pinocchio MeshcatVisualizer to draw in, else the page's
+        own.
+    changes
+        Values of a scenario by dotted key.
+    scenario
+        The scenario that a finished run is shown in, where it does not know its own.
+    speed
+        Simulated seconds per second, 0.01 to 10.
+    paused
+        Wait for the button; else the run starts when the first browser is there.
+    host, port
+        Where the page is served; port 0 takes any that is free.
+    open
+        Open the page in the web browser, where there is a screen.
+    told
+        Called with the page's address.
+
+    Raises
+    ------
+    SphshellError
+        `what` cannot be built or read, or the port is taken.
+    """
+    if not SLOWEST <= speed <= FASTEST:
+        raise InvalidParameter("speed", speed, f"must be from {SLOWEST:g} to {FASTEST:g}")
+    live = Live(
+        player_of(what, changes=changes, scenario=scenario),
+        visualizer,
+        host=host,
+        port=port,
+        speed=speed,
+        running=not paused,
+        wait=True,
+    )
+    told(live.url)
+    if open:
+        open_browser(live.url)
+    live.run()
+
+
+def player_of(
+    what: Any,
+    *,
+    changes: Mapping[str, str] | None = None,
+    scenario: str | PathLike[str] | None = None,
+) -> Player:
+    """Return the player of `what`; see `preview`."""
+    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.scenario import Built, build
+    from sphshell_pin.scenario.live import LiveRun
+    from sphshell_pin.scenario.replay import Replay
+
+    if isinstance(what, str | PathLike):
+        finished = result_file(what)
+        if finished is None:
+            if scenario is not None:
+                raise SphshellError(f"{what} is a scenario itself: only a finished run needs one")
+            return LiveRun(build(what, changes))
+        if changes:
+            key = next(iter(changes))
+            raise InvalidParameter(key, changes[key], "cannot be changed: this is a finished run")
+        return Replay(finished, scenario)
+    if isinstance(what, Built):
+        return LiveRun(what)
+    if isinstance(what, Result):
+        return Replay(what, scenario)
+    if callable(getattr(what, "advance", None)):
+        player: Player = what
+        return player
+    raise InvalidParameter(
+        "what", type(what).__name__, "must be a scenario, a finished run, or a player"
+    )
+
+
+def result_file(what: str | PathLike[str]) -> Path | None:
+    """Return the file of the finished run that `what` names; None if it names a scenario."""
+    path = Path(what)
+    if path.suffix == ".npz":
+        return path
+    return path / RESULT if (path / RESULT).is_file() else None
+
+
+def open_browser(url: str) -> None:
+    """Open `url` in the web browser, unless there is no screen to show it on."""
+    on_a_screen = sys.platform in ("darwin", "win32") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+    if on_a_screen:
+        try:
+            webbrowser.open(url)
+        except webbrowser.Error:
+            return

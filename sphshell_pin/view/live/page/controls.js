@@ -1,0 +1,119 @@
+// Sliders, numbers, and how they are written.
+"use strict";
+
+export const element = (id) => document.getElementById(id);
+const STEPS = 1000;
+const REST = 500; // [ms] after the last touch: until then a control does not follow the others
+
+// Four digits; very large and very small numbers in powers of ten.
+export function number(value, digits = 4) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "-";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e5 || size < 1e-3) {
+    return value.toExponential(digits - 1).replace(/\.?0+e/, "e").replace("e+", "e");
+  }
+  return String(Number(value.toPrecision(digits)));
+}
+
+// "N/m^1.5" with its exponent raised.
+export function write_unit(node, unit) {
+  node.textContent = "";
+  unit.split(/\^(-?[\d.]+)/).forEach((piece, index) => {
+    const part = index % 2 ? document.createElement("sup") : document.createTextNode(piece);
+    if (index % 2) part.textContent = piece;
+    node.append(part);
+  });
+}
+
+// A slider from low to high, with an optional field to type the number in.
+export class Slider {
+  constructor(range, { low, high, log, value, field = null, output = null, tell = null }, changed) {
+    Object.assign(this, { range, low, high, log, field, output, changed });
+    this.tell = tell || ((number_) => number(number_));
+    this.touched = 0;
+    range.addEventListener("input", () => {
+      this.touched = performance.now();
+      this.value = this.from(Number(range.value) / STEPS);
+      this.write();
+      changed(this.value);
+    });
+    if (field) {
+      field.addEventListener("change", () => {
+        const typed = Number(field.value.trim().replace(",", "."));
+        field.blur();
+        if (!Number.isFinite(typed) || field.value.trim() === "") { this.write(); return; }
+        this.touched = performance.now();
+        this.value = typed;
+        this.place();
+        this.write();
+        changed(typed);
+      });
+      field.addEventListener("keydown", (event) => {
+        if (event.key === "Escape") { this.write(); field.blur(); }
+      });
+    }
+    this.set(value);
+  }
+
+  from(share) {
+    if (!this.log) return Number((this.low + share * (this.high - this.low)).toPrecision(4));
+    return Number((this.low * (this.high / this.low) ** share).toPrecision(3));
+  }
+
+  place() {
+    const share = this.log
+      ? Math.log(Math.max(this.value, this.low) / this.low) / Math.log(this.high / this.low)
+      : (this.value - this.low) / (this.high - this.low);
+    this.range.value = Math.round(STEPS * Math.min(1, Math.max(0, share)));
+  }
+
+  write() {
+    if (this.field) this.field.value = this.tell(this.value);
+    if (this.output) this.output.textContent = this.tell(this.value);
+  }
+
+  set(value) {
+    this.value = value;
+    this.place();
+    this.write();
+  }
+
+  // What another browser did, unless this one is being moved just now.
+  follow(value) {
+    const busy = performance.now() - this.touched < REST || document.activeElement === this.field;
+    if (!busy && value !== null && value !== this.value) this.set(value);
+  }
+}
+
+// One knob: label, number with unit, slider.
+export function make_knob(knob, changed) {
+  const row = document.createElement("div");
+  row.className = "row";
+  const label = document.createElement("label");
+  label.textContent = knob.label;
+  label.title = knob.key;
+  if (knob.restart) {
+    const mark = document.createElement("span");
+    mark.className = "restart";
+    mark.textContent = "restarts";
+    mark.title = "A new value holds in a run that starts anew";
+    label.append(mark);
+  }
+  const entry = document.createElement("span");
+  entry.className = "entry";
+  const field = document.createElement("input");
+  field.type = "text";
+  field.inputMode = "decimal";
+  field.setAttribute("aria-label", knob.label);
+  const unit = document.createElement("i");
+  write_unit(unit, knob.unit);
+  entry.append(field, unit);
+  const range = document.createElement("input");
+  Object.assign(range, { type: "range", min: 0, max: STEPS, step: 1 });
+  range.id = `knob-${knob.key}`;
+  range.dataset.knob = knob.key;
+  label.htmlFor = range.id;
+  row.append(label, entry, range);
+  return { row, slider: new Slider(range, { ...knob, field }, changed) };
+}

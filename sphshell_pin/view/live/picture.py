@@ -1,0 +1,280 @@
+"""The scene of the live page: a Display, and what only makes sense while things move."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, get_args
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.view.arrows import ArrowPool, ArrowScale
+from sphshell_pin.view.camera import View, look, set_surroundings
+from sphshell_pin.view.display import Display, Part, choose_view
+from sphshell_pin.view.nodes import (
+    HIDDEN_SCALE,
+    FloatArray,
+    Move,
+    material,
+    mover,
+    pose,
+    rod,
+    rotation_to,
+    set_object,
+    show,
+)
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.scene import Scene, SceneContacts
+    from sphshell_pin.view.live.player import Player
+
+POOL = 16
+CONE_COLOR = 0x1F8A8A
+# More of the robot than in a recording: here one looks round before one looks closely.
+FAR = 18.0
+# Frames with contact from which the scale of the arrows is taken.
+FRAMES_TO_SCALE = 45
+# A trail is drawn in pieces of so many points; the oldest piece makes room for the newest.
+POINTS_OF_PIECE, PIECES = 48, 60
+
+LIVE_PARTS: tuple[str, ...] = (*get_args(Part), "cones")
+SHOWN_AT_FIRST = frozenset({"robot", "spheres", "arrows", "points", "wireframe", "trails"})
+
+
+class Picture:
+    """Draws the state of `player` below `visualizer` again and again."""
+
+    def __init__(self, player: Player, visualizer: Any) -> None:
+        scene, q = player.scene, player.q
+        touched = player.contacts
+        view = choose_view(
+            scene, q[None, :], touched.point_world, touched.normal_world, player.visual_model, FAR
+        )
+        # Down a little, from below the figures that lie over the top of the scene.
+        lift = np.array([0.0, 0.0, 0.05 * view.distance])
+        view = View(view.eye + lift, view.target + lift)
+        self.display = Display(scene, player.visual_model, visualizer, view=view, pool=_pool(scene))
+        self.view: View = view
+        self.shown = {part: part in SHOWN_AT_FIRST for part in LIVE_PARTS}
+        self._pairs = scene.pairs
+        self._scale = _Scale(scene, view)
+        self._cones = ConePool(visualizer["cones"], _pool(scene))
+        show(visualizer["cones"], False)
+        self._trails = _Trails(self.display)
+        width = 0.0026 * view.distance
+        self._push = ArrowPool(visualizer["push"], 1, width, "total")
+
+    @property
+    def arrow_scale(self) -> ArrowScale:
+        """What the length of an arrow means now."""
+        return self.display.arrow_scale
+
+    def update(self, player: Player, push: PushShown | None) -> None:
+        """Show the state of `player`, and a `push` on a body."""
+        if player.scene.pairs is not self._pairs:
+            self._pairs = player.scene.pairs
+            self.display.replace_scene(player.scene, player.visual_model)
+            self._trails.clear()
+        if not np.isfinite(player.q).all():
+            return  # of a run that diverged the last sound state stays
+        contacts = player.contacts
+        scale = self._scale.update(contacts)
+        self.display.arrow_scale = scale
+        self.display.update(player.q, contacts)
+        if self.shown["cones"]:
+            self._cones.update(contacts, self._pairs, scale)
+        if self.shown["trails"]:
+            self._trails.add(contacts)
+        self._push.update(push, scale)
+
+    def show(self, part: str, on: bool) -> None:
+        """Show or hide one of LIVE_PARTS."""
+        self.shown[part] = on
+        if part == "cones":
+            show(self.display.visualizer["cones"], on)
+        else:
+            self.display.show(part, on)  # type: ignore[arg-type]
+
+    def look(self) -> None:
+        """Place the camera again, and the background: other pages than ours may forget both."""
+        set_surroundings(self.display.visualizer)
+        look(self.display.visualizer, self.view)
+
+    def magnify_arrows(self, factor: float) -> None:
+        """Draw arrows `factor` times as long as by themselves."""
+        self._scale.factor = factor
+
+    @property
+    def magnification(self) -> float:
+        """How many times longer than by themselves arrows are drawn."""
+        return self._scale.factor
+
+    def clear(self) -> None:
+        """Start afresh: no trails, and a scale that is yet to be found."""
+        self._trails.clear()
+        self._scale.forget()
+
+
+@dataclass(frozen=True)
+class PushShown:
+    """A push as an arrow pool draws it: one force at one point."""
+
+    point_world: FloatArray
+    """(1, 3) [m]."""
+    normal_world: FloatArray
+    """Direction of the push (1, 3)."""
+    normal_force: FloatArray
+    """(1,) [N]."""
+    friction_force_world: FloatArray
+    """Zeros (1, 3)."""
+
+    @classmethod
+    def at(cls, point_world: FloatArray, force_world: FloatArray) -> PushShown:
+        """Build from a point (3,) [m] and a force (3,) [N] other than zero."""
+        size = float(np.linalg.norm(force_world))
+        direction = (force_world / size)[None]
+        return cls(point_world[None], direction, np.array([size]), np.zeros((1, 3)))
+
+
+class ConePool:
+    """Friction cones: `size` of them below `visualizer`, from the contact point along the normal.
+
+    Height is the normal force and radius its mu-fold, at the scale of the arrows: an arrow of
+    friction that reaches the rim is at its limit.
+    """
+
+    def __init__(self, visualizer: Any, size: int) -> None:
+        self._moves: list[Move] = []
+        for index in range(size):
+            node = visualizer[f"cone_{index}"]
+            look = material("MeshBasic", CONE_COLOR, 0.22, depthTest=False, depthWrite=False)
+            set_object(node, rod(0.0, 1.0), look, order=8)
+            self._moves.append(mover(node))
+            self._moves[-1](pose(np.eye(3), np.zeros(3), HIDDEN_SCALE))
+
+    def update(self, contacts: SceneContacts, pairs: Any, scale: ArrowScale) -> None:
+        """Show the cones of `contacts`, the largest forces first; hide the others."""
+        order = np.argsort(-contacts.normal_force, kind="stable")
+        for slot, move in enumerate(self._moves):
+            matrix = None
+            if slot < len(order):
+                k = int(order[slot])
+                law = pairs[int(contacts.pair[k])].friction
+                matrix = self._cone(contacts, k, getattr(law, "mu_static", 0.0), scale)
+            move(pose(np.eye(3), np.zeros(3), HIDDEN_SCALE) if matrix is None else matrix)
+
+    @staticmethod
+    def _cone(contacts: SceneContacts, k: int, mu: float, scale: ArrowScale) -> FloatArray | None:
+        height = min(contacts.normal_force[k] * scale.metres_per_newton, scale.longest)
+        if not (mu > 0.0 and height > 0.0):
+            return None
+        normal = contacts.normal_world[k]
+        middle = contacts.point_world[k] + 0.5 * height * normal
+        shape = np.array([mu * height, height, mu * height])
+        matrix: FloatArray = pose(rotation_to(normal), middle, np.maximum(shape, HIDDEN_SCALE))
+        return matrix
+
+
+class _Scale:
+    """Chooses the length of arrows from the first forces that appear, and then keeps it."""
+
+    def __init__(self, scene: Scene, view: View) -> None:
+        radii = [pair.sphere.radius for pair in scene.pairs if pair.sphere is not None]
+        self._length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
+        self.factor = 1.0
+        self.forget()
+
+    def forget(self) -> None:
+        """Look for a scale anew."""
+        self._seen: list[float] = []
+        self._found = ArrowScale.from_forces(np.zeros(0), self._length)
+
+    def update(self, contacts: SceneContacts) -> ArrowScale:
+        if len(self._seen) < FRAMES_TO_SCALE and len(contacts):
+            self._seen.append(float(np.max(contacts.normal_force)))
+            self._found = ArrowScale.from_forces(np.array(self._seen), self._length)
+        found = self._found
+        return ArrowScale(
+            found.reference_length * self.factor,
+            found.reference_force,
+            found.longest * max(1.0, self.factor),
+        )
+
+
+class _Trails:
+    """Where the contacts have been, on their shells; of each pair the strongest contact."""
+
+    def __init__(self, display: Display) -> None:
+        self._display = display
+        self._step = 0.6 * display.trail_width
+        self._jump = 0.04 * display.view.distance
+        self.clear()
+
+    def clear(self) -> None:
+        for pair in {pair for pair, _ in getattr(self, "_drawn", ())}:
+            self._display.trail_node(pair).delete()
+        self._drawn: set[tuple[int, int]] = set()
+        self._points: dict[int, list[FloatArray]] = {}
+        self._piece: dict[int, int] = {}
+        self._undrawn: dict[int, int] = {}
+
+    def add(self, contacts: SceneContacts) -> None:
+        """Go on to where `contacts` are now."""
+        pairs = self._display.scene.pairs
+        strongest: dict[int, int] = {}
+        for k in np.argsort(contacts.normal_force, kind="stable"):
+            strongest[int(contacts.pair[k])] = int(k)
+        for index in [index for index in self._points if index not in strongest]:
+            self._finish(index)
+        for index, k in strongest.items():
+            pair = pairs[index]
+            if pair.shell is None:
+                continue
+            where = self._display.data.oMi[pair.joint_j] * pair.shell_placement
+            self._extend(index, where.actInv(contacts.point_world[k]))
+
+    def _extend(self, index: int, point: FloatArray) -> None:
+        points = self._points.setdefault(index, [])
+        if points:
+            step = math.dist(points[-1], point)
+            if step < self._step:
+                return
+            if step > self._jump:
+                self._finish(index)
+                points = self._points.setdefault(index, [])
+        points.append(point)
+        self._undrawn[index] = self._undrawn.get(index, 0) + 1
+        full = len(points) >= POINTS_OF_PIECE
+        # A piece is drawn anew as it grows: every few points will do.
+        if full or self._undrawn[index] >= 4:
+            self._draw(index)
+        if full:
+            self._finish(index)
+            self._points[index] = [point]
+
+    def _draw(self, index: int) -> None:
+        slot = self._piece.setdefault(index, 0) % PIECES
+        self._undrawn[index] = 0
+        if self._display.draw_trail(str(slot), np.array(self._points[index]), index) is not None:
+            self._drawn.add((index, slot))
+
+    def _finish(self, index: int) -> None:
+        if self._undrawn.get(index, 0) and len(self._points[index]) > 1:
+            self._draw(index)
+        if len(self._points.pop(index)) > 1:
+            self._piece[index] = self._piece.get(index, 0) + 1
+
+
+def _pool(scene: Scene) -> int:
+    return max(4, min(POOL, 2 * len(scene.pairs)))
+
+
+def frame_point(model: pin.Model, data: pin.Data, name: str) -> FloatArray | None:
+    """Return where the origin of a frame or joint stands (3,) [m]; None if there is none."""
+    if model.existFrame(name):
+        frame = model.frames[model.getFrameId(name)]
+        return np.array((data.oMi[frame.parentJoint] * frame.placement).translation)
+    if model.existJointName(name):
+        return np.array(data.oMi[model.getJointId(name)].translation)
+    return None

@@ -1,0 +1,86 @@
+"""What the live page plays: a run that goes on for ever, or a finished one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+from sphshell_pin.view.nodes import FloatArray
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.scene import Scene, SceneContacts
+    from sphshell_pin.scenario.knobs import Knob
+    from sphshell_pin.scenario.player import Rows
+
+
+class Player(Protocol):
+    """A scene in motion, advanced piece by piece; SI units, world frame.
+
+    `scene` may become another object when a knob is turned; its model stays the same.
+    """
+
+    @property
+    def title(self) -> str:
+        """One line on what there is to see."""
+
+    @property
+    def visual_model(self) -> Any:
+        """A pinocchio.GeometryModel of scene.model, or None for a skeleton."""
+
+    @property
+    def scene(self) -> Scene:
+        """What is simulated now."""
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+
+    @property
+    def start(self) -> float:
+        """Time at which it starts [s]."""
+
+    @property
+    def q(self) -> FloatArray:
+        """Configuration (nq,)."""
+
+    @property
+    def contacts(self) -> SceneContacts:
+        """The contacts at this state."""
+
+    @property
+    def residual(self) -> float:
+        """Energy that appeared from nowhere since the start [J]."""
+
+    @property
+    def exchanged(self) -> float:
+        """Energy that changed form since the start [J]."""
+
+    @property
+    def knobs(self) -> tuple[Knob, ...]:
+        """What can be turned, with the values of now."""
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Frames that can be pushed; none in a replay."""
+
+    @property
+    def duration(self) -> float | None:
+        """Length of a replay [s]; None where it goes on for ever."""
+
+    @property
+    def ended(self) -> str | None:
+        """Why it cannot go on, in one sentence; None while it can."""
+
+    def advance(self, duration: float, wall: float) -> Rows:
+        """Go `duration` [s] on, computing for `wall` [s] at most; return what was recorded."""
+
+    def reset(self) -> None:
+        """Go back to the start."""
+
+    def change(self, key: str, value: float) -> None:
+        """Turn a knob; raise SphshellError, and go on unchanged, where it cannot be."""
+
+    def push(self, body: str, force_world: FloatArray, seconds: float) -> None:
+        """Push the origin of a body with `force_world` (3,) [N] for `seconds` [s]."""
+
+    def seek(self, t: float) -> None:
+        """Go to time `t` [s] of a replay."""

@@ -1,0 +1,420 @@
+"""A new scenario works as it is written: it touches, presses as promised, and keeps its energy."""
+
+from __future__ import annotations
+
+import shutil
+import tomllib
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from typer.testing import CliRunner
+
+import sphshell_pin as sp
+from sphshell_pin import robots
+from sphshell_pin.cli import app
+from sphshell_pin.errors import (
+    FrameNotFound,
+    InvalidParameter,
+    NameNotFound,
+    ScenarioError,
+    SphshellError,
+    UnitMissing,
+)
+from sphshell_pin.scenario import build, judge, knobs_of, rebuild, shipped_scenarios
+from sphshell_pin.scenario.new import new_scenario
+from sphshell_pin.scenario.run import simulate
+
+SURFACES = next(iter(shipped_scenarios().values())).parent / "surfaces"
+BLADE, BOWL = SURFACES / "bladex_upper.stl", SURFACES / "bowl.shl"
+
+LINK = """
+  <link name="{name}">
+    <inertial>
+      <origin xyz="0 0 {half}"/><mass value="{mass}"/>
+      <inertia ixx="{i}" iyy="{i}" izz="{j}" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+  </link>"""
+JOINT = """
+  <joint name="joint_{k}" type="revolute">
+    <parent link="{parent}"/><child link="{child}"/><origin xyz="0 0 {up}"/><axis xyz="{axis}"/>
+    <limit lower="{low}" upper="2.8" effort="60" velocity="3"/>
+  </joint>"""
+
+
+def arm_urdf(folder: Path, axes: str = "zyyzyz", low: float = -2.8) -> Path:
+    """Write an arm of links of 0.2 m that stands straight up at zero; return its URDF file."""
+    parts = ['<robot name="arm"><link name="base"/>']
+    for k, axis in enumerate(axes):
+        mass = 2.0 / (k + 1)
+        parts.append(LINK.format(name=f"link_{k}", half=0.1, mass=mass, i=mass / 250, j=mass / 900))
+        parts.append(
+            JOINT.format(
+                k=k,
+                parent=f"link_{k - 1}" if k else "base",
+                child=f"link_{k}",
+                up=0.2 if k else 0.0,
+                axis={"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}[axis],
+                low=low,
+            )
+        )
+    path = folder / "arm.urdf"
+    path.write_text("".join(parts) + "</robot>", encoding="utf-8")
+    return path
+
+
+CASES = [
+    ("panda", BLADE, {"unit": "mm"}),
+    ("panda", "plane", {"material": "steel"}),
+    ("ur5", "box", {}),
+    ("allegro_right_hand", "sphere", {}),
+    ("three_link_finger", "cylinder", {}),
+    ("ball", BOWL, {"unit": "mm"}),
+    ("ball", "box", {"material": "silicone"}),
+    ("a1", "plane", {}),
+    ("arm", "bowl", {"radius": 0.02}),
+    ("arm", BLADE, {"radius": 0.003, "unit": "mm"}),
+]
+# Robots that come with the package itself, or with the tests.
+AT_HAND = ("arm", "ball", "three_link_finger")
+
+
+@pytest.mark.parametrize(("robot", "surface", "options"), CASES)
+def test_what_is_written_works(robot, surface, options, tmp_path):
+    if robot not in AT_HAND:
+        pytest.importorskip("example_robot_data")
+    name = arm_urdf(tmp_path) if robot == "arm" else robot
+    made = new_scenario(name, surface, out=tmp_path / "made.toml", **options)
+    built = build(made.path)  # what stands in the file, read again
+    result, stopped = simulate(built)
+    assert stopped is None
+    verdicts = list(judge(built, result))
+    assert len(verdicts) >= 2
+    assert [v.figure for v in verdicts if not v.met] == []
+    assert made.explanation.warnings == ()
+    gaps = [pair.gap for pair in built.scene.explain(built.q0, built.v0).pairs]
+    radius = built.scene.pairs[0].sphere.radius
+    assert 0 < min(gaps) <= 2.01 * radius
+
+
+@pytest.mark.parametrize("robot", ["ball", "arm"])
+def test_a_cad_file_works_without_a_unit(robot, tmp_path):
+    pytest.importorskip("OCP")
+    step = Path(__file__).parents[3] / "shared" / "data" / "trimesh_featuretype.STEP"
+    if not step.is_file():
+        pytest.skip("the corpus of CAD files is not here")
+    name = arm_urdf(tmp_path) if robot == "arm" else robot
+    built = new_scenario(name, step, radius=0.012, out=tmp_path / "a.toml").built
+    result, stopped = simulate(built)
+    assert stopped is None
+    assert [v.figure for v in judge(built, result) if not v.met] == []
+    # The part measures 5 inches; its file says so.
+    sizes = np.ptp(built.shells["trimesh_featuretype"].box, axis=0)
+    assert sizes.max() == pytest.approx(5 * 0.0254, rel=1e-3)
+
+
+def test_a_robot_that_stands_weighs_what_it_weighs(tmp_path):
+    pytest.importorskip("example_robot_data")
+    built = new_scenario("a1", out=tmp_path / "a1.toml").built
+    result, _ = simulate(built)
+    contacts = built.scene.contacts(result.q[-1], result.v[-1])
+    assert len(contacts) == 4
+    weight = 9.81 * pin.computeTotalMass(built.scene.model)
+    assert contacts.normal_force.sum() == pytest.approx(weight, rel=0.01)
+    upright = pin.Quaternion(result.q[-1][3:7]).toRotationMatrix()[2, 2]
+    assert upright > np.cos(np.deg2rad(3))
+
+
+def test_the_force_is_the_one_asked_for(tmp_path):
+    pytest.importorskip("example_robot_data")
+    built = new_scenario("ur5", press=12.0, out=tmp_path / "ur5.toml").built
+    result, _ = simulate(built)
+    contacts = built.scene.contacts(result.q[-1], result.v[-1])
+    assert contacts.normal_force.sum() == pytest.approx(12.0, rel=0.05)
+    # It came to the end of its way across the surface.
+    way = np.array(built.scenario.controller.path)
+    assert np.linalg.norm(way[-1] - way[0]) > 5 * 0.012
+    data = built.scene.model.createData()
+    ends = []
+    for q in (result.q[0], result.q[-1]):
+        pin.framesForwardKinematics(built.scene.model, data, q)
+        ends.append(data.oMf[built.scene.model.getFrameId("tool0")].translation.copy())
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(
+        np.linalg.norm(way[-1] - way[0]), rel=0.05
+    )
+
+
+@pytest.mark.parametrize("place", ["below", "above", "+x", "-x", "+y", "-y"])
+def test_the_surface_stands_where_it_was_asked_for(place, tmp_path):
+    built = new_scenario(
+        arm_urdf(tmp_path), "plane", radius=0.01, place=place, out=tmp_path / "a.toml"
+    ).built
+    (pair,) = built.scene.pairs
+    data = built.scene.model.createData()
+    pin.framesForwardKinematics(built.scene.model, data, built.q0)
+    tip = data.oMf[built.scene.model.getFrameId("link_5")].translation
+    k = {"below": 2, "above": 2}.get(place, "xyz".find(place[-1]))
+    sign = -1 if place in ("below", "-x", "-y") else 1
+    away = pair.placement.translation - tip
+    expected = np.zeros(3)
+    expected[k] = sign * 1.02 * pair.sphere.radius
+    np.testing.assert_allclose(away, expected, atol=2e-6)
+
+
+def test_an_arm_stretched_out_is_bent_within_its_limits(tmp_path):
+    made = new_scenario(arm_urdf(tmp_path, low=0.3), "plane", radius=0.01, out=tmp_path / "a.toml")
+    model, q = made.built.scene.model, made.built.q0
+    assert (q >= model.lowerPositionLimit).all()
+    assert (q <= model.upperPositionLimit).all()
+    # Neutral was singular: straight up, the tip cannot move along z.
+    data = model.createData()
+    jacobian = pin.computeFrameJacobian(
+        model, data, q, model.getFrameId("link_5"), pin.LOCAL_WORLD_ALIGNED
+    )
+    values = np.linalg.svd(jacobian[:3], compute_uv=False)
+    assert values[2] > 0.05 * values[0]
+    assert any("bent" in one for one in made.why)
+
+
+def test_the_same_question_has_the_same_answer(tmp_path):
+    urdf = arm_urdf(tmp_path)
+    texts = [
+        new_scenario(urdf, "box", radius=0.01, out=tmp_path / "a.toml", force=True).text
+        for _ in range(2)
+    ]
+    assert texts[0] == texts[1]
+
+
+def test_a_single_body_of_ones_own_floats(tmp_path):
+    shutil.copy(robots.URDF_FOLDER / "ball.urdf", tmp_path / "mine.urdf")
+    made = new_scenario(tmp_path / "mine.urdf", "plane", out=tmp_path / "a.toml")
+    assert made.built.scenario.robot[0].free_flyer
+    assert made.built.scene.model.nv == 6
+    assert made.built.q0[2] == pytest.approx(0.012 + 2 * 0.012, rel=1e-3)
+
+
+def test_files_are_named_relative_to_the_scenario(tmp_path):
+    old = tmp_path / "old"
+    (old / "parts").mkdir(parents=True)
+    shutil.copy(BLADE, old / "parts" / "my blade.stl")
+    made = new_scenario(
+        arm_urdf(old / "parts"), old / "parts" / "my blade.stl", unit="mm", radius=0.01,
+        out=old / "a.toml",
+    )  # fmt: skip
+    data = tomllib.loads(made.text)
+    assert data["robot"]["urdf"] == "parts/arm.urdf"
+    assert data["shell"][0]["file"] == "parts/my blade.stl"
+    old.rename(tmp_path / "new")
+    assert build(tmp_path / "new" / "a.toml").shells["my blade"].num_elements == 522
+
+
+def test_materials_give_hertzs_law(tmp_path):
+    made = new_scenario(
+        "ball", "plane", material="aluminium", against="rubber", out=tmp_path / "a.toml"
+    )
+    (pair,) = made.built.scene.pairs
+    softness = (1 - 0.33**2) / 7.0e10 + (1 - 0.49**2) / 1.0e7
+    assert pair.law.stiffness == pytest.approx(4 / 3 * np.sqrt(0.012) / softness, rel=1e-12)
+    turned = new_scenario(
+        "ball", "plane", material="rubber", against="aluminium", out=tmp_path / "b.toml"
+    )
+    assert turned.built.scene.pairs[0].friction == pair.friction
+
+
+def test_the_ball_comes_back_as_high_as_its_material_says(tmp_path):
+    built = new_scenario("ball", "plane", material="wood", out=tmp_path / "a.toml").built
+    result, _ = simulate(built)
+    touched = float(result.contact_columns()["t [s]"][0])
+    after = result.t > touched + 0.01
+    rising = result.v[after, 2][0] + 9.81 * (result.t[after][0] - touched)
+    assert rising / np.sqrt(2 * 9.81 * 0.024) == pytest.approx(0.6, rel=0.03)
+
+
+def test_its_knobs_turn(tmp_path):
+    built = new_scenario("ball", "plane", out=tmp_path / "a.toml").built
+    knobs = knobs_of(built)
+    assert len(knobs) >= 4
+    for knob in knobs:
+        for value in (knob.low, knob.high):
+            rebuild(built, {knob.key: repr(value)})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "error", "match"),
+    [
+        (("pandda",), {}, NameNotFound, "no robot 'pandda'"),
+        (("nix.urdf",), {}, SphshellError, "nix.urdf: no such URDF file"),
+        (("ball", "blub"), {}, NameNotFound, "plane, box, sphere, cylinder, bowl"),
+        (("ball", "blub.stl"), {}, SphshellError, "no such surface file: blub.stl"),
+        (("ball", BLADE), {}, UnitMissing, "must be stated"),
+        (("ball", "plane"), {"unit": "mm"}, SphshellError, "sized in metres"),
+        (("ball",), {"frame": "bal"}, FrameNotFound, "no frame 'bal'"),
+        (("ball",), {"radius": -1.0}, InvalidParameter, "must be positive"),
+        (("ball",), {"press": 3.0}, SphshellError, "leave out --press"),
+        (("ball",), {"material": "iron"}, NameNotFound, "steel, aluminium"),
+        (("ball",), {"against": "iron"}, NameNotFound, "steel, aluminium"),
+        (("ball",), {"place": "left"}, NameNotFound, "below, above"),
+        (("ball",), {"free_flyer": True}, SphshellError, "belong to a URDF file"),
+        (("turntable",), {}, SphshellError, "--radius 0.012"),
+        (("ball", BLADE), {"unit": "um"}, SphshellError, "less than the sphere's radius"),
+        (("gear_pair",), {}, SphshellError, "one of gear_1, gear_2"),
+        (("three_link_finger",), {"press": 1e4}, SphshellError, "allow a push of"),
+        (("three_link_finger",), {"frame": "base", "radius": 0.01}, SphshellError, "no joint"),
+    ],
+)
+def test_what_cannot_be_found_out_is_asked_for_in_one_sentence(
+    arguments, options, error, match, tmp_path
+):
+    with pytest.raises(error, match=match) as caught:
+        new_scenario(*arguments, out=tmp_path / "a.toml", **options)
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_is_there_stays(tmp_path, monkeypatch):
+    path = tmp_path / "a.toml"
+    path.write_text("precious", encoding="utf-8")
+    with pytest.raises(ScenarioError, match="--force"):
+        new_scenario("ball", out=path)
+    with pytest.raises(NameNotFound):
+        new_scenario("ball", "blub", out=path, force=True)
+    assert path.read_text(encoding="utf-8") == "precious"
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("os.replace", full)
+        with pytest.raises(ScenarioError, match="No space left"):
+            new_scenario("ball", out=path, force=True)
+    assert path.read_text(encoding="utf-8") == "precious"
+    assert list(tmp_path.iterdir()) == [path]
+    new_scenario("ball", out=path, force=True)
+    assert build(path).scenario.title == "ball falls on plane"
+
+
+@pytest.mark.parametrize(("out", "match"), [("a.txt", r"\.toml"), ("no/a.toml", "does not exist")])
+def test_a_place_that_cannot_be_written(out, match, tmp_path):
+    with pytest.raises(ScenarioError, match=match):
+        new_scenario("ball", out=tmp_path / out)
+
+
+def test_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(BOWL, "bowl.shl")
+    call = ["new", "--robot", "ball", "--surface", "bowl.shl", "--unit", "mm", "--radius", "12mm"]
+    result = CliRunner().invoke(app, call)
+    assert result.exit_code == 0, result.output
+    assert "sphshell-pin run ball_on_bowl.toml" in result.output
+    assert "verdict" in result.output
+    assert "Recommended dt" in result.output
+    assert build("ball_on_bowl.toml").scene.pairs[0].sphere.radius == pytest.approx(
+        0.012, rel=1e-12
+    )
+    again = CliRunner().invoke(app, call)
+    assert again.exit_code == 2
+    assert "is there already" in again.output
+    for radius, said in (("12xx", "must be one of"), ("abc", "must be a length")):
+        wrong = CliRunner().invoke(app, ["new", "--robot", "ball", "--radius", radius])
+        assert wrong.exit_code == 2
+        assert said in wrong.output
+
+
+def test_a_unit_is_asked_for_as_the_command_takes_it():
+    wrong = CliRunner().invoke(app, ["new", "--robot", "ball", "--surface", str(BLADE)])
+    assert wrong.exit_code == 2
+    assert "--unit mm if that is 0.1558 m" in wrong.output
+
+
+def test_feet_come_down_on_what_is_under_them():
+    """Four feet over a plate that only one can reach: that one has the gap."""
+    from sphshell_pin.scenario.plan import _under
+
+    plate = sp.Shell.from_geometry(coal.Box(0.1, 0.1, 0.02))
+    feet = np.array([[x, y, 0.3] for x in (-0.4, 0.4) for y in (-0.2, 0.2)])
+    radii = np.full(4, 0.02)
+    placement = _under(plate, feet, radii, 0.002)
+    gaps = np.abs(plate.closest_points(feet - placement.translation).distances) - radii
+    assert gaps.min() == pytest.approx(0.002, rel=2e-3)
+    # Over a plate that is large enough all of them have it.
+    large = sp.Shell.from_geometry(coal.Box(2.0, 2.0, 0.02))
+    placement = _under(large, feet, radii, 0.002)
+    gaps = np.abs(large.closest_points(feet - placement.translation).distances) - radii
+    np.testing.assert_allclose(gaps, 0.002, rtol=2e-3)
+
+
+def test_a_spot_avoids_edges_and_grooves():
+    """On a roof the ridge is in the middle: a tip is put beside it, on one side."""
+    from sphshell_pin.scenario.spots import find_spot, spots_about, touches_once
+
+    roof = [[x, y, 0.1 - abs(x)] for x in (-0.1, 0.0, 0.1) for y in (-0.2, 0.2)]
+    shell = sp.Shell(roof, [[0, 2, 3, 1], [2, 4, 5, 3]])
+    up = np.array([0.0, 0.0, 1.0])
+    middle = find_spot(shell, 0.01, 1e-3, toward=up)
+    assert not touches_once(shell, middle, middle.point[None], 0.01, 1e-3)
+    good = next(
+        spot
+        for spot in spots_about(shell, 0.01, 1e-3, toward=up)
+        if touches_once(shell, spot, spot.point[None], 0.01, 1e-3)
+    )
+    assert abs(good.point[0]) > 0.002
+    np.testing.assert_allclose(np.abs(good.normal), [np.sqrt(0.5), 0, np.sqrt(0.5)], atol=1e-6)
+
+
+def shell_of(geometry) -> sp.Shell:
+    return sp.Shell.from_geometry(geometry)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "toward", "inside", "point", "normal"),
+    [
+        (coal.Box(0.2, 0.2, 0.04), None, False, [0, 0, 0.02], [0, 0, 1]),
+        (coal.Box(0.2, 0.04, 0.2), None, False, [0, 0.02, 0], [0, 1, 0]),
+        (coal.Box(0.1, 0.1, 0.1), None, False, [0, 0, 0.05], [0, 0, 1]),
+        (coal.Box(0.2, 0.2, 0.04), [1, 0, 0], False, [0.1, 0, 0], [1, 0, 0]),
+        (coal.Sphere(0.1), [0, 0, 1], True, [0, 0, -0.1], [0, 0, 1]),
+        (coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), None, False, [0, 0, 0], [0, 0, 1]),
+    ],
+)
+def test_a_surface_is_touched_in_the_middle_of_its_broad_side(
+    geometry, toward, inside, point, normal
+):
+    from sphshell_pin.scenario.spots import find_spot
+
+    spot = find_spot(shell_of(geometry), 0.01, 1e-3, toward=toward, inside=inside)
+    np.testing.assert_allclose(spot.point, point, atol=1e-4)
+    np.testing.assert_allclose(spot.normal, normal, atol=1e-3)
+    np.testing.assert_allclose(spot.centre, spot.point + 0.011 * spot.normal, atol=2e-6)
+
+
+def test_a_sphere_has_room_in_a_groove():
+    """A V of 60 degrees: the sphere rests on both sides, its centre at twice the distance."""
+    from sphshell_pin.scenario.spots import find_spot
+
+    slope = np.tan(np.deg2rad(60))
+    vertices = [[-0.1, y, 0.1 * slope] for y in (-0.1, 0.1)]
+    vertices += [[0.0, y, 0.0] for y in (-0.1, 0.1)] + [[0.1, y, 0.1 * slope] for y in (-0.1, 0.1)]
+    shell = sp.Shell(vertices, [[0, 2, 3, 1], [2, 4, 5, 3]])
+    spot = find_spot(shell, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))
+    distance = abs(shell.closest_points(spot.centre[None]).distances[0])
+    assert distance == pytest.approx(0.011, rel=1e-3)
+    # From the bottom of the groove the centre stands 1 / cos 60 degrees as high.
+    assert spot.centre[2] == pytest.approx(0.022, rel=1e-3)
+
+
+def test_a_way_across_stays_on_the_surface_and_ends_at_the_rim():
+    from sphshell_pin.scenario.spots import find_spot, way_across
+
+    ball = shell_of(coal.Sphere(0.1))
+    spot = find_spot(ball, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))
+    way = way_across(ball, spot, np.array([1.0, 0.0, 0.0]), 0.1, 0.005)
+    assert len(way) == 21
+    np.testing.assert_allclose(np.linalg.norm(way, axis=1), 0.1, atol=2e-4)
+    assert way[-1, 0] > 0.05
+    box = shell_of(coal.Box(0.2, 0.2, 0.04))
+    spot = find_spot(box, 0.01, 1e-3)
+    way = way_across(box, spot, np.array([1.0, 0.0, 0.0]), 1.0, 0.005)
+    assert np.abs(way[:, :2]).max() <= 0.1 + 1e-9
+    np.testing.assert_allclose(way[:, 2], 0.02, atol=1e-9)

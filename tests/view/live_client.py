@@ -1,0 +1,76 @@
+"""A browser without a picture, for tests of the server: real HTTP, a real websocket."""
+
+import asyncio
+import contextlib
+import json
+import urllib.error
+import urllib.request
+
+import umsgpack
+from tornado.httpclient import HTTPRequest
+from tornado.websocket import WebSocketClosedError, websocket_connect
+
+PATIENCE = 20.0
+
+
+def get(url, **headers):
+    """Return status and body of a page."""
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers)) as answer:
+            return answer.status, answer.read(), dict(answer.headers)
+    except urllib.error.HTTPError as refused:
+        return refused.code, refused.read(), {}
+
+
+class Client:
+    """One websocket; keeps what it was told."""
+
+    def __init__(self, url, answers=True):
+        self.address = url.replace("http:", "ws:") + "socket"
+        self.answers = answers
+        self.hello, self.state, self.closed = None, None, False
+        self.errors, self.rows, self.scenes, self.ends = [], [], [], 0
+
+    async def open(self, **headers):
+        request = HTTPRequest(self.address, headers=headers)
+        self.socket = await websocket_connect(request, max_message_size=2**28)
+        return self
+
+    async def __aenter__(self):
+        return await self.open()
+
+    async def __aexit__(self, *_):
+        self.socket.close()
+
+    def say(self, kind, **fields):
+        return self.socket.write_message(json.dumps({"type": kind, **fields}))
+
+    async def read(self):
+        """Take one message."""
+        message = await asyncio.wait_for(self.socket.read_message(), PATIENCE)
+        if message is None:
+            self.closed = True
+        elif isinstance(message, bytes):
+            self.scenes.append(umsgpack.unpackb(message))
+            if self.answers:
+                with contextlib.suppress(WebSocketClosedError):
+                    await self.say("seen", frame=len(self.scenes))
+        else:
+            data = json.loads(message)
+            kind = data["type"]
+            if kind == "rows":
+                self.rows += data["rows"]
+            elif kind == "error":
+                self.errors.append(data["text"])
+            elif kind == "end":
+                self.ends += 1
+            else:
+                setattr(self, kind, data)
+
+    async def until(self, condition):
+        """Read until condition(self) holds, or the connection is closed."""
+        deadline = asyncio.get_running_loop().time() + PATIENCE
+        while not condition(self) and not self.closed:
+            assert asyncio.get_running_loop().time() < deadline, "it never came"
+            await self.read()
+        return self

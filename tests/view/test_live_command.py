@@ -1,0 +1,119 @@
+"""sphshell-pin view: one sentence for every fault, a clean end, a page that is there."""
+
+import signal
+import subprocess
+import sys
+import time
+import webbrowser
+
+import pytest
+from typer.testing import CliRunner
+
+from sphshell_pin.cli import app
+from sphshell_pin.scenario import run_scenario
+from sphshell_pin.view.live import Live, opening
+from tests.scenario.files import write
+from tests.view.live_client import get
+from tests.view.live_player import BallPlayer
+
+# Tests that run in the background pass on that Ctrl-C is to be ignored.
+ENTRY = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from sphshell_pin.cli import main; main()"
+)
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, ["view", *(str(one) for one in arguments)])
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("finished")
+    run_scenario(write(folder), folder / "out", recording=False)
+    return folder / "out"
+
+
+def started(*arguments):
+    process = subprocess.Popen(
+        [sys.executable, "-c", ENTRY, "view", *map(str, arguments), "--no-open"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    return process, process.stdout.readline().split()[0]
+
+
+def test_the_help_has_an_example():
+    told = call("--help")
+    assert told.exit_code == 0
+    assert "Example: sphshell-pin view" in told.output
+
+
+@pytest.mark.parametrize("kind", ["scenario", "folder", "file"])
+def test_it_serves_a_page_and_ctrl_c_ends_it(kind, tmp_path, finished):
+    what = {"scenario": write(tmp_path), "folder": finished, "file": finished / "run.npz"}[kind]
+    process, url = started(what)
+    try:
+        assert get(url)[0] == 200
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        rest, errors = process.communicate(timeout=20)
+    finally:
+        process.kill()
+    assert (process.returncode, rest, errors) == (0, "", "")
+
+
+def test_faults_are_one_sentence(tmp_path, finished):
+    scenario = write(tmp_path)
+    with Live(BallPlayer()) as live:
+        for arguments, words in (
+            (["no_such"], "fingertip_on_blade"),
+            ([tmp_path / "no.npz"], "no.npz"),
+            ([scenario, "--speed", "0"], "must be from 0.01 to 10"),
+            ([scenario, "--port", "70000"], "65535"),
+            ([scenario, "--port", live.server.port], "another port"),
+            ([scenario, "--scenario", "gear_contact"], "only a finished run"),
+            ([finished, "--set", "gravity.2=0"], "finished run"),
+            ([finished, "--scenario", "gear_contact"], "nq"),
+        ):
+            told = call(*arguments, "--no-open")
+            assert told.exit_code == 2, arguments
+            assert words in told.stderr
+            assert told.stderr.count("\n") == 1
+            assert "Traceback" not in told.output
+
+
+def test_without_meshcat_it_says_what_to_install(tmp_path):
+    code = f"import sys; sys.modules['meshcat'] = None; {ENTRY}"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "view", str(write(tmp_path)), "--no-open"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "sphshell-pin[view]" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch):
+    opened = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    opening.open_browser("http://x/")
+    assert opened == []
+    monkeypatch.setenv("DISPLAY", ":0")
+    opening.open_browser("http://x/")
+    assert opened == ["http://x/"]
+
+
+def test_importing_the_page_loads_nothing_heavy():
+    code = (
+        "import sys, sphshell_pin.view.live\n"
+        "print([m for m in ('meshcat', 'tornado', 'pydantic', 'matplotlib') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

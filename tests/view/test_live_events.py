@@ -1,0 +1,69 @@
+"""Whatever a browser says is an event or one sentence, never anything else."""
+
+import contextlib
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sphshell_pin.view.live.events import FIELDS, LARGEST_MESSAGE, BadMessage, read_event
+
+PUSH = {"type": "push", "body": "tip", "direction": [0, 3, 4], "newtons": 2, "seconds": 0.1}
+BAD = {
+    "bytes": b"\x00\x01",
+    "no JSON": "pause!",
+    "no object": "[1, 2]",
+    "no type": "{}",
+    "unknown": '{"type": "explode"}',
+    "type of a wrong type": '{"type": ["run"]}',
+    "missing field": '{"type": "speed"}',
+    "text for a number": '{"type": "speed", "value": "fast"}',
+    "truth for a number": '{"type": "speed", "value": true}',
+    "number for a truth": '{"type": "run", "on": 1}',
+    "not a number": '{"type": "speed", "value": NaN}',
+    "infinite": '{"type": "knob", "key": "k", "value": Infinity}',
+    "beyond floats": '{"type": "knob", "key": "k", "value": 1' + 400 * "0" + "}",
+    "negative": '{"type": "step", "seconds": -1}',
+    "a long name": json.dumps({"type": "knob", "key": 300 * "k", "value": 1.0}),
+    "a direction of no length": json.dumps({**PUSH, "direction": [0, 0, 0]}),
+    "a direction of two": json.dumps({**PUSH, "direction": [0, 1]}),
+    "huge": json.dumps({"type": "knob", "key": LARGEST_MESSAGE * "k", "value": 1.0}),
+    "deep": 8_000 * "[",
+}
+
+
+@pytest.mark.parametrize("message", BAD.values(), ids=BAD.keys())
+def test_a_bad_message_is_answered_with_one_sentence(message):
+    with pytest.raises(BadMessage) as told:
+        read_event(message)
+    assert 10 < len(str(told.value)) < 300
+    assert "\n" not in str(told.value)
+
+
+def test_a_direction_has_unit_length():
+    assert read_event(json.dumps(PUSH))["direction"] == [0.0, 0.6, 0.8]
+
+
+values = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=20),
+    lambda one: st.lists(one, max_size=4) | st.dictionaries(st.text(max_size=5), one, max_size=4),
+    max_leaves=6,
+)
+
+
+@given(st.sampled_from([*FIELDS, "other"]), st.data())
+def test_no_message_is_more_than_an_event_or_a_sentence(kind, data):
+    names = [*FIELDS.get(kind, {}), "extra"]
+    message = {"type": kind} | {name: data.draw(values) for name in names}
+    try:
+        event = read_event(json.dumps(message))
+    except BadMessage:
+        return
+    assert set(event) == {"type", *FIELDS[kind]}
+
+
+@given(st.text())
+def test_no_text_is_more_than_a_sentence(text):
+    with contextlib.suppress(BadMessage):
+        read_event(text)

@@ -1,0 +1,280 @@
+"""The live page in a real browser: pixels, clicks, keys, sliders, several tabs, no network."""
+
+import numpy as np
+import pytest
+
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.view.arrows import NORMAL_COLOR
+from sphshell_pin.view.live import Live
+from tests.view.live_player import ArmPlayer, BallPlayer, FilmPlayer
+from tests.view.test_recording_in_browser import browser, count, is_blue  # noqa: F401
+
+pytestmark = pytest.mark.browser
+
+SIZE = {"width": 900, "height": 500}
+LONG = 60_000  # [ms] on machines that draw without a graphics card
+
+
+class Tab:
+    """A browser's tab with the page of `live`."""
+
+    def __init__(self, context, live):
+        self.page = context.new_page()
+        self.complaints = []
+        self.page.on("pageerror", lambda fault: self.complaints.append(str(fault)))
+        self.page.on(
+            "request",
+            lambda request: (
+                request.url.startswith((live.url, "data:", "blob:"))
+                or self.complaints.append(request.url)
+            ),
+        )
+        self.page.goto(live.url)
+        self.wait("globalThis.state && document.body.classList.contains('ready')")
+
+    def wait(self, expression):
+        # Not once per picture, as a tab behind another draws none.
+        self.page.wait_for_function(expression, timeout=LONG, polling=50)
+
+    def click(self, selector):
+        """Click at once; the mouse would wait for pictures."""
+        self.page.evaluate("selector => document.querySelector(selector).click()", selector)
+
+    def state(self, name):
+        return self.page.evaluate(f"state.{name}")
+
+    def slide(self, selector, share):
+        self.page.evaluate(
+            """([selector, share]) => {
+                const slider = document.querySelector(selector);
+                slider.value = Math.round(slider.max * share);
+                slider.dispatchEvent(new Event("input", {bubbles: true}));
+            }""",
+            [selector, share],
+        )
+
+    def scene(self):
+        """Return the picture (h, w, 3) without the panels that lie over it."""
+        import io
+
+        from PIL import Image
+
+        # Standing still, it leaves the machine time for the screenshot.
+        if self.state("running"):
+            self.click("#run")
+            self.wait("!state.running")
+        self.page.add_style_tag(
+            content="#status, #legend, #toasts, #notice { visibility: hidden !important; }"
+        )
+        shot = self.page.locator("#stage").screenshot(timeout=LONG)
+        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
+
+
+@pytest.fixture
+def opened(browser):  # noqa: F811
+    lives, tabs = [], []
+    context = browser.new_context(viewport=SIZE)
+
+    def open_live(player, **options):
+        lives.append(Live(player, **options).start())
+        tabs.append(Tab(context, lives[-1]))
+        return lives[-1], tabs[-1]
+
+    def open_again(live):
+        tabs.append(Tab(context, live))
+        return tabs[-1]
+
+    open_live.again = open_again
+    yield open_live
+    context.close()
+    for live in lives:
+        live.stop()
+    for tab in tabs:
+        assert tab.complaints == []
+
+
+def test_ball_shell_and_arrow_are_seen_and_parts_can_be_hidden(opened):
+    _, tab = opened(BallPlayer(), running=False)
+    tab.page.select_option("#step-size", "0.1")
+    tab.click("#step")
+    tab.wait("state.t > 0.09 && state.contacts.length")
+    seen = tab.scene()
+    assert np.count_nonzero(is_blue(seen)) > 100
+    shell = (seen[..., 1] - seen[..., 0] > 15) & (seen[..., 1] >= seen[..., 2])
+    assert np.count_nonzero(shell) > 0.03 * shell.size
+    assert count(seen, NORMAL_COLOR) > 30
+    tab.click("[data-part=arrows]")
+    tab.wait("!state.show.arrows")
+    assert count(tab.scene(), NORMAL_COLOR) == 0
+
+
+def test_a_robot_is_seen_and_fills_its_part_of_the_window(opened):
+    _, tab = opened(ArmPlayer())
+    tab.wait("state.t === 0")
+    seen = tab.scene()
+    # The sample arm is pale yellow: less blue than red, which nothing else in the page is.
+    assert np.count_nonzero(seen[..., 0] - seen[..., 2] > 12) > 300
+    pane = tab.page.locator("#scene").bounding_box()
+    canvas = tab.page.locator("#scene > canvas").bounding_box()
+    assert canvas == pane
+    tab.click("#fold")
+    tab.wait("document.querySelector('#scene > canvas').clientWidth === innerWidth")
+
+
+def test_the_button_and_the_keys(opened):
+    live, tab = opened(BallPlayer())
+    tab.wait("state.t > 0.1")
+    tab.page.locator("#run").click()
+    tab.wait("!state.running")
+    stopped = live.player.time
+    tab.page.wait_for_timeout(300)
+    assert live.player.time == stopped
+    tab.page.keyboard.press("s")
+    tab.wait(f"state.t > {stopped}")
+    assert live.player.time == pytest.approx(stopped + 1e-3)
+    tab.page.keyboard.press("ArrowRight")
+    tab.wait(f"state.t > {stopped + 1.5e-3}")
+    tab.page.keyboard.press(" ")
+    tab.wait("state.running")
+    tab.page.keyboard.press(" ")
+    tab.wait("!state.running")
+    tab.page.keyboard.press("r")
+    tab.wait("state.t === 0")
+
+
+def test_a_slider_changes_what_the_simulation_uses(opened):
+    live, tab = opened(LiveRun(build("sphere_on_shell")))
+    law = live.player.scene.pairs[0].law
+    stiffness = next(k for k in live.player.knobs if k.label == "stiffness")
+    tab.slide(f'[data-knob="{stiffness.key}"]', 1.0)
+    tab.wait(f"state.knobs['{stiffness.key}'] > {2 * stiffness.value}")
+    changed = live.player.scene.pairs[0].law
+    assert changed.stiffness == pytest.approx(
+        law.stiffness * stiffness.high / stiffness.value, rel=0.01
+    )
+    field = tab.page.get_by_label(stiffness.label, exact=True).first
+    field.fill("2e5")
+    field.press("Enter")
+    tab.wait(f"state.knobs['{stiffness.key}'] === 2e5")
+    # Keys typed into a field are no commands.
+    assert tab.state("running")
+
+
+def test_a_push_moves_the_ball_and_holding_pushes_on(opened):
+    live, tab = opened(BallPlayer())
+    tab.page.select_option("#direction", "+y")
+    tab.click("#push")
+    tab.wait("state.t > 0")
+    deadline = live.player.time + 60.0
+    while live.player.v[1] <= 0.0 and live.player.time < deadline:
+        tab.page.wait_for_timeout(20)
+    tab.page.wait_for_timeout(300)
+    assert live.player.v[1] == pytest.approx(5.0 * 0.1, rel=0.02)  # 5 N for 0.1 s on 1 kg
+    # The camera looks along -x more or less: its right hand is a direction of the world.
+    right = tab.page.evaluate("""async () => {
+        const scene = await import("./scene.js");
+        return scene.Picture.prototype.direction.call({viewer}, "right");
+    }""")
+    tab.page.select_option("#direction", "right")
+    live.player.v[:] = 0.0
+    button = tab.page.locator("#hold").bounding_box()
+    tab.page.locator("#hold").scroll_into_view_if_needed()
+    button = tab.page.locator("#hold").bounding_box()
+    tab.page.mouse.move(button["x"] + 20, button["y"] + 10)
+    tab.page.mouse.down()
+    tab.page.wait_for_timeout(500)
+    assert np.linalg.norm(live.player.v[:2]) > 0.5
+    tab.page.mouse.up()
+    tab.page.wait_for_timeout(300)
+    velocity = live.player.v.copy()
+    tab.page.wait_for_timeout(200)
+    np.testing.assert_allclose(live.player.v[:2], velocity[:2], atol=1e-12)
+    along = velocity[:2] / np.linalg.norm(velocity[:2])
+    assert along @ right[:2] / np.linalg.norm(right[:2]) > 0.999
+
+
+def test_a_finished_run_scrubs(opened):
+    live, tab = opened(FilmPlayer(), running=False)
+    assert tab.page.locator("#scrub").is_visible()
+    assert not tab.page.locator("#push-section").is_visible()
+    tab.slide("#scrubber", 0.75)
+    tab.wait("state.t === 1.5")
+    assert live.player.time == 1.5
+    assert "1.500 / 2.000" in tab.page.locator("#scrub-value").inner_text()
+    tab.page.keyboard.press(" ")
+    tab.wait("state.t === 2 && !state.running")
+
+
+def test_a_second_tab_follows(opened):
+    # Standing still: two tabs that draw are too much for a machine without a graphics card.
+    live, tab = opened(BallPlayer(), running=False)
+    second = opened.again(live)
+    tab.slide("#speed", 0.25)
+    second.wait("state.speed < 0.9")
+    second.wait("document.getElementById('speed').value < 300")
+    second.click("[data-part=trails]")
+    tab.wait("!document.querySelector('[data-part=trails]').checked")
+    second.click("#run")
+    tab.wait("state.running && document.getElementById('run-word').innerText === 'Pause'")
+    second.click("#run")
+    tab.wait("!state.running")
+    assert not live.running
+    assert live.speed < 0.9
+
+
+def test_garbage_from_a_page_is_told_there_and_stops_nothing(opened):
+    live, tab = opened(BallPlayer())
+    tab.page.evaluate("""async () => {
+        const socket = new WebSocket(`ws://${location.host}/socket`);
+        await new Promise((done) => { socket.onopen = done; });
+        for (const one of ["}{", "[]", '{"type": "speed", "value": "x"}']) socket.send(one);
+        socket.send(new Uint8Array(100));
+    }""")
+    before = live.player.time
+    tab.wait(f"state.t > {before + 0.2}")
+    tab.page.keyboard.press("s")  # and the page is none the worse
+    tab.wait("!state.running")
+
+
+def test_the_end_is_said_and_a_new_run_is_found(opened):
+    live, tab = opened(BallPlayer())
+    port = live.server.port
+    live.stop()
+    tab.wait("document.getElementById('notice').innerText.includes('has ended')")
+    player = BallPlayer()
+    player.title = "Another run"
+    with Live(player, port=port):
+        tab.wait("document.getElementById('title').innerText === 'Another run'")
+
+
+def test_strip_and_list_show_the_forces(opened):
+    _, tab = opened(BallPlayer())
+    tab.wait("state.t > 1.0")
+    texts = tab.page.locator("#contacts td").all_inner_texts()
+    assert texts[0] == "ball"
+    # At rest the force is the weight, and the depth what the spring of 5 kN/m needs for it.
+    assert float(texts[1]) == pytest.approx(1e3 * 9.81 / 5e3, rel=0.02)
+    assert float(texts[2]) == pytest.approx(9.81, rel=0.02)
+    drawn = tab.page.evaluate("""() => {
+        const canvas = document.getElementById("chart");
+        const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+        let red = 0;
+        for (let k = 0; k < data.length; k += 4)
+            red += data[k] > 180 && data[k + 1] < 80 && data[k + 2] < 90 && data[k + 3] > 200;
+        return red;
+    }""")
+    assert drawn > 50
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1920, 1080)])
+def test_nothing_is_cut_off(opened, size):
+    _, tab = opened(BallPlayer())
+    tab.page.set_viewport_size({"width": size[0], "height": size[1]})
+    tab.wait("state.contacts.length")
+    cut = tab.page.evaluate("""() => [...document.querySelectorAll("button, th, td, output")]
+        .filter((one) => one.offsetParent && one.scrollWidth > one.clientWidth + 1)
+        .map((one) => one.innerText)""")
+    assert cut == []
+    box = tab.page.evaluate("document.documentElement.scrollHeight <= innerHeight")
+    assert box

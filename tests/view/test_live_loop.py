@@ -1,0 +1,363 @@
+"""The loop, frame by frame: what time does, what events do, what is not done."""
+
+import subprocess
+import sys
+import threading
+import time
+import warnings
+
+import meshcat
+import numpy as np
+import pytest
+
+from sphshell_pin.errors import InvalidParameter, NameNotFound, SimulationDiverged
+from sphshell_pin.view import live as live_module
+from sphshell_pin.view.live import Live, preview
+from sphshell_pin.view.live.loop import BUDGET, FPS
+from sphshell_pin.view.live.opening import player_of
+from tests.view.live_player import BallPlayer, FilmPlayer
+
+TAB, OTHER_TAB = object(), object()
+
+
+class Told(list):
+    """Stands in for the answers to browsers."""
+
+    def __call__(self, client, text):
+        self.append((client, text))
+
+
+@pytest.fixture
+def make():
+    made = []
+
+    def make_live(player=None, **options):
+        live = Live(BallPlayer() if player is None else player, **options)
+        live.told = live.server.tell = Told()
+        made.append(live)
+        return live
+
+    yield make_live
+    for live in made:
+        live.stop()
+
+
+def say(live, kind, client=TAB, **fields):
+    live.server.take(client, {"type": kind, **fields})
+
+
+def frames(live, count, wall=1 / 60):
+    for _ in range(count):
+        live.frame(wall)
+
+
+def test_time_runs_as_fast_as_asked(make):
+    live = make(speed=0.5)
+    frames(live, 60)
+    assert live.player.time == pytest.approx(0.5, rel=1e-6)
+    say(live, "speed", value=2.0)
+    frames(live, 60)
+    assert live.player.time == pytest.approx(2.5, rel=1e-6)
+
+
+def test_the_speed_keeps_to_its_limits(make):
+    live = make()
+    for given, kept in ((0.0, 0.01), (1e9, 10.0), (3.0, 3.0)):
+        say(live, "speed", value=given)
+        live.frame(0.0)
+        assert live.speed == kept
+
+
+def test_pause_step_run_reset(make):
+    live = make()
+    say(live, "run", on=False)
+    frames(live, 10)
+    assert live.player.time == 0.0
+    for _ in range(3):
+        say(live, "step", seconds=0.002)
+    frames(live, 2)
+    assert live.player.time == pytest.approx(0.006)
+    assert not live.running
+    say(live, "run", on=True)
+    frames(live, 6)
+    assert live.player.time == pytest.approx(0.106)
+    say(live, "reset")
+    live.frame(0.0)
+    assert live.player.time == 0.0
+    assert live.running
+
+
+def test_physics_too_slow_lowers_the_factor_and_not_the_frames(make):
+    # Ten seconds of computing a second: no frame may ask for more than its share.
+    live = make(BallPlayer(wall_per_second=10.0))
+    frames(live, 30)
+    assert all(wall == BUDGET for _, wall in live.player.calls)
+    assert live.player.time == pytest.approx(30 * min(1 / 60, BUDGET / 10.0))
+    # A frame that came late does not make the next one longer and longer.
+    live.player.calls.clear()
+    live.frame(5.0)
+    assert live.player.calls[0][0] <= 2.0 * BUDGET
+
+
+def test_nothing_is_drawn_for_nobody(make):
+    live = make()
+    drawn = live._window.frame
+    state = live._panel.news(0)[0]
+    frames(live, 20)
+    assert live.player.time > 0.3
+    assert (live._window.frame, live._panel.news(0)[0]) == (drawn, state)
+
+
+def test_it_waits_for_the_first_browser_if_asked_to(make):
+    live = make(wait=True)
+    frames(live, 10)
+    assert live.player.time == 0.0
+    live.server.clients.add(TAB)
+    frames(live, 10)
+    assert live.player.time > 0.1
+    live.server.clients.clear()
+
+
+def test_a_slider_that_is_dragged_is_one_change(make):
+    live = make()
+    changes = []
+    change = live.player.change
+    live.player.change = lambda key, value: (changes.append(value), change(key, value))
+    for value in np.linspace(1e3, 2e3, 500):
+        say(live, "knob", key="stiffness", value=value)
+        say(live, "knob", key="radius", value=value / 4e4)
+    live.frame(0.0)
+    assert changes == [2e3, 0.05]
+
+
+def test_a_knob_that_cannot_be_turned_is_told_to_its_browser(make):
+    live = make()
+    say(live, "knob", key="stiffness", value=-1.0)
+    say(live, "knob", OTHER_TAB, key="hat", value=1.0)
+    say(live, "knob", OTHER_TAB, key="radius", value=0.04)
+    live.frame(1 / 60)
+    assert [client for client, _ in live.told] == [TAB, OTHER_TAB]
+    assert "must be positive" in live.told[0][1]
+    assert "stiffness" in live.told[1][1]
+    assert live.player.knob_values == {"stiffness": 5e3, "radius": 0.04}
+    assert live.player.time > 0.0
+
+
+def test_whatever_a_knob_does_the_run_goes_on(make):
+    live = make()
+
+    def breaks(*_):
+        raise ZeroDivisionError("a defect")
+
+    live.player.change = breaks
+    say(live, "knob", key="stiffness", value=1.0)
+    live.frame(1 / 60)
+    assert live.told == [(TAB, "ZeroDivisionError: a defect")]
+    assert live.player.time > 0.0
+
+
+def test_a_push_has_its_direction_force_and_time(make):
+    live = make()
+    push = {"body": "ball", "direction": [0.0, 0.6, 0.8], "newtons": 10.0}
+    say(live, "push", **push, seconds=0.25)
+    live.frame(0.0)
+    np.testing.assert_allclose(live.player.force, [0.0, 6.0, 8.0])
+    assert live.player.push_end == 0.25
+    frames(live, 60)
+    # Impulse and momentum: F t = m v along y, which nothing else acts on.
+    assert live.player.v[1] == pytest.approx(6.0 * 0.25, rel=0.01)
+
+
+def test_what_is_held_pushes_until_it_is_let_go(make):
+    live = make()
+    hold = {"body": "ball", "direction": [1.0, 0.0, 0.0], "newtons": 3.0}
+    say(live, "hold", **hold)
+    frames(live, 60)
+    assert live.player.v[0] == pytest.approx(3.0, rel=0.02)
+    live.server.leave(TAB)
+    frames(live, 2)
+    speed = live.player.v[0]
+    frames(live, 30)
+    assert live.player.v[0] == speed
+
+
+def test_a_run_that_fails_stops_says_why_and_can_start_again(make):
+    live = make()
+    live.server.clients.add(TAB)
+    live.player.fails = SimulationDiverged(0.5, "it blew up", None)
+    frames(live, 3)
+    assert not live.running
+    assert "it blew up" in live._state()["ended"]
+    say(live, "run", on=True)
+    live.frame(1 / 60)
+    assert "Reset" in live.told[-1][1]
+    live.player.fails = None
+    say(live, "reset")
+    say(live, "run", on=True)
+    frames(live, 10)
+    assert live.player.time > 0.1
+    assert live._state()["ended"] is None
+    live.server.clients.clear()
+
+
+def test_a_finished_run_scrubs_and_starts_again_at_its_end(make):
+    live = make(FilmPlayer())
+    say(live, "seek", t=1.5)
+    live.frame(0.0)
+    assert live.player.time == 1.5
+    # The strip shows what led there: 5 N all the way.
+    assert live._strip_rows[0][0] < 0.02
+    assert 1.48 < live._strip_rows[-1][0] <= 1.5
+    assert {row[1][0] for row in live._strip_rows} == {5.0}
+    frames(live, 60)
+    assert live.player.time == 2.0
+    assert not live.running
+    say(live, "run", on=True)
+    frames(live, 6)
+    assert 0.0 < live.player.time < 0.2
+    say(live, "push", body="ball", direction=[1, 0, 0], newtons=1.0, seconds=1.0)
+    live.frame(0.0)
+    assert "this run has: none" in live.told[-1][1]
+
+
+def test_the_thread_keeps_real_time():
+    with Live(BallPlayer()) as live:
+        time.sleep(0.3)
+        before, start = live.player.time, time.perf_counter()
+        time.sleep(0.7)
+        factor = (live.player.time - before) / (time.perf_counter() - start)
+    assert 0.7 < factor < 1.05
+    stopped = live.player.time
+    time.sleep(0.1)
+    assert live.player.time == stopped
+
+
+def test_a_script_may_end_without_stopping_it():
+    code = (
+        "from sphshell_pin.scenario import build\n"
+        "from sphshell_pin.scenario.live import LiveRun\n"
+        "from sphshell_pin.view.live import Live\n"
+        "import time\n"
+        "live = Live(LiveRun(build('sphere_on_shell')), speed=10.0).start()\n"
+        "time.sleep(0.3)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_in_slow_motion_the_strip_has_a_point_a_frame(make):
+    live = make(speed=0.01)
+    advance = live.player.advance
+    live.player.advance = lambda *given: advance(*given).select(slice(0, 0))
+    frames(live, 30)
+    assert len(live._strip_rows) >= 28
+    assert live._strip_rows[0][1][0] == pytest.approx(5e3 * 1e-3, rel=0.05)
+
+
+def test_a_state_that_is_no_number_is_not_drawn(make):
+    live = make()
+    live.server.clients.add(TAB)
+    live.player.q = np.full(3, np.nan)
+    live.player.advance = lambda *_: BallPlayer().advance(0.0)
+    frames(live, 3)
+    assert np.isfinite(live._window._matrices).all()
+    live.server.clients.clear()
+
+
+def test_run_blocks_until_it_is_stopped():
+    live = Live(BallPlayer())
+    threading.Timer(0.3, live.stop).start()
+    live.run()
+    assert live.player.time > 0.05
+
+
+def test_ctrl_c_ends_it_cleanly():
+    class Interrupted(BallPlayer):
+        def advance(self, duration, wall=np.inf):
+            if self.time > 0.1:
+                raise KeyboardInterrupt
+            return super().advance(duration, wall)
+
+    live = Live(Interrupted())
+    live.run()
+    assert not live.server._thread.is_alive()
+
+
+class ForeignWindow:
+    """Stands in for the window of somebody's meshcat server."""
+
+    web_url = "http://127.0.0.1:7000/static/"
+
+    def __init__(self):
+        self.commands = []
+
+    def send(self, command):
+        self.commands.append(command.lower())
+
+
+def test_a_picture_in_somebody_elses_window(make):
+    window = ForeignWindow()
+    live = make(visualizer=meshcat.Visualizer(window=window))
+    assert any(command["type"] == "set_object" for command in window.commands)
+    window.commands.clear()
+    for _ in range(5):
+        live.frame(1 / 60)
+        time.sleep(0.04)
+    moved = [c["path"] for c in window.commands if c["type"] == "set_transform"]
+    assert "/meshcat/spheres/0_ball" in moved
+    assert not any(path.startswith("/meshcat/shells") for path in moved)  # it stands still
+    assert live._foreign.url == ForeignWindow.web_url
+    window.commands.clear()
+    say(live, "look")
+    live.frame(0.0)
+    told = [(c["type"], c["path"]) for c in window.commands]
+    assert ("set_object", "/Cameras/default/rotated") in told
+    assert ("set_property", "/Background") in told
+
+
+def test_pinocchios_visualizer_is_taken_too(make):
+    window = ForeignWindow()
+
+    class Visualizer:
+        viewer = meshcat.Visualizer(window=window)
+
+    make(visualizer=Visualizer())
+    assert window.commands
+    with pytest.raises(InvalidParameter, match="visualizer"):
+        Live(BallPlayer(), visualizer="http://127.0.0.1:7000")
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, np.nan, np.inf])
+def test_a_speed_that_is_none_is_refused(speed):
+    with pytest.raises(InvalidParameter, match="speed"):
+        Live(BallPlayer(), speed=speed)
+
+
+def test_what_can_be_previewed():
+    player = BallPlayer()
+    assert player_of(player) is player
+    with pytest.raises(InvalidParameter, match="must be a scenario"):
+        player_of(7)
+    with pytest.raises(NameNotFound, match="fingertip_on_blade"):
+        player_of("no_such_scenario")
+    with pytest.raises(InvalidParameter, match="speed"):
+        preview(player, speed=100.0)
+
+
+def test_preview_tells_the_address_and_ends(monkeypatch):
+    opened, told = [], []
+    monkeypatch.setattr(live_module.opening, "open_browser", opened.append)
+    monkeypatch.setattr(Live, "run", lambda live: live.stop())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        preview(BallPlayer(), told=told.append)
+    assert told == opened
+    assert told[0].startswith("http://127.0.0.1:")
+    preview(BallPlayer(), told=told.append, open=False)
+    assert len(opened) == 1
+
+
+def test_the_page_offers_no_more_frames_than_it_draws():
+    assert 1.0 / FPS < BUDGET < 1.0 / 30.0

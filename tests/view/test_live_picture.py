@@ -1,0 +1,188 @@
+"""What only the live picture has: friction cones, growing trails, spheres that change size."""
+
+from types import SimpleNamespace
+
+import meshcat
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin.contact import CoulombFriction
+from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown
+from sphshell_pin.view.live.window import LiveWindow
+from tests.view.live_player import ArmPlayer, BallPlayer
+from tests.view.stand_ins import ball_configuration, ball_model, contact_pair, plate
+from tests.view.test_live_window import Browser
+
+
+class Easel:
+    """A picture of a player, and what a browser sees of it."""
+
+    def __init__(self, player):
+        self.player, window = player, LiveWindow()
+        self.picture = Picture(player, meshcat.Visualizer(window=window))
+        self.browser = Browser(window)
+        self.window = window
+
+    def draw(self, push=None):
+        self.picture.update(self.player, push)
+        self.window.commit()
+        return self.browser.look()
+
+    def where(self, name):
+        return self.draw().matrices[f"/meshcat/{name}"]
+
+
+def test_the_rim_of_a_cone_is_the_limit_of_friction():
+    easel = Easel(BallPlayer(friction=CoulombFriction(0.4, 0.3, 0.01, 0.1)))
+    easel.draw()
+    easel.picture.show("cones", True)
+    contacts, scale = easel.player.contacts, easel.draw() and easel.picture.arrow_scale
+    force = contacts.normal_force[0] * scale.metres_per_newton
+    cone = easel.where("cones/cone_0")
+    # three.js's cone lies along y from -1/2, the apex, to 1/2, a rim of radius one.
+    np.testing.assert_allclose((cone @ [0, -0.5, 0, 1])[:3], contacts.point_world[0], atol=1e-6)
+    rim = (cone @ [1.0, 0.5, 0, 1])[:3] - contacts.point_world[0]
+    np.testing.assert_allclose(rim[2], force, rtol=1e-5)
+    np.testing.assert_allclose(np.hypot(rim[0], rim[1]), 0.4 * force, rtol=1e-5)
+    easel.player.q = np.array([0.0, 0.0, 1.0])
+    assert np.abs(easel.where("cones/cone_0")[:3, :3]).max() < 1e-5
+
+
+def test_a_sphere_that_changes_size_is_drawn_anew_and_nothing_else_is():
+    easel = Easel(BallPlayer())
+    easel.draw()
+    easel.player.change("radius", 0.04)
+    log = easel.draw().log
+    redrawn = [c["path"] for c in log if c["type"] == "set_object"]
+    assert redrawn
+    assert all(path.startswith("/meshcat/spheres/") for path in redrawn)
+    (ball,) = [c for c in log if c.get("path", "").endswith("/ball")]
+    assert ball["object"]["geometries"][0]["radius"] == 0.04
+    assert easel.draw().log == []
+
+
+def test_a_trail_grows_on_its_shell_and_moves_with_it():
+    model = ball_model()
+    player = SimpleNamespace(
+        scene=SimpleNamespace(
+            model=model, pairs=(contact_pair(model, "ball", 0.05, plate(), "table"),)
+        ),
+        visual_model=None,
+        q=ball_configuration([0.0, 0.0, 0.05]),
+    )
+
+    def touch(point):
+        player.contacts = BallPlayer().contacts
+        columns = {name: getattr(player.contacts, name) for name in player.contacts.__annotations__}
+        player.contacts = type(player.contacts)(**columns | {"point_world": np.array([point])})
+
+    touch([0.0, 0.0, 0.0])
+    easel = Easel(player)
+    angles = np.linspace(0.0, 1.0, 200)
+    for angle in angles:
+        # The table turns below a contact that stands still: on the table it runs on an arc.
+        player.q = ball_configuration([0.3, 0.0, 0.05], angle)
+        touch([0.3, 0.0, 0.0])
+        easel.draw()
+    pieces = [o for path, o in easel.browser.objects.items() if "/trail/" in path]
+    assert len(pieces) > 1
+    points = np.vstack(
+        [
+            np.frombuffer(
+                o["geometries"][0]["data"]["attributes"]["position"]["array"].data, "<f4"
+            ).reshape(-1, 3)
+            for o in pieces
+        ]
+    )
+    radius = np.hypot(points[:, 0], points[:, 1])
+    np.testing.assert_allclose(radius, 0.3, atol=2.0 * easel.picture.display.trail_width)
+    seen = -np.arctan2(points[:, 1], points[:, 0])
+    assert seen.min() < 0.02
+    assert seen.max() > 0.95
+    easel.picture.clear()
+    easel.draw()
+    assert not any("/trail/" in path for path in easel.browser.objects)
+
+
+def test_a_contact_that_jumps_starts_another_piece():
+    player = BallPlayer()
+    easel = Easel(player)
+    for start in (-0.4, 0.3):
+        for x in np.linspace(start, start + 0.05, 30):
+            player.q = np.array([x, 0.0, 0.049])
+            easel.draw()
+    for path, drawn in easel.browser.objects.items():
+        if "/trail/" in path:
+            data = drawn["geometries"][0]["data"]["attributes"]["position"]["array"].data
+            x = np.frombuffer(data, "<f4")[::3]
+            assert np.ptp(x) < 0.1
+
+
+@pytest.mark.parametrize("part", LIVE_PARTS)
+def test_every_part_can_be_hidden_and_shown(part):
+    easel = Easel(BallPlayer())
+    easel.draw()
+    for on in (False, True):
+        easel.picture.show(part, on)
+        easel.draw()
+        told = [v for (_, name), v in easel.browser.properties.items() if name == "visible"]
+        assert (not on or part == "patches") in told or on in told
+        assert easel.picture.shown[part] is on
+
+
+def test_patches_have_colours_of_their_own():
+    easel = Easel(BallPlayer())
+    easel.picture.show("patches", True)
+    easel.draw()
+    (drawn,) = [o for path, o in easel.browser.objects.items() if path.endswith("/patches")]
+    attributes = drawn["geometries"][0]["data"]["attributes"]
+    assert drawn["materials"][0]["vertexColors"]
+    positions, colors = (
+        np.frombuffer(attributes[name]["array"].data, "<f4") for name in ("position", "color")
+    )
+    assert len(colors) == len(positions)
+    assert 0.0 < colors.min() <= colors.max() < 1.0
+
+
+def test_a_push_is_an_arrow_from_the_body():
+    easel = Easel(BallPlayer())
+    easel.draw(PushShown.at(np.array([0.0, 0.0, 0.2]), np.array([3.0, 0.0, 0.0])))
+    shaft = easel.browser.matrices["/meshcat/push/total_0/shaft"]
+    np.testing.assert_allclose((shaft @ [0, -0.5, 0, 1])[:3], [0.0, 0.0, 0.2], atol=1e-6)
+    assert (shaft @ [0, 0.5, 0, 1])[0] > 0.01
+    easel.draw(None)
+    assert np.abs(easel.browser.matrices["/meshcat/push/total_0/shaft"][:3, :3]).max() < 1e-5
+
+
+def test_the_scale_of_arrows_is_found_once_and_then_kept():
+    player = BallPlayer()
+    easel = Easel(player)
+    for _ in range(60):
+        easel.draw()
+    found = easel.picture.arrow_scale
+    player.change("stiffness", 5e4)
+    for _ in range(60):
+        easel.draw()
+    assert easel.picture.arrow_scale == found
+    easel.picture.magnify_arrows(2.0)
+    easel.draw()
+    assert easel.picture.arrow_scale.metres_per_newton == pytest.approx(
+        2.0 * found.metres_per_newton
+    )
+    easel.picture.magnify_arrows(1.0)
+    easel.picture.clear()
+    for _ in range(60):
+        easel.draw()
+    assert easel.picture.arrow_scale.reference_force > found.reference_force
+
+
+def test_the_robot_is_placed_as_pinocchio_places_it():
+    player = ArmPlayer(mesh_scale=[1.0, 2.0, 3.0])
+    model, geometry = player.scene.model, player.visual_model
+    seen = Easel(player).draw().matrices
+    data, placed = model.createData(), geometry.createData()
+    pin.updateGeometryPlacements(model, data, geometry, placed, player.q)
+    for index, body in enumerate(geometry.geometryObjects):
+        expected = placed.oMg[index].homogeneous @ np.diag([*body.meshScale, 1.0])
+        np.testing.assert_allclose(seen[f"/meshcat/robot/visuals/{body.name}"], expected, atol=1e-6)

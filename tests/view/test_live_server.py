@@ -1,0 +1,303 @@
+"""The server against browsers of all kinds: several, slow, late, gone, hostile."""
+
+import asyncio
+import json
+import socket
+import threading
+import time
+
+import pytest
+from tornado.httpclient import HTTPClientError
+
+from sphshell_pin.errors import InvalidParameter, SphshellError
+from sphshell_pin.view.live import Live
+from sphshell_pin.view.live.events import LARGEST_MESSAGE
+from tests.view.live_client import Client, get
+from tests.view.live_player import BallPlayer
+from tests.view.test_live_events import BAD
+
+
+@pytest.fixture
+def live():
+    with Live(BallPlayer()) as running:
+        yield running
+
+
+def goes_on(live, seconds=0.3):
+    """Tell whether simulated time passes."""
+    before = live.player.time
+    time.sleep(seconds)
+    return live.player.time > before + 0.1 * seconds
+
+
+def test_the_page_is_served_whole_and_nothing_else(live):
+    status, page, headers = get(live.url)
+    assert status == 200
+    assert "default-src 'self'" in headers["Content-Security-Policy"]
+    for name in ("style.css", "page.js", "scene.js", "chart.js", "controls.js", "viewer.js"):
+        status, body, _ = get(live.url + name)
+        assert status == 200
+        assert body
+    text = page.decode()
+    assert "http://" not in text
+    assert "https://" not in text
+    for name in ("server.py", "..%2fserver.py", "%2e%2e/loop.py", "/etc/passwd", "page/index.html"):
+        assert get(live.url + name)[0] == 404
+
+
+def test_other_sites_are_refused(live):
+    async def connects(**headers):
+        client = Client(live.url)
+        try:
+            await client.open(**headers)
+        except HTTPClientError as refused:
+            return refused.code
+        client.socket.close()
+        return 101
+
+    async def visit():
+        host = f"127.0.0.1:{live.server.port}"
+        assert await connects(Origin=f"http://{host}") == 101
+        assert await connects() == 101  # a program, not a page
+        assert await connects(Origin="http://evil.example") == 403
+        assert await connects(Origin="null") == 403
+        assert await connects(Origin=f"http://127.0.0.1:{live.server.port + 1}") == 403
+        # A name of the other site's own that was made to lead here.
+        rebound = f"evil.example:{live.server.port}"
+        assert await connects(Origin=f"http://{rebound}", Host=rebound) == 403
+
+    asyncio.run(visit())
+    assert get(live.url, Host="evil.example")[0] == 403
+
+
+def test_a_late_browser_gets_the_whole_scene(live):
+    async def visit():
+        async with Client(live.url) as early:
+            await early.until(lambda c: len(c.scenes) > 10)
+            async with Client(live.url) as late:
+                await late.until(lambda c: c.scenes and c.state and c.rows)
+                return early, late
+
+    early, late = asyncio.run(visit())
+    kinds = [command["type"] for command in late.scenes[0]]
+    assert kinds.count("set_object") >= len(
+        [c for c in early.scenes[0] if c["type"] == "set_object"]
+    )
+    assert "move" in kinds
+    assert late.hello["title"] == BallPlayer.title
+    # Of the strip it gets what was there before it came.
+    assert late.rows[0][0] < 0.1
+
+
+def test_several_browsers_follow_each_other(live):
+    async def visit():
+        async with Client(live.url) as one, Client(live.url) as two:
+            await one.until(lambda c: c.state)
+            await one.say("knob", key="stiffness", value=7000.0)
+            await one.say("speed", value=0.5)
+            await one.say("show", part="trails", on=False)
+            await two.until(lambda c: c.state and c.state["speed"] == 0.5)
+            assert two.state["knobs"]["stiffness"] == 7000.0
+            assert two.state["show"]["trails"] is False
+            await two.say("run", on=False)
+            await one.until(lambda c: not c.state["running"])
+
+    asyncio.run(visit())
+    assert live.player.knob_values["stiffness"] == 7000.0
+
+
+@pytest.mark.parametrize("message", BAD.values(), ids=BAD.keys())
+def test_no_message_stops_the_run(live, message):
+    async def visit():
+        async with Client(live.url) as client, Client(live.url) as other:
+            await client.socket.write_message(message, binary=isinstance(message, bytes))
+            await client.until(lambda c: c.errors)
+            await other.until(lambda c: len(c.scenes) > 3)
+            return client, other
+
+    client, other = asyncio.run(visit())
+    assert len(client.errors) == 1
+    assert other.errors == []
+    assert goes_on(live)
+
+
+def test_a_message_beyond_all_measure_only_ends_its_own_connection(live):
+    async def visit():
+        async with Client(live.url) as client, Client(live.url) as other:
+            await client.socket.write_message(100 * LARGEST_MESSAGE * "x")
+            await client.until(lambda _: False)
+            assert client.closed
+            await other.until(lambda c: len(c.scenes) > 3)
+
+    asyncio.run(visit())
+    assert goes_on(live)
+
+
+def test_a_flood_is_answered_and_survived(live):
+    async def visit():
+        async with Client(live.url) as client:
+            await client.until(lambda c: c.state)
+            for k in range(6_000):
+                client.say("knob", key="stiffness", value=1000.0 + k)
+            await client.say("reset")
+            await client.until(lambda c: c.state["knobs"]["stiffness"] == 6999.0 or c.errors)
+
+    asyncio.run(visit())
+    assert goes_on(live)
+
+
+def test_wrong_names_and_values_are_told_to_the_one_who_asked(live):
+    async def visit():
+        async with Client(live.url) as client, Client(live.url) as other:
+            for kind, fields, words in (
+                ("knob", {"key": "no_such", "value": 1.0}, "stiffness, radius"),
+                ("knob", {"key": "stiffness", "value": -1.0}, "must be positive"),
+                ("show", {"part": "hat", "on": True}, "cones"),
+                ("hold", {"body": "x", "direction": [1, 0, 0], "newtons": 1.0}, "ball"),
+                ("seek", {"t": 1.0}, "finished run"),
+            ):
+                client.errors.clear()
+                await client.say(kind, **fields)
+                await client.until(lambda c: c.errors)
+                assert words in client.errors[0]
+                assert "\n" not in client.errors[0]
+            await other.until(lambda c: len(c.scenes) > 3)
+            assert other.errors == []
+
+    asyncio.run(visit())
+    assert live.player.knob_values["stiffness"] == 5e3
+    assert goes_on(live)
+
+
+def raw_socket(live):
+    """Connect, and never read."""
+    connection = socket.create_connection(("127.0.0.1", live.server.port))
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    connection.sendall(
+        b"GET /socket HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n"
+        b"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+    return connection
+
+
+def test_a_browser_that_never_reads_holds_up_nobody(live):
+    deaf = raw_socket(live)
+
+    async def visit():
+        async with Client(live.url) as client:
+            await client.until(lambda c: len(c.scenes) > 60)
+            first, start = len(client.scenes), time.monotonic()
+            while time.monotonic() < start + 1.0:
+                await client.read()
+            return len(client.scenes) - first
+
+    while not live.server.watched:
+        time.sleep(0.01)
+    frames = asyncio.run(visit())
+    assert frames > 10  # far below what an idle machine shows
+    assert goes_on(live)
+    deaf.close()
+
+
+def test_a_browser_that_answers_late_skips_frames_and_gets_the_newest(live):
+    async def visit():
+        async with Client(live.url, answers=False) as slow, Client(live.url) as fast:
+            await fast.until(lambda c: len(c.scenes) > 80)
+            while True:
+                try:
+                    await asyncio.wait_for(slow.read(), 0.05)
+                except TimeoutError:
+                    break
+            return slow, fast
+
+    slow, fast = asyncio.run(visit())
+    assert 1 <= len(slow.scenes) < 0.5 * len(fast.scenes)
+
+
+def test_a_tab_that_is_closed_lets_go_what_it_held(live):
+    async def hold():
+        async with Client(live.url) as client:
+            await client.until(lambda c: c.state)
+            await client.say("hold", body="ball", direction=[1, 0, 0], newtons=2.0)
+            await client.until(lambda _: live.player.force[0] == 2.0)
+
+    asyncio.run(hold())
+    deadline = time.monotonic() + 10.0
+    while live.player.time < live.player.push_end and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert live.player.time >= live.player.push_end
+    assert not live.server.watched
+
+
+def test_browsers_that_come_and_go_leave_nothing_behind(live):
+    async def visit():
+        for _ in range(15):
+            client = await Client(live.url).open()
+            await client.read()
+            client.socket.close()
+
+    asyncio.run(visit())
+    deadline = time.monotonic() + 10.0
+    while live.server.watched and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not live.server.clients
+
+
+def test_the_end_is_told():
+    async def visit():
+        live = Live(BallPlayer()).start()
+        async with Client(live.url) as client:
+            await client.until(lambda c: c.state)
+            ending = threading.Thread(target=live.stop)
+            ending.start()
+            await client.until(lambda _: False)
+            ending.join()
+            return client
+
+    client = asyncio.run(visit())
+    assert client.ends == 1
+    assert client.closed
+
+
+def test_a_server_that_comes_back_on_its_port_is_another_session():
+    first = Live(BallPlayer()).start()
+    port = first.server.port
+
+    async def session(url):
+        async with Client(url) as client:
+            await client.until(lambda c: c.hello)
+            return client.hello["session"]
+
+    before = asyncio.run(session(first.url))
+    first.stop()
+    with Live(BallPlayer(), port=port) as second:
+        assert second.url == first.url
+        assert asyncio.run(session(second.url)) != before
+
+
+def test_a_busy_port_is_one_sentence(live):
+    with pytest.raises(SphshellError) as told:
+        Live(BallPlayer(), port=live.server.port)
+    assert str(live.server.port) in str(told.value)
+    assert "another port" in str(told.value)
+    assert "\n" not in str(told.value)
+    with pytest.raises(SphshellError, match=r"cannot be served at no\.such\.host"):
+        Live(BallPlayer(), host="no.such.host.invalid")
+
+
+@pytest.mark.parametrize("port", [-1, 65536, True, "80"])
+def test_a_port_that_is_none_is_refused(port):
+    with pytest.raises(InvalidParameter, match="port"):
+        Live(BallPlayer(), port=port)
+
+
+def test_answers_carry_json_that_browsers_read(live):
+    live.player.residual, live.player.exchanged = float("nan"), 0.0
+
+    async def visit():
+        async with Client(live.url) as client:
+            await client.until(lambda c: c.state and c.state["residual"] is None)
+            return json.dumps(client.state, allow_nan=False)
+
+    assert '"relative": null' in asyncio.run(visit())
