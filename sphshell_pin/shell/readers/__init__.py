@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sphshell_pin.checks import check_type
 from sphshell_pin.errors import InvalidParameter, ShellFileError
+from sphshell_pin.shell.cad.options import CAD_SUFFIXES
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers.mesh import read_obj, read_off, read_stl
 from sphshell_pin.shell.readers.ply import read_ply
@@ -23,7 +24,7 @@ READERS: dict[str, Callable[[Path], RawSurface]] = {
 }
 """Readers of formats that carry no unit; .shl carries one and has a reader of its own."""
 
-SUFFIXES = (*READERS, ".shl")
+SUFFIXES = (*READERS, ".shl", *CAD_SUFFIXES)
 
 
 def reader_for(path: str | os.PathLike[str]) -> tuple[Path, str]:

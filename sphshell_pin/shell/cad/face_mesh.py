@@ -1,0 +1,369 @@
+"""The triangles of one CAD face, and how far they are from its exact surface.
+
+OpenCASCADE's deflection is no guarantee, so the distance is measured: at points inside each
+triangle and along each side against the surface, and along the border against its exact curves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+from OCP.GeomAbs import GeomAbs_C0, GeomAbs_Line, GeomAbs_Plane
+from OCP.gp import gp_Pnt, gp_Vec
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS
+
+from sphshell_pin.shell.cad.model import subshapes
+from sphshell_pin.shell.raw import Floats, Longs, Mask
+
+ALONG = (0.25, 0.5, 0.75)
+"""Where along a side the distance is measured."""
+
+MOST_STEPS = 8
+"""Of Newton's method towards a foot point; it starts next to it."""
+
+MOST_TURN = 0.7
+"""The surface may turn by this along a side inside a face [rad]; curved elements need it small."""
+
+TURN_ROUNDS = 3
+"""Times sides are halved for that: along a kink the turn never falls."""
+
+SINGULAR = 1e-10
+"""Where |du x dv| is below this share of the largest |du| |dv|, a surface has no normal."""
+
+LIMIT_STEP = 1e-4
+"""Part of the way to the middle of the triangle at which the limit of a normal is taken."""
+
+
+class FaceSurface:
+    """The surface below a face: points and derivatives at many places at once."""
+
+    def __init__(self, face: Any) -> None:
+        self._surface = BRepAdaptor_Surface(face)
+        surface = self._surface
+        self.low = np.array([surface.FirstUParameter(), surface.FirstVParameter()])
+        self.high = np.array([surface.LastUParameter(), surface.LastVParameter()])
+        # Round a closed surface a way may lead across its seam.
+        endless = np.array([surface.IsUPeriodic(), surface.IsVPeriodic()])
+        self._lowest = np.where(endless, -np.inf, self.low)
+        self._highest = np.where(endless, np.inf, self.high)
+        self._scale = 0.0
+        self.flat = surface.GetType() == GeomAbs_Plane
+        self.kinked = GeomAbs_C0 in (surface.UContinuity(), surface.VContinuity())
+
+    def nodes(self, uv: Floats) -> tuple[Floats, Floats]:
+        """Points and unit normals (n, 3) at parameters uv (n, 2); zero where there is no normal."""
+        points, by_u, by_v = self.derivatives(uv)
+        normal = np.cross(by_u, by_v)
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        largest = np.linalg.norm(by_u, axis=1, keepdims=True)
+        largest = largest * np.linalg.norm(by_v, axis=1, keepdims=True)
+        if self._scale == 0.0:
+            self._scale = float(largest.max(initial=0.0))
+        defined = length > SINGULAR * self._scale
+        return points, np.where(defined, normal / np.where(defined, length, 1.0), 0.0)
+
+    def derivatives(self, uv: Floats) -> tuple[Floats, Floats, Floats]:
+        """Points and derivatives by u and by v at parameters uv (n, 2), (n, 3) each."""
+        place, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
+        rows, first = [], self._surface.D1
+        for u, v in uv.tolist():
+            first(u, v, place, by_u, by_v)
+            rows.append(place.Coord() + by_u.Coord() + by_v.Coord())
+        table = np.array(rows).reshape(-1, 9)
+        return table[:, :3], table[:, 3:6], table[:, 6:]
+
+    def distances(self, points: Floats, uv: Floats, tolerance: float) -> Floats:
+        """Distances (n,) of points next to the surface at uv (n, 2), without its trimming.
+
+        Newton's steps go on while they are longer than `tolerance`: less changes the distance by
+        far less, as the surface is nearly flat within it.
+        """
+        distance = np.full(len(points), np.inf)
+        at, left = uv.copy(), np.arange(len(points))
+        for _ in range(MOST_STEPS):
+            place, by_u, by_v = self.derivatives(at[left])
+            offset = points[left] - place
+            uu, vv, mixed = (_dot(a, b) for a, b in ((by_u, by_u), (by_v, by_v), (by_u, by_v)))
+            along_u, along_v = _dot(offset, by_u), _dot(offset, by_v)
+            area = uu * vv - mixed * mixed
+            regular = area > 1e-20 * uu * vv
+            area = np.where(regular, area, 1.0)
+            step = np.stack([along_u * vv - along_v * mixed, along_v * uu - along_u * mixed], 1)
+            step = np.where(regular, step.T / area, 0.0).T
+            moved = step[:, :1] * by_u + step[:, 1:] * by_v
+            # To the tangent plane if it is near, to the point itself in any case.
+            near = np.linalg.norm(moved, axis=1) <= tolerance
+            away = np.linalg.norm(np.where(near[:, None], offset - moved, offset), axis=1)
+            distance[left] = np.minimum(distance[left], away)
+            at[left] = np.clip(at[left] + step, self._lowest, self._highest)
+            left = left[~near & regular]
+            if left.size == 0:
+                break
+        return distance
+
+
+@dataclass(frozen=True)
+class Border:
+    """The sides along one edge of a face.
+
+    `nodes` (b,), their parameters `at` (b,), and the exact `curve` on the face's surface.
+    """
+
+    nodes: Longs
+    at: Floats
+    curve: Any
+
+    def error(self, points: Floats) -> float:
+        """Largest distance of the curve from the polyline through `points` of the nodes."""
+        corners = points[self.nodes]
+        if self.curve.GetType() == GeomAbs_Line:
+            ends = np.array([self.curve.Value(t).Coord() for t in (self.at[0], self.at[-1])])
+            return float(np.linalg.norm(corners[[0, -1]] - ends, axis=1).max())
+        start, way = corners[:-1], np.diff(corners, axis=0)
+        shares = np.array((0.0, *ALONG))[:, None]
+        places = ((1.0 - shares) * self.at[:-1] + shares * self.at[1:]).ravel()
+        exact = np.array([self.curve.Value(t).Coord() for t in places.tolist()]).reshape(-1, 3)
+        own = np.tile(np.arange(len(start)), len(shares))
+        away = _to_segments(exact, start[own], way[own])
+        # Where curve and polyline run at different speeds, another side is the nearest. The
+        # farthest first: it seldom takes more than a few to know the largest distance.
+        largest = 0.0
+        for k in np.argsort(-away):
+            if away[k] <= largest:
+                break
+            largest = max(largest, float(_to_segments(exact[k], start, way).min()))
+        return largest
+
+
+@dataclass(frozen=True)
+class FaceMesh:
+    """Triangles of one face.
+
+    Attributes
+    ----------
+    surface : the exact one below
+    points : (n, 3) nodes [units of the model]
+    exact : (n, 3) the surface at the nodes' parameters: the same points, but for the tolerance of
+        the file along the border
+    uv : (n, 2) parameters
+    free : (n, 2) where a parameter means nothing, as one does at the pole of a sphere
+    normals : (n, 3) unit, along du x dv, zero where the surface has none
+    triangles : (t, 3) nodes, anticlockwise in uv
+    borders : the sides along each edge of the face
+    reversed : the face's outer side is where du x dv points away from
+    """
+
+    surface: FaceSurface
+    points: Floats
+    exact: Floats
+    uv: Floats
+    free: Mask
+    normals: Floats
+    triangles: Longs
+    borders: tuple[Border, ...]
+    reversed: bool
+
+    @property
+    def border_nodes(self) -> Longs:
+        """Nodes on the border, ascending."""
+        rows = [border.nodes for border in self.borders]
+        return np.unique(np.concatenate(rows)) if rows else np.zeros(0, np.int64)
+
+    def border_error(self, tolerance: float) -> float:
+        """Largest distance of the exact border from its sides, of its nodes from the surface."""
+        nodes = self.border_nodes
+        off = self.surface.distances(self.points[nodes], self.uv[nodes], tolerance)
+        sides = [border.error(self.points) for border in self.borders]
+        return max(float(off.max(initial=0.0)), *sides, 0.0)
+
+    def sides(self) -> tuple[Longs, Longs]:
+        """Sides (s, 2) as pairs of nodes, and the three (t, 3) of each triangle."""
+        ends = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], axis=2)
+        keys, place = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+        return keys, place.reshape(-1, 3)
+
+    def refined(self, tolerance: float, rounds: int) -> tuple[FaceMesh, float]:
+        """Halve sides inside the face until all points measured are within `tolerance`.
+
+        Also where the surface turns by more than MOST_TURN along a side, a few times. Returns the
+        mesh and the largest distance measured. Sides on the border stay: the face across them has
+        the same.
+        """
+        mesh, largest, known = self, 0.0, 0
+        if self.surface.flat:
+            return self, float(np.linalg.norm(self.points - self.exact, axis=1).max(initial=0.0))
+        for turn in range(rounds + 1):
+            sides, of_triangle = mesh.sides()
+            at_sides, middles = mesh._errors(sides, of_triangle, known, tolerance)
+            inner = np.bincount(of_triangle.ravel(), minlength=len(sides)) == 2
+            marked = np.zeros(len(sides), np.bool_)
+            if turn < rounds:
+                marked = mesh._too_long(sides, at_sides > tolerance, turn)
+                # A triangle too far in its middle alone: its longest side inside the face.
+                length = np.linalg.norm(mesh.points[sides[:, 0]] - mesh.points[sides[:, 1]], axis=1)
+                longest = np.argmax(np.where(inner, length, -1.0)[of_triangle], axis=1)
+                wanted = (middles > tolerance) & ~(marked & inner)[of_triangle].any(axis=1)
+                marked[of_triangle[wanted, longest[wanted]]] = True
+                marked &= inner
+            whole = ~marked[of_triangle].any(axis=1)
+            kept = (at_sides[~marked].max(initial=0.0), middles[whole].max(initial=0.0))
+            largest = max(largest, float(max(kept)))
+            if not marked.any():
+                break
+            mesh, known = mesh._split(sides, of_triangle, marked), int(whole.sum())
+        return mesh, largest
+
+    def corner_normals(self) -> Floats:
+        """Exact unit normals (t, 3, 3) at the corners, on the face's outer side.
+
+        Where the surface has none, as at the pole of a sphere or the tip of a cone, or several, as
+        along a kink, it is the limit on the way from the middle of the triangle.
+        """
+        corners = self.normals[self.triangles]
+        limits: Mask = np.asarray(~corners.any(axis=2) | self.surface.kinked, np.bool_)
+        if limits.any():
+            corners[limits] = self._limits(limits)
+        return -corners if self.reversed else corners
+
+    def parameters(self, nodes: Longs) -> Floats:
+        """Parameters (k, c, 2) of the c nodes of k sides or triangles.
+
+        A pole takes those of the other nodes, so that what lies between them is on the way.
+        """
+        uv, free = self.uv[nodes], self.free[nodes]
+        if not free.any():
+            return np.asarray(uv)
+        count = (~free).sum(axis=1, keepdims=True)
+        mean = np.where(free, 0.0, uv).sum(axis=1, keepdims=True) / np.maximum(count, 1)
+        return np.where(free & (count > 0), mean, uv)
+
+    def _errors(
+        self, sides: Longs, of_triangle: Longs, known: int, tolerance: float
+    ) -> tuple[Floats, Floats]:
+        """Largest distance to the surface along each side and at each middle; 0 where `known`.
+
+        known : number of triangles, the first ones, that were measured before
+        """
+        at_sides, middles = np.zeros(len(sides)), np.zeros(len(self.triangles))
+        fresh = np.unique(of_triangle[known:])
+        ends = sides[fresh]
+        between = self.parameters(ends)
+        for share in ALONG:
+            points = (1.0 - share) * self.points[ends[:, 0]] + share * self.points[ends[:, 1]]
+            uv = (1.0 - share) * between[:, 0] + share * between[:, 1]
+            off = self.surface.distances(points, uv, tolerance)
+            at_sides[fresh] = np.maximum(at_sides[fresh], off)
+        new = self.triangles[known:]
+        points, uv = self.points[new].mean(axis=1), self.parameters(new).mean(axis=1)
+        middles[known:] = self.surface.distances(points, uv, tolerance)
+        return at_sides, middles
+
+    def _too_long(self, sides: Longs, far: Mask, turn: int) -> Mask:
+        """Sides that are `far` from the surface, or along which it turns too much."""
+        if turn >= TURN_ROUNDS:
+            return far
+        first, second = self.normals[sides[:, 0]], self.normals[sides[:, 1]]
+        defined = first.any(axis=1) & second.any(axis=1)
+        turned: Mask = defined & (_dot(first, second) < np.cos(MOST_TURN))
+        return far | turned
+
+    def _split(self, sides: Longs, of_triangle: Longs, marked: Mask) -> FaceMesh:
+        """Halve the sides where `marked` (s,) holds, with new nodes on the surface."""
+        uv = self.parameters(sides[marked]).mean(axis=1)
+        points, normals = self.surface.nodes(uv)
+        node = np.full(len(sides), -1)
+        node[marked] = len(self.points) + np.arange(len(uv))
+        halves = node[of_triangle]
+        count = (halves >= 0).sum(axis=1)
+        pieces = [self.triangles[count == 0]]
+        for number in (1, 2, 3):
+            corners, middles = self.triangles[count == number], halves[count == number]
+            # Turned so that a lone half is on the first side, a lone whole on the last.
+            lone = (middles >= 0) if number == 1 else (middles < 0)
+            first = np.argmax(lone, axis=1) + (1 if number == 2 else 0)
+            turn = (first[:, None] + np.arange(3)) % 3
+            a, b, c = np.take_along_axis(corners, turn, axis=1).T
+            ab, bc, ca = np.take_along_axis(middles, turn, axis=1).T
+            rows = {
+                1: [(a, ab, c), (ab, b, c)],
+                2: [(ab, b, bc), (a, ab, bc), (a, bc, c)],
+                3: [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)],
+            }[number]
+            pieces += [np.stack(row, axis=1) for row in rows]
+        return replace(
+            self,
+            points=np.concatenate([self.points, points]),
+            exact=np.concatenate([self.exact, points]),
+            uv=np.concatenate([self.uv, uv]),
+            free=np.concatenate([self.free, np.zeros((len(uv), 2), np.bool_)]),
+            normals=np.concatenate([self.normals, normals]),
+            triangles=np.concatenate(pieces),
+        )
+
+    def _limits(self, chosen: Mask) -> Floats:
+        uv = self.parameters(self.triangles)
+        start = uv[chosen]
+        way = np.broadcast_to(uv.mean(axis=1)[:, None], uv.shape)[chosen] - start
+        near, far = (self.surface.nodes(start + k * LIMIT_STEP * way)[1] for k in (1.0, 2.0))
+        # Carried on from two places on the way, the limit is exact to second order.
+        limit = 2.0 * near - far
+        length = np.linalg.norm(limit, axis=1, keepdims=True)
+        return np.asarray(limit / np.where(length > 0.0, length, 1.0))
+
+
+def take_mesh(face: Any) -> FaceMesh | None:
+    """Return the triangles that OpenCASCADE has laid on a face, None if it could not."""
+    location = TopLoc_Location()
+    found = BRep_Tool.Triangulation_s(face, location)
+    if found is None or found.NbTriangles() == 0 or not found.HasUVNodes():
+        return None
+    place = location.Transformation()
+    count = range(1, found.NbNodes() + 1)
+    uv = np.array([found.UVNode(k).Coord() for k in count])
+    rows = [found.Triangle(k).Get() for k in range(1, found.NbTriangles() + 1)]
+    surface = FaceSurface(face)
+    exact, normals = surface.nodes(uv)
+    lengths = np.stack([np.linalg.norm(by, axis=1) for by in surface.derivatives(uv)[1:]], axis=1)
+    return FaceMesh(
+        surface=surface,
+        points=np.array([found.Node(k).Transformed(place).Coord() for k in count]),
+        exact=exact,
+        uv=uv,
+        free=lengths <= SINGULAR * lengths.max(axis=0),
+        normals=normals,
+        triangles=np.array(rows) - 1,
+        borders=tuple(_borders(face, found, location)),
+        reversed=face.Orientation() == TopAbs_REVERSED,
+    )
+
+
+def _borders(face: Any, found: Any, location: Any) -> Iterator[Border]:
+    for part in subshapes(face, TopAbs_EDGE):
+        edge = TopoDS.Edge(part)
+        polygon = BRep_Tool.PolygonOnTriangulation_s(edge, found, location)
+        if polygon is None or BRep_Tool.Degenerated_s(edge) or not polygon.HasParameters():
+            continue
+        count = range(1, polygon.NbNodes() + 1)
+        yield Border(
+            nodes=np.array([polygon.Node(k) for k in count]) - 1,
+            at=np.array([polygon.Parameter(k) for k in count]),
+            curve=BRepAdaptor_Curve(edge, face),
+        )
+
+
+def _to_segments(point: Floats, start: Floats, way: Floats) -> Floats:
+    """Distances of points (3,) or (n, 3) from segments (n, 3)."""
+    square = np.maximum(_dot(way, way), np.finfo(float).tiny)
+    along = np.clip(_dot(point - start, way) / square, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(point - start - along[:, None] * way, axis=1))
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.einsum("ij,ij->i", a, b))

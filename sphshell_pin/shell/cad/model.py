@@ -1,0 +1,143 @@
+"""The faces of a CAD model: where each belongs, what it is called, and how to choose among them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from OCP.Bnd import Bnd_Box
+from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepBndLib import BRepBndLib
+from OCP.collections import (
+    IndexedDataMap_TopoDS_Shape_List_TopoDS_Shape_TopTools_ShapeMapHasher as AncestorMap,
+)
+from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
+from OCP.TopExp import TopExp, TopExp_Explorer
+from OCP.TopoDS import TopoDS, TopoDS_Compound
+
+from sphshell_pin.errors import NameNotFound
+
+LARGEST = 1
+"""Which tolerance ShapeAnalysis_ShapeTolerance is to tell: the largest, not the mean."""
+
+
+@dataclass(frozen=True)
+class CadFace:
+    """One trimmed face.
+
+    `shape` (a TopoDS_Face), its `name`, its `number` in the file from 1, and the row of the `body`
+    it belongs to.
+    """
+
+    shape: Any
+    name: str
+    number: int
+    body: int
+
+
+@dataclass(frozen=True)
+class CadModel:
+    """What a CAD file holds.
+
+    Attributes
+    ----------
+    path : of the file
+    faces : in the order of the file
+    bodies : name of each body
+    solids : shape of each body, a solid if the file has one
+    unit : name of the header's unit of length, None if the file has none
+    header_metres : metres per unit of the header, None if the file has none
+    metres : metres per unit of `shape`, by the header; 1 if it has none
+    notes : sentences about the reading
+    """
+
+    path: Path
+    faces: tuple[CadFace, ...]
+    bodies: tuple[str, ...]
+    solids: tuple[Any, ...]
+    unit: str | None
+    header_metres: float | None
+    metres: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def shape(self) -> Any:
+        """All faces as one TopoDS_Compound; borders that faces share stay shared."""
+        return compound([face.shape for face in self.faces])
+
+    @property
+    def tolerance(self) -> float:
+        """The file's own tolerance, the largest of any edge or vertex [units of `shape`]."""
+        return float(ShapeAnalysis_ShapeTolerance().Tolerance(self.shape, LARGEST))
+
+    def selected(self, bodies: Sequence[str] | None, faces: Sequence[str | int] | None) -> CadModel:
+        """Return the model with the bodies and the faces named; with None, with all.
+
+        Raises
+        ------
+        NameNotFound
+            If no body or no face of those bodies has a name; the message lists the valid ones.
+        """
+        kept = self.faces
+        if bodies is not None:
+            for name in bodies:
+                if name not in self.bodies:
+                    raise NameNotFound("body", name, self.path.name, self.bodies)
+            kept = tuple(face for face in kept if self.bodies[face.body] in bodies)
+        if faces is not None:
+            valid = list(dict.fromkeys(face.name for face in kept))
+            numbers = {face.number for face in kept}
+            for face in faces:
+                if face not in (numbers if isinstance(face, int) else valid):
+                    raise NameNotFound("face", str(face), self.path.name, valid)
+            kept = tuple(face for face in kept if face.name in faces or face.number in faces)
+        return replace(self, faces=kept)
+
+
+def compound(shapes: Sequence[Any]) -> Any:
+    """Return one TopoDS_Compound of several shapes."""
+    builder, whole = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(whole)
+    for shape in shapes:
+        builder.Add(whole, shape)
+    return whole
+
+
+def subshapes(shape: Any, kind: Any, avoid: Any = None) -> Iterator[Any]:
+    """Walk the parts of `shape` of one kind, oriented and placed as they stand in it.
+
+    With `avoid`, without those inside a part of that kind.
+    """
+    explorer = (
+        TopExp_Explorer(shape, kind) if avoid is None else TopExp_Explorer(shape, kind, avoid)
+    )
+    while explorer.More():
+        yield explorer.Current()
+        explorer.Next()
+
+
+def faces_of(shape: Any) -> list[Any]:
+    """All faces of a shape, as TopoDS_Face."""
+    return [TopoDS.Face(face) for face in subshapes(shape, TopAbs_FACE)]
+
+
+def count_open_edges(shape: Any) -> int:
+    """How many edges bound only one face, and that once."""
+    owners = AncestorMap()
+    TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, owners)
+    return sum(
+        owners.FindFromIndex(k).Size() == 1
+        and not BRep_Tool.Degenerated_s(TopoDS.Edge(owners.FindKey(k)))
+        for k in range(1, owners.Extent() + 1)
+    )
+
+
+def box_size(shape: Any) -> float:
+    """Diagonal of the box round a shape [its units]; 0 if it is empty."""
+    box = Bnd_Box()
+    # The quick box may be far too large: it holds the poles of the splines.
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    return 0.0 if box.IsVoid() else float(box.SquareExtent() ** 0.5)

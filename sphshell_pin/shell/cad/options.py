@@ -1,0 +1,79 @@
+"""What may be asked of a CAD file, and whether the library that reads one is installed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sphshell_pin.checks import check_positive
+from sphshell_pin.errors import InvalidParameter, MissingExtra
+
+STEP_SUFFIXES = (".step", ".stp")
+IGES_SUFFIXES = (".iges", ".igs")
+BREP_SUFFIXES = (".brep", ".brp")
+CAD_SUFFIXES = (*STEP_SUFFIXES, *IGES_SUFFIXES, *BREP_SUFFIXES)
+
+
+@dataclass(frozen=True)
+class CadOptions:
+    """How a CAD file is turned into elements; None leaves the choice to the file.
+
+    Attributes
+    ----------
+    chord_error : largest distance between the flat elements and the exact surface [m]; 1e-3 of the
+        box diagonal unless given
+    bodies : names of the bodies to take, all unless given
+    faces : names of the faces to take, or their numbers in the file (from 1), all unless given
+    sew : faces whose borders are nearer than this are joined [m], 0 leaves them as they are; unless
+        given, the smallest of a few tolerances that joins the most
+    """
+
+    chord_error: float | None = None
+    bodies: Sequence[str] | None = None
+    faces: Sequence[str | int] | None = None
+    sew: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter if an option is out of range."""
+        if self.chord_error is not None:
+            check_positive("chord_error", self.chord_error, "m")
+        if self.sew is not None:
+            try:
+                fits = 0.0 <= float(self.sew) < math.inf
+            except (TypeError, ValueError):
+                fits = False
+            if not fits:
+                raise InvalidParameter("sew", self.sew, "must be 0 or a tolerance [m]")
+        for name, kinds in (("bodies", (str,)), ("faces", (str, int))):
+            given = getattr(self, name)
+            if given is None:
+                continue
+            listed = isinstance(given, (list, tuple)) and len(given) > 0
+            if not listed or not all(
+                isinstance(one, kinds) and not isinstance(one, bool) for one in given
+            ):
+                what = "names" if name == "bodies" else "names or numbers"
+                raise InvalidParameter(name, given, f"must be a list of {what}, or left out")
+
+    def check_unused(self, suffix: str) -> None:
+        """Raise InvalidParameter if anything was asked for, as `suffix` is of a mesh file."""
+        for name in ("chord_error", "bodies", "faces", "sew"):
+            given = getattr(self, name)
+            if given is not None:
+                raise InvalidParameter(
+                    name,
+                    given,
+                    f"belongs to CAD files ({', '.join(CAD_SUFFIXES)}): leave it out for a "
+                    f"{suffix} file, whose elements are taken as they are",
+                )
+
+
+def require_kernel(purpose: str) -> None:
+    """Raise MissingExtra unless OpenCASCADE can be imported; and keep it from printing."""
+    try:
+        from OCP.Message import Message
+    except ImportError as error:
+        raise MissingExtra("cadquery-ocp-novtk", "cad", purpose) from error
+    # Its readers write their own reports to the standard output.
+    Message.DefaultMessenger_s().ChangePrinters().Clear()

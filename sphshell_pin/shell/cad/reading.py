@@ -1,0 +1,258 @@
+"""STEP, IGES and BREP files: their faces and bodies, with names and the unit of the header."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from OCP.BRep import BRep_Builder
+from OCP.BRepTools import BRepTools
+from OCP.collections import Sequence_TCollection_AsciiString, Sequence_TDF_Label
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.IGESControl import IGESControl_Reader
+from OCP.Interface import Interface_Static
+from OCP.STEPCAFControl import STEPCAFControl_Reader
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDF import TDF_Label
+from OCP.TDocStd import TDocStd_Document
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Shape
+from OCP.XCAFApp import XCAFApp_Application
+from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
+
+from sphshell_pin.errors import InvalidParameter, ShellFileError
+from sphshell_pin.shell.cad.model import CadFace, CadModel, compound, subshapes
+from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES
+from sphshell_pin.units import metres_per_unit
+
+MILLIMETRE = 1e-3
+"""OpenCASCADE's tolerances are meant for numbers in millimetres: STEP and IGES are read in them."""
+
+IGES_FACES = (143, 144, 510)
+"""IGES entities that stand for a face: bounded surface, trimmed surface, face of a solid."""
+
+_NO_NAME = re.compile(r"|NONE|SOLID|COMPOUND|COMPSOLID|SHELL|FACE|=>.*|Open CASCADE STEP tr.*")
+"""What writers put where there is no name."""
+
+_STEP_NAMES = re.compile(
+    rb"(?:FACE|FACE_SURFACE|BREP|BREP_WITH_VOIDS|SURFACE_MODEL|SHELL)\s*\(\s*'([^']+)'"
+)
+"""Names of faces and bodies: to find the entity of a shape takes long, so not without need."""
+
+Part = tuple[str, Any]
+Namer = Callable[[Any], str]
+
+
+def read_model(path: Path) -> CadModel:
+    """Read all faces of a CAD file.
+
+    Raises
+    ------
+    ShellFileError
+        If the file cannot be read, is truncated or damaged, or holds no face.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
+    suffix = path.suffix.lower()
+    kind = "STEP" if suffix in STEP_SUFFIXES else "BREP" if suffix in BREP_SUFFIXES else "IGES"
+    _check_frame(path, kind, data)
+    try:
+        read = {"STEP": _read_step, "IGES": _read_iges, "BREP": _read_brep}[kind]
+        model = read(path, data)
+    except ShellFileError:
+        raise
+    except Exception as error:  # whatever OpenCASCADE throws
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise ShellFileError(path, f"is damaged, it cannot be read as {kind} ({reason})") from error
+    if not model.faces:
+        raise ShellFileError(
+            path, "holds no surface, only curves or points at most: export faces or solids"
+        )
+    return model
+
+
+def _check_frame(path: Path, kind: str, data: bytes) -> None:
+    """See that a file begins and ends as its format has it: half a file may read as a whole."""
+    head, tail = data[:4096].lstrip(b"\xef\xbb\xbf \r\n\t"), data[-4096:].rstrip(b"\0\x1a \r\n\t")
+    if kind == "STEP":
+        begins = head.startswith(b"ISO-10303-21")
+        ends = re.search(rb"END-ISO-10303-21\s*;$", tail) is not None
+        missing = "END-ISO-10303-21"
+    elif kind == "IGES":
+        begins = re.match(rb"[^\r\n]{72}[SFC]", data) is not None
+        ends = re.search(rb"(^|[\r\n])[^\r\n]{72}T *\d+$", tail) is not None
+        missing = "the T line"
+    else:
+        begins = head.startswith((b"DBRep_DrawableShape", b"CASCADE Topology"))
+        ends = re.search(rb"[\r\n][-+ie]\d+ \d+$", tail) is not None
+        missing = "the line of the whole shape"
+    if not begins:
+        raise ShellFileError(path, f"is no {kind} file: it does not begin as one")
+    if not ends:
+        raise ShellFileError(path, f"is truncated: {missing} at its end is missing")
+
+
+def _read_step(path: Path, data: bytes) -> CadModel:
+    reader = STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    reader.SetColorMode(False)
+    Interface_Static.SetCVal_s("xstep.cascade.unit", "MM")  # exists as soon as a reader does
+    document = TDocStd_Document(TCollection_ExtendedString("MDTV-XCAF"))
+    XCAFApp_Application.GetApplication_s().InitDocument(document)
+    if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):
+        raise ShellFileError(path, "is damaged, its STEP entities cannot be read")
+    units = Sequence_TCollection_AsciiString()
+    reader.ChangeReader().FileUnits(
+        units, Sequence_TCollection_AsciiString(), Sequence_TCollection_AsciiString()
+    )
+    unit, metres = _header_unit({unit.ToCString() for unit in units})
+    labels = Sequence_TDF_Label()
+    XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(labels)
+    parts: list[Part] = []
+    for label in labels:
+        _walk(label, TopLoc_Location(), parts)
+    transfer = reader.ChangeReader().WS().TransferReader()
+
+    def name_of(shape: Any) -> str:
+        entity = transfer.EntityFromShapeResult(shape.Located(TopLoc_Location()), 1)
+        text = entity.Name() if entity is not None and hasattr(entity, "Name") else None
+        return "" if text is None else _name(text.ToCString())
+
+    named = any(_name(text.decode(errors="replace")) for text in _STEP_NAMES.findall(data))
+    faces, bodies, solids = _sort(parts, name_of if named else _no_name)
+    notes = _lost(len(re.findall(rb"=\s*(?:ADVANCED_|)FACE(?:_SURFACE|)\s*\(", data)), faces)
+    return CadModel(path, faces, bodies, solids, unit, metres, MILLIMETRE, notes)
+
+
+def _walk(label: Any, location: Any, parts: list[Part]) -> None:
+    """Gather the parts of an assembly, each where it stands."""
+    if XCAFDoc_ShapeTool.IsReference_s(label):
+        location = location.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label))
+        referred = TDF_Label()
+        XCAFDoc_ShapeTool.GetReferredShape_s(label, referred)
+        label = referred
+    if XCAFDoc_ShapeTool.IsAssembly_s(label):
+        components = Sequence_TDF_Label()
+        XCAFDoc_ShapeTool.GetComponents_s(label, components)
+        for component in components:
+            _walk(component, location, parts)
+        return
+    shape = XCAFDoc_ShapeTool.GetShape_s(label)
+    if shape.IsNull():
+        return
+    text = TDataStd_Name()
+    named = label.FindAttribute(TDataStd_Name.GetID_s(), text)
+    name = _name(text.Get().ToExtString()) if named else ""
+    # A shape of its own place keeps it below that of the assembly.
+    parts.append((name, shape.Moved(location)))
+
+
+def _read_iges(path: Path, data: bytes) -> CadModel:
+    reader = IGESControl_Reader()
+    Interface_Static.SetCVal_s("xstep.cascade.unit", "MM")
+    if reader.ReadFile(str(path)) != IFSelect_RetDone:
+        raise ShellFileError(path, "is damaged, its IGES entities cannot be read")
+    reader.TransferRoots()
+    shape = reader.OneShape()
+    model = reader.IGESModel()
+    transfer = reader.WS().TransferReader()
+
+    def name_of(shape: Any) -> str:
+        entity = transfer.EntityFromShapeResult(shape, 1)
+        text = entity.NameValue() if entity is not None and entity.HasName() else None
+        return "" if text is None else _name(text.ToCString())
+
+    parts: list[Part] = [] if shape is None or shape.IsNull() else [("", shape)]
+    entities = range(1, model.NbEntities() + 1)
+    named = any(model.Entity(k).HasName() for k in entities)
+    faces, bodies, solids = _sort(parts, name_of if named else _no_name)
+    held = (model.Entity(k).TypeNumber() for k in entities)
+    notes = _lost(sum(kind in IGES_FACES for kind in held), faces)
+    header = model.GlobalSection()
+    metres = float(header.UnitValue()) * MILLIMETRE
+    unit = next((name for name in _UNITS if metres_per_unit(name) == metres), f"{metres:.6g} m")
+    return CadModel(path, faces, bodies, solids, unit, metres, MILLIMETRE, notes)
+
+
+def _read_brep(path: Path, data: bytes) -> CadModel:
+    shape = TopoDS_Shape()
+    if not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
+        raise ShellFileError(path, "is damaged, its BREP shape cannot be read")
+    faces, bodies, solids = _sort([("", shape)], _no_name)
+    return CadModel(path, faces, bodies, solids, None, None, 1.0)
+
+
+_UNITS = ("mm", "m", "in", "cm", "ft", "um", "km", "mil", "dm", "yd")
+
+
+def _header_unit(names: set[str]) -> tuple[str | None, float | None]:
+    """Return name and metres of the unit a STEP header states; of several, or of none, None."""
+    if len(names) != 1:
+        return None, None
+    (name,) = names
+    try:
+        metres = metres_per_unit(name.lower())
+    except InvalidParameter:
+        return None, None
+    return next(unit for unit in _UNITS if metres_per_unit(unit) == metres), metres
+
+
+def _no_name(_: Any) -> str:
+    return ""
+
+
+def _name(text: str) -> str:
+    """Return a name as the file has it, or "" if it is none."""
+    text = " ".join(text.split())
+    return "" if _NO_NAME.fullmatch(text) else text
+
+
+def _lost(held: int, faces: tuple[CadFace, ...]) -> tuple[str, ...]:
+    """Say if fewer faces came out than the file has entities for."""
+    lost = held - len(faces)
+    if lost <= 0:
+        return ()
+    return (f"{lost} of the {held} faces of the file could not be read and are missing",)
+
+
+def _sort(
+    parts: list[Part], name_of: Namer
+) -> tuple[tuple[CadFace, ...], tuple[str, ...], tuple[Any, ...]]:
+    """Sort faces into bodies: each solid, each shell outside of solids, all loose faces of a part.
+
+    Returns faces, names of the bodies and their shapes. Names of bodies are made unique; those of
+    faces are as the file has them, or "Face 12".
+    """
+    faces: list[CadFace] = []
+    bodies: list[str] = []
+    found: list[Any] = []
+    for part, shape in parts:
+        solids = list(subshapes(shape, TopAbs_SOLID))
+        shells = list(subshapes(shape, TopAbs_SHELL, TopAbs_SOLID))
+        loose = list(subshapes(shape, TopAbs_FACE, TopAbs_SHELL))
+        groups = [*solids, *shells, *([compound(loose)] if loose else [])]
+        for group in groups:
+            own = part if len(groups) == 1 else name_of(group)
+            name = own or (f"{part} {len(bodies) + 1}" if part else f"Body {len(bodies) + 1}")
+            bodies.append(_unique(name, bodies))
+            found.append(group)
+            for face in subshapes(group, TopAbs_FACE):
+                number = len(faces) + 1
+                called = name_of(face) or f"Face {number}"
+                faces.append(CadFace(TopoDS.Face(face), called, number, len(bodies) - 1))
+    return tuple(faces), tuple(bodies), tuple(found)
+
+
+def _unique(name: str, taken: list[str]) -> str:
+    """Return `name`, numbered from its second time on."""
+    count, one = 1, name
+    while one in taken:
+        count += 1
+        one = f"{name} ({count})"
+    return one

@@ -1,0 +1,171 @@
+"""A CAD file as polygons with exact normals, ready for the cleaning."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from sphshell_pin.errors import UnitMissing, UnitWarning
+from sphshell_pin.shell.cad.kinks import without_kinks
+from sphshell_pin.shell.cad.model import CadModel, box_size
+from sphshell_pin.shell.cad.options import CadOptions
+from sphshell_pin.shell.cad.reading import read_model
+from sphshell_pin.shell.cad.tessellation import Sewn, Tessellation, sew, tessellate
+from sphshell_pin.shell.raw import RawSurface
+from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
+
+CHORD_ERROR = 1e-3
+"""Share of the box diagonal that the elements may be off the exact surface, unless said."""
+
+
+@dataclass(frozen=True)
+class CadSurface:
+    """The tessellated faces of a CAD file.
+
+    Attributes
+    ----------
+    whole, model : the faces as they were read, and with those that have a kink divided
+    size : box diagonal [units of the model]
+    unit : the unit taken
+    sewn : how borders were joined
+    found : the triangles
+    stated : chord error asked for [units of the model]
+    """
+
+    whole: CadModel
+    model: CadModel
+    size: float
+    unit: str
+    sewn: Sewn
+    found: Tessellation
+    stated: float
+
+    @property
+    def factor(self) -> float:
+        """Metres per unit of the file."""
+        header = self.model.header_metres
+        return self.model.metres if header is None else header
+
+    def notes(self) -> tuple[str, ...]:
+        """Sentences about what was read and how near it was met."""
+        return (*self.model.notes, *_told(self))
+
+    def polygons(self) -> RawSurface:
+        """Triangles of all faces side by side [m], outer sides out; each face has its own points.
+
+        Polygons of one face follow each other, in the order of its triangles.
+        """
+        points, corners, normals, faces = [], [], [], []
+        count = 0
+        for row, mesh in enumerate(self.found.meshes):
+            if mesh is None:
+                continue
+            turn = (0, 2, 1) if mesh.reversed else (0, 1, 2)
+            points.append(mesh.points)
+            corners.append(mesh.triangles[:, turn] + count)
+            normals.append(mesh.corner_normals()[:, turn])
+            faces.append(np.full(len(mesh.triangles), row, np.int32))
+            count += len(mesh.points)
+        triangles = np.concatenate(corners)
+        return RawSurface(
+            vertices=np.concatenate(points) * self.model.metres,
+            offsets=3 * np.arange(len(triangles) + 1, dtype=np.int64),
+            corners=triangles.ravel().astype(np.int32),
+            normals=np.concatenate(normals).reshape(-1, 3),
+            faces=np.concatenate(faces),
+            face_names=tuple(face.name for face in self.model.faces),
+        )
+
+
+def read_cad(path: Path, unit: str | None, options: CadOptions) -> tuple[RawSurface, str, float]:
+    """Read and tessellate a CAD file: in metres, the unit taken, metres per file unit.
+
+    Raises
+    ------
+    ShellFileError, InvalidShell
+        If the file is damaged, or no surface can be made of what it holds.
+    UnitMissing
+        If `unit` is not stated where the file has none.
+    InvalidParameter, NameNotFound
+        If an option is out of range, or names a body or face that is not there.
+    """
+    surface = load_cad(path, unit, options)
+    return surface.polygons().noting(*surface.notes()), surface.unit, surface.factor
+
+
+def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
+    """Read, sew and tessellate; see `read_cad` for the errors."""
+    model = read_model(path).selected(options.bodies, options.faces)
+    size = box_size(model.shape)
+    model, taken = in_unit(model, unit, size)
+    whole = model
+    model, kinked = without_kinks(model)
+    if kinked:
+        note = f"{kinked} of the faces with a kink inside, divided along it"
+        model = replace(model, notes=(*model.notes, note))
+    chord_error = options.chord_error
+    stated = size * CHORD_ERROR if chord_error is None else chord_error / model.metres
+    sewn = sew(model, size, None if options.sew is None else options.sew / model.metres)
+    found = tessellate(sewn.shape, sewn.faces, size, stated, model.metres)
+    return CadSurface(whole, model, size, taken, sewn, found, stated)
+
+
+def in_unit(model: CadModel, unit: str | None, size: float) -> tuple[CadModel, str]:
+    """Return the model with the metres per unit that hold, and the name of that unit.
+
+    size : of the model [its units]. A unit that is stated wins over that of the header.
+    """
+    own, header = model.unit, model.header_metres
+    if unit is None:
+        if own is None or header is None:
+            raise UnitMissing(model.path, size, METRES_PER_UNIT)
+        return replace(model, notes=(*model.notes, f"unit '{own}' from the file's header")), own
+    stated = metres_per_unit(unit)
+    if header is None:
+        return replace(model, metres=model.metres * stated), unit
+    if np.isclose(stated, header, rtol=1e-9):
+        note = f"unit '{unit}', as the file's header has it"
+        return replace(model, notes=(*model.notes, note)), unit
+    metres = model.metres * stated / header
+    note = (
+        f"unit '{unit}' as stated, though the file's header says '{own}': the surface measures "
+        f"{size * metres:.4g} m, not {size * model.metres:.4g} m"
+    )
+    warnings.warn(f"{model.path.name}: {note}", UnitWarning, stacklevel=7)
+    return replace(model, metres=metres, header_metres=stated, notes=(*model.notes, note)), unit
+
+
+def _told(surface: CadSurface) -> list[str]:
+    """Say what was found about sewing and chord error."""
+    model, sewn, found, stated = surface.model, surface.sewn, surface.found, surface.stated
+    metres = model.metres
+    count = len(model.faces)
+    notes = [
+        f"{count} CAD face{'' if count == 1 else 's'}, tolerance of the file "
+        f"{model.tolerance * metres:.3g} m"
+    ]
+    if sewn.tolerance > 0.0:
+        notes.append(
+            f"borders of faces joined within {sewn.tolerance * metres:.3g} m: open edges of the "
+            f"faces {sewn.before} before, {sewn.after} after"
+        )
+    for k, mesh in enumerate(found.meshes):
+        if mesh is None:
+            notes.append(
+                f"face '{model.faces[k].name}' could not be given triangles: it is missing"
+            )
+    held = (
+        "held"
+        if found.error <= stated
+        else f"not held, by a factor {found.error / stated:.3g}; finer elements bring no less, the "
+        "faces do not meet more exactly"
+    )
+    notes.append(
+        f"chord error {stated * metres:.3g} m stated, {found.error * metres:.3g} m measured "
+        f"({found.interior * metres:.3g} m from the surfaces, {found.border * metres:.3g} m from "
+        f"their borders): {held}"
+    )
+    return notes

@@ -1,0 +1,233 @@
+"""From trimmed faces to triangles within a stated distance, which is measured."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.BRepTools import BRepTools
+from OCP.collections import (
+    IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap,
+)
+from OCP.IMeshTools import IMeshTools_Parameters
+from OCP.TopAbs import TopAbs_FACE
+from OCP.TopExp import TopExp
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS
+
+from sphshell_pin.errors import InvalidParameter, InvalidShell
+from sphshell_pin.shell.cad.face_mesh import FaceMesh, take_mesh
+from sphshell_pin.shell.cad.model import CadModel, count_open_edges
+
+ANGLE = 0.35
+"""Neighbouring elements on a face turn by about this at most [rad]: less than the crease angle."""
+
+MARGIN = 0.95
+"""Between the points measured the distance may be a little larger."""
+
+MOST_TRIANGLES = 2_000_000
+"""More are refused: they would take minutes and gigabytes."""
+
+MOST_TRIES, MOST_ROUNDS = 4, 6
+"""Times to mesh anew, more finely; times to halve the sides inside a face."""
+
+SEWING_TOLERANCES = (1e-6, 1e-5, 1e-4)
+"""Shares of the size within which the borders of faces are joined, if that joins more of them."""
+
+
+@dataclass(frozen=True)
+class Tessellation:
+    """The triangles of the faces of a model.
+
+    Attributes
+    ----------
+    meshes : one per face, None where OpenCASCADE finds no triangles
+    interior, border : largest distance measured from the surfaces, and from their borders [units
+        of the model]
+    """
+
+    meshes: tuple[FaceMesh | None, ...]
+    interior: float
+    border: float
+
+    @property
+    def error(self) -> float:
+        """The larger of the two."""
+        return max(self.interior, self.border)
+
+    @property
+    def count(self) -> int:
+        """Number of triangles."""
+        return sum(len(mesh.triangles) for mesh in self.meshes if mesh is not None)
+
+
+@dataclass(frozen=True)
+class Sewn:
+    """Faces of a model with their borders joined.
+
+    `shape`, its `faces` in the order of the model, the `tolerance` taken (0 for none) [units of the
+    model], open edges of the faces `before` and `after`.
+    """
+
+    shape: Any
+    faces: tuple[Any, ...]
+    tolerance: float
+    before: int
+    after: int
+
+
+def sew(model: CadModel, size: float, tolerance: float | None) -> Sewn:
+    """Join faces whose borders lie side by side without being shared.
+
+    size : of the model; tolerance : how far they may be apart, 0 leaves all as it is, and None
+    takes the smallest of a few that joins the most [units of the model]
+    """
+    shape = model.shape
+    faces = tuple(face.shape for face in model.faces)
+    before = count_open_edges(shape)
+    best = Sewn(shape, faces, 0.0, before, before)
+    if before == 0 or len(faces) < 2:
+        return best
+    ladder = [share * size for share in SEWING_TOLERANCES] if tolerance is None else [tolerance]
+    for step in ladder:
+        if step == 0.0 or best.after == 0:
+            break
+        sewing = BRepBuilderAPI_Sewing(step)
+        sewing.Add(shape)
+        sewing.Perform()
+        joined = sewing.SewedShape()
+        if joined.IsNull():
+            continue
+        after = count_open_edges(joined)
+        # As they stand in the sewn shape: that may have turned them.
+        found = ShapeMap()
+        TopExp.MapShapes_s(joined, TopAbs_FACE, found)
+        rows = [found.FindIndex(sewing.ModifiedSubShape(face)) for face in faces]
+        if after < best.after and 0 not in rows:
+            images = tuple(TopoDS.Face(found.FindKey(row)) for row in rows)
+            best = Sewn(joined, images, step, before, after)
+    return best
+
+
+def tessellate(
+    shape: Any, faces: tuple[Any, ...], size: float, chord_error: float, metres: float
+) -> Tessellation:
+    """Lay triangles on all faces; refine until they are as near as asked, or no nearer.
+
+    shape : what holds the faces; size : its diagonal; chord_error : largest distance [its units];
+    metres : per unit
+
+    Raises
+    ------
+    InvalidParameter
+        If so small a chord error would take millions of triangles.
+    InvalidShell
+        If no face can be given triangles.
+    """
+    _check_count(shape, faces, size, chord_error, metres)
+    target = MARGIN * chord_error
+    deflection = target
+    best: Tessellation | None = None
+    for _ in range(MOST_TRIES):
+        found = _mesh(shape, faces, deflection, target)
+        if best is None or found.error < MARGIN * best.error:
+            stuck = best is not None and found.error > 0.8 * best.error
+            best = found
+        else:
+            stuck = True
+        if best.error <= target or stuck or found.count > MOST_TRIANGLES // 4:
+            break
+        deflection *= min(max(0.8 * target / found.error, 0.2), 0.7)
+    if best is None or best.count == 0:
+        raise InvalidShell("no face of the model can be given triangles: check it in its CAD")
+    return best
+
+
+def _lay(shape: Any, deflection: float) -> None:
+    parameters = IMeshTools_Parameters()
+    parameters.Deflection = parameters.DeflectionInterior = deflection
+    parameters.Angle = parameters.AngleInterior = ANGLE
+    # Without it, splines are only measured along their isolines.
+    parameters.ControlSurfaceDeflection = True
+    BRepTools.Clean_s(shape)
+    BRepMesh_IncrementalMesh(shape, parameters)
+
+
+def _mesh(shape: Any, faces: tuple[Any, ...], deflection: float, target: float) -> Tessellation:
+    _lay(shape, deflection)
+    meshes = _meet([take_mesh(face) for face in faces])
+    interior = border = 0.0
+    for k, mesh in enumerate(meshes):
+        if mesh is not None:
+            border = max(border, mesh.border_error(target))
+            meshes[k], error = mesh.refined(target, MOST_ROUNDS)
+            interior = max(interior, error)
+    return Tessellation(tuple(meshes), interior, border)
+
+
+def _meet(meshes: list[FaceMesh | None]) -> list[FaceMesh | None]:
+    """Put nodes that faces share in the middle of where their surfaces have them.
+
+    OpenCASCADE puts them on the curve of the edge, which in files of loose tolerance leaves the
+    surfaces so far that the triangles there fold over.
+    """
+    there = [mesh for mesh in meshes if mesh is not None]
+    nodes = [mesh.border_nodes for mesh in there]
+    if not sum(map(len, nodes)):
+        return meshes
+    shared = np.concatenate([mesh.points[rows] for mesh, rows in zip(there, nodes, strict=True)])
+    exact = np.concatenate([mesh.exact[rows] for mesh, rows in zip(there, nodes, strict=True)])
+    # Faces have the points of an edge in common, to the last bit.
+    _, place, count = np.unique(shared, axis=0, return_inverse=True, return_counts=True)
+    place = place.ravel()
+    middle = np.zeros((len(count), 3))
+    np.add.at(middle, place, exact)
+    middle = (middle / count[:, None])[place]
+    moved: list[FaceMesh | None] = []
+    start = 0
+    for mesh in meshes:
+        if mesh is None:
+            moved.append(mesh)
+            continue
+        rows = mesh.border_nodes
+        points = mesh.points.copy()
+        points[rows] = middle[start : start + len(rows)]
+        moved.append(replace(mesh, points=points))
+        start += len(rows)
+    return moved
+
+
+def _check_count(
+    shape: Any, faces: tuple[Any, ...], size: float, chord_error: float, metres: float
+) -> None:
+    """Refuse what would take too many triangles, judged by two coarse meshes."""
+    coarse = 2e-3 * size
+    if chord_error >= coarse / 8:
+        return
+    counts = []
+    for deflection in (coarse, coarse / 4):
+        _lay(shape, deflection)
+        counts.append(sum(_count(face) for face in faces))
+    if 0 in counts:
+        return
+    # Triangles grow with 1/error on a face curved two ways, with its root on a cylinder.
+    power = min(max(math.log(counts[1] / counts[0], 4.0), 0.0), 1.0)
+    expected = counts[1] * (coarse / 4 / chord_error) ** max(power, 0.5)
+    if expected > MOST_TRIANGLES:
+        enough = coarse / 4 * (counts[1] / MOST_TRIANGLES) ** (1.0 / max(power, 0.5))
+        raise InvalidParameter(
+            "chord_error",
+            float(f"{chord_error * metres:.6g}"),
+            f"would take about {expected:.2g} triangles, more than {MOST_TRIANGLES:.0e}: take at "
+            f"least {enough * metres:.2g} [m]",
+        )
+
+
+def _count(face: Any) -> int:
+    found = BRep_Tool.Triangulation_s(face, TopLoc_Location())
+    return 0 if found is None else int(found.NbTriangles())

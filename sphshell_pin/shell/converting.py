@@ -1,0 +1,201 @@
+"""From one surface file to another, and how far apart they are."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sphshell_pin.errors import InvalidParameter, ShellFileError
+from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions, require_kernel
+from sphshell_pin.shell.cad.options import BREP_SUFFIXES
+from sphshell_pin.shell.raw import Floats
+from sphshell_pin.shell.readers import SUFFIXES, reader_for
+from sphshell_pin.shell.shell import Shell
+from sphshell_pin.units import metres_per_unit
+
+SAMPLES = 5000
+"""Points taken of each surface to measure how far it is from the other."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a file holds.
+
+    `path`, its length `unit`, `count` of `kind` (elements or CAD faces), `size` of the box diagonal
+    [m], `area` [m^2]; of CAD, both of a tessellation.
+    """
+
+    path: Path
+    unit: str
+    count: int
+    kind: str
+    size: float
+    area: float
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """Two files, and the distances between what they hold.
+
+    Attributes
+    ----------
+    source, target : what was read, and what was written and read back
+    forth : distances (n,) of points of the source from the surface of the target [m]
+    back : distances (n,) of points of the target from the surface of the source [m]
+    notes : what the reader of the source had to say
+    """
+
+    source: Held
+    target: Held
+    forth: Floats
+    back: Floats
+    notes: tuple[str, ...]
+
+    @property
+    def largest(self) -> float:
+        """The largest of all distances [m]."""
+        return float(max(self.forth.max(), self.back.max()))
+
+    @property
+    def rms(self) -> float:
+        """Their root mean square [m]."""
+        return float(np.sqrt(np.mean(np.concatenate([self.forth, self.back]) ** 2)))
+
+
+def convert(
+    source: str | os.PathLike[str],
+    target: str | os.PathLike[str],
+    unit_in: str | None = None,
+    unit_out: str | None = None,
+    *,
+    chord_error: float | None = None,
+    bodies: Sequence[str] | None = None,
+    faces: Sequence[str | int] | None = None,
+) -> Conversion:
+    """Write the surface of one file in the format the suffix of another names.
+
+    Meshes (.stl, .obj, .ply, .off, .shl) hold elements, CAD files (.step, .iges, .brep) exact
+    surfaces: CAD becomes a mesh within `chord_error`, CAD to CAD keeps the exact surfaces, and a
+    mesh becomes planar CAD faces, one for each element. The new file is read back and compared
+    before it takes the place of one that was there.
+
+    Parameters
+    ----------
+    source, target : the files
+    unit_in : unit of length of the source, as for `Shell.from_file`
+    unit_out : that of the target; the source's unless given
+    chord_error, bodies, faces : of a CAD source, as for `Shell.from_file`
+
+    Raises
+    ------
+    SphshellError
+        As `Shell.from_file` and `Shell.to_file` do; of a mesh of too many elements for CAD; and if
+        what was written cannot be read back.
+    """
+    file, suffix = reader_for(source)
+    goal = Path(target)
+    if goal.suffix.lower() not in SUFFIXES:
+        raise InvalidParameter("target", str(goal), f"must end in one of: {', '.join(SUFFIXES)}")
+    if goal.exists() and goal.resolve() == file.resolve():
+        raise InvalidParameter("target", str(goal), "must be another file than the source")
+    if not goal.parent.is_dir():
+        raise ShellFileError(goal, "cannot be written: there is no such folder")
+    if unit_out is not None:
+        metres_per_unit(unit_out)
+    options = CadOptions(chord_error, bodies, faces)
+    if suffix not in CAD_SUFFIXES:
+        options.check_unused(suffix)
+    if {suffix, goal.suffix.lower()} & set(CAD_SUFFIXES):
+        require_kernel(f"converting {suffix} to {goal.suffix.lower()} files")
+    first = _surface(file, unit_in, options)
+    unit = unit_out or first.unit
+    handle, name = tempfile.mkstemp(prefix=f".{goal.stem}.", suffix=goal.suffix, dir=goal.parent)
+    os.close(handle)
+    try:
+        _write(Path(name), unit, first, options)
+        carried = goal.suffix.lower() == ".shl" or goal.suffix.lower() in CAD_SUFFIXES
+        brep = goal.suffix.lower() in BREP_SUFFIXES
+        second = _surface(Path(name), unit if brep or not carried else None, CadOptions())
+        rng = np.random.default_rng(0)
+        conversion = Conversion(
+            source=Held(file, first.unit, *first.count, *first.extent),
+            target=Held(goal, unit, *second.count, *second.extent),
+            forth=second.distances(first.samples(SAMPLES, rng)),
+            back=first.distances(second.samples(SAMPLES, rng)),
+            notes=first.notes,
+        )
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(name, 0o666 & ~mask)
+        os.replace(name, goal)
+    except OSError as error:
+        raise ShellFileError(goal, f"cannot be written ({error.strerror})") from error
+    finally:
+        if os.path.exists(name):
+            os.unlink(name)
+    return conversion
+
+
+def _surface(path: Path, unit: str | None, options: CadOptions) -> Any:
+    """Return what a file holds: an ExactSurface of CAD, else its flat elements."""
+    if path.suffix.lower() not in CAD_SUFFIXES:
+        return _Mesh(Shell.from_file(path, unit, crease_angle=0.0))
+    from sphshell_pin.shell.cad.reference import ExactSurface
+
+    return ExactSurface(path, unit, options)
+
+
+def _write(path: Path, unit: str, source: Any, options: CadOptions) -> None:
+    if path.suffix.lower() not in CAD_SUFFIXES:
+        source.shell().to_file(path, unit)
+        return
+    from sphshell_pin.shell.cad.writing import MILLIMETRE, faceted, parts_of, write_cad
+
+    if isinstance(source, _Mesh):
+        shell = source.shell()
+        write_cad(path, [(shell.name, faceted(shell))], MILLIMETRE, unit)
+    else:
+        model = source.model
+        write_cad(path, parts_of(model, options.faces is None), model.metres, unit)
+
+
+class _Mesh:
+    """The flat elements of a shell."""
+
+    def __init__(self, shell: Shell) -> None:
+        self._shell = shell
+        self.unit = shell.unit or "m"
+        self.notes = shell.health.notes
+
+    def shell(self) -> Shell:
+        """Return the shell."""
+        return self._shell
+
+    @property
+    def count(self) -> tuple[int, str]:
+        """How many elements there are."""
+        return self._shell.num_elements, "elements"
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Box diagonal [m] and area [m^2]."""
+        return self._shell.size, self._shell.health.area
+
+    def distances(self, points: Floats) -> Floats:
+        """Distances (n,) of points (n, 3) [m]."""
+        return np.abs(self._shell.closest_points(points, method="facets").distances)
+
+    def samples(self, count: int, rng: np.random.Generator) -> Floats:
+        """Random points (count, 3), spread by area [m]."""
+        corners = self._shell.vertices[self._shell.triangles]
+        spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(spans, axis=1)
+        chosen = rng.choice(len(area), count, p=area / area.sum())
+        weights = rng.dirichlet((1.0, 1.0, 1.0), count)
+        return np.asarray(np.einsum("nk,nkx->nx", weights, corners[chosen]))

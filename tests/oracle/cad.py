@@ -1,0 +1,303 @@
+"""Distance to trimmed CAD faces, asked of OpenCASCADE's exact geometry: slow and obvious.
+
+Every near face and edge is tried: Newton's method from several seeds on the surface, kept if the
+foot lies inside the trimming, and along the edges, whose ends are the vertices. (OpenCASCADE's own
+BRepExtrema misses the nearest point on real files.) Seeds are points of a tessellation made here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.gp import gp_Pnt, gp_Pnt2d, gp_Vec
+from OCP.IntTools import IntTools_FClass2d
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_OUT, TopAbs_REVERSED
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS
+from scipy.spatial import cKDTree
+
+from sphshell_pin import Shell
+from sphshell_pin.shell.curved import curved_mesh
+
+Array = NDArray[np.float64]
+
+SEEDS, EDGE_SEEDS = 16, 6
+"""How many of the nearest seeds are tried for each point, on faces and on edges."""
+
+SPACING = 1 / 80
+"""Distance of seeds from each other, at most, as a share of the size."""
+
+EDGE_POINTS = 129
+NEWTON_STEPS = 30
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """Closest points of n points: distances (n,), points and unit normals (n, 3), on_edge (n,)."""
+
+    distances: Array
+    points: Array
+    normals: Array
+    on_edge: NDArray[np.bool_]
+
+
+class ExactShape:
+    """A shape, scaled by `metres` per unit, whose faces and edges can be asked for distances."""
+
+    def __init__(self, shape: Any, metres: float = 1e-3, seed_share: float = 2e-3) -> None:
+        copy = BRepBuilderAPI_Copy(shape, True, False).Shape()
+        self.metres = metres
+        self.faces = [TopoDS.Face(face) for face in _parts(copy, TopAbs_FACE)]
+        size = max(1e-12, _size(self.faces))
+        BRepMesh_IncrementalMesh(copy, seed_share * size, False, 0.2, False)
+        self.surfaces = [BRepAdaptor_Surface(face) for face in self.faces]
+        self.inside = [IntTools_FClass2d(face, 1e-9) for face in self.faces]
+        self.turned = [face.Orientation() == TopAbs_REVERSED for face in self.faces]
+        self._triangles = [_triangles(face) for face in self.faces]
+        self._reach = 2 * SPACING * size
+        self._seeds, self._uv = [], []
+        for points, at, rows in self._triangles:
+            weights, triangle = _spread(points[rows], SPACING * size)
+            self._seeds.append(cKDTree(np.einsum("nk,nkx->nx", weights, points[rows[triangle]])))
+            self._uv.append(np.einsum("nk,nkx->nx", weights, at[rows[triangle]]))
+        self._curves: list[Any] = []
+        places, edge_of, at_edge = [], [], []
+        for face in self.faces:
+            for edge in _parts(face, TopAbs_EDGE):
+                if BRep_Tool.Degenerated_s(TopoDS.Edge(edge)):
+                    continue
+                curve = BRepAdaptor_Curve(TopoDS.Edge(edge), face)
+                at = np.linspace(curve.FirstParameter(), curve.LastParameter(), EDGE_POINTS)
+                places.append(np.array([curve.Value(t).Coord() for t in at.tolist()]))
+                edge_of.append(np.full(EDGE_POINTS, len(self._curves)))
+                at_edge.append(at)
+                self._curves.append(curve)
+        self._edge_seeds = cKDTree(np.concatenate(places)) if places else None
+        if places:
+            self._edge_reach = max(np.linalg.norm(np.diff(p, axis=0), axis=1).max() for p in places)
+            self._edge_of, self._at_edge = np.concatenate(edge_of), np.concatenate(at_edge)
+
+    def closest(self, points: Array) -> Nearest:
+        """Closest point of the trimmed faces to each of points (n, 3) [m]."""
+        places = np.asarray(points, float) / self.metres
+        distance = np.full(len(places), np.inf)
+        closest, normal = np.zeros_like(places), np.zeros_like(places)
+        on_edge = np.zeros(len(places), bool)
+        found = [tree.query(places, min(SEEDS, tree.n)) for tree in self._seeds]
+        away = np.array([d.reshape(len(places), -1)[:, 0] for d, _ in found])
+        near = [rows.reshape(len(places), -1) for _, rows in found]
+        for k, point in enumerate(places):
+            for face in np.argsort(away[:, k]):
+                # No point of the face is farther than that from one of its seeds.
+                if away[face, k] - self._reach > distance[k]:
+                    break
+                rows = near[face][k]
+                for seed in rows[np.unique([0, 1, SEEDS // 2, SEEDS - 1]) % len(rows)]:
+                    foot, uv = self._foot(int(face), self._uv[face][seed], point)
+                    off = float(np.linalg.norm(foot - point))
+                    if off < distance[k] and self._holds(int(face), uv):
+                        distance[k], closest[k] = off, foot
+                        normal[k] = self._normal(int(face), uv)
+        if self._edge_seeds is None:
+            return Nearest(distance * self.metres, closest * self.metres, normal, on_edge)
+        away, near = self._edge_seeds.query(places, min(EDGE_SEEDS, self._edge_seeds.n))
+        for k in np.flatnonzero(away[:, 0] - self._edge_reach < distance):
+            for edge in np.unique(self._edge_of[near[k]]):
+                seed = near[k][np.argmax(self._edge_of[near[k]] == edge)]
+                foot = self._foot_on_edge(int(edge), float(self._at_edge[seed]), places[k])
+                off = float(np.linalg.norm(foot - places[k]))
+                if off < distance[k] * (1 - 1e-9):
+                    distance[k], closest[k], on_edge[k] = off, foot, True
+                    normal[k] = (places[k] - foot) / max(off, 1e-300)
+        return Nearest(distance * self.metres, closest * self.metres, normal, on_edge)
+
+    def samples(self, count: int, rng: np.random.Generator) -> Array:
+        """Random points (n <= count, 3) of the trimmed faces [m], spread by area."""
+        areas = [_areas(points, rows) for points, _, rows in self._triangles]
+        face = np.concatenate([np.full(len(area), k) for k, area in enumerate(areas)])
+        row = np.concatenate([np.arange(len(area)) for area in areas])
+        share = np.concatenate(areas)
+        chosen = rng.choice(len(share), count, p=share / share.sum())
+        found = []
+        for pick, weights in zip(chosen, _barycentric(rng, count), strict=True):
+            k = int(face[pick])
+            _, uv, rows = self._triangles[k]
+            at = weights @ uv[rows[row[pick]]]
+            if self._holds(k, at):
+                found.append(self.surfaces[k].Value(*at.tolist()).Coord())
+        return np.array(found) * self.metres
+
+    def _holds(self, face: int, uv: Array) -> bool:
+        return bool(self.inside[face].Perform(gp_Pnt2d(*uv.tolist())) != TopAbs_OUT)
+
+    def _normal(self, face: int, uv: Array) -> Array:
+        place, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
+        self.surfaces[face].D1(*uv.tolist(), place, by_u, by_v)
+        normal = np.cross(by_u.Coord(), by_v.Coord())
+        length = np.linalg.norm(normal)
+        unit = normal / length if length > 0.0 else normal
+        return -unit if self.turned[face] else unit
+
+    def _foot(self, face: int, seed: Array, point: Array) -> tuple[Array, Array]:
+        """Foot of a point on the untrimmed surface, by Newton's method with a line search."""
+        surface = self.surfaces[face]
+        place, u, v, uu, vv, uv = gp_Pnt(), gp_Vec(), gp_Vec(), gp_Vec(), gp_Vec(), gp_Vec()
+        low = np.array([surface.FirstUParameter(), surface.FirstVParameter()])
+        high = np.array([surface.LastUParameter(), surface.LastVParameter()])
+        # Round a closed surface the way may lead across its seam.
+        endless = np.array([surface.IsUPeriodic(), surface.IsVPeriodic()])
+        low, high = np.where(endless, -np.inf, low), np.where(endless, np.inf, high)
+        at = np.array(seed, float)
+        for _ in range(NEWTON_STEPS):
+            surface.D2(*at.tolist(), place, u, v, uu, vv, uv)
+            r = np.array(place.Coord()) - point
+            a, b = np.array(u.Coord()), np.array(v.Coord())
+            slope = np.array([r @ a, r @ b])
+            metric = np.array([[a @ a, a @ b], [a @ b, b @ b]])
+            bend = np.array([r @ uu.Coord(), r @ uv.Coord(), r @ vv.Coord()])
+            full = metric + np.array([[bend[0], bend[1]], [bend[1], bend[2]]])
+            if full[0, 0] <= 0.0 or np.linalg.det(full) <= 1e-14 * full[0, 0] * abs(full[1, 1]):
+                full = metric + 1e-14 * np.trace(metric) * np.eye(2)
+            step = -np.linalg.solve(full, slope)
+            for share in (1.0, 0.5, 0.25, 0.1, 0.01):
+                new = np.clip(at + share * step, low, high)
+                offset = np.array(surface.Value(*new.tolist()).Coord()) - point
+                if offset @ offset <= r @ r:
+                    break
+            else:
+                break
+            moved = np.linalg.norm(a * (new - at)[0] + b * (new - at)[1])
+            at = new
+            if moved <= 1e-14 * (1.0 + np.abs(point).max()):
+                break
+        return np.array(surface.Value(*at.tolist()).Coord()), at
+
+    def _foot_on_edge(self, edge: int, seed: float, point: Array) -> Array:
+        """Nearest point of an edge near a seed, by bisecting golden sections."""
+        curve = self._curves[edge]
+        low, high = curve.FirstParameter(), curve.LastParameter()
+        reach = (high - low) / (EDGE_POINTS - 1)
+        low, high = max(low, seed - reach), min(high, seed + reach)
+
+        def away(t: float) -> float:
+            offset = np.array(curve.Value(t).Coord()) - point
+            return float(offset @ offset)
+
+        share = (5**0.5 - 1) / 2
+        a, b = high - share * (high - low), low + share * (high - low)
+        at_a, at_b = away(a), away(b)
+        for _ in range(45):
+            if at_a < at_b:
+                high, b, at_b = b, a, at_a
+                a = high - share * (high - low)
+                at_a = away(a)
+            else:
+                low, a, at_a = a, b, at_b
+                b = low + share * (high - low)
+                at_b = away(b)
+        return np.array(curve.Value((low + high) / 2).Coord())
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Distances [m] between a shell and the exact shape.
+
+    flat, smooth : of points of the flat and of the curved elements from the shape
+    back, back_smooth : of points of the shape from the flat and from the curved elements
+    """
+
+    flat: Array
+    smooth: Array
+    back: Array
+    back_smooth: Array
+
+    @property
+    def largest(self) -> tuple[float, float, float, float]:
+        """The largest of each."""
+        return tuple(  # type: ignore[return-value]
+            float(column.max()) for column in (self.flat, self.smooth, self.back, self.back_smooth)
+        )
+
+
+def deviation(shell: Shell, exact: ExactShape, samples: int, seed: int = 0) -> Deviation:
+    """Distances of random points of a shell from the exact shape, and the other way."""
+    rng = np.random.default_rng(seed)
+    corners = shell.vertices[shell.triangles]
+    share = _areas(shell.vertices, shell.triangles)
+    chosen = rng.choice(len(share), samples, p=share / share.sum())
+    flat = np.einsum("nk,nkx->nx", _barycentric(rng, samples), corners[chosen])
+    points, _, _ = curved_mesh(shell, 4)
+    smooth = points.reshape(len(corners), -1, 3)
+    smooth = smooth[chosen, rng.integers(0, smooth.shape[1], samples)]
+    there = exact.samples(samples, rng)
+    back = [shell.closest_points(there, method=method).distances for method in ("facets", "smooth")]
+    return Deviation(
+        exact.closest(flat).distances,
+        exact.closest(smooth).distances,
+        np.abs(back[0]),
+        np.abs(back[1]),
+    )
+
+
+def _parts(shape: Any, kind: Any) -> list[Any]:
+    explorer, found = TopExp_Explorer(shape, kind), []
+    while explorer.More():
+        found.append(explorer.Current())
+        explorer.Next()
+    return found
+
+
+def _triangles(face: Any) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Points and parameters of the nodes of a face, and its triangles."""
+    location = TopLoc_Location()
+    found = BRep_Tool.Triangulation_s(face, location)
+    if found is None:
+        return np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 3), np.int64)
+    count = range(1, found.NbNodes() + 1)
+    uv = np.array([found.UVNode(k).Coord() for k in count])
+    surface = BRepAdaptor_Surface(face)
+    points = np.array([surface.Value(*at).Coord() for at in uv.tolist()])
+    rows = np.array([found.Triangle(k).Get() for k in range(1, found.NbTriangles() + 1)]) - 1
+    return points, uv, rows
+
+
+def _spread(corners: Array, spacing: float) -> tuple[Array, NDArray[np.int64]]:
+    """Weights (n, 3) and triangle (n,) of a grid of points on each triangle."""
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    pieces = np.maximum(2, np.ceil(longest / spacing).astype(int))
+    weights, triangle = [], []
+    for number in np.unique(pieces):
+        grid = [(i, j, number - i - j) for i in range(number + 1) for j in range(number + 1 - i)]
+        own = np.flatnonzero(pieces == number)
+        weights.append(np.tile(np.array(grid) / number, (len(own), 1)))
+        triangle.append(np.repeat(own, len(grid)))
+    return np.concatenate(weights), np.concatenate(triangle)
+
+
+def _size(faces: list[Any]) -> float:
+    """Diagonal of a box round some points of the faces."""
+    points = []
+    for face in faces:
+        for edge in _parts(face, TopAbs_EDGE):
+            curve = BRepAdaptor_Curve(TopoDS.Edge(edge), face)
+            ends = np.linspace(curve.FirstParameter(), curve.LastParameter(), 9)
+            points += [curve.Value(t).Coord() for t in ends.tolist()]
+    return float(np.linalg.norm(np.ptp(np.array(points), axis=0)))
+
+
+def _areas(points: Array, rows: NDArray[Any]) -> Array:
+    corners = points[rows]
+    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(0.5 * np.linalg.norm(spans, axis=1))
+
+
+def _barycentric(rng: np.random.Generator, count: int) -> Array:
+    return rng.dirichlet((1.0, 1.0, 1.0), count)

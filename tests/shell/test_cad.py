@@ -1,0 +1,247 @@
+"""CAD files: what is read, what it is called, in which unit, and what is refused."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip("OCP")
+
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
+from OCP.gp import gp_Pnt
+
+from sphshell_pin import Shell
+from sphshell_pin.errors import (
+    InvalidParameter,
+    MissingExtra,
+    NameNotFound,
+    ShellFileError,
+    UnitMissing,
+    UnitWarning,
+)
+from tests.shell import cad_shapes as shapes
+
+
+def load(tmp_path, shape, **options):
+    return Shell.from_file(shapes.write_brep(tmp_path / "part.brep", shape), "mm", **options)
+
+
+@pytest.mark.parametrize(
+    "make", ["box", "ball", "cylinder", "cone", "ring", "rounded_box", "drilled_plate"]
+)
+def test_solids_come_closed_with_their_area_and_volume(make, tmp_path):
+    shape = getattr(shapes, make)()
+    shell = load(tmp_path, shape, chord_error=1e-5)
+    area, volume = shapes.area_and_volume(shape)
+    assert shell.is_closed
+    assert shell.health.problems == ()
+    assert shell.health.area == pytest.approx(area * 1e-6, rel=5e-3)
+    # The solid is off by less than a layer as thick as the chord error.
+    assert abs(shell.health.volume - volume * 1e-9) < 1e-5 * shell.health.area
+    assert any("chord error 1e-05 m stated" in note for note in shell.health.notes)
+    assert any(note.endswith(": held") for note in shell.health.notes)
+
+
+@pytest.mark.parametrize("make", ["ball", "cone", "ring", "cylinder", "rounded_box"])
+def test_normals_are_those_of_the_exact_surface(make, tmp_path):
+    """Also at poles, where the surface has none, and at the tip of the cone."""
+    shell = load(tmp_path, getattr(shapes, make)())
+    points = shell.vertices[shell.triangles]
+    expected = {
+        "ball": lambda p: p,
+        "cone": lambda p: np.concatenate([p[..., :2], np.full((*p.shape[:2], 1), 0.0)], axis=2),
+        "ring": lambda p: p - shapes.RING * 1e-3 * unit(p * [1, 1, 0]),
+        "cylinder": lambda p: p * [1, 1, 0],
+    }
+    if make == "rounded_box":
+        # Of what lies 2 mm below the surface: a box again.
+        inner = np.clip(points, 2e-3, np.array([18e-3, 28e-3, 8e-3]))
+        assert np.allclose(shell.normals, unit(points - inner), atol=1e-6)
+        return
+    exact = unit(expected[make](points))
+    side = np.full(len(points), True)
+    if make in ("cone", "cylinder"):
+        side = np.abs(shell.triangle_normals[:, 2]) < 0.9
+    if make == "cone":
+        tip = np.linalg.norm(points - [0, 0, 0.01], axis=2) < 1e-9
+        middle = np.repeat(points.mean(axis=1, keepdims=True), 3, axis=1)
+        exact = np.where(tip[..., None], unit(middle * [1, 1, 0]), exact)
+        exact = unit(exact * 10.0 + [0, 0, 6.0])
+        # At the tip the limit depends on the way: along the middle of the triangle, roughly.
+        assert np.einsum("tx,tx->t", shell.normals[tip], exact[tip]).min() > 0.99
+        side = side[:, None] & ~tip
+    assert np.abs(shell.normals[side] - exact[side]).max() < 1e-7
+
+
+def unit(vectors):
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
+
+
+def test_faces_are_known_by_element_and_stay_so(tmp_path):
+    shell = load(tmp_path, shapes.box())
+    assert shell.face_names == tuple(f"Face {k}" for k in range(1, 7))
+    # One plane each: elements of a face share a normal, faces do not.
+    normals = shell.triangle_normals[np.searchsorted(shell.triangle_element, np.arange(12))]
+    for face in range(6):
+        own = normals[shell.element_face == face]
+        assert len(own) == 2
+        assert np.allclose(own, own[0])
+    for other in (pickle.loads(pickle.dumps(shell)), shell.transformed(2.0)):
+        assert other.face_names == shell.face_names
+        assert np.array_equal(other.element_face, shell.element_face)
+    assert Shell([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).element_face is None
+
+
+@pytest.mark.parametrize("crease_angle", [np.deg2rad(30), np.deg2rad(5)])
+def test_tangent_faces_are_one_patch_and_sharp_ones_are_not(crease_angle, tmp_path):
+    """Whatever the crease angle: CAD knows better."""
+    assert load(tmp_path, shapes.rounded_box(), crease_angle=crease_angle).num_patches == 1
+    assert load(tmp_path, shapes.cylinder(), crease_angle=crease_angle).num_patches == 3
+
+
+def test_a_kink_inside_a_face_divides_it(tmp_path):
+    shell = load(tmp_path, shapes.roof())
+    assert shell.face_names == ("Face 1", "Face 1")
+    assert shell.num_patches == 2
+    ridge = np.isclose(shell.vertices[:, 0], 0.010)
+    assert ridge.sum() >= 2
+    assert np.allclose(shell.vertices[ridge, 2], 0.003)
+
+
+def test_bodies_and_faces_can_be_chosen_by_name(tmp_path):
+    path = shapes.write_step(
+        tmp_path / "two.step",
+        ("plate", shapes.box()),
+        ("pin", shapes.cylinder()),
+        faces=[(0, "barrel")],
+    )
+    both = Shell.from_file(path)
+    assert both.health.components == 2
+    pin = Shell.from_file(path, bodies=["pin"])
+    assert np.allclose(pin.box, [[0.095, -0.005, 0], [0.105, 0.005, 0.02]], atol=1e-4)
+    assert pin.is_closed
+    barrel = Shell.from_file(path, faces=["barrel"])
+    assert not barrel.is_closed
+    assert barrel.health.area == pytest.approx(2 * np.pi * 0.005 * 0.02, rel=1e-2)
+    assert Shell.from_file(path, faces=[7]).health.area == barrel.health.area
+    assert set(barrel.face_names) == {"barrel"}
+    with pytest.raises(NameNotFound, match=r"no body 'bolt'; two\.step has: plate, pin"):
+        Shell.from_file(path, bodies=["bolt"])
+    with pytest.raises(NameNotFound, match="barrel, Face 8, Face 9"):
+        Shell.from_file(path, bodies=["pin"], faces=["Face 1"])
+
+
+def test_faces_written_one_by_one_are_joined(tmp_path):
+    path = shapes.write_iges(tmp_path / "loose.iges", shapes.rounded_box())
+    shell = Shell.from_file(path)
+    assert shell.is_closed
+    assert any("joined within" in note for note in shell.health.notes)
+    loose = Shell.from_file(path, sew=0)
+    assert not any("joined within" in note for note in loose.health.notes)
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("MM", 1e-3), ("M", 1.0), ("INCH", 0.0254)])
+def test_the_unit_of_the_header_is_taken(unit, metres, tmp_path):
+    path = shapes.write_step(tmp_path / "box.step", ("box", shapes.box()), unit=unit)
+    iges = shapes.write_iges(tmp_path / "box.iges", shapes.box(), "IN" if unit == "INCH" else unit)
+    for file in (path, iges):
+        shell = Shell.from_file(file)
+        assert np.allclose(shell.box[1] - shell.box[0], [0.02, 0.03, 0.01])
+        assert shell.health.scale == pytest.approx(metres)
+        with pytest.warns(UnitWarning, match="though the file's header says"):
+            larger = Shell.from_file(file, unit="ft")
+        assert larger.size == pytest.approx(shell.size * 0.3048 / metres)
+    assert Shell.from_file(iges, scale=2.0).size == pytest.approx(2 * shell.size)
+
+
+def test_brep_files_need_a_unit(tmp_path):
+    path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
+    with pytest.raises(UnitMissing, match=r"box.brep measures 37.42 units"):
+        Shell.from_file(path)
+
+
+def test_a_wire_holds_no_surface(tmp_path):
+    edge = BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, 0), gp_Pnt(1, 0, 0)).Edge()
+    files = [
+        shapes.write_brep(tmp_path / "wire.brep", edge),
+        shapes.write_iges(tmp_path / "wire.iges", edge),
+        shapes.write_step(tmp_path / "wire.step", ("wire", edge)),
+    ]
+    for path in files:
+        with pytest.raises(ShellFileError, match="holds no surface"):
+            Shell.from_file(path, "mm")
+
+
+@pytest.mark.parametrize("suffix", [".step", ".iges", ".brep"])
+def test_damaged_files_are_told_in_a_sentence(suffix, tmp_path, capfd):
+    write = {
+        ".step": lambda path: shapes.write_step(path, ("box", shapes.box())),
+        ".iges": lambda path: shapes.write_iges(path, shapes.box()),
+        ".brep": lambda path: shapes.write_brep(path, shapes.box()),
+    }[suffix]
+    whole = write(tmp_path / f"whole{suffix}").read_bytes()
+    capfd.readouterr()
+    broken = {
+        "empty": (b"", "is empty"),
+        "text": (b"this is no CAD file\n", "does not begin as one"),
+        "half": (whole[: len(whole) // 2], "is truncated"),
+        "noise": (bytes(range(256)) * 20, "does not begin as one"),
+    }
+    for name, (data, told) in broken.items():
+        path = tmp_path / f"{name}{suffix}"
+        path.write_bytes(data)
+        with pytest.raises(ShellFileError, match=told):
+            Shell.from_file(path, "mm")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_would_take_millions_of_triangles_is_refused(tmp_path):
+    path = shapes.write_brep(tmp_path / "ball.brep", shapes.ball())
+    with pytest.raises(InvalidParameter, match=r"chord_error = 1e-12 would take about .* \[m\]"):
+        Shell.from_file(path, "mm", chord_error=1e-12)
+
+
+@pytest.mark.parametrize(
+    "options", [{"chord_error": 0.0}, {"sew": -1.0}, {"bodies": "pin"}, {"faces": []}]
+)
+def test_options_out_of_range_are_refused(options, tmp_path):
+    with pytest.raises(InvalidParameter, match=next(iter(options))):
+        load(tmp_path, shapes.box(), **options)
+
+
+def test_options_of_cad_are_refused_for_meshes(tmp_path):
+    path = tmp_path / "part.stl"
+    load(tmp_path, shapes.box()).to_file(path)
+    with pytest.raises(InvalidParameter, match="belongs to CAD files"):
+        Shell.from_file(path, "m", chord_error=1e-4)
+
+
+def test_without_the_library_the_extra_is_named(tmp_path, monkeypatch):
+    path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
+    monkeypatch.setitem(sys.modules, "OCP.Message", None)
+    with pytest.raises(MissingExtra, match=r"reading .brep files needs .*sphshell-pin\[cad\]"):
+        Shell.from_file(path, "mm")
+
+
+def test_importing_the_package_leaves_the_library_alone():
+    code = "import sys, sphshell_pin; print(any(m.split('.')[0] == 'OCP' for m in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+def test_a_scenario_takes_a_body_of_a_cad_file_without_a_unit(tmp_path):
+    from sphshell_pin.scenario import build
+    from tests.scenario.files import DROP, write
+
+    shapes.write_step(tmp_path / "two.step", ("plate", shapes.box()), ("pin", shapes.cylinder()))
+    file = 'file = "two.step"\nchord_error = 1e-5\nbodies = ["pin"]'
+    text = DROP.replace('primitive = { type = "box", size = [0.2, 0.2, 0.02] }', file)
+    (pair,) = build(write(tmp_path, text)).scene.pairs
+    assert pair.shell.box[0, 0] == pytest.approx(0.095, abs=1e-5)
+    assert pair.shell.is_closed
+    with pytest.raises(Exception, match="no body 'nut'"):
+        build(write(tmp_path, text.replace('"pin"', '"nut"')))

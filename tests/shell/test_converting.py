@@ -1,0 +1,127 @@
+"""From file to file: exact where it can be, measured in any case, and never half done."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("OCP")
+
+from typer.testing import CliRunner
+
+from sphshell_pin import Shell
+from sphshell_pin.cli import app
+from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError
+from sphshell_pin.shell import converting
+from sphshell_pin.shell.converting import convert
+from tests import meshes
+from tests.shell import cad_shapes as shapes
+
+
+@pytest.fixture
+def plate(tmp_path):
+    return shapes.write_step(tmp_path / "plate.step", ("plate", shapes.drilled_plate()))
+
+
+@pytest.mark.parametrize("suffix", [".iges", ".brep", ".stp"])
+@pytest.mark.parametrize("unit", [None, "in"])
+def test_cad_to_cad_keeps_the_exact_surfaces(plate, suffix, unit, tmp_path):
+    done = convert(plate, tmp_path / f"out{suffix}", unit_out=unit)
+    assert done.largest < 1e-9
+    assert (done.target.count, done.target.kind) == (7, "CAD faces")
+    assert done.target.size == pytest.approx(done.source.size, rel=1e-9)
+    assert done.target.unit == (unit or "mm")
+
+
+def test_cad_to_mesh_stays_within_the_chord_error(plate, tmp_path):
+    done = convert(plate, tmp_path / "out.obj", unit_out="m", chord_error=5e-5)
+    shell = Shell.from_file(tmp_path / "out.obj", "m")
+    assert done.target.count == shell.num_elements
+    assert shell.is_closed
+    # Seen from the hole the exact surface is nearer to its axis than 10 mm nowhere.
+    inner = np.linalg.norm(shell.vertices[:, :2] - 0.020, axis=1).min()
+    assert inner == pytest.approx(0.010, rel=1e-6)
+    assert 1e-6 < done.largest <= 5e-5
+    assert 0.0 < done.rms < done.largest
+
+
+@pytest.mark.parametrize("suffix", [".step", ".iges", ".brep"])
+def test_meshes_become_planar_faces(suffix, tmp_path):
+    vertices, elements = meshes.icosphere(1, 0.02)
+    Shell(vertices, elements).to_file(tmp_path / "ball.ply", "cm")
+    done = convert(tmp_path / "ball.ply", tmp_path / f"ball{suffix}", "cm", "mm")
+    assert done.largest < 1e-10
+    again = Shell.from_file(tmp_path / f"ball{suffix}", "mm")
+    assert again.is_closed
+    assert again.num_elements == done.source.count == len(elements)
+    assert again.health.volume == pytest.approx(Shell(vertices, elements).health.volume)
+
+
+def test_quads_stay_quads_between_meshes(tmp_path):
+    Shell([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]).to_file(tmp_path / "a.off")
+    done = convert(tmp_path / "a.off", tmp_path / "a.shl", "cm")
+    assert (done.source.count, done.target.count) == (1, 1)
+    assert done.largest < 1e-15
+    assert Shell.from_file(tmp_path / "a.shl").size == pytest.approx(0.01 * 2**0.5)
+
+
+def test_a_body_is_converted_alone(tmp_path):
+    path = shapes.write_step(
+        tmp_path / "two.step", ("plate", shapes.box()), ("pin", shapes.cylinder())
+    )
+    done = convert(path, tmp_path / "pin.iges", bodies=["pin"])
+    assert done.target.count == 3
+    assert Shell.from_file(tmp_path / "pin.iges").is_closed
+    assert convert(path, tmp_path / "side.step", faces=[7]).target.count == 1
+    again = convert(path, tmp_path / "both.step").target.path
+    assert np.allclose(Shell.from_file(again, bodies=["pin"]).box[0, 0], 0.095, atol=1e-4)
+
+
+def test_a_failed_conversion_leaves_the_old_file_and_nothing_else(plate, tmp_path, monkeypatch):
+    target = tmp_path / "out.stl"
+    target.write_bytes(b"precious")
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(NameNotFound):
+        convert(plate, target, bodies=["nothing"])
+
+    def fail(*_):
+        raise ShellFileError(target, "no room")
+
+    monkeypatch.setattr(converting, "_write", fail)
+    with pytest.raises(ShellFileError):
+        convert(plate, target)
+    assert target.read_bytes() == b"precious"
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_what_cannot_be_is_refused(plate, tmp_path, monkeypatch):
+    for target, told in (("out.xyz", "must end in one of"), ("plate.step", "another file")):
+        with pytest.raises(InvalidParameter, match=told):
+            convert(plate, tmp_path / target)
+    with pytest.raises(ShellFileError, match="no such folder"):
+        convert(plate, tmp_path / "nowhere" / "out.stl")
+    with pytest.raises(InvalidParameter, match="unit"):
+        convert(plate, tmp_path / "out.iges", unit_out="parsec")
+    convert(plate, tmp_path / "out.stl")
+    with pytest.raises(InvalidParameter, match="belongs to CAD files"):
+        convert(tmp_path / "out.stl", tmp_path / "out.obj", "mm", chord_error=1e-4)
+    from sphshell_pin.shell.cad import writing
+
+    monkeypatch.setattr(writing, "MOST_FACETS", 10)
+    with pytest.raises(InvalidParameter, match="too many for a CAD file"):
+        convert(tmp_path / "out.stl", tmp_path / "out.step", "mm")
+
+
+def test_the_command_prints_what_it_measured(plate, tmp_path):
+    target = tmp_path / "out.stl"
+    told = CliRunner().invoke(app, ["convert", str(plate), str(target), "--chord-error", "1e-4"])
+    assert told.exit_code == 0, told.output
+    assert "7 CAD faces" in told.output
+    assert "deviation measured at" in told.output
+    assert target.is_file()
+    told = CliRunner().invoke(app, ["check", str(plate), "--face", "7", "--chord-error", "1e-5"])
+    assert told.exit_code == 0
+    assert "1 CAD face, tolerance" in told.output
+    told = CliRunner().invoke(app, ["convert", str(target), str(tmp_path / "out.obj")])
+    assert told.exit_code == 2
+    assert "--unit-in mm" in told.output
