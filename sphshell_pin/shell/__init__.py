@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sphshell_pin.shell.shell import ClosestPoints, Shell
+from sphshell_pin.shell.closest_points import ClosestPoints
+from sphshell_pin.shell.shell import Shell
 
 if TYPE_CHECKING:
     from sphshell_pin.shell.cleaning import CleanedSurface, clean

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ import numpy.typing as npt
 from sphshell_pin import _core
 from sphshell_pin.checks import as_floats, check_points, check_positive, check_vector, read_only
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.shell.closest_points import ClosestPoints
 from sphshell_pin.shell.options import CREASE_ANGLE, SIDES, check_options, thread_count
 from sphshell_pin.shell.topology import Topology
 
@@ -24,29 +25,6 @@ if TYPE_CHECKING:
     from sphshell_pin.shell.cleaning import CleanedSurface
     from sphshell_pin.shell.health import ShellHealth
     from sphshell_pin.shell.raw import Floats, Ints
-
-
-@dataclass(frozen=True)
-class ClosestPoints:
-    """Where the surface is nearest to each of n points, in the shell's frame.
-
-    Attributes
-    ----------
-    points : (n, 3) on the surface [m]
-    normals : (n, 3) unit, along the way from there to the point, or with flat elements that of the
-        element, or the mean one of the edge or vertex; on the side the winding makes the outer one
-    distances : (n,) [m], negative behind the surface
-    elements : (n,) row of shell.elements
-    """
-
-    points: Floats
-    normals: Floats
-    distances: Floats
-    elements: Ints
-
-    def __len__(self) -> int:
-        """Return the number of points."""
-        return len(self.distances)
 
 
 class Shell(Topology):
