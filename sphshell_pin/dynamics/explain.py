@@ -241,7 +241,8 @@ def _impact_times(law: NormalLaw, mass: float, speed: float, depth: float, load:
     k, e = law.stiffness, law.exponent
     times = [2 * depth / speed * _duration_integral(e)]
     if load > 0:
-        times.append(math.pi * math.sqrt(mass / (k * e * law.depth_at(load) ** (e - 1))))
+        # The stiffness under the load, k e depth^(e-1), is e load/depth.
+        times.append(math.pi * math.sqrt(mass * law.depth_at(load) / (e * load)))
     # A decay needs fewer steps than an oscillation: 20 decay times count like one period.
     if isinstance(law, ImpactLaw) and law.damping:
         share = min(depth / law.full_damping_depth, 1.0)

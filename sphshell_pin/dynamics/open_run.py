@@ -114,11 +114,12 @@ class OpenRun:
         core_controller = None
         if controller is not None and controller is not self._controller:
             core_controller = simulation.core_controller(controller, q)
-            self._controller = controller
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", WeakLawWarning)
             pairs = simulation.core_pairs(q, v)
         self._core.change(pairs, core_controller)
+        if core_controller is not None:
+            self._controller = controller
         self.simulation = simulation
         return True
 

@@ -41,13 +41,19 @@ class Assembly:
 
 @contextmanager
 def blamed_on(path: Path, key: str) -> Iterator[None]:
-    """Name the scenario's file and `key` in any fault of the package that happens inside."""
+    """Name the scenario's file and `key` in any fault of the package that happens inside.
+
+    So it does of numbers that are too large or too small to compute with.
+    """
     try:
         yield
     except (ScenarioError, MissingExtra):
         raise
     except SphshellError as error:
         raise ScenarioError(path, key, str(error)) from error
+    except ArithmeticError as error:
+        why = f"has a number too large or too small to compute with ({error})"
+        raise ScenarioError(path, key, why) from error
 
 
 def to_se3(placement: Placement) -> Any:

@@ -105,6 +105,11 @@ def _shell(shell: ShellSection, plan: Plan, digits: int) -> list[str]:
         lines.append(_beside(f"file = {_string(shell.file)}", "relative to this file"))
     if shell.unit is not None:
         lines.append(_beside(f"unit = {_string(shell.unit)}", "length unit of the file's numbers"))
+    if shell.bodies is not None:
+        lines.append(_beside(f"bodies = {_list(map(_string, shell.bodies))}", "of the CAD file"))
+    if shell.faces is not None:
+        faces = (str(one) if isinstance(one, int) else _string(one) for one in shell.faces)
+        lines.append(_beside(f"faces = {_list(faces)}", "of the CAD file"))
     if shell.primitive is not None:
         table = ", ".join(f"{k} = {_value(v)}" for k, v in shell.primitive.model_dump().items())
         lines.append(f"primitive = {{ {table} }}")

@@ -113,6 +113,8 @@ def check_knobs(scenario: Scenario, path: Path, *, ranges: bool) -> None:
         seen.add(key)
         low, high, log = _range(section, value)
         if low is None or high is None:
+            if not ranges:
+                continue  # its author saw a range, which this value has left
             raise ScenarioError(
                 path, where, f"needs min and max, as '{section.key}' is not positive", value
             )
@@ -124,7 +126,8 @@ def check_knobs(scenario: Scenario, path: Path, *, ranges: bool) -> None:
             raise ScenarioError(
                 path,
                 where,
-                f"'{section.key}' = {value:g} lies outside its range {low:g} to {high:g}",
+                f"'{section.key}' = {value:g} lies outside its range {low:g} to {high:g}: change "
+                "the knob's min and max",
             )
 
 
@@ -151,8 +154,12 @@ def _range(section: KnobSection, value: float) -> tuple[float | None, float | No
 def _knob(section: KnobSection, scenario: Scenario, path: Path) -> Knob:
     value, key = _value(section, scenario, path)
     low, high, log = _range(section, value)
-    low = value if low is None else min(low, value)
-    high = value if high is None else max(high, value)
+    # A missing end, and a value that is not positive any more.
+    if low is None:
+        low = DECADE * value
+    if high is None:
+        high = value / DECADE if value < 0.0 else 1.0
+    low, high = min(low, value), max(high, value)
     label, unit = _meaning(key, scenario)
     return Knob(
         key=section.key,

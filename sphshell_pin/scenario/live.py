@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,11 @@ from sphshell_pin.checks import check_not_negative, check_vector
 from sphshell_pin.dynamics.open_run import OpenRun, contacts_of
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
-from sphshell_pin.errors import NameNotFound, SphshellError
+from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.scenario.build import Built, rebuild
 from sphshell_pin.scenario.knobs import Knob, knobs_of
 from sphshell_pin.scenario.player import Rows
+from sphshell_pin.scenario.reading import look_up
 
 Array = npt.NDArray[np.float64]
 
@@ -40,21 +42,15 @@ class LiveRun:
         self.built = built
         self.title = built.scenario.title or built.name
         self.start = 0.0
-        self._begin(built.q0, built.v0, 0.0, built.controller)
+        self._knobs = knobs_of(built)
+        self._begin(_open_run(built, built.q0, built.v0, 0.0))
 
-    def _begin(self, q: Array, v: Array, t: float, controller: Any) -> None:
-        self._run = OpenRun(
-            self.built.simulation,
-            q,
-            v,
-            controller,
-            self.built.scenario.run.control_dt,
-            record_dt=ROW_DT,
-            t0=t,
-        )
+    def _begin(self, run: OpenRun) -> None:
+        """Go on with `run`, which stands at its start."""
+        self._run = run
         self._fault: str | None = None
-        self._push_end = math.inf
-        self._row = self._run.snapshot()
+        self._push: tuple[str, Array, float] | None = None
+        self._row = run.snapshot()
         self._total = float(self._row.energy.total[0])
         self._exchanged = 0.0
 
@@ -108,7 +104,7 @@ class LiveRun:
     @property
     def knobs(self) -> tuple[Knob, ...]:
         """The knobs of the scenario, with the values they stand at."""
-        return knobs_of(self.built)
+        return self._knobs
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -131,9 +127,10 @@ class LiveRun:
         """
         until = self.time + check_not_negative("duration", duration, "s")
         pieces = []
-        if self._push_end <= until:
-            pieces.append(self._advance(max(self._push_end - self.time, 0.0), wall))
-            if self.time >= self._push_end:
+        if self._push is not None and self._push[2] <= until:
+            end = self._push[2]
+            pieces.append(self._advance(max(end - self.time, 0.0), wall))
+            if self.time >= end:
                 self._end_push()
         if self.time < until:
             pieces.append(self._advance(until - self.time, wall))
@@ -165,8 +162,7 @@ class LiveRun:
 
     def reset(self) -> None:
         """Start anew, with the knobs as they stand."""
-        built = self.built
-        self._begin(built.q0, built.v0, 0.0, built.controller)
+        self._begin(_open_run(self.built, self.built.q0, self.built.v0, 0.0))
 
     def change(self, key: str, value: float) -> None:
         """Set the number at the dotted `key` of the scenario.
@@ -175,7 +171,16 @@ class LiveRun:
         ------
         ScenarioError
             There is no such key, or the value is out of its range; the run goes on as it was.
+        InvalidParameter
+            Nothing can be computed with such a value; the run goes on as it was.
         """
+        try:
+            self._change(key, value)
+        except ArithmeticError:
+            why = "is too large or too small to compute with"
+            raise InvalidParameter(key, value, why) from None
+
+    def _change(self, key: str, value: float) -> None:
         before = self.built
         after = rebuild(before, {key: repr(float(value))})
         same = {
@@ -184,26 +189,28 @@ class LiveRun:
         }
         controller = None if same["controller"] else after.controller
         goes_on = same["robot"] and same["shell"] and same["run"] and self.ended is None
-        if goes_on:
-            try:
-                if self._run.change(after.scene, controller):
-                    self.built = after
-                    self._row = self._run.snapshot()
-                    return
-                # Another gravity: from here on, under it.
-                self.built = after
-                self._begin(self.q, self.v, self.time, after.controller)
-                return
-            except SphshellError:
-                self.built = before
-                raise
+        if not goes_on:
+            self._begin(_open_run(after, after.q0, after.v0, 0.0))
+        elif self._run.change(after.scene, controller):
+            self._row = self._run.snapshot()
+        else:  # another gravity: from here on, under it
+            self._go_on(_open_run(after, self.q, self.v, self.time))
         self.built = after
-        try:
-            self.reset()
-        except SphshellError:
-            self.built = before
-            self.reset()
-            raise
+        # Their ranges stay those of the start: they do not wander with the values.
+        self._knobs = tuple(
+            replace(knob, value=float(look_up(after.scenario, knob.key, after.path)[0]))
+            for knob in self._knobs
+        )
+
+    def _go_on(self, run: OpenRun) -> None:
+        """Go on with `run`, which stands where this one does: with its push and its audit."""
+        residual, exchanged, push = self.residual, self._exchanged, self._push
+        self._begin(run)
+        self._total -= residual
+        self._exchanged = exchanged
+        if push is not None:
+            run.push(push[0], push[1])
+            self._push = push
 
     def push(self, body: str, force_world: npt.ArrayLike, seconds: float) -> None:
         """Push at the origin of the frame `body` with a force (3,) [N] in the world for a time [s].
@@ -220,7 +227,7 @@ class LiveRun:
         force = check_vector("force_world", force_world, 3, " [N]")
         seconds = check_not_negative("seconds", seconds, "s")
         self._run.push(body, force)
-        self._push_end = self.time + seconds
+        self._push = body, force, self.time + seconds
 
     def seek(self, t: float) -> None:
         """Refuse: what has not happened yet cannot be shown.
@@ -234,7 +241,20 @@ class LiveRun:
 
     def _end_push(self) -> None:
         self._run.push(self.bodies[0], np.zeros(3))
-        self._push_end = math.inf
+        self._push = None
+
+
+def _open_run(built: Built, q: Array, v: Array, t: float) -> OpenRun:
+    """Open the run of `built` from a state; raises what `Simulation.run` raises of a start."""
+    return OpenRun(
+        built.simulation,
+        q,
+        v,
+        built.controller,
+        built.scenario.run.control_dt,
+        record_dt=ROW_DT,
+        t0=t,
+    )
 
 
 def _exchanged(before: Result, rows: Result, now: Result) -> float:
@@ -243,7 +263,8 @@ def _exchanged(before: Result, rows: Result, now: Result) -> float:
         np.concatenate([getattr(one.energy, name) for one in (before, rows, now)])
         for name in before.energy.__annotations__
     ]
-    return 0.5 * float(np.abs(np.diff(columns, axis=1)).sum())
+    with np.errstate(all="ignore"):  # of a run that diverges
+        return 0.5 * float(np.abs(np.diff(columns, axis=1)).sum())
 
 
 def _joined(pieces: list[Rows], pairs: int) -> Rows:

@@ -85,6 +85,8 @@ def new_scenario(
     frame: str | None = None,
     radius: float | None = None,
     unit: str | None = None,
+    bodies: Sequence[str] | None = None,
+    faces: Sequence[str | int] | None = None,
     material: str | None = None,
     against: str = "steel",
     press: float | None = None,
@@ -103,6 +105,8 @@ def new_scenario(
         `package_dirs`: folders above the packages of its meshes).
     surface
         A surface file, its `unit` where the format has none, or a word of WORDS.
+    bodies, faces
+        Of a CAD file: those to take, by name or number; by default all of it.
     frame, radius
         Of the sphere [m], which stands in the frame's origin; by default a known fingertip or foot.
     material, against
@@ -143,7 +147,7 @@ def new_scenario(
         bare = _build_bare(section, path)
     loaded = bare.assembly.loaded[0]
     tips = find_tips(loaded, shipped=section.name, frame=frame, radius=radius)
-    shell_section, word = _shell_section(surface, unit, path, bare, tips)
+    shell_section, word = _shell_section(surface, unit, (bodies, faces), path, bare, tips)
     with_shell = _build_bare(section, path, shell_section, reuse=bare)
     _check_size(with_shell.shells[shell_section.name], tips)
     wish = _Wish(material, against, press, place, word)
@@ -225,6 +229,8 @@ def _robot_section(
             raise SphshellError(
                 f"a free root and mesh folders belong to a URDF file, not to {robot}"
             )
+        if file.is_file():
+            raise SphshellError(f"{robot}: is not a URDF file, which ends in .urdf or .xml")
         return RobotSection(name=str(robot))
     return RobotSection(
         urdf=_relative(file, path),
@@ -262,13 +268,22 @@ def _build_bare(
 
 
 def _shell_section(
-    surface: str | PathLike[str], unit: str | None, path: Path, built: Built, tips: Sequence[Tip]
+    surface: str | PathLike[str],
+    unit: str | None,
+    parts: tuple[Sequence[str] | None, Sequence[str | int] | None],
+    path: Path,
+    built: Built,
+    tips: Sequence[Tip],
 ) -> tuple[ShellSection, str | None]:
     """Return the surface's table, and the word that stood for it."""
     file = Path(surface)
     if file.is_file():
         name = file.stem.replace(".", "-")
-        return ShellSection(name=name, file=_relative(file, path), unit=unit), None
+        bodies, faces = (None if one is None else list(one) for one in parts)
+        section = ShellSection(
+            name=name, file=_relative(file, path), unit=unit, bodies=bodies, faces=faces
+        )
+        return section, None
     word = str(surface)
     if word not in WORDS:
         if file.suffix:
@@ -276,6 +291,8 @@ def _shell_section(
         raise NameNotFound("surface", word, "the command (beside files)", WORDS)
     if unit is not None:
         raise SphshellError(f"a unit belongs to a surface file; the {word} is sized in metres")
+    if parts != (None, None):
+        raise SphshellError(f"bodies and faces belong to a CAD file, not to the {word}")
     centres = _centres(built, tips)
     spread = float(np.linalg.norm(np.ptp(centres, axis=0)))
     size = _round_up(max(_SIZE * max(tip.radius for tip in tips), spread))

@@ -24,6 +24,8 @@ _EASY = 0.1
 # by its reach, beyond which a posture is near a singular one.
 _SLIDE_STEPS = 20
 _FASTEST = 6.0
+# Cosine between a limb and straight down up to which it presses down.
+_DOWNWARD = 0.5
 # How far joints are bent out of a singular posture [rad or m], in turn, and how often it is tried.
 _BENDS = (0.3, 0.6, 0.9)
 _TRIES = 40
@@ -72,15 +74,31 @@ class Stance:
 def take_stance(model: Any, q: Array, tip: Tip, approach: Array | None) -> Stance:
     """Return how the robot stands with its tip near the configuration q (nq,).
 
-    `approach` (3,) is where the tip shall press; by default down, for a sphere before its frame as
-    the frame points, or where it moves best if it cannot move there. A posture in which it cannot
-    move is bent a little, always in the same way.
+    `approach` (3,) is where the tip shall press; by default down if its limb points down, else as
+    it points, or where it moves best if it cannot move there. A posture in which it cannot move is
+    bent a little, always in the same way.
     """
     lock = _joints_aside(model, tip)
     inside = _into_limits(model, q)
+    best, best_score = _bend(model, inside, lock, tip, approach, best_way=False)
+    if best_score < _MOBILE and approach is None:
+        best, _ = _bend(model, inside, lock, tip, approach, best_way=True)
+    return _with_room(replace(best, bent=not np.array_equal(best.q, q)), tip)
+
+
+def _bend(
+    model: Any,
+    inside: Array,
+    lock: tuple[str, ...],
+    tip: Tip,
+    approach: Array | None,
+    *,
+    best_way: bool,
+) -> tuple[Stance, float]:
+    """Return the stance at `inside`, or a bent one where that cannot move, and its mobility."""
     rng = np.random.default_rng(0)
     moving = [j for j in range(1, model.njoints) if model.names[j] not in lock]
-    best, best_score = _stance(model, inside, lock, tip, approach)
+    best, best_score = _stance(model, inside, lock, tip, approach, best_way=best_way)
     bends = _BENDS if best_score < _MOBILE else ()
     for bend in bends:
         if best_score >= _EASY:
@@ -91,10 +109,10 @@ def take_stance(model: Any, q: Array, tip: Tip, approach: Array | None) -> Stanc
                 joint = model.joints[j]
                 step[joint.idx_v : joint.idx_v + joint.nv] = rng.uniform(-bend, bend, joint.nv)
             bent = _into_limits(model, pin.integrate(model, inside, step))
-            one, score = _stance(model, bent, lock, tip, approach)
+            one, score = _stance(model, bent, lock, tip, approach, best_way=best_way)
             if score > best_score:
                 best, best_score = one, score
-    return _with_room(replace(best, bent=not np.array_equal(best.q, q)), tip)
+    return best, best_score
 
 
 def _joints_aside(model: Any, tip: Tip) -> tuple[str, ...]:
@@ -121,9 +139,18 @@ def _into_limits(model: Any, q: Array) -> Array:
 
 
 def _stance(
-    model: Any, q: Array, lock: tuple[str, ...], tip: Tip, approach: Array | None
+    model: Any,
+    q: Array,
+    lock: tuple[str, ...],
+    tip: Tip,
+    approach: Array | None,
+    *,
+    best_way: bool,
 ) -> tuple[Stance, float]:
-    """Return the stance at q, and its mobility along the approach as a part of the best one."""
+    """Return the stance at q, and its mobility along the approach as a part of the best one.
+
+    Without an `approach` it is forward; with `best_way`, where the tip moves best if not forward.
+    """
     reduced = reduced_model(model, lock, q) if lock else model
     short = _coordinates(model, reduced, q)
     data = reduced.createData()
@@ -140,12 +167,8 @@ def _stance(
     values, axes = np.linalg.eigh(mobility)
     top = max(float(values[-1]), 1e-300)
     if approach is None:
-        # A sphere before its frame is pressed as the frame points, else the frame would be dragged
-        # beside it.
-        approach = np.array([0.0, 0.0, -1.0])
-        if tip.offset.any():
-            approach = pose.rotation @ tip.offset / np.linalg.norm(tip.offset)
-        if approach @ mobility @ approach < _MOBILE * top:
+        approach = _forward(data, pose, tip)
+        if best_way and approach @ mobility @ approach < _MOBILE * top:
             approach = _roomier(reduced, short, linear, mass_matrix, _upright(axes[:, -1]))
     along = float(approach @ mobility @ approach)
     across = np.eye(3) - np.outer(approach, approach)
@@ -184,6 +207,25 @@ def _stance(
     return stance, usable / top
 
 
+def _forward(data: Any, pose: Any, tip: Tip) -> Array:
+    """Return where there is nothing of the robot before the tip: down, or as its limb points.
+
+    A sphere before its frame is pressed as the frame points, else the frame would be dragged beside
+    it; any other as the way to it from the last joint that is not inside it. On a surface that lies
+    beside that way or behind it the limb would pass through the surface.
+    """
+    if tip.offset.any():
+        ahead: Array = pose.rotation @ tip.offset
+        return ahead / np.linalg.norm(ahead)
+    down = np.array([0.0, 0.0, -1.0])
+    for joint in reversed(list(data.oMi)[1:]):
+        limb = pose.translation - joint.translation
+        length = float(np.linalg.norm(limb))
+        if length > tip.radius:
+            return down if limb @ down > _DOWNWARD * length else _upright(limb / length, free=False)
+    return down
+
+
 def _with_room(stance: Stance, tip: Tip) -> Stance:
     """Return the stance with its slide turned to where there is more room, and how much."""
     if stance.slide is None:
@@ -220,15 +262,14 @@ def _coordinates(model: Any, reduced: Any, q: Array) -> Array:
     return short
 
 
-def _upright(axis: Array) -> Array:
-    """Return `axis` along the nearest coordinate axis, where it nearly is one; its sign is free."""
+def _upright(axis: Array, *, free: bool = True) -> Array:
+    """Return `axis` along the nearest coordinate axis, where it nearly is one; `free`: in its +."""
     k = int(np.argmax(np.abs(axis)))
+    sign = np.sign(axis[k])
+    upright: Array = axis * sign
     if abs(axis[k]) > 0.97:
-        straight = np.zeros(3)
-        straight[k] = 1.0
-        return straight
-    upright: Array = axis * np.sign(axis[k])
-    return upright
+        upright = np.eye(3)[k]
+    return upright if free else sign * upright
 
 
 def _roomier(model: Any, q: Array, linear: Array, mass_matrix: Array, axis: Array) -> Array:

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from sphshell_pin.errors import NameNotFound, ScenarioError
-from sphshell_pin.scenario.schema import LISTS, Scenario
+from sphshell_pin.scenario.schema import ERROR_CONTROLLED, LISTS, RunSection, Scenario
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -40,9 +40,14 @@ def find_scenario(name: str | PathLike[str]) -> Path:
     shipped = shipped_scenarios()
     if str(name) in shipped:
         return shipped[str(name)]
+    beside = path.with_name(f"{path.name}.toml") if path.name else path
+    if beside.is_file():
+        raise ScenarioError(path, "", f"no such file; did you mean {beside}?")
+    if path.is_dir():
+        raise ScenarioError(path, "", "is a folder: give the .toml file of a scenario")
     if path.suffix == ".toml" or len(path.parts) > 1:
         raise ScenarioError(path, "", "no such file")
-    raise NameNotFound("scenario", str(name), "sphshell-pin", shipped)
+    raise NameNotFound("scenario", str(name), "beside .toml files, sphshell-pin", shipped)
 
 
 def read_scenario(path: str | PathLike[str], changes: Mapping[str, str] | None = None) -> Scenario:
@@ -86,8 +91,29 @@ def change_scenario(
     """
     data = scenario.model_dump(exclude_unset=True)
     for key, text in changes.items():
+        whole = _with_table(key, data)
+        if whole != key:
+            raise ScenarioError(path, key, f"unknown key; did you mean '{whole}'?", text)
         _change(data, key, _parse_value(text), path, scenario)
+    if "run.integrator" in changes:
+        # Another kind of integrator has no use for the step or the tolerances of the file's.
+        by_error = changes["run.integrator"].strip("\"'") in ERROR_CONTROLLED
+        for key in ("dt",) if by_error else ("rtol", "atol"):
+            if f"run.{key}" not in changes:
+                data["run"].pop(key, None)
     return _validated(data, path)
+
+
+def _with_table(key: str, data: Mapping[str, Any]) -> str:
+    """Return `key` with the table that was left out before it, if that is run or controller."""
+    if key.partition(".")[0] not in Scenario.model_fields:
+        for table, known in (
+            ("run", RunSection.model_fields),
+            ("controller", data.get("controller", {})),
+        ):
+            if key in known:
+                return f"{table}.{key}"
+    return key
 
 
 def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> tuple[Any, str]:

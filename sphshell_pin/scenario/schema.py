@@ -345,9 +345,12 @@ class RunSection(Section):
         """Refuse a step where the error decides, and a tolerance where it does not."""
         if self.integrator in ERROR_CONTROLLED:
             if self.dt is not None:
-                raise ValueError(f"{self.integrator} takes rtol and atol, not dt")
+                raise ValueError(
+                    f"{self.integrator} takes rtol and atol, not dt: for fixed steps set "
+                    "run.integrator to semi-implicit-euler, and leave rtol and atol out"
+                )
         elif self.rtol is not None or self.atol is not None:
-            raise ValueError(f"{self.integrator} takes dt, not rtol and atol")
+            raise ValueError(f"{self.integrator} takes dt, not rtol and atol: leave them out")
         return self
 
 

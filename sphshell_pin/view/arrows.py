@@ -209,7 +209,9 @@ class ArrowPool:
         return np.stack((normal, friction))
 
     def _place_arrow(self, arrow: int, contact: int, force: FloatArray, scale: ArrowScale) -> None:
-        size = math.sqrt(force @ force)
+        size = math.hypot(*force.tolist())
+        if not math.isfinite(size):
+            size = 0.0  # of a run that diverges: it has no direction to show
         length = min(size * scale.metres_per_newton, scale.longest)
         start = self._where[contact]
         place_shaft, place_head = self._arrows[arrow]

@@ -164,3 +164,18 @@ def test_a_push_that_cannot_be(frame: str, force: list[float], fault: type, says
     run = opened(sliding_ball(), FIXED[0], models.free_q([0.0, 0.0, R]), None)
     with pytest.raises(fault, match=says):
         run.push(frame, force)
+
+
+def test_a_fixed_step_of_many_fine_ones_can_be_left_half_way() -> None:
+    """Whoever waits for a frame gets the clock back, and the motion is that of the run in one."""
+    dt = 1e-2
+    q, v = models.free_q([0.0, 0.0, R + 0.1]), np.array([0.0, 0.0, -200.0, 0.0, 0.0, 0.0])
+    law = sp.ImpactLaw(1e9, 1.5)
+    simulation = sp.Simulation(models.on_plate(models.ball(), law), sp.RungeKutta4(dt))
+    whole = simulation.run(q, v, 2 * dt)
+    run = OpenRun(simulation, q, v, record_dt=dt)
+    run.advance(dt, wall=0.0)
+    assert 0.0 < run.time < dt
+    while run.time < 2 * dt:
+        run.advance(2 * dt - run.time, wall=0.0)
+    np.testing.assert_array_equal(run.snapshot().q[0], whole.q[-1])

@@ -7,6 +7,7 @@ import pytest
 
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build, knobs_of, rebuild, shipped_scenarios
+from sphshell_pin.scenario.live import LiveRun
 from tests.scenario.files import DROP, write
 
 STIFFNESS = "contact.ball-plate.law.stiffness"
@@ -171,3 +172,18 @@ def test_the_users_functions_are_loaded_once(tmp_path):
     turned = rebuild(built, {"source.gears.law.stiffness": "1e9"})
     assert turned.controller is built.controller
     assert turned.scene.pairs[0].find is built.scene.pairs[0].find
+
+
+KNOB = '\n[[knob]]\nkey = "contact.ball-plate.law.damping"\n'
+
+
+def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
+    path = write(tmp_path, DROP + KNOB)
+    (knob,) = knobs_of(build(path, {"contact.ball-plate.law.damping": "0"}))
+    assert (knob.value, knob.log) == (0.0, False)
+    assert knob.low <= 0.0 < knob.high
+    live = LiveRun(build(path))
+    (before,) = live.knobs
+    live.change(before.key, 0.0)
+    (after,) = live.knobs
+    assert (after.low, after.high, after.value) == (before.low, before.high, 0.0)

@@ -135,3 +135,53 @@ def test_another_path_speed_goes_on_from_where_the_tip_is() -> None:
     way = np.linalg.norm(live.contacts.point_world[0] - first)
     assert way == pytest.approx(0.02 * 0.5, rel=0.15)  # as the crow flies
     assert live.contacts.normal_force[0] == pytest.approx(5.0, rel=0.2)
+
+
+def test_a_start_that_cannot_be_leaves_the_run_where_it_is(live: LiveRun) -> None:
+    live.advance(0.1)
+    time, q = live.time, live.q.copy()
+    with pytest.raises(SphshellError, match="depth"):
+        live.change("robot.ball.start.root_joint.2", -0.001)
+    assert live.time == time
+    np.testing.assert_array_equal(live.q, q)
+
+
+def test_a_number_that_overflows_is_one_sentence(live: LiveRun) -> None:
+    live.advance(0.1)
+    before = live.built
+    with pytest.raises(SphshellError, match=r"law\.exponent = 1e\+?300|too large") as told:
+        live.change(f"{LAW}.exponent", 1e300)
+    assert "\n" not in str(told.value)
+    live.change(f"{LAW}.exponent", 1e-9)  # no depth carries the weight: as stiff as can be
+    live.change(f"{LAW}.exponent", 1.5)
+    live.advance(0.01)
+    assert live.ended is None
+    assert live.built.scenario == before.scenario
+
+
+def test_gravity_takes_push_and_audit_along(live: LiveRun) -> None:
+    settle(live)
+    live.push("ball", [0.0, 0.0, 2.0], 10.0)
+    live.advance(0.01)
+    residual, exchanged = live.residual, live.exchanged
+    live.change("gravity.2", 0.0)
+    assert live.residual == pytest.approx(residual, abs=1e-12)
+    assert live.exchanged == exchanged
+    live.advance(0.2)  # out of the contact
+    mass, v = float(live.scene.model.inertias[1].mass), live.v.copy()
+    live.advance(0.05)
+    assert live.v[2] - v[2] == pytest.approx(2.0 * 0.05 / mass, rel=1e-2)
+
+
+def test_what_changes_add_is_booked(live: LiveRun) -> None:
+    """Depth, stiffness and radius change under load: nothing of it comes from nowhere."""
+    settle(live)
+    for key, value in (
+        (f"{LAW}.stiffness", 1e5),
+        ("contact.ball-plate.sphere.radius", 0.0125),
+        (f"{LAW}.stiffness", 1e6),
+        ("contact.ball-plate.sphere.radius", 0.012),
+    ):
+        live.change(key, value)
+        settle(live, 0.2)
+    assert abs(live.residual) < 1e-2 * live.exchanged

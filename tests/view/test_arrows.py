@@ -119,3 +119,13 @@ def test_a_contact_keeps_its_arrow_when_another_lets_go():
     # Only the first contact's point ever shrinks; the second's stays in its slot throughout.
     assert list(sizes) == ["point_0"]
     assert sizes["point_0"][1] < 1e-3 * sizes["point_0"][0]
+
+
+@pytest.mark.parametrize("size", [1e200, np.inf, np.nan])
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_forces_beyond_all_bounds_are_drawn_as_far_as_can_be(size):
+    where = last_transforms(1, forces(size), ArrowScale(0.1, 1.0, longest=0.25))
+    tip = (where["normal_0/head"] @ [0, 0.5, 0, 1])[:3]
+    assert np.isfinite(tip).all()
+    expected = 0.25 if np.isfinite(size) else 0.0
+    assert np.linalg.norm(tip - [0, 1, 2]) == pytest.approx(expected, abs=1e-6)

@@ -117,3 +117,17 @@ def test_importing_the_page_loads_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_other_machines_are_let_in_with_a_warning_only(tmp_path, monkeypatch):
+    monkeypatch.setattr(Live, "run", lambda live: live.stop())
+    for host, warned in (("127.0.0.1", False), ("0.0.0.0", True), ("", True)):
+        told = call(write(tmp_path), "--no-open", "--host", host)
+        assert told.exit_code == 0
+        assert ("everybody" in told.stderr) is warned
+
+
+def test_a_folder_without_a_result_is_named(tmp_path):
+    told = call(tmp_path, "--no-open")
+    assert told.exit_code == 2
+    assert "has no run.npz" in told.stderr

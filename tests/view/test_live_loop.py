@@ -11,13 +11,17 @@ import numpy as np
 import pytest
 
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SimulationDiverged
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.live import LiveRun
 from sphshell_pin.view import live as live_module
 from sphshell_pin.view.live import Live, preview
 from sphshell_pin.view.live.loop import BUDGET, FPS
 from sphshell_pin.view.live.opening import player_of
+from tests.scenario.files import DROP, write
 from tests.view.live_player import BallPlayer, FilmPlayer
 
 TAB, OTHER_TAB = object(), object()
+START_KNOB = '\n[[knob]]\nkey = "robot.ball.start.root_joint.2"\n'
 
 
 class Told(list):
@@ -361,3 +365,66 @@ def test_preview_tells_the_address_and_ends(monkeypatch):
 
 def test_the_page_offers_no_more_frames_than_it_draws():
     assert 1.0 / FPS < BUDGET < 1.0 / 30.0
+
+
+def test_fixed_steps_longer_than_a_frame_keep_the_speed(make, tmp_path):
+    """A step of 1 ms, a frame of 0.17 ms: one step in six frames."""
+    path = write(tmp_path, DROP.replace("dt = 1e-4", "dt = 1e-3"))
+    live = make(LiveRun(build(path)), speed=0.01)
+    frames(live, 600)
+    assert live.player.time == pytest.approx(0.1, abs=1.1e-3)
+
+
+def test_a_key_held_down_does_not_go_on_when_it_is_let_go(make):
+    live = make(running=False)
+    advanced, advance = [], live.player.advance
+    live.player.advance = lambda *given: (advanced.append(given[0]), advance(*given))[1]
+    for _ in range(5):
+        say(live, "step", seconds=1e-3)
+    frames(live, 1)
+    assert live.player.time == pytest.approx(5e-3)
+    assert advanced == [pytest.approx(5e-3)]
+
+
+def test_a_picture_that_fails_is_told_and_the_page_goes_on(make):
+    live = make()
+    live.server.clients.add(TAB)
+
+    def fail(*_):
+        raise ZeroDivisionError("no direction")
+
+    update, live.picture.update = live.picture.update, fail
+    frames(live, 3)
+    assert not live.running
+    assert "no direction" in live._state()["ended"]
+    live.picture.update = update
+    say(live, "reset")
+    say(live, "run", on=True)
+    frames(live, 3)
+    live.server.clients.clear()
+    assert live._state()["ended"] is None
+    assert live.player.time > 0.0
+
+
+def test_the_arrow_of_a_push_ends_where_a_knob_starts_the_run_anew(make, tmp_path):
+    live = make(LiveRun(build(write(tmp_path, DROP + START_KNOB))))
+    frames(live, 6)
+    say(live, "push", body="ball", direction=[1.0, 0.0, 0.0], newtons=0.1, seconds=5.0)
+    frames(live, 1)
+    assert live._push_shown() is not None
+    say(live, "knob", key="robot.ball.start.root_joint.2", value=0.05)
+    frames(live, 1)
+    assert live._push_shown() is None
+
+
+def test_the_legend_says_where_arrows_are_cut(make):
+    live = make()
+    frames(live, 60)
+    live.draw()
+    assert live._state()["cut"] is False
+    say(live, "push", body="ball", direction=[1.0, 0.0, 0.0], newtons=1e6, seconds=1.0)
+    live.running = False
+    live.server.clients.add(TAB)
+    frames(live, 1)
+    live.server.clients.clear()
+    assert live._state()["cut"] is True

@@ -301,3 +301,29 @@ def test_answers_carry_json_that_browsers_read(live):
             return json.dumps(client.state, allow_nan=False)
 
     assert '"relative": null' in asyncio.run(visit())
+
+
+@pytest.mark.parametrize("host", ["no.such.host.invalid", "192.0.2.1", "a..b"])
+def test_a_host_that_is_none_is_one_sentence(host):
+    with pytest.raises(SphshellError, match="must be a name or an address") as told:
+        Live(BallPlayer(), host=host)
+    assert "Unknown error" not in str(told.value)
+    assert "port" not in str(told.value)
+
+
+def test_only_names_of_this_machine_lead_to_any_of_its_own_addresses():
+    with Live(BallPlayer(), host="127.0.0.2") as other:
+        assert not other.server.is_open
+        assert get(other.url)[0] == 200
+        assert get(other.url, Host="localhost:1")[0] == 200
+        assert get(other.url, Host="[::1]")[0] == 200
+        for stranger in ("evil.example", "[", "127.0.0.1.evil.example", "localhost@evil"):
+            assert get(other.url, Host=stranger)[0] in (400, 403)
+
+
+def test_a_browser_that_goes_during_the_handshake_leaves_no_complaint(live, caplog):
+    for _ in range(20):
+        with socket.create_connection(("127.0.0.1", live.server.port)) as raw:
+            raw.sendall(b"GET /socket HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n")
+    assert goes_on(live)
+    assert not caplog.records

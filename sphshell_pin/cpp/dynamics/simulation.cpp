@@ -117,7 +117,7 @@ double Simulation::end_of_step() const {
 }
 
 Simulation::Status Simulation::step() {
-  hold_torques();
+  if (fine_steps_ == 0) hold_torques();
   const double end = end_of_step();
   Status status = Status::Running;
   if (settings_.dt == 0) {
@@ -130,8 +130,12 @@ Simulation::Status Simulation::step() {
                                          ? Integrator::Implicit
                                          : Integrator::Adaptive,
                                      scene_);
-      for (int i = 0; status == Status::Running && state_.t < end; ++i)
-        status = i < kMostFineSteps ? controlled_step(*fine_stepper_, end) : Status::Stuck;
+      // One at a time: a fixed step may take very many, and the caller wants to look at the clock.
+      status =
+          fine_steps_++ < kMostFineSteps ? controlled_step(*fine_stepper_, end) : Status::Stuck;
+      if (status == Status::Running && state_.t < end)
+        return is_finite() ? status : Status::Diverged;
+      fine_steps_ = 0;
       // Back to fixed steps when they would do.
       if (proposal_ > 0.5 * settings_.dt) set_fine(false);
     }
@@ -141,9 +145,12 @@ Simulation::Status Simulation::step() {
         settings_.record_dt > 0 ? std::max(1L, std::lround(settings_.record_dt / settings_.dt)) : 1;
     if (status == Status::Running && (grid_ % every == 0 || at_end())) write_row(state_);
   }
-  // Not-a-number fails every comparison.
-  if (!(state_.v.squaredNorm() < 1e24) || !(state_.q.squaredNorm() < 1e24)) return Status::Diverged;
-  return status;
+  return is_finite() ? status : Status::Diverged;
+}
+
+// Not-a-number fails every comparison.
+bool Simulation::is_finite() const {
+  return state_.v.squaredNorm() < 1e24 && state_.q.squaredNorm() < 1e24;
 }
 
 void Simulation::set_fine(bool fine) {

@@ -105,6 +105,7 @@ class Simulation : private Torques {
   Status step();
   bool fixed_step(double end);
   void set_fine(bool fine);
+  bool is_finite() const;
   Status controlled_step(Stepper& stepper, double end);
   void attempt(Stepper& stepper, double h);
   double error_of(const Stepper& stepper);
@@ -135,6 +136,7 @@ class Simulation : private Torques {
   std::vector<PairSummary> summaries_;
   std::vector<double> normal_force_;
   std::vector<char> touching_, deep_, through_;
+  int fine_steps_ = 0;  // made of the fixed step under way
   long grid_ = 0, grid_steps_ = 0, steps_ = 0, rejected_ = 0, rows_ = 0, next_row_ = 0;
   double wall_time_ = 0;
   double until_ = std::numeric_limits<double>::infinity();  // where advance() stops [s]

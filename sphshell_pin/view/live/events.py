@@ -109,3 +109,23 @@ def read_event(message: str | bytes) -> Event:
         except BadMessage as fault:
             raise BadMessage(f"'{name}' of '{kind}' {fault}") from None
     return event
+
+
+def newest(events: list[tuple[object, Event]]) -> list[tuple[object, Event]]:
+    """Keep of a slider's many values only the last, where the last one came; join steps.
+
+    Else a key held down, where physics is slow, would go on for long after it was let go.
+    """
+    kept: list[tuple[object, Event]] = []
+    seen: set[tuple[Any, ...]] = set()
+    for client, event in reversed(events):
+        if event["type"] in ("knob", "speed", "arrows", "seek"):
+            key = (event["type"], event.get("key"))
+            if key in seen:
+                continue
+            seen.add(key)
+        elif event["type"] == "step" and kept and kept[-1][1]["type"] == "step":
+            kept[-1] = client, event | {"seconds": event["seconds"] + kept[-1][1]["seconds"]}
+            continue
+        kept.append((client, event))
+    return kept[::-1]

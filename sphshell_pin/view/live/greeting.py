@@ -5,6 +5,8 @@ from __future__ import annotations
 import secrets
 from typing import TYPE_CHECKING
 
+from sphshell_pin.checks import check_finite
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR
 from sphshell_pin.view.live.picture import CONE_COLOR
 from sphshell_pin.view.nodes import Json
@@ -17,6 +19,14 @@ STRIP_SECONDS = 6.0  # of the clock on the wall, that the strip shows at the spe
 
 _KNOB = ("key", "label", "unit", "low", "high", "log", "value")
 _COLORS = {"normal": NORMAL_COLOR, "friction": FRICTION_COLOR, "cone": CONE_COLOR}
+
+
+def check_speed(speed: float) -> float:
+    """Return `speed`, which must be one that the page offers; raise InvalidParameter else."""
+    value = check_finite("speed", speed)
+    if not SLOWEST <= value <= FASTEST:
+        raise InvalidParameter("speed", speed, f"must be from {SLOWEST:g} to {FASTEST:g}")
+    return value
 
 
 def greeting(player: Player, picture: str | None) -> Json:

@@ -11,11 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sphshell_pin.checks import check_positive
 from sphshell_pin.errors import NameNotFound, SphshellError
-from sphshell_pin.view.live.events import BadMessage, Event
+from sphshell_pin.view.live.events import BadMessage, Event, newest
 from sphshell_pin.view.live.foreign import ForeignWindow, window_of
-from sphshell_pin.view.live.greeting import FASTEST, SLOWEST, STRIP_SECONDS, greeting
+from sphshell_pin.view.live.greeting import (
+    FASTEST,
+    SLOWEST,
+    STRIP_SECONDS,
+    check_speed,
+    greeting,
+)
 from sphshell_pin.view.live.panel import Panel, Strip, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown, frame_point
 from sphshell_pin.view.live.server import Server
@@ -62,7 +67,7 @@ class Live:
     ) -> None:
         meshcat = require_meshcat()
         self.player = player
-        self.speed = min(max(check_positive("speed", speed), SLOWEST), FASTEST)
+        self.speed = check_speed(speed)
         self.running = running
         self.fault: Exception | None = None
         """What stopped the run, where that was no end of its own."""
@@ -83,6 +88,8 @@ class Live:
         self._knob_values = self._read_knobs()
         self._next_panel = 0.0
         self._simulated = 0.0
+        # Simulated time gone beyond what was due: a fixed step may be longer than a frame.
+        self._ahead = 0.0
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         # First of all the port: a picture takes time.
@@ -172,7 +179,7 @@ class Live:
     def frame(self, wall: float) -> None:
         """Handle what browsers said, go on by `wall` [s] at the speed chosen, and draw."""
         watched = self.server.watched
-        for client, event in _newest(self.server.events()):
+        for client, event in newest(self.server.events()):
             try:
                 self._handle(client, event)
             except BadMessage as fault:
@@ -188,7 +195,7 @@ class Live:
             self._waiting = False
             wall = 0.0
         if self.running and not self._waiting:
-            self._advance(self.speed * min(wall, 2.0 * BUDGET), BUDGET)
+            self._follow(self.speed * min(wall, 2.0 * BUDGET))
         else:
             self._pace.clear()
         if watched or self._foreign is not None:
@@ -199,7 +206,14 @@ class Live:
         now = time.perf_counter()
         if self._changed and (self._foreign is None or self._foreign.due(now)):
             self._changed = False
-            self.picture.update(self.player, self._push_shown())
+            try:
+                # A run that diverges has its say in the panel, not on the terminal.
+                with np.errstate(all="ignore"):
+                    self.picture.update(self.player, self._push_shown())
+            except Exception as fault:
+                # What cannot be drawn is told in the panel, which goes on.
+                self.fault = fault
+                self.running = False
             self._window.commit()
         if now >= self._next_panel:
             self._next_panel = now + PANEL_PERIOD
@@ -214,6 +228,17 @@ class Live:
     def panel_news(self, since: int) -> tuple[int, list[str]]:
         """Answer the server: what the panel says that is newer than `since`."""
         return self._panel.news(since)
+
+    def _follow(self, due: float) -> None:
+        """Go on by what is `due` [s], less what an earlier frame went too far."""
+        wanted = due - self._ahead
+        if wanted > 0.0:
+            before = self.player.time
+            self._advance(wanted, BUDGET)
+            self._ahead = max(0.0, self.player.time - before - wanted)
+        else:
+            self._ahead = -wanted
+            self._keep_pace()
 
     def _advance(self, duration: float, wall: float) -> None:
         player = self.player
@@ -234,12 +259,15 @@ class Live:
         self._strip_rows += self._strip.add(rows, self._spacing)
         self._strip_rows = self._strip_rows[-2 * STRIP_POINTS :]
         self._simulated += player.time - before
+        self._keep_pace()
+        if player.ended is not None:
+            self.running = False
+
+    def _keep_pace(self) -> None:
         now = time.perf_counter()
         self._pace.append((now, self._simulated))
         while self._pace[0][0] < now - RATE_WINDOW:
             self._pace.popleft()
-        if player.ended is not None:
-            self.running = False
 
     # Events
 
@@ -266,8 +294,7 @@ class Live:
                 before = player.time
                 player.change(event["key"], event["value"])
                 if player.time < before:  # it started anew
-                    self._start_strip()
-                    self.picture.clear()
+                    self._start_anew()
             case "push":
                 self._push(event, event["seconds"])
             case "hold":
@@ -306,8 +333,12 @@ class Live:
 
     def _reset(self) -> None:
         self.player.reset()
+        self._start_anew()
+
+    def _start_anew(self) -> None:
         self.fault = None
         self._pushed = None
+        self._ahead = 0.0
         self._start_strip()
         self.picture.clear()
 
@@ -375,18 +406,5 @@ class Live:
             "show": self.picture.shown,
             "arrows": self.picture.magnification,
             "scale": str(self.picture.arrow_scale),
+            "cut": self.picture.cut,
         }
-
-
-def _newest(events: list[tuple[object, Event]]) -> list[tuple[object, Event]]:
-    """Keep of a slider's many values only the last, where the last one came."""
-    kept: list[tuple[object, Event]] = []
-    seen: set[tuple[Any, ...]] = set()
-    for client, event in reversed(events):
-        if event["type"] in ("knob", "speed", "arrows", "seek"):
-            key = (event["type"], event.get("key"))
-            if key in seen:
-                continue
-            seen.add(key)
-        kept.append((client, event))
-    return kept[::-1]

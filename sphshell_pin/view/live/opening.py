@@ -10,8 +10,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sphshell_pin.errors import InvalidParameter, SphshellError
-from sphshell_pin.view.live.greeting import FASTEST, SLOWEST
+from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
+from sphshell_pin.view.live.greeting import check_speed
 from sphshell_pin.view.live.loop import Live
 
 if TYPE_CHECKING:
@@ -63,8 +63,7 @@ def preview(
     SphshellError
         `what` cannot be built or read, or the port is taken.
     """
-    if not SLOWEST <= speed <= FASTEST:
-        raise InvalidParameter("speed", speed, f"must be from {SLOWEST:g} to {FASTEST:g}")
+    check_speed(speed)  # before anything is built
     live = Live(
         player_of(what, changes=changes, scenario=scenario),
         visualizer,
@@ -74,10 +73,18 @@ def preview(
         running=not paused,
         wait=True,
     )
-    told(live.url)
-    if open:
-        open_browser(live.url)
-    live.run()
+    try:
+        told(live.url)
+        if live.server.is_open:
+            port = live.server.port
+            print(f"everybody who reaches port {port} may look and play", file=sys.stderr)
+        if open:
+            open_browser(live.url)
+        live.run()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        live.stop()
 
 
 def player_of(
@@ -115,11 +122,20 @@ def player_of(
 
 
 def result_file(what: str | PathLike[str]) -> Path | None:
-    """Return the file of the finished run that `what` names; None if it names a scenario."""
+    """Return the file of the finished run that `what` names; None if it names a scenario.
+
+    Raises ResultError for a folder without one.
+    """
+    from sphshell_pin.scenario.reading import shipped_scenarios
+
     path = Path(what)
     if path.suffix == ".npz":
         return path
-    return path / RESULT if (path / RESULT).is_file() else None
+    if (path / RESULT).is_file():
+        return path / RESULT
+    if path.is_dir() and str(what) not in shipped_scenarios():
+        raise ResultError(path, f"has no {RESULT}: the folder of a finished run would")
+    return None
 
 
 def open_browser(url: str) -> None:

@@ -64,6 +64,8 @@ class Picture:
         self._trails = _Trails(self.display)
         width = 0.0026 * view.distance
         self._push = ArrowPool(visualizer["push"], 1, width, "total")
+        self.cut = False
+        """Whether a force is larger than its arrow: no arrow is longer than the longest."""
 
     @property
     def arrow_scale(self) -> ArrowScale:
@@ -87,6 +89,9 @@ class Picture:
         if self.shown["trails"]:
             self._trails.add(contacts)
         self._push.update(push, scale)
+        self.cut = scale.cuts(contacts.normal_force) or (
+            push is not None and scale.cuts(push.normal_force)
+        )
 
     def show(self, part: str, on: bool) -> None:
         """Show or hide one of LIVE_PARTS."""

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import collections
+import errno
+import ipaddress
 import json
 import os
+import socket
 import threading
 import time
 from collections.abc import Callable
@@ -69,12 +72,21 @@ class Server:
         try:
             # Of a name with several addresses, one port has to do for all.
             sockets = tornado.netutil.bind_sockets(port, host, reuse_port=False)[:1]
+        except socket.gaierror as fault:
+            raise SphshellError(
+                f"the live page cannot be served at {host}:{port} ({fault.strerror}): the host "
+                "must be a name or an address of this machine"
+            ) from fault
+        except UnicodeError as fault:
+            raise InvalidParameter("host", host, "must be a name or an address") from fault
         except OSError as fault:
             raise SphshellError(
                 f"the live page cannot be served at {host}:{port} ({os.strerror(fault.errno or 0)}"
-                "): choose another port, or 0 for any that is free"
+                f"): {_remedy(fault.errno)}"
             ) from fault
-        self.host, self.port = host, int(sockets[0].getsockname()[1])
+        address, self.port = sockets[0].getsockname()[:2]
+        self.host = host
+        self._local = ipaddress.ip_address(address.partition("%")[0]).is_loopback
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(
             target=self._serve, args=(sockets, viewer), daemon=True, name="live-page"
@@ -86,6 +98,11 @@ class Server:
         """Where the page is."""
         name = "localhost" if self.host in ("", "0.0.0.0", "::") else self.host
         return f"http://{f'[{name}]' if ':' in name else name}:{self.port}/"
+
+    @property
+    def is_open(self) -> bool:
+        """Whether other machines may reach the page."""
+        return not self._local
 
     @property
     def watched(self) -> bool:
@@ -131,10 +148,13 @@ class Server:
 
     def is_own(self, host: str) -> bool:
         """Tell whether `host`, of a request's header, is a name of this server."""
-        if self.host in ("127.0.0.1", "localhost", "::1"):
+        if self._local:
             # Any other name that leads here was made to, by a page that wants to listen in.
             # The port may differ: a tunnel ends at one of its own.
-            return host.lower().rsplit(":", 1)[0] in ("127.0.0.1", "localhost", "[::1]")
+            from tornado.httputil import split_host_and_port
+
+            name = split_host_and_port(host.lower())[0]
+            return name in ("127.0.0.1", "localhost", "[::1]", self.host.lower())
         return True
 
     def _call(self, routine: Callable[[], Any]) -> None:
@@ -186,6 +206,12 @@ class Server:
             self._loop.close()
 
 
+def _remedy(number: int | None) -> str:
+    if number == errno.EADDRNOTAVAIL:
+        return "the host must be a name or an address of this machine"
+    return "choose another port, or 0 for any that is free"
+
+
 def _handlers() -> tuple[type, type]:
     """Make the two handlers; tornado is not loaded before somebody wants the page."""
     import tornado.iostream
@@ -226,6 +252,7 @@ def _handlers() -> tuple[type, type]:
             self._sent, self._seen = 0, 0
             self._last = 0.0
             self._answers: set[asyncio.Future[None]] = set()
+            self._pump_task: asyncio.Future[None] | None = None
 
         def prepare(self) -> None:
             # Checked here, as versions of tornado differ in when they ask check_origin.
@@ -257,8 +284,9 @@ def _handlers() -> tuple[type, type]:
                 self.say({"type": "error", "text": str(fault)})
 
         def on_close(self) -> None:
-            self._server.leave(self)
-            self._pump_task.cancel()
+            if self._pump_task is not None:  # else it went before it was let in
+                self._server.leave(self)
+                self._pump_task.cancel()
 
         def say(self, data: dict[str, Any]) -> None:
             """Send one text, without waiting; nobody minds if the browser has gone."""

@@ -1,6 +1,8 @@
 // A strip chart on a canvas: normal and friction force over the last seconds.
 "use strict";
 
+import { number } from "./controls.js";
+
 const MOST = 1600;
 const LEFT = 46, RIGHT = 14, TOP = 8, BOTTOM = 24;
 
@@ -94,7 +96,7 @@ export class Chart {
       pen.strokeStyle = k === 0 ? "#b8c2cb" : "#e9edf1";
       pen.beginPath(); pen.moveTo(LEFT, at); pen.lineTo(width - RIGHT, at); pen.stroke();
       pen.fillStyle = "#67737f";
-      pen.fillText(String(Number((k * step).toPrecision(6))), LEFT - 7, at);
+      pen.fillText(number(k * step, 6), LEFT - 7, at);
     }
     const tick = nice(this.span / 7);
     pen.textBaseline = "top";

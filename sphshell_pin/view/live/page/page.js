@@ -45,7 +45,7 @@ function connect() {
   };
   socket.onopen = () => {
     document.body.classList.remove("lost");
-    notice(null);
+    if (element("notice").dataset.why === "lost") notice(null);
   };
 }
 
@@ -83,7 +83,12 @@ function greet(data) {
     element("status").style.bottom = "12px";
     element("legend").hidden = true;
   } else {
-    picture = new Picture(element("scene"));
+    try {
+      picture = new Picture(element("scene"));
+    } catch {
+      element("as-seen").remove();
+      notice("This browser cannot draw the scene: it has no WebGL. All else works.", "blind");
+    }
   }
   chart = new Chart(element("chart"), data.colors);
   for (const [name, color] of Object.entries(data.colors)) {
@@ -146,6 +151,7 @@ function show(data) {
   element("run").classList.toggle("running", data.running);
   element("run-word").textContent = data.running ? "Pause" : "Run";
   element("scale").textContent = data.scale;
+  element("cut").hidden = !data.cut;
   sliders.speed.follow(data.speed);
   sliders.arrows.follow(data.arrows);
   for (const [key, value] of Object.entries(data.knobs)) knobs.get(key)?.follow(value);
