@@ -137,10 +137,11 @@ def load_urdf(
         try:
             geometry.append(pin.buildGeomFromUrdf(model, str(file), kind, package_dirs=dirs))
         except (ValueError, RuntimeError) as error:
-            searched = ", ".join(dirs)
+            searched = ", ".join(dict.fromkeys(str(Path(one)) for one in dirs))
             raise RobotError(
-                f"{file}: a mesh cannot be loaded ({error}); searched in {searched}: "
-                "give the folder above the package in package_dirs"
+                f"{file}: a mesh cannot be loaded ({str(error).strip().rstrip('.')}); searched in "
+                f"{searched}: give the folder above the package with --package-dir, package_dirs "
+                "in a scenario or in Python"
             ) from None
     return LoadedRobot(name or model.name, model, *geometry, pin.neutral(model))
 

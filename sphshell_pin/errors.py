@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
@@ -35,7 +36,10 @@ class InvalidParameter(SphshellError, ValueError):
 
 
 class UnitMissing(InvalidParameter):
-    """A surface file without a unit of its own: `path`, `size` of its box diagonal as it stands."""
+    """A surface file without a unit of its own: `path`, `size` of its box diagonal as it stands.
+
+    Most formats have none; in STEP and IGES files it may be missing, or one nobody knows.
+    """
 
     def __init__(self, path: str | PathLike[str], size: float, units: Iterable[str]) -> None:
         """Say that the unit of the file at `path` must be stated as one of `units`."""
@@ -47,8 +51,12 @@ class UnitMissing(InvalidParameter):
     def must(self, option: str) -> str:
         """Say what to do; `option` is how the caller states a unit, with {} in its place."""
         mm, m = option.format("mm"), option.format("m")
+        suffix = self.path.suffix.lower()
+        # These may carry one; this one does not.
+        header = suffix in (".step", ".stp", ".iges", ".igs")
+        lacking = f"the header of {self.path.name} states" if header else f"{suffix} files carry"
         return (
-            f"must be stated, as {self.path.suffix.lower()} files carry none: one of "
+            f"must be stated, as {lacking} none: one of "
             f"{', '.join(self.units)}; {self.path.name} measures {self.size:.4g} units: "
             f"say {mm} if that is {self.size * 1e-3:.4g} m, {m} if it is {self.size:.4g} m"
         )
@@ -117,6 +125,23 @@ class MissingExtra(SphshellError, ImportError):
         )
         self.package = package
         self.extra = extra
+
+
+class UnusableExtra(MissingExtra):
+    """An optional `package` is installed but cannot be loaded: `reason`, as the system tells it."""
+
+    def __init__(self, package: str, extra: str, purpose: str, reason: str, debian: str) -> None:
+        """Say what `purpose` needs `package`, which needs the system packages `debian`."""
+        reason = " ".join(reason.split())
+        absent = re.match(r"(\S+\.so\S*): cannot open shared object file", reason)
+        why = f"it needs the library {absent[1]}, which is absent" if absent else f"({reason})"
+        super(MissingExtra, self).__init__(
+            f"{purpose} needs {package}, which is installed but cannot be loaded: {why}; on Debian "
+            f"or Ubuntu, apt-get install {debian}"
+        )
+        self.package = package
+        self.extra = extra
+        self.reason = reason
 
 
 class DeepStart(SphshellError, ValueError):

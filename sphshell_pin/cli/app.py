@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import warnings
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -55,7 +56,8 @@ def faults(context: typer.Context) -> Iterator[None]:
     """Turn faults into one sentence on stderr and an exit code, unless --debug asks for more."""
     debug = bool(context.find_root().obj)
     try:
-        yield
+        with _plain_warnings():
+            yield
     except (typer.Exit, typer.Abort):
         raise
     except KeyboardInterrupt as error:
@@ -64,6 +66,9 @@ def faults(context: typer.Context) -> Iterator[None]:
     except Exception as error:
         from sphshell_pin.errors import SphshellError
 
+        if _comes_from_ctrl_c(error):
+            typer.echo("interrupted", err=True)
+            raise typer.Exit(INTERRUPTED) from None
         if debug:
             raise
         known = isinstance(error, SphshellError)
@@ -72,6 +77,37 @@ def faults(context: typer.Context) -> Iterator[None]:
         told = ", ".join([told, *getattr(error, "__notes__", ())])
         typer.echo(f"error: {told}{'' if known else ' (see it with --debug)'}", err=True)
         raise typer.Exit(ERROR) from None
+
+
+@contextlib.contextmanager
+def _plain_warnings() -> Iterator[None]:
+    """Print each warning of this package once, as a sentence without its place in the code."""
+    from sphshell_pin import errors
+
+    told: set[str] = set()
+
+    def show(message: Warning | str, *rest: Any, **named: Any) -> None:
+        if getattr(errors, type(message).__name__, None) is not type(message):
+            usual(message, *rest, **named)
+        elif str(message) not in told:
+            told.add(str(message))
+            typer.echo(f"warning: {message}", err=True)
+
+    with warnings.catch_warnings():
+        usual: Any = warnings.showwarning
+        warnings.showwarning = show
+        yield
+
+
+def _comes_from_ctrl_c(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind `error`: a library interrupted while it loads reports a fault."""
+    seen = set[int]()  # chains may be rings: a cause that is raised again
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        if id(error) in seen:
+            return False
+        seen.add(id(error))
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def changes_of(set_: list[str] | None, dt: float | None, duration: float | None) -> dict[str, str]:

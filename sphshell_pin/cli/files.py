@@ -61,7 +61,7 @@ def check(
                 _number_or_word(scale),
                 chord_error=chord_error,
                 bodies=body,
-                faces=_faces(face),
+                faces=faces_of(face),
                 side=_side(side),
             )
         except UnitMissing as error:
@@ -103,7 +103,7 @@ def convert(
                 unit_out,
                 chord_error=chord_error,
                 bodies=body,
-                faces=_faces(face),
+                faces=faces_of(face),
             )
         except UnitMissing as error:
             raise SphshellError(f"the unit {error.must('--unit-in {}')}") from error
@@ -126,7 +126,7 @@ def convert(
             terminal().print(f"note: {note}", markup=False, highlight=False)
 
 
-def _faces(names: list[str] | None) -> list[str | int] | None:
+def faces_of(names: list[str] | None) -> list[str | int] | None:
     """Return faces by name, or by number where the name is one."""
     return None if names is None else [int(n) if n.isdecimal() else n for n in names]
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sphshell_pin.cli.app import app, faults, terminal
+from sphshell_pin.cli.files import BodyOption, FaceOption, faces_of
 
 if TYPE_CHECKING:
     from sphshell_pin.scenario.new import NewScenario
@@ -32,6 +33,8 @@ def new(
     unit: Annotated[
         str | None, typer.Option(help="Length unit of the surface file: mm, cm, m, inch, ...")
     ] = None,
+    body: BodyOption = None,
+    face: FaceOption = None,
     law: Annotated[
         str | None,
         typer.Option(
@@ -42,7 +45,10 @@ def new(
     press: Annotated[float | None, typer.Option(metavar="N", help="Normal force \\[N].")] = None,
     place: Annotated[
         str | None,
-        typer.Option(help="Where the surface is, seen from the tip: below, above, +x, -x, +y, -y."),
+        typer.Option(
+            help="Where the surface is, seen from the tip: below, above, +x, -x, +y, -y; by "
+            "default below, or before a tip that does not point down."
+        ),
     ] = None,
     free_flyer: Annotated[
         bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
@@ -73,6 +79,8 @@ def new(
                 frame=frame,
                 radius=_length(radius),
                 unit=unit,
+                bodies=body,
+                faces=faces_of(face),
                 material=law,
                 against=against,
                 press=press,

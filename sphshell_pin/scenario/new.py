@@ -279,9 +279,13 @@ def _shell_section(
     file = Path(surface)
     if file.is_file():
         name = file.stem.replace(".", "-")
-        bodies, faces = (None if one is None else list(one) for one in parts)
+        bodies, faces = parts
         section = ShellSection(
-            name=name, file=_relative(file, path), unit=unit, bodies=bodies, faces=faces
+            name=name,
+            file=_relative(file, path),
+            unit=unit,
+            bodies=None if bodies is None else list(bodies),
+            faces=None if faces is None else list(faces),
         )
         return section, None
     word = str(surface)

@@ -17,7 +17,7 @@ from sphshell_pin.shell.cad.options import BREP_SUFFIXES
 from sphshell_pin.shell.raw import Floats
 from sphshell_pin.shell.readers import SUFFIXES, reader_for
 from sphshell_pin.shell.shell import Shell
-from sphshell_pin.units import metres_per_unit
+from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
 
 SAMPLES = 5000
 """Points taken of each surface to measure how far it is from the other."""
@@ -89,7 +89,7 @@ def convert(
     ----------
     source, target : the files
     unit_in : unit of length of the source, as for `Shell.from_file`
-    unit_out : that of the target; the source's unless given
+    unit_out : that of the target; the source's unless given, mm if that has no name of its own
     chord_error, bodies, faces : of a CAD source, as for `Shell.from_file`
 
     Raises
@@ -114,7 +114,7 @@ def convert(
     if {suffix, goal.suffix.lower()} & set(CAD_SUFFIXES):
         require_kernel(f"converting {suffix} to {goal.suffix.lower()} files")
     first = _surface(file, unit_in, options)
-    unit = unit_out or first.unit
+    unit = unit_out or (first.unit if first.unit in METRES_PER_UNIT else "mm")
     handle, name = tempfile.mkstemp(prefix=f".{goal.stem}.", suffix=goal.suffix, dir=goal.parent)
     os.close(handle)
     try:
@@ -155,7 +155,8 @@ def _write(path: Path, unit: str, source: Any, options: CadOptions) -> None:
     if path.suffix.lower() not in CAD_SUFFIXES:
         source.shell().to_file(path, unit)
         return
-    from sphshell_pin.shell.cad.writing import MILLIMETRE, faceted, parts_of, write_cad
+    from sphshell_pin.shell.cad.units import MILLIMETRE
+    from sphshell_pin.shell.cad.writing import faceted, parts_of, write_cad
 
     if isinstance(source, _Mesh):
         shell = source.shell()

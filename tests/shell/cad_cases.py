@@ -35,13 +35,15 @@ class Known:
     """A surface of which `normals(rng, n)` gives n points [m] and outer unit normals.
 
     A ball of `radius` [m] on its outer side touches it at one place alone; `make` gives its shape,
-    `chord` is a chord error [m] from which on triangles shrink in all directions alike.
+    `chord` is a chord error [m] from which on triangles shrink in all directions alike, with every
+    `step` by which it is divided.
     """
 
     make: Callable[[], Any]
     radius: float
     normals: Callable[[np.random.Generator, int], tuple[Array, Array]]
     chord: float = 1e-4
+    step: float = 4.0
 
 
 def _on_ball(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
@@ -69,9 +71,9 @@ def _on_cylinder(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
 
 KNOWN = {
     "ball": Known(shapes.ball, 4e-3, _on_ball),
-    "ball as splines": Known(lambda: shapes.nurbs(shapes.ball()), 4e-3, _on_ball),
-    "ring": Known(shapes.ring, 1e-3, _on_ring, 2e-5),
-    "cylinder": Known(shapes.cylinder, 2e-3, _on_cylinder),
+    "ball as splines": Known(lambda: shapes.nurbs(shapes.ball()), 4e-3, _on_ball, 2e-4),
+    "ring": Known(shapes.ring, 1e-3, _on_ring, 4e-5, 3.0),
+    "cylinder": Known(shapes.cylinder, 2e-3, _on_cylinder, 1e-4, 8.0),
 }
 
 

@@ -55,13 +55,13 @@ def report_files(names: list[str], samples: int) -> None:
 
 def report_forces(levels: int) -> None:
     """Print the error of the smooth force on known surfaces, under refinement."""
-    print("\nforce k depth^1.5 on balls, relative error (order) as the chord error falls by 8")
+    print("\nforce k depth^1.5 on balls, relative error (order) as the chord error falls")
     for name, known in KNOWN.items():
         with tempfile.TemporaryDirectory() as folder:
             path = shapes.write_brep(Path(folder) / "part.brep", known.make())
             before = None
             for level in range(levels):
-                shell = Shell.from_file(path, "mm", chord_error=known.chord / 8**level)
+                shell = Shell.from_file(path, "mm", chord_error=known.chord / known.step**level)
                 errors, chord = force_errors(shell, known), stated_and_measured(shell)[1]
                 figures = (rms(errors), float(errors.max()))
                 line = f"{name:18s} {len(shell.elements):7d} elements, measured {chord:8.2e} m"
@@ -76,7 +76,7 @@ def report_forces(levels: int) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=10_000)
-    parser.add_argument("--levels", type=int, default=3, help="chord errors, each an eighth")
+    parser.add_argument("--levels", type=int, default=3, help="chord errors, one below the other")
     parser.add_argument("names", nargs="*", default=list(REAL_FILES))
     chosen = parser.parse_args()
     require_kernel("this report")

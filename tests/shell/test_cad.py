@@ -22,6 +22,7 @@ from sphshell_pin.errors import (
     ShellFileError,
     UnitMissing,
     UnitWarning,
+    UnusableExtra,
 )
 from tests.shell import cad_shapes as shapes
 
@@ -35,14 +36,14 @@ def load(tmp_path, shape, **options):
 )
 def test_solids_come_closed_with_their_area_and_volume(make, tmp_path):
     shape = getattr(shapes, make)()
-    shell = load(tmp_path, shape, chord_error=1e-5)
+    shell = load(tmp_path, shape, chord_error=4e-5)
     area, volume = shapes.area_and_volume(shape)
     assert shell.is_closed
     assert shell.health.problems == ()
     assert shell.health.area == pytest.approx(area * 1e-6, rel=5e-3)
     # The solid is off by less than a layer as thick as the chord error.
-    assert abs(shell.health.volume - volume * 1e-9) < 1e-5 * shell.health.area
-    assert any("chord error 1e-05 m stated" in note for note in shell.health.notes)
+    assert abs(shell.health.volume - volume * 1e-9) < 4e-5 * shell.health.area
+    assert any("chord error 4e-05 m stated" in note for note in shell.health.notes)
     assert any(note.endswith(": held") for note in shell.health.notes)
 
 
@@ -224,6 +225,30 @@ def test_without_the_library_the_extra_is_named(tmp_path, monkeypatch):
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
     monkeypatch.setitem(sys.modules, "OCP.Message", None)
     with pytest.raises(MissingExtra, match=r"reading .brep files needs .*sphshell-pin\[cad\]"):
+        Shell.from_file(path, "mm")
+
+
+@pytest.mark.parametrize(
+    ("reason", "told"),
+    [
+        (
+            "libGL.so.1: cannot open shared object file: No such file or directory",
+            r"it needs the library libGL\.so\.1, which is absent; .* install libgl1 libx11-6$",
+        ),
+        ("version `GLIBC_2.99' not found", r"\(version `GLIBC_2\.99' not found\)"),
+    ],
+)
+def test_a_library_of_the_system_that_is_absent_is_named(reason, told, tmp_path, monkeypatch):
+    path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
+
+    class Unloadable:
+        def find_spec(self, name, path=None, target=None):
+            if name == "OCP.Message":
+                raise ImportError(reason)
+
+    monkeypatch.delitem(sys.modules, "OCP.Message", raising=False)
+    monkeypatch.setattr(sys, "meta_path", [Unloadable(), *sys.meta_path])
+    with pytest.raises(UnusableExtra, match="installed but cannot be loaded: .*" + told):
         Shell.from_file(path, "mm")
 
 

@@ -12,21 +12,23 @@ from typing import Any
 
 import numpy as np
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
-from OCP.GeomAbs import GeomAbs_C0, GeomAbs_Line, GeomAbs_Plane
-from OCP.gp import gp_Pnt, gp_Vec
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.GeomAbs import GeomAbs_Line
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
+from sphshell_pin.shell.cad.face_surface import SINGULAR, FaceSurface, dot
+from sphshell_pin.shell.cad.flipping import flipped
 from sphshell_pin.shell.cad.model import subshapes
+from sphshell_pin.shell.cad.thinning import thinned
 from sphshell_pin.shell.raw import Floats, Longs, Mask
 
 ALONG = (0.25, 0.5, 0.75)
 """Where along a side the distance is measured."""
 
-MOST_STEPS = 8
-"""Of Newton's method towards a foot point; it starts next to it."""
+CURVED = 0.25
+"""Curved sides inside a face must be nearer than this share of the chord error."""
 
 MOST_TURN = 0.7
 """The surface may turn by this along a side inside a face [rad]; curved elements need it small."""
@@ -34,79 +36,11 @@ MOST_TURN = 0.7
 TURN_ROUNDS = 3
 """Times sides are halved for that: along a kink the turn never falls."""
 
-SINGULAR = 1e-10
-"""Where |du x dv| is below this share of the largest |du| |dv|, a surface has no normal."""
+FLIP_ROUNDS = 3
+"""Times thin triangles are flipped after sides were halved: later ones would undo halvings."""
 
 LIMIT_STEP = 1e-4
 """Part of the way to the middle of the triangle at which the limit of a normal is taken."""
-
-
-class FaceSurface:
-    """The surface below a face: points and derivatives at many places at once."""
-
-    def __init__(self, face: Any) -> None:
-        self._surface = BRepAdaptor_Surface(face)
-        surface = self._surface
-        self.low = np.array([surface.FirstUParameter(), surface.FirstVParameter()])
-        self.high = np.array([surface.LastUParameter(), surface.LastVParameter()])
-        # Round a closed surface a way may lead across its seam.
-        endless = np.array([surface.IsUPeriodic(), surface.IsVPeriodic()])
-        self._lowest = np.where(endless, -np.inf, self.low)
-        self._highest = np.where(endless, np.inf, self.high)
-        self._scale = 0.0
-        self.flat = surface.GetType() == GeomAbs_Plane
-        self.kinked = GeomAbs_C0 in (surface.UContinuity(), surface.VContinuity())
-
-    def nodes(self, uv: Floats) -> tuple[Floats, Floats]:
-        """Points and unit normals (n, 3) at parameters uv (n, 2); zero where there is no normal."""
-        points, by_u, by_v = self.derivatives(uv)
-        normal = np.cross(by_u, by_v)
-        length = np.linalg.norm(normal, axis=1, keepdims=True)
-        largest = np.linalg.norm(by_u, axis=1, keepdims=True)
-        largest = largest * np.linalg.norm(by_v, axis=1, keepdims=True)
-        if self._scale == 0.0:
-            self._scale = float(largest.max(initial=0.0))
-        defined = length > SINGULAR * self._scale
-        return points, np.where(defined, normal / np.where(defined, length, 1.0), 0.0)
-
-    def derivatives(self, uv: Floats) -> tuple[Floats, Floats, Floats]:
-        """Points and derivatives by u and by v at parameters uv (n, 2), (n, 3) each."""
-        place, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
-        rows, first = [], self._surface.D1
-        for u, v in uv.tolist():
-            first(u, v, place, by_u, by_v)
-            rows.append(place.Coord() + by_u.Coord() + by_v.Coord())
-        table = np.array(rows).reshape(-1, 9)
-        return table[:, :3], table[:, 3:6], table[:, 6:]
-
-    def distances(self, points: Floats, uv: Floats, tolerance: float) -> Floats:
-        """Distances (n,) of points next to the surface at uv (n, 2), without its trimming.
-
-        Newton's steps go on while they are longer than `tolerance`: less changes the distance by
-        far less, as the surface is nearly flat within it.
-        """
-        distance = np.full(len(points), np.inf)
-        at, left = uv.copy(), np.arange(len(points))
-        for _ in range(MOST_STEPS):
-            place, by_u, by_v = self.derivatives(at[left])
-            offset = points[left] - place
-            uu, vv, mixed = (_dot(a, b) for a, b in ((by_u, by_u), (by_v, by_v), (by_u, by_v)))
-            along_u, along_v = _dot(offset, by_u), _dot(offset, by_v)
-            area = uu * vv - mixed * mixed
-            regular = area > 1e-20 * uu * vv
-            area = np.where(regular, area, 1.0)
-            step = np.stack([along_u * vv - along_v * mixed, along_v * uu - along_u * mixed], 1)
-            step = np.where(regular, step.T / area, 0.0).T
-            moved = step[:, :1] * by_u + step[:, 1:] * by_v
-            # To the tangent plane if it is near, to the point itself in any case.
-            near = np.linalg.norm(moved, axis=1) <= tolerance
-            away = np.linalg.norm(np.where(near[:, None], offset - moved, offset), axis=1)
-            distance[left] = np.minimum(distance[left], away)
-            at[left] = np.clip(at[left] + step, self._lowest, self._highest)
-            left = left[~near & regular]
-            if left.size == 0:
-                break
-        return distance
 
 
 @dataclass(frozen=True)
@@ -196,16 +130,21 @@ class FaceMesh:
         mesh and the largest distance measured. Sides on the border stay: the face across them has
         the same.
         """
-        mesh, largest, known = self, 0.0, 0
         if self.surface.flat:
             return self, float(np.linalg.norm(self.points - self.exact, axis=1).max(initial=0.0))
+        mesh, _ = self._thinned()._flipped(0)
+        largest, known = 0.0, 0
         for turn in range(rounds + 1):
             sides, of_triangle = mesh.sides()
             at_sides, middles = mesh._errors(sides, of_triangle, known, tolerance)
             inner = np.bincount(of_triangle.ravel(), minlength=len(sides)) == 2
             marked = np.zeros(len(sides), np.bool_)
             if turn < rounds:
-                marked = mesh._too_long(sides, at_sides > tolerance, turn)
+                fresh = np.unique(of_triangle[known:])
+                curved = CURVED * tolerance
+                far = at_sides > tolerance
+                far[fresh] |= mesh._bulges(sides[fresh], curved - at_sides[fresh], curved) > curved
+                marked = mesh._too_long(sides, far, turn)
                 # A triangle too far in its middle alone: its longest side inside the face.
                 length = np.linalg.norm(mesh.points[sides[:, 0]] - mesh.points[sides[:, 1]], axis=1)
                 longest = np.argmax(np.where(inner, length, -1.0)[of_triangle], axis=1)
@@ -218,6 +157,8 @@ class FaceMesh:
             if not marked.any():
                 break
             mesh, known = mesh._split(sides, of_triangle, marked), int(whole.sum())
+            if turn < FLIP_ROUNDS:
+                mesh, known = mesh._flipped(known)
         return mesh, largest
 
     def corner_normals(self) -> Floats:
@@ -271,8 +212,33 @@ class FaceMesh:
             return far
         first, second = self.normals[sides[:, 0]], self.normals[sides[:, 1]]
         defined = first.any(axis=1) & second.any(axis=1)
-        turned: Mask = defined & (_dot(first, second) < np.cos(MOST_TURN))
+        turned: Mask = defined & (dot(first, second) < np.cos(MOST_TURN))
         return far | turned
+
+    def _bulges(self, sides: Longs, spare: Floats, tolerance: float) -> Floats:
+        """Distances of sides (s,) from the surface, where each lies highest when it is curved.
+
+        A side whose ends stand for little of it, such as one that ends in a narrow bend, may be
+        near while it is straight, but not once it is curved to meet the normals. `spare` (s,) is
+        what it may bulge without being measured: there the distance is 0.
+        """
+        ends, upright = self.points[sides], self.normals[sides]
+        way = ends[:, 1] - ends[:, 0]
+        # What the tangents at the ends are off the side; they lie in the tangent planes there.
+        first, last = (-dot(upright[:, k], way)[:, None] * upright[:, k] for k in (0, 1))
+        shares = np.array(ALONG)[:, None, None]
+        lifts = shares * (1 - shares) * ((1 - shares) * first - shares * last)
+        highest = np.argmax(np.linalg.norm(lifts, axis=2), axis=0)
+        lift = lifts[highest, np.arange(len(sides))]
+        chosen = np.flatnonzero(np.linalg.norm(lift, axis=1) > spare)
+        share = np.array(ALONG)[highest[chosen], None]
+        between = self.parameters(sides[chosen])
+        uv = (1 - share) * between[:, 0] + share * between[:, 1]
+        found = np.zeros(len(sides))
+        found[chosen] = self.surface.distances(
+            ends[chosen, 0] + share * way[chosen] + lift[chosen], uv, tolerance
+        )
+        return found
 
     def _split(self, sides: Longs, of_triangle: Longs, marked: Mask) -> FaceMesh:
         """Halve the sides where `marked` (s,) holds, with new nodes on the surface."""
@@ -306,6 +272,38 @@ class FaceMesh:
             normals=np.concatenate([self.normals, normals]),
             triangles=np.concatenate(pieces),
         )
+
+    def _thinned(self) -> FaceMesh:
+        """Return the mesh with fewer nodes where triangles are needles without need."""
+        fixed: Mask = np.asarray(~self.normals.any(axis=1), np.bool_)
+        fixed[self.border_nodes] = True
+        rows = thinned(self.points, self.normals, self.parameters, self.triangles, fixed)
+        used = np.zeros(len(self.points), np.bool_)
+        used[rows] = True
+        used[self.border_nodes] = True
+        row = np.cumsum(used) - 1
+        return replace(
+            self,
+            points=self.points[used],
+            exact=self.exact[used],
+            uv=self.uv[used],
+            free=self.free[used],
+            normals=self.normals[used],
+            triangles=row[rows],
+            borders=tuple(replace(one, nodes=row[one.nodes]) for one in self.borders),
+        )
+
+    def _flipped(self, known: int) -> tuple[FaceMesh, int]:
+        """Return the mesh with thin triangles flipped, and how many of the first are as before.
+
+        known : number of triangles, the first ones, that were measured before
+        """
+        rows, changed = flipped(
+            self.points, self.normals, self.parameters(self.triangles), self.triangles
+        )
+        kept = np.flatnonzero(~changed[:known])
+        fresh = np.concatenate([np.flatnonzero(changed[:known]), np.arange(known, len(rows))])
+        return replace(self, triangles=rows[np.concatenate([kept, fresh])]), len(kept)
 
     def _limits(self, chosen: Mask) -> Floats:
         uv = self.parameters(self.triangles)
@@ -360,10 +358,6 @@ def _borders(face: Any, found: Any, location: Any) -> Iterator[Border]:
 
 def _to_segments(point: Floats, start: Floats, way: Floats) -> Floats:
     """Distances of points (3,) or (n, 3) from segments (n, 3)."""
-    square = np.maximum(_dot(way, way), np.finfo(float).tiny)
-    along = np.clip(_dot(point - start, way) / square, 0.0, 1.0)
+    square = np.maximum(dot(way, way), np.finfo(float).tiny)
+    along = np.clip(dot(point - start, way) / square, 0.0, 1.0)
     return np.asarray(np.linalg.norm(point - start - along[:, None] * way, axis=1))
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("ij,ij->i", a, b))

@@ -12,7 +12,7 @@ from OCP.GeomAbs import GeomAbs_C0, GeomAbs_C1
 from OCP.ShapeBuild import ShapeBuild_ReShape
 from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideContinuity
 
-from sphshell_pin.shell.cad.face_mesh import FaceSurface
+from sphshell_pin.shell.cad.face_surface import FaceSurface
 from sphshell_pin.shell.cad.model import CadFace, CadModel, faces_of
 from sphshell_pin.shell.joints import TANGENT_ANGLE
 from sphshell_pin.shell.raw import Floats

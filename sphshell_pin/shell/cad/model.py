@@ -19,6 +19,7 @@ from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Compound
 
 from sphshell_pin.errors import NameNotFound
+from sphshell_pin.shell.cad.units import HeaderUnit
 
 LARGEST = 1
 """Which tolerance ShapeAnalysis_ShapeTolerance is to tell: the largest, not the mean."""
@@ -48,9 +49,7 @@ class CadModel:
     faces : in the order of the file
     bodies : name of each body
     solids : shape of each body, a solid if the file has one
-    unit : name of the header's unit of length, None if the file has none
-    header_metres : metres per unit of the header, None if the file has none
-    metres : metres per unit of `shape`, by the header; 1 if it has none
+    unit : what the header says about the unit of length, and in what `shape` came
     notes : sentences about the reading
     """
 
@@ -58,10 +57,13 @@ class CadModel:
     faces: tuple[CadFace, ...]
     bodies: tuple[str, ...]
     solids: tuple[Any, ...]
-    unit: str | None
-    header_metres: float | None
-    metres: float
+    unit: HeaderUnit
     notes: tuple[str, ...] = ()
+
+    @property
+    def metres(self) -> float:
+        """Metres per unit of `shape`."""
+        return self.unit.shape_metres
 
     @property
     def shape(self) -> Any:

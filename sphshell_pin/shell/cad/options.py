@@ -7,11 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sphshell_pin.checks import check_positive
-from sphshell_pin.errors import InvalidParameter, MissingExtra
+from sphshell_pin.errors import InvalidParameter, MissingExtra, UnusableExtra
 
 STEP_SUFFIXES = (".step", ".stp")
 IGES_SUFFIXES = (".iges", ".igs")
 BREP_SUFFIXES = (".brep", ".brp")
+PACKAGE = "cadquery-ocp-novtk"
+SYSTEM_PACKAGES = "libgl1 libx11-6"
+"""What OpenCASCADE needs of Debian and Ubuntu; images of containers often lack it."""
+
 CAD_SUFFIXES = (*STEP_SUFFIXES, *IGES_SUFFIXES, *BREP_SUFFIXES)
 
 
@@ -70,10 +74,20 @@ class CadOptions:
 
 
 def require_kernel(purpose: str) -> None:
-    """Raise MissingExtra unless OpenCASCADE can be imported; and keep it from printing."""
+    """Keep OpenCASCADE from printing.
+
+    Raises
+    ------
+    MissingExtra
+        If it is not installed.
+    UnusableExtra
+        If it is, but a library of the system that it needs is not.
+    """
     try:
         from OCP.Message import Message
+    except ModuleNotFoundError as error:
+        raise MissingExtra(PACKAGE, "cad", purpose) from error
     except ImportError as error:
-        raise MissingExtra("cadquery-ocp-novtk", "cad", purpose) from error
+        raise UnusableExtra(PACKAGE, "cad", purpose, str(error), SYSTEM_PACKAGES) from error
     # Its readers write their own reports to the standard output.
     Message.DefaultMessenger_s().ChangePrinters().Clear()

@@ -9,7 +9,7 @@ from typing import Any
 
 from OCP.BRep import BRep_Builder
 from OCP.BRepTools import BRepTools
-from OCP.collections import Sequence_TCollection_AsciiString, Sequence_TDF_Label
+from OCP.collections import Sequence_TDF_Label
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.IGESControl import IGESControl_Reader
 from OCP.Interface import Interface_Static
@@ -24,13 +24,10 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
-from sphshell_pin.errors import InvalidParameter, ShellFileError
+from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.cad.model import CadFace, CadModel, compound, subshapes
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES
-from sphshell_pin.units import metres_per_unit
-
-MILLIMETRE = 1e-3
-"""OpenCASCADE's tolerances are meant for numbers in millimetres: STEP and IGES are read in them."""
+from sphshell_pin.shell.cad.units import NO_UNIT, iges_unit, step_unit
 
 IGES_FACES = (143, 144, 510)
 """IGES entities that stand for a face: bounded surface, trimmed surface, face of a solid."""
@@ -107,11 +104,7 @@ def _read_step(path: Path, data: bytes) -> CadModel:
     XCAFApp_Application.GetApplication_s().InitDocument(document)
     if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):
         raise ShellFileError(path, "is damaged, its STEP entities cannot be read")
-    units = Sequence_TCollection_AsciiString()
-    reader.ChangeReader().FileUnits(
-        units, Sequence_TCollection_AsciiString(), Sequence_TCollection_AsciiString()
-    )
-    unit, metres = _header_unit({unit.ToCString() for unit in units})
+    unit = step_unit(reader.ChangeReader().StepModel())
     labels = Sequence_TDF_Label()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(labels)
     parts: list[Part] = []
@@ -127,7 +120,7 @@ def _read_step(path: Path, data: bytes) -> CadModel:
     named = any(_name(text.decode(errors="replace")) for text in _STEP_NAMES.findall(data))
     faces, bodies, solids = _sort(parts, name_of if named else _no_name)
     notes = _lost(len(re.findall(rb"=\s*(?:ADVANCED_|)FACE(?:_SURFACE|)\s*\(", data)), faces)
-    return CadModel(path, faces, bodies, solids, unit, metres, MILLIMETRE, notes)
+    return CadModel(path, faces, bodies, solids, unit, notes)
 
 
 def _walk(label: Any, location: Any, parts: list[Part]) -> None:
@@ -158,9 +151,10 @@ def _read_iges(path: Path, data: bytes) -> CadModel:
     Interface_Static.SetCVal_s("xstep.cascade.unit", "MM")
     if reader.ReadFile(str(path)) != IFSelect_RetDone:
         raise ShellFileError(path, "is damaged, its IGES entities cannot be read")
+    model = reader.IGESModel()
+    unit = iges_unit(path, model.GlobalSection())
     reader.TransferRoots()
     shape = reader.OneShape()
-    model = reader.IGESModel()
     transfer = reader.WS().TransferReader()
 
     def name_of(shape: Any) -> str:
@@ -174,10 +168,7 @@ def _read_iges(path: Path, data: bytes) -> CadModel:
     faces, bodies, solids = _sort(parts, name_of if named else _no_name)
     held = (model.Entity(k).TypeNumber() for k in entities)
     notes = _lost(sum(kind in IGES_FACES for kind in held), faces)
-    header = model.GlobalSection()
-    metres = float(header.UnitValue()) * MILLIMETRE
-    unit = next((name for name in _UNITS if metres_per_unit(name) == metres), f"{metres:.6g} m")
-    return CadModel(path, faces, bodies, solids, unit, metres, MILLIMETRE, notes)
+    return CadModel(path, faces, bodies, solids, unit, notes)
 
 
 def _read_brep(path: Path, data: bytes) -> CadModel:
@@ -185,22 +176,7 @@ def _read_brep(path: Path, data: bytes) -> CadModel:
     if not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
         raise ShellFileError(path, "is damaged, its BREP shape cannot be read")
     faces, bodies, solids = _sort([("", shape)], _no_name)
-    return CadModel(path, faces, bodies, solids, None, None, 1.0)
-
-
-_UNITS = ("mm", "m", "in", "cm", "ft", "um", "km", "mil", "dm", "yd")
-
-
-def _header_unit(names: set[str]) -> tuple[str | None, float | None]:
-    """Return name and metres of the unit a STEP header states; of several, or of none, None."""
-    if len(names) != 1:
-        return None, None
-    (name,) = names
-    try:
-        metres = metres_per_unit(name.lower())
-    except InvalidParameter:
-        return None, None
-    return next(unit for unit in _UNITS if metres_per_unit(unit) == metres), metres
+    return CadModel(path, faces, bodies, solids, NO_UNIT)
 
 
 def _no_name(_: Any) -> str:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.errors import UnitMissing, UnitWarning
 from sphshell_pin.shell.cad.kinks import without_kinks
 from sphshell_pin.shell.cad.model import CadModel, box_size
 from sphshell_pin.shell.cad.options import CadOptions
 from sphshell_pin.shell.cad.reading import read_model
 from sphshell_pin.shell.cad.tessellation import Sewn, Tessellation, sew, tessellate
+from sphshell_pin.shell.cad.units import take_unit
 from sphshell_pin.shell.raw import RawSurface
-from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
 
 CHORD_ERROR = 1e-3
 """Share of the box diagonal that the elements may be off the exact surface, unless said."""
@@ -46,8 +44,7 @@ class CadSurface:
     @property
     def factor(self) -> float:
         """Metres per unit of the file."""
-        header = self.model.header_metres
-        return self.model.metres if header is None else header
+        return self.model.unit.metres
 
     def notes(self) -> tuple[str, ...]:
         """Sentences about what was read and how near it was met."""
@@ -100,8 +97,9 @@ def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
     """Read, sew and tessellate; see `read_cad` for the errors."""
     model = read_model(path).selected(options.bodies, options.faces)
     size = box_size(model.shape)
-    model, taken = in_unit(model, unit, size)
-    whole = model
+    held, taken, told = take_unit(path, model.unit, unit, size)
+    notes = (*model.notes, told) if told else model.notes
+    whole = model = replace(model, unit=held, notes=notes)
     model, kinked = without_kinks(model)
     if kinked:
         note = f"{kinked} of the faces with a kink inside, divided along it"
@@ -111,31 +109,6 @@ def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
     sewn = sew(model, size, None if options.sew is None else options.sew / model.metres)
     found = tessellate(sewn.shape, sewn.faces, size, stated, model.metres)
     return CadSurface(whole, model, size, taken, sewn, found, stated)
-
-
-def in_unit(model: CadModel, unit: str | None, size: float) -> tuple[CadModel, str]:
-    """Return the model with the metres per unit that hold, and the name of that unit.
-
-    size : of the model [its units]. A unit that is stated wins over that of the header.
-    """
-    own, header = model.unit, model.header_metres
-    if unit is None:
-        if own is None or header is None:
-            raise UnitMissing(model.path, size, METRES_PER_UNIT)
-        return replace(model, notes=(*model.notes, f"unit '{own}' from the file's header")), own
-    stated = metres_per_unit(unit)
-    if header is None:
-        return replace(model, metres=model.metres * stated), unit
-    if np.isclose(stated, header, rtol=1e-9):
-        note = f"unit '{unit}', as the file's header has it"
-        return replace(model, notes=(*model.notes, note)), unit
-    metres = model.metres * stated / header
-    note = (
-        f"unit '{unit}' as stated, though the file's header says '{own}': the surface measures "
-        f"{size * metres:.4g} m, not {size * model.metres:.4g} m"
-    )
-    warnings.warn(f"{model.path.name}: {note}", UnitWarning, stacklevel=7)
-    return replace(model, metres=metres, header_metres=stated, notes=(*model.notes, note)), unit
 
 
 def _told(surface: CadSurface) -> list[str]:

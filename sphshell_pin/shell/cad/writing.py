@@ -33,6 +33,7 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad.model import CadModel, compound
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES
+from sphshell_pin.shell.cad.units import MILLIMETRE
 from sphshell_pin.units import metres_per_unit
 
 if TYPE_CHECKING:
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
 
 MOST_FACETS = 20_000
 """A face takes about 1 kB in a STEP file, and CAD programs choke on more of them."""
-
-MILLIMETRE = 1e-3
 
 STEP_UNITS = {"mm": "MM", "m": "M", "cm": "CM", "in": "INCH", "ft": "FT", "km": "KM", "um": "UM"}
 IGES_UNITS = {"mm": "MM", "m": "M", "cm": "CM", "in": "IN", "ft": "FT", "km": "KM", "um": "UM"}

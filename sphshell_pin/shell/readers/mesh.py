@@ -28,10 +28,13 @@ def read_stl(path: Path) -> RawSurface:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
     try:
         mesh: Any = trimesh.load(data, file_type="stl", process=False, force="mesh")
-        if len(mesh.faces) == 0:
-            raise ValueError("it holds no triangles")
+    except ImportError as error:  # it fails to guess the encoding of what is no text
+        why = "it is neither a whole binary file nor text"
+        raise ShellFileError(path, f"is not a readable .stl file ({why})") from error
     except Exception as error:  # whatever a damaged file makes the parser raise
         raise ShellFileError(path, f"is not a readable .stl file ({error})") from error
+    if len(mesh.faces) == 0:
+        raise ShellFileError(path, "is not a readable .stl file (it holds no triangles)")
     triangles = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
     offsets, corners = pack_polygons(np.full(len(triangles), 3), triangles.ravel())
     return finish(path, np.asarray(mesh.vertices, np.float64), offsets, corners)

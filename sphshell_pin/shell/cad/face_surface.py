@@ -1,0 +1,91 @@
+"""The surface below a CAD face, at many places at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.GeomAbs import GeomAbs_C0, GeomAbs_Plane
+from OCP.gp import gp_Pnt, gp_Vec
+
+from sphshell_pin.shell.raw import Floats
+
+MOST_STEPS = 8
+"""Of Newton's method towards a foot point; it starts next to it."""
+
+SINGULAR = 1e-10
+"""Where |du x dv| is below this share of the largest |du| |dv|, a surface has no normal."""
+
+
+class FaceSurface:
+    """The surface below a face: points and derivatives at many places at once."""
+
+    def __init__(self, face: Any) -> None:
+        self._surface = BRepAdaptor_Surface(face)
+        surface = self._surface
+        self.low = np.array([surface.FirstUParameter(), surface.FirstVParameter()])
+        self.high = np.array([surface.LastUParameter(), surface.LastVParameter()])
+        # Round a closed surface a way may lead across its seam.
+        endless = np.array([surface.IsUPeriodic(), surface.IsVPeriodic()])
+        self._lowest = np.where(endless, -np.inf, self.low)
+        self._highest = np.where(endless, np.inf, self.high)
+        self._scale = 0.0
+        self.flat = surface.GetType() == GeomAbs_Plane
+        self.kinked = GeomAbs_C0 in (surface.UContinuity(), surface.VContinuity())
+
+    def nodes(self, uv: Floats) -> tuple[Floats, Floats]:
+        """Points and unit normals (n, 3) at parameters uv (n, 2); zero where there is no normal."""
+        points, by_u, by_v = self.derivatives(uv)
+        normal = np.cross(by_u, by_v)
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        largest = np.linalg.norm(by_u, axis=1, keepdims=True)
+        largest = largest * np.linalg.norm(by_v, axis=1, keepdims=True)
+        if self._scale == 0.0:
+            self._scale = float(largest.max(initial=0.0))
+        defined = length > SINGULAR * self._scale
+        return points, np.where(defined, normal / np.where(defined, length, 1.0), 0.0)
+
+    def derivatives(self, uv: Floats) -> tuple[Floats, Floats, Floats]:
+        """Points and derivatives by u and by v at parameters uv (n, 2), (n, 3) each."""
+        place, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
+        rows, first = [], self._surface.D1
+        for u, v in uv.tolist():
+            first(u, v, place, by_u, by_v)
+            rows.append(place.Coord() + by_u.Coord() + by_v.Coord())
+        table = np.array(rows).reshape(-1, 9)
+        return table[:, :3], table[:, 3:6], table[:, 6:]
+
+    def distances(self, points: Floats, uv: Floats, tolerance: float) -> Floats:
+        """Distances (n,) of points next to the surface at uv (n, 2), without its trimming.
+
+        Newton's steps go on while they are longer than `tolerance`: less changes the distance by
+        far less, as the surface is nearly flat within it.
+        """
+        distance = np.full(len(points), np.inf)
+        at, left = uv.copy(), np.arange(len(points))
+        for _ in range(MOST_STEPS):
+            place, by_u, by_v = self.derivatives(at[left])
+            offset = points[left] - place
+            uu, vv, mixed = (dot(a, b) for a, b in ((by_u, by_u), (by_v, by_v), (by_u, by_v)))
+            along_u, along_v = dot(offset, by_u), dot(offset, by_v)
+            area = uu * vv - mixed * mixed
+            regular = area > 1e-20 * uu * vv
+            area = np.where(regular, area, 1.0)
+            step = np.stack([along_u * vv - along_v * mixed, along_v * uu - along_u * mixed], 1)
+            step = np.where(regular, step.T / area, 0.0).T
+            moved = step[:, :1] * by_u + step[:, 1:] * by_v
+            # To the tangent plane if it is near, to the point itself in any case.
+            near = np.linalg.norm(moved, axis=1) <= tolerance
+            away = np.linalg.norm(np.where(near[:, None], offset - moved, offset), axis=1)
+            distance[left] = np.minimum(distance[left], away)
+            at[left] = np.clip(at[left] + step, self._lowest, self._highest)
+            left = left[~near & regular]
+            if left.size == 0:
+                break
+        return distance
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Scalar products (n,) of vectors (n, k)."""
+    return np.asarray(np.einsum("ij,ij->i", a, b))

@@ -1,0 +1,139 @@
+"""The unit of length a CAD file states, and the one that is taken."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from OCP.STEPConstruct import STEPConstruct_UnitContext
+from OCP.StepRepr import StepRepr_GlobalUnitAssignedContext
+
+from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, UnitWarning
+from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
+
+MILLIMETRE = 1e-3
+"""OpenCASCADE's tolerances are meant for numbers in millimetres: STEP and IGES are read in them."""
+
+SAME = 1e-9
+"""Units whose lengths differ by less than this share are one."""
+
+NAMED = 3
+"""Flag of an IGES header whose unit is a name. OpenCASCADE changes it for the names it knows."""
+
+
+@dataclass(frozen=True)
+class HeaderUnit:
+    """What the header of a file says about its unit of length.
+
+    Attributes
+    ----------
+    names : of the units stated: none, one, or several, each applied to its own part of the file
+    metres : per unit of the file; of several, and of none, per unit of the shape
+    shape_metres : metres per unit of the shape as it was read, 1 if no unit is known
+    """
+
+    names: tuple[str, ...]
+    metres: float
+    shape_metres: float
+
+
+NO_UNIT = HeaderUnit((), 1.0, 1.0)
+
+
+def step_unit(model: Any) -> HeaderUnit:
+    """Return the unit in which a STEP file (StepData_StepModel) gives its lengths.
+
+    OpenCASCADE has brought the lengths to millimetres, each by the unit of its own context; where
+    there is none it has left them.
+    """
+    found: list[float] = []
+    for row in range(1, model.NbEntities() + 1):
+        context = model.Entity(row)
+        if hasattr(context, "GlobalUnitAssignedContext"):
+            context = context.GlobalUnitAssignedContext()
+        if not isinstance(context, StepRepr_GlobalUnitAssignedContext):
+            continue
+        factors = STEPConstruct_UnitContext()
+        factors.ComputeFactors(context)
+        metres = factors.LengthFactor() * MILLIMETRE
+        if factors.LengthDone() and not any(math.isclose(metres, one) for one in found):
+            found.append(metres)
+    if not found:
+        return NO_UNIT
+    metres = found[0] if len(found) == 1 else MILLIMETRE
+    return HeaderUnit(tuple(map(_called, found)), metres, MILLIMETRE)
+
+
+def iges_unit(path: Path, header: Any) -> HeaderUnit:
+    """Return the unit an IGES header (IGESData_GlobalSection) states.
+
+    Raises
+    ------
+    ShellFileError
+        If its flag is none that IGES has: OpenCASCADE would read everything as points.
+    """
+    metres = float(header.UnitValue()) * MILLIMETRE
+    if metres == 0.0:
+        raise ShellFileError(
+            path, f"states a unit of length by flag {header.UnitFlag()}, which IGES does not have"
+        )
+    if header.UnitFlag() == NAMED:
+        return NO_UNIT
+    return HeaderUnit((_called(metres),), metres, MILLIMETRE)
+
+
+def take_unit(
+    path: Path, header: HeaderUnit, unit: str | None, size: float
+) -> tuple[HeaderUnit, str, str]:
+    """Return the unit that holds, its name, and a sentence about it.
+
+    unit : as stated, it wins over that of the header; size : of the shape [its units]
+
+    Raises
+    ------
+    UnitMissing
+        If neither the header nor the user states one.
+    InvalidParameter
+        If one is stated in place of several.
+    """
+    names = header.names
+    if unit is None:
+        if not names:
+            raise UnitMissing(path, size, METRES_PER_UNIT)
+        if len(names) > 1:
+            note = f"units {_listed(names)} from the file's header, each for its own part"
+            return header, "mm", note
+        return header, names[0], f"unit '{names[0]}' from the file's header"
+    stated = metres_per_unit(unit)
+    if not names:
+        return HeaderUnit((unit,), stated, stated), unit, ""
+    if len(names) > 1:
+        raise InvalidParameter(
+            "unit",
+            unit,
+            f"cannot take the place of the {len(names)} units {_listed(names)} that {path.name} "
+            "states, each for its own part: leave it out",
+        )
+    if math.isclose(stated, header.metres, rel_tol=SAME):
+        return header, unit, f"unit '{unit}', as the file's header has it"
+    # The header's factor taken back: these are the numbers of the file.
+    metres = header.shape_metres / header.metres * stated
+    note = (
+        f"unit '{unit}' as stated, though the file's header says '{names[0]}': the surface "
+        f"measures {size * metres:.4g} m, not {size * header.shape_metres:.4g} m"
+    )
+    warnings.warn(f"{path.name}: {note}", UnitWarning, stacklevel=7)
+    return replace(header, metres=stated, shape_metres=metres), unit, note
+
+
+def _called(metres: float) -> str:
+    """Name of a unit, its length if it has none."""
+    known = (name for name, one in METRES_PER_UNIT.items() if math.isclose(one, metres))
+    return next(known, f"{metres:.9g} m")
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(f"'{name}'" for name in names)

@@ -1,0 +1,138 @@
+"""What a first user meets: surfaces before the tip, parts of a file, names nearly right, Ctrl-C."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from typer.testing import CliRunner
+
+from sphshell_pin.cli import app
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.new import new_scenario
+from tests.scenario.files import DROP, write
+from tests.scenario.test_new import arm_urdf
+
+
+def told(*arguments):
+    done = CliRunner().invoke(app, [str(one) for one in arguments])
+    return done.exit_code, " ".join(done.output.split())
+
+
+@pytest.mark.parametrize("axes", ["zyyy", "zyyzyz", "zyzyyy"])
+def test_no_joint_stands_behind_the_surface(axes, tmp_path):
+    """A surface under an arm that stands upright would be pierced by the arm itself."""
+    urdf = arm_urdf(tmp_path, axes)
+    built = new_scenario(urdf, "plane", radius=0.01, out=tmp_path / "a.toml").built
+    (pair,), model = built.scene.pairs, built.scene.model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, built.q0)
+    origins = np.array([one.translation for one in list(data.oMi)[1:]])
+    plane = pair.placement
+    tip = data.oMf[model.getFrameId(f"link_{len(axes) - 1}")].translation
+    outward = plane.rotation[:, 2] * np.sign((tip - plane.translation) @ plane.rotation[:, 2])
+    assert ((origins - plane.translation) @ outward).min() > 0.009
+
+
+def test_a_new_scenario_takes_one_body_of_a_cad_file(tmp_path):
+    pytest.importorskip("OCP")
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from OCP.BRepTools import BRepTools
+    from OCP.gp import gp_Pnt
+    from OCP.TopoDS import TopoDS_Compound
+
+    builder, pair = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(pair)
+    builder.Add(pair, BRepPrimAPI_MakeBox(100.0, 100.0, 20.0).Shape())
+    builder.Add(pair, BRepPrimAPI_MakeBox(gp_Pnt(300, 0, 0), 40.0, 40.0, 40.0).Shape())
+    BRepTools.Write_s(pair, str(tmp_path / "two.brep"))
+    call = ["new", "--robot", "ball", "--surface", tmp_path / "two.brep", "--unit", "mm"]
+    call += ["--radius", "5mm", "--out", tmp_path / "a.toml"]
+    code, output = told(*call, "--face", "3")
+    assert code == 0, output
+    assert build(tmp_path / "a.toml").scenario.shell[0].faces == [3]
+    made = new_scenario(
+        "ball", tmp_path / "two.brep", unit="mm", faces=[7, 8, 9, 10, 11, 12], radius=0.005,
+        out=tmp_path / "b.toml",
+    )  # fmt: skip
+    (shell,) = build(made.path).shells.values()
+    np.testing.assert_allclose(np.ptp(shell.box, axis=0), 0.04, atol=1e-9)
+
+
+def test_body_and_face_belong_to_a_file(tmp_path):
+    code, output = told("new", "--robot", "ball", "--face", "3", "--out", tmp_path / "a.toml")
+    assert code == 2
+    assert "not to the plane" in output
+
+
+def test_a_cad_file_is_no_robot(tmp_path):
+    part = tmp_path / "part.step"
+    part.write_text("ISO-10303-21;", encoding="utf-8")
+    code, output = told("new", "--robot", part)
+    assert code == 2
+    assert "is not a URDF file" in output
+
+
+def test_a_scenario_is_found_by_its_whole_name(tmp_path):
+    path = write(tmp_path, DROP)
+    code, output = told("explain", path.with_suffix(""))
+    assert code == 2
+    assert f"did you mean {path}" in output.replace("\n", "")
+    assert "is a folder" in told("explain", tmp_path)[1]
+
+
+def test_a_key_without_its_table_is_recognised(tmp_path):
+    path = write(tmp_path, DROP)
+    code, output = told("explain", path, "--set", "duration=2")
+    assert code == 2
+    assert "did you mean 'run.duration'?" in output
+
+
+def test_another_integrator_leaves_the_old_ones_settings_behind(tmp_path):
+    made = new_scenario("three_link_finger", out=tmp_path / "a.toml")
+    built = build(made.path, {"run.integrator": "semi-implicit-euler", "run.dt": "1e-4"})
+    assert (built.scenario.run.dt, built.scenario.run.rtol) == (1e-4, None)
+    again = build(made.path, {"run.integrator": "adaptive"})
+    assert again.scenario.run.rtol == made.built.scenario.run.rtol
+    code, output = told("explain", made.path, "--dt", "1e-4")
+    assert code == 2
+    assert "set run.integrator to semi-implicit-euler" in output
+
+
+def test_a_doubtful_unit_is_told_once_and_plainly(tmp_path):
+    box = "\n".join(f"v {x} {y} {z}" for x in (0, 99) for y in (0, 99) for z in (0, 9))
+    (tmp_path / "b.obj").write_text(
+        box + "\nf 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n",
+        encoding="utf-8",
+    )
+    call = ["--robot", "ball", "--surface", tmp_path / "b.obj", "--unit", "m", "--radius", "3mm"]
+    code, output = told("new", *call, "--out", tmp_path / "a.toml")
+    assert code == 0, output
+    assert "UnitWarning" not in output
+    assert ".py" not in output
+
+
+def test_noise_is_no_stl(tmp_path):
+    path = tmp_path / "noise.stl"
+    path.write_bytes(np.random.default_rng(0).bytes(3000))
+    code, output = told("check", path, "--unit", "mm")
+    assert code == 2
+    assert "No module" not in output
+
+
+@pytest.mark.parametrize("cause", [KeyboardInterrupt, ValueError])
+def test_ctrl_c_while_a_library_loads_is_an_interruption(cause, monkeypatch):
+    def load(*_):
+        try:
+            raise cause
+        except cause as error:
+            ring = ImportError("initialization failed")
+            error.__context__ = None if cause is KeyboardInterrupt else ring
+            raise ring from error
+
+    monkeypatch.setattr("sphshell_pin.scenario.build", load)
+    code, output = told("explain", "sphere_on_shell")
+    assert (code, "interrupted" in output) == (
+        (130, True) if cause is KeyboardInterrupt else (2, False)
+    )

@@ -1,0 +1,201 @@
+"""The unit of a CAD file: stated by its header, by the user, by both, or by nobody."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+pytest.importorskip("OCP")
+
+from sphshell_pin import Shell
+from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, UnitWarning
+from sphshell_pin.shell.converting import convert
+from tests.shell import cad_shapes as shapes
+
+SIDES = np.array([20.0, 30.0, 10.0])
+"""Of the box in the files, as their numbers have it."""
+
+MILLIMETRE = "SI_UNIT(.MILLI.,.METRE.)"
+
+
+@pytest.fixture(scope="module")
+def step(tmp_path_factory):
+    path = tmp_path_factory.mktemp("step") / "box.step"
+    return shapes.write_step(path, ("box", shapes.box()), ("pin", shapes.box())).read_text()
+
+
+@pytest.fixture(scope="module")
+def iges(tmp_path_factory):
+    path = tmp_path_factory.mktemp("iges") / "box.iges"
+    return shapes.write_iges(path, shapes.box()).read_text()
+
+
+def with_unit(step, entities, part=None):
+    """The text with the unit of length replaced, of the body of row `part` or of all.
+
+    entities : what stands in brackets after "LENGTH_UNIT() NAMED_UNIT", and entities after it
+    """
+    rows = [m.span() for m in re.finditer(r"LENGTH_UNIT\(\) NAMED_UNIT\(\*\) SI_UNIT[^;]*;", step)]
+    assert len(rows) == 2
+    for row in (1, 0) if part is None else (part,):
+        start, end = rows[row]
+        step = step[:start] + entities.replace("#9", f"#9{row}") + step[end:]
+    return step
+
+
+def prefixed(prefix):
+    return f"LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT({prefix},.METRE.) );"
+
+
+def converted(name, millimetres):
+    return (
+        f"CONVERSION_BASED_UNIT('{name}',#9001) LENGTH_UNIT() NAMED_UNIT(#9003) );\n"
+        f"#9001=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE({millimetres}),#9002);\n"
+        f"#9002=(LENGTH_UNIT() NAMED_UNIT(*) {MILLIMETRE});\n"
+        "#9003=DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.);"
+    )
+
+
+def written(folder, text, suffix=".step"):
+    path = folder / f"part{suffix}"
+    path.write_text(text)
+    return path
+
+
+def sides(shell):
+    """Lengths of the first box [m]."""
+    own = shell.vertices[shell.vertices[:, 0] < 0.5 * shell.box[:, 0].sum()]
+    return np.ptp(own, axis=0)
+
+
+UNITS = {
+    "m": (prefixed("$"), 1.0, "m"),
+    "mm": (prefixed(".MILLI."), 1e-3, "mm"),
+    "um": (prefixed(".MICRO."), 1e-6, "um"),
+    "nm": (prefixed(".NANO."), 1e-9, "1e-09 m"),
+    "inch": (converted("INCH", "25.4"), 0.0254, "in"),
+    "foot, in lower case": (converted("foot", "3.048E2"), 0.3048, "ft"),
+    "millimetre of its own": (converted("MILLIMETRE", "1."), 1e-3, "mm"),
+    "furlong": (converted("FURLONG", "201168."), 201.168, "201.168 m"),
+    "inch that is none": (converted("INCH", "30."), 0.03, "0.03 m"),
+}
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_step_units_are_taken_by_their_length_not_by_their_name(name, step, tmp_path):
+    entities, metres, called = UNITS[name]
+    path = written(tmp_path, with_unit(step, entities))
+    shell = Shell.from_file(path)
+    assert np.allclose(sides(shell), SIDES * metres, rtol=1e-12, atol=0.0)
+    assert shell.health.scale == pytest.approx(metres, rel=1e-12)
+    assert shell.unit == called
+    with pytest.warns(UnitWarning, match=re.escape(f"header says '{called}'")):
+        other = Shell.from_file(path, "yd")
+    assert np.allclose(sides(other), SIDES * 0.9144, rtol=1e-12, atol=0.0)
+    assert other.health.scale == 0.9144
+
+
+def test_a_step_file_without_a_unit_needs_one(step, tmp_path):
+    """Of the contexts' lists of units the first, that of length, is taken away; or all lists."""
+    for text in (
+        re.sub(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\(#\d+,", "GLOBAL_UNIT_ASSIGNED_CONTEXT((", step),
+        re.sub(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\([^)]*\)\)", "", step),
+    ):
+        assert text != step
+        path = written(tmp_path, text)
+        told = r"unit = None must be stated, as the header of part\.step states none: one of m, "
+        with pytest.raises(UnitMissing, match=told + r".*measures 1[\d.]+ units: say unit='mm'"):
+            Shell.from_file(path)
+        for unit, metres in (("mm", 1e-3), ("m", 1.0), ("in", 0.0254)):
+            shell = Shell.from_file(path, unit)
+            assert np.allclose(sides(shell), SIDES * metres, rtol=1e-12, atol=0.0)
+            assert shell.health.scale == metres
+
+
+def test_several_units_hold_for_their_own_parts(step, tmp_path):
+    path = written(tmp_path, with_unit(step, converted("INCH", "25.4"), part=1))
+    both = Shell.from_file(path)
+    for body, metres in (("box", 1e-3), ("pin", 0.0254)):
+        own = Shell.from_file(path, bodies=[body])
+        assert np.allclose(np.ptp(own.vertices, axis=0), SIDES * metres, rtol=1e-12, atol=0.0)
+    assert any("units 'mm', 'in' from the file's header" in note for note in both.health.notes)
+    with pytest.raises(InvalidParameter, match=r"the 2 units 'mm', 'in' that part\.step states"):
+        Shell.from_file(path, "mm")
+
+
+def test_units_without_a_name_are_converted_to_one(step, tmp_path):
+    path = written(tmp_path, with_unit(step, converted("FURLONG", "201168.")))
+    done = convert(path, tmp_path / "out.step")
+    assert done.target.unit == "mm"
+    assert done.target.size == pytest.approx(done.source.size, rel=1e-12)
+
+
+def with_header(iges, edit, delimiter=",", ends=";"):
+    """The text of an IGES file with other global parameters, and other delimiters throughout."""
+    lines = iges.splitlines()
+    table = "".join(line[:72] for line in lines if line[72] == "G")
+    assert table.startswith(",,")
+    table = edit(table[2:])
+    swap = str.maketrans({",": delimiter, ";": ends})
+    first = "," if (delimiter, ends) == (",", ";") else f"1H{delimiter}{delimiter}1H{ends}"
+    table = f"{first}{delimiter}{table.translate(swap)}"
+    rows = [table[k : k + 72] for k in range(0, len(table), 72)]
+    found = {kind: [line for line in lines if line[72] == kind] for kind in "SDPT"}
+    last = found["T"][0]
+    return "\n".join(
+        [
+            *found["S"],
+            *(f"{row:72s}G{number:7d}" for number, row in enumerate(rows, 1)),
+            *found["D"],
+            *(line[:64].translate(swap) + line[64:] for line in found["P"]),
+            f"{last[:8]}G{len(rows):7d}{last[16:]}",
+            "",
+        ]
+    )
+
+
+@pytest.mark.parametrize(
+    ("stated", "metres", "called"),
+    [
+        ("2,2HMM", 1e-3, "mm"),
+        ("3,2HMM", 1e-3, "mm"),
+        ("3,1HM", 1.0, "m"),
+        ("3,4HINCH", 0.0254, "in"),
+        ("3,2HFT", 0.3048, "ft"),
+        ("1,2HIN", 0.0254, "in"),
+        ("1,", 0.0254, "in"),
+        ("10,2HCM", 0.01, "cm"),
+        ("11,3HUIN", 2.54e-8, "2.54e-08 m"),
+    ],
+)
+def test_iges_units_come_by_flag_or_by_name(stated, metres, called, iges, tmp_path):
+    text = with_header(iges, lambda table: table.replace(",2,2HMM,", f",{stated},"))
+    path = written(tmp_path, text, ".iges")
+    shell = Shell.from_file(path)
+    assert np.allclose(np.ptp(shell.vertices, axis=0), SIDES * metres, rtol=1e-12, atol=0.0)
+    assert shell.unit == called
+    with pytest.warns(UnitWarning, match=re.escape(f"header says '{called}'")):
+        other = Shell.from_file(path, "yd")
+    assert np.allclose(np.ptp(other.vertices, axis=0), SIDES * 0.9144, rtol=1e-12, atol=0.0)
+
+
+def test_iges_units_nobody_knows(iges, tmp_path):
+    text = with_header(iges, lambda table: table.replace(",2,2HMM,", ",3,7HFURLONG,"))
+    path = written(tmp_path, text, ".iges")
+    with pytest.raises(UnitMissing, match=r"the header of part\.iges states none"):
+        Shell.from_file(path)
+    shell = Shell.from_file(path, "in")
+    assert np.allclose(np.ptp(shell.vertices, axis=0), SIDES * 0.0254, rtol=1e-12, atol=0.0)
+    text = with_header(iges, lambda table: table.replace(",2,2HMM,", ",99,2HMM,"))
+    with pytest.raises(ShellFileError, match="by flag 99, which IGES does not have"):
+        Shell.from_file(written(tmp_path, text, ".iges"), "mm")
+
+
+@pytest.mark.parametrize(("delimiter", "ends"), ["/;", "|!", ":#"])
+def test_iges_delimiters_are_those_of_the_header(delimiter, ends, iges, tmp_path):
+    text = with_header(iges, lambda table: table.replace(",2,2HMM,", ",1,2HIN,"), delimiter, ends)
+    shell = Shell.from_file(written(tmp_path, text, ".iges"))
+    assert np.allclose(np.ptp(shell.vertices, axis=0), SIDES * 0.0254, rtol=1e-12, atol=0.0)
+    assert shell.is_closed
