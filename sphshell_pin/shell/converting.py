@@ -115,9 +115,12 @@ def convert(
         require_kernel(f"converting {suffix} to {goal.suffix.lower()} files")
     first = _surface(file, unit_in, options)
     unit = unit_out or (first.unit if first.unit in METRES_PER_UNIT else "mm")
-    handle, name = tempfile.mkstemp(prefix=f".{goal.stem}.", suffix=goal.suffix, dir=goal.parent)
-    os.close(handle)
+    name = ""
     try:
+        handle, name = tempfile.mkstemp(
+            prefix=f".{goal.stem}.", suffix=goal.suffix, dir=goal.parent
+        )
+        os.close(handle)
         _write(Path(name), unit, first, options)
         carried = goal.suffix.lower() == ".shl" or goal.suffix.lower() in CAD_SUFFIXES
         brep = goal.suffix.lower() in BREP_SUFFIXES
@@ -137,7 +140,7 @@ def convert(
     except OSError as error:
         raise ShellFileError(goal, f"cannot be written ({error.strerror})") from error
     finally:
-        if os.path.exists(name):
+        if name and os.path.exists(name):
             os.unlink(name)
     return conversion
 

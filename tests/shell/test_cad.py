@@ -206,6 +206,12 @@ def test_what_would_take_millions_of_triangles_is_refused(tmp_path):
         Shell.from_file(path, "mm", chord_error=1e-12)
 
 
+def test_a_few_fillets_on_a_block_are_enough_to_be_refused(tmp_path):
+    """Its faces are nearly all flat: a coarse mesh does not grow, the fine one would."""
+    with pytest.raises(InvalidParameter, match="chord_error = 1e-09 would take about"):
+        load(tmp_path, shapes.rounded_box(), chord_error=1e-9)
+
+
 @pytest.mark.parametrize(
     "options", [{"chord_error": 0.0}, {"sew": -1.0}, {"bodies": "pin"}, {"faces": []}]
 )
