@@ -71,6 +71,21 @@ def check_points(name: str, value: Any) -> Array:
     return array
 
 
+def check_each_positive(name: str, value: Any, count: int, unit: str = "") -> Array:
+    """Return `value`, one number or (count,), as an array (count,); raise unless all are > 0."""
+    try:
+        array = np.array(np.broadcast_to(as_floats(value), (count,)))
+    except (TypeError, ValueError):
+        raise InvalidParameter(
+            name, np.shape(value), f"must be one number or have shape ({count},)"
+        ) from None
+    wrong = np.flatnonzero(~(np.isfinite(array) & (array > 0.0)))
+    if wrong.size:
+        k = int(wrong[0])
+        raise InvalidParameter(f"{name}[{k}]", float(array[k]), f"must be positive{_in(unit)}")
+    return array
+
+
 def as_floats(value: Any) -> Array:
     """Return a copy of `value` as an array of float64.
 

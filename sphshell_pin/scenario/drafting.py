@@ -26,9 +26,8 @@ def draft_text(
     shell: ShellSection,
     plan: Plan,
     run: RunSection,
-    run_why: str = "",
 ) -> str:
-    """Return the text of the scenario called `name`; `run_why` is the integrator's comment."""
+    """Return the text of the scenario called `name`."""
     pairs = pair_names(plan.tips, shell.name)
     digits = decimals(plan.gap)
     parts = [
@@ -50,7 +49,7 @@ def draft_text(
         parts.append(_press(plan.control, plan.tips[0], shell.name, digits))
     if isinstance(plan.control, Hold):
         parts.append(_hold(plan.control))
-    parts.append(_run(run, run_why))
+    parts.append(_run(run))
     parts += _knobs(plan, pairs)
     parts.append(_expect(plan, pairs))
     return "\n\n".join("\n".join(part) for part in parts) + "\n"
@@ -225,9 +224,9 @@ def _hold(hold: Hold) -> list[str]:
     ]
 
 
-def _run(run: RunSection, why: str) -> list[str]:
+def _run(run: RunSection) -> list[str]:
     lines = ["[run]", f"duration = {_value(run.duration)}"]
-    lines.append(_beside(f"integrator = {_string(run.integrator)}", why))
+    lines.append(_beside(f"integrator = {_string(run.integrator)}", "its steps follow the contact"))
     for key in ("dt", "rtol", "record_dt"):
         value = getattr(run, key)
         if value is not None:

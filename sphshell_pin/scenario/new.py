@@ -153,16 +153,12 @@ def new_scenario(
     wish = _Wish(material, against, press, place, word)
     section, plan = _plan(section, with_shell, tips, wish)
     title = f"{loaded.name} {_DOES[type(plan.control)]} {shell_section.name}"
-    run = _run(plan)
-    draft = draft_text(path.stem, title, section, shell_section, plan, run)
-    explanation = explain_built(_build_text(draft, path, with_shell))
-    run_why = f"steps follow the contact; fixed ones: dt = {explanation.recommended_dt:g} s"
-    text = draft_text(path.stem, title, section, shell_section, plan, run, run_why)
+    text = draft_text(path.stem, title, section, shell_section, plan, _run(plan))
     # What is written is what was built.
     built = _build_text(text, path, with_shell)
     _write(path, text)
     why = (*plan.why, _tell_materials(plan))
-    return NewScenario(path, text, built, explanation, why)
+    return NewScenario(path, text, built, explain_built(built), why)
 
 
 def _tell_materials(plan: Plan) -> str:

@@ -66,6 +66,15 @@ class CleanedSurface:
     element_face: Ints | None = None
     face_names: tuple[str, ...] = ()
 
+    def moved(self, scale: float, rotation: Floats, translation: Floats) -> CleanedSurface:
+        """Return the surface made larger, then turned by (3, 3), then moved by (3,) [m]."""
+        return replace(
+            self,
+            vertices=(self.vertices * scale) @ rotation.T + translation,
+            normals=None if self.normals is None else self.normals @ rotation.T,
+            health=self.health.moved(scale, rotation, translation),
+        )
+
 
 def clean(vertices: object, polygons: object, normals: object = None) -> CleanedSurface:
     """Clean a surface given as arrays; see `raw_surface` for their shapes and the errors."""

@@ -12,7 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin import _core
-from sphshell_pin.checks import as_floats, check_points, check_positive, check_vector, read_only
+from sphshell_pin.checks import (
+    check_each_positive,
+    check_points,
+    check_positive,
+    check_vector,
+    read_only,
+)
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.closest_points import ClosestPoints
 from sphshell_pin.shell.options import CREASE_ANGLE, SIDES, check_options, thread_count
@@ -324,16 +330,7 @@ class Shell(Topology):
         from sphshell_pin.contact.contact_set import Method
 
         places = check_points("centers", centers)
-        try:
-            sizes = np.array(np.broadcast_to(as_floats(radii), (len(places),)))
-        except (TypeError, ValueError):
-            raise InvalidParameter(
-                "radii", np.shape(radii), f"must be one number or have shape ({len(places)},)"
-            ) from None
-        wrong = np.flatnonzero(~(np.isfinite(sizes) & (sizes > 0.0)))
-        if wrong.size:
-            k = int(wrong[0])
-            raise InvalidParameter(f"radii[{k}]", float(sizes[k]), "must be positive [m]")
+        sizes = check_each_positive("radii", radii, len(places), "m")
         workers = thread_count(threads)
         depth, count = self.core_for(method).contacts_batch(
             places, sizes, int(Method.from_name(method)), workers
@@ -386,17 +383,10 @@ class Shell(Topology):
                 raise InvalidParameter(
                     "placement", placement, "must be a pinocchio.SE3 or a scale"
                 ) from None
-        surface = CleanedSurface(
-            vertices=(self.vertices * scale) @ rotation.T + translation,
-            elements=self.elements,
-            triangles=self.triangles,
-            triangle_element=self.triangle_element,
-            normals=None if self.normals is None else self.normals @ rotation.T,
-            source_element=self.source_element,
-            element_face=self.element_face,
-            face_names=self.face_names,
-            health=self.health.moved(scale, rotation, translation),
+        own = CleanedSurface(
+            **{one.name: getattr(self, one.name) for one in fields(CleanedSurface)}
         )
+        surface = own.moved(scale, rotation, translation)
         shell = type(self).__new__(type(self))
         shell._set(surface, self.crease_angle, self.side, self.name, self.source, self.unit)
         return shell
