@@ -9,9 +9,9 @@ import time
 
 import numpy as np
 
-from benchmarks.query import against_peers, against_size
-from benchmarks.step import ingredients, step_cost
-from benchmarks.timing import machine, one_core, ratio, take_turns
+from sphshell_pin.benchmarks.query import against_peers, against_size
+from sphshell_pin.benchmarks.step import ingredients, step_cost
+from sphshell_pin.benchmarks.timing import machine, one_core, ratio, take_turns
 
 
 def import_time(rounds: int) -> None:

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.query import RADIUS as QUERY_RADIUS
-from benchmarks.query import query_contestant
-from benchmarks.surfaces import (
+from sphshell_pin import Shell
+from sphshell_pin.benchmarks.query import RADIUS as QUERY_RADIUS
+from sphshell_pin.benchmarks.query import query_contestant
+from sphshell_pin.benchmarks.surfaces import (
     SHEET,
     Mesh,
     ball_places,
@@ -28,8 +29,7 @@ from benchmarks.surfaces import (
     touching_centres,
     wavy_sheet,
 )
-from benchmarks.timing import machine, median_us, one_core, ratio, take_turns
-from sphshell_pin import Shell
+from sphshell_pin.benchmarks.timing import machine, median_us, one_core, ratio, take_turns
 
 Array = NDArray[np.float64]
 RADIUS = 0.010  # of the touching sphere [m]

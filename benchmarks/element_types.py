@@ -17,7 +17,7 @@ from math import factorial, prod
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.surfaces import (
+from sphshell_pin.benchmarks.surfaces import (
     SHEET,
     Mesh,
     ball_places,
@@ -27,7 +27,7 @@ from benchmarks.surfaces import (
     sheet,
     torus,
 )
-from benchmarks.timing import one_core, ratio, take_turns
+from sphshell_pin.benchmarks.timing import one_core, ratio, take_turns
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from benchmarks.timing import machine
+from sphshell_pin.benchmarks.timing import machine
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live import LiveRun
 from sphshell_pin.view.live import Live

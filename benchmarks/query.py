@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.surfaces import touching_centres, wavy_sheet
-from benchmarks.timing import median_us, ratio, take_turns
 from sphshell_pin import Shell, _core
+from sphshell_pin.benchmarks.surfaces import touching_centres, wavy_sheet
+from sphshell_pin.benchmarks.timing import median_us, ratio, take_turns
 
 Array = NDArray[np.float64]
 RADIUS, DEPTH = 0.010, 0.0005

@@ -10,9 +10,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from benchmarks.surfaces import wavy_sheet
-from benchmarks.timing import median_us, ratio, take_turns
 from sphshell_pin import _core, robots
+from sphshell_pin.benchmarks.surfaces import wavy_sheet
+from sphshell_pin.benchmarks.timing import median_us, ratio, take_turns
 
 Array = NDArray[np.float64]
 DT, STEPS, RADIUS = 1e-5, 5000, 0.012

@@ -16,9 +16,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from benchmarks.surfaces import Mesh, icosphere
-from benchmarks.timing import machine, one_core
 from sphshell_pin import ImpactLaw, RungeKutta4, Scene, Shell, Simulation, Sphere
+from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
+from sphshell_pin.benchmarks.timing import machine, one_core
 from sphshell_pin.dynamics import Result
 
 Array = NDArray[np.float64]

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 import sphshell_pin as sp
-from benchmarks.timing import machine, one_core
-from benchmarks.work_precision_cases import (
+from sphshell_pin.benchmarks.timing import machine, one_core
+from sphshell_pin.benchmarks.work_precision_cases import (
     FAST_CREEP,
     SLOW_CREEP,
     Array,

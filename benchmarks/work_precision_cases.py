@@ -12,8 +12,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from benchmarks import swing
-from benchmarks.step import RADIUS, START, panda, tip_position
+from sphshell_pin.benchmarks import swing
+from sphshell_pin.benchmarks.step import RADIUS, START, panda, tip_position
 from sphshell_pin.dynamics import Result
 from sphshell_pin.dynamics.integrators import Integrator
 

@@ -8,8 +8,8 @@ from functools import cache
 import pytest
 
 import sphshell_pin as sp
-from benchmarks.work_precision import Judge, cost_at, measure
-from benchmarks.work_precision_cases import bowl, press, stick_slip
+from sphshell_pin.benchmarks.work_precision import Judge, cost_at, measure
+from sphshell_pin.benchmarks.work_precision_cases import bowl, press, stick_slip
 
 CASES = {
     "bowl": lambda: replace(bowl(), duration=0.2),

@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from benchmarks.swing import ball_model
+from sphshell_pin.benchmarks.swing import ball_model
 from sphshell_pin.dynamics import Result
 from tests import models
 from tests.hard_cases import surfaces

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import ellipk
 
 import sphshell_pin as sp
-from benchmarks.swing import ball_model, downward_crossings, mean_period
+from sphshell_pin.benchmarks.swing import ball_model, downward_crossings, mean_period
 from sphshell_pin.dynamics import Result
 from tests.hard_cases import surfaces
 from tests.hard_cases.balls import (

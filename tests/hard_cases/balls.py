@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from benchmarks.swing import GRAVITY, MASS, RADIUS
+from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
 from sphshell_pin.dynamics import Result
 from tests import models
 

@@ -12,9 +12,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.surfaces import Mesh, icosphere
-from benchmarks.swing import any_turn
 from sphshell_pin import Shell
+from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
+from sphshell_pin.benchmarks.swing import any_turn
 from tests import meshes
 from tests.contact.smooth import surfaces as unit
 from tests.hard_cases.balls import RADIUS

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import surfaces
+from sphshell_pin.benchmarks import surfaces
 from tests import meshes
 from tests.shell.surfaces import tetrahedron
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from sphshell_pin.robots import gear_mesh
 
 from sphshell_pin import robots, scenarios
+from sphshell_pin.robots import gear_mesh
 
 
 @pytest.fixture(scope="module")

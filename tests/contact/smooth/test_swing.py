@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.swing import (
+from sphshell_pin.benchmarks.swing import (
     ANGLE,
     ARM,
     AZIMUTHS,
