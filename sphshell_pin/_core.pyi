@@ -155,14 +155,9 @@ class CartesianImpedance(Controller):
         actuated: _Doubles,
     ) -> None: ...
 
-class Simulation:
+class RunSettings:
     def __init__(
         self,
-        model: pin.Model,
-        pairs: Sequence[Pair],
-        controller: Controller | None,
-        q0: _Doubles,
-        v0: _Doubles,
         *,
         integrator: int,
         dt: float,
@@ -172,6 +167,17 @@ class Simulation:
         start_time: float,
         control_dt: float,
         record_dt: float,
+    ) -> None: ...
+
+class Simulation:
+    def __init__(
+        self,
+        model: pin.Model,
+        pairs: Sequence[Pair],
+        controller: Controller | None,
+        q0: _Doubles,
+        v0: _Doubles,
+        settings: RunSettings,
     ) -> None: ...
     def advance(self, wall_seconds: float, until: float = ...) -> int: ...
     def change(self, pairs: list[Pair], controller: Controller | None) -> None: ...
@@ -201,6 +207,30 @@ class Simulation:
     @property
     def summaries(self) -> list[dict[str, float]]: ...
 
+class Rollout:
+    def __init__(self, model: pin.Model, threads: int) -> None: ...
+    def add(
+        self,
+        pairs: Sequence[Pair],
+        controller: Controller | None,
+        q0: _Doubles,
+        v0: _Doubles,
+        settings: RunSettings,
+    ) -> None: ...
+    def wait(self, left: int, seconds: float) -> int: ...
+    def stop(self) -> None: ...
+    def __len__(self) -> int: ...
+    def outcome(self, number: int) -> dict[str, Any]: ...
+    def record(self, number: int) -> dict[str, NDArray[Any]]: ...
+
+def step_parts(
+    model: pin.Model,
+    pairs: Sequence[Pair],
+    q: _Doubles,
+    v: _Doubles,
+    dt: float,
+    repeats: int,
+) -> dict[str, float]: ...
 def bare_dynamics(model: pin.Model, q: _Doubles, v: _Doubles, dt: float, steps: int) -> float: ...
 def coal_collide_all(
     vertices: _Doubles, triangles: _Ints, centers: _Doubles, radius: float

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.rollout import Rollout
 
 
 # Longer lists of valid names are cut to the nearest ones, longer values in the middle.
@@ -202,6 +203,29 @@ class Interrupted(SphshellError, KeyboardInterrupt):
         super().__init__(f"interrupted at t = {t:.6g} s")
         self.t = t
         self.result = result
+
+
+class RunFailed(SphshellError, RuntimeError):
+    """A user's routine that broke in a run at time `t` [s]; `result` holds all that came before."""
+
+    def __init__(self, t: float, why: str, result: Result) -> None:
+        """Say when and what the routine raised."""
+        super().__init__(f"the run stopped at t = {t:.6g} s, its routine raised {why}")
+        self.t = t
+        self.result = result
+
+
+class RolloutInterrupted(SphshellError, KeyboardInterrupt):
+    """Ctrl-C during a rollout; `rollout` holds the runs that were finished."""
+
+    def __init__(self, done: int, rollout: Rollout) -> None:
+        """Say how many runs were `done`."""
+        super().__init__(f"interrupted when {done} of {len(rollout)} runs were done")
+        self.rollout = rollout
+
+
+class SweepError(SphshellError, RuntimeError):
+    """A sweep that cannot begin or go on; the runs that were done are kept."""
 
 
 def add_origin(error: Exception, what: str) -> None:

@@ -9,6 +9,7 @@ from sphshell_pin.dynamics.integrators import (
     SemiImplicitEuler,
 )
 from sphshell_pin.dynamics.result import ContactLog, EnergyAudit, Event, Result
+from sphshell_pin.dynamics.rollout import Rollout
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
 from sphshell_pin.dynamics.simulation import Simulation
 
@@ -24,6 +25,7 @@ __all__ = [
     "JointPD",
     "LinearlyImplicitEuler",
     "Result",
+    "Rollout",
     "RungeKutta4",
     "Scene",
     "SceneContacts",

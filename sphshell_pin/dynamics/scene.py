@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -195,10 +196,9 @@ class Scene:
         check_friction(friction)
         method = "smooth" if method is None else method
         Method.from_name(method)
-        joint_i, in_i = self._frame(sphere.frame)
+        joint_i = self.frame_in_joint(sphere.frame)[0]
         placement = check_placement("placement", placement)
-        joint_j, in_j = self._frame(frame)
-        centre = in_i * pin.SE3(np.eye(3), np.array(sphere.offset))
+        joint_j, in_j = self.frame_in_joint(frame)
         suspicion = unit_warning(self._model, sphere.radius, shell.size)
         if suspicion:
             warnings.warn(f"shell '{shell.name}': {suspicion}", UnitWarning, stacklevel=2)
@@ -210,7 +210,7 @@ class Scene:
                 frame=frame,
                 joint_i=joint_i,
                 joint_j=joint_j,
-                sphere_placement=centre,
+                sphere_placement=self.place(sphere),
                 placement=placement,
                 shell_placement=in_j * placement,
                 law=law,
@@ -241,8 +241,8 @@ class Scene:
         law = _default_law() if law is None else law
         check_law(law)
         check_friction(friction)
-        joint_i, in_i = self._frame(frame_i, "frame_i")
-        joint_j, in_j = self._frame(frame_j, "frame_j")
+        joint_i, in_i = self.frame_in_joint(frame_i, "frame_i")
+        joint_j, in_j = self.frame_in_joint(frame_j, "frame_j")
         return self._add(
             ContactPair(
                 name=self._pair_name(name, f"{frame_i}-{frame_j}"),
@@ -383,7 +383,18 @@ class Scene:
             wanted, k = f"{default}-{k}", k + 1
         return wanted
 
-    def _frame(self, name: str, called: str = "frame") -> tuple[int, pin.SE3]:
+    def with_pairs(self, pairs: tuple[ContactPair, ...]) -> Scene:
+        """Return a scene of the same model, which both share, with other `pairs`."""
+        other = copy(self)
+        other._pairs, other._core = pairs, None
+        return other
+
+    def place(self, sphere: Sphere) -> pin.SE3:
+        """Return where the centre of `sphere` is in the joint of its frame."""
+        return self.frame_in_joint(sphere.frame)[1] * pin.SE3(np.eye(3), np.array(sphere.offset))
+
+    def frame_in_joint(self, name: str, called: str = "frame") -> tuple[int, pin.SE3]:
+        """Return the joint of the frame `name`, and where the frame is in it."""
         frame = self._model.frames[find_frame(self._model, name, called)]
         return int(frame.parentJoint), pin.SE3(frame.placement)
 

@@ -6,8 +6,8 @@ import math
 import signal
 import threading
 import warnings
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -32,11 +32,14 @@ from sphshell_pin.errors import (
     WeakLawWarning,
 )
 
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.rollout import Rollout
+
 Array = NDArray[np.float64]
 
 _DIVERGED, _STUCK = 2, 3
 # Python looks up this often [s] while the compiled loop runs: progress, Ctrl-C.
-_GLANCE = 0.05
+GLANCE = 0.05
 _MOST_STEPS = 2.0**31 - 1
 # The compiled loop gives up beyond this position [m or rad].
 _FARTHEST = 1e12
@@ -90,9 +93,9 @@ class Simulation:
         blocks: list[dict[str, NDArray[Any]]] = []
         status = 0
         try:
-            with _CtrlC() as ctrl_c:
+            with CtrlC() as ctrl_c:
                 while not status:
-                    status = core.advance(_GLANCE)
+                    status = core.advance(GLANCE)
                     if status or core.full:
                         blocks.append(core.take())
                     if progress is not None:
@@ -101,12 +104,71 @@ class Simulation:
                         raise KeyboardInterrupt
         except KeyboardInterrupt:
             blocks.append(core.take())
-            raise Interrupted(core.time, self._gather(core, blocks)) from None
-        result = self._gather(core, blocks)
+            raise Interrupted(core.time, self.gather(core, blocks)) from None
+        result = self.gather(core, blocks)
         reason = why_ended(status, core, self.scene)
         if reason is not None:
             raise SimulationDiverged(core.time, reason, result)
         return result
+
+    def rollout(
+        self,
+        q0s: Any,
+        v0s: Any = None,
+        duration: float = 1.0,
+        threads: int | None = None,
+        *,
+        controller: Controller | Callback | Sequence[Controller | Callback | None] | None = None,
+        control_dt: float | None = None,
+        vary: Mapping[str, Any] | None = None,
+        record_dt: float | None = None,
+        progress: Callable[[float], object] | None = None,
+        t0: float = 0.0,
+    ) -> Rollout:
+        """Make many runs at once, over threads; each has the bits that `run` gives it.
+
+        Parameters
+        ----------
+        q0s : (n, nq), or (nq,) for all runs
+        v0s : (n, nv), or (nv,) for all runs; at rest unless given
+        duration, controller, control_dt, t0 : as of `run`; `controller` may be a list of n. A
+            callable is asked for all runs in turn, and holds up the other threads meanwhile
+        threads : how many; all processors unless given
+        vary : parameters that differ from run to run: names to n values each. Names are
+            "PAIR.law" and "PAIR.friction" (n laws, n frictions or None), "PAIR.law.FIELD" and
+            "PAIR.friction.FIELD" (n numbers; the fields of the law or friction that the pair has),
+            "PAIR.sphere.radius" (n) [m], "PAIR.sphere.offset" (n, 3) [m], "PAIR.placement" of
+            the shell in its frame (n pinocchio.SE3)
+        record_dt : between recorded rows [s]; unless given only start and end are recorded
+        progress : called a few times a second with the share of the runs that are done
+
+        Returns
+        -------
+        Rollout : its length is n, [i] gives the Result of run i. A run that fails is noted in
+            `failures`, and the others go on
+
+        Raises
+        ------
+        InvalidParameter, NameNotFound
+            For wrong sizes, names and values, before anything runs.
+        RolloutInterrupted
+            On Ctrl-C, with the `rollout` so far.
+        """
+        from sphshell_pin.dynamics.many_runs import roll_out
+
+        return roll_out(
+            self,
+            q0s,
+            v0s,
+            duration,
+            threads,
+            controller=controller,
+            control_dt=control_dt,
+            vary=vary,
+            record_dt=record_dt,
+            progress=progress,
+            t0=t0,
+        )
 
     def to_core(
         self,
@@ -120,11 +182,20 @@ class Simulation:
         t0: float = 0.0,
     ) -> _core.Simulation:
         """Check what `run` takes, which see, and return the compiled run, not yet started."""
-        dt = self._dt
         q0, v0 = self.scene.check_state(q0, v0)
         duration = check_not_negative("duration", duration, "s")
         self._check_start(q0)
-        core_controller, hold = self._bind(controller, control_dt, q0)
+        core_controller, hold = self.bind(controller, control_dt, q0)
+        settings = self.core_settings(duration, hold, record_dt=record_dt, t0=t0)
+        return _core.Simulation(
+            self.scene.model, self.core_pairs(q0, v0), core_controller, q0, v0, settings
+        )
+
+    def core_settings(
+        self, duration: float, hold: float, *, record_dt: float | None, t0: float
+    ) -> _core.RunSettings:
+        """Check and gather what the compiled loop is told; torques are held for `hold` [s]."""
+        dt = self._dt
         t0 = check_finite("t0", t0)
         if np.spacing(abs(t0) + duration) > 1e-3 * (dt or 1e-6):
             raise InvalidParameter(
@@ -136,12 +207,7 @@ class Simulation:
         record = 0.0
         if record_dt is not None:
             record = min(check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
-        return _core.Simulation(
-            self.scene.model,
-            self.core_pairs(q0, v0),
-            core_controller,
-            q0,
-            v0,
+        return _core.RunSettings(
             integrator=self.integrator.code,
             dt=dt,
             rtol=getattr(self.integrator, "rtol", 0.0),
@@ -156,7 +222,7 @@ class Simulation:
         self, controller: Controller | Callback | None, q: Array
     ) -> _core.Controller | None:
         """Return the C++ twin of a controller that `run` takes, started at q (nq,)."""
-        return self._bind(controller, None, q)[0]
+        return self.bind(controller, None, q)[0]
 
     def core_pairs(self, q0: Array, v0: Array) -> list[_core.Pair]:
         """Build the C++ twins of the pairs; a law that cannot stop its sphere earns a warning."""
@@ -183,9 +249,10 @@ class Simulation:
         """The fixed step [s], or 0 where the error decides."""
         return float(getattr(self.integrator, "dt", 0.0))
 
-    def _bind(
+    def bind(
         self, controller: Controller | Callback | None, control_dt: float | None, q0: Array
     ) -> tuple[_core.Controller | None, float]:
+        """Return the C++ twin of a controller, started at q0 (nq,), and how long it holds [s]."""
         dt = self._dt
         if control_dt is not None and check_positive("control_dt", control_dt, "s") < dt:
             raise InvalidParameter("control_dt", control_dt, f"must not be below dt = {dt!r} s")
@@ -228,7 +295,8 @@ class Simulation:
         distance = float(pair.shell.closest_points(local[None], method=pair.method).distances[0])
         return pair.sphere.radius - (distance if pair.shell.side == "outside" else -distance)
 
-    def _gather(self, core: _core.Simulation, blocks: list[dict[str, NDArray[Any]]]) -> Result:
+    def gather(self, core: Any, blocks: list[dict[str, NDArray[Any]]]) -> Result:
+        """Make the result of a compiled run `core`, or of what is left of one, and its blocks."""
         names = tuple(pair.name for pair in self.scene.pairs)
         figures = {}
         for name, summary in zip(names, core.summaries, strict=True):
@@ -250,7 +318,7 @@ class Simulation:
         return Result.from_blocks(blocks, names, stats, self.scene)
 
 
-class _CtrlC:
+class CtrlC:
     """Notes Ctrl-C during a run instead of letting it break into somebody's callback.
 
     A second one breaks in all the same. Outside the main thread signals cannot be caught.
@@ -260,7 +328,7 @@ class _CtrlC:
         self.pressed = False
         self._before: Any = None
 
-    def __enter__(self) -> _CtrlC:
+    def __enter__(self) -> CtrlC:
         if threading.current_thread() is threading.main_thread():
             self._before = signal.getsignal(signal.SIGINT)
             if self._before is signal.default_int_handler:
@@ -277,14 +345,14 @@ class _CtrlC:
         self.pressed = True
 
 
-def why_ended(status: int, core: _core.Simulation, scene: Scene) -> str | None:
+def why_ended(status: int, core: Any, scene: Scene) -> str | None:
     """Say why the compiled run cannot go on after `status`; None where it can, or has finished."""
     if status == _STUCK:
         return f"the error stays too large however short the step (tried {core.last_step:.1e} s)"
     return _runaway(core, scene) if status == _DIVERGED else None
 
 
-def _runaway(core: _core.Simulation, scene: Scene) -> str:
+def _runaway(core: Any, scene: Scene) -> str:
     """Say which joint ran away first."""
     if not np.abs(np.asarray(core.q)).max(initial=0.0) < _FARTHEST:
         return "a joint's position grew beyond all bounds"

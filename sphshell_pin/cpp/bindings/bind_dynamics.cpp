@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "bindings/arrays.hpp"
+#include "bindings/records.hpp"
 #include "dynamics/linearization.hpp"
 #include "dynamics/simulation.hpp"
 
@@ -21,15 +22,6 @@ using RowPoints = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
 SE3 to_se3(const Eigen::Matrix4d& m) {
   return SE3(Eigen::Matrix3d(m.topLeftCorner<3, 3>()), Vec3(m.topRightCorner<3, 1>()));
-}
-
-Array<double> rows_to_array(std::vector<ContactRow> rows) {
-  const std::size_t n = rows.size();
-  auto* kept = new std::vector<ContactRow>(std::move(rows));
-  nb::capsule owner(kept,
-                    [](void* p) noexcept { delete static_cast<std::vector<ContactRow>*>(p); });
-  return Array<double>(reinterpret_cast<double*>(kept->data()),
-                       {n, std::size_t(ContactRow::kColumns)}, owner);
 }
 
 // The callable returns points, normals and depths, checked and converted by its Python wrapper.
@@ -70,12 +62,6 @@ std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matr
   return pair;
 }
 
-std::vector<Pair> copies(const std::vector<const Pair*>& pairs) {
-  std::vector<Pair> out;
-  for (const Pair* pair : pairs) out.push_back(*pair);
-  return out;
-}
-
 // A Python callable tau(t, q, v, contacts): contacts as rows, its Python wrapper gives them names.
 class PythonController : public Controller {
  public:
@@ -102,48 +88,10 @@ std::vector<Vec3> to_points(const RowPoints& rows) {
   return out;
 }
 
-nb::dict to_dict(Record record, int nq, int nv) {
-  nb::dict out;
-  const std::size_t n = record.t.size();
-  std::vector<double> event_t;
-  std::vector<int> event_pair, event_kind;
-  for (const Event& e : record.events) {
-    event_t.push_back(e.t);
-    event_pair.push_back(e.pair);
-    event_kind.push_back(static_cast<int>(e.kind));
-  }
-  out["t"] = to_array(std::move(record.t));
-  out["q"] = to_array(std::move(record.q), {n, std::size_t(nq)});
-  out["v"] = to_array(std::move(record.v), {n, std::size_t(nv)});
-  out["energy"] = to_array(std::move(record.energy), {n, std::size_t(Record::kEnergies)});
-  out["contact_row"] = to_array(std::move(record.contact_row));
-  out["contacts"] = rows_to_array(std::move(record.contacts));
-  out["event_t"] = to_array(std::move(event_t));
-  out["event_pair"] = to_array(std::move(event_pair));
-  out["event_kind"] = to_array(std::move(event_kind));
-  return out;
-}
-
 // At a state of its own, no part of a run: bristles are not stretched.
 void evaluate_alone(Scene& scene, const VectorX& q, const VectorX& v) {
   scene.restart();
   scene.evaluate(q, v, VectorX::Zero(scene.bristle_size()));
-}
-
-nb::list summaries(const Simulation& simulation) {
-  nb::list out;
-  for (const PairSummary& s : simulation.summaries()) {
-    nb::dict d;
-    d["contact_time"] = s.contact_time;
-    d["impulse"] = s.impulse;
-    d["peak_force"] = s.peak_force;
-    d["peak_force_time"] = s.peak_force_time;
-    d["max_depth"] = s.max_depth;
-    d["max_depth_time"] = s.max_depth_time;
-    d["touches"] = s.touches;
-    out.append(d);
-  }
-  return out;
 }
 
 }  // namespace
@@ -251,29 +199,34 @@ void bind_dynamics(nanobind::module_& m) {
           nb::arg("posture_stiffness"), nb::arg("joint_damping"), nb::arg("q_ref"),
           nb::arg("actuated"));
 
+  nb::class_<RunSettings>(m, "RunSettings")
+      .def(
+          "__init__",
+          [](RunSettings* self, int integrator, double dt, double rtol, double atol,
+             double duration, double start_time, double control_dt, double record_dt) {
+            new (self) RunSettings{static_cast<Integrator>(integrator),
+                                   dt,
+                                   rtol,
+                                   atol,
+                                   duration,
+                                   start_time,
+                                   control_dt,
+                                   record_dt};
+          },
+          nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"), nb::arg("atol"),
+          nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"));
+
   nb::class_<Simulation>(m, "Simulation")
       .def(
           "__init__",
           [](Simulation* self, nb::handle model, const std::vector<const Pair*>& pairs,
-             std::shared_ptr<Controller> controller, VectorX q0, VectorX v0, int integrator,
-             double dt, double rtol, double atol, double duration, double start_time,
-             double control_dt, double record_dt) {
-            RunSettings settings;
-            settings.integrator = static_cast<Integrator>(integrator);
-            settings.dt = dt;
-            settings.rtol = rtol;
-            settings.atol = atol;
-            settings.duration = duration;
-            settings.start_time = start_time;
-            settings.control_dt = control_dt;
-            settings.record_dt = record_dt;
+             std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
+             const RunSettings& settings) {
             new (self) Simulation(model_of(model), copies(pairs), settings, std::move(controller),
                                   std::move(q0), std::move(v0));
           },
           nb::arg("model"), nb::arg("pairs"), nb::arg("controller").none(), nb::arg("q0"),
-          nb::arg("v0"), nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"),
-          nb::arg("atol"), nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"),
-          nb::arg("record_dt"))
+          nb::arg("v0"), nb::arg("settings"))
       .def(
           "advance",
           [](Simulation& self, double wall_seconds, double until) {
@@ -309,5 +262,5 @@ void bind_dynamics(nanobind::module_& m) {
       .def_prop_ro("evaluations", &Simulation::evaluations)
       .def_prop_ro("last_step", &Simulation::last_step)
       .def_prop_ro("wall_time", &Simulation::wall_time)
-      .def_prop_ro("summaries", &summaries);
+      .def_prop_ro("summaries", [](const Simulation& self) { return to_list(self.summaries()); });
 }

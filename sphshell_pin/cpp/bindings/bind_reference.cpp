@@ -5,12 +5,15 @@
 #include <coal/collision.h>
 #include <coal/shape/geometric_shapes.h>
 
+#include <algorithm>
 #include <chrono>
 
-#include "bindings/arrays.hpp"
+#include "bindings/records.hpp"
 #include "dynamics/multibody.hpp"
+#include "dynamics/scene.hpp"
 
 #include <nanobind/eigen/dense.h>
+#include <nanobind/stl/vector.h>
 
 namespace sphshell {
 namespace {
@@ -34,6 +37,39 @@ double bare_dynamics(nb::handle model, VectorX q, VectorX v, double dt, int step
     q.swap(next);
   }
   return seconds_since(start) / steps;
+}
+
+// Seconds that each part of a step of semi-implicit Euler takes at one state, again and again.
+// "law" holds the forces of the contacts and what gathers and audits them.
+nb::dict step_parts(nb::handle model, const std::vector<const Pair*>& pairs, const VectorX& q,
+                    const VectorX& v, double dt, int repeats) {
+  Scene scene(model_of(model), copies(pairs));
+  const VectorX z = VectorX::Zero(scene.bristle_size()), tau = VectorX::Zero(v.size());
+  const VectorX step = dt * v;
+  VectorX next = q;
+  scene.evaluate(q, v, z);
+  std::vector<Query> queries(pairs.size(), Query(true));
+  const auto time = [&](auto&& part) {
+    const auto start = Clock::now();
+    for (int i = 0; i < repeats; ++i) part();
+    return seconds_since(start) / repeats;
+  };
+  Multibody& body = scene.body();
+  nb::dict out;
+  const double kinematics = time([&] { body.kinematics(q, v); });
+  const double query = time([&] {
+    for (std::size_t k = 0; k < pairs.size(); ++k)
+      if (pairs[k]->shell)
+        queries[k].find(*pairs[k]->shell, scene.states()[k].centre, pairs[k]->radius,
+                        pairs[k]->method);
+  });
+  const double evaluation = time([&] { scene.evaluate(q, v, z); });
+  out["kinematics"] = kinematics;
+  out["query"] = query;
+  out["law"] = std::max(evaluation - kinematics - query, 0.0);
+  out["aba"] = time([&] { scene.acceleration(q, v, tau); });
+  out["integrate"] = time([&] { body.integrate(q, step, next); });
+  return out;
 }
 
 // Seconds per query and contacts per query of coal::collide with all contacts.
@@ -73,6 +109,8 @@ void bind_reference(nanobind::module_& m) {
   using namespace sphshell;
   m.def("bare_dynamics", &bare_dynamics, nb::arg("model"), nb::arg("q"), nb::arg("v"),
         nb::arg("dt"), nb::arg("steps"));
+  m.def("step_parts", &step_parts, nb::arg("model"), nb::arg("pairs"), nb::arg("q"), nb::arg("v"),
+        nb::arg("dt"), nb::arg("repeats"));
   m.def("coal_collide_all", &coal_collide_all, nb::arg("vertices"), nb::arg("triangles"),
         nb::arg("centers"), nb::arg("radius"));
   m.attr("pinocchio_version") = PINOCCHIO_VERSION;

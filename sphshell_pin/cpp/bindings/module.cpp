@@ -6,6 +6,7 @@ void bind_mending(nb::module_& m);
 void bind_shell(nb::module_& m);
 void bind_contact(nb::module_& m);
 void bind_dynamics(nb::module_& m);
+void bind_rollout(nb::module_& m);
 void bind_reference(nb::module_& m);
 
 NB_MODULE(_core, m) {
@@ -16,5 +17,6 @@ NB_MODULE(_core, m) {
   bind_shell(m);
   bind_contact(m);
   bind_dynamics(m);
+  bind_rollout(m);
   bind_reference(m);
 }

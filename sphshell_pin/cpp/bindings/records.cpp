@@ -1,0 +1,58 @@
+#include "bindings/records.hpp"
+
+namespace sphshell {
+
+Array<double> rows_to_array(std::vector<ContactRow> rows) {
+  const std::size_t n = rows.size();
+  auto* kept = new std::vector<ContactRow>(std::move(rows));
+  nb::capsule owner(kept,
+                    [](void* p) noexcept { delete static_cast<std::vector<ContactRow>*>(p); });
+  return Array<double>(reinterpret_cast<double*>(kept->data()),
+                       {n, std::size_t(ContactRow::kColumns)}, owner);
+}
+
+nb::dict to_dict(Record record, int nq, int nv) {
+  nb::dict out;
+  const std::size_t n = record.t.size();
+  std::vector<double> event_t;
+  std::vector<int> event_pair, event_kind;
+  for (const Event& e : record.events) {
+    event_t.push_back(e.t);
+    event_pair.push_back(e.pair);
+    event_kind.push_back(static_cast<int>(e.kind));
+  }
+  out["t"] = to_array(std::move(record.t));
+  out["q"] = to_array(std::move(record.q), {n, std::size_t(nq)});
+  out["v"] = to_array(std::move(record.v), {n, std::size_t(nv)});
+  out["energy"] = to_array(std::move(record.energy), {n, std::size_t(Record::kEnergies)});
+  out["contact_row"] = to_array(std::move(record.contact_row));
+  out["contacts"] = rows_to_array(std::move(record.contacts));
+  out["event_t"] = to_array(std::move(event_t));
+  out["event_pair"] = to_array(std::move(event_pair));
+  out["event_kind"] = to_array(std::move(event_kind));
+  return out;
+}
+
+nb::list to_list(const std::vector<PairSummary>& summaries) {
+  nb::list out;
+  for (const PairSummary& s : summaries) {
+    nb::dict d;
+    d["contact_time"] = s.contact_time;
+    d["impulse"] = s.impulse;
+    d["peak_force"] = s.peak_force;
+    d["peak_force_time"] = s.peak_force_time;
+    d["max_depth"] = s.max_depth;
+    d["max_depth_time"] = s.max_depth_time;
+    d["touches"] = s.touches;
+    out.append(d);
+  }
+  return out;
+}
+
+std::vector<Pair> copies(const std::vector<const Pair*>& pairs) {
+  std::vector<Pair> out;
+  for (const Pair* pair : pairs) out.push_back(*pair);
+  return out;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,18 @@
+// What runs write down, as Python takes it.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <vector>
+
+#include "bindings/arrays.hpp"
+#include "dynamics/simulation.hpp"
+
+namespace sphshell {
+
+Array<double> rows_to_array(std::vector<ContactRow> rows);
+nb::dict to_dict(Record record, int nq, int nv);
+nb::list to_list(const std::vector<PairSummary>& summaries);
+std::vector<Pair> copies(const std::vector<const Pair*>& pairs);
+
+}  // namespace sphshell

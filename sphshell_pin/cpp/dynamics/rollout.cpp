@@ -1,0 +1,112 @@
+#include "dynamics/rollout.hpp"
+
+#include <chrono>
+#include <exception>
+
+namespace sphshell {
+namespace {
+
+// How often a run under way looks whether it shall stop [s].
+constexpr double kGlance = 0.05;
+
+template <class T>
+void move_behind(std::vector<T>& all, std::vector<T>& more) {
+  if (all.empty()) {
+    all = std::move(more);
+    all.shrink_to_fit();
+  } else {
+    all.insert(all.end(), more.begin(), more.end());
+  }
+}
+
+void move_behind(Record& all, Record more) {
+  move_behind(all.t, more.t);
+  move_behind(all.q, more.q);
+  move_behind(all.v, more.v);
+  move_behind(all.energy, more.energy);
+  move_behind(all.contacts, more.contacts);
+  move_behind(all.contact_row, more.contact_row);
+  move_behind(all.events, more.events);
+}
+
+}  // namespace
+
+Rollout::Rollout(const pinocchio::Model& model, int threads) : model_(model) {
+  for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
+}
+
+void Rollout::add(Task task) {
+  {
+    const std::lock_guard lock(mutex_);
+    waiting_.emplace_back(outcomes_.size(), std::move(task));
+    outcomes_.emplace_back();
+  }
+  added_.notify_one();
+}
+
+std::size_t Rollout::wait(std::size_t left, double seconds) {
+  std::unique_lock lock(mutex_);
+  finished_.wait_for(lock, std::chrono::duration<double>(seconds),
+                     [&] { return outcomes_.size() - done_ <= left; });
+  return done_;
+}
+
+void Rollout::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+  }
+  added_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+  threads_.clear();
+}
+
+void Rollout::work() {
+  for (;;) {
+    std::size_t number;
+    Task task;
+    {
+      std::unique_lock lock(mutex_);
+      added_.wait(lock, [this] { return stopped_ || !waiting_.empty(); });
+      if (stopped_) return;
+      number = waiting_.front().first;
+      task = std::move(waiting_.front().second);
+      waiting_.pop_front();
+    }
+    Outcome outcome = run(std::move(task));
+    {
+      const std::lock_guard lock(mutex_);
+      outcomes_[number] = std::move(outcome);
+      ++done_;
+    }
+    finished_.notify_one();
+  }
+}
+
+Outcome Rollout::run(Task task) const {
+  Outcome out;
+  Simulation run(model_, std::move(task.pairs), task.settings, std::move(task.controller),
+                 std::move(task.q0), std::move(task.v0));
+  try {
+    while (out.status == Simulation::Status::Running && !stopped_) {
+      out.status = run.advance(kGlance);
+      if (out.status != Simulation::Status::Running || run.full())
+        move_behind(out.record, run.take());
+    }
+  } catch (const std::exception& error) {
+    out.fault = error.what();
+  }
+  if (out.status == Simulation::Status::Running) move_behind(out.record, run.take());
+  out.time = run.time();
+  out.last_step = run.last_step();
+  out.wall_time = run.wall_time();
+  out.steps = run.steps();
+  out.rejected = run.rejected();
+  out.evaluations = run.evaluations();
+  out.q = run.q();
+  out.v = run.v();
+  out.summaries = run.summaries();
+  return out;
+}
+
+}  // namespace sphshell

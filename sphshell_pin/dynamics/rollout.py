@@ -1,0 +1,178 @@
+"""What is left of many runs of one scene."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin import _core
+from sphshell_pin.checks import read_only
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.simulation import Simulation, why_ended
+from sphshell_pin.dynamics.variations import Variations
+from sphshell_pin.errors import (
+    Interrupted,
+    MissingExtra,
+    RunFailed,
+    SimulationDiverged,
+    SphshellError,
+    WeakLawWarning,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+_STOPPED = 0
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was to be run: `numbers` are those of the compiled runs, None of those not begun."""
+
+    starts: list[tuple[Array, Array]]
+    numbers: list[int | None]
+    variations: Variations
+    failures: dict[int, SphshellError]
+    t0: float
+
+
+class Rollout(Sequence[Result]):
+    """Runs that Simulation.rollout made: n of them, in the order of their starts.
+
+    [i] gives the Result of run i, with the rows that were recorded, and a slice a list of them; a
+    run that could not begin raises its failure.
+
+    Attributes
+    ----------
+    t (n,) : when each run ended [s]
+    q (n, nq), v (n, nv) : its state there
+    steps (n,) : how many it took
+    residual (n,) : energy that appeared from nowhere from its first row to its last [J]
+    figures : of each pair over all steps, (n,) each: "PAIR.peak_force", "PAIR.mean_force" [N],
+        "PAIR.impulse" [N s], "PAIR.max_depth" [m], "PAIR.contact_time", "PAIR.peak_force_time",
+        "PAIR.max_depth_time" [s], "PAIR.touches"; nan in runs that could not begin
+    failures : why runs ended before their time, by their numbers; {} where all is well
+    varied : what was varied, by name: the values of all runs
+    threads : how many worked
+    wall_time : of the whole rollout [s]
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        core: _core.Rollout,
+        plan: Plan,
+        threads: int,
+        wall_time: float,
+    ) -> None:
+        self._simulation, self._core, self._plan = simulation, core, plan
+        self.threads, self.wall_time = threads, wall_time
+        self.varied = plan.variations.columns
+        self.failures = dict(plan.failures)
+        count, model = len(plan.starts), simulation.scene.model
+        self.t = np.full(count, plan.t0)
+        self.q = np.array([q for q, _ in plan.starts]).reshape(count, model.nq)
+        self.v = np.array([v for _, v in plan.starts]).reshape(count, model.nv)
+        self.steps = np.zeros(count, dtype=np.int64)
+        self.residual = np.full(count, math.nan)
+        self.figures: dict[str, Array] = {}
+        through: list[tuple[int, str]] = []
+        for run, number in enumerate(plan.numbers):
+            if number is None:
+                continue
+            left = core.outcome(number)
+            self.t[run], self.steps[run] = left["time"], left["steps"]
+            self.q[run], self.v[run] = left["q"], left["v"]
+            self.residual[run] = left["residual"]
+            for pair, summary in zip(simulation.scene.pairs, left["summaries"], strict=True):
+                duration = summary["contact_time"]
+                mean = summary["impulse"] / duration if duration else 0.0
+                for name, value in {**summary, "mean_force": mean}.items():
+                    column = f"{pair.name}.{name}"
+                    self.figures.setdefault(column, np.full(count, math.nan))[run] = value
+            through += [(run, simulation.scene.pairs[k].name) for k in left["through"]]
+            why = self._why_failed(run, left)
+            if why is not None:
+                self.failures[run] = why
+        self.failures = dict(sorted(self.failures.items()))
+        for array in (self.t, self.q, self.v, self.steps, self.residual, *self.figures.values()):
+            read_only(array)
+        if through:
+            run, name = through[0]
+            runs = len({run for run, _ in through})
+            warnings.warn(
+                f"in {runs} of {count} runs, the first of them run {run}, a sphere's centre was "
+                f"pushed through the shell: the law of contact '{name}' is too weak for the speed",
+                WeakLawWarning,
+                stacklevel=4,
+            )
+
+    def __len__(self) -> int:
+        """Return the number of runs."""
+        return len(self._plan.numbers)
+
+    @overload
+    def __getitem__(self, index: int) -> Result: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Result]: ...
+    def __getitem__(self, index: int | slice) -> Result | list[Result]:
+        """Return the result of a run, or of a slice of the runs."""
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        run = range(len(self))[index]
+        number = self._plan.numbers[run]
+        if number is None:
+            raise self.failures[run]
+        return self._result(run, SimpleNamespace(**self._core.outcome(number)), number)
+
+    def __iter__(self) -> Iterator[Result]:
+        """Go through the results of all runs."""
+        return (self[run] for run in range(len(self)))
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a pandas DataFrame with a row for each run: what was varied, and its figures.
+
+        What was varied and is no number is left out. Raises MissingExtra without pandas.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise MissingExtra("pandas", "tables", "Rollout.to_dataframe") from None
+        columns: dict[str, Any] = {"run": np.arange(len(self))}
+        for name, values in self.varied.items():
+            array = np.asarray(values)
+            if array.dtype.kind == "f":
+                parts = array.T if array.ndim == 2 else [array]
+                suffixes = [f".{i}" for i in range(len(parts))] if array.ndim == 2 else [""]
+                columns |= {f"{name}{s}": part for s, part in zip(suffixes, parts, strict=True)}
+        columns |= {"t": self.t, "steps": self.steps, "residual": self.residual, **self.figures}
+        columns["failure"] = [str(self.failures.get(run, "")) for run in range(len(self))]
+        return pandas.DataFrame(columns)
+
+    def _result(self, run: int, left: Any, number: int) -> Result:
+        simulation = Simulation(self._plan.variations.scene(run), self._simulation.integrator)
+        return simulation.gather(left, [self._core.record(number)])
+
+    def _why_failed(self, run: int, left: dict[str, Any]) -> SphshellError | None:
+        number = self._plan.numbers[run]
+        assert number is not None
+        view = SimpleNamespace(**left)
+        if view.fault:
+            # The interpreter's text of an exception ends with what it is.
+            why = view.fault.strip().splitlines()[-1]
+            return RunFailed(view.time, why, self._result(run, view, number))
+        reason = why_ended(view.status, view, self._simulation.scene)
+        if reason is not None:
+            return SimulationDiverged(view.time, reason, self._result(run, view, number))
+        if view.status == _STOPPED:
+            return Interrupted(view.time, self._result(run, view, number))
+        return None

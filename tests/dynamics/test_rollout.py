@@ -1,0 +1,353 @@
+"""Many runs over threads: against the same runs one by one, and against closed forms."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+
+import sphshell_pin as sp
+from sphshell_pin.errors import (
+    DeepStart,
+    InvalidParameter,
+    NameNotFound,
+    RolloutInterrupted,
+    RunFailed,
+    SimulationDiverged,
+    WeakLawWarning,
+)
+from tests import models
+
+G = 9.81
+R = 0.05
+BRISTLES = sp.BristleFriction(0.6, 0.5, 1e5, 100.0)
+INTEGRATORS = [
+    sp.SemiImplicitEuler(1e-4),
+    sp.RungeKutta4(1e-4),
+    sp.LinearlyImplicitEuler(1e-4),
+    sp.Adaptive(1e-8),
+    sp.Implicit(1e-7),
+]
+every = pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda i: type(i).__name__)
+PAIR = "tip"
+
+
+def ball_on_plate(friction=models.FRICTION, law=models.LAW, side="both") -> sp.Scene:
+    scene = sp.Scene(models.ball())
+    shell = models.plate(side=side)
+    scene.add_contact(sp.Sphere(R, "ball"), shell, law=law, friction=friction, name=PAIR)
+    return scene
+
+
+def starts(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    q = np.array([models.free_q([x, y, R + 1e-3]) for x, y in rng.uniform(-0.2, 0.2, (count, 2))])
+    return q, rng.uniform(-0.5, 0.5, (count, 6))
+
+
+def slider_scene(law) -> sp.Scene:
+    scene = sp.Scene(models.slider())
+    scene.add_contact(sp.Sphere(R, "ball"), models.plate(), law=law, name=PAIR)
+    return scene
+
+
+def assert_same_bits(a: sp.Result, b: sp.Result) -> None:
+    for name in ("t", "q", "v"):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+    for name in ("depth", "number", "friction_force_world", "t", "row"):
+        np.testing.assert_array_equal(getattr(a.contacts, name), getattr(b.contacts, name))
+    np.testing.assert_array_equal(a.energy.total, b.energy.total)
+    assert a.events == b.events
+    assert a.stats["pairs"] == b.stats["pairs"]
+    assert a.stats["steps"] == b.stats["steps"]
+
+
+@every
+@pytest.mark.parametrize("friction", [models.FRICTION, BRISTLES], ids=["coulomb", "bristle"])
+def test_each_run_is_the_run_alone(integrator, friction) -> None:
+    q0s, v0s = starts(5)
+    simulation = sp.Simulation(ball_on_plate(friction), integrator)
+    rollout = simulation.rollout(q0s, v0s, 0.05, threads=3, record_dt=1e-2)
+    assert len(rollout) == 5
+    assert rollout.failures == {}
+    for run, (q0, v0) in enumerate(zip(q0s, v0s, strict=True)):
+        alone = simulation.run(q0, v0, 0.05, record_dt=1e-2)
+        assert_same_bits(rollout[run], alone)
+        np.testing.assert_array_equal(rollout.q[run], alone.q[-1])
+        np.testing.assert_array_equal(rollout.v[run], alone.v[-1])
+        assert (
+            rollout.figures[f"{PAIR}.peak_force"][run] == alone.stats["pairs"][PAIR]["peak_force"]
+        )
+        assert rollout.residual[run] == pytest.approx(alone.energy.residual[-1], abs=1e-14)
+
+
+def test_a_varied_run_is_that_of_the_scene_built_so() -> None:
+    rng = np.random.default_rng(1)
+    count = 4
+    q0s, v0s = starts(count)
+    poses = [
+        pin.SE3(pin.utils.rpyToMatrix(*rng.uniform(-0.1, 0.1, 3)), 1e-3 * rng.normal(size=3))
+        for _ in range(count)
+    ]
+    offsets, radii = 1e-3 * rng.normal(size=(count, 3)), rng.uniform(0.04, 0.049, count)
+    stiffnesses, mus = rng.uniform(1e5, 1e6, count), rng.uniform(0.3, 0.9, count)
+    rollout = sp.Simulation(ball_on_plate(), sp.Adaptive(1e-8)).rollout(
+        q0s,
+        v0s,
+        0.05,
+        vary={
+            f"{PAIR}.law.stiffness": stiffnesses,
+            f"{PAIR}.friction.mu_static": mus,
+            f"{PAIR}.friction": [sp.CoulombFriction(1.0, 0.2, 1e-3, 1e-2)] * count,
+            f"{PAIR}.sphere.radius": radii,
+            f"{PAIR}.sphere.offset": offsets,
+            f"{PAIR}.placement": poses,
+        },
+        record_dt=5e-3,
+    )
+    for run in range(count):
+        scene = sp.Scene(models.ball())
+        law = sp.ImpactLaw(
+            stiffnesses[run], models.LAW.exponent, models.LAW.damping, models.LAW.full_damping_depth
+        )
+        scene.add_contact(
+            sp.Sphere(radii[run], "ball", offsets[run]),
+            models.plate(),
+            placement=poses[run],
+            law=law,
+            friction=sp.CoulombFriction(mus[run], 0.2, 1e-3, 1e-2),
+            name=PAIR,
+        )
+        alone = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
+            q0s[run], v0s[run], 0.05, record_dt=5e-3
+        )
+        assert_same_bits(rollout[run], alone)
+        assert rollout[run].scene.pairs[0].law == law
+
+
+def test_the_number_of_threads_changes_no_bit() -> None:
+    q0s, v0s = starts(40)
+    simulation = sp.Simulation(ball_on_plate(BRISTLES), sp.Adaptive())
+    one, many = (simulation.rollout(q0s, v0s, 0.1, threads=n) for n in (1, 7))
+    np.testing.assert_array_equal(one.q, many.q)
+    np.testing.assert_array_equal(one.v, many.v)
+    np.testing.assert_array_equal(one.steps, many.steps)
+    assert many.threads == 7
+
+
+def test_impacts_of_many_speeds_and_stiffnesses_have_the_closed_form() -> None:
+    """Largest depth ((e + 1) m v^2 / (2 k))^(1 / (e + 1)) of an undamped blow without gravity."""
+    rng = np.random.default_rng(2)
+    count = 200
+    speed, stiffness = rng.uniform(0.05, 1.0, count), 10 ** rng.uniform(7, 9, count)
+    scene = sp.Scene(models.slider(gravity=0.0))
+    law = sp.ImpactLaw(1e8, 1.5)
+    scene.add_contact(sp.Sphere(R, "ball"), models.plate(), law=law, name=PAIR)
+    rollout = sp.Simulation(scene, sp.Adaptive(1e-9)).rollout(
+        [R + 1e-3], -speed[:, None], 0.05, vary={f"{PAIR}.law.stiffness": stiffness}
+    )
+    depth = (2.5 * speed**2 / (2 * stiffness)) ** 0.4
+    # The figure is the largest of the depths at the ends of steps.
+    np.testing.assert_allclose(rollout.figures[f"{PAIR}.max_depth"], depth, rtol=2e-4)
+    np.testing.assert_allclose(rollout.v[:, 0], speed, rtol=1e-7)
+
+
+def test_controllers_of_ones_own_and_of_the_package() -> None:
+    """A force that holds the weight, and one short of it by a tenth, each in a run of its own."""
+    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
+
+    def part(share: float):  # type: ignore[no-untyped-def]
+        return lambda t, q, v, contacts: np.array([share * G])
+
+    held = simulation.rollout([[1.0]] * 3, None, 0.2, controller=[part(1), part(0.9), None])
+    np.testing.assert_allclose(held.v[:, 0], [0.0, -0.1 * G * 0.2, -G * 0.2], atol=1e-12)
+    simulation = sp.Simulation(slider_scene(sp.ImpactLaw(1e9)), sp.SemiImplicitEuler(1e-3))
+    pd = sp.JointPD(100.0, 20.0, q_ref=np.array([1.1]))
+    both = simulation.rollout([[1.0], [1.2]], None, 0.2, controller=pd)
+    for run, q0 in enumerate((1.0, 1.2)):
+        alone = simulation.run([q0], None, 0.2, pd)
+        np.testing.assert_array_equal(both.q[run], alone.q[-1])
+
+
+def test_a_failed_run_is_noted_and_the_rest_kept() -> None:
+    def touchy(t, q, v, contacts):  # type: ignore[no-untyped-def]
+        if q[0] > 2:
+            raise ValueError("too high for me")
+        return np.array([1e25 if q[0] > 1 else 0.0])
+
+    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
+    rollout = simulation.rollout([[0.5], [1.5], [2.5], [0.01], [0.6]], None, 0.1, controller=touchy)
+    assert list(rollout.failures) == [1, 2, 3]
+    assert isinstance(rollout.failures[1], SimulationDiverged)
+    assert rollout.failures[1].t == rollout.t[1] < 0.1
+    broken = rollout.failures[2]
+    assert isinstance(broken, RunFailed)
+    assert "ValueError: too high for me" in str(broken)
+    assert isinstance(rollout.failures[3], DeepStart)
+    with pytest.raises(DeepStart):
+        rollout[3]
+    for run, height in ((0, 0.5), (4, 0.6)):
+        assert rollout.q[run, 0] == pytest.approx(height - 0.5 * G * 0.1 * (0.1 + 1e-3))
+    assert np.isnan(rollout.figures[f"{PAIR}.peak_force"][3])
+
+
+def test_deep_starts_in_a_solid_are_seen_as_run_sees_them() -> None:
+    box = trimesh.creation.box(extents=(0.4, 0.4, 0.4))
+    scene = sp.Scene(models.ball())
+    shell = sp.Shell(box.vertices, box.faces, side="outside")
+    scene.add_contact(sp.Sphere(R, "ball"), shell, name=PAIR)
+    q0s = [models.free_q([0, 0, z]) for z in (0.30, 0.24, 0.21, 0.0)]
+    simulation = sp.Simulation(scene, sp.Adaptive())
+    rollout = simulation.rollout(q0s, None, 1e-3)
+    assert list(rollout.failures) == [2, 3]
+    for run in (2, 3):
+        with pytest.raises(DeepStart, match=re.escape(str(rollout.failures[run]))):
+            simulation.run(q0s[run], None, 1e-3)
+
+
+def test_a_law_too_weak_is_told_once() -> None:
+    simulation = sp.Simulation(slider_scene(models.LAW), sp.Adaptive())
+    laws = [sp.ImpactLaw(k, 1.0) for k in (1e6, 1e2, 1e2)]
+    with pytest.warns(WeakLawWarning, match="in 2 of 3 runs, the first of them run 1"):
+        simulation.rollout([R + 0.01], [-5.0], 0.05, vary={f"{PAIR}.law": laws})
+
+
+@pytest.mark.parametrize(
+    ("vary", "fault", "sentence"),
+    [
+        ({"tip.law.stifness": [1.0] * 3}, NameNotFound, "tip.law.stiffness"),
+        ({"top.law": [None] * 3}, NameNotFound, "tip.law"),
+        ({"tip.law.stiffness": [1e5, -1.0, 1e5]}, InvalidParameter, "of run 1"),
+        ({"tip.law.stiffness": [1e5, 1e6]}, InvalidParameter, "(3,)"),
+        ({"tip.law.stiffness": ["a", "b", "c"]}, InvalidParameter, "3 numbers"),
+        ({"tip.sphere.offset": [0.0, 0.0, 0.0]}, InvalidParameter, "(3, 3)"),
+        ({"tip.placement": [np.eye(4)] * 3}, InvalidParameter, "pinocchio.SE3"),
+        ({"tip.law": 3}, InvalidParameter, "list of 3 values"),
+        ({"tip.law": [3, 3, 3]}, InvalidParameter, "must be a law"),
+    ],
+)
+def test_wrong_variations_say_what_and_where(vary, fault, sentence) -> None:
+    q0s, _ = starts(3)
+    with pytest.raises(fault) as caught:
+        sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(q0s, None, 0.1, vary=vary)
+    assert sentence in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("q0s", "v0s", "more", "sentence"),
+    [
+        (np.zeros((3, 6)), None, {}, "(n, 7)"),
+        (np.zeros((3, 7)), None, {}, "run 0"),
+        ([models.free_q([0, 0, 1])] * 3, np.zeros((2, 6)), {}, "rows"),
+        ([models.free_q([0, 0, 1])] * 3, None, {"controller": [None] * 2}, "3, one a run"),
+        ([models.free_q([0, 0, 1])] * 3, None, {"threads": 0}, "threads"),
+        ([models.free_q([0, 0, 1])] * 3, None, {"duration": -1.0}, "duration"),
+        ("nonsense", None, {}, "q0s"),
+    ],
+)
+def test_wrong_starts_say_what_and_where(q0s, v0s, more, sentence) -> None:
+    with pytest.raises(InvalidParameter) as caught:
+        sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(q0s, v0s, **{"duration": 0.1, **more})
+    assert sentence in str(caught.value)
+
+
+def test_progress_grows_to_one() -> None:
+    shares: list[float] = []
+    q0s, v0s = starts(30)
+    sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(q0s, v0s, 0.2, progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+def test_ctrl_c_keeps_what_is_done() -> None:
+    q0s, v0s = starts(400)
+    simulation = sp.Simulation(ball_on_plate(), sp.SemiImplicitEuler(1e-5))
+
+    def interrupt(share: float) -> None:
+        if 0 < share < 1 and not pressed:
+            pressed.append(share)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    pressed: list[float] = []
+    with pytest.raises(RolloutInterrupted) as caught:
+        simulation.rollout(q0s, v0s, 0.2, threads=2, progress=interrupt)
+    rollout = caught.value.rollout
+    done = [run for run in range(400) if run not in rollout.failures]
+    assert pressed
+    assert 0 < len(done) < 400
+    assert_same_bits(
+        rollout[done[0]], simulation.run(q0s[done[0]], v0s[done[0]], 0.2, record_dt=0.2)
+    )
+
+
+def test_python_goes_on_meanwhile() -> None:
+    """Another Python thread counts while the compiled runs hold no interpreter lock."""
+    q0s, v0s = starts(8)
+    ticks: list[float] = []
+    over = threading.Event()
+
+    def count() -> None:
+        while not over.is_set():
+            ticks.append(time.perf_counter())
+            time.sleep(1e-3)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    rollout = sp.Simulation(ball_on_plate(), sp.SemiImplicitEuler(2e-6)).rollout(
+        q0s, v0s, 0.2, threads=1
+    )
+    over.set()
+    thread.join()
+    # With the lock held a run would let it tick once; half a second of runs holds hundreds.
+    assert len(ticks) > 20 * rollout.wall_time
+    assert len(rollout) == 8
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads Linux's memory figures")
+def test_memory_is_that_of_what_is_kept() -> None:
+    def resident() -> float:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
+    simulation.rollout(np.full((500, 1), 0.1), None, 0.02, threads=2)
+    before = resident()
+    rollout = simulation.rollout(np.full((5000, 1), 0.1), None, 0.02, threads=2)
+    assert len(rollout) == 5000
+    assert resident() - before < 5000 * 4096
+
+
+def test_a_table_of_the_runs() -> None:
+    pandas = pytest.importorskip("pandas")
+    q0s, v0s = starts(3)
+    stiffness = [1e5, 2e5, 3e5]
+    rollout = sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(
+        q0s,
+        v0s,
+        0.05,
+        vary={f"{PAIR}.law.stiffness": stiffness, f"{PAIR}.sphere.offset": np.zeros((3, 3))},
+    )
+    table = rollout.to_dataframe()
+    assert isinstance(table, pandas.DataFrame)
+    assert table[f"{PAIR}.law.stiffness"].tolist() == stiffness
+    assert table[f"{PAIR}.sphere.offset.2"].tolist() == [0.0] * 3
+    assert table[f"{PAIR}.max_depth"].tolist() == rollout.figures[f"{PAIR}.max_depth"].tolist()
+    assert table["failure"].tolist() == [""] * 3
+
+
+def test_no_runs_and_slices() -> None:
+    simulation = sp.Simulation(ball_on_plate(), sp.Adaptive())
+    assert len(simulation.rollout(np.empty((0, 7)), None, 0.1)) == 0
+    q0s, v0s = starts(3)
+    rollout = simulation.rollout(q0s, v0s, 0.01)
+    assert [one.q[-1].tolist() for one in rollout[1:]] == rollout.q[1:].tolist()
+    assert rollout[-1].t.tolist() == [0.0, 0.01]
+    with pytest.raises(IndexError):
+        rollout[3]
