@@ -1,0 +1,216 @@
+"""The command sweep: one scenario, many runs with other values, one table."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sphshell_pin.cli.app import (
+    ERROR,
+    DtOption,
+    ScenarioArgument,
+    SetOption,
+    app,
+    changes_of,
+    faults,
+    make_table,
+    plain,
+    terminal,
+)
+
+if TYPE_CHECKING:
+    from sphshell_pin.study.sweep import Plan, SweepReport
+
+# So many failed runs are told one by one.
+_MOST_FAILURES = 5
+
+
+@app.command()
+def sweep(
+    *,
+    context: typer.Context,
+    scenario: ScenarioArgument,
+    vary: Annotated[
+        list[str],
+        typer.Option(
+            metavar="KEY=VALUES",
+            help="What varies: lo:hi:n, lo:hi:log:n or a,b,c; several keys make a grid.",
+        ),
+    ],
+    together: Annotated[
+        bool, typer.Option("--together", help="Take the values of all keys in step: no grid.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Table, .parquet or .h5.", show_default="results/<scenario>/sweep.parquet"
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes.", show_default="one per processor")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler that does the runs instead.")
+    ] = None,
+    plot: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FIGURE", help="Draw this figure; may be given several times."),
+    ] = None,
+    pictures: Annotated[
+        bool, typer.Option("--pictures/--no-pictures", help="Draw the table.")
+    ] = True,
+    verdicts: Annotated[
+        bool, typer.Option("--verdicts", help="A column for each expectation: met or not.")
+    ] = False,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Do failed runs of an earlier call again.")
+    ] = False,
+    dt: DtOption = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Time to simulate \\[s] in place of run.duration.")
+    ] = None,
+    set_: SetOption = None,
+) -> None:
+    """Run a scenario with many values, over processes or a Dask cluster; write one table.
+
+    The same command goes on where an earlier one was stopped.
+
+    Example: sphshell-pin sweep sphere_on_shell --vary contact.law.k=1e3:1e5:log:20
+    """
+    with faults(context):
+        from sphshell_pin.study.sweep import plan_sweep, run_plan
+
+        changes = changes_of(set_, dt, duration)
+        plan = plan_sweep(scenario, vary, changes=changes, together=together, verdicts=verdicts)
+        figures = _drawn(plan, plot or [], wanted=pictures)
+        file = out or Path("results") / str(plan.head["scenario"]) / "sweep.parquet"
+        try:
+            with _bar() as (progress, note):
+                report = run_plan(
+                    plan,
+                    workers=workers,
+                    scheduler=scheduler,
+                    out=file,
+                    retry_failed=retry_failed,
+                    progress=progress,
+                    note=note,
+                )
+        except KeyboardInterrupt as stop:
+            again = shlex.join(["sphshell-pin", *sys.argv[1:]])
+            raise KeyboardInterrupt(f"{stop}; to go on: {again}" if str(stop) else "") from None
+        files = [file, *_draw(report.table, figures, file, all_=bool(plot))]
+        _print_report(plan, report, files)
+    if report.failed == len(plan.runs):
+        raise typer.Exit(ERROR)
+
+
+@contextlib.contextmanager
+def _bar() -> Iterator[tuple[Callable[[int, int, int], object], Callable[[str], object]]]:
+    """Show a bar on a terminal; yield what moves it and what prints a sentence beside it."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import TimeRemainingColumn as Remaining
+
+    bar = Progress(
+        TextColumn("runs"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.description}"),
+        Remaining(),
+        console=terminal(err=True),
+        transient=True,
+        disable=not sys.stderr.isatty(),
+    )
+    with bar:
+        task = bar.add_task("", total=None)
+
+        def progress(done: int, failed: int, total: int) -> None:
+            told = f"[red]{failed} failed[/red]" if failed else ""
+            bar.update(task, completed=done, total=total, description=told)
+
+        yield progress, lambda sentence: typer.echo(sentence, err=True)
+
+
+def _drawn(plan: Plan, plot: list[str], *, wanted: bool) -> list[str]:
+    """Return the figures that may be drawn; refuse wrong ones before anything runs."""
+    from sphshell_pin.errors import InvalidParameter, NameNotFound
+
+    for name in plot:
+        if name not in plan.figures:
+            raise NameNotFound("figure", name, "a run of this scenario", plan.figures)
+    if not wanted:
+        return []
+    from sphshell_pin.plot.sweep import drawable_keys
+
+    try:
+        drawable_keys(plan.varied)
+    except InvalidParameter as fault:
+        if plot:
+            raise
+        typer.echo(f"no picture: {fault}", err=True)
+        return []
+    own = [name for name in plan.figures if name.startswith("figures.")]
+    peaks = [name for name in plan.figures if name.endswith(".peak_force")]
+    return plot or own + peaks
+
+
+def _draw(table: Any, figures: list[str], file: Path, *, all_: bool) -> list[Path]:
+    """Write pictures of the figures beside the table's `file`; return their paths.
+
+    Unless `all_` are wanted, only the first that any run has is drawn.
+    """
+    from sphshell_pin.errors import MissingExtra
+    from sphshell_pin.plot.figure import RESOLUTION
+    from sphshell_pin.plot.sweep import plot_sweep
+
+    paths: list[Path] = []
+    if not all_:
+        figures = [name for name in figures if table[name].notna().any()][:1]
+    for name in figures:
+        path = file.with_name(f"{file.stem}.{name.replace('/', '_')}.png")
+        try:
+            plot_sweep(table, name).savefig(path, dpi=RESOLUTION)
+        except MissingExtra as missing:
+            typer.echo(str(missing), err=True)
+            break
+        paths.append(path)
+    return paths
+
+
+def _print_report(plan: Plan, report: SweepReport, files: list[Path]) -> None:
+    console = terminal()
+    total = len(plan.runs)
+    console.print(
+        f"[bold]{plan.head['scenario']}[/bold]: {total} runs, {total - report.failed} done, "
+        f"{report.failed} failed"
+        + (f"; {report.resumed} were done before" if report.resumed else ""),
+        highlight=False,
+    )
+    if report.deaths:
+        typer.echo(f"{report.deaths} workers died; their runs were done again", err=True)
+    ranges = make_table("figure", "smallest", "in run", "largest", "in run")
+    for name in plan.figures:
+        column = report.table[name]
+        if name.startswith("final.") or column.nunique() < 2:
+            continue
+        low, high = column.idxmin(), column.idxmax()
+        ranges.add_row(
+            plain(name), f"{column[low]:.6g}", f"{low}", f"{column[high]:.6g}", f"{high}"
+        )
+    if ranges.row_count:
+        console.print(ranges)
+    failed = report.table[report.table["status"] == "failed"]
+    for _, row in failed.head(_MOST_FAILURES).iterrows():
+        values = ", ".join(f"{axis.key} = {row[axis.key]}" for axis in plan.axes)
+        typer.echo(f"run {row['run']} failed ({values}): {row['error']}", err=True)
+    if len(failed) > _MOST_FAILURES:
+        typer.echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)
+    names = ", ".join(str(file) for file in files)
+    console.print(
+        f"files: {names}; journal with wall times: {report.journal}", markup=False, highlight=False
+    )

@@ -1,0 +1,106 @@
+"""What the workers of a sweep are told, and what one run leaves behind."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sphshell_pin.scenario.schema import PythonSection, Scenario
+
+DONE, FAILED = "done", "failed"
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a sweep: its `number`, counted from zero, and the `changes` by dotted key."""
+
+    number: int
+    changes: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run left behind; `wall_time` [s] and `worker` are no part of the table."""
+
+    number: int
+    status: str
+    """DONE or FAILED."""
+    error: str
+    """Why it failed, in one sentence; empty otherwise."""
+    figures: Mapping[str, float]
+    wall_time: float = 0.0
+    worker: str = ""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all runs of a sweep share; it goes to each worker."""
+
+    name: str
+    """A shipped scenario's name, or the absolute path of a file."""
+    shipped: bool
+    scenario: Scenario
+    """As read and changed by --set, before any value is varied."""
+    sample: Run
+    """A run that could be built where the sweep began: a worker must be able to as well."""
+    verdicts: bool
+    """Whether the scenario's expectations are judged."""
+    files: Mapping[str, str]
+    """Digests of the surfaces, robots and routines beside the scenario, by name."""
+    versions: Mapping[str, str]
+    token: str
+    """Tells this job from any other."""
+
+
+def digest_settings(scenario: Scenario) -> str:
+    """Return the SHA-256 of all settings of `scenario`, in hexadecimal digits."""
+    return digest(scenario.model_dump(mode="json"))
+
+
+def digest(data: Any) -> str:
+    """Return the SHA-256 of `data`, made of what JSON knows, in hexadecimal digits."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def files_of(scenario: Scenario) -> set[str]:
+    """Return the files that `scenario` names: surfaces, URDFs, Python routines."""
+    routines = [one.find for one in scenario.source] + list(scenario.figures.values())
+    if isinstance(scenario.controller, PythonSection):
+        routines.append(scenario.controller.function)
+    named = [one.file for one in scenario.shell] + [one.urdf for one in scenario.robot]
+    named += [routine.rpartition(":")[0] for routine in routines]
+    return {name for name in named if name}
+
+
+def digest_files(folder: Path, names: Iterable[str]) -> dict[str, str]:
+    """Return the SHA-256 of each file of `names` in `folder`; "absent" for what is no file."""
+    found = {}
+    for name in sorted(names):
+        path = folder / name
+        if not path.is_file():
+            found[name] = "absent"
+            continue
+        with open(path, "rb") as file:
+            found[name] = hashlib.file_digest(file, "sha256").hexdigest()
+    return found
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what decides a run's numbers."""
+    import coal
+    import numpy as np
+    import pinocchio as pin
+
+    import sphshell_pin
+
+    return {
+        "sphshell_pin": sphshell_pin.__version__,
+        "pinocchio": pin.__version__,
+        "coal": coal.__version__,
+        "numpy": np.__version__,
+    }

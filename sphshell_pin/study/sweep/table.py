@@ -1,0 +1,161 @@
+"""The table of a sweep: one row for each run, in their order, without anything that is of today."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.study.sweep.extras import need
+from sphshell_pin.study.sweep.grid import Axis, Value
+from sphshell_pin.study.sweep.job import Outcome
+
+Columns = dict[str, NDArray[Any]]
+
+PARQUET = (".parquet", ".pq")
+HDF5 = (".h5", ".hdf5")
+DATASET = "sweep"
+"""Name of the dataset in an HDF5 file, and of the description in either kind of file."""
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse a file whose kind is not known, and one that an optional package is missing for.
+
+    Raises
+    ------
+    InvalidParameter, MissingExtra
+    """
+    suffix = path.suffix.lower()
+    if suffix not in PARQUET + HDF5:
+        raise InvalidParameter("out", str(path), "must end in .parquet or .h5")
+    need("pyarrow" if suffix in PARQUET else "h5py")
+
+
+def columns_of(
+    axes: Sequence[Axis],
+    points: Sequence[tuple[Value, ...]],
+    digests: Sequence[str],
+    outcomes: Mapping[int, Outcome],
+    figures: Sequence[str],
+) -> Columns:
+    """Return the columns of the table by name, each (n,) for n runs.
+
+    They are `run`, the varied keys, `status`, `error`, the figures (float64; NaN where a run has
+    none), and `settings`, the digest of the run's settings. Columns of `figures` come first, then
+    those that only some runs have (where robots or contacts vary).
+    """
+    rows = [outcomes[i] for i in range(len(points))]
+    names = list(dict.fromkeys([*figures, *(name for row in rows for name in row.figures)]))
+    columns: Columns = {"run": np.arange(len(points), dtype=np.int64)}
+    columns |= varied_columns(axes, points)
+    columns["status"] = _texts([row.status for row in rows])
+    columns["error"] = _texts([row.error for row in rows])
+    for name in names:
+        columns[name] = np.array([row.figures.get(name, np.nan) for row in rows], dtype=np.float64)
+    columns["settings"] = _texts(digests)
+    return columns
+
+
+def varied_columns(axes: Sequence[Axis], points: Sequence[tuple[Value, ...]]) -> Columns:
+    """Return what each run varies, (n,) by key: numbers where all values are, else texts."""
+    return {axis.key: _varied([point[i] for point in points]) for i, axis in enumerate(axes)}
+
+
+def frame_of(columns: Columns) -> Any:
+    """Return the table as a pandas.DataFrame."""
+    return need("pandas").DataFrame(columns)
+
+
+def write_table(path: Path, columns: Columns, description: Mapping[str, Any]) -> None:
+    """Write the table to `path`, Parquet or HDF5 by its suffix, in place of an earlier one.
+
+    The same columns and description give the same bytes.
+
+    Raises
+    ------
+    ResultError
+        It cannot be written; an earlier table stays as it was.
+    """
+    write = _write_parquet if path.suffix.lower() in PARQUET else _write_hdf5
+    text = json.dumps(description, sort_keys=True)
+    aside = None
+    try:
+        handle, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
+        os.close(handle)
+        write(Path(aside), columns, text)
+        # A temporary file is for its owner's eyes; a table has the rights of any new file.
+        os.chmod(aside, 0o666 & ~_umask())
+        with open(aside, "rb") as file:
+            os.fsync(file.fileno())
+        os.replace(aside, path)
+    except OSError as fault:
+        raise ResultError(path, f"cannot be written: {fault.strerror or fault}") from None
+    finally:
+        if aside is not None:
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(aside)
+
+
+def _write_parquet(path: Path, columns: Columns, description: str) -> None:
+    arrow, parquet = need("pyarrow"), need("pyarrow.parquet")
+    arrays = {
+        name: arrow.array(values.tolist(), arrow.string()) if _is_text(values) else values
+        for name, values in columns.items()
+    }
+    table = arrow.table(arrays).replace_schema_metadata({DATASET: description})
+    parquet.write_table(table, path, compression="zstd")
+
+
+def _write_hdf5(path: Path, columns: Columns, description: str) -> None:
+    h5py = need("h5py")
+    # One array of records: a column's name may hold the slash that would make it a folder.
+    fields: list[tuple[str, Any]] = []
+    encoded: Columns = {}
+    for name, values in columns.items():
+        if _is_text(values):
+            # Of fixed length: texts elsewhere in the file would leave gaps of unknown bytes.
+            encoded[name] = np.array([one.encode() for one in values], dtype=np.bytes_)
+            length = max(encoded[name].dtype.itemsize, 1)
+            fields.append((name, h5py.string_dtype("utf-8", length)))
+        else:
+            encoded[name] = values
+            fields.append((name, values.dtype))
+    records = np.zeros(len(columns["run"]), dtype=fields)
+    for name, values in encoded.items():
+        records[name] = values
+    with h5py.File(path, "w") as file:
+        dataset = file.create_dataset(DATASET, data=records, track_times=False)
+        dataset.attrs["description"] = description
+
+
+def _varied(values: Sequence[Value]) -> NDArray[Any]:
+    kinds = {type(value) for value in values}
+    if kinds == {bool}:
+        return np.array(values, dtype=np.bool_)
+    if kinds == {int}:
+        return np.array(values, dtype=np.int64)
+    if kinds <= {int, float}:
+        return np.array(values, dtype=np.float64)
+    return _texts([str(value) for value in values])
+
+
+def _texts(values: Sequence[str]) -> NDArray[Any]:
+    return np.array(values, dtype=object)
+
+
+def _is_text(values: NDArray[Any]) -> bool:
+    return bool(values.dtype == object)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,169 @@
+"""What happens in a worker: the scenario is built once, then changed and run again and again."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+import time
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from sphshell_pin.errors import Interrupted, SphshellError, SweepError
+from sphshell_pin.scenario import Built, judge
+from sphshell_pin.scenario.build import build_scenario
+from sphshell_pin.scenario.figures import figure_names, measure
+from sphshell_pin.scenario.knobs import check_knobs
+from sphshell_pin.scenario.reading import change_scenario, find_scenario
+from sphshell_pin.scenario.run import simulate
+from sphshell_pin.scenario.schema import Scenario
+from sphshell_pin.study.sweep.job import DONE, FAILED, Job, Outcome, Run, digest_files, versions
+
+# Figures that are no property of the motion: they differ from one time to the next.
+NOT_REPEATABLE = ("stats.real_time_factor",)
+_MORE_OF_PAIR = ("impulse", "peak_force_time")
+_MORE_STATS = ("stats.rejected", "stats.evaluations", "stats.dt")
+
+# One run at a time: the threads of a Dask worker take turns, as a scenario's own routines may
+# share what they remember.
+_turn = threading.Lock()
+# What was built last, by the job's token: its surfaces and robots serve the next run.
+_built: dict[str, Built] = {}
+
+
+def sweep_figures(built: Built) -> list[str]:
+    """Return the names of the figures that a row of a sweep has: all that repeat bit for bit."""
+    names = [name for name in figure_names(built) if name not in NOT_REPEATABLE]
+    names += [f"pairs.{pair.name}.{one}" for pair in built.scene.pairs for one in _MORE_OF_PAIR]
+    return names + list(_MORE_STATS)
+
+
+def verdict_names(scenario: Scenario) -> list[str]:
+    """Return the figures of `scenario` that its expectations judge, without those of time."""
+    return [name for name in scenario.expect if name not in NOT_REPEATABLE]
+
+
+def changed(scenario: Scenario, run: Run, path: Path) -> Scenario:
+    """Return the scenario of `run`.
+
+    Raises
+    ------
+    ScenarioError
+        A key or a value that no scenario may have.
+    """
+    found = change_scenario(scenario, run.changes, path)
+    check_knobs(found, path, ranges=False)
+    return found
+
+
+def prepare(job: Job) -> int:
+    """Make this process ready for the runs of `job`; return its number among the system's.
+
+    Raises
+    ------
+    SweepError
+        It cannot run them: other versions, other files, a scenario that cannot be built here.
+    """
+    with _turn:
+        _prepare(job)
+    return os.getpid()
+
+
+def run_one(job: Job, run: Run) -> Outcome:
+    """Build and run the scenario of `run`; a fault of that run is part of the outcome.
+
+    Raises
+    ------
+    SweepError
+        This worker cannot do any run of the job.
+    """
+    with _turn:
+        if job.token not in _built:
+            _prepare(job)
+        start = time.perf_counter()
+        status, error, figures = _try_run(job, run)
+        return Outcome(run.number, status, error, figures, time.perf_counter() - start, _here())
+
+
+def _prepare(job: Job) -> None:
+    here = versions()
+    other = [f"{name} {here[name]}" for name in here if here[name] != job.versions[name]]
+    if other:
+        wanted = ", ".join(f"{name} {version}" for name, version in job.versions.items())
+        raise SweepError(
+            f"worker {_here()} has {', '.join(other)}; the sweep was begun with {wanted}"
+        )
+    try:
+        path = _path(job)
+        for name, digest in digest_files(path.parent, job.files).items():
+            if digest != job.files[name]:
+                have = "no" if digest == "absent" else "another"
+                raise SweepError(f"worker {_here()} has {have} file {path.parent / name}")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            built = build_scenario(changed(job.scenario, job.sample, path), path)
+    except SweepError:
+        raise
+    except Exception as fault:
+        # Most faults cannot be sent from one process to another; their sentence can.
+        raise SweepError(f"worker {_here()} cannot build the scenario: {_told(fault)}") from None
+    _built.clear()
+    _built[job.token] = built
+
+
+def _path(job: Job) -> Path:
+    # A shipped scenario may stand elsewhere on a worker's machine.
+    return find_scenario(job.name) if job.shipped else Path(job.name)
+
+
+def _try_run(job: Job, run: Run) -> tuple[str, str, dict[str, float]]:
+    path = _path(job)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            # The user's routines are loaded anew: what they remember must not reach another run.
+            before = replace(_built[job.token], functions={})
+            built = build_scenario(changed(job.scenario, run, path), path, before)
+            _built[job.token] = built
+            result, stopped = simulate(built)
+    except (Exception, SystemExit) as fault:  # a routine of the user's may call exit()
+        return FAILED, _told(fault, path), {}
+    if isinstance(stopped, Interrupted):
+        raise KeyboardInterrupt
+    if stopped is not None:
+        return FAILED, _told(stopped, path), {}
+    return _measure(job, built, result)
+
+
+def _measure(job: Job, built: Built, result: Any) -> tuple[str, str, dict[str, float]]:
+    """Return all figures that can be measured; the first that cannot makes the run a failed one."""
+    error, figures = "", {}
+    for name in sweep_figures(built):
+        try:
+            figures[name] = measure(built, result, name)
+        except (Exception, SystemExit) as fault:
+            error = error or _told(fault)
+    if job.verdicts and not error:
+        wanted = verdict_names(built.scenario)
+        figures |= {
+            f"met.{one.figure}": float(one.met)
+            for one in judge(built, result)
+            if one.figure in wanted
+        }
+    return FAILED if error else DONE, error, figures
+
+
+def _told(fault: BaseException, path: Path | None = None) -> str:
+    """Return the sentence of `fault`, the same wherever the scenario stands."""
+    told = str(fault)
+    if path is not None:
+        told = told.removeprefix(f"{path}: ").replace(f"{path.parent}{os.sep}", "")
+    if not isinstance(fault, SphshellError):
+        told = f"{type(fault).__name__}: {told}"
+    return ", ".join([" ".join(told.split()), *getattr(fault, "__notes__", ())])
+
+
+def _here() -> str:
+    return f"{socket.gethostname()}:{os.getpid()}"

@@ -1,0 +1,262 @@
+"""Sweeps: the closed form of what is swept, and that nothing that happens shows in the table."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sphshell_pin import robots
+from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError, SweepError
+from sphshell_pin.study.sweep import plan_sweep, sweep
+from sphshell_pin.study.sweep.worker import prepare
+from tests.study.resting import GRAVITY, RADIUS, SCENARIO, check_once, entries, write
+
+pd = pytest.importorskip("pandas")
+pytest.importorskip("pyarrow")
+
+STIFFNESS, EXPONENT = "contact.law.stiffness", "contact.law.exponent"
+VARY = {STIFFNESS: "1e4:1e6:log:30", EXPONENT: [1.5, 2.0]}
+SMALL = {STIFFNESS: [1e4, 2e4, 3e4, 4e4]}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("sweep")
+    write(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def serial(folder):
+    """The file that the runs leave when they are done in turn in this process."""
+    path = folder / "serial.parquet"
+    sweep(folder / "resting.toml", VARY, workers=0, out=path)
+    return path
+
+
+def kill_worker(table: Path) -> None:
+    """Kill the worker that did the last run."""
+    os.kill(int(entries(table)[-1]["worker"].rpartition(":")[2]), signal.SIGKILL)
+
+
+def test_the_depth_of_rest_follows_its_closed_form(serial):
+    table = pd.read_parquet(serial)
+    assert len(table) == 60
+    assert (table["status"] == "done").all()
+    assert (table["error"] == "").all()
+    mass = robots.load("ball").model.inertias[1].mass
+    expected = (mass * GRAVITY / table[STIFFNESS]) ** (1 / table[EXPONENT])
+    np.testing.assert_allclose(table["figures.depth"], expected, rtol=1e-8)
+    np.testing.assert_allclose(RADIUS - table["final.q.root_joint.2"], expected, rtol=1e-8)
+    assert table["settings"].nunique() == 60
+    assert not [name for name in table.columns if "wall" in name or "real_time" in name]
+
+
+def test_two_workers_leave_the_same_bytes(folder, serial):
+    table = folder / "two.parquet"
+    sweep(folder / "resting.toml", VARY, workers=2, out=table)
+    check_once(table, 60)
+    assert len({one["worker"] for one in entries(table)}) == 2
+    assert table.read_bytes() == serial.read_bytes()
+
+
+def test_a_killed_worker_costs_nothing(folder, serial):
+    table = folder / "killed.parquet"
+
+    def progress(done, failed, total):
+        if done in (10, 35):
+            kill_worker(table)
+
+    sweep(folder / "resting.toml", VARY, workers=2, out=table, progress=progress)
+    check_once(table, 60)
+    assert len({one["worker"] for one in entries(table)}) >= 4
+    assert table.read_bytes() == serial.read_bytes()
+
+
+def test_values_are_read_back_exactly_from_either_kind_of_file(folder, serial):
+    h5py = pytest.importorskip("h5py")
+    table = folder / "same.h5"
+    returned = sweep(folder / "resting.toml", VARY, workers=0, out=table)
+    pd.testing.assert_frame_equal(returned, pd.read_parquet(serial), check_dtype=False)
+    with h5py.File(table) as file:
+        rows = file["sweep"][()]
+        assert json.loads(file["sweep"].attrs["description"])["scenario"] == "resting"
+    for name in returned.columns:
+        if rows.dtype[name].kind == "f":
+            np.testing.assert_array_equal(rows[name], returned[name].to_numpy())
+        elif rows.dtype[name].kind == "S":
+            assert [one.decode() for one in rows[name]] == returned[name].tolist()
+    again = folder / "again.h5"
+    sweep(folder / "resting.toml", VARY, workers=0, out=again)
+    assert again.read_bytes() == table.read_bytes()
+
+
+def test_a_failed_run_is_a_row_that_says_why(folder):
+    vary = {"contact.sphere.radius": [0.012, 0.03, 0.0125]}
+    table = sweep(folder / "resting.toml", vary, workers=0)
+    assert table["status"].tolist() == ["done", "failed", "done"]
+    assert "starts at depth" in table["error"][1]
+    assert str(folder) not in table["error"][1]
+    assert table["figures.depth"].isna().tolist() == [False, True, False]
+
+
+def test_a_figure_that_breaks_leaves_the_others(tmp_path):
+    path = write(tmp_path, "breaks")
+    table = sweep(path, SMALL, workers=0)
+    assert table["status"].tolist() == ["done", "failed", "done", "done"]
+    assert "ZeroDivisionError" in table["error"][1]
+    assert "figures.py:breaks" in table["error"][1]
+    assert np.isnan(table["figures.breaks"][1])
+    assert table["figures.depth"].notna().all()
+
+
+def test_a_run_that_kills_its_workers_is_given_up_and_the_others_go_on(tmp_path):
+    path = write(tmp_path, "deadly")
+    out = tmp_path / "table.parquet"
+    table = sweep(path, SMALL, workers=2, out=out)
+    assert table["status"].tolist() == ["done", "failed", "done", "done"]
+    assert "worker process died" in table["error"][1]
+    assert np.isnan(table["figures.depth"][1])
+    check_once(out, 4)
+
+
+def test_routines_forget_between_runs(tmp_path):
+    """A routine that remembers would make a row depend on those before it."""
+    path = write(tmp_path, "count")
+    assert sweep(path, SMALL, workers=0)["figures.count"].tolist() == [1.0] * 4
+
+
+def test_expectations_become_columns(folder):
+    table = sweep(folder / "resting.toml", {STIFFNESS: [1e4, 1e6]}, workers=0, verdicts=True)
+    assert table["met.figures.depth"].tolist() == [0.0, 1.0]
+    assert (table["figures.depth"] <= 1e-4).tolist() == [False, True]
+
+
+def test_words_lists_and_values_in_step(folder):
+    vary = {"contact.method": "smooth,facets", "gravity": "[0,0,-9.81],[0,0,-1.62]"}
+    table = sweep(folder / "resting.toml", vary, workers=0, together=True)
+    assert table["contact.method"].tolist() == ["smooth", "facets"]
+    assert table["gravity"].tolist() == ["[0, 0, -9.81]", "[0, 0, -1.62]"]
+    deep, shallow = table["figures.depth"]
+    assert shallow / deep == pytest.approx((1.62 / 9.81) ** (1 / 1.5), rel=1e-8)
+
+
+def test_a_torn_journal_goes_on_and_a_damaged_one_is_refused(folder):
+    path, out = folder / "resting.toml", folder / "torn.parquet"
+    sweep(path, SMALL, workers=0, out=out)
+    whole = out.read_bytes()
+    journal = out.with_name(out.name + ".journal")
+    text = journal.read_bytes()
+    lines = text.splitlines(keepends=True)
+    for torn in (b"".join(lines[:3]) + lines[3][:40], text[:-1], lines[0][:20], b""):
+        out.unlink()
+        journal.write_bytes(torn)
+        sweep(path, SMALL, workers=0, out=out)
+        assert out.read_bytes() == whole
+        check_once(out, 4)
+    for damaged in (lines[0] + b"#\n" + lines[2], b"a,b\n1,2\n", b"something of mine"):
+        journal.write_bytes(damaged)
+        with pytest.raises(SweepError, match="no entry of a sweep's journal"):
+            sweep(path, SMALL, workers=0, out=out)
+        assert journal.read_bytes() == damaged
+
+
+def test_done_runs_are_not_done_again(folder):
+    path, out = folder / "resting.toml", folder / "done.parquet"
+    sweep(path, SMALL, workers=0, out=out)
+    before = entries(out)
+    calls = []
+    sweep(path, SMALL, workers=0, out=out, progress=lambda *counts: calls.append(counts))
+    assert calls == [(4, 0, 4)]
+    assert entries(out) == before
+
+
+def test_failed_runs_are_done_again_on_demand(folder):
+    path, out = folder / "resting.toml", folder / "retry.parquet"
+    vary = {"contact.sphere.radius": [0.012, 0.03]}
+    first = sweep(path, vary, workers=0, out=out)
+    second = sweep(path, vary, workers=0, out=out, retry_failed=True)
+    pd.testing.assert_frame_equal(first, second)
+    assert [one["run"] for one in entries(out)] == [0, 1, 1]
+
+
+def test_the_journal_of_another_sweep_is_refused(tmp_path):
+    path, out = write(tmp_path), tmp_path / "table.parquet"
+    sweep(path, SMALL, workers=0, out=out)
+    kept = out.read_bytes()
+
+    def refused(words, vary=SMALL, **named):
+        with pytest.raises(SweepError, match=words):
+            sweep(path, vary, workers=0, out=out, **named)
+
+    refused("other values", {STIFFNESS: [1e4, 5e4]})
+    refused("other settings", changes={"run.duration": "2.0"})
+    refused("combined in another way", together=True)
+    refused("other columns", verdicts=True)
+    figures = tmp_path / "figures.py"
+    figures.write_text(figures.read_text() + "\n# changed\n")
+    refused("other contents of the files")
+    path.write_text(SCENARIO.replace("damping = 5.0", "damping = 6.0"))
+    refused("other settings")
+    assert out.read_bytes() == kept
+
+
+def test_only_one_sweep_writes_a_journal(folder):
+    out = folder / "locked.parquet"
+
+    def progress(done, failed, total):
+        if done == 1:
+            with pytest.raises(SweepError, match="another sweep is writing it"):
+                sweep(folder / "resting.toml", SMALL, workers=0, out=out)
+
+    sweep(folder / "resting.toml", SMALL, workers=0, out=out, progress=progress)
+    check_once(out, 4)
+
+
+def test_a_worker_with_other_files_or_versions_is_told(folder, tmp_path):
+    job = plan_sweep(folder / "resting.toml", SMALL).job
+    with pytest.raises(SweepError, match=r"has numpy .*; the sweep was begun with .*numpy 1\.0"):
+        prepare(replace(job, versions={**job.versions, "numpy": "1.0"}))
+    with pytest.raises(SweepError, match=r"has another file .*figures\.py"):
+        prepare(replace(job, files={"figures.py": "0" * 64}))
+    with pytest.raises(SweepError, match=r"has no file .*figures\.py"):
+        prepare(replace(job, name=str(tmp_path / "elsewhere.toml")))
+
+
+def test_a_shipped_scenario_is_found_by_its_name_on_any_machine():
+    job = plan_sweep("sphere_on_shell", {"run.rtol": [1e-3]}).job
+    assert (job.name, job.shipped) == ("sphere_on_shell", True)
+    assert set(job.files) == {"sphere_on_shell.py", "surfaces/bowl.shl"}
+    assert prepare(job) == os.getpid()
+
+
+def test_a_missing_extra_is_told_before_anything_runs(folder, monkeypatch):
+    path, out = folder / "resting.toml", folder / "extra.parquet"
+    for package in ("pandas", "pyarrow"):
+        with monkeypatch.context() as patch:
+            patch.setitem(sys.modules, package, None)
+            with pytest.raises(MissingExtra, match=rf"{package}.*sphshell-pin\[sweep\]"):
+                sweep(path, SMALL, workers=0, out=out)
+    assert not list(folder.glob("extra*"))
+
+
+def test_wrong_arguments_are_told_and_leave_nothing(folder):
+    path = folder / "resting.toml"
+    with pytest.raises(InvalidParameter, match=r"\.parquet or \.h5"):
+        sweep(path, SMALL, out=folder / "table.csv")
+    with pytest.raises(InvalidParameter, match="0 or more"):
+        sweep(path, SMALL, workers=-1)
+    with pytest.raises(InvalidParameter, match="scheduler"):
+        sweep(path, SMALL, workers=2, scheduler="tcp://127.0.0.1:8786")
+    with pytest.raises(InvalidParameter, match="tcp://host:8786"):
+        sweep(path, SMALL, scheduler="nowhere", out=folder / "nothing.parquet")
+    with pytest.raises(ResultError, match="cannot be written"):
+        sweep(path, SMALL, out=path / "below_a_file" / "table.parquet")
+    assert not list(folder.glob("nothing*"))

@@ -1,0 +1,119 @@
+"""What a sweep varies: texts to values, values to runs; wrong ones are told in one sentence."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.study.sweep import axes_of, plan_sweep
+from sphshell_pin.study.sweep.grid import points_of, text_of
+from tests.study.resting import write
+
+KEY = "contact.law.stiffness"
+
+
+def values(text):
+    (axis,) = axes_of([f"key={text}"])
+    return axis.values
+
+
+def test_equal_steps_have_both_ends_and_short_numbers():
+    assert values("0:1:11") == (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+    assert values("1:-1:3") == (1.0, 0.0, -1.0)
+
+
+def test_equal_factors_have_both_ends_and_one_ratio():
+    assert values("1e3:1e6:log:4") == (1e3, 1e4, 1e5, 1e6)
+    found = values("2.5e-3:7:log:9")
+    assert (found[0], found[-1]) == (2.5e-3, 7.0)
+    ratios = [b / a for a, b in pairwise(found)]
+    assert ratios == pytest.approx([(7 / 2.5e-3) ** (1 / 8)] * 8, rel=1e-11)
+
+
+def test_lists_are_numbers_words_truths_or_lists():
+    assert values("1, 2.5,1e-3, .5") == (1, 2.5, 1e-3, 0.5)
+    assert values("adaptive,implicit") == ("adaptive", "implicit")
+    assert values("true,false") == (True, False)
+    assert values("[0,0,-9.81],[0, 0, -1.6]") == ("[0, 0, -9.81]", "[0, 0, -1.6]")
+    assert values("a.py:f,b.py:g") == ("a.py:f", "b.py:g")
+
+
+def test_python_values_are_taken_as_they_are():
+    axes = axes_of({"a": np.geomspace(1, 8, 4), "b": ["x", "y"], "c": "1:2:2", "d": [np.int64(3)]})
+    assert axes[0].values == tuple(np.geomspace(1, 8, 4).tolist())
+    assert [axis.values for axis in axes[1:]] == [("x", "y"), (1.0, 2.0), (3,)]
+
+
+def test_texts_of_numbers_are_exact():
+    for value in (0.1 + 0.2, 1e-308, math.pi, 2**53):
+        assert float(text_of(value)) == value
+
+
+def test_the_last_key_turns_fastest_unless_all_go_together():
+    axes = axes_of({"a": [1, 2], "b": ["x", "y"]})
+    assert points_of(axes, False) == [(1, "x"), (1, "y"), (2, "x"), (2, "y")]
+    assert points_of(axes, True) == [(1, "x"), (2, "y")]
+
+
+@pytest.mark.parametrize(
+    ("vary", "words"),
+    [
+        ([], "what varies"),
+        (["no_equals"], "key=lo:hi:n"),
+        (["k=1:2"], "lo:hi:n"),
+        (["k=1:2:1"], "2 or more"),
+        (["k=1:2:lin:4"], "lo:hi:log:n"),
+        (["k=0:2:log:4"], "positive"),
+        (["k=2:2:4"], "differ"),
+        (["k=1,2,1"], "given twice"),
+        (["k=1,2", "k=3"], "given twice"),
+        ({"k": []}, "at least one"),
+        ({"k": [None]}, "numbers, words"),
+    ],
+)
+def test_wrong_values_are_told(vary, words):
+    with pytest.raises(InvalidParameter, match=words):
+        axes_of(vary)
+
+
+def test_too_many_runs_and_keys_of_different_lengths_are_told():
+    with pytest.raises(InvalidParameter, match="too many"):
+        points_of(axes_of(["a=0:1:2000", "b=0:1:2000"]), False)
+    with pytest.raises(InvalidParameter, match="a has 2, b has 3"):
+        points_of(axes_of(["a=1,2", "b=1,2,3"]), True)
+
+
+@pytest.mark.parametrize(
+    ("vary", "kind", "words"),
+    [
+        (["contact.law.stifness=1,2"], ScenarioError, "did you mean 'stiffness'"),
+        ([f"{KEY}=1e4,-1"], ScenarioError, "greater than 0"),
+        (["run.integrator=implicit,euler"], ScenarioError, "adaptive"),
+        (["contact.shell=plate2,plate3"], ScenarioError, "plate"),
+        ([f"{KEY}=1e4,2e4", "contact.ball-plate.law.stiffness=1"], InvalidParameter, "twice"),
+        (["contact.law.damping=1,2"], InvalidParameter, "set as well"),
+    ],
+)
+def test_a_wrong_key_or_value_is_told_before_anything_runs(tmp_path, vary, kind, words):
+    with pytest.raises(kind, match=words):
+        plan_sweep(write(tmp_path), vary, changes={"contact.ball-plate.law.damping": "4"})
+
+
+def test_an_unknown_scenario_is_told():
+    with pytest.raises(NameNotFound, match="fingertip_on_blade"):
+        plan_sweep("no_such", [f"{KEY}=1,2"])
+
+
+def test_integrators_may_vary_where_the_file_gives_a_step(tmp_path):
+    path = write(tmp_path)
+    vary = ["run.integrator=adaptive,semi-implicit-euler"]
+    text = path.read_text().replace('"implicit"\n', '"runge-kutta-4"\ndt = 1e-3\n')
+    path.write_text(text)
+    plan = plan_sweep(path, vary)
+    assert len(set(plan.digests)) == 2
+    with pytest.raises(SphshellError, match="takes rtol and atol, not dt"):
+        plan_sweep(path, [*vary, "run.dt=1e-3,1e-4"])

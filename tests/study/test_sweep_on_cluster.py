@@ -1,0 +1,87 @@
+"""Sweeps on a Dask cluster of real processes, of which one is killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+
+from sphshell_pin.errors import SweepError
+from sphshell_pin.study.sweep import plan_sweep, run_plan, sweep
+from tests.study.cluster import Cluster
+from tests.study.resting import check_once, entries, write
+
+pytest.importorskip("distributed")
+pytest.importorskip("pyarrow")
+
+VARY = {"contact.law.stiffness": "1e4:1e6:log:30", "contact.law.exponent": [1.5, 2.0]}
+
+
+def test_a_killed_worker_of_a_cluster_costs_nothing(tmp_path, request):
+    cluster = Cluster(tmp_path)
+    request.addfinalizer(cluster.close)
+    path = write(tmp_path / "scenario")
+    for _ in range(2):
+        cluster.start_worker("--no-nanny")
+    serial, table = tmp_path / "serial.parquet", tmp_path / "cluster.parquet"
+    sweep(path, VARY, workers=0, out=serial)
+    killed = []
+
+    def progress(done, failed, total):
+        workers = {one["worker"] for one in entries(table)}
+        if done >= 15 and not killed and len(workers) == 2:
+            killed.append(min(workers))
+            os.kill(int(killed[0].rpartition(":")[2]), signal.SIGKILL)
+
+    sweep(path, VARY, scheduler=cluster.address, out=table, progress=progress)
+    check_once(table, 60)
+    assert len(killed) == 1
+    assert [p.poll() for p in cluster.processes].count(-signal.SIGKILL) == 1
+    assert table.read_bytes() == serial.read_bytes()
+
+
+def test_a_run_that_kills_the_workers_of_a_cluster_is_given_up(tmp_path, request):
+    # Runs that were with a dying worker are given up at once, and tried again alone.
+    cluster = Cluster(tmp_path, allowed_failures=0)
+    request.addfinalizer(cluster.close)
+    path = write(tmp_path / "scenario", "deadly")
+    cluster.start_worker()  # a nanny starts it again
+    vary = {"contact.law.stiffness": [1e4, 2e4, 3e4, 4e4]}
+    table = sweep(path, vary, scheduler=cluster.address)
+    assert table["status"].tolist() == ["done", "failed", "done", "done"]
+    assert "worker process died" in table["error"][1]
+
+
+def test_a_scheduler_without_workers_is_waited_for_and_one_that_dies_is_told(
+    tmp_path, request, monkeypatch
+):
+    monkeypatch.setattr("sphshell_pin.study.sweep.cluster._PATIENCE", 0.2)
+    path = write(tmp_path / "scenario")
+    cluster = Cluster(tmp_path)
+    request.addfinalizer(cluster.close)
+    table = tmp_path / "table.parquet"
+    notes = []
+
+    def note(sentence):
+        notes.append(sentence)
+        cluster.start_worker("--no-nanny")
+
+    def progress(done, failed, total):
+        if done == 10:
+            cluster.processes[0].kill()
+
+    plan = plan_sweep(path, VARY)
+    with pytest.raises(SweepError, match="went away"):
+        run_plan(plan, scheduler=cluster.address, out=table, progress=progress, note=note)
+    assert len(notes) == 1
+    assert "has no workers" in notes[0]
+    assert 10 <= len(entries(table)) < 60
+    sweep(path, VARY, workers=0, out=table)
+    check_once(table, 60)
+
+
+def test_no_scheduler_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr("sphshell_pin.study.sweep.cluster._CONNECT_TIMEOUT", 0.5)
+    with pytest.raises(SweepError, match="no Dask scheduler answers"):
+        sweep(write(tmp_path), VARY, scheduler="tcp://127.0.0.1:9")

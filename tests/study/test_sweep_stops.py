@@ -1,0 +1,163 @@
+"""The command sweep: killed, interrupted, and taken up again; and what it prints."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from typer.testing import CliRunner
+
+from sphshell_pin.cli import app
+from tests.study.resting import check_once, entries, write
+
+pytest.importorskip("pandas")
+pytest.importorskip("pyarrow")
+
+# Tests that run in the background pass on that Ctrl-C is to be ignored.
+ENTRY = [
+    sys.executable,
+    "-c",
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from sphshell_pin.cli import main; main()",
+]
+RUNS = 40
+VARY = ["--vary", "contact.law.stiffness=1e4:1e6:log:20", "--vary", "contact.law.exponent=1.5,2"]
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, [str(one) for one in arguments])
+
+
+def wait_for(condition, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.002)
+
+
+def is_alive(pid):
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(pid, 0)
+        return True
+    return False
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("sweep"))
+
+
+@pytest.fixture(scope="module")
+def reference(scenario):
+    """The bytes of the table of a sweep that nothing happened to."""
+    out = scenario.parent / "reference.parquet"
+    told = call("sweep", scenario, *VARY, "--workers", "0", "--out", out)
+    assert told.exit_code == 0, told.output
+    assert f"{RUNS} runs, {RUNS} done, 0 failed" in told.output
+    return out.read_bytes()
+
+
+def stopped(scenario, out, workers, number):
+    """Begin a sweep, send it the signal when 5 runs are done; return the ended process."""
+    command = [*ENTRY, "sweep", scenario, *VARY, "--workers", workers, "--out", out]
+    with subprocess.Popen(
+        list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        wait_for(lambda: len(entries(out)) >= 5 or process.poll() is not None)
+        process.send_signal(number)
+        _, told = process.communicate(timeout=60)
+    return process.returncode, told
+
+
+def test_a_killed_sweep_leaves_no_worker_and_goes_on(scenario, reference):
+    out = scenario.parent / "killed.parquet"
+    code, _ = stopped(scenario, out, 2, signal.SIGKILL)
+    assert code == -signal.SIGKILL
+    assert not out.exists()
+    done = len(entries(out))
+    assert 5 <= done < RUNS
+    workers = {int(one["worker"].rpartition(":")[2]) for one in entries(out)}
+    wait_for(lambda: not any(map(is_alive, workers)))
+    told = call("sweep", scenario, *VARY, "--workers", "0", "--out", out)
+    assert told.exit_code == 0, told.output
+    assert f"{done} were done before" in told.output
+    check_once(out, RUNS)
+    assert out.read_bytes() == reference
+
+
+def test_ctrl_c_tells_how_to_go_on(scenario, reference):
+    out = scenario.parent / "interrupted.parquet"
+    code, told = stopped(scenario, out, 1, signal.SIGINT)
+    assert code == 130
+    kept = len(entries(out))
+    number = int(told.split()[1])
+    assert kept - 1 <= number <= kept  # Ctrl-C may come when a run is kept but not counted yet
+    assert told.startswith(f"interrupted: {number} of {RUNS} runs are done and kept in {out}.")
+    assert told.strip().endswith(f"--workers 1 --out {out}")
+    assert len(told.splitlines()) == 1
+    assert not out.exists()
+    assert call("sweep", scenario, *VARY, "--out", out, "--workers", "0").exit_code == 0
+    check_once(out, RUNS)
+    assert out.read_bytes() == reference
+
+
+def test_a_script_without_a_guard_is_told(scenario):
+    script = scenario.parent / "script.py"
+    script.write_text(
+        "from sphshell_pin.study.sweep import sweep\n"
+        f"sweep({str(scenario)!r}, ['contact.law.stiffness=1e4,1e5'], workers=1)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 1
+    assert '__name__ == "__main__"' in done.stderr.splitlines()[-1]
+
+
+def test_pictures_and_failed_runs_are_told(scenario):
+    pytest.importorskip("matplotlib")
+    out = scenario.parent / "failed.parquet"
+    radii = ["--vary", "contact.sphere.radius=0.012,0.03", "--workers", "0", "--out", out]
+    told = call("sweep", scenario, *radii, "--plot", "figures.depth", "--plot", "energy.residual")
+    assert told.exit_code == 0
+    assert "2 runs, 1 done, 1 failed" in told.output
+    assert "run 1 failed (contact.sphere.radius = 0.03): contact 'ball-plate' starts" in told.output
+    for name in ("figures.depth", "energy.residual"):
+        assert (scenario.parent / f"failed.{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_sweep_of_failures_is_an_error(scenario):
+    out = scenario.parent / "failures.parquet"
+    vary = ["--vary", "contact.sphere.radius=0.03,0.04", "--workers", "0", "--out", out]
+    assert call("sweep", scenario, *vary).exit_code == 2
+
+
+FAULTS = {
+    "key": (["--vary", "contact.law.stifness=1,2"], "did you mean 'stiffness'"),
+    "value": (["--vary", "contact.law.stiffness=1:2"], "lo:hi:n"),
+    "figure": (["--vary", "contact.law.stiffness=1,2", "--plot", "peak"], "no figure 'peak'"),
+    "file": (["--vary", "contact.law.stiffness=1,2", "--out", "x.csv"], ".parquet or .h5"),
+    "picture": (
+        [f"--vary={key}=1:2:2" for key in ("gravity.0", "gravity.1", "gravity.2")]
+        + ["--plot", "figures.depth"],
+        "too many numbers for one picture",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_are_one_sentence(scenario, fault):
+    arguments, words = FAULTS[fault]
+    told = call("sweep", scenario, *arguments)
+    assert told.exit_code == 2
+    assert words in told.output
+    assert told.output.count("\n") == 1
+
+
+def test_help_has_an_example():
+    assert "Example: sphshell-pin sweep" in call("sweep", "--help").output
