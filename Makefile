@@ -8,7 +8,7 @@ CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 OUT ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench hard-cases work-precision lint format clean
+.PHONY: sweep-survival rollouts help demo test bench hard-cases work-precision lint format wheel docs clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -17,6 +17,10 @@ help:
 # make bench  print what contact costs, as ratios
 # make hard-cases      run every hard case and write docs/hard_cases.md
 # make work-precision  print error against computing time of the integrators, draw the figure
+# make wheel  build a wheel into dist/ and run it in an environment without a compiler
+# make docs   build the documentation site into build/site
+# make sweep-survival  500 runs five ways, workers killed and the sweep resumed: the same bytes
+# make rollouts        print the speed-up of 10 000 runs over threads
 # make clean  remove everything that was built
 
 $(BIN)/python:
@@ -47,6 +51,12 @@ $(VENV)/.bench: $(VENV)/.test
 hard-cases: $(VENV)/.test
 	$(BIN)/python -m tests.hard_cases --write
 
+sweep-survival: $(VENV)/.test
+	$(BIN)/python -m tests.study.sweep_survival
+
+rollouts: $(VENV)/.test
+	$(BIN)/python -m benchmarks.rollout
+
 work-precision: $(VENV)/.test
 	$(BIN)/python -m benchmarks.work_precision --write
 
@@ -64,5 +74,14 @@ format: $(VENV)/.test
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $(CPP)
 
+wheel: $(BIN)/python
+	rm -rf dist
+	$(BIN)/python -m pip wheel -q . --no-deps -w dist
+	$(BIN)/python .ci/check_wheel.py dist/*.whl
+
+docs: $(VENV)/.test
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo "See it: $(BIN)/python -m http.server -d build/site --bind 127.0.0.1"
+
 clean:
-	rm -rf $(VENV) build $(OUT)
+	rm -rf $(VENV) build dist $(OUT)

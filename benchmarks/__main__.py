@@ -3,26 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
-import time
 
 import numpy as np
 
 from sphshell_pin.benchmarks.query import against_peers, against_size
 from sphshell_pin.benchmarks.step import ingredients, step_cost
-from sphshell_pin.benchmarks.timing import machine, one_core, ratio, take_turns
+from sphshell_pin.benchmarks.timing import machine, measure_import, one_core, ratio
 
 
 def import_time(rounds: int) -> None:
-    """Time of importing the package against importing Pinocchio, each in a fresh interpreter."""
-
-    def fresh(module: str) -> float:
-        start = time.perf_counter()
-        subprocess.run([sys.executable, "-c", f"import {module}"], check=True)
-        return time.perf_counter() - start
-
-    times = take_turns({m: lambda m=m: fresh(m) for m in ("sphshell_pin", "pinocchio")}, rounds)
+    """Print the time of importing the package against importing Pinocchio."""
+    times = measure_import(rounds)
     print("Import, whole interpreter")
     print(
         f"  {'sphshell_pin / pinocchio':40s} {np.median(times['sphshell_pin']) * 1e3:9.1f} ms   "

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +24,23 @@ from sphshell_pin.benchmarks.surfaces import (
     icosphere,
     on_sheet,
     on_torus,
+    plate,
     sheet,
     torus,
     touching_centres,
     wavy_sheet,
 )
-from sphshell_pin.benchmarks.timing import machine, median_us, one_core, ratio, take_turns
+from sphshell_pin.benchmarks.timing import (
+    Progress,
+    Spread,
+    machine,
+    median_us,
+    one_core,
+    part,
+    ratio,
+    silent,
+    take_turns,
+)
 
 Array = NDArray[np.float64]
 RADIUS = 0.010  # of the touching sphere [m]
@@ -38,6 +49,8 @@ EXPONENT = 1.5
 PLACES = 300
 BALL = 4 * RADIUS
 RING, TUBE = 6 * RADIUS, 3 * RADIUS
+PLATE = 6 * RADIUS  # half the side of the flat plate
+TIMED_PLACES = 2000
 
 
 @dataclass(frozen=True)
@@ -45,8 +58,14 @@ class Surface:
     """Meshes from coarse to fine, random places with outward normals, and where the sphere is."""
 
     meshes: Callable[[], list[Mesh]]
-    places: Callable[[np.random.Generator], tuple[Array, Array]]
+    places: Callable[[np.random.Generator, int], tuple[Array, Array]]
     inside: bool
+
+    def touching(self, seed: int, count: int) -> tuple[Array, Array]:
+        """Return centres (count, 3) of spheres DEPTH deep, and the exact unit forces (count, 3)."""
+        points, outward = self.places(np.random.default_rng(seed), count)
+        normals = -outward if self.inside else outward
+        return points + (RADIUS - DEPTH) * normals, normals
 
 
 @dataclass(frozen=True)
@@ -75,20 +94,27 @@ class Row:
     largest: float
     magnitude: float
     direction: float
+    time: Spread | None = None  # of a query [s]
 
 
-def on_ball(rng: np.random.Generator) -> tuple[Array, Array]:
-    return ball_places(BALL, rng, PLACES)
+def on_ball(rng: np.random.Generator, count: int = PLACES) -> tuple[Array, Array]:
+    return ball_places(BALL, rng, count)
 
 
-def torus_places(rng: np.random.Generator) -> tuple[Array, Array]:
-    return on_torus(RING, TUBE, *rng.uniform(0, 2 * np.pi, (2, PLACES)))
+def torus_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    return on_torus(RING, TUBE, *rng.uniform(0, 2 * np.pi, (2, count)))
 
 
-def sheet_places(rng: np.random.Generator) -> tuple[Array, Array]:
+def sheet_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     clear = SHEET - 1.3  # of the borders
-    points, normals = on_sheet(*rng.uniform(-clear, clear, (2, PLACES)))
+    points, normals = on_sheet(*rng.uniform(-clear, clear, (2, count)))
     return RADIUS * points, normals
+
+
+def plate_places(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    clear = PLATE - 1.3 * RADIUS
+    xy = rng.uniform(-clear, clear, (count, 2))
+    return np.c_[xy, np.zeros(count)], np.tile([0.0, 0.0, 1.0], (count, 1))
 
 
 def balls() -> list[Mesh]:
@@ -104,11 +130,22 @@ def sheets() -> list[Mesh]:
     return [Mesh(RADIUS * m.vertices, m.triangles, m.normals) for m in meshes]
 
 
+def plates() -> list[Mesh]:
+    return [plate(side * RADIUS, PLATE) for side in (1.0, 0.5, 0.25, 0.125, 0.0625)]
+
+
 SURFACES = {
     "bowl: inside a sphere, R = 4 r": Surface(balls, on_ball, inside=True),
     "dome: outside a sphere, R = 4 r": Surface(balls, on_ball, inside=False),
     "inside a torus, R = 6 r and 3 r": Surface(tori, torus_places, inside=True),
     "on a wavy sheet": Surface(sheets, sheet_places, inside=False),
+}
+# Those of the report, under short names.
+REPORTED = {
+    "bowl": SURFACES["bowl: inside a sphere, R = 4 r"],
+    "dome": SURFACES["dome: outside a sphere, R = 4 r"],
+    "torus": SURFACES["inside a torus, R = 6 r and 3 r"],
+    "flat plate": Surface(plates, plate_places, inside=False),
 }
 RULES = {
     "smooth, exact normals": Rule("smooth", True, "#2f6fde", "o"),
@@ -127,36 +164,47 @@ def relative_forces(shell: Shell, method: str, centres: Array) -> Array:
     return forces
 
 
-def measure(name: str, surface: Surface) -> list[Row]:
-    """Measure every rule on every mesh of a surface."""
-    points, outward = surface.places(np.random.default_rng(0))
-    normals = -outward if surface.inside else outward
-    centres = points + (RADIUS - DEPTH) * normals
-    rows = []
-    for mesh in surface.meshes():
+def measure(
+    name: str, surface: Surface, rounds: int = 0, progress: Progress = silent, finest: int = 5
+) -> list[Row]:
+    """Measure every rule on the first `finest` meshes of a surface; queries timed in `rounds`."""
+    centres, normals = surface.touching(0, PLACES)
+    elsewhere, _ = surface.touching(1, TIMED_PLACES)
+    rows, contestants = [], {}
+    meshes = surface.meshes()[:finest]
+    for k, mesh in enumerate(meshes):
         estimated = Shell(mesh.vertices, mesh.triangles)
         exact = Shell(mesh.vertices, mesh.triangles, normals=mesh.normals)
         for label, rule in RULES.items():
             shell = exact if rule.exact_normals else estimated
-            forces = relative_forces(shell, rule.method, centres)
-            errors = np.linalg.norm(forces - normals, axis=1)
-            magnitudes = np.linalg.norm(forces, axis=1)
-            some = magnitudes > 0
-            sines = np.linalg.norm(np.cross(forces, normals), axis=1)[some]
-            angles = np.arctan2(sines, np.einsum("ij,ij->i", forces, normals)[some])
             rows.append(
-                Row(
-                    surface=name,
-                    rule=label,
-                    triangles=len(mesh.triangles),
-                    side=mesh.mean_side / RADIUS,
-                    mean=errors.mean(),
-                    largest=errors.max(),
-                    magnitude=np.abs(magnitudes - 1).mean(),
-                    direction=np.degrees(angles).mean(),
-                )
+                row_of(name, label, mesh, relative_forces(shell, rule.method, centres), normals)
             )
-    return rows
+            contestants[str(len(rows) - 1)] = query_contestant(shell, elsewhere, rule.method)
+        progress(0.5 * (k + 1) / len(meshes))
+    if rounds == 0:
+        return rows
+    times = take_turns(contestants, rounds, part(progress, 0.5, 1.0))
+    return [replace(row, time=Spread.of(times[str(k)])) for k, row in enumerate(rows)]
+
+
+def row_of(name: str, label: str, mesh: Mesh, forces: Array, normals: Array) -> Row:
+    """Return the errors of relative forces (n, 3) whose exact values are the normals (n, 3)."""
+    errors = np.linalg.norm(forces - normals, axis=1)
+    magnitudes = np.linalg.norm(forces, axis=1)
+    some = magnitudes > 0
+    sines = np.linalg.norm(np.cross(forces, normals), axis=1)[some]
+    angles = np.arctan2(sines, np.einsum("ij,ij->i", forces, normals)[some])
+    return Row(
+        surface=name,
+        rule=label,
+        triangles=len(mesh.triangles),
+        side=mesh.mean_side / RADIUS,
+        mean=float(errors.mean()),
+        largest=float(errors.max()),
+        magnitude=float(np.abs(magnitudes - 1).mean()),
+        direction=float(np.degrees(angles).mean()),
+    )
 
 
 def print_table(rows: list[Row]) -> None:
@@ -186,21 +234,26 @@ def order(coarser: Row | None, finer: Row, key: str) -> str:
     return f"[{np.log(fall) / np.log(coarser.side / finer.side):.1f}]"
 
 
-def print_cost(rounds: int) -> None:
-    """Print the time of a query of each method, as `benchmarks.query` measures it."""
+def measure_cost(rounds: int, progress: Progress = silent) -> dict[str, dict[str, Array]]:
+    """Return the times of a query [s] of each method on 200 k triangles, wavy and flat."""
     depth = 0.0005
     vertices, triangles = wavy_sheet(316, 1.0)
     centres = touching_centres(20_000, 1.0, QUERY_RADIUS, depth)
-    plate = vertices * [1.0, 1.0, 0.0]
     above = centres * [1.0, 1.0, 0.0] + [0.0, 0.0, QUERY_RADIUS - depth]
-    for name, corners, places in (("wavy sheet", vertices, centres), ("flat plate", plate, above)):
+    surfaces = {"wavy sheet": (vertices, centres), "flat plate": (vertices * [1, 1, 0], above)}
+    found = {}
+    for k, (name, (corners, places)) in enumerate(surfaces.items()):
         shell = Shell(corners, triangles)
         methods = ("facets", "smooth", "elements")
-        times = take_turns({m: query_contestant(shell, places, m) for m in methods}, rounds)
-        print(
-            f"Query, {name} of {len(triangles)} triangles, r = 10 mm, depth 0.5 mm, "
-            "cold random positions"
-        )
+        contestants = {m: query_contestant(shell, places, m) for m in methods}
+        found[name] = take_turns(contestants, rounds, part(progress, k / 2, (k + 1) / 2))
+    return found
+
+
+def print_cost(rounds: int) -> None:
+    """Print the time of a query of each method, as `benchmarks.query` measures it."""
+    for name, times in measure_cost(rounds).items():
+        print(f"Query, {name} of 199712 triangles, r = 10 mm, depth 0.5 mm, cold random positions")
         for method, t in times.items():
             print(f"  {method:25s} {median_us(t)}   {ratio(t, times['facets'])} x")
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin import Shell, _core
 from sphshell_pin.benchmarks.surfaces import touching_centres, wavy_sheet
-from sphshell_pin.benchmarks.timing import median_us, ratio, take_turns
+from sphshell_pin.benchmarks.timing import Progress, median_us, ratio, silent, take_turns
 
 Array = NDArray[np.float64]
 RADIUS, DEPTH = 0.010, 0.0005
@@ -70,8 +70,16 @@ def fcpw_contestant(
     return run
 
 
-def against_peers(rounds: int) -> None:
-    """200 k triangles: all contacts of a touching sphere at cold, random positions."""
+THIS, COAL = "this", "coal::collide, all contacts"
+LIBIGL, FCPW = "libigl AABB, closest point", "fcpw, closest point, single precision"
+
+
+def measure_peers(rounds: int, progress: Progress = silent) -> dict[str, Array]:
+    """Return times [s] of a query on 200 k triangles at cold, random positions, by name.
+
+    A sphere that touches, all its contacts; libigl and fcpw, where installed, look for the closest
+    point alone.
+    """
     vertices, triangles = wavy_sheet(316, 1.0)
     shell = Shell(vertices, triangles)
     centres = touching_centres(20_000, 1.0, RADIUS, DEPTH)
@@ -80,30 +88,45 @@ def against_peers(rounds: int) -> None:
         seconds, _ = _core.coal_collide_all(vertices, triangles, centres[:2000], RADIUS)
         return float(seconds)
 
-    contestants = {"this": query_contestant(shell, centres), "coal::collide, all contacts": coal}
+    contestants = {THIS: query_contestant(shell, centres), COAL: coal}
     peers = {
-        "libigl AABB, closest point": libigl_contestant(vertices, triangles, centres),
-        "fcpw, closest point, single precision": fcpw_contestant(vertices, triangles, centres),
+        LIBIGL: libigl_contestant(vertices, triangles, centres),
+        FCPW: fcpw_contestant(vertices, triangles, centres),
     }
     contestants |= {name: run for name, run in peers.items() if run is not None}
-    times = take_turns(contestants, rounds)
-    print(f"Query, {len(triangles)} triangles, r = 10 mm, depth 0.5 mm, cold random positions")
+    return take_turns(contestants, rounds, progress)
+
+
+def against_peers(rounds: int) -> None:
+    """200 k triangles: all contacts of a touching sphere at cold, random positions."""
+    times = measure_peers(rounds)
+    print("Query, 199712 triangles, r = 10 mm, depth 0.5 mm, cold random positions")
     for name, t in times.items():
-        print(f"  {name:40s} {median_us(t)}   {ratio(t, times['this'])} x")
-    for name, run in peers.items():
-        if run is None:
+        print(f"  {name:40s} {median_us(t)}   {ratio(t, times[THIS])} x")
+    for name in (LIBIGL, FCPW):
+        if name not in times:
             print(f"  {name:40s} not installed (pip install 'sphshell-pin[bench]')")
 
 
-def against_size(rounds: int) -> None:
-    """Time the same contact patch on sheets of 2 k to 2 M triangles."""
+SHEETS = ((32, 0.1), (100, 0.316), (316, 1.0), (1000, 3.16))  # cells along a side, side [m]
+
+
+def measure_sizes(
+    rounds: int, progress: Progress = silent, sheets: tuple[tuple[int, float], ...] = SHEETS
+) -> dict[int, Array]:
+    """Return times [s] at equal contact patch on sheets of all sizes, by their triangles."""
     contestants = {}
-    for cells, size in ((32, 0.1), (100, 0.316), (316, 1.0), (1000, 3.16)):
+    for cells, size in sheets:
         shell = Shell(*wavy_sheet(cells, size))
         centres = touching_centres(20_000, size, RADIUS, DEPTH)
-        contestants[f"{len(shell.elements):8d} triangles"] = query_contestant(shell, centres)
-    times = take_turns(contestants, rounds)
+        contestants[str(shell.num_elements)] = query_contestant(shell, centres)
+    return {int(n): t for n, t in take_turns(contestants, rounds, progress).items()}
+
+
+def against_size(rounds: int) -> None:
+    """Print the same contact patch on sheets of 2 k to 2 M triangles."""
+    times = measure_sizes(rounds)
     smallest = next(iter(times.values()))
     print("Query at equal contact patch")
-    for name, t in times.items():
-        print(f"  {name:40s} {median_us(t)}   {ratio(t, smallest)} x")
+    for count, t in times.items():
+        print(f"  {f'{count:8d} triangles':40s} {median_us(t)}   {ratio(t, smallest)} x")

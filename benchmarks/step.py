@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import sphshell_pin as sp
 from sphshell_pin import _core, robots
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
-from sphshell_pin.benchmarks.timing import median_us, ratio, take_turns
+from sphshell_pin.benchmarks.timing import Progress, median_us, ratio, silent, take_turns
 
 Array = NDArray[np.float64]
 DT, STEPS, RADIUS = 1e-5, 5000, 0.012
@@ -68,27 +68,76 @@ def bare(scene: sp.Scene) -> Callable[[], float]:
     return lambda: float(_core.bare_dynamics(model, q, np.zeros(model.nv), DT, STEPS))
 
 
-def step_cost(rounds: int) -> None:
-    """Whole step against bare ABA + integrate, and touching against free with a controller."""
+BARE, FREE, FAR = "ABA + integrate alone, C++", "scene without contact", "far sphere"
+TOUCHING = "touching, damping and friction"
+CONTROL_FREE, CONTROL_TOUCHING = "joint PD + gravity, no contact", "joint PD + gravity, touching"
+
+
+def measure_step(rounds: int, progress: Progress = silent) -> dict[str, Array]:
+    """Return the times of a step [s], by what the scene holds."""
     shell = sp.Shell(*wavy_sheet(316, 1.0))
     pd = sp.JointPD(100.0, 10.0)
-    times = take_turns(
+    return take_turns(
         {
-            "ABA + integrate alone, C++": bare(panda()),
-            "scene without contact": runner(panda()),
-            "far sphere": runner(with_sheet(panda(), shell, -1.0)),
-            "touching, damping and friction": runner(with_sheet(panda(), shell, 5e-4)),
-            "joint PD + gravity, no contact": runner(panda(), pd),
-            "joint PD + gravity, touching": runner(with_sheet(panda(), shell, 5e-4), pd),
+            BARE: bare(panda()),
+            FREE: runner(panda()),
+            FAR: runner(with_sheet(panda(), shell, -1.0)),
+            TOUCHING: runner(with_sheet(panda(), shell, 5e-4)),
+            CONTROL_FREE: runner(panda(), pd),
+            CONTROL_TOUCHING: runner(with_sheet(panda(), shell, 5e-4), pd),
         },
         rounds,
+        progress,
     )
-    base = times["ABA + integrate alone, C++"]
+
+
+def step_cost(rounds: int) -> None:
+    """Print whole step against bare ABA + integrate, and touching against free with control."""
+    times = measure_step(rounds)
     print("Step, Panda and fingertip on 199712 triangles, against ABA + integrate")
     for name, t in times.items():
-        print(f"  {name:40s} {median_us(t)}   {ratio(t, base)} x")
-    share = ratio(times["joint PD + gravity, touching"], times["joint PD + gravity, no contact"])
+        print(f"  {name:40s} {median_us(t)}   {ratio(t, times[BARE])} x")
+    share = ratio(times[CONTROL_TOUCHING], times[CONTROL_FREE])
     print(f"  {'with control: touching / no contact':40s} {'':12s}   {share} x")
+
+
+PARTS = ("kinematics", "query", "law", "aba", "integrate")
+
+
+def measure_parts(rounds: int, progress: Progress = silent) -> dict[str, dict[str, Array]]:
+    """Return the times [s] of the parts of a step and of the whole of it, by scene.
+
+    The parts are timed one by one at the first state, the whole in a run. Of ABA and integrate
+    alone there is the whole.
+    """
+    shell = sp.Shell(*wavy_sheet(316, 1.0))
+    scenes = {FREE: panda(), FAR: with_sheet(panda(), shell, -1.0)}
+    scenes[TOUCHING] = with_sheet(panda(), shell, 5e-4)
+    runs = {name: runner(scene) for name, scene in scenes.items()}
+    alone = bare(panda())
+    found: dict[str, dict[str, list[float]]] = {
+        name: {what: [] for what in (*PARTS, "whole")} for name in scenes
+    }
+    found[BARE] = {"whole": []}
+    for turn in range(rounds + 1):
+        times = {BARE: {"whole": alone()}}
+        for name, scene in scenes.items():
+            times[name] = {**parts_of(scene), "whole": runs[name]()}
+        if turn > 0:  # the first warms up
+            for name, parts in times.items():
+                for what, seconds in parts.items():
+                    found[name][what].append(seconds)
+        progress((turn + 1) / (rounds + 1))
+    return {name: {what: np.array(t) for what, t in times.items()} for name, times in found.items()}
+
+
+def parts_of(scene: sp.Scene) -> dict[str, float]:
+    """Return the times [s] of the parts of a step at the start."""
+    pairs = [pair.to_core() for pair in scene.pairs]
+    times: dict[str, float] = _core.step_parts(
+        scene.model, pairs, START, np.zeros(scene.model.nv), DT, STEPS
+    )
+    return times
 
 
 def with_moving_sheet(shell: sp.Shell) -> sp.Scene:
@@ -112,8 +161,8 @@ def with_moving_sheet(shell: sp.Shell) -> sp.Scene:
     return scene
 
 
-def ingredients(rounds: int) -> None:
-    """Time what each ingredient of a scene adds to the step."""
+def measure_ingredients(rounds: int, progress: Progress = silent) -> dict[str, Array]:
+    """Return the times of a step [s] of scenes that differ by one ingredient."""
     shell = sp.Shell(*wavy_sheet(316, 1.0))
 
     def touching(**settings: Any) -> sp.Scene:
@@ -128,7 +177,7 @@ def ingredients(rounds: int) -> None:
     def zero(t: float, q: Array, v: Array, contacts: sp.dynamics.SceneContacts) -> Array:
         return np.zeros_like(v)
 
-    times = take_turns(
+    return take_turns(
         {
             "no contact": runner(panda()),
             "fingers not locked, no contact": runner(panda(lock=())),
@@ -144,7 +193,13 @@ def ingredients(rounds: int) -> None:
             "... and a Python controller": runner(touching(law=UNDAMPED, friction=None), zero),
         },
         rounds,
+        progress,
     )
+
+
+def ingredients(rounds: int) -> None:
+    """Print what each ingredient of a scene adds to the step."""
+    times = measure_ingredients(rounds)
     base = times["no contact"]
     print("What an ingredient adds to the step")
     for name, t in times.items():

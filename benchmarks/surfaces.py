@@ -134,13 +134,26 @@ def on_sheet(x: Array, y: Array) -> tuple[Array, Array]:
 
 def sheet(side: float) -> Mesh:
     """Return a sheet with moved vertices and random diagonals, like `torus`."""
-    rng, cells = np.random.default_rng(1), round(1.15 * 2 * SHEET / side)
-    vertices, triangles = wavy_sheet(cells, 2 * SHEET)
+    x, y, triangles = random_grid(round(1.15 * 2 * SHEET / side), SHEET)
+    points, normals = on_sheet(x, y)
+    return Mesh(points, triangles, normals)
+
+
+def random_grid(cells: int, half: float) -> tuple[Array, Array, NDArray[np.int32]]:
+    """Return moved x, y (n,) over the square of side 2 `half`, and random halves of the cells."""
+    rng = np.random.default_rng(1)
+    vertices, triangles = wavy_sheet(cells, 2 * half)
     x, y, _ = vertices.T
-    inner = np.maximum(np.abs(x), np.abs(y)) < SHEET * (1 - 1e-9)
-    x, y = (k + inner * rng.uniform(-0.4, 0.4, len(k)) * SHEET / cells for k in (x, y))
-    (a, b, c), (_, _, d) = (half.T for half in np.split(triangles, 2))
+    inner = np.maximum(np.abs(x), np.abs(y)) < half * (1 - 1e-9)
+    x, y = (k + inner * rng.uniform(-0.4, 0.4, len(k)) * half / cells for k in (x, y))
+    (a, b, c), (_, _, d) = (part.T for part in np.split(triangles, 2))
     first = rng.random(len(a)) < 0.5
     halves = np.where(first, [a, b, c], [a, b, d]), np.where(first, [a, c, d], [b, c, d])
-    points, normals = on_sheet(x, y)
-    return Mesh(points, np.hstack(halves).T.astype(np.int32), normals)
+    return x, y, np.hstack(halves).T.astype(np.int32)
+
+
+def plate(side: float, half: float) -> Mesh:
+    """Return the flat plate |x|, |y| <= `half` [m] of triangles like those of `sheet`."""
+    x, y, triangles = random_grid(max(3, round(1.15 * 2 * half / side)), half)
+    up = np.tile([0.0, 0.0, 1.0], (len(x), 1))
+    return Mesh(np.c_[x, y, np.zeros(len(x))], triangles, up)

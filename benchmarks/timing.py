@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
-from collections.abc import Callable
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
+
+Progress = Callable[[float], None]  # told the share that is done, 0 to 1
+
+
+def silent(share: float) -> None:
+    """Tell nobody how far it is."""
+
+
+def part(progress: Progress, first: float, last: float) -> Progress:
+    """Return the progress of a part of the work, from share `first` to `last` of the whole."""
+    return lambda share: progress(first + (last - first) * share)
 
 
 def one_core() -> None:
@@ -15,7 +31,38 @@ def one_core() -> None:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
-def take_turns(contestants: dict[str, Callable[[], float]], rounds: int) -> dict[str, np.ndarray]:
+@contextlib.contextmanager
+def on_one_core() -> Iterator[None]:
+    """Keep this thread and its child processes on one core for a while."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    one_core()
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Median and quartiles of a figure over the rounds."""
+
+    median: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, figures: np.ndarray) -> Spread:
+        """Return the spread of figures (rounds,)."""
+        low, middle, high = np.percentile(figures, [25, 50, 75])
+        return cls(float(middle), float(low), float(high))
+
+
+def take_turns(
+    contestants: dict[str, Callable[[], float]], rounds: int, progress: Progress = silent
+) -> dict[str, np.ndarray]:
     """Run every contestant once a round; return the times of each, (rounds,).
 
     A contestant times itself and returns seconds per unit of its work.
@@ -23,16 +70,30 @@ def take_turns(contestants: dict[str, Callable[[], float]], rounds: int) -> dict
     times: dict[str, list[float]] = {name: [] for name in contestants}
     for run in contestants.values():
         run()  # warm up
-    for _ in range(rounds):
+    progress(1 / (rounds + 1))
+    for turn in range(rounds):
         for name, run in contestants.items():
             times[name].append(run())
+        progress((turn + 2) / (rounds + 1))
     return {name: np.array(t) for name, t in times.items()}
+
+
+def measure_import(rounds: int, progress: Progress = silent) -> dict[str, np.ndarray]:
+    """Return the times [s] of importing this package and Pinocchio in fresh interpreters."""
+
+    def fresh(module: str) -> float:
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-c", f"import {module}"], check=True)
+        return time.perf_counter() - start
+
+    modules = ("sphshell_pin", "pinocchio")
+    return take_turns({m: lambda m=m: fresh(m) for m in modules}, rounds, progress)
 
 
 def ratio(a: np.ndarray, b: np.ndarray) -> str:
     """Median of a / b round by round, with the quartiles."""
-    low, middle, high = np.percentile(a / b, [25, 50, 75])
-    return f"{middle:7.2f} [{low:.2f}, {high:.2f}]"
+    spread = Spread.of(a / b)
+    return f"{spread.median:7.2f} [{spread.low:.2f}, {spread.high:.2f}]"
 
 
 def median_us(times: np.ndarray) -> str:

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks.timing import machine, one_core
+from sphshell_pin.benchmarks.analytic_cases import Exact
+from sphshell_pin.benchmarks.timing import Progress, machine, one_core, silent
 from sphshell_pin.benchmarks.work_precision_cases import (
     FAST_CREEP,
     SLOW_CREEP,
@@ -91,14 +92,17 @@ def cpu_of(case: Case, integrator: Integrator, duration: float | None = None) ->
     return time.process_time() - before, result
 
 
-def measure(case: Case, judge: Judge, rounds: int) -> list[Row]:
+def measure(
+    case: Case, judge: Judge | Exact, rounds: int, progress: Progress = silent
+) -> list[Row]:
     """Run every setting; a setting that diverges has no row."""
     # What a run of nothing takes: a second that is simulated costs the rest.
-    setup = float(np.median([cpu_of(case, case.references[0], 0.0)[0] for _ in range(5)]))
+    setup = float(np.median([cpu_of(case, case.integrators[0], 0.0)[0] for _ in range(5)]))
     times: dict[Integrator, list[float]] = {}
     rows: dict[Integrator, Row] = {}
     for turn in range(rounds):
-        for integrator in case.integrators:
+        for k, integrator in enumerate(case.integrators):
+            progress((turn + k / len(case.integrators)) / rounds)
             if turn > 0 and (integrator not in rows or times[integrator][0] > LONG):
                 continue
             try:

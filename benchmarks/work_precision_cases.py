@@ -26,7 +26,8 @@ class Case:
 
     `figures` reads dimensionless vectors (n, k) off the rows of a result: the error is the largest
     length of the difference of one of them. Fixed steps divide `record_dt` [s]. `references` are
-    two methods of different kinds; a result is judged by the one that is not of its own.
+    two methods of different kinds; a result is judged by the one that is not of its own. A case
+    with a closed form has none.
     """
 
     name: str
@@ -39,7 +40,7 @@ class Case:
     duration: float
     record_dt: float
     figures: Callable[[Result], list[Array]]
-    references: tuple[Integrator, Integrator]
+    references: tuple[Integrator, ...]
     integrators: tuple[Integrator, ...]
     quick_dt: float  # --quick makes no shorter steps
 

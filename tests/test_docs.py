@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
+import shlex
 import tomllib
 from pathlib import Path
 
 import pytest
+import typer
 
+from sphshell_pin.cli import app
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario import build, read_scenario
 
@@ -16,12 +20,14 @@ PAGES = [
     ROOT / "README.md",
     ROOT / "CHANGELOG.md",
     ROOT / "scenarios" / "README.md",
-    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
 ]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 INLINE_CODE = re.compile(r"`[^`\n]*`")
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+# A line of a block, or code within a line; what follows may go on behind a backslash.
+COMMAND = re.compile(r"(?:^ *(?:\$ )?|`)(sphshell-pin (?:[^`\n\\]|\\\n)*)", re.MULTILINE)
 
 
 def blocks(page: Path, language: str) -> list[tuple[int, str]]:
@@ -78,6 +84,30 @@ def test_the_scenarios_of_a_page_are_valid(page, tmp_path):
             pytest.skip(f"{where}: {missing}")
 
 
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if COMMAND.search(page.read_text("utf-8"))], ids=name_of
+)
+def test_the_commands_of_a_page_exist_with_their_options(page):
+    group = typer.main.get_command(app)
+    for told in COMMAND.findall(page.read_text(encoding="utf-8")):
+        line = told.replace("\\\n", " ").split(" > ")[0]
+        name, *arguments = shlex.split(line, comments=True)[1:]
+        if name == "--help":
+            continue
+        assert name in group.commands, f"{told}: no such command"
+        command = group.commands[name]
+        parser = command.make_parser(command.context_class(command, info_name=name))
+        parser.parse_args(arguments)  # raises for an option that is not there
+
+
+def test_the_page_of_commands_is_that_of_the_help():
+    spec = importlib.util.spec_from_file_location("commands", ROOT / "docs/site/commands.py")
+    commands = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(commands)
+    written = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    assert written == commands.page(), "write it anew: python docs/site/commands.py"
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_the_links_of_a_page_lead_somewhere(page):
     text = INLINE_CODE.sub("", FENCE.sub("", page.read_text(encoding="utf-8")))
@@ -97,7 +127,8 @@ def test_no_page_is_an_orphan():
         for link in LINK.findall(page.read_text(encoding="utf-8")):
             if not re.match(r"[a-z]+:", link):
                 linked.add((page.parent / link.partition("#")[0]).resolve())
-    assert {page for page in PAGES if page.parent.name == "docs"} <= linked
+    start = ROOT / "docs" / "index.md"  # of the site
+    assert {page for page in PAGES if ROOT / "docs" in page.parents} - {start} <= linked
     pictures = set((ROOT / "docs" / "pictures").iterdir())
     assert pictures <= linked
     assert all(picture.stat().st_size < 400_000 for picture in pictures)

@@ -17,9 +17,10 @@ class ShellHealth:
     """Findings about a surface: counts, worst values, and sentences about both.
 
     Nothing is repaired in silence: whatever the cleaning changed is counted here. `str()` gives a
-    table; `repairs` and `problems` give sentences; `ok` is True if no problem is left.
+    table; `repairs` and `problems` give sentences; `ok` is True if no problem is left. Lengths are
+    in [m].
 
-    Attributes (lengths in [m])
+    Attributes
     ----------
     name, source, unit, scale : of the surface; the file it came from, the unit its numbers were
         taken in, the factor from the numbers of the file to metres

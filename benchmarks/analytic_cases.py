@@ -1,0 +1,159 @@
+"""Cases of work and precision with a closed form: a ball on springs, bounces, a stiff plate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import sphshell_pin as sp
+from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
+from sphshell_pin.benchmarks.work_precision_cases import Array, Case, decades, rectangle, steps
+from sphshell_pin.dynamics import Result
+from sphshell_pin.dynamics.integrators import Integrator
+
+
+@dataclass(frozen=True)
+class Exact:
+    """Judges the results of a case by its closed form: figures at the times t (n,)."""
+
+    case: Case
+    figures: Callable[[Array], list[Array]]
+
+    def error(self, integrator: Integrator, result: Result) -> float:
+        """Return the largest length of a difference from the closed form at any row."""
+        pairs = zip(self.case.figures(result), self.figures(result.t), strict=True)
+        return max(float(np.linalg.norm(found - exact, axis=1).max()) for found, exact in pairs)
+
+
+def settings(fixed: tuple[float, ...], tolerances: tuple[float, ...]) -> tuple[Integrator, ...]:
+    """Return every integrator, with the steps [s] or the exponents of its tolerance."""
+    kinds: tuple[Any, ...] = (sp.SemiImplicitEuler, sp.RungeKutta4, sp.LinearlyImplicitEuler)
+    made: list[Integrator] = [i for kind in kinds for i in steps(kind, *fixed)]
+    adaptive: tuple[Any, ...] = (sp.Adaptive, sp.Implicit)
+    return (*made, *(i for kind in adaptive for i in decades(kind, *tolerances)))
+
+
+def ball_on_plate(law: sp.ImpactLaw, joint: Any, plate: float = 0.1) -> sp.Scene:
+    """Return a ball on `joint` above the plate z = 0."""
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
+    index = model.addJoint(0, joint, pin.SE3.Identity(), "ball_joint")
+    model.appendBodyToJoint(index, pin.Inertia.FromSphere(MASS, RADIUS), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", index, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), rectangle(plate, plate), law=law)
+    return scene
+
+
+def bob() -> Exact:
+    """Let a ball bob on an undamped spring that it never leaves: a cosine."""
+    stiffness = 1e4
+    omega, sag = math.sqrt(stiffness / MASS), MASS * GRAVITY / stiffness
+    amplitude = 0.8 * sag
+    case = Case(
+        name="bob",
+        title="Ball bobs on a spring",
+        judged="error of height / amplitude, against a cosine",
+        scene=ball_on_plate(sp.ImpactLaw(stiffness, 1.0), pin.JointModelPZ()),
+        controller=None,
+        q0=np.array([RADIUS - sag + amplitude]),
+        v0=None,
+        duration=0.1,
+        record_dt=0.004,
+        figures=lambda result: [(result.q - RADIUS + sag) / amplitude],
+        references=(),
+        integrators=settings(
+            (1e-3, 4e-4, 2e-4, 1e-4, 4e-5, 2e-5, 1e-5), (2, 3, 4, 5, 6, 7, 8, 9, 10)
+        ),
+        quick_dt=4e-5,
+    )
+    return Exact(case, lambda t: [np.cos(omega * t)[:, None]])
+
+
+FALL = 0.02  # [m]
+
+
+def bounce_height(t: Array, stiffness: float) -> Array:
+    """Return how far (n,) [m] the ball's lowest point is above the plate; let go at t = 0."""
+    omega, speed = math.sqrt(stiffness / MASS), math.sqrt(2 * GRAVITY * FALL)
+    flight = 2 * speed / GRAVITY
+    touch = 2 * (math.pi - math.atan(speed * omega / GRAVITY)) / omega
+    since = (t + flight / 2) % (flight + touch)
+    angle, sag = omega * (since - flight), GRAVITY / omega**2
+    flying = speed * since - 0.5 * GRAVITY * since**2
+    pressed = sag * (np.cos(angle) - 1) - speed / omega * np.sin(angle)
+    return np.where(since <= flight, flying, pressed)
+
+
+def bounces() -> Exact:
+    """Let a ball fall on an undamped spring, five times: parabolas and sines, joined."""
+    stiffness = 1e4
+    case = Case(
+        name="bounces",
+        title="Ball bounces five times",
+        judged="error of height / fall, against parabolas and sines",
+        scene=ball_on_plate(sp.ImpactLaw(stiffness, 1.0), pin.JointModelPZ()),
+        controller=None,
+        q0=np.array([RADIUS + FALL]),
+        v0=None,
+        duration=0.74,
+        record_dt=0.02,
+        figures=lambda result: [(result.q - RADIUS) / FALL],
+        references=(),
+        integrators=settings(
+            (1e-3, 4e-4, 2e-4, 1e-4, 4e-5, 2e-5, 1e-5), (2, 3, 4, 5, 6, 7, 8, 9, 10)
+        ),
+        quick_dt=4e-5,
+    )
+    return Exact(case, lambda t: [bounce_height(t, stiffness)[:, None] / FALL])
+
+
+STIFF, SPRING, REACH = 1e6, 5.0, 0.05  # plate and slow spring [N/m], amplitude along it [m]
+
+
+def glide() -> Exact:
+    """Let a ball glide on a stiff, overdamped plate, to and fro on a soft spring.
+
+    Along the plate a cosine of 10 rad/s; into it the sum of two decays, of 1e2 and 2e5 per second,
+    towards the depth of rest. Explicit steps must resolve the fast one for as long as it lasts.
+    """
+    damping = 1e4
+    sag = MASS * GRAVITY / STIFF
+    law = sp.ImpactLaw(STIFF, 1.0, damping, 0.1 * sag)
+    root = math.sqrt(damping**2 - 4 * MASS * STIFF)
+    slow, fast = (-damping + root) / (2 * MASS), (-damping - root) / (2 * MASS)
+    omega, deeper = math.sqrt(SPRING / MASS), 0.5 * sag  # that much deeper than at rest at first
+
+    def exact(t: Array) -> list[Array]:
+        decay = (fast * np.exp(slow * t) - slow * np.exp(fast * t)) / (fast - slow)
+        return [np.c_[np.cos(omega * t), np.zeros_like(t), 1 + 0.5 * decay]]
+
+    case = Case(
+        name="glide",
+        title="Ball glides on a stiff plate",
+        judged="error of way / reach, of depth / depth at rest",
+        scene=ball_on_plate(law, pin.JointModelTranslation()),
+        controller=sp.JointPD([SPRING, 0, 0], 0.0, np.zeros(3), gravity_compensation=False),
+        q0=np.array([REACH, 0.0, RADIUS - sag - deeper]),
+        v0=None,
+        duration=0.5,
+        record_dt=0.02,
+        figures=lambda result: [
+            np.c_[result.q[:, :1] / REACH, result.q[:, 1:2], (RADIUS - result.q[:, 2:]) / sag]
+        ],
+        references=(),
+        integrators=(
+            *steps(sp.SemiImplicitEuler, 4e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6),
+            *steps(sp.RungeKutta4, 2e-5, 1e-5, 5e-6, 2e-6),
+            *steps(sp.LinearlyImplicitEuler, 1e-2, 4e-3, 2e-3, 1e-3, 4e-4, 2e-4, 1e-4, 4e-5),
+            *decades(sp.Adaptive, 2, 3, 4, 5, 6, 7),
+            *decades(sp.Implicit, 2, 3, 4, 5, 6, 7, 8, 9),
+        ),
+        quick_dt=5e-6,
+    )
+    return Exact(case, exact)

@@ -1,0 +1,61 @@
+"""The arm of the press with its fixed links merged: what the engines without Pinocchio load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
+
+AXES = {"JointModelRX": "1 0 0", "JointModelRY": "0 1 0", "JointModelRZ": "0 0 1"}
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Return the numbers with all their digits, as an attribute."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def merged_urdf(scene: PressScene, scale: float = 1.0, sphere: bool = True) -> str:
+    """Return a URDF of one link per moving joint, every length times `scale`.
+
+    Link and joint `i` are those of Pinocchio's model, in its order; the fingertip is a collision
+    sphere on the last link, unless `sphere` is False; inertias grow with scale^2, masses stay.
+    Joints have no limits, which some engines would check in every step.
+    """
+    model = pin.buildModelFromXML(scene.urdf)
+    tip = model.frames[model.getFrameId(FRAME)]
+    nothing = " ".join(f'{name}="0"' for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    parts = [
+        f'<link name="link0"><inertial><mass value="0"/><inertia {nothing}/></inertial></link>'
+    ]
+    for i in range(1, model.njoints):
+        inertia, placement = model.inertias[i], model.jointPlacements[i]
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = scale**2 * np.asarray(inertia.inertia)
+        parts.append(
+            f'<link name="link{i}"><inertial><origin xyz="{numbers(scale * inertia.lever)}"/>'
+            f'<mass value="{numbers([inertia.mass])}"/><inertia ixx="{numbers([xx])}" '
+            f'ixy="{numbers([xy])}" ixz="{numbers([xz])}" iyy="{numbers([yy])}" '
+            f'iyz="{numbers([yz])}" izz="{numbers([zz])}"/></inertial>'
+        )
+        if sphere and i == tip.parentJoint:
+            parts.append(
+                f'<collision><origin xyz="{numbers(scale * tip.placement.translation)}"/>'
+                f'<geometry><sphere radius="{numbers([scale * scene.radius])}"/></geometry>'
+                "</collision>"
+            )
+        turn = pin.rpy.matrixToRpy(placement.rotation)
+        parts.append(
+            f'</link><joint name="joint{i}" type="continuous">'
+            f'<parent link="link{model.parents[i]}"/><child link="link{i}"/>'
+            f'<origin xyz="{numbers(scale * placement.translation)}" rpy="{numbers(turn)}"/>'
+            f'<axis xyz="{AXES[model.joints[i].shortname()]}"/></joint>'
+        )
+    return f'<robot name="arm">{"".join(parts)}</robot>'
+
+
+def obj_text(vertices: np.ndarray, triangles: np.ndarray) -> str:
+    """Return a mesh as the text of an OBJ file: vertices (n, 3), triangles (m, 3)."""
+    points = "v %.17g %.17g %.17g\n" * len(vertices) % tuple(vertices.ravel().tolist())
+    return points + "f %d %d %d\n" * len(triangles) % tuple((triangles + 1).ravel().tolist())

@@ -1,0 +1,299 @@
+"""Query time, building time and memory against the number of triangles, ours and others'.
+
+Each contestant lives in a process of its own, so that its memory can be told; all of them on one
+core, told in turn to time their queries. One that gets too slow or too big is left out of larger
+sheets. `python -m benchmarks.sizes` prints the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sphshell_pin.benchmarks.query import (
+    DEPTH,
+    RADIUS,
+    fcpw_contestant,
+    libigl_contestant,
+    query_contestant,
+)
+from sphshell_pin.benchmarks.surfaces import Array, touching_centres, wavy_sheet
+from sphshell_pin.benchmarks.timing import Progress, Spread, machine, one_core, silent
+
+# Cells along a side of the sheet, at equal size of the cells: 968 to 5 M triangles.
+CELLS = (22, 32, 100, 316, 1000, 1581)
+QUICK_CELLS = CELLS[:4]
+SIDE = 1 / 316  # of a cell [m]
+LARGE = 1_000_000  # triangles from which three rounds are enough
+LONGEST_BUILD, LONGEST_QUERY = 30.0, 5e-3  # [s]
+MEMORY_PER_TRIANGLE = 1600  # bytes that building takes for a while, the most of all contestants
+OURS, OURS_FLAT, COAL, TRIMESH = "smooth", "facets", "coal::collide", "trimesh"
+LIBIGL, FCPW = "libigl", "fcpw"
+QUESTIONS = {
+    OURS: "all contacts, curved elements",
+    OURS_FLAT: "all contacts, flat elements",
+    COAL: "all contacts, flat elements",
+    TRIMESH: "closest point",
+    LIBIGL: "closest point",
+    FCPW: "closest point, single precision",
+}
+NEEDS = {TRIMESH: "rtree", LIBIGL: "igl", FCPW: "fcpw"}  # modules, all of the extra `bench`
+QUERIES = {COAL: 2000, TRIMESH: 200}  # in a round; 20 000 for the others
+
+
+@dataclass(frozen=True)
+class Row:
+    """One contestant on one sheet: times [s], memory held after a query [bytes].
+
+    The memory is NaN where it is less than what the process held before.
+    """
+
+    name: str
+    question: str
+    triangles: int
+    query: Spread
+    build: float
+    memory: float
+
+
+def resident() -> float:
+    """Return the memory that this process holds [bytes]; NaN where the system does not tell."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return float(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return float("nan")
+
+
+def available() -> float:
+    """Return the memory that is free for programs [bytes]; infinity where nobody tells."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            for line in file:
+                if line.startswith("MemAvailable"):
+                    return float(line.split()[1]) * 1024
+    except OSError:
+        pass
+    return float("inf")
+
+
+def coal_contestant(vertices: Array, triangles: Any, centres: Array) -> Callable[[], float]:
+    """Time compiled collisions; the tree is built anew for each round, and not counted."""
+    from sphshell_pin import _core
+
+    return lambda: float(_core.coal_collide_all(vertices, triangles, centres, RADIUS)[0])
+
+
+def coal_tree(vertices: Array, triangles: Any) -> Any:
+    """Return Coal's tree."""
+    import coal
+
+    tree = coal.BVHModelOBBRSS()
+    tree.beginModel(len(triangles), len(vertices))
+    tree.addVertices(vertices)
+    tree.addTriangles(triangles.astype(np.uint32))
+    tree.endModel()
+    return tree
+
+
+def trimesh_contestant(vertices: Array, triangles: Any, centres: Array) -> Callable[[], float]:
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, triangles, process=False)
+
+    def run() -> float:
+        start = time.perf_counter()
+        trimesh.proximity.closest_point(mesh, centres)
+        return (time.perf_counter() - start) / len(centres)
+
+    return run
+
+
+def contestant(name: str, vertices: Array, triangles: Any, centres: Array) -> Callable[[], float]:
+    """Build what answers the queries of `name`."""
+    if name in (OURS, OURS_FLAT):
+        from sphshell_pin import Shell
+
+        return query_contestant(Shell(vertices, triangles), centres, name)
+    makers: dict[str, Any] = {
+        TRIMESH: trimesh_contestant,
+        LIBIGL: libigl_contestant,
+        FCPW: fcpw_contestant,
+        COAL: coal_contestant,
+    }
+    made: Callable[[], float] = makers[name](vertices, triangles, centres)
+    return made
+
+
+def serve(name: str, cells: int) -> None:
+    """Build, tell the time and the memory of that, then time a round at each line of stdin."""
+    size = cells * SIDE
+    vertices, triangles = wavy_sheet(cells, size)
+    centres = touching_centres(QUERIES.get(name, 20_000), size, RADIUS, DEPTH)
+    contestant(name, *wavy_sheet(4, 4 * SIDE), centres[:1])()  # imports what it needs
+    before, start = resident(), time.perf_counter()
+    if name == COAL:
+        tree = coal_tree(vertices, triangles)
+        told = {"build": time.perf_counter() - start, "memory": resident() - before}
+        del tree
+        run = contestant(name, vertices, triangles, centres)
+    else:
+        run = contestant(name, vertices, triangles, centres)
+        run()  # some build at the first query
+        told = {"build": time.perf_counter() - start, "memory": resident() - before}
+    print(json.dumps(told), flush=True)
+    for _ in sys.stdin:
+        print(json.dumps(run()), flush=True)
+
+
+class Served:
+    """A contestant in a process of its own."""
+
+    def __init__(self, name: str, cells: int) -> None:
+        self.name = name
+        command = [sys.executable, "-m", "sphshell_pin.benchmarks.sizes", "--serve", name]
+        self.process = subprocess.Popen(
+            [*command, str(cells)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def answer(self) -> Any:
+        """Read a line of its answers."""
+        assert self.process.stdout is not None
+        assert self.process.stderr is not None
+        line = self.process.stdout.readline()
+        if not line:
+            told = self.process.stderr.read().strip().splitlines()
+            code = self.process.wait()
+            raise RuntimeError(f"{self.name} ended with {code}: {told[-1] if told else 'no word'}")
+        return json.loads(line)
+
+    def time(self) -> float:
+        """Let it time one round; return seconds per query."""
+        assert self.process.stdin is not None
+        self.process.stdin.write("\n")
+        self.process.stdin.flush()
+        return float(self.answer())
+
+    def end(self) -> None:
+        """End the process."""
+        self.process.kill()
+        self.process.communicate()
+
+
+def installed() -> tuple[list[str], list[str]]:
+    """Return the contestants that can start, and sentences on the others."""
+    names, notes = [], []
+    for name in QUESTIONS:
+        module = NEEDS.get(name)
+        if module is None or importlib.util.find_spec(module) is not None:
+            names.append(name)
+        else:
+            notes.append(
+                f"{name} is left out: {module} is missing (pip install 'sphshell-pin[bench]')."
+            )
+    return names, notes
+
+
+def measure(
+    cells: tuple[int, ...] = CELLS, rounds: int = 5, progress: Progress = silent
+) -> tuple[list[Row], list[str]]:
+    """Return the rows of all contestants that keep up, and sentences on those that do not."""
+    names, notes = installed()
+    rows: list[Row] = []
+    whole = sum(c**2 for c in cells)
+    for k, side in enumerate(cells):
+        triangles = 2 * side**2
+        needed = triangles * MEMORY_PER_TRIANGLE * len(names)
+        if needed > available():
+            notes.append(
+                f"{triangles} triangles are left out: all contestants together may take "
+                f"{needed / 1e9:.0f} GB of memory, {available() / 1e9:.0f} GB are free."
+            )
+            break
+        found = measure_one(names, side, rounds if triangles < LARGE else 3, notes)
+        rows += found
+        for row in found:
+            if row.build > LONGEST_BUILD or row.query.median > LONGEST_QUERY:
+                names.remove(row.name)
+                if k + 1 < len(cells):
+                    notes.append(
+                        f"{row.name} is left out above {triangles} triangles, where it takes "
+                        f"{row.build:.2g} s to build and {row.query.median * 1e6:.2g} us a query."
+                    )
+        progress(sum(c**2 for c in cells[: k + 1]) / whole)
+    return rows, notes
+
+
+def measure_one(names: list[str], cells: int, rounds: int, notes: list[str]) -> list[Row]:
+    """Return the rows of one sheet; who fails there leaves `names`, with a sentence in `notes`."""
+    triangles, built = 2 * cells**2, {}
+    served: dict[str, Served] = {}
+    try:
+        for name in list(names):
+            served[name] = Served(name, cells)
+            try:
+                # One after the other, so that none is built while another is.
+                built[name] = served[name].answer()
+            except RuntimeError as error:
+                served.pop(name).end()
+                names.remove(name)
+                notes.append(f"{name} is left out from {triangles} triangles on: {error}.")
+        times: dict[str, list[float]] = {name: [] for name in served}
+        for _ in range(rounds):
+            for name, one in served.items():
+                times[name].append(one.time())
+    finally:
+        for one in served.values():
+            one.end()
+    return [
+        Row(
+            name,
+            QUESTIONS[name],
+            triangles,
+            Spread.of(np.array(times[name])),
+            built[name]["build"],
+            built[name]["memory"] if built[name]["memory"] > 0 else float("nan"),
+        )
+        for name in served
+    ]
+
+
+def main() -> None:
+    """Measure and print the table, or serve a parent."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.sizes", description=(__doc__ or "").partition("\n")[0]
+    )
+    parser.add_argument("--quick", action="store_true", help="up to 200 k triangles")
+    parser.add_argument("--serve", nargs=2, metavar=("NAME", "CELLS"), help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.serve:
+        serve(options.serve[0], int(options.serve[1]))
+        return
+    one_core()
+    print(machine())
+    rows, notes = measure(QUICK_CELLS if options.quick else CELLS)
+    for row in rows:
+        print(
+            f"  {row.name:14s} {row.question:32s} {row.triangles:8d}  "
+            f"{row.query.median * 1e6:10.3f} us [{row.query.low * 1e6:.3f}, "
+            f"{row.query.high * 1e6:.3f}]  build {row.build:7.3f} s  {row.memory / 1e6:8.1f} MB"
+        )
+    print(*notes, sep="\n")
+
+
+if __name__ == "__main__":
+    main()

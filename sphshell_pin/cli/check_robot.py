@@ -1,0 +1,166 @@
+"""The command check-robot, which judges contact on a robot."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sphshell_pin.cli.app import (
+    ERROR,
+    INTERRUPTED,
+    MISSED,
+    app,
+    faults,
+    make_table,
+    plain,
+    terminal,
+)
+
+if TYPE_CHECKING:
+    from sphshell_pin.study.robot_check import RobotReport, Sizes
+
+# A pipe has no width: so wide the table need not fold.
+_PIPE_WIDTH = 170
+
+
+@app.command("check-robot")
+def check_robot_(
+    context: typer.Context,
+    robot: Annotated[
+        list[str] | None,
+        typer.Argument(help="Names of shipped robots (sphshell-pin list), or URDF files."),
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Check every robot there is.")] = False,
+    frame: Annotated[
+        str | None,
+        typer.Option(
+            help="Frame that carries the sphere; by default a known tip, or the end of "
+            "the longest limb."
+        ),
+    ] = None,
+    radius: Annotated[float | None, typer.Option(help="Of the sphere \\[m].")] = None,
+    free_flyer: Annotated[
+        bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
+    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer postures and runs.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random postures.")] = 0,
+    json: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures to this file.")
+    ] = None,
+    write: Annotated[
+        Path | None, typer.Option("--write", metavar="FILE", help="Write the table as Markdown.")
+    ] = None,
+) -> None:
+    """Check contact on robots: forces, momentum, energy, derivatives, contacts missed.
+
+    A sphere is put on the robot, a curved shell under it, and what comes out is compared to ways
+    apart from the compiled core. Exit code 1 if a check fails.
+
+    Example: sphshell-pin check-robot panda my_robot.urdf
+    """
+    with faults(context):
+        from sphshell_pin.errors import SphshellError
+        from sphshell_pin.study import robot_check as study
+
+        if every and robot:
+            raise SphshellError("give robots or --all, not both")
+        if not every and not robot:
+            raise SphshellError("say which robots: names, URDF files, or --all")
+        names = study.all_names() if every else list(robot or [])
+        study.check_known(names)
+        for path in (json, write):
+            if path is not None and not path.parent.is_dir():
+                raise SphshellError(f"{path}: there is no folder {path.parent} to write to")
+        sizes = study.QUICK if quick else study.Sizes()
+        reports, stopped = _check(names, frame, radius, free_flyer, seed, sizes)
+        _print(reports)
+        if stopped:
+            left = len(names) - len(reports)
+            typer.echo(f"interrupted: {left} of {len(names)} robots were not checked", err=True)
+            raise typer.Exit(INTERRUPTED)
+        if json is not None:
+            study.write(json, study.as_json(reports, seed, sizes))
+        if write is not None:
+            told = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
+            study.write(write, study.as_markdown(reports, f"{told} --write {write}"))
+        verdicts = [one.verdict for one in reports]
+        # A robot that was asked for by name and cannot be checked is wrong input.
+        unread = not every and study.NOT_CHECKED in verdicts
+        raise typer.Exit(MISSED if study.FAILED in verdicts else ERROR if unread else 0)
+
+
+def _check(
+    names: Sequence[str],
+    frame: str | None,
+    radius: float | None,
+    free_flyer: bool,
+    seed: int,
+    sizes: Sizes,
+) -> tuple[list[RobotReport], bool]:
+    """Return the reports, and whether Ctrl-C came before the last."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    from sphshell_pin.study.robot_check import check_robot
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        console=terminal(err=True),
+        transient=True,
+        disable=not sys.stderr.isatty(),
+    )
+    reports: list[RobotReport] = []
+    with bar:
+        task = bar.add_task("", total=len(names))
+        try:
+            for name in names:
+
+                def tell(title: str, name: str = name) -> None:
+                    bar.update(task, description=f"{Path(name).name}: {title}")
+
+                reports.append(
+                    check_robot(
+                        name,
+                        frame=frame,
+                        radius=radius,
+                        free_flyer=free_flyer,
+                        seed=seed,
+                        sizes=sizes,
+                        progress=tell,
+                    )
+                )
+                bar.advance(task)
+        except KeyboardInterrupt:
+            return reports, True
+    return reports, False
+
+
+def _print(reports: Sequence[RobotReport]) -> None:
+    from sphshell_pin.study.robot_check import CHECKS, PASS, remarks, told
+
+    console = terminal()
+    titles = [check.title for check in CHECKS.values()]
+    if not sys.stdout.isatty():
+        console.width = _PIPE_WIDTH
+    table = make_table("robot", "frame", "nq/nv", *titles, "verdict")
+    table.columns[0].no_wrap = table.columns[-1].no_wrap = True
+    table.columns[1].justify = "left"
+    for one in reports:
+        figures = []
+        for key in CHECKS:
+            text = told(one.findings[key].error) if key in one.findings else ""
+            figures.append(f"[red]{text}[/red]" if text and not one.met(key) else text)
+        colour = "green" if one.verdict == PASS else "red"
+        size = f"{one.nq}/{one.nv}" if one.nv else ""
+        verdict = f"[{colour}]{one.verdict}[/{colour}]"
+        table.add_row(plain(one.name), plain(one.frame), size, *figures, verdict)
+    console.print(table)
+    for sentence in remarks(reports):
+        console.print(sentence, markup=False, highlight=False)
+    passed = sum(one.verdict == PASS for one in reports)
+    console.print(f"{passed} of {len(reports)} robots pass", highlight=False)

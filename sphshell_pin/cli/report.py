@@ -1,0 +1,75 @@
+"""The command report: speed against error on this machine."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sphshell_pin.cli.app import MISSED, app, faults, make_table, plain, terminal
+
+if TYPE_CHECKING:
+    from sphshell_pin.study.report import Report
+
+
+@app.command()
+def report(
+    context: typer.Context,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Under three minutes: fewer rounds and sizes.")
+    ] = False,
+    peers: Annotated[
+        bool, typer.Option("--peers", help="The same scenes in other engines, too.")
+    ] = False,
+    out: Annotated[Path, typer.Option(help="Folder of the page and its tables.")] = Path(
+        "results/report"
+    ),
+) -> None:
+    """Measure speed against error on this machine and write a page of it.
+
+    Contact forces, queries, integrators, steps and hard cases, each against its aim. The machine
+    should have nothing else to do. Exit code 1: a section could not be measured.
+
+    Example: sphshell-pin report --quick
+    """
+    with faults(context):
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        from sphshell_pin.study.report import PAGE, make_report
+
+        bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeElapsedColumn(),
+            console=terminal(err=True),
+            transient=True,
+            disable=not sys.stderr.isatty(),
+        )
+        with bar:
+            task = bar.add_task("report", total=1.0)
+            made = make_report(
+                out,
+                quick=quick,
+                with_peers=peers,
+                command=shlex.join(["sphshell-pin", *sys.argv[1:]]),
+                tell=lambda title, share: bar.update(task, description=title, completed=share),
+            )
+        _print(made)
+        terminal().print(f"page: {out / PAGE}", markup=False, highlight=False)
+    raise typer.Exit(MISSED if made.failed else 0)
+
+
+def _print(made: Report) -> None:
+    table = make_table("figure", "median", "quartiles", "aim", "verdict")
+    for section in made.sections:
+        for finding in section.findings:
+            word = {True: "[green]met[/green]", False: "[red]missed[/red]", None: ""}[finding.met]
+            texts = (finding.what, finding.text, finding.spread_text, finding.aim_text)
+            table.add_row(*(plain(text) for text in texts), word)
+    terminal().print(table)
+    for section in made.failed:
+        typer.echo(f"not measured: {section.title}: {section.error}", err=True)

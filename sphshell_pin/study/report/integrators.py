@@ -1,0 +1,229 @@
+"""Section 3: computing time against error of every integrator."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from sphshell_pin.study.report.contents import (
+    TIMES,
+    Column,
+    Finding,
+    Picture,
+    Progress,
+    Section,
+    Table,
+    benchmark,
+)
+from sphshell_pin.study.report.drawing import (
+    BLUE,
+    FAINT,
+    GREEN,
+    ORANGE,
+    RED,
+    SMALL,
+    VIOLET,
+    drawing,
+    guide,
+    label_ends,
+    logarithmic,
+    power_of_ten,
+    to_svg,
+)
+
+KEY, TITLE = "integrators", "Work and precision of the integrators"
+COLORS = {
+    "SemiImplicitEuler": (ORANGE, "^", "semi-implicit"),
+    "LinearlyImplicitEuler": (RED, "v", "linearly implicit"),
+    "RungeKutta4": (GREEN, "s", "Runge-Kutta 4"),
+    "Adaptive": (BLUE, "o", "adaptive"),
+    "Implicit": (VIOLET, "D", "implicit"),
+}
+LARGEST_DRAWN = 0.3
+EXPLICIT = ("SemiImplicitEuler", "RungeKutta4", "Adaptive")
+ERRORS = (1e-2, 1e-4, 1e-6)
+TEXT = """\
+Every integrator with many steps or tolerances, CPU seconds per simulated second against the largest
+error at any instant. Three cases have a closed form: a ball that bobs on a spring without leaving
+it (order of convergence), one that bounces five times (touches and lift-offs), and one that glides
+on a plate so stiff and damped that an explicit method is bound to steps of 1e-5 s by a motion that
+has long died out. The others are judged by a much finer run of a method of another kind: a ball
+that swings in a bowl of curved elements, a Panda that slides a steel ball on steel, a block that
+sticks and slips on a belt."""
+
+
+def section(*, quick: bool, progress: Progress) -> Section:
+    """Measure and return the section."""
+    analytic, referenced = benchmark("analytic_cases"), benchmark("work_precision_cases")
+    work, timing = benchmark("work_precision"), benchmark("timing")
+    judges = [analytic.bob(), analytic.bounces(), analytic.glide()]
+    others = [referenced.bowl()]
+    if not quick:
+        others += [referenced.press(), referenced.stick_slip()]
+    judges += [work.Judge(case) for case in others]
+    rows, cases = [], []
+    for k, judge in enumerate(judges):
+        case = work.thinned(judge.case) if quick else judge.case
+        cases.append(case)
+        share = timing.part(progress, 0.9 * k / len(judges), 0.9 * (k + 1) / len(judges))
+        rows += work.measure(case, judge, 1 if quick else 3, share)
+    swing = benchmark("swing")
+    swings = swing.measure(swing.mesh_scene(swing.bowl(0.15)), swing.reference_period())
+    progress(1.0)
+    notes = ["The Panda, the block and the finest settings were left out (--quick)."]
+    return assemble(cases, rows, swings, notes if quick else [])
+
+
+def assemble(
+    cases: list[Any], rows: list[Any], swings: Any, notes: list[str] | None = None
+) -> Section:
+    """Return the section of what was measured."""
+    return Section(
+        KEY,
+        TITLE,
+        TEXT,
+        findings=findings_of(rows, swings),
+        pictures=[picture(cases, rows)],
+        tables=[costs_table(cases, rows), rows_table(rows)],
+        notes=notes or [],
+    )
+
+
+def cheapest(rows: list[Any], case: str, integrators: tuple[str, ...], error: float) -> float:
+    """Return the least CPU time per simulated second of a setting with at most this error."""
+    return min(
+        (
+            r.cpu
+            for r in rows
+            if r.case == case and r.integrator in integrators and r.error <= error
+        ),
+        default=math.nan,
+    )
+
+
+def findings_of(rows: list[Any], swings: Any) -> list[Finding]:
+    """Return the figures of the section."""
+    stiff = cheapest(rows, "glide", EXPLICIT, 1e-4) / cheapest(rows, "glide", ("Implicit",), 1e-4)
+    bounce = min(
+        (r.error for r in rows if (r.case, r.integrator) == ("bounces", "Implicit")),
+        default=math.nan,
+    )
+    return [
+        Finding(
+            "swing_period",
+            "frictionless bowl swing, h / r = 0.15, 8 azimuths, 4 periods: error of the period",
+            swings.rms,
+            aim=5e-7,
+            headline=True,
+        ),
+        Finding(
+            "swing_energy",
+            "the same: largest change of energy / energy of the swing",
+            swings.energy,
+            aim=1e-6,
+        ),
+        Finding(
+            "stiff_cost",
+            "stiff contact, error 1e-4: CPU time of the best explicit method / Implicit",
+            stiff,
+            TIMES,
+            headline=True,
+        ),
+        Finding("bounces_error", "five bounces on a spring: least error reached", bounce),
+    ]
+
+
+def costs_table(cases: list[Any], rows: list[Any]) -> Table:
+    """Return what an error costs: the cheapest setting of each integrator."""
+    cells = [
+        (
+            case.title,
+            name,
+            *(cheapest(rows, case.name, (name,), error) for error in ERRORS),
+        )
+        for case in cases
+        for name in COLORS
+    ]
+    columns = [Column(f"cpu_at_{error:.0e}", f"error {power_of_ten(error)}") for error in ERRORS]
+    return Table(
+        "integrators_costs",
+        "CPU seconds per simulated second of the cheapest setting with at most this error; a "
+        "dash where no setting that was tried gets there.",
+        (Column("case", "case"), Column("integrator", "integrator"), *columns),
+        cells,
+    )
+
+
+def rows_table(rows: list[Any]) -> Table:
+    """Return every setting."""
+    return Table(
+        "integrators",
+        "All settings.",
+        (
+            Column("case", "case"),
+            Column("integrator", "integrator"),
+            Column("setting", "setting"),
+            Column("error", "error"),
+            Column("cpu_s_per_s", "CPU s/s"),
+            Column("evaluations_per_s", "evaluations / s"),
+            Column("steps", "steps"),
+            Column("rejected", "rejected"),
+        ),
+        [
+            (r.case, r.integrator, r.setting, r.error, r.cpu, r.evaluations, r.steps, r.rejected)
+            for r in rows
+        ],
+        folded=True,
+    )
+
+
+def picture(cases: list[Any], rows: list[Any]) -> Picture:
+    """Draw cost against error, one panel per case."""
+    lines = -(-len(cases) // 2)
+    with drawing(7.8, 2.75 * lines) as figure:
+        figure.get_layout_engine().set(h_pad=0.12)
+        panels = figure.subplots(lines, 2, sharey=True, squeeze=False).ravel()
+        for axis, case in zip(panels, cases, strict=False):
+            logarithmic(axis, every=(2, 1))
+            axis.set_title(case.title)
+            axis.set_xlabel(case.judged, fontsize=SMALL)
+            for name, (color, marker, _) in COLORS.items():
+                found = drawn(rows, case, name)
+                axis.plot(
+                    [r.error for r in found], [r.cpu for r in found], color=color, marker=marker
+                )
+            axis.axhline(1.0, color=FAINT, linewidth=0.8, linestyle=(0, (4, 3)))
+            axis.invert_xaxis()
+        guide(panels[0], (1e-4, 1.5e-3), 1e-7, -0.25, "order 4")
+        panels[0].annotate(
+            "real time", (0.99, 1.0), xycoords=("axes fraction", "data"), xytext=(0, 3),
+            textcoords="offset points", color=FAINT, fontsize=SMALL, ha="right",
+        )  # fmt: skip
+        for axis, case in zip(panels, cases, strict=False):  # now that all have their limits
+            ends = []
+            for name, (color, _, label) in COLORS.items():
+                found = drawn(rows, case, name)
+                if found:
+                    ends.append((found[-1].error, found[-1].cpu, label, color))
+            label_ends(axis, ends)
+        for axis in panels[len(cases) :]:
+            axis.set_visible(False)
+        figure.supylabel("CPU seconds per simulated second", fontsize=SMALL + 1)
+        svg = to_svg(figure, "integrators")
+    return Picture(
+        svg,
+        "CPU time against error of five integrators, one panel per case.",
+        "More precise to the right, dearer upwards; every line goes from coarse to fine settings. "
+        f"Settings with an error above {LARGEST_DRAWN} are left to the table.",
+    )
+
+
+def drawn(rows: list[Any], case: Any, integrator: str) -> list[Any]:
+    """Return the rows of a line of the picture."""
+    return [
+        r
+        for r in rows
+        if (r.case, r.integrator) == (case.name, integrator)
+        and r.error <= LARGEST_DRAWN
+        and r.cpu > 0
+    ]

@@ -1,0 +1,230 @@
+"""Measure the sections one after another, and write the page and its tables."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import dataclasses
+import io
+import json
+import math
+import os
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
+from sphshell_pin.plot.figure import new_figure
+from sphshell_pin.study.report import forces, hard_cases, integrators, peers, queries, steps
+from sphshell_pin.study.report.contents import Progress, Section, Table, benchmark
+from sphshell_pin.study.report.machine import describe
+from sphshell_pin.study.report.page import render
+
+PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
+Tell = Callable[[str, float], None]  # told the section's title and the share of all that is done
+
+
+class Measure(Protocol):
+    """Measures a section."""
+
+    def __call__(self, *, quick: bool, progress: Progress) -> Section:
+        """Return the section."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A section to be: `seconds` it takes, about, with --quick and in full; `pinned` to a core."""
+
+    key: str
+    title: str
+    measure: Measure
+    seconds: tuple[float, float]
+    pinned: bool = True
+
+
+PARTS = (
+    Part(forces.KEY, forces.TITLE, forces.section, (8.0, 20.0)),
+    Part(queries.KEY, queries.TITLE, queries.section, (40.0, 300.0)),
+    Part(integrators.KEY, integrators.TITLE, integrators.section, (10.0, 120.0)),
+    Part(steps.KEY, steps.TITLE, steps.section, (15.0, 60.0)),
+    Part(hard_cases.KEY, hard_cases.TITLE, hard_cases.section, (60.0, 300.0), pinned=False),
+)
+PEERS = Part(peers.KEY, peers.TITLE, peers.section, (180.0, 1200.0), pinned=False)
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was measured, on which machine."""
+
+    sections: list[Section]
+    machine: dict[str, str]
+
+    @property
+    def failed(self) -> list[Section]:
+        """The sections that could not be measured."""
+        return [section for section in self.sections if section.error is not None]
+
+
+def make_report(
+    out: Path,
+    *,
+    quick: bool = False,
+    with_peers: bool = False,
+    command: str = "",
+    tell: Tell | None = None,
+) -> Report:
+    """Measure everything, then write the page and its tables to the folder `out`.
+
+    An error of one section is told in that section. Nothing is written before all is measured, so
+    that an interrupted run leaves what was there. `tell` hears how far it is.
+
+    Raises
+    ------
+    MissingExtra
+        Without matplotlib (the extra `view`).
+    ResultError
+        Where the folder cannot be written.
+    """
+    new_figure(1.0, 1.0)  # raises now what would be raised at the end
+    _check_folder(out)
+    begin = time.perf_counter()
+    machine = describe(command)
+    parts = (*PARTS, PEERS) if with_peers else PARTS
+    whole = sum(part.seconds[not quick] for part in parts)
+    sections, done = [], 0.0
+    for part in parts:
+        share = part.seconds[not quick] / whole
+
+        def progress(
+            of_part: float, part: Part = part, base: float = done, all_: float = share
+        ) -> None:
+            if tell is not None:
+                tell(part.title, base + all_ * of_part)
+
+        progress(0.0)
+        sections.append(measured(part, quick=quick, progress=progress))
+        done += share
+    if not with_peers:
+        sections.append(peers.left_out())
+    machine["measured in"] = f"{time.perf_counter() - begin:.0f} s{', quick' if quick else ''}"
+    report = Report(sections, machine)
+    write(report, out)
+    return report
+
+
+def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
+    """Return the section, or one that says what went wrong."""
+    timing = benchmark("timing")
+    begin = time.perf_counter()
+    try:
+        with warnings.catch_warnings():
+            # Steps are timed with a soft sheet, which fast robots might fall through.
+            warnings.simplefilter("ignore", WeakLawWarning)
+            with timing.on_one_core() if part.pinned else contextlib.nullcontext():
+                section = part.measure(quick=quick, progress=progress)
+    except KeyboardInterrupt:
+        raise
+    except Exception as error:
+        told = (
+            str(error) if isinstance(error, SphshellError) else f"{type(error).__name__}: {error}"
+        )
+        section = Section(part.key, part.title, error=told)
+    return dataclasses.replace(section, seconds=time.perf_counter() - begin)
+
+
+def write(report: Report, out: Path) -> None:
+    """Write page, tables and data to the folder `out`; whole files take the place of old ones."""
+    tables = [table for section in report.sections for table in section.tables]
+    files = {f"{table.name}.csv": csv_text(table) for table in tables}
+    files[f"{FINDINGS}.csv"] = findings_text(report.sections)
+    files[DATA] = json_text(report, sorted(files))
+    files[PAGE] = render(report.sections, report.machine)
+    stale = set(_files_of_old(out)) - set(files)
+    try:
+        beside = {name: out / f".{name}.new" for name in files}
+        for name, text in files.items():
+            beside[name].write_text(text, encoding="utf-8")
+        for name, path in beside.items():
+            os.replace(path, out / name)
+        for name in stale:
+            (out / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise ResultError(out, f"cannot be written: {error.strerror}") from None
+
+
+def _files_of_old(out: Path) -> list[str]:
+    """Return the tables of the report that is in the folder."""
+    try:
+        names = json.loads((out / DATA).read_text(encoding="utf-8"))["files"]
+        return [name for name in names if Path(name).name == name and name.endswith(".csv")]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        return []
+
+
+def _check_folder(out: Path) -> None:
+    """Make the folder; raise where no file can be made in it."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        probe = out / f".{DATA}.new"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise ResultError(out, f"cannot hold a report: {error.strerror}") from None
+
+
+def csv_text(table: Table) -> str:
+    """Return a table as csv, with all digits."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([column.key for column in table.columns])
+    writer.writerows(table.rows)
+    return stream.getvalue()
+
+
+def findings_text(sections: list[Section]) -> str:
+    """Return all findings as csv."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    keys = ("section", "key", "what", "value", "unit", "low", "high", "sense", "aim", "met")
+    writer.writerow((*keys, "text"))
+    for section in sections:
+        for f in section.findings:
+            sense = "" if f.aim is None else f.sense
+            writer.writerow(
+                (section.key, f.key, f.what, f.value, f.unit, f.low, f.high, sense, f.aim)
+                + (f.met, f.text)
+            )
+    return stream.getvalue()
+
+
+def json_text(report: Report, files: list[str]) -> str:
+    """Return the report's data but for its tables, which are in `files`."""
+    data: dict[str, Any] = {
+        "machine": report.machine,
+        "files": files,
+        "sections": [
+            {
+                "key": section.key,
+                "title": section.title,
+                "error": section.error,
+                "seconds": section.seconds,
+                "notes": section.notes,
+                "findings": [dataclasses.asdict(f) | {"met": f.met} for f in section.findings],
+                "tables": [table.name for table in section.tables],
+            }
+            for section in report.sections
+        ],
+    }
+    return json.dumps(_finite(data), indent=1) + "\n"
+
+
+def _finite(data: Any) -> Any:
+    """Return the data with None for what JSON has no number for."""
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data

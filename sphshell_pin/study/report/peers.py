@@ -1,0 +1,259 @@
+"""Section 6: the same scenes in other engines."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from sphshell_pin.study.report.contents import (
+    TIMES,
+    Column,
+    Finding,
+    Picture,
+    Progress,
+    Section,
+    Table,
+    benchmark,
+    number,
+)
+from sphshell_pin.study.report.drawing import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    SMALL,
+    VIOLET,
+    drawing,
+    logarithmic,
+    to_svg,
+)
+
+KEY, TITLE = "peers", "Other engines"
+# Name on the page, colour, marker; of an engine that is not here, its own name in grey.
+LOOKS = {
+    "ours": ("sphshell_pin", BLUE, "o"),
+    "mujoco": ("MuJoCo", RED, "v"),
+    "drake": ("Drake", GREEN, "s"),
+    "pybullet": ("PyBullet", ORANGE, "^"),
+    "loop": ("Python loop", VIOLET, "D"),
+}
+SWING = "bowl"
+ABOUT = 100  # rows of a whole measurement, for the progress
+TEXT = """\
+The same scenes, each with a truth that no engine computes, in other engines. Every engine runs in a
+process of its own on one core, with the settings that its documentation recommends; the errors are
+worked out from the motion of the ball alone, in the same way for all. Costs are CPU time of
+stepping. In the swing each peer is taken at its best error and this package at its cheapest setting
+that is at least as good in period and energy; ratios are measured in turns."""
+MISSING = "Engines that are not installed have no figures here: pip install 'sphshell-pin[peers]'."
+
+
+def left_out() -> Section:
+    """Return the section of a report without peers."""
+    return Section(
+        KEY,
+        TITLE,
+        notes=[
+            "Left out of this run: sphshell-pin report --peers measures the same scenes in MuJoCo, "
+            "Drake, PyBullet and a Python loop (pip install 'sphshell-pin[peers]')."
+        ],
+    )
+
+
+def section(*, quick: bool, progress: Progress) -> Section:
+    """Measure and return the section."""
+    measuring = benchmark("peers.measuring")
+    told: list[str] = []
+
+    def say(line: str) -> None:
+        told.append(line)
+        progress(len(told) / (len(told) + ABOUT / 2))
+
+    rows, ratios = measuring.measure(quick=quick, say=say)
+    titles = {name: make().title for name, make in benchmark("peers.scenes").SCENES.items()}
+    return assemble(rows, ratios, titles)
+
+
+def assemble(rows: list[Any], ratios: list[Any], titles: dict[str, str]) -> Section:
+    """Return the section of what was measured; `titles` of the scenes by name."""
+    scenes = list(dict.fromkeys(row.scene for row in rows))
+    drawn = [row for row in rows if row.scene == SWING and not row.note]
+    return Section(
+        KEY,
+        TITLE,
+        TEXT,
+        findings=findings_of(ratios),
+        pictures=[picture(drawn)] if drawn else [],
+        tables=[
+            ratios_table(ratios),
+            *(scene_table(rows, scene, titles.get(scene, scene)) for scene in scenes),
+            settings_table(rows),
+        ],
+        notes=notes_of(rows),
+    )
+
+
+def name_of(engine: str) -> str:
+    """Return the name of an engine on the page."""
+    return LOOKS.get(engine, (engine, GREY, "P"))[0]
+
+
+def notes_of(rows: list[Any]) -> list[str]:
+    """Return versions, and who is missing."""
+    versions = dict.fromkeys(row.version for row in rows if row.version)
+    absent = any(row.note.startswith("not installed") for row in rows)
+    return [f"Versions: {', '.join(versions)}.", *([MISSING] if absent else [])]
+
+
+def findings_of(ratios: list[Any]) -> list[Finding]:
+    """Return the ratios that count: the fastest peer at the press, the best at the swing."""
+    press = [r for r in ratios if r.peer.scene == "press"]
+    swings = [r for r in ratios if r.peer.scene.startswith(SWING)]
+    found = []
+    if press:
+        fastest = min(press, key=lambda r: r.median)
+        found.append(
+            _finding(
+                "peers_press",
+                "Panda press with control on 200 k triangles, time of a step: fastest peer "
+                f"({name_of(fastest.peer.engine)}) / ours",
+                fastest,
+                1.6,
+            )
+        )
+    if swings:
+        best = min(swings, key=lambda r: r.peer.errors["period"] * r.peer.errors["energy"])
+        found.append(
+            _finding(
+                "peers_swing",
+                "bowl swing, CPU time at equal errors of period and energy: peer of the best "
+                f"error ({name_of(best.peer.engine)}) / ours",
+                best,
+                100.0,
+            )
+        )
+    return found
+
+
+def _finding(key: str, what: str, ratio: Any, aim: float) -> Finding:
+    return Finding(
+        key, what, ratio.median, TIMES, ratio.low, ratio.high, aim, sense=">=", headline=True
+    )
+
+
+def knob_text(knob: dict[str, Any]) -> str:
+    """Return a setting in a few words."""
+    return ", ".join(
+        f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {value}"
+        for name, value in knob.items()
+    )
+
+
+def errors_text(errors: dict[str, float]) -> str:
+    """Return errors as "period 2.0e-4, energy ..."."""
+    return ", ".join(f"{name} {number(value)}" for name, value in errors.items())
+
+
+def ratios_table(ratios: list[Any]) -> Table:
+    """Return every peer's ratio."""
+    return Table(
+        "peers_ratios",
+        "Cost of a peer over ours, in turns.",
+        (
+            Column("scene", "scene"),
+            Column("peer", "peer"),
+            Column("ratio", f"peer / ours [{TIMES}]"),
+            Column("low", "lower quartile"),
+            Column("high", "upper quartile"),
+            Column("peer_errors", "its errors"),
+            Column("our_errors", "ours"),
+            Column("peer_setting", "its setting"),
+            Column("our_setting", "ours"),
+        ),
+        [
+            (r.what, name_of(r.peer.engine), r.median, r.low, r.high)
+            + (errors_text(r.peer.errors), errors_text(r.ours.errors))
+            + (knob_text(r.peer.knob), knob_text(r.ours.knob))
+            for r in ratios
+        ],
+    )
+
+
+def scene_table(rows: list[Any], scene: str, title: str) -> Table:
+    """Return all settings of all engines in one scene."""
+    found = [row for row in rows if row.scene == scene]
+    names = list(dict.fromkeys(name for row in found for name in row.errors))
+    unit = next((row.unit for row in found if row.unit), "")
+    return Table(
+        f"peers_{scene.replace(' ', '_')}",
+        f"{title}.",
+        (
+            Column("engine", "engine"),
+            Column("setting", "setting"),
+            *(Column(name.replace(" ", "_"), name) for name in names),
+            Column("cost", unit),
+            Column("low", "lower quartile"),
+            Column("high", "upper quartile"),
+            Column("note", "note"),
+        ),
+        [
+            (name_of(row.engine), knob_text(row.knob))
+            + tuple(row.errors.get(name, math.nan) for name in names)
+            + (row.cost, row.low, row.high, row.note)
+            for row in found
+        ],
+        folded=True,
+    )
+
+
+def settings_table(rows: list[Any]) -> Table:
+    """Return what was set in each engine, and who recommends it."""
+    told = dict.fromkeys(
+        (name_of(row.engine), row.scene, name, str(text))
+        for row in rows
+        for name, text in row.settings.items()
+    )
+    return Table(
+        "peers_settings",
+        "Settings, and where they are recommended.",
+        (
+            Column("engine", "engine"),
+            Column("scene", "scene"),
+            Column("setting", "setting"),
+            Column("text", "value and source"),
+        ),
+        list(told),
+        folded=True,
+    )
+
+
+def picture(rows: list[Any]) -> Picture:
+    """Draw the cost of the swing against its errors, a dot per setting."""
+    with drawing(7.8, 3.7) as figure:
+        panels = figure.subplots(1, 2, sharey=True)
+        engines = list(dict.fromkeys(row.engine for row in rows))
+        for axis, what in zip(panels, ("period", "energy"), strict=True):
+            logarithmic(axis, every=(2, 1))
+            axis.set_title(f"error of the {what}")
+            axis.invert_xaxis()
+            for engine in engines:
+                _, color, marker = LOOKS.get(engine, (engine, GREY, "P"))
+                found = [row for row in rows if row.engine == engine and row.errors[what] > 0]
+                axis.plot(
+                    [row.errors[what] for row in found], [row.cost for row in found], marker,
+                    color=color, label=name_of(engine), markersize=5, alpha=0.85,
+                )  # fmt: skip
+        panels[0].set_ylabel("CPU seconds per simulated second")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(
+            handles, labels, loc="outside upper center", ncols=len(labels), frameon=False,
+            fontsize=SMALL,
+        )  # fmt: skip
+        svg = to_svg(figure, "peers")
+    return Picture(
+        svg,
+        f"CPU time against errors of the bowl swing for {', '.join(map(name_of, engines))}.",
+        "The swing in the bowl, triangles of 0.3 r: a dot is a setting of an engine; more precise "
+        "to the right, dearer upwards.",
+    )

@@ -1,0 +1,251 @@
+"""Section 2: time and memory of a query, against other codes and the number of triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from sphshell_pin.study.report.contents import (
+    TIMES,
+    Column,
+    Finding,
+    Picture,
+    Progress,
+    Section,
+    Table,
+    benchmark,
+    microseconds,
+    number,
+)
+from sphshell_pin.study.report.drawing import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    VIOLET,
+    drawing,
+    guide,
+    label_ends,
+    logarithmic,
+    to_svg,
+)
+
+KEY, TITLE = "queries", "Time and memory of a query"
+COLORS = {
+    "smooth": (BLUE, "o"),
+    "facets": (GREEN, "s"),
+    "coal::collide": (RED, "v"),
+    "trimesh": (ORANGE, "^"),
+    "libigl": (VIOLET, "D"),
+    "fcpw": (GREY, "P"),
+}
+TEXT = """\
+All contacts of a 10 mm sphere pressed 0.5 mm into a wavy sheet, at random positions that the caches
+do not know, on one core. Coal, in a compiled loop, collects a contact for every triangle that is
+touched; trimesh, libigl and fcpw (in single precision) answer the smaller question of the one
+closest point. The sheet grows at equal size of its triangles, so that the sphere always touches the
+same number of them. In the picture every contestant has a process of its own; memory is what it
+holds after its first query. The ratios among the findings are measured in turn in one process."""
+
+
+def section(*, quick: bool, progress: Progress) -> Section:
+    """Measure and return the section."""
+    query, sizes, timing = benchmark("query"), benchmark("sizes"), benchmark("timing")
+    convergence = benchmark("convergence")
+    rounds = 5 if quick else 15
+    peers = query.measure_peers(rounds, timing.part(progress, 0.0, 0.1))
+    cells = query.SHEETS[:3] if quick else query.SHEETS
+    growth = query.measure_sizes(rounds, timing.part(progress, 0.1, 0.2), cells)
+    cost = convergence.measure_cost(rounds, timing.part(progress, 0.2, 0.3))
+    chosen = sizes.QUICK_CELLS if quick else sizes.CELLS
+    rows, notes = sizes.measure(chosen, 3 if quick else 7, timing.part(progress, 0.3, 1.0))
+    if quick:
+        notes.append("Sheets of more than 200 k triangles were left out (--quick).")
+    return assemble(peers, growth, cost, rows, notes)
+
+
+def assemble(
+    peers: dict[str, Any],
+    growth: dict[int, Any],
+    cost: dict[str, dict[str, Any]],
+    rows: list[Any],
+    notes: list[str],
+) -> Section:
+    """Return the section of what was measured."""
+    return Section(
+        KEY,
+        TITLE,
+        TEXT,
+        findings=findings_of(peers, growth, cost),
+        pictures=[picture(rows)] if rows else [],
+        tables=[peers_table(peers), cost_table(cost), growth_table(growth), sizes_table(rows)],
+        notes=notes,
+    )
+
+
+def finding(key: str, what: str, figures: Any, **more: Any) -> Finding:
+    """Return a finding on a ratio that every round gave."""
+    spread = benchmark("timing").Spread.of(figures)
+    return Finding(key, what, spread.median, TIMES, spread.low, spread.high, **more)
+
+
+def findings_of(
+    peers: dict[str, Any], growth: dict[int, Any], cost: dict[str, dict[str, Any]]
+) -> list[Finding]:
+    """Return the ratios that have aims."""
+    query = benchmark("query")
+    this = peers[query.THIS]
+    found = [
+        finding(
+            "query_coal",
+            "query, 200 k triangles: time of coal::collide with all contacts / ours (facets)",
+            peers[query.COAL] / this,
+            aim=15.0,
+            sense=">=",
+            headline=True,
+        )
+    ]
+    for key, name, label in (
+        ("query_libigl", query.LIBIGL, "libigl's AABB tree (closest point)"),
+        ("query_fcpw", query.FCPW, "single-precision fcpw (closest point)"),
+    ):
+        if name in peers:
+            what = f"the same against {label}"
+            found.append(finding(key, what, peers[name] / this, aim=1.0, sense=">="))
+    few, lot = min(growth), max(growth)
+    found += [
+        finding(
+            "query_growth",
+            f"query at equal contact patch: {number(lot)} / {number(few)} triangles",
+            growth[lot] / growth[few],
+            aim=4.0,
+        ),
+        finding(
+            "query_smooth",
+            "query, 200 k triangles: curved elements / flat ones",
+            cost["wavy sheet"]["smooth"] / cost["wavy sheet"]["facets"],
+            aim=1.5,
+        ),
+    ]
+    return found
+
+
+def times_columns(*first: Column) -> tuple[Column, ...]:
+    """Return columns of a time and its quartiles behind `first`."""
+    return (
+        *first,
+        Column("median_s", "median [us]", microseconds),
+        Column("low_s", "lower quartile", microseconds),
+        Column("high_s", "upper quartile", microseconds),
+    )
+
+
+def spread(times: Any) -> tuple[float, float, float]:
+    """Return median and quartiles."""
+    of = benchmark("timing").Spread.of(np.asarray(times))
+    return of.median, of.low, of.high
+
+
+def peers_table(peers: dict[str, Any]) -> Table:
+    """Return the times on 200 k triangles."""
+    this = peers[benchmark("query").THIS]
+    columns = times_columns(Column("code", "200 k triangles"))
+    return Table(
+        "queries_peers",
+        "A query on 200 k triangles, in turn in one process; ours is the method facets.",
+        (*columns, Column("over_ours", f"over ours [{TIMES}]")),
+        [(name, *spread(t), float(np.median(t / this))) for name, t in peers.items()],
+    )
+
+
+def cost_table(cost: dict[str, dict[str, Any]]) -> Table:
+    """Return the times of our methods."""
+    columns = times_columns(Column("surface", "200 k triangles"), Column("method", "method"))
+    return Table(
+        "queries_methods",
+        "What a method costs.",
+        (*columns, Column("over_facets", f"over facets [{TIMES}]")),
+        [
+            (surface, method, *spread(t), float(np.median(t / times["facets"])))
+            for surface, times in cost.items()
+            for method, t in times.items()
+        ],
+    )
+
+
+def growth_table(growth: dict[int, Any]) -> Table:
+    """Return our time at equal contact patch."""
+    few = growth[min(growth)]
+    columns = times_columns(Column("triangles", "triangles"))
+    return Table(
+        "queries_growth",
+        "Our query (facets) at equal contact patch, in turn in one process.",
+        (*columns, Column("over_smallest", f"over the smallest [{TIMES}]")),
+        [(count, *spread(t), float(np.median(t / few))) for count, t in growth.items()],
+    )
+
+
+def sizes_table(rows: list[Any]) -> Table:
+    """Return times and memory of all contestants at all sizes."""
+    columns = times_columns(
+        Column("code", "code"), Column("question", "answers"), Column("triangles", "triangles")
+    )
+    return Table(
+        "queries_sizes",
+        "Every contestant in a process of its own: query, building, memory held.",
+        (
+            *columns,
+            Column("build_s", "build [s]"),
+            Column("memory_bytes", "memory [MB]", lambda m: number(m / 1e6)),
+            Column("bytes_per_triangle", "bytes / triangle"),
+        ),
+        [
+            (row.name, row.question, row.triangles, row.query.median, row.query.low)
+            + (row.query.high, row.build, row.memory, row.memory / row.triangles)
+            for row in rows
+        ],
+        folded=True,
+    )
+
+
+def picture(rows: list[Any]) -> Picture:
+    """Draw time and memory against the number of triangles."""
+    with drawing(7.8, 3.9) as figure:
+        panels = figure.subplots(1, 2)
+        values: tuple[tuple[str, Callable[[Any], float]], ...] = (
+            ("time of a query [us]", lambda r: r.query.median * 1e6),
+            ("memory held [MB]", lambda r: r.memory / 1e6),
+        )
+        for axis, (title, value) in zip(panels, values, strict=True):
+            logarithmic(axis, counts=True)
+            axis.set_title(title)
+            axis.set_xlabel("triangles")
+            ends = []
+            for name, (color, marker) in COLORS.items():
+                line = [r for r in rows if r.name == name and value(r) > 0]
+                if not line:
+                    continue
+                x = [r.triangles for r in line]
+                axis.plot(x, [value(r) for r in line], color=color, marker=marker)
+                ends.append((x[-1], value(line[-1]), name, color))
+            axis.margins(x=0.04, y=0.12)
+            if axis is panels[0]:
+                for row in rows:
+                    low, high = row.query.low * 1e6, row.query.high * 1e6
+                    axis.plot([row.triangles] * 2, [low, high], color=COLORS[row.name][0])
+            else:
+                count = [r.triangles for r in rows]
+                start = (min(count) * 3, 0.4 * min(value(r) for r in rows if value(r) > 0))
+                guide(axis, start, max(count) / 30, 1, "~ triangles")
+            label_ends(axis, ends, gap=0.06)
+        svg = to_svg(figure, "queries")
+    largest = max(r.triangles for r in rows)
+    return Picture(
+        svg,
+        f"Query time and memory from a thousand to {number(largest)} triangles for "
+        f"{', '.join(sorted({r.name for r in rows}, key=list(COLORS).index))}.",
+        "Left: median time of a query, with quartiles. Right: memory held after the first query.",
+    )

@@ -1,0 +1,153 @@
+"""Is contact right on this robot? Seven checks against ways apart from the compiled core.
+
+`check_robot` takes a name that sphshell_pin.robots knows or a URDF file, and returns a RobotReport.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from sphshell_pin.checks import check_finite, check_positive
+from sphshell_pin.errors import FrameNotFound, MissingExtra, NameNotFound, SphshellError
+from sphshell_pin.study.robot_check.checks import CHECKS, QUICK, SPEED, Check, Sizes, run_checks
+from sphshell_pin.study.robot_check.models import all_names, check_known, load_subject
+from sphshell_pin.study.robot_check.report import (
+    FAILED,
+    NOT_CHECKED,
+    PASS,
+    RobotReport,
+    as_json,
+    as_markdown,
+    remarks,
+    told,
+    write,
+)
+from sphshell_pin.study.robot_check.setting import Touch, fixed_touch, free_touch, setting_of
+
+__all__ = [
+    "CHECKS",
+    "FAILED",
+    "NOT_CHECKED",
+    "PASS",
+    "QUICK",
+    "Check",
+    "RobotReport",
+    "Sizes",
+    "Touch",
+    "all_names",
+    "as_json",
+    "as_markdown",
+    "check_known",
+    "check_robot",
+    "contact_scene",
+    "remarks",
+    "told",
+    "write",
+]
+
+
+def check_robot(
+    robot: Any,
+    *,
+    frame: str | None = None,
+    radius: float | None = None,
+    free_flyer: bool = False,
+    seed: int = 0,
+    sizes: Sizes | None = None,
+    progress: Callable[[str], object] | None = None,
+) -> RobotReport:
+    """Check contact on a robot: a name that sphshell_pin.robots knows, a URDF file, or a model.
+
+    A sphere of `radius` [m] sits at `frame`; without them it is a fingertip or foot that is known,
+    else the end of the longest limb. `free_flyer` frees the root link of a URDF file. Meshes are
+    not loaded. The same `seed` gives the same postures; `sizes` says how many; `progress` is called
+    with the title of each check before it starts. A model is a pinocchio.Model.
+
+    A robot that cannot be loaded on this machine, or whose sphere nothing can move, is reported as
+    not checked, with the reason.
+
+    Raises
+    ------
+    NameNotFound, SphshellError
+        There is no such robot or file.
+    FrameNotFound
+        The robot has no frame of that name.
+    MissingExtra
+        The robot comes from a package that is not installed.
+    InvalidParameter
+        `radius` is not positive, or `free_flyer` is asked of a robot that is no URDF file.
+    """
+    if radius is not None:
+        radius = check_positive("radius", radius, "m")
+    try:
+        subject = load_subject(robot, free_flyer=free_flyer)
+    except (MissingExtra, NameNotFound):
+        raise
+    except _load_fault() as error:
+        return RobotReport(str(robot), reason=str(error))
+    rng = _random(seed, subject.name)
+    try:
+        setting = setting_of(subject, rng, frame, radius)
+        findings = run_checks(setting, rng, sizes or Sizes(), progress or (lambda _: None))
+    except FrameNotFound:
+        raise
+    except SphshellError as error:
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        model = subject.robot.model
+        return RobotReport(
+            subject.name, nq=model.nq, nv=model.nv, notes=subject.notes, reason=str(error)
+        )
+    return RobotReport(
+        subject.name,
+        setting.sphere.frame,
+        setting.radius,
+        setting.model.nq,
+        setting.model.nv,
+        findings,
+        setting.notes,
+    )
+
+
+def contact_scene(
+    robot: Any,
+    *,
+    frame: str | None = None,
+    radius: float | None = None,
+    depth: float = 0.1,
+    free: bool = False,
+    free_flyer: bool = False,
+    seed: int = 0,
+) -> Touch:
+    """Return a scene of a robot whose sphere is `depth` [radii] deep in a curved patch.
+
+    Robot, frame, radius and seed are those of `check_robot`. At a random legal posture and velocity
+    (`q`, `v` of what is returned) the sphere moves into the patch. The patch is fixed to the world;
+    with `free` it floats, as the robot's root does, without gravity. A negative depth is a gap. The
+    contact has damping and friction that fit the mass it feels.
+
+    Raises what `check_robot` raises, and SphshellError if no joint moves the sphere.
+    """
+    if radius is not None:
+        radius = check_positive("radius", radius, "m")
+    subject = load_subject(robot, free_flyer=free_flyer)
+    rng = _random(seed, subject.name)
+    setting = setting_of(subject, rng, frame, radius)
+    make = free_touch if free else fixed_touch
+    return make(setting, rng, -check_finite("depth", depth), SPEED * setting.radius)
+
+
+def _random(seed: int, name: str) -> np.random.Generator:
+    """Return random numbers that do not depend on which other robots are checked."""
+    return np.random.default_rng([seed, zlib.crc32(name.encode())])
+
+
+def _load_fault() -> type[SphshellError]:
+    from sphshell_pin import robots
+
+    fault: type[SphshellError] = robots.RobotError
+    return fault

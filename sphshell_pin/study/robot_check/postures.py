@@ -1,0 +1,104 @@
+"""Legal random postures, and joints that no forward dynamics can move."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.testing.forces import joint_names, mass_matrix
+
+Array = NDArray[np.float64]
+
+# Below this, of mass matrices with a unit diagonal, rounding decides the accelerations.
+_SINGULAR = 1e-9
+
+
+def random_posture(model: Any, rng: np.random.Generator) -> Array:
+    """Return a random configuration (nq,) within the joints' limits.
+
+    Where a joint has none (or more than a turn) it lies within half a turn [rad] or half a metre of
+    its neutral place; free bodies are turned anyhow within half a metre of the origin.
+    """
+    move = np.zeros(model.nv)
+    limited: list[tuple[int, float]] = []
+    for joint in list(model.joints)[1:]:
+        span = slice(joint.idx_v, joint.idx_v + joint.nv)
+        slides = "Prismatic" in joint.shortname() or joint.shortname()[10:] in ("PX", "PY", "PZ")
+        if joint.nq == joint.nv:
+            for k in range(joint.nq):
+                low, high = (
+                    float(limit[joint.idx_q + k])
+                    for limit in (model.lowerPositionLimit, model.upperPositionLimit)
+                )
+                widest = 0.5 if slides else np.pi
+                low, high = max(low, -widest), min(high, widest)
+                # Limits that leave nothing within the widest range, or none at all, are as given.
+                value = rng.uniform(low, high) if low < high else 0.5 * (low + high)
+                limited.append((joint.idx_q + k, value))
+        elif joint.shortname() == "JointModelPlanar":
+            move[span] = (*rng.uniform(-0.5, 0.5, 2), rng.uniform(-np.pi, np.pi))
+        elif joint.shortname() == "JointModelFreeFlyer":
+            move[span] = (*rng.uniform(-0.5, 0.5, 3), *_turn(rng))
+        else:
+            move[span] = rng.uniform(-np.pi, np.pi, joint.nv) if joint.nv != 3 else _turn(rng)
+    q = np.array(pin.integrate(model, pin.neutral(model), move))
+    for k, value in limited:
+        q[k] = value
+    return q
+
+
+def massless_joints(model: Any, postures: list[Array]) -> list[str]:
+    """Return the joints to hold so that forward dynamics has an answer at one of `postures`.
+
+    First those that move no mass or inertia at all; then, as long as it is needed, the last one on
+    its limb that the bodies behind it cannot slow down.
+    """
+    data, names = model.createData(), joint_names(model)
+    least = np.max([np.diag(mass_matrix(model, data, q)) for q in postures], axis=0)
+    light = least <= 1e-14 * least.max(initial=0.0)
+    held = list(dict.fromkeys(name for name, bare in zip(names, light, strict=True) if bare))
+    while len(held) < model.njoints - 1:
+        ids = [model.getJointId(name) for name in held]
+        rest = pin.buildReducedModel(model, ids, postures[0]) if held else model
+        keep = [k for k, name in enumerate(names) if name not in held]
+        space = [_pivots(rest, rest.createData(), _kept(model, rest, q)) for q in postures]
+        shares = np.max(space, axis=0)
+        weak = np.flatnonzero(~(shares > _SINGULAR))
+        if not len(weak):
+            break
+        held.append(names[keep[int(weak[-1])]])
+    return held
+
+
+def regularity(model: Any, data: Any, q: Array) -> float:
+    """Return how far the mass matrix at q (nq,) is from singular: 0 if it is, 1 if diagonal."""
+    pivots = _pivots(model, data, q)
+    return float(pivots.min(initial=1.0)) if np.isfinite(pivots).all() else 0.0
+
+
+def _pivots(model: Any, data: Any, q: Array) -> Array:
+    """Return by what ABA divides (nv,): the inertia at each joint, other joints free to yield.
+
+    Relative to that with the other joints held.
+    """
+    held = np.diag(mass_matrix(model, data, q))
+    pin.cholesky.decompose(model, data)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.array(data.D) / held)
+
+
+def _kept(model: Any, rest: Any, q: Array) -> Array:
+    """Return of q (nq,) of `model` what the joints of its part `rest` have."""
+    parts = [
+        q[joint.idx_q : joint.idx_q + joint.nq]
+        for joint in (model.joints[model.getJointId(name)] for name in list(rest.names)[1:])
+    ]
+    return np.concatenate(parts)
+
+
+def _turn(rng: np.random.Generator) -> Array:
+    axis = rng.normal(size=3)
+    return np.asarray(axis / np.linalg.norm(axis) * rng.uniform(0.0, np.pi))

@@ -1,0 +1,316 @@
+"""The scene of a check: a sphere on the robot, a curved patch where it touches, a fitting law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
+from sphshell_pin.dynamics import Scene
+from sphshell_pin.dynamics.models import check_no_mimic, find_frame
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.shell import Shell
+from sphshell_pin.study.robot_check.models import Subject, listed
+from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
+from sphshell_pin.study.robot_check.spheres import center_of, find_sphere, moved_sphere, placed_data
+from sphshell_pin.testing.forces import mass_matrix, point_jacobian
+
+Array = NDArray[np.float64]
+
+PLATE, BASE = "sphshell_check_plate", "sphshell_check_base"
+
+# Of the patch, in radii of the sphere: half its side, height and length of its waves.
+_HALF, _HEIGHT, _WAVE = 12.0, 0.3, 12.0
+_CELLS = 20
+# Deepest indentation the law is made for, in radii.
+_DEEPEST = 0.2
+_TRIES = 60
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A robot with its sphere: `model` without the joints that are held, the patch, and notes."""
+
+    model: Any
+    sphere: Sphere
+    shell: Shell
+    notes: tuple[str, ...]
+
+    @property
+    def radius(self) -> float:
+        """Radius of the sphere [m]."""
+        return float(self.sphere.radius)
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A scene and a state (q, v) in which the sphere is about to touch, or touches."""
+
+    scene: Scene
+    q: Array
+    v: Array
+    speed: float
+    """Of the sphere's centre against the patch [m/s]."""
+    mass: float
+    """That the contact feels along its normal [kg]."""
+
+
+def setting_of(
+    subject: Subject, rng: np.random.Generator, frame: str | None, radius: float | None
+) -> Setting:
+    """Put a sphere on the robot: at `frame`, at a tip that is known, or at the longest limb's end.
+
+    Joints that move no mass are held, with a note. SphshellError if no joint is left that moves the
+    sphere, FrameNotFound if there is no such frame.
+    """
+    model, notes = subject.robot.model, [*subject.notes]
+    check_no_mimic(model)
+    if model.nv == 0:
+        raise SphshellError(f"the robot '{subject.name}' has no joint that moves")
+    postures = [random_posture(model, rng) for _ in range(5)]
+    held = massless_joints(model, postures)
+    if held:
+        model = Scene(model, lock=held, q_lock=postures[0]).model
+        notes.append(
+            "joints that move no mass are held here, as `lock` does it in a scene, because forward "
+            f"dynamics has no answer for them: {listed(held)}"
+        )
+    tip, said = find_sphere(subject, model, rng, frame, radius)
+    sphere, shifted = moved_sphere(model, tip, rng)
+    notes += said + shifted
+    return Setting(model, sphere, patch(tip.radius), tuple(notes))
+
+
+def patch(radius: float) -> Shell:
+    """Return a wavy patch (800 triangles, exact normals) round the origin, z up, for `radius`."""
+    at = np.linspace(-_HALF, _HALF, _CELLS + 1) * radius
+    x, y = (one.ravel() for one in np.meshgrid(at, at, indexing="ij"))
+    z, normals = _wave(x, y, radius)
+    number = np.arange((_CELLS + 1) ** 2).reshape(_CELLS + 1, _CELLS + 1)
+    a, b, c, d = (
+        one.ravel() for one in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
+    )
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return Shell(np.stack([x, y, z], 1), triangles, normals=normals, name="patch")
+
+
+def fixed_touch(
+    setting: Setting, rng: np.random.Generator, gap: float, speed: float, *, least: bool = False
+) -> Touch:
+    """Put the patch into the world, `gap` [radii] before the sphere that comes with `speed` [m/s].
+
+    A negative gap is a depth. With `least` the joints move no faster than they must.
+    """
+    model = setting.model
+    q, v, way = _motion(model, setting.sphere, rng, speed)
+    if least:
+        data = placed_data(model, q)
+        joint, center = center_of(model, data, setting.sphere)
+        pin.computeJointJacobians(model, data, q)
+        v = np.linalg.pinv(point_jacobian(model, data, joint, center)) @ (speed * way)
+    contact = _Contact.facing(way, rng, gap, setting)
+    scene = Scene(model)
+    data = placed_data(model, q)
+    mass = contact.mass(model, data, q, setting.sphere)
+    law, friction = _law(mass, speed, setting.radius)
+    pose = contact.pose(model, data, setting.sphere)
+    scene.add_contact(
+        setting.sphere, setting.shell, placement=pose, law=law, friction=friction, name="touch"
+    )
+    return Touch(scene, q, v, speed, mass)
+
+
+def free_touch(setting: Setting, rng: np.random.Generator, gap: float, speed: float) -> Touch:
+    """Let the robot's root and the patch float without gravity; else as `fixed_touch`.
+
+    The patch is as heavy as the robot is in the contact, and turns a little.
+    """
+    model = _floating(setting.model, setting.sphere)
+    q, v, way = _motion(model, setting.sphere, rng, speed)
+    contact = _Contact.facing(way, rng, gap, setting)
+    data = placed_data(model, q)
+    of_robot = contact.mass(model, data, q, setting.sphere)
+    plate = model.joints[model.getJointId(PLATE)]
+    width = 2.0 * _HALF * setting.radius
+    model.inertias[plate.id] = pin.Inertia.FromBox(of_robot, width, width, 0.1 * width)
+    q[plate.idx_q : plate.idx_q + 7] = pin.SE3ToXYZQUAT(contact.pose(model, data, setting.sphere))
+    v[plate.idx_v : plate.idx_v + 3] = 0.0
+    v[plate.idx_v + 3 : plate.idx_v + 6] = 0.1 * speed / width * rng.normal(size=3)
+    mass = contact.mass(model, placed_data(model, q, data), q, setting.sphere, plate.id)
+    scene = Scene(model)
+    law, friction = _law(mass, speed, setting.radius)
+    scene.add_contact(
+        setting.sphere, setting.shell, PLATE, law=law, friction=friction, name="touch"
+    )
+    return Touch(scene, q, v, speed, mass)
+
+
+def meeting_posture(
+    model: Any, data: Any, setting: Setting, rng: np.random.Generator, gap: float
+) -> Array:
+    """Return a random posture (nq,) of a `free_touch`'s model with the patch `gap` [radii] away."""
+    q = random_posture(model, rng)
+    placed_data(model, q, data)
+    way = rng.normal(size=3)
+    contact = _Contact.facing(way / np.linalg.norm(way), rng, gap, setting)
+    plate = model.joints[model.getJointId(PLATE)]
+    q[plate.idx_q : plate.idx_q + 7] = pin.SE3ToXYZQUAT(contact.pose(model, data, setting.sphere))
+    return q
+
+
+def random_torques(model: Any, q: Array, rng: np.random.Generator) -> Array:
+    """Return random torques (nv,) that move light and heavy joints alike."""
+    weight = np.diag(mass_matrix(model, model.createData(), q))
+    return np.asarray(np.sqrt(weight) * rng.normal(size=model.nv))
+
+
+def stopping_law(mass: float, speed: float, depth: float) -> ImpactLaw:
+    """Return the lossless law that stops `mass` [kg] at `speed` [m/s] within `depth` [m]."""
+    return ImpactLaw(1.25 * mass * speed**2 / depth**2.5, 1.5)
+
+
+@dataclass(frozen=True)
+class _Contact:
+    """Where on the patch, and from where, the sphere meets it: all lengths in metres."""
+
+    normal: Array
+    """In the world, from the patch to the sphere (3,)."""
+    gap: float
+    spot: Any
+    """SE3 in the patch: origin at the place, z along its normal, turned at random."""
+    radius: float
+
+    @classmethod
+    def facing(cls, way: Array, rng: np.random.Generator, gap: float, setting: Setting) -> _Contact:
+        """Meet a sphere that comes along `way` (3,), up to half a radian askew."""
+        radius = setting.radius
+        askew = rng.normal(size=3)
+        askew -= (askew @ way) * way
+        normal = -way + rng.uniform(0.1, 0.5) * askew / np.linalg.norm(askew)
+        place = rng.uniform(-0.25, 0.25, 2) * _HALF * radius
+        z, up = _wave(place[0], place[1], radius)
+        turn = _frame_along(up) @ pin.AngleAxis(rng.uniform(0, 2 * np.pi), np.eye(3)[2]).matrix()
+        spot = pin.SE3(turn, np.array([*place, z]))
+        return cls(normal / np.linalg.norm(normal), gap * radius, spot, radius)
+
+    def pose(self, model: Any, data: Any, sphere: Sphere) -> Any:
+        """Return where the patch is in the world (SE3)."""
+        point = self._point(model, data, sphere)[1]
+        return pin.SE3(_frame_along(self.normal), point) * self.spot.inverse()
+
+    def mass(self, model: Any, data: Any, q: Array, sphere: Sphere, other: int = 0) -> float:
+        """Return the mass [kg] that the contact feels along its normal, against joint `other`."""
+        joint, point = self._point(model, data, sphere)
+        pin.computeJointJacobians(model, data, q)
+        jacobian = point_jacobian(model, data, joint, point)
+        row = self.normal @ (jacobian - point_jacobian(model, data, other, point))
+        half = np.triu(np.asarray(pin.computeMinverse(model, data, q)).reshape(len(row), len(row)))
+        return 1.0 / float(row @ (half + np.triu(half, 1).T) @ row)
+
+    def _point(self, model: Any, data: Any, sphere: Sphere) -> tuple[int, Array]:
+        joint, center = center_of(model, data, sphere)
+        return joint, center - (self.radius + self.gap) * self.normal
+
+
+def _motion(
+    model: Any, sphere: Sphere, rng: np.random.Generator, speed: float
+) -> tuple[Array, Array, Array]:
+    """Return q, v and the direction (3,) in which the sphere's centre moves with `speed` [m/s]."""
+    data = model.createData()
+    # A posture where two axes are nearly one is legal, but its accelerations run away: a last way.
+    for wanted in (1e-3, 1e-4, 1e-9):
+        for _ in range(_TRIES):
+            q = random_posture(model, rng)
+            pin.framesForwardKinematics(model, data, q)
+            joint, center = center_of(model, data, sphere)
+            pin.computeJointJacobians(model, data, q)
+            jacobian = point_jacobian(model, data, joint, center)
+            v = rng.normal(size=model.nv)
+            way = jacobian @ v
+            fast = float(np.linalg.norm(way))
+            # A limb stretched out hardly moves its end: another posture says more.
+            moves = fast > 0.05 * np.linalg.norm(jacobian) > 0.0
+            if moves and regularity(model, data, q) > wanted:
+                carries = np.abs(jacobian).max(axis=0) > 0.0
+                v *= np.where(carries, speed / fast, min(speed / fast, 1.0))
+                return q, v, way / fast
+    raise SphshellError(
+        f"none of {3 * _TRIES} random postures moves frame '{sphere.frame}' and has a regular mass "
+        "matrix"
+    )
+
+
+def _law(mass: float, speed: float, radius: float) -> tuple[NormalLaw, CoulombFriction]:
+    deepest = _DEEPEST * radius
+    lossless = stopping_law(mass, speed, deepest)
+    law = ImpactLaw(lossless.stiffness, 1.5, 0.3 * mass * speed / deepest, 0.8 * deepest)
+    return law, CoulombFriction(0.3, 0.2, 0.2 * speed, speed)
+
+
+def _floating(model: Any, sphere: Sphere) -> Any:
+    """Return the robot with a free root, and a free plate, without gravity.
+
+    Of its frames only that of the sphere is kept. The links that are fixed to the world are not in
+    a model: a lump as heavy as the rest stands for them.
+    """
+    whole = pin.Model()
+    whole.gravity.vector = np.zeros(6)
+    joints = range(1, model.njoints)
+    anew = {0: 0}
+    if any(model.parents[j] == 0 and not _flies(model.joints[j]) for j in joints):
+        mass = max(float(sum(model.inertias[j].mass for j in joints)), 1e-3)
+        anew[0] = _add_free(whole, BASE, pin.Inertia.FromSphere(mass, 0.2))
+    for j in joints:
+        parent = anew[int(model.parents[j])] if not _flies(model.joints[j]) else 0
+        placed = model.jointPlacements[j], model.names[j]
+        anew[j] = int(whole.addJoint(parent, model.joints[j], *placed))
+        whole.appendBodyToJoint(anew[j], model.inertias[j], pin.SE3.Identity())
+    frame = model.frames[find_frame(model, sphere.frame)]
+    whole.addFrame(
+        pin.Frame(sphere.frame, anew[frame.parentJoint], 0, frame.placement, pin.FrameType.OP_FRAME)
+    )
+    _add_free(whole, PLATE, pin.Inertia.FromSphere(1.0, 1.0))
+    for name in ("lowerPositionLimit", "upperPositionLimit", "armature"):
+        values = np.array(getattr(whole, name))
+        of = np.asarray(getattr(model, name))
+        for j in joints:
+            old, new = model.joints[j], whole.joints[anew[j]]
+            at, to, n = old.idx_q, new.idx_q, old.nq
+            if len(of) == model.nv and name == "armature":
+                at, to, n = old.idx_v, new.idx_v, old.nv
+            values[to : to + n] = of[at : at + n]
+        setattr(whole, name, values)
+    return whole
+
+
+def _flies(joint: Any) -> bool:
+    return bool(joint.shortname() == "JointModelFreeFlyer")
+
+
+def _add_free(model: Any, name: str, inertia: Any) -> int:
+    """Add a free body called `name`, with a frame; return its joint."""
+    joint = int(model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name))
+    model.addJointFrame(joint)
+    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    return joint
+
+
+def _wave(x: Any, y: Any, radius: float) -> tuple[Any, Any]:
+    """Return the height of the patch at x, y [m], and its unit normal, pointing up."""
+    k = 2.0 * np.pi / (_WAVE * radius)
+    z = 0.5 * _HEIGHT * radius * (np.sin(k * x) + np.cos(k * y))
+    slope = 0.5 * _HEIGHT * radius * k
+    normal = np.stack(np.broadcast_arrays(-slope * np.cos(k * x), slope * np.sin(k * y), 1.0), -1)
+    return z, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+def _frame_along(z: Array) -> Array:
+    """Return a rotation (3, 3) whose third column is the unit vector `z`."""
+    least = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = np.cross(least, z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=1)

@@ -1,0 +1,99 @@
+"""Distances by trying every triangle: slow, obvious, and nothing of the compiled core."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Points times triangles that are tried at once: some tens of megabytes.
+_AT_ONCE = 200_000
+
+
+def distances(points: Array, corners: Array) -> Array:
+    """Return the distance (n, t) [m] of each of points (n, 3) to each triangle (t, 3, 3)."""
+    rows = max(1, _AT_ONCE // max(1, len(corners)))
+    parts = [_distances(points[k : k + rows], corners) for k in range(0, len(points), rows)]
+    return np.concatenate(parts) if parts else np.zeros((0, len(corners)))
+
+
+def _distances(points: Array, corners: Array) -> Array:
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    inside = np.ones((len(points), len(corners)), dtype=bool)
+    nearest = np.full((len(points), len(corners)), np.inf)
+    for p, q in ((a, b), (b, c), (c, a)):
+        side = q - p
+        away = points[:, None, :] - p
+        along = np.einsum("ntx,tx->nt", away, side) / np.einsum("tx,tx->t", side, side)
+        foot = np.clip(along, 0.0, 1.0)[..., None] * side
+        nearest = np.minimum(nearest, np.linalg.norm(away - foot, axis=2))
+        # Inside is where the foot of the perpendicular is on the inner hand of every side.
+        inside &= np.einsum("ntx,tx->nt", away, np.cross(normal, side)) >= 0.0
+    height = np.abs(np.einsum("ntx,tx->nt", points[:, None, :] - a, normal))
+    return np.where(inside, height, nearest)
+
+
+def feet(point: Array, corners: Array) -> tuple[Ints, Array]:
+    """Return the triangles (k,) of (t, 3, 3) nearest to `point` (3,) at their inside, and where.
+
+    Feet (k, 3) of the perpendiculars well inside: there the distance has a strict minimum, whatever
+    the neighbours are.
+    """
+    a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(u, v)
+    twice = np.einsum("tx,tx->t", normal, normal)
+    away = point - a
+    first = np.einsum("tx,tx->t", np.cross(away, v), normal) / twice
+    second = np.einsum("tx,tx->t", np.cross(u, away), normal) / twice
+    margin = 1e-6
+    inside = np.flatnonzero((first > margin) & (second > margin) & (first + second < 1 - margin))
+    return inside, (a + first[:, None] * u + second[:, None] * v)[inside]
+
+
+def pieces(triangles: Ints, touched: NDArray[np.bool_]) -> list[Ints]:
+    """Split the `touched` (t,) among triangles (t, 3) into pieces that hang together by vertices.
+
+    Returns the indices of the triangles of each piece.
+    """
+    rows = np.flatnonzero(touched)
+    label = np.arange(len(rows))
+    while True:
+        lowest = np.full(int(triangles.max()) + 1, len(rows))
+        for corner in range(3):
+            np.minimum.at(lowest, triangles[rows, corner], label)
+        new = lowest[triangles[rows]].min(axis=1)
+        if (new == label).all():
+            break
+        label = new
+    return [rows[label == one] for one in np.unique(label)]
+
+
+def crossed(start: Array, end: Array, corners: Array) -> Ints:
+    """Return the triangles (t, 3, 3) through which the way from `start` (3,) to `end` (3,) leads.
+
+    By Moeller and Trumbore (1997); a way within a triangle's plane crosses nothing.
+    """
+    a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    way = end - start
+    across = np.cross(way, v)
+    det = np.einsum("tx,tx->t", u, across)
+    safe = np.where(det == 0.0, 1.0, det)
+    from_a = start - a
+    first = np.einsum("tx,tx->t", from_a, across) / safe
+    other = np.cross(from_a, u)
+    second = other @ way / safe
+    share = np.einsum("tx,tx->t", v, other) / safe
+    hit = (first >= 0) & (second >= 0) & (first + second <= 1) & (share >= 0) & (share <= 1)
+    return np.flatnonzero(hit & (det != 0.0))
+
+
+def samples(corners: Array, count: int, rng: np.random.Generator) -> Array:
+    """Return `count` random points (count, 3) of triangles (t, 3, 3), spread by area."""
+    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(spans, axis=1)
+    chosen = rng.choice(len(corners), count, p=area / area.sum())
+    return np.asarray(np.einsum("nk,nkx->nx", rng.dirichlet(np.ones(3), count), corners[chosen]))

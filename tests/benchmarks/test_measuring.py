@@ -1,0 +1,85 @@
+"""Workers, choices of settings, tables and files."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from sphshell_pin.benchmarks.peers import measuring, tables, workers
+from sphshell_pin.benchmarks.peers.measuring import Ratio, Row, as_good_as, best_of, compared
+
+
+def row(engine, period, energy, cost, **more):
+    errors = {"period": period, "energy": energy}
+    return Row(
+        "bowl", engine, knob={"dt": 1e-3}, errors=errors, unit="CPU s / s", cost=cost, **more
+    )
+
+
+def test_the_best_of_a_peer_is_met_by_the_cheapest_of_ours_that_is_as_good():
+    peers = [row("mujoco", 1e-3, 1e-2, 0.1), row("mujoco", 5e-4, 3e-3, 2.0)]
+    peers.append(row("mujoco", 5.2e-4, 3.1e-3, 0.5))  # as good within a tenth, and cheaper
+    ours = [row("ours", 1e-4, 4e-3, 0.001), row("ours", 4e-4, 2e-3, 0.02)]
+    ours.append(row("ours", 1e-6, 1e-6, 0.05))
+    assert best_of(peers) is peers[2]
+    assert not as_good_as(ours[0], peers[2])
+    assert compared(peers + ours, "bowl", "mujoco") == (peers[2], ours[1])
+    assert compared(peers + ours[:1], "bowl", "mujoco") is None
+    assert compared(ours, "bowl", "mujoco") is None
+
+
+def test_a_setting_that_does_not_press_is_not_compared():
+    def press(engine, pressed, cost):
+        return Row("press", engine, errors={"pressed [mm]": pressed}, cost=cost)
+
+    rows = [press("drake", -0.1, 1.0), press("drake", 0.4, 9.0), press("ours", 0.4, 2.0)]
+    assert compared(rows, "press", "drake") == (rows[1], rows[2])
+
+
+def test_rows_come_from_a_process_of_its_own():
+    told = []
+    rows, ratios = measuring.measure(["ours"], ["plate"], quick=True, say=told.append)
+    assert ratios == []
+    assert len(told) >= 2
+    assert not rows[0].note
+    assert rows[0].errors["depth"] < 1e-10
+    assert rows[0].low <= rows[0].cost <= rows[0].high
+
+
+def test_a_lost_process_is_told_and_starts_anew():
+    worker = workers.Worker("ours")
+    try:
+        with pytest.raises(workers.WorkerLost, match="took longer than 0 s"):
+            worker.ask("facts", "plate", timeout=0.0)
+        status, facts = worker.ask("facts", "plate")
+        assert status == "done"
+        assert facts["knobs"]
+        worker._process.kill()
+        worker._process.join()
+        with pytest.raises(workers.WorkerLost, match="ended with code"):
+            worker.ask("facts", "plate")
+        assert worker.ask("run", "plate", {"integrator": "None"})[0] == "failed"
+    finally:
+        worker.close()
+
+
+def test_files_are_whole_and_json_is_strict(tmp_path):
+    rows = [row("mujoco", 1e-3, math.nan, math.nan, note="diverged"), row("ours", 1e-6, 1e-5, 0.01)]
+    ratios = [Ratio("swing", rows[0], rows[1], 100.0, 90.0, 110.0)]
+    tables.write_files(tmp_path, rows, ratios)
+
+    def refuse(name):
+        raise AssertionError(name)
+
+    text = (tmp_path / "results.json").read_text()
+    content = json.loads(text, parse_constant=refuse)
+    assert content["rows"][0]["errors"]["energy"] is None
+    assert content["ratios"][0]["median"] == 100.0
+    lines = (tmp_path / "results.csv").read_text().splitlines()
+    assert len(lines) == 3
+    assert all(len(line.split(",")) == len(lines[0].split(",")) for line in lines)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["results.csv", "results.json"]
+    assert "mujoco / ours = 100" in tables.text_tables(rows, ratios)
+    assert "| swing | mujoco | 100 [90, 110] |" in tables.page(rows, ratios)

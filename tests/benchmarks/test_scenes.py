@@ -1,0 +1,231 @@
+"""The scenes' truths, against equations of motion integrated here and against plain geometry."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sphshell_pin.benchmarks import swing
+from sphshell_pin.benchmarks.peers import press as press_module
+from sphshell_pin.benchmarks.peers import scenes
+from sphshell_pin.benchmarks.peers.engine import Trajectory
+from sphshell_pin.errors import MissingExtra
+
+
+def integrate(rate, state, duration, steps):
+    """Return t and the states (steps + 1, n) by the classical method of order 4."""
+    h = duration / steps
+    rows = [np.asarray(state, dtype=float)]
+    for _ in range(steps):
+        y = rows[-1]
+        a = rate(y)
+        b = rate(y + h / 2 * a)
+        c = rate(y + h / 2 * b)
+        d = rate(y + h * c)
+        rows.append(y + h / 6 * (a + 2 * b + 2 * c + d))
+    return np.linspace(0, duration, steps + 1), np.array(rows)
+
+
+def trajectory(t, position, velocity, **more):
+    zero = np.zeros_like(position)
+    return Trajectory(t, position, velocity, zero, 1.0, float(t[-1]), len(t) - 1, **more)
+
+
+def rolling(scene, contact, normal, surface_velocity, gravity):
+    """Return the acceleration and spin rate of a hard ball of lever a = |contact| that rolls.
+
+    Newton's and Euler's laws with the constraint that the point of contact moves with the surface:
+    solved for the force at every state as a linear system.
+    """
+    m, inertia = scene.mass, scene.inertia
+
+    def rate(y):
+        x, v, w = y[:3], y[3:6], y[6:9]
+        r, n = contact(x), normal(x)
+        small = 1e-6
+        n_rate = (normal(x + small * v) - normal(x - small * v)) / (2 * small)
+        r_rate = (contact(x + small * v) - contact(x - small * v)) / (2 * small)
+        u_rate = (
+            surface_velocity(x + small * v) - surface_velocity(x - small * v)
+        ) / (2 * small)  # fmt: skip
+        # d/dt (v + w x r - u) = 0 along the two tangents; n . v = 0 stays so.
+        t1 = np.cross(n, [0.3, 0.5, 0.8])
+        t1 /= np.linalg.norm(t1)
+        t2 = np.cross(n, t1)
+
+        def motion(force):
+            return gravity + force / m, np.cross(r, force) / inertia
+
+        def residual(force):
+            acceleration, spin_rate = motion(force)
+            slip = acceleration + np.cross(spin_rate, r) + np.cross(w, r_rate) - u_rate
+            return np.array([t1 @ slip, t2 @ slip, n @ acceleration + n_rate @ v])
+
+        base = residual(np.zeros(3))
+        matrix = np.column_stack([residual(e) - base for e in np.eye(3)])
+        acceleration, spin_rate = motion(np.linalg.solve(matrix, -base))
+        return np.concatenate([v, acceleration, spin_rate])
+
+    return rate
+
+
+def test_the_cylinder_is_what_the_equations_of_rolling_give():
+    scene = scenes.cylinder()
+    lever = scene.radius - scene.depth
+
+    def outward(x):
+        flat = np.array([x[0], x[1], 0.0])
+        return flat / np.linalg.norm(flat)
+
+    rate = rolling(
+        scene,
+        lambda x: lever * outward(x),
+        lambda x: -outward(x),
+        lambda x: np.zeros(3),
+        np.array(scene.gravity),
+    )
+    start = np.concatenate([scene.position, scene.velocity, scene.angular_velocity])
+    t, rows = integrate(rate, start, scene.duration, 600)
+    errors = scene.errors(trajectory(t, rows[:, :3], rows[:, 3:6]))
+    assert errors["rate"] < 1e-6
+    assert errors["path"] < 1e-6
+
+
+def test_the_turntable_is_what_the_equations_of_rolling_give():
+    scene = scenes.turntable()
+    lever = scene.radius - scene.weight / scene.stiffness
+    up = np.array([0.0, 0.0, 1.0])
+    rate = rolling(
+        scene,
+        lambda x: -lever * up,
+        lambda x: up,
+        lambda x: scene.table_speed * np.cross(up, x),
+        np.array(scene.gravity),
+    )
+    start = np.concatenate([scene.position, scene.velocity, scene.angular_velocity])
+    t, rows = integrate(rate, start, scene.duration, 250)
+    errors = scene.errors(trajectory(t, rows[:, :3], rows[:, 3:6]))
+    assert errors["rate"] < 1e-8
+    assert errors["closure"] < 1e-7
+    # 2/7 of a hard ball, but for the sink into the spring.
+    b = scene.b(0.0)
+    assert b / (1 + b) == pytest.approx(2 / 7)
+
+
+def test_the_slope_is_what_the_equations_of_rolling_give():
+    scene = scenes.slope()
+    depth = scene.mass * -scene.gravity[2] / scene.stiffness
+    up = np.array([0.0, 0.0, 1.0])
+    rate = rolling(
+        scene,
+        lambda x: -(scene.radius - depth) * up,
+        lambda x: up,
+        lambda x: np.zeros(3),
+        np.array(scene.gravity),
+    )
+    start = np.concatenate([scene.position, scene.velocity, scene.angular_velocity])
+    t, rows = integrate(rate, start, scene.duration, 100)
+    assert scene.errors(trajectory(t, rows[:, :3], rows[:, 3:6]))["acceleration"] < 1e-10
+    ball, locked = scene.variants()
+    assert ball.rolls
+    assert not locked.rolls
+    crept = np.array(scene.position) + np.outer(t, [2e-3, 0, 0])
+    creep = locked.errors(trajectory(t, crept, np.zeros_like(crept)))["creep [m/s]"]
+    assert creep == pytest.approx(2e-3)
+
+
+def test_a_swing_with_a_wrong_period_or_energy_is_judged_so():
+    scene = scenes.bowl(0.3).variants()[3]
+    pull = scene.stiffness / scene.mass
+
+    def rate(y):
+        reach = np.linalg.norm(y[:3])
+        back = pull * max(0.0, reach - swing.ARM) / reach
+        return np.concatenate([y[3:], -back * y[:3] + scene.gravity])
+
+    start = np.concatenate([scene.position, np.zeros(3)])
+    t, rows = integrate(rate, start, scene.duration, 4000)
+    right = scene.errors(trajectory(t, rows[:, :3], rows[:, 3:]))
+    assert right["period"] < 1e-7
+    assert right["energy"] < 1e-7
+    slow = scene.errors(trajectory(1.001 * t, rows[:, :3], rows[:, 3:] / 1.001))
+    assert slow["period"] == pytest.approx(1e-3, rel=1e-3)
+    lower = rows[:, :3] - np.outer(t / t[-1], [0, 0, 0.01 * swing.ENERGY / scene.weight])
+    lost = scene.errors(trajectory(t, lower, rows[:, 3:]))["energy"]
+    assert 0.005 < lost < 0.011
+
+
+def test_at_rest_the_plate_and_the_groove_are_right():
+    still = np.zeros((50, 3))
+    t = np.linspace(0, 0.3, 50)
+    plate = scenes.plate()
+    place = np.tile([0.0, 0.0, plate.radius - plate.weight / plate.stiffness], (50, 1))
+    weight = np.tile([0.0, 0.0, plate.weight], (50, 1))
+    errors = plate.errors(trajectory(t, place, still, force=weight))
+    assert max(errors.values()) < 1e-12
+    groove = scenes.groove()
+    # m g = 2 N cos 45 deg: two walls at right angles.
+    load = groove.weight / math.sqrt(2)
+    height = (groove.radius - load / groove.stiffness) * math.sqrt(2)
+    place = np.tile([0.0, 0.0, height], (50, 1))
+    pushes = load * math.sqrt(0.5) * np.array([[1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]])
+    errors = groove.errors(trajectory(t, place, still, contact_forces=pushes))
+    assert max(errors.values()) < 1e-12
+
+
+def test_a_shot_passed_or_came_back():
+    scene = scenes.shot()
+    t = np.array([0.0, scene.duration])
+    back = np.array([[0, 0, 0.02], [0, 0, 0.3]])
+    velocity = np.array([[0, 0, -100.0], [0, 0, 90.0]])
+    came_back = scene.errors(trajectory(t, back, velocity))
+    assert came_back == {"passed": 0.0, "speed": pytest.approx(0.1)}
+    passed = scene.errors(trajectory(t, -back, velocity))
+    assert passed == {"passed": 1.0}
+    assert scene.joined([came_back, passed]) == {"passed": 0.5, "speed": pytest.approx(0.1)}
+    starts = [variant.position[2] for variant in scene.variants()]
+    assert len(set(starts)) == len(starts)
+
+
+@pytest.mark.parametrize("name", [name for name in scenes.SCENES if name != "press"])
+def test_the_surface_is_one_thing_in_all_its_forms(name):
+    surface = scenes.SCENES[name]().surface
+    a, b, c = surface.vertices[surface.triangles].transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1)
+    assert length.min() > 0.02 * np.median(length)
+    normal /= length[:, None]
+    if surface.normals is not None:
+        corners = surface.normals[surface.triangles]
+        assert np.einsum("ij,ikj->ik", normal, corners).min() > 0.98
+    if surface.height is not None and "bowl" not in name:
+        x, y, z = surface.vertices.T
+        assert np.abs(surface.height(x, y) - z).max() < 1e-12
+    if surface.boxes:
+        distance = np.full(len(surface.vertices), np.inf)
+        for box in surface.boxes:
+            local = np.abs((surface.vertices - box.centre) @ box.rotation) - box.half
+            outside = np.linalg.norm(np.maximum(local, 0), axis=1)
+            distance = np.minimum(distance, outside + np.maximum(-local.max(axis=1), 0))
+        # On the surface of a box, up to the sagitta of the cylinder's facets.
+        assert distance.max() < 1e-4
+
+
+@pytest.mark.robots
+def test_the_press_starts_as_deep_as_it_says():
+    try:
+        scene = press_module.press()
+    except MissingExtra as missing:
+        pytest.skip(str(missing))
+    assert len(scene.surface.triangles) == 199712
+    x, y, z = np.array(scene.place)
+    point = np.array([[x, y, z + scene.radius - scene.rise]])
+    pressed = scene.errors(trajectory(np.zeros(1), point, point))["pressed [mm]"]
+    # The sheet slopes there: by height it is `rise`, measured along the normal it is more.
+    apart = scene.surface.vertices - point
+    nearest = np.linalg.norm(apart, axis=1).min()
+    assert pressed * 1e-3 == pytest.approx(scene.radius - nearest, abs=2e-4)
+    assert "prismatic" not in scene.urdf
+    assert "visual" not in scene.urdf

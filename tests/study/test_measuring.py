@@ -1,0 +1,114 @@
+"""What the report measures with: closed forms, contestants in processes of their own, spreads."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from sphshell_pin.benchmarks import analytic_cases, sizes, step, surfaces, timing
+from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
+
+
+def integrated(slope, start, t, method="DOP853"):
+    """Return rows of a solution by SciPy."""
+    return solve_ivp(slope, (0, t[-1]), start, method, t, rtol=1e-10, atol=1e-15).y.T
+
+
+def test_closed_form_of_the_bobbing_ball():
+    exact = analytic_cases.bob()
+    t = np.linspace(0, 0.1, 26)
+    sag = MASS * GRAVITY / 1e4
+    rows = integrated(lambda _, y: [y[1], -1e4 / MASS * y[0]], [0.8 * sag, 0.0], t)
+    assert exact.figures(t)[0][:, 0] == pytest.approx(rows[:, 0] / (0.8 * sag), abs=1e-7)
+    assert exact.case.q0[0] == pytest.approx(RADIUS - sag + 0.8 * sag)
+
+
+def test_closed_form_of_the_bounces():
+    t = np.linspace(0, 0.2, 101)
+
+    def slope(_, y):
+        return [y[1], -GRAVITY + 1e4 / MASS * max(0.0, -y[0])]
+
+    found = solve_ivp(
+        slope, (0, 0.2), [analytic_cases.FALL, 0.0], "DOP853", t, rtol=1e-12, atol=1e-15,
+        max_step=1e-4,
+    )  # fmt: skip
+    assert analytic_cases.bounce_height(t, 1e4) == pytest.approx(found.y[0], abs=1e-8)
+
+
+def test_closed_form_of_the_gliding_ball():
+    exact = analytic_cases.glide()
+    t = np.linspace(0, 0.1, 21)
+    sag, damping = MASS * GRAVITY / analytic_cases.STIFF, 1e4
+
+    def slope(_, y):
+        depth = -y[0]
+        push = analytic_cases.STIFF * depth - damping * y[1]
+        return [y[1], -GRAVITY + push / MASS]
+
+    rows = integrated(slope, [-1.5 * sag, 0.0], t, "Radau")
+    figures = exact.figures(t)[0]
+    assert figures[:, 2] == pytest.approx(-rows[:, 0] / sag, abs=1e-6)
+    along = np.cos(np.sqrt(analytic_cases.SPRING / MASS) * t)
+    assert figures[:, 0] == pytest.approx(along)
+
+
+def test_contestants_answer_from_their_own_processes():
+    names, notes = [sizes.OURS, sizes.COAL], []
+    rows = sizes.measure_one(names, 22, 2, notes)
+    assert [row.name for row in rows] == names
+    assert notes == []
+    assert all(row.triangles == 968 and row.query.median > 0 for row in rows)
+    assert all(not row.memory > 5e7 for row in rows)
+
+
+def test_who_cannot_answer_is_left_out_with_a_reason(monkeypatch):
+    monkeypatch.setitem(sizes.NEEDS, sizes.TRIMESH, "no_such_module")
+    names, notes = sizes.installed()
+    assert sizes.TRIMESH not in names
+    assert "no_such_module is missing" in " ".join(notes)
+    names, notes = ["nobody", sizes.OURS_FLAT], []
+    rows = sizes.measure_one(names, 22, 1, notes)
+    assert [row.name for row in rows] == names == [sizes.OURS_FLAT]
+    assert notes[0].startswith("nobody is left out from 968 triangles on: nobody ended with 1")
+
+
+def test_sheets_that_do_not_fit_the_memory_are_left_out(monkeypatch):
+    monkeypatch.setattr(sizes, "available", lambda: 1e6)
+    rows, notes = sizes.measure((1000,), 1)
+    assert rows == []
+    assert "2000000 triangles are left out" in notes[-1]
+
+
+@pytest.mark.robots
+@pytest.mark.skipif(
+    importlib.util.find_spec("example_robot_data") is None, reason="needs the extra robots"
+)
+def test_the_parts_of_a_step(monkeypatch):
+    monkeypatch.setattr(step, "STEPS", 50)
+    monkeypatch.setattr(step, "wavy_sheet", lambda cells, size: surfaces.wavy_sheet(60, size))
+    with pytest.warns(UserWarning, match="law"):
+        parts = step.measure_parts(2)
+    touching = parts[step.TOUCHING]
+    assert set(touching) == {*step.PARTS, "whole"}
+    assert all(len(t) == 2 for t in touching.values())
+    assert np.median(touching["query"]) > np.median(parts[step.FREE]["query"])
+    assert np.median(touching["aba"]) < np.median(touching["whole"])
+
+
+def test_one_core_for_a_while():
+    before = os.sched_getaffinity(0)
+    with timing.on_one_core():
+        assert len(os.sched_getaffinity(0)) == 1
+    assert os.sched_getaffinity(0) == before
+
+
+def test_spread():
+    assert timing.Spread.of(np.array([3.0, 1.0, 2.0])) == timing.Spread(2.0, 1.5, 2.5)
+    heard = []
+    timing.part(heard.append, 0.25, 0.5)(0.5)
+    assert heard == [0.375]

@@ -1,0 +1,391 @@
+"""The report: what it says of measured data, and what it leaves when something goes wrong."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import replace
+from functools import cache
+from html.parser import HTMLParser
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import sphshell_pin as sp
+from sphshell_pin.benchmarks import analytic_cases, convergence, hard_cases, query, step
+from sphshell_pin.benchmarks import work_precision as work
+from sphshell_pin.benchmarks.peers.measuring import Ratio
+from sphshell_pin.benchmarks.peers.measuring import Row as PeerRow
+from sphshell_pin.benchmarks.sizes import Row as SizeRow
+from sphshell_pin.benchmarks.timing import Spread
+from sphshell_pin.cli import app
+from sphshell_pin.errors import Interrupted
+from sphshell_pin.study.report import PAGE, making
+from sphshell_pin.study.report import forces as forces_section
+from sphshell_pin.study.report import hard_cases as hard_section
+from sphshell_pin.study.report import integrators as integrators_section
+from sphshell_pin.study.report import peers as peers_section
+from sphshell_pin.study.report import queries as queries_section
+from sphshell_pin.study.report import steps as steps_section
+from sphshell_pin.study.report.contents import Column, Finding, Section, Table, number
+from sphshell_pin.study.report.drawing import spread_apart
+from tests.view.test_recording_in_browser import browser  # noqa: F401
+
+pytest.importorskip("matplotlib")
+KEYS = ["forces", "queries", "integrators", "steps", "hard_cases", "peers"]
+RNG = np.random.default_rng(4)
+
+
+def times(seconds: float) -> np.ndarray:
+    return seconds * RNG.uniform(0.9, 1.1, 5)
+
+
+@cache
+def force_rows() -> list[convergence.Row]:
+    surfaces = convergence.REPORTED.items()
+    return [row for known in surfaces for row in convergence.measure(*known, rounds=2, finest=2)]
+
+
+def forces(*, quick, progress):
+    rows = force_rows()
+    progress(1.0)
+    return forces_section.assemble(list(convergence.REPORTED), rows)
+
+
+def queries(*, quick, progress):
+    peers = {query.THIS: times(1e-6), query.COAL: times(4e-5), query.FCPW: times(2e-6)}
+    growth = {2048: times(1e-6), 2_000_000: times(3e-6)}
+    cost = {"wavy sheet": {"facets": times(1e-6), "smooth": times(1.2e-6)}}
+    rows = [
+        SizeRow(name, "contacts", count, Spread.of(times(1e-6)), 0.1, 500.0 * count)
+        for name in ("smooth", "coal::collide")
+        for count in (968, 199_712)
+    ]
+    return queries_section.assemble(peers, growth, cost, rows, ["trimesh is left out."])
+
+
+def integrators(*, quick, progress):
+    chosen = (sp.RungeKutta4(1e-3), sp.RungeKutta4(2e-4), sp.Implicit(1e-3), sp.Implicit(1e-5))
+    rows, cases = [], []
+    for judge in (analytic_cases.bob(), analytic_cases.bounces()):
+        cases.append(replace(judge.case, integrators=chosen))
+        rows += work.measure(cases[-1], judge, 1)
+    return integrators_section.assemble(cases, rows, SimpleNamespace(rms=1e-8, energy=2e-6))
+
+
+def steps(*, quick, progress):
+    names = (step.BARE, step.FREE, step.FAR, step.TOUCHING, step.CONTROL_FREE)
+    whole = {name: times(2e-6 + 2e-7 * k) for k, name in enumerate(names)}
+    whole[step.CONTROL_TOUCHING] = times(3.5e-6)
+    parts = {
+        step.BARE: {"whole": times(2e-6)},
+        step.TOUCHING: {name: times(4e-7) for name in step.PARTS} | {"whole": times(3e-6)},
+    }
+    added = {"no contact": times(2e-6), "... and damping": times(2.1e-6)}
+    imports = {"sphshell_pin": times(0.14), "pinocchio": times(0.13)}
+    return steps_section.assemble(whole, parts, added, imports)
+
+
+def hard(*, quick, progress):
+    row = hard_cases.Row("Impacts", "ball", "a < b & c", "1", 1.0, 1.0, 1e-9, 1e-6, ok=True)
+    bad = replace(row, measured="passed", expected="none", error=math.inf, ok=False)
+    nothing = replace(row, error=0.0, bound=0.0)
+    return hard_section.assemble(hard_cases.Found([row, bad, nothing], 2, 1.0), quick=quick)
+
+
+def peers(*, quick, progress):
+    swing = {"period": 1e-4, "energy": 1e-3}
+    ours = PeerRow("bowl", "ours", "sphshell_pin 0", knob={"dt": 1e-3}, errors=swing, cost=0.01)
+    other = replace(ours, engine="mujoco", settings={"solver": "<Newton>"}, cost=1.0)
+    press = replace(ours, scene="press", errors={"pressed [mm]": 0.1}, unit="us / step")
+    absent = PeerRow("bowl", "drake", note="not installed: no module named pydrake")
+    ratios = [
+        Ratio("swing", other, ours, 120.0, 110.0, 130.0),
+        Ratio("press", replace(press, engine="mujoco"), press, 1.2, 1.1, 1.3),
+    ]
+    return peers_section.assemble([ours, other, press, absent], ratios, {"bowl": "Ball swings"})
+
+
+def parts_of(*measures) -> tuple[making.Part, ...]:
+    return tuple(
+        making.Part(known.key, known.title, measure, (1.0, 1.0), pinned=False)
+        for known, measure in zip((*making.PARTS, making.PEERS), measures, strict=True)
+    )
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """All sections on little data, and a way to put another measure in the place of one."""
+
+    def put(**others) -> None:
+        measures = {
+            "forces": forces, "queries": queries, "integrators": integrators, "steps": steps,
+            "hard_cases": hard, "peers": peers,
+        } | others  # fmt: skip
+        made = parts_of(*measures.values())
+        monkeypatch.setattr(making, "PARTS", made[:-1])
+        monkeypatch.setattr(making, "PEERS", made[-1])
+
+    put()
+    return put
+
+
+def stub(*, quick, progress):
+    return Section("x", "X", findings=[Finding("a", "a | b", 1.0, aim=2.0, headline=True)])
+
+
+@pytest.fixture
+def stubs(small):
+    """Sections of nothing but one finding."""
+    small(**dict.fromkeys(KEYS, stub))
+    return small
+
+
+class Page(HTMLParser):
+    """What a page holds: ids of sections, texts of cells, addresses, tags that stay open."""
+
+    VOID = ("meta", "br", "img", "link", "use", "path")
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.sections: list[str] = []
+        self.addresses: list[str] = []
+        self.open: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        if tag == "section":
+            self.sections.append(values["id"])
+        self.addresses += [
+            v for k, v in attrs if k in ("href", "src", "xlink:href", "srcset", "action") and v
+        ]
+        if tag not in (*self.VOID, "th"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.addresses += [v for k, v in attrs if k in ("href", "src", "xlink:href") and v]
+
+    def handle_endtag(self, tag):
+        if tag not in (*self.VOID, "th"):
+            assert self.open.pop() == tag
+
+
+def table_of(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_whole_report(small, tmp_path):
+    heard = []
+    report = making.make_report(
+        tmp_path, quick=True, with_peers=True, command="sphshell-pin report <x>",
+        tell=lambda title, share: heard.append(share),
+    )  # fmt: skip
+    assert [s.error for s in report.sections] == [None] * 6
+    assert heard == sorted(heard)
+    assert 0 <= heard[0] <= heard[-1] <= 1 + 1e-12
+    text = (tmp_path / PAGE).read_text(encoding="utf-8")
+    page = Page(text)
+    assert page.open == []
+    assert page.sections == KEYS
+    # One file that asks nobody: links and references stay on the page.
+    assert all(address.startswith("#") for address in page.addresses)
+    assert "http:" not in text
+    assert "https:" not in text
+    assert "url(http" not in text
+    assert "@import" not in text
+    assert text.count("<svg") == 7
+    assert "#a1000" not in text
+    assert "&lt;Newton&gt;" in text
+    assert "sphshell-pin report &lt;x&gt;" in text
+    judged = [f.met for s in report.sections for f in s.findings if f.met is not None]
+    assert f"{sum(judged)} of {len(judged)} aims are met." in text
+    assert sorted(f.name for f in tmp_path.iterdir() if f.name.startswith(".")) == []
+    found = table_of(tmp_path / "forces.csv")
+    assert len(found) == 4 * 2 * 4
+    assert list(found[0])[:6] == [
+        "surface", "method", "triangles", "side_over_radius", "mean_error", "largest_error",
+    ]  # fmt: skip
+    assert {row["method"] for row in found} == set(convergence.RULES)
+    verdicts = {row["key"]: row["met"] for row in table_of(tmp_path / "findings.csv")}
+    assert verdicts["peers_swing"] == "True"
+    assert verdicts["peers_press"] == "False"
+    assert verdicts["hard_cases"] == "False"
+    assert verdicts["swing_energy"] == "False"
+    data = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert {"processor", "cores", "system", "packages", "date", "command"} <= set(data["machine"])
+    assert set(data["files"]) == {f.name for f in tmp_path.glob("*.csv")}
+
+
+@pytest.mark.browser
+def test_the_page_in_a_browser(small, tmp_path, browser):  # noqa: F811
+    making.make_report(tmp_path, with_peers=True)
+    address = (tmp_path / PAGE).as_uri()
+    asked, complaints, looks = [], [], {}
+    for width, scheme in ((400, "light"), (1400, "dark")):
+        context = browser.new_context(
+            viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True
+        )
+        page = context.new_page()
+        page.on("request", lambda request: asked.append(request.url))
+        page.on("pageerror", lambda fault: complaints.append(str(fault)))
+        page.goto(address)
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+        heights = page.evaluate(
+            "[...document.querySelectorAll('svg')].map(s => s.getBoundingClientRect().height)"
+        )
+        assert len(heights) == 7
+        assert min(heights) > 80
+        looks[scheme] = page.evaluate(
+            "[getComputedStyle(document.body).backgroundColor, "
+            "getComputedStyle(document.querySelector('svg text')).fill]"
+        )
+        context.close()
+    assert asked == [address, address]
+    assert complaints == []
+    # Pictures follow the page's colours.
+    assert all(light != dark for light, dark in zip(*looks.values(), strict=True))
+
+
+def test_small_forces_have_the_error_of_their_method():
+    found = forces(quick=True, progress=lambda share: None)
+    by_key = {f.key: f for f in found.findings}
+    assert by_key["flat_error"].met
+    assert by_key["force_order_estimated"].met
+
+
+def test_the_cheapest_setting_of_an_integrator():
+    rows = [
+        SimpleNamespace(case="a", integrator="Implicit", error=e, cpu=c)
+        for e, c in ((1e-3, 0.1), (1e-5, 0.4), (1e-6, 0.3))
+    ]
+    assert integrators_section.cheapest(rows, "a", ("Implicit",), 1e-4) == 0.3
+    assert math.isnan(integrators_section.cheapest(rows, "a", ("Implicit",), 1e-7))
+
+
+def test_order_and_error_of_a_power_law():
+    line = [
+        SimpleNamespace(side=h, mean=0.7 * h**4, largest=3 * h**4) for h in (1.2, 0.61, 0.29, 0.16)
+    ]
+    assert forces_section.order(line) == pytest.approx(4.0)
+    assert forces_section.error_at(line) == pytest.approx(0.7 * 0.3**4)
+    assert forces_section.error_at(line, "largest") == pytest.approx(3 * 0.3**4)
+
+
+def test_the_rest_of_a_step():
+    measured = {name: np.array([k, k, k]) for k, name in enumerate(step.PARTS, 1)}
+    parts = steps_section.with_rest(measured | {"whole": np.array([20.0, 21.0, 22.0])})
+    assert parts["rest"] == pytest.approx(21.0 - 15.0)
+    assert "whole" not in parts
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1.2345, "1.23"), (0.0, "0"), (2.66e-15, "2.7\u00d710⁻¹⁵"), (199712, "199\u202f712"),
+        (12345.6, "12\u202f346"), (math.nan, "-"), (None, ""),
+    ],
+)  # fmt: skip
+def test_numbers(value, text):
+    assert number(value) == text
+
+
+def test_nothing_measured_meets_no_aim():
+    assert Finding("a", "a", math.nan, aim=1.0).met is False
+    assert Finding("a", "a", math.nan, aim=1.0, sense=">=").met is False
+    assert Finding("a", "a", 1.0, aim=1.0).met is True
+    assert Finding("a", "a", 1.0).met is None
+
+
+def test_labels_move_apart_as_little_as_needed():
+    heights = spread_apart([0.1, 0.5, 0.51, 0.52, 0.9], 0.1)
+    assert heights == pytest.approx([0.1, 0.41, 0.51, 0.61, 0.9])
+    assert np.diff(spread_apart(sorted(RNG.uniform(0, 1, 9)), 0.07)).min() > 0.07 - 1e-12
+
+
+def broken(*, quick, progress):
+    raise ValueError("a <b> broke")
+
+
+def test_a_broken_section_does_not_lose_the_others(stubs, tmp_path):
+    stubs(**dict.fromkeys(KEYS, stub) | {"queries": broken})
+    ran = CliRunner().invoke(app, ["report", "--out", str(tmp_path)])
+    assert ran.exit_code == 1
+    assert "not measured: Time and memory of a query: ValueError: a <b> broke" in ran.stderr
+    text = (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert "could not be measured: ValueError: a &lt;b&gt; broke" in text
+    assert "4 of 4 aims are met. 1 section could not be measured." in text
+    assert "--peers" in text
+
+
+def test_exit_code_and_table(stubs, tmp_path):
+    ran = CliRunner().invoke(app, ["report", "--quick", "--peers", "--out", str(tmp_path / "new")])
+    assert ran.exit_code == 0, ran.output
+    assert "at most 2" in ran.stdout
+    assert str(tmp_path / "new" / PAGE) in ran.stdout
+
+
+@pytest.mark.parametrize("kind", [KeyboardInterrupt(), Interrupted(0.1, None)])
+def test_an_interrupted_run_leaves_the_old_page(stubs, tmp_path, kind):
+    making.make_report(tmp_path)
+    before = {f.name: f.read_bytes() for f in tmp_path.iterdir()}
+
+    def interrupted(*, quick, progress):
+        raise kind
+
+    stubs(**dict.fromkeys(KEYS, stub) | {"hard_cases": interrupted})
+    ran = CliRunner().invoke(app, ["report", "--out", str(tmp_path)])
+    assert ran.exit_code == 130
+    assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == before
+
+
+def test_tables_of_an_old_report_go(stubs, tmp_path):
+    def with_table(*, quick, progress):
+        return Section("x", "X", tables=[Table("old", "", (Column("a", "a"),), [(1.0,)])])
+
+    (tmp_path / "mine.csv").write_text("keep me")
+    stubs(**dict.fromkeys(KEYS, stub) | {"steps": with_table})
+    making.make_report(tmp_path)
+    assert (tmp_path / "old.csv").read_text() == "a\n1.0\n"
+    stubs(**dict.fromkeys(KEYS, stub))
+    making.make_report(tmp_path)
+    assert not (tmp_path / "old.csv").exists()
+    assert (tmp_path / "mine.csv").read_text() == "keep me"
+
+
+def test_a_folder_that_cannot_be(stubs, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    ran = CliRunner().invoke(app, ["report", "--out", str(tmp_path / "file")])
+    assert ran.exit_code == 2
+    assert "cannot hold a report" in ran.stderr
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_away_from_the_checkout_there_are_no_hard_cases(monkeypatch, tmp_path):
+    monkeypatch.setattr(hard_cases.sphshell_pin, "__file__", str(tmp_path / "p" / "__init__.py"))
+    section = hard_section.section(quick=True, progress=lambda share: None)
+    assert section.error is None
+    assert "part of the checkout" in section.notes[0]
+
+
+def test_hard_cases_run_in_a_process_of_their_own():
+    shares = []
+    found = hard_cases.measure(
+        hard_cases.checkout(), quick=True, only="impact of Hunt", progress=shares.append
+    )
+    assert (found.cases, len(found.rows)) == (1, 4)
+    assert all(row.ok and row.error <= row.bound for row in found.rows)
+    assert shares == [1.0]
+
+
+def test_a_hard_case_that_ends_its_process_is_told(tmp_path):
+    (tmp_path / "tests" / "hard_cases").mkdir(parents=True)
+    (tmp_path / "tests" / "__init__.py").touch()
+    (tmp_path / "tests" / "hard_cases" / "__init__.py").touch()
+    (tmp_path / "tests" / "hard_cases" / "__main__.py").write_text("raise SystemExit('no luck')")
+    with pytest.raises(RuntimeError, match="ended early: no luck"):
+        hard_cases.measure(tmp_path)

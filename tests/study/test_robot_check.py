@@ -1,0 +1,352 @@
+"""Whole robots: the shipped ones pass, hard ones are told of honestly, wrong physics fails."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from typer.testing import CliRunner
+
+from sphshell_pin import Scene, robots
+from sphshell_pin.cli import app
+from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
+from sphshell_pin.study import robot_check
+from sphshell_pin.study.robot_check import (
+    CHECKS,
+    FAILED,
+    NOT_CHECKED,
+    PASS,
+    QUICK,
+    RobotReport,
+    Sizes,
+    as_json,
+    as_markdown,
+    check_robot,
+    contact_scene,
+)
+from sphshell_pin.study.robot_check.models import load_subject
+from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
+from sphshell_pin.study.robot_check.setting import patch
+from sphshell_pin.testing.finding import Finding
+
+ROOT = Path(__file__).parents[2]
+TINY = Sizes(1, 1, 4)
+JOINTS = ("revolute", "continuous", "prismatic", "planar", "floating")
+
+
+def chain(tmp_path: Path, joints: tuple[str, ...], extra: str = "", massless: str = "") -> Path:
+    """A URDF of links on these joints in a row, each 0.2 m on, with meshes that are not there."""
+    parts = []
+    for k in range(len(joints) + 1):
+        inertial = f"""<inertial><origin xyz="0.01 0.02 0.1"/><mass value="{1.0 + 0.3 * k}"/>
+            <inertia ixx="0.01" iyy="0.012" izz="0.005" ixy="0.001" ixz="0" iyz="0"/></inertial>"""
+        mesh = """<geometry><mesh filename="package://nowhere/absent.stl"/></geometry>"""
+        parts.append(
+            f"""<link name="link{k}">{"" if f"link{k}" in massless.split() else inertial}
+            <visual>{mesh}</visual><collision>{mesh}</collision></link>"""
+        )
+    for k, kind in enumerate(joints):
+        limit = (
+            ""
+            if kind in ("continuous", "floating", "planar")
+            else ('<limit lower="-1" upper="1" effort="10" velocity="10"/>')
+        )
+        axis = "" if kind == "floating" else f'<axis xyz="{"1 0 0" if k % 2 else "0 1 0"}"/>'
+        mimic = '<mimic joint="joint0"/>' if f"mimic{k}" in extra.split() else ""
+        parts.append(
+            f"""<joint name="joint{k}" type="{kind}"><parent link="link{k}"/>
+            <child link="link{k + 1}"/><origin xyz="0 0.02 0.2"/>{axis}{limit}{mimic}</joint>"""
+        )
+    file = tmp_path / "chain.urdf"
+    file.write_text(f'<robot name="chain">{"".join(parts)}</robot>')
+    return file
+
+
+def passes(report: RobotReport) -> bool:
+    assert report.verdict == PASS, report.remarks
+    assert set(report.findings) == set(CHECKS)
+    return True
+
+
+@pytest.mark.robots
+def test_every_robot_passes() -> None:
+    pytest.importorskip("example_robot_data")
+    assert len(robots.names()) > 70
+    for name in robots.names():
+        report = check_robot(name, sizes=TINY)
+        if report.verdict == NOT_CHECKED:
+            # The one reason there is on this machine.
+            assert "the wheel of pinocchio has no SDF reader" in str(report.reason)
+            continue
+        assert passes(report)
+
+
+@pytest.mark.parametrize("name", robots.OWN)
+def test_own_robots_pass_at_full_size(name: str) -> None:
+    assert passes(check_robot(name))
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_each_kind_of_joint(joint: str, tmp_path: Path) -> None:
+    report = check_robot(str(chain(tmp_path, ("revolute", joint, "revolute"))), sizes=QUICK)
+    assert passes(report)
+    assert report.name == "chain"
+
+
+def test_all_joints_in_one_on_a_free_root(tmp_path: Path) -> None:
+    report = check_robot(str(chain(tmp_path, JOINTS)), free_flyer=True, sizes=QUICK)
+    assert passes(report)
+    assert report.nv == 6 + 1 + 1 + 1 + 3 + 6
+
+
+def test_a_long_chain(tmp_path: Path) -> None:
+    report = check_robot(str(chain(tmp_path, ("revolute", "prismatic") * 15)), sizes=TINY)
+    assert passes(report)
+    assert report.nv == 30
+
+
+def test_mimic_joints_are_told(tmp_path: Path) -> None:
+    report = check_robot(str(chain(tmp_path, ("revolute",) * 3, extra="mimic2")), sizes=TINY)
+    assert passes(report)
+    assert any("mimic joints move freely here" in n and "'joint2'" in n for n in report.notes)
+    # Kept as a constraint by the user: forward dynamics refuses, and so it is told.
+    kept = pin.buildModelFromUrdf(str(tmp_path / "chain.urdf"), mimic=True)
+    report = check_robot(kept, sizes=TINY)
+    assert report.verdict == NOT_CHECKED
+    assert "mimic" in str(report.reason)
+
+
+def test_massless_links_are_held_and_told(tmp_path: Path) -> None:
+    end = chain(tmp_path, ("revolute",) * 3, massless="link3")
+    report = check_robot(str(end), frame="link2", radius=0.02, sizes=TINY)
+    assert passes(report)
+    assert report.nv == 2
+    assert any("move no mass" in note and "'joint2'" in note for note in report.notes)
+    # In the middle of a limb the links behind it lend their mass: nothing is held.
+    middle = chain(tmp_path, ("revolute",) * 3, massless="link2")
+    report = check_robot(str(middle), radius=0.02, sizes=TINY)
+    assert passes(report)
+    assert report.nv == 3
+    # The sphere on what is held: nothing can move it.
+    alone = chain(tmp_path, ("revolute",), massless="link1")
+    report = check_robot(str(alone), radius=0.02, sizes=TINY)
+    assert report.verdict == NOT_CHECKED
+
+
+def test_which_joints_move_no_mass() -> None:
+    """Against the rank of the mass matrix."""
+    model = pin.Model()
+    joint = 0
+    for k in range(4):
+        joint = model.addJoint(joint, pin.JointModelRZ(), pin.SE3.Identity(), f"j{k}")
+        # All four turn about one axis: only their sum moves anything.
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    for j in range(1, 5):
+        model.addJointFrame(j)
+    rng = np.random.default_rng(0)
+    postures = [random_posture(model, rng) for _ in range(3)]
+    assert regularity(model, model.createData(), postures[0]) < 1e-12
+    held = massless_joints(model, postures)
+    assert len(held) == 3
+    ids = [model.getJointId(name) for name in held]
+    rest = pin.buildReducedModel(model, ids, postures[0])
+    assert regularity(rest, rest.createData(), np.zeros(1)) == pytest.approx(1.0)
+
+
+def test_random_postures_are_legal(tmp_path: Path) -> None:
+    model = pin.buildModelFromUrdf(str(chain(tmp_path, JOINTS)), pin.JointModelFreeFlyer())
+    rng = np.random.default_rng(1)
+    some = np.array([random_posture(model, rng) for _ in range(200)])
+    assert all(pin.isNormalized(model, q, 1e-12) for q in some)
+    limited = [j.idx_q for j in list(model.joints)[1:] if j.nq == j.nv == 1]
+    assert len(limited) == 2
+    assert np.abs(some[:, limited]).max() <= 1
+    assert (some[:, limited].max(axis=0) > 0.4).all()
+    assert (some[:, limited].min(axis=0) < -0.4).all()
+
+
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("depth", [0.1, 0.3])
+def test_scenes_have_the_depth_asked_for(free: bool, depth: float) -> None:
+    for seed in range(4):
+        touch = contact_scene("three_link_finger", depth=depth, free=free, seed=seed)
+        contacts = touch.scene.contacts(touch.q, touch.v)
+        # The patch is curved where the depth is counted from, its elements are as good as it.
+        assert contacts.depth == pytest.approx([depth * 0.01], rel=5e-3)
+        assert contacts.normal_force[0] > 0
+
+
+def test_the_patch_has_hundreds_of_elements_and_its_exact_normals() -> None:
+    shell = patch(0.01)
+    assert len(shell.elements) == 800
+    assert shell.normals is not None
+    assert shell.health.is_closed is False
+    # Gentler than the sphere: no contact but one.
+    found = shell.contacts([0.003, 0.002, 0.009], 0.01)
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "broken"),
+    [
+        ("forces", "external_forces"),
+        ("reaction", "external_forces"),
+        ("derivatives", "contact_derivatives"),
+        ("contacts", "contacts"),
+    ],
+)
+def test_wrong_physics_fails(name: str, broken: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = getattr(Scene, broken)
+
+    def wrong(self, q, v=None):
+        told = right(self, q, v)
+        if broken == "external_forces":
+            for joint in range(1, len(told)):
+                told[joint] = pin.Force(told[joint].linear, 1.001 * told[joint].angular)
+            return told
+        if broken == "contact_derivatives":
+            return told[0] * (1 + 1e-4), told[1]
+        return type(told)(**{k: column[:0] for k, column in vars(told).items()})
+
+    monkeypatch.setattr(Scene, broken, wrong)
+    report = check_robot("three_link_finger", sizes=Sizes(2, 1, 12))
+    assert report.verdict == FAILED
+    assert not report.met(name)
+    assert report.met("energy")
+    with pytest.raises(AssertionError, match=f"failed: .*{name} failed"):
+        report.require()
+
+
+def test_the_same_seed_gives_the_same_figures() -> None:
+    one, two = (as_json([check_robot("ball", sizes=TINY)], 0, TINY) for _ in range(2))
+    assert one == two
+    assert one != as_json([check_robot("ball", seed=1, sizes=TINY)], 0, TINY)
+
+
+def test_wrong_input_is_told() -> None:
+    with pytest.raises(NameNotFound, match="no robot 'panado'"):
+        check_robot("panado")
+    with pytest.raises(SphshellError, match="no such file"):
+        check_robot("nowhere/robot.urdf")
+    with pytest.raises(FrameNotFound, match="no frame 'nose'"):
+        check_robot("ball", frame="nose")
+    with pytest.raises(InvalidParameter, match="radius"):
+        check_robot("ball", radius=-1.0)
+    with pytest.raises(InvalidParameter, match="must be a URDF file"):
+        check_robot("ball", free_flyer=True)
+    with pytest.raises(InvalidParameter, match="must be a name, a URDF file or a pinocchio"):
+        check_robot(3)
+
+
+def test_meshes_are_not_loaded() -> None:
+    robot = load_subject("three_link_finger").robot
+    assert robot.visual_model.ngeoms == 0
+    assert {type(g.geometry).__name__ for g in robot.collision_model.geometryObjects} == {"Sphere"}
+
+
+REPORTS = [
+    RobotReport("good", "tip", 0.01, 3, 3, {k: Finding(0.0, "here") for k in CHECKS}, ("odd",)),
+    RobotReport("bad", "tip", 0.01, 7, 6, {k: Finding(np.inf, "there") for k in CHECKS}),
+    RobotReport("absent", reason="it is not there"),
+    RobotReport("fine", "tip", 0.01, 3, 3, {k: Finding(1e-13, "here") for k in CHECKS}, ("odd",)),
+]
+
+
+def test_the_page() -> None:
+    REPORTS[3].findings["fast"] = Finding(0.0, "never")
+    page = as_markdown(REPORTS, "a command")
+    rows = {line.split(" | ")[0]: line for line in page.splitlines() if line.startswith("| ")}
+    assert rows["| good"].endswith("| pass |")
+    assert rows["| bad"].count("no figure") == len(CHECKS)
+    assert rows["| absent"].endswith("| not checked |")
+    assert len({line.count(" | ") for name, line in rows.items() if name[2:] in "goodbadfine"}) == 1
+    assert "2 of 4 robots pass; written by `a command`" in page
+    assert "- good, fine: odd.\n" in page
+    assert "- absent: it is not there.\n" in page
+    assert "- bad: forces failed: there (no figure, allowed 1e-08).\n" in page
+
+
+def test_the_figures_as_json() -> None:
+    data = json.loads(as_json(REPORTS, 7, QUICK))
+    assert data["seed"] == 7
+    assert data["sizes"] == {"postures": 1, "runs": 1, "poses": 12}
+    assert [one["verdict"] for one in data["robots"]] == [PASS, FAILED, NOT_CHECKED, PASS]
+    assert data["robots"][1]["checks"]["forces"] == {"error": None, "met": False, "where": "there"}
+
+
+def run(*arguments: object):
+    return CliRunner().invoke(app, ["check-robot", *(str(one) for one in arguments)])
+
+
+def test_the_command(tmp_path: Path) -> None:
+    figures, page = tmp_path / "figures.json", tmp_path / "page.md"
+    result = run("ball", "turntable", "--quick", "--json", figures, "--write", page)
+    assert result.exit_code == 0, result.output
+    assert "2 of 2 robots pass" in result.output
+    assert [one["name"] for one in json.loads(figures.read_text())["robots"]] == [
+        "ball",
+        "turntable",
+    ]
+    assert "| turntable | `disc` | 2/1 |" in page.read_text()
+    assert sorted(tmp_path.iterdir()) == [figures, page]
+
+
+def test_exit_codes_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for wrong, told in (
+        (["ball", "--all"], "not both"),
+        ([], "say which robots"),
+        (["bal"], "no robot 'bal'"),
+        ([tmp_path / "no.urdf"], "no such file"),
+        (["ball", "--frame", "nose"], "no frame 'nose'"),
+        (["ball", "--radius", "0"], "radius = 0.0 must be positive"),
+        (["ball", "--json", tmp_path / "no" / "x.json"], "there is no folder"),
+    ):
+        result = run(*wrong)
+        assert result.exit_code == 2, result.output
+        assert told in result.output
+        assert "Traceback" not in result.output
+    broken = tmp_path / "broken.urdf"
+    broken.write_text("<robot")
+    result = run("ball", broken, "--quick")
+    assert result.exit_code == 2
+    assert "1 of 2 robots pass" in result.output
+    assert re.search(r"not a URDF that can be read", result.output)
+    found = {k: Finding(1.0, "there") for k in CHECKS}
+    report = RobotReport("ball", "tip", 0.01, 7, 6, found)
+    monkeypatch.setattr(robot_check, "check_robot", lambda *a, **k: report)
+    result = run("ball")
+    assert result.exit_code == 1
+    assert "forces failed: there" in result.output
+
+
+def test_ctrl_c_tells_what_is_done(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    done: list[str] = []
+
+    def check(name: str, **_: object) -> RobotReport:
+        if done:
+            raise KeyboardInterrupt
+        done.append(name)
+        return REPORTS[0]
+
+    monkeypatch.setattr(robot_check, "check_robot", check)
+    result = run("ball", "turntable", "gear_pair", "--json", tmp_path / "x.json")
+    assert result.exit_code == 130
+    assert "1 of 1 robots pass" in result.output
+    assert "interrupted: 2 of 3 robots were not checked" in result.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_page_of_the_docs_is_of_these_robots() -> None:
+    page = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    table = re.findall(
+        r"^\| (\w+) \| `?\S*`? \|.*\| (pass|failed|not checked) \|$", page, re.MULTILINE
+    )
+    verdicts = dict(table)
+    assert "failed" not in verdicts.values()
+    assert [name for name, verdict in verdicts.items() if verdict == NOT_CHECKED] == ["cassie"]
+    if len(robots.names()) > len(robots.OWN):
+        assert list(verdicts) == robots.names()

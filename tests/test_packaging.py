@@ -1,0 +1,237 @@
+"""Packaging and release: what pyproject.toml, the workflows and the wheel promise each other."""
+
+from __future__ import annotations
+
+import fnmatch
+import importlib.metadata
+import importlib.util
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import sphshell_pin
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+WHEELS = PROJECT["tool"]["cibuildwheel"]
+WORKFLOWS = ROOT / ".github" / "workflows"
+CHECK = ROOT / ".ci" / "check_wheel.py"
+NAME = re.compile(r"[A-Za-z0-9_.-]+")
+
+
+def test_it_is_compiled_against_the_versions_it_runs_with():
+    built = {NAME.match(one)[0]: one.split("==")[-1] for one in PROJECT["build-system"]["requires"]}
+    runs = {NAME.match(one)[0]: one.split("==")[-1] for one in PROJECT["project"]["dependencies"]}
+    for name in ("pin", "coal"):
+        assert built[name] == runs[name], name
+        assert importlib.metadata.version(name).startswith(runs[name].rstrip("*"))
+
+
+def test_every_folder_that_is_installed_exists():
+    for target, source in PROJECT["tool"]["scikit-build"]["wheel"]["packages"].items():
+        assert (ROOT / source / "__init__.py").is_file(), source
+        assert target.split("/")[0] in ("sphshell_pin", "pytest_sphshell_pin")
+
+
+def test_versions_and_entry_points_agree():
+    assert PROJECT["project"]["version"] == sphshell_pin.__version__
+    # An editable install may be older than its extras, but not than its commands.
+    (command,) = importlib.metadata.entry_points(group="console_scripts", name="sphshell-pin")
+    assert command.value == PROJECT["project"]["scripts"]["sphshell-pin"]
+    assert callable(command.load())
+    for group in PROJECT["project"].get("entry-points", {}).values():
+        for module in group.values():
+            assert importlib.util.find_spec(module.partition(":")[0]) is not None, module
+
+
+def test_every_extra_is_in_the_table_of_the_readme_and_in_all():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    table = dict(re.findall(r"^\| `(\w+)` \| (.+?) \|", readme, re.MULTILINE))
+    assert set(EXTRAS) <= set(table), "README's table of extras lacks some"
+    assert set(table) & {"all"}
+    (everything,) = EXTRAS["all"]
+    inside = set(everything.partition("[")[2].rstrip("]").split(","))
+    assert inside == set(EXTRAS) - {"all"}
+
+
+def test_an_extra_that_an_error_names_exists():
+    source = "\n".join(
+        file.read_text(encoding="utf-8")
+        for folder in ("sphshell_pin", "robots", "scenarios", "benchmarks")
+        for file in (ROOT / folder).rglob("*.py")
+    )
+    named = set(re.findall(r'MissingExtra\(\s*"[^"]+",\s*"(\w+)"', source))
+    assert named
+    assert named <= set(EXTRAS)
+
+
+def test_nothing_is_bundled_into_a_wheel():
+    """A second registry of Boost.Python would know no pinocchio.Model."""
+    assert WHEELS["macos"]["repair-wheel-command"] == ""
+    command = shlex.split(WHEELS["linux"]["repair-wheel-command"])
+    assert command[:2] == ["auditwheel", "repair"]
+    left_out = [command[k + 1] for k, word in enumerate(command) if word == "--exclude"]
+    readelf = shutil.which("readelf")
+    if readelf is None or sys.platform != "linux":
+        pytest.skip("no readelf on this machine")
+    core = sphshell_pin._core.__file__
+    told = subprocess.run([readelf, "-d", core], capture_output=True, text=True, check=True).stdout
+    needed = re.findall(r"NEEDED.*\[(.+)\]", told)
+    system = ("libstdc++.so*", "libm.so*", "libgcc_s.so*", "libc.so*", "ld-linux*", "libpthread*")
+    ours = [one for one in needed if not any(fnmatch.fnmatch(one, name) for name in system)]
+    assert any("pinocchio" in one for one in ours)
+    for one in ours:
+        assert any(fnmatch.fnmatch(one, name) for name in left_out), f"{one} would be bundled"
+    (path,) = re.findall(r"R(?:UN)?PATH.*\[(.+)\]", told)
+    assert "$ORIGIN/../cmeel.prefix/lib" in path.split(":")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the policy is that of Linux wheels")
+def test_the_policy_of_the_wheels_is_that_of_pinocchios():
+    """A wheel for an older system could not be installed there: its dependencies have none."""
+    policies = set()
+    for name in ("pin", "coal"):
+        wheel = importlib.metadata.distribution(name).read_text("WHEEL")
+        policies |= set(re.findall(r"^Tag: .*-(manylinux_\d+_\d+)_\w+$", wheel, re.MULTILINE))
+    assert policies == {WHEELS["linux"]["manylinux-x86_64-image"]}
+    assert policies == {WHEELS["linux"]["manylinux-aarch64-image"]}
+    assert "--plat $AUDITWHEEL_PLAT --only-plat" in WHEELS["linux"]["repair-wheel-command"]
+
+
+@pytest.mark.parametrize(
+    ("platform", "machine", "suffix"),
+    [
+        ("linux", "x86_64", "manylinux_x86_64"),
+        ("linux", "aarch64", "manylinux_aarch64"),
+        ("macos", "arm64", "macosx_arm64"),
+    ],
+)
+def test_wheels_are_built_for_every_python_that_pinocchio_has(platform, machine, suffix):
+    pytest.importorskip("cibuildwheel", reason="needs cibuildwheel, the builder of the wheels")
+    command = [sys.executable, "-m", "cibuildwheel", "--print-build-identifiers"]
+    told = subprocess.run(
+        [*command, "--platform", platform, "--archs", machine, str(ROOT)],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split()
+    assert told == [f"cp3{minor}-{suffix}" for minor in (11, 12, 13, 14)]
+    assert PROJECT["project"]["requires-python"] == ">=3.11"
+
+
+@pytest.fixture
+def workflow():
+    yaml = pytest.importorskip("yaml", reason="needs PyYAML, which comes with the extra docs")
+    if not (WORKFLOWS.is_dir() and CHECK.is_file()):
+        pytest.skip("workflows are part of the checkout")
+
+    def read(name):
+        return yaml.safe_load((WORKFLOWS / f"{name}.yml").read_text(encoding="utf-8"))
+
+    return read
+
+
+def test_only_a_tag_publishes_and_only_what_was_checked(workflow):
+    release = workflow("release")
+    trigger = release[True]  # YAML 1.1 takes the key "on" for true
+    assert trigger["push"] == {"tags": ["v*"]}
+    assert "pull_request" not in trigger
+    jobs = release["jobs"]
+    publish = jobs.pop("publish")
+    assert publish["if"] == "startsWith(github.ref, 'refs/tags/v')"
+    assert set(publish["needs"]) == set(jobs)
+    assert publish["permissions"] == {"id-token": "write"}  # trusted publishing: no stored token
+    assert release["permissions"] == {"contents": "read"}
+    for job in jobs.values():
+        assert "permissions" not in job
+        told = " ".join(step.get("run", "") for step in job["steps"])
+        assert ".ci/check_wheel.py" in told
+    assert "secrets." not in (WORKFLOWS / "release.yml").read_text(encoding="utf-8")
+    runners = set(jobs["wheels"]["strategy"]["matrix"]["runner"])
+    assert runners == {"ubuntu-24.04", "ubuntu-24.04-arm", "macos-15"}
+
+
+def test_ci_runs_the_projects_own_entry(workflow):
+    steps = workflow("ci")["jobs"]["test"]["steps"]
+    assert ".ci/run" in [step.get("run") for step in steps]
+    assert (ROOT / ".ci" / "run").stat().st_mode & 0o111
+
+
+def test_actions_are_pinned(workflow):
+    for name in ("ci", "release"):
+        text = (WORKFLOWS / f"{name}.yml").read_text(encoding="utf-8")
+        uses = re.findall(r"uses: (\S+)", text)
+        assert uses
+        assert all(re.search(r"@(v\d+|release/v\d+)$", one) for one in uses), uses
+        for line in re.findall(r"pip install (cibuildwheel\S*)", text):
+            assert re.fullmatch(r"cibuildwheel==\d+\.\d+\.\d+", line)
+
+
+@pytest.fixture
+def check_contents():
+    if not CHECK.is_file():
+        pytest.skip("the check of wheels is part of the checkout")
+    spec = importlib.util.spec_from_file_location("check_wheel", CHECK)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.check_contents
+
+
+GOOD = {
+    "sphshell_pin/_core.cpython-311-x86_64-linux-gnu.so": b"\0$ORIGIN/../cmeel.prefix/lib\0",
+    **dict.fromkeys(
+        (
+            "sphshell_pin/_core.pyi",
+            "sphshell_pin/py.typed",
+            "sphshell_pin/view/recording.html",
+            "sphshell_pin/view/live/page/page.js",
+            "sphshell_pin/robots/urdf/ball.urdf",
+            "sphshell_pin/robots/meshes/gear_20.stl",
+            "sphshell_pin/scenarios/sphere_on_shell.toml",
+            "sphshell_pin/scenarios/surfaces/bladex_upper.LICENSE.txt",
+            "sphshell_pin/benchmarks/__init__.py",
+            "pytest_sphshell_pin/__init__.py",
+            "sphshell_pin-0.1.0.dist-info/METADATA",
+        ),
+        b"",
+    ),
+}
+BAD = {
+    "a bundled library": ({"sphshell_pin.libs/libboost_python311-1.so.1.90.0": b""}, "outside"),
+    "sources": ({"sphshell_pin/cpp/shell/bvh.cpp": b""}, "bvh.cpp does not belong"),
+    "tests": ({"sphshell_pin/tests/test_a.py": b""}, "does not belong"),
+    "a core that finds no libraries": (
+        {"sphshell_pin/_core.cpython-311-x86_64-linux-gnu.so": b"$ORIGIN"},
+        "cmeel.prefix",
+    ),
+    "no scenarios": ({"sphshell_pin/scenarios/sphere_on_shell.toml": None}, "no sphshell_pin/scen"),
+    "no plugin": ({"pytest_sphshell_pin/__init__.py": None}, "no pytest_sphshell_pin"),
+    "no types": ({"sphshell_pin/py.typed": None}, "no sphshell_pin/py.typed"),
+}
+
+
+def pack(file, contents):
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, data in contents.items():
+            if data is not None:
+                archive.writestr(name, data)
+    return file
+
+
+def test_a_good_wheel_passes_its_check(tmp_path, check_contents):
+    assert check_contents(pack(tmp_path / "good.whl", GOOD)) == []
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_a_wheel_is_refused_with(what, tmp_path, check_contents):
+    change, told = BAD[what]
+    faults = check_contents(pack(tmp_path / "bad.whl", {**GOOD, **change}))
+    assert any(told in fault for fault in faults), faults

@@ -1,0 +1,201 @@
+"""The documentation site: builds without a warning, asks nobody for anything, and is complete."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from functools import partial
+from html.parser import HTMLParser
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+import sphshell_pin
+from sphshell_pin import errors
+from tests.view.test_recording_in_browser import browser  # noqa: F401
+
+for package in ("mkdocs", "material", "mkdocstrings"):
+    pytest.importorskip(package, reason="needs the extra docs: mkdocs-material, mkdocstrings")
+
+ROOT = Path(__file__).parent.parent
+# What a browser loads by itself, other than what a reader clicks on.
+LOADED = {("script", "src"), ("img", "src"), ("iframe", "src"), ("link", "href"), ("source", "src")}
+
+
+class Page(HTMLParser):
+    """The links, loaded files and anchors of a page."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        self.links: set[str] = set()
+        self.loaded: set[str] = set()
+        self.anchors: set[str] = set()
+        self.text: list[str] = []
+        self.feed(file.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        for key, value in attrs:
+            if value is None:
+                continue
+            if (tag, key) in LOADED:
+                self.loaded.add(value)
+            elif (tag, key) == ("a", "href"):
+                self.links.add(value)
+            elif key == "id":
+                self.anchors.add(value)
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    site = tmp_path_factory.mktemp("site")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(site)],
+        cwd=ROOT,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return site, done
+
+
+@pytest.fixture(scope="module")
+def pages(built):
+    site, _ = built
+    return {file: Page(file) for file in site.rglob("*.html")}
+
+
+def test_it_builds_without_a_warning(built):
+    _, done = built
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+
+
+def test_every_page_is_there_and_in_the_menu(built, pages):
+    site, _ = built
+    written = {page.relative_to(ROOT / "docs") for page in (ROOT / "docs").rglob("*.md")}
+    shown = {file.relative_to(site).with_suffix(".md") for file in pages} - {Path("404.md")}
+    assert shown == written
+    start = pages[site / "index.html"]
+    assert {str(page.with_suffix(".html")) for page in written} <= start.links | {"index.html"}
+
+
+def test_it_asks_nobody_for_anything(built, pages):
+    site, _ = built
+    for file, page in pages.items():
+        for one in page.loaded:
+            assert not urlsplit(one).netloc, f"{file.name} loads {one}"
+            # The page of wrong addresses names files from the root of the host.
+            target = site / one.lstrip("/") if one.startswith("/") else file.parent / unquote(one)
+            assert one.startswith("data:") or target.exists(), f"{file.name} loads {one}"
+    for style in site.rglob("*.css"):
+        text = style.read_text(encoding="utf-8")
+        assert not re.search(r"(url\(|@import)\s*[\"']?(https?:)?//", text), style.name
+
+
+def test_the_links_of_the_site_lead_somewhere(pages):
+    for file, page in pages.items():
+        if file.name == "404.html":  # its links are those of a site at the root of a host
+            continue
+        for link in page.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (file.parent / unquote(parts.path)).resolve() if parts.path else file
+            assert target.exists(), f"{file.name}: {link}"
+            if parts.fragment and target in pages:
+                assert unquote(parts.fragment) in pages[target].anchors, f"{file.name}: {link}"
+
+
+def test_every_public_name_is_in_the_api(built, pages):
+    site, _ = built
+    anchors = set().union(*(pages[file].anchors for file in (site / "api").glob("*.html")))
+    for name in sphshell_pin.__all__:
+        home = getattr(sphshell_pin, name).__module__
+        assert f"{home}.{name}" in anchors or any(
+            anchor.startswith("sphshell_pin.") and anchor.endswith(f".{name}") for anchor in anchors
+        ), f"sphshell_pin.{name} is on no page"
+    faults = [
+        name
+        for name, one in vars(errors).items()
+        if getattr(one, "__module__", "") == errors.__name__
+    ]
+    for name in faults:
+        if not name.startswith("_"):
+            assert f"sphshell_pin.errors.{name}" in anchors, name
+
+
+def test_meanings_of_parameters_do_not_pass_for_types(built, pages):
+    site, _ = built
+    text = " ".join("".join(pages[site / "api" / "shell.html"].text).split())
+    assert re.search(r"crease_angle \(float, default: CREASE_ANGLE ?\) \S edges that turn", text)
+
+
+def test_docstrings_are_spelled_out(tmp_path):
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "from sections import spell_out\n"
+            "text = 'Do it.\\n\\nParameters\\n----------\\na : first [m],\\n    or none\\n'\n"
+            "text += 'b : (n,); c : (m,) last\\nd (n, 3), e (n,) : both\\n'\n"
+            "text += '\\nRaises\\n------\\nError : kept\\n'\n"
+            "print(spell_out(text), end='')",
+        ],
+        cwd=ROOT / "docs" / "api",
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == (
+        "Do it.\n\nParameters\n----------\na\n    first [m],\n    or none\n"
+        "b\n    (n,)\nc\n    (m,) last\nd, e\n    (n, 3), (n,) both\n\n"
+        "Raises\n------\nError : kept\n"
+    )
+
+
+@pytest.fixture
+def address(built, monkeypatch):
+    site, _ = built
+    monkeypatch.setattr(SimpleHTTPRequestHandler, "log_message", lambda *_: None)
+    handler = partial(SimpleHTTPRequestHandler, directory=str(site))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+@pytest.mark.browser
+def test_it_fits_a_telephone_and_its_search_finds(browser, address, pages):  # noqa: F811
+    context = browser.new_context(viewport={"width": 400, "height": 800})
+    page = context.new_page()
+    complaints: list[str] = []
+    page.on("pageerror", lambda fault: complaints.append(str(fault)))
+    page.on("response", lambda answer: answer.status < 400 or complaints.append(answer.url))
+    page.on(
+        "request",
+        lambda request: (
+            request.url.startswith((address, "data:")) or complaints.append(request.url)
+        ),
+    )
+    for name in ("index", "tutorial", "scenarios", "hard_cases", "api/shell", "api/dynamics"):
+        page.goto(f"{address}/{name}.html", wait_until="networkidle")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400, name
+        shown = page.evaluate("[...document.images].every(i => i.complete && i.naturalWidth > 0)")
+        assert shown, name
+    page.goto(f"{address}/index.html", wait_until="networkidle")
+    page.locator("label[for=__search]").first.click()
+    ready = "document.querySelector('.md-search-result__meta').textContent.includes('Type')"
+    page.wait_for_function(ready)
+    page.locator("input[name=query]").press_sequentially("BristleFriction")
+    page.locator(".md-search-result__item a").first.wait_for()
+    assert not complaints
+    context.close()

@@ -1,0 +1,368 @@
+"""The assertions hold where contact is right, and fail where it was broken on purpose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import (
+    Adaptive,
+    BristleFriction,
+    CoulombFriction,
+    ImpactLaw,
+    RungeKutta4,
+    Scene,
+    Shell,
+    Simulation,
+    Sphere,
+)
+from sphshell_pin.errors import InvalidParameter, WeakLawWarning
+from sphshell_pin.testing import (
+    assert_contacts_found,
+    assert_derivatives,
+    assert_energy_kept,
+    assert_forces_balance,
+    assert_lossless_energy_kept,
+    assert_momentum_kept,
+    assert_no_contact_missed,
+    assert_not_passed_through,
+    assert_wrenches_cancel,
+)
+from sphshell_pin.testing.triangles import crossed, distances, pieces
+from tests import meshes
+from tests.contact.smooth.surfaces import shell_of
+from tests.models import (
+    ARM_Q,
+    arm,
+    ball,
+    free_q,
+    linear_law,
+    on_plate,
+    plate,
+    slider,
+    two_free_bodies,
+    two_free_state,
+)
+from tests.oracle.geometry import closest_on_triangles
+
+LAW = ImpactLaw(4e4, 1.5, 20.0, 2e-2)
+FRICTION = CoulombFriction(0.3, 0.1, 0.1, 1.0)
+ARM_V = np.array([0.3, 0.2, -0.4])
+EVERY_FRICTION = [None, FRICTION, BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05)]
+
+
+def arm_scene(kind=Scene, friction=FRICTION):
+    """Arm whose tip is 5 mm deep in a plate that stands askew."""
+    model, data = arm(), arm().createData()
+    pin.framesForwardKinematics(model, data, ARM_Q)
+    tip = data.oMf[model.getFrameId("ball")].translation
+    rotation = meshes.random_rotation(3)
+    scene = kind(model)
+    scene.add_contact(
+        Sphere(0.05, "ball"),
+        plate(),
+        placement=pin.SE3(rotation, tip - rotation @ np.array([0.0, 0.0, 0.045])),
+        law=LAW,
+        friction=friction,
+        method="facets",
+    )
+    return scene
+
+
+class Weaker(Scene):
+    """Tells one joint's wrench a millionth too small."""
+
+    def external_forces(self, q, v=None):
+        forces = super().external_forces(q, v)
+        joint = self.model.njoints - 1
+        forces[joint] = pin.Force(forces[joint].vector * (1 - 1e-6))
+        return forces
+
+
+class InTheWorld(Scene):
+    """Tells the wrenches in the world's axes, as who forgets that they belong to the joint."""
+
+    def external_forces(self, q, v=None):
+        forces = super().external_forces(q, v)
+        data = self.model.createData()
+        pin.forwardKinematics(self.model, data, self.check_state(q, v)[0])
+        for joint in range(1, self.model.njoints):
+            forces[joint] = data.oMi[joint].act(forces[joint])
+        return forces
+
+
+class Stiffer(Scene):
+    """Tells one entry of a derivative a hundred-thousandth too large."""
+
+    entry = 0
+
+    def contact_derivatives(self, q, v=None):
+        both = [np.array(one) for one in super().contact_derivatives(q, v)]
+        matrix = both[self.entry]
+        k = np.unravel_index(np.abs(matrix).argmax(), matrix.shape)
+        matrix[k] *= 1 + 1e-5
+        return tuple(both)
+
+
+@pytest.mark.parametrize("friction", EVERY_FRICTION)
+def test_a_right_scene_passes(friction) -> None:
+    scene = arm_scene(friction=friction)
+    assert assert_forces_balance(scene, ARM_Q, ARM_V, tau=np.array([1.0, -2.0, 3.0])) < 1e-12
+    assert assert_derivatives(scene, ARM_Q, ARM_V) < 1e-6
+    assert assert_contacts_found(scene, ARM_Q) < 1e-12
+    free = two_free_bodies(LAW, friction)
+    assert assert_wrenches_cancel(free, *two_free_state()) < 1e-13
+    assert assert_derivatives(free, *two_free_state()) < 1e-6
+
+
+@pytest.mark.parametrize("kind", [Weaker, InTheWorld])
+def test_a_wrong_wrench_is_told(kind) -> None:
+    with pytest.raises(
+        AssertionError, match=r"forces do not balance: \S+ \(at most 1e-08\), joint"
+    ):
+        assert_forces_balance(arm_scene(kind), ARM_Q, ARM_V)
+    right = two_free_bodies(LAW, FRICTION)
+    wrong = kind(right.model)
+    pair = right.pairs[0]
+    wrong.add_contact(pair.sphere, pair.shell, pair.frame, pair.placement, LAW, FRICTION, "facets")
+    with pytest.raises(AssertionError, match=r"action and reaction differ.*leave a force of \("):
+        assert_wrenches_cancel(wrong, *two_free_state())
+
+
+@pytest.mark.parametrize("entry", [0, 1])
+def test_a_wrong_derivative_is_told(entry: int) -> None:
+    scene = arm_scene(Stiffer)
+    scene.entry = entry
+    match = f"the contact forces by {'qv'[entry]}: of joint .* by joint"
+    with pytest.raises(AssertionError, match=match):
+        assert_derivatives(scene, ARM_Q, ARM_V)
+
+
+def test_scenes_that_say_nothing_are_refused() -> None:
+    with pytest.raises(InvalidParameter, match="contact with the universe"):
+        assert_wrenches_cancel(arm_scene(), ARM_Q)
+    massless = arm()
+    massless.inertias[3] = pin.Inertia.Zero()
+    with pytest.raises(InvalidParameter, match="mass matrix is singular"):
+        assert_forces_balance(on_plate(massless, LAW), ARM_Q)
+    with pytest.raises(InvalidParameter, match=r"tau has shape \(2,\)|tau = \(2,\)"):
+        assert_forces_balance(arm_scene(), ARM_Q, tau=np.zeros(2))
+
+
+def test_a_single_joint_has_matrices_too() -> None:
+    scene = on_plate(slider(), LAW)
+    q, v = np.array([0.049]), np.array([-0.1])
+    assert assert_forces_balance(scene, q, v) < 1e-12
+    assert assert_derivatives(scene, q, v) < 1e-6
+    # Closed form: F = k d^e - c STEP(d) v, so dF/dv = -c STEP(d).
+    step = 0.001 / 2e-2
+    by_v = scene.contact_derivatives(q, v)[1]
+    assert by_v[0, 0] == pytest.approx(-20.0 * step**2 * (3 - 2 * step), rel=1e-9)
+
+
+def closed_run(integrator, law=LAW, friction=FRICTION):
+    return Simulation(two_free_bodies(law, friction), integrator).run(*two_free_state(), 0.02)
+
+
+def test_momentum_of_a_closed_system_is_kept() -> None:
+    assert assert_momentum_kept(closed_run(Adaptive(1e-9))) < 1e-7
+    # Of order 4: a coarse step is told, with where and how much.
+    with pytest.raises(AssertionError, match=r"momentum is not kept.*at t = .* impulse is"):
+        assert_momentum_kept(closed_run(RungeKutta4(5e-3)), tolerance=1e-9)
+
+
+def test_momentum_that_creeps_in_is_told() -> None:
+    result = closed_run(Adaptive(1e-9))
+    push = np.zeros(12)
+    push[0] = 1e-5
+    crept = replace(result, v=result.v + np.linspace(0, 1, len(result.t))[:, None] * push)
+    with pytest.raises(AssertionError, match="momentum is not kept"):
+        assert_momentum_kept(crept)
+
+
+def test_open_systems_have_no_momentum_to_keep() -> None:
+    run = Simulation(arm_scene(), Adaptive()).run(ARM_Q, ARM_V, 1e-3)
+    with pytest.raises(InvalidParameter, match="gravity"):
+        assert_momentum_kept(run)
+    far = Simulation(two_free_bodies(LAW), Adaptive()).run(*two_free_state(-1.0), 1e-3)
+    with pytest.raises(InvalidParameter, match="nothing touched"):
+        assert_momentum_kept(far)
+    with pytest.raises(InvalidParameter, match="must know its scene"):
+        assert_momentum_kept(replace(far, scene=None))
+
+
+def test_energy_is_kept() -> None:
+    run = Simulation(arm_scene(), Adaptive(1e-9)).run(ARM_Q, ARM_V, 0.05)
+    assert assert_energy_kept(run) < 1e-6
+    lossless = on_plate(ball(), linear_law(1e4))
+    drop = Simulation(lossless, Adaptive(1e-9)).run(free_q([0, 0, 0.06]), np.zeros(6), 0.2)
+    assert len(drop.contacts)
+    assert assert_lossless_energy_kept(drop) < 1e-7
+    with pytest.raises(InvalidParameter, match="without damping, friction"):
+        assert_lossless_energy_kept(run)
+
+
+def test_a_source_that_makes_energy_is_told() -> None:
+    """Its depth grows along z while it pushes askew: round a closed path it does work."""
+
+    def find(pose_i, pose_j):
+        askew = np.array([np.sin(0.3), 0.0, np.cos(0.3)])
+        depth = 0.05 - pose_i.translation[2]
+        return pose_i.translation[None], askew[None], np.array([depth])
+
+    def honest(pose_i, pose_j):
+        depth = 0.05 - pose_i.translation[2]
+        return pose_i.translation[None], np.array([[0.0, 0.0, 1.0]]), np.array([depth])
+
+    results = []
+    for source in (honest, find):
+        scene = Scene(ball())
+        scene.add_contact_source(source, "ball", "universe", linear_law(1e4))
+        v = np.array([1.0, 0, 0, 0, 0, 0])
+        results.append(Simulation(scene, Adaptive(1e-9)).run(free_q([0, 0, 0.06]), v, 0.3))
+        assert len(results[-1].contacts)
+    assert assert_energy_kept(results[0]) < 1e-6
+    with pytest.raises(AssertionError, match=r"energy does not add up.*J too much.*changed form"):
+        assert_energy_kept(results[1])
+    with pytest.raises(AssertionError, match="energy does not add up"):
+        assert_lossless_energy_kept(results[1])
+
+
+class Holed:
+    """A shell whose search loses the contacts on some elements."""
+
+    def __init__(self, shell: Shell, lost: range) -> None:
+        self.shell, self.lost = shell, lost
+
+    def __getattr__(self, name: str):
+        return getattr(self.shell, name)
+
+    def keep(self, found):
+        return ~np.isin(found.element, list(self.lost))
+
+    def contacts(self, center, radius, method="smooth"):
+        found = self.shell.contacts(center, radius, method)
+        keep = self.keep(found)
+        columns = ("point", "normal", "depth", "element", "patch", "feature", "weight")
+        return replace(found, **{name: getattr(found, name)[keep] for name in columns})
+
+
+class Ghosts(Holed):
+    """A shell whose contacts lie a hair beside the surface."""
+
+    def contacts(self, center, radius, method="smooth"):
+        found = self.shell.contacts(center, radius, method)
+        return replace(found, point=found.point + np.array([0.0, 0.0, 1e-6 * radius]))
+
+
+class Swallows(Holed):
+    """A shell that tells the deepest contact alone."""
+
+    def keep(self, found):
+        return np.arange(len(found)) == 0
+
+
+GROOVE = Shell(*meshes.v_groove(np.radians(80), size=8.0, cells=4))
+
+
+@pytest.mark.parametrize("surface", ["bowl", "plate", "groove", "icosphere"])
+@pytest.mark.parametrize("method", ["facets", "elements"])
+def test_nothing_is_missed_on_right_shells(surface: str, method: str) -> None:
+    shell = {
+        "bowl": lambda: Shell(*meshes.bowl()),
+        "plate": plate,
+        "groove": lambda: GROOVE,
+        "icosphere": lambda: Shell(*meshes.icosphere(2)),
+    }[surface]()
+    assert assert_no_contact_missed(shell, 0.3, method=method) < 1e-12
+
+
+def test_smooth_shells_need_room_for_their_bulge() -> None:
+    shell = shell_of("bowl", 0.6)
+    error = assert_no_contact_missed(shell, 0.3, method="smooth", tolerance=0.5)
+    assert error > 1e-6
+    with pytest.raises(AssertionError):
+        assert_no_contact_missed(shell, 0.3, method="smooth", tolerance=0.1 * error)
+
+
+def test_a_hole_in_the_search_is_told() -> None:
+    shell = Holed(plate(count=40), range(0, 40))
+    with pytest.raises(AssertionError, match=r"depth .* m is missed at element \d+ \(centre \("):
+        assert_no_contact_missed(shell, 0.1)
+
+
+def test_a_second_contact_that_is_swallowed_is_told() -> None:
+    """Both flanks of a groove, in one piece, and two sheets one above the other, in two."""
+    below, elements = meshes.grid_plate(4, 4)
+    both = np.concatenate([below, below + np.array([0.0, 0.0, 0.2])])
+    sheets = Shell(both, np.concatenate([elements, elements + len(below)]))
+    for shell, place, radius, told in (
+        (GROOVE, [0.0, 0.3, 0.75], 0.6, r"deep at its inside, but no contact"),
+        (sheets, [0.01, 0.02, 0.09], 0.15, r"deep in a piece of \d+ triangles, but no contact"),
+    ):
+        assert len(shell.contacts(place, radius, "facets")) == 2
+        assert_no_contact_missed(shell, radius, [place])
+        with pytest.raises(AssertionError, match=told):
+            assert_no_contact_missed(Swallows(shell, range(0)), radius, [place])
+
+
+def test_a_ghost_is_told() -> None:
+    with pytest.raises(AssertionError, match=r"off the surface, its depth .* wrong"):
+        assert_no_contact_missed(Ghosts(plate(), range(0)), 0.1)
+
+
+def test_one_sided_shells_are_refused() -> None:
+    with pytest.raises(InvalidParameter, match="must be 'both'"):
+        assert_no_contact_missed(plate(side="outside"), 0.1)
+
+
+def test_a_sphere_that_passes_is_told() -> None:
+    weak = Simulation(on_plate(ball(), linear_law(1.0)), Adaptive())
+    v = np.array([0, 0, -3.0, 0, 0, 0])
+    with pytest.warns(WeakLawWarning):
+        through = weak.run(free_q([0, 0, 0.1]), v, 0.1)
+    with pytest.raises(AssertionError, match=r"passed through.*told so at t = .*element \d+"):
+        assert_not_passed_through(through)
+    # The run itself need not know: nothing stops a sphere in a scene without contacts.
+    scene = on_plate(ball(), linear_law(1e5))
+    free = replace(Simulation(Scene(ball()), Adaptive()).run(free_q([0, 0, 0.1]), v, 0.1))
+    with pytest.raises(AssertionError, match=r"passed through.*'ball-plate', element \d+"):
+        assert_not_passed_through(replace(free, scene=scene))
+    stopped = Simulation(scene, Adaptive()).run(free_q([0, 0, 0.1]), v, 0.1)
+    assert assert_not_passed_through(stopped) == 0.0
+
+
+def test_distances_are_those_of_the_oracle() -> None:
+    rng = np.random.default_rng(5)
+    corners = rng.normal(size=(40, 3, 3))
+    points = rng.normal(size=(30, 3))
+    got = distances(points, corners)
+    for point, row in zip(points, got, strict=True):
+        nearest = closest_on_triangles(point, corners.astype(np.longdouble))
+        expected = np.linalg.norm((nearest - point).astype(float), axis=1)
+        assert row == pytest.approx(expected, abs=1e-13)
+
+
+def test_pieces_hang_together_by_vertices() -> None:
+    triangles = np.array([[0, 1, 2], [2, 3, 4], [5, 6, 7], [7, 8, 9], [9, 0, 10]])
+    touched = np.array([True, True, True, True, False])
+    assert [one.tolist() for one in pieces(triangles, touched)] == [[0, 1], [2, 3]]
+    assert len(pieces(triangles, np.ones(5, bool))) == 1
+    assert pieces(triangles, np.zeros(5, bool)) == []
+
+
+def test_ways_through_triangles() -> None:
+    corners = np.array(
+        [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 1]]], float
+    )
+
+    def through(start, end):
+        return crossed(np.array(start, float), np.array(end, float), corners).tolist()
+
+    assert through([0.2, 0.2, -1], [0.2, 0.2, 2]) == [0, 1]
+    assert through([0.2, 0.2, 2], [0.2, 0.2, 0.5]) == [1]
+    assert through([0.2, 0.2, 0.4], [0.2, 0.2, 0.6]) == []
+    assert through([0.9, 0.9, -1], [0.9, 0.9, 2]) == []
