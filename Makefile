@@ -8,7 +8,7 @@ CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 OUT ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: sweep-survival rollouts help demo test bench hard-cases work-precision lint format wheel docs clean
+.PHONY: help demo test bench hard-cases work-precision lint format report robots sweep-survival rollouts wheel docs clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -19,6 +19,8 @@ help:
 # make work-precision  print error against computing time of the integrators, draw the figure
 # make wheel  build a wheel into dist/ and run it in an environment without a compiler
 # make docs   build the documentation site into build/site
+# make report measure speed against error, a page in results/report
+# make robots check every robot and write docs/robots.md
 # make sweep-survival  500 runs five ways, workers killed and the sweep resumed: the same bytes
 # make rollouts        print the speed-up of 10 000 runs over threads
 # make clean  remove everything that was built
@@ -50,6 +52,12 @@ $(VENV)/.bench: $(VENV)/.test
 
 hard-cases: $(VENV)/.test
 	$(BIN)/python -m tests.hard_cases --write
+
+robots: $(VENV)/.test
+	$(BIN)/sphshell-pin check-robot --all --write docs/robots.md
+
+report: $(VENV)/.test
+	$(BIN)/sphshell-pin report --out $(OUT)/report
 
 sweep-survival: $(VENV)/.test
 	$(BIN)/python -m tests.study.sweep_survival

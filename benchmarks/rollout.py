@@ -1,8 +1,8 @@
 """Many runs over threads: python -m benchmarks.rollout [--runs N] [--seconds S].
 
 Drops a rubber ball from random places into the bowl of `sphere_on_shell`, with stiffness and radius
-of each run its own; prints the time with one thread and with all processors, the memory, and
-whether both have the same bits.
+of each run its own; prints the memory, and the time with one thread and with all processors, in
+turn, and whether both have the same bits.
 """
 
 from __future__ import annotations
@@ -45,28 +45,31 @@ def memory() -> float:
 def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.rollout", description=__doc__)
-    parser.add_argument("--runs", type=int, default=10_000)
+    parser.add_argument("--runs", type=int, default=10_000, help="for the memory")
     parser.add_argument("--seconds", type=float, default=0.3, help="of each run, simulated")
-    parser.add_argument("--rounds", type=int, default=1, help="how often, in turn")
+    parser.add_argument("--rounds", type=int, default=7, help="for the speed-up, in turn")
     options = parser.parse_args()
-    cores = (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
+    cores = os.cpu_count() or 1
     drops(options.runs // 10, options.seconds, cores)
-    print(f"{options.runs} drops of {options.seconds} s; after a tenth of them {memory():.0f} MB")
+    before = memory()
+    all_runs = drops(options.runs, options.seconds, cores)
+    print(
+        f"{options.runs} drops of {options.seconds} s, {cores} threads: "
+        f"{all_runs.wall_time:.0f} s, {len(all_runs.failures)} failed; memory at most "
+        f"{memory():.0f} MB, after a tenth of them "
+        f"{before:.0f} MB"
+    )
     ratios = []
     for _ in range(options.rounds):
-        many = drops(options.runs, options.seconds, cores)
-        peak = memory()
-        one = drops(options.runs, options.seconds, 1)
+        many, one = (drops(options.runs // 20, options.seconds, n) for n in (cores, 1))
         same = np.array_equal(one.q, many.q) and np.array_equal(one.v, many.v)
         ratios.append(one.wall_time / many.wall_time)
         print(
-            f"  1 thread {one.wall_time:.1f} s, {cores} threads {many.wall_time:.1f} s: "
-            f"{ratios[-1]:.2f} x; {len(many.failures)} failed; memory at most {peak:.0f} MB; "
-            f"bits {'the same' if same else 'DIFFER'}"
+            f"  {len(one)} drops: 1 thread {one.wall_time:.1f} s, {cores} threads "
+            f"{many.wall_time:.1f} s, {ratios[-1]:.2f} x; bits {'the same' if same else 'DIFFER'}"
         )
-    print(f"  median {np.median(ratios):.2f} x")
+    low, middle, high = np.percentile(ratios, [25, 50, 75])
+    print(f"  median {middle:.2f} x [{low:.2f}, {high:.2f}]")
 
 
 if __name__ == "__main__":
