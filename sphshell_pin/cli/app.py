@@ -147,6 +147,20 @@ def terminal(*, err: bool = False) -> Any:
     return Console(stderr=err, soft_wrap=not err, width=None if stream.isatty() else 120)
 
 
+def progress_bar(*columns: Any) -> Any:
+    """Return a bar on stderr of the description, a bar and `columns`; on a pipe it is silent."""
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        *columns,
+        console=terminal(err=True),
+        transient=True,
+        disable=not sys.stderr.isatty(),
+    )
+
+
 def plain(text: str) -> str:
     """Return `text` so that rich prints its brackets as they are."""
     from rich.markup import escape

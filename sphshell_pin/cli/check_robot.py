@@ -17,6 +17,7 @@ from sphshell_pin.cli.app import (
     faults,
     make_table,
     plain,
+    progress_bar,
     terminal,
 )
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from sphshell_pin.study.robot_check import RobotReport, Sizes
 
 # A pipe has no width: so wide the table need not fold.
-_PIPE_WIDTH = 170
+_PIPE_WIDTH, _WIDE = 170, 125
 
 
 @app.command("check-robot")
@@ -102,18 +103,11 @@ def _check(
     sizes: Sizes,
 ) -> tuple[list[RobotReport], bool]:
     """Return the reports, and whether Ctrl-C came before the last."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import MofNCompleteColumn
 
     from sphshell_pin.study.robot_check import check_robot
 
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        console=terminal(err=True),
-        transient=True,
-        disable=not sys.stderr.isatty(),
-    )
+    bar = progress_bar(MofNCompleteColumn())
     reports: list[RobotReport] = []
     with bar:
         task = bar.add_task("", total=len(names))
@@ -147,9 +141,18 @@ def _print(reports: Sequence[RobotReport]) -> None:
     titles = [check.title for check in CHECKS.values()]
     if not sys.stdout.isatty():
         console.width = _PIPE_WIDTH
-    table = make_table("robot", "frame", "nq/nv", *titles, "verdict")
-    table.columns[0].no_wrap = table.columns[-1].no_wrap = True
-    table.columns[1].justify = "left"
+    # Where all columns do not fit, frame and size are left out and the titles cut: a figure that
+    # folds cannot be read.
+    narrow = console.width < _WIDE
+    titles = [title[:6] for title in titles] if narrow else titles
+    table = make_table("robot", *([] if narrow else ["frame", "nq/nv"]), *titles, "verdict")
+    for column in table.columns:
+        column.no_wrap = True
+    if narrow:
+        table.padding = (0, 1, 0, 0)
+        table.columns[0].no_wrap = False
+    else:
+        table.columns[1].justify, table.columns[1].no_wrap = "left", False
     for one in reports:
         figures = []
         for key in CHECKS:
@@ -157,8 +160,9 @@ def _print(reports: Sequence[RobotReport]) -> None:
             figures.append(f"[red]{text}[/red]" if text and not one.met(key) else text)
         colour = "green" if one.verdict == PASS else "red"
         size = f"{one.nq}/{one.nv}" if one.nv else ""
+        what = [] if narrow else [plain(one.frame), size]
         verdict = f"[{colour}]{one.verdict}[/{colour}]"
-        table.add_row(plain(one.name), plain(one.frame), size, *figures, verdict)
+        table.add_row(plain(one.name), *what, *figures, verdict)
     console.print(table)
     for sentence in remarks(reports):
         console.print(sentence, markup=False, highlight=False)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.cli.app import MISSED, app, faults, make_table, plain, terminal
+from sphshell_pin.cli.app import MISSED, app, faults, make_table, plain, progress_bar, terminal
 
 if TYPE_CHECKING:
     from sphshell_pin.study.report import Report
@@ -36,19 +36,11 @@ def report(
     Example: sphshell-pin report --quick
     """
     with faults(context):
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+        from rich.progress import TextColumn, TimeElapsedColumn
 
         from sphshell_pin.study.report import PAGE, make_report
 
-        bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.percentage:>3.0f} %"),
-            TimeElapsedColumn(),
-            console=terminal(err=True),
-            transient=True,
-            disable=not sys.stderr.isatty(),
-        )
+        bar = progress_bar(TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn())
         with bar:
             task = bar.add_task("report", total=1.0)
             made = make_report(

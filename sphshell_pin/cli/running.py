@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +19,7 @@ from sphshell_pin.cli.app import (
     faults,
     make_table,
     plain,
+    progress_bar,
     terminal,
 )
 
@@ -52,21 +52,13 @@ def run(
     Example: sphshell-pin run fingertip_on_blade --duration 2 --set controller.normal_force=8
     """
     with faults(context):
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import TextColumn, TimeRemainingColumn
 
         from sphshell_pin.scenario import build, explain_built, run_built
 
         changes = changes_of(set_, dt, duration)
         built = build(scenario, changes)
-        bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.percentage:>3.0f} %"),
-            TimeRemainingColumn(),
-            console=terminal(err=True),
-            transient=True,
-            disable=not sys.stderr.isatty(),
-        )
+        bar = progress_bar(TextColumn("{task.percentage:>3.0f} %"), TimeRemainingColumn())
         for warning in explain_built(built).warnings:
             typer.echo(f"warning: {warning}", err=True)
         with bar:

@@ -21,6 +21,7 @@ from sphshell_pin.cli.app import (
     faults,
     make_table,
     plain,
+    progress_bar,
     terminal,
 )
 
@@ -113,25 +114,16 @@ def sweep(
 @contextlib.contextmanager
 def _bar() -> Iterator[tuple[Callable[[int, int, int], object], Callable[[str], object]]]:
     """Show a bar on a terminal; yield what moves it and what prints a sentence beside it."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-    from rich.progress import TimeRemainingColumn as Remaining
+    from rich.progress import MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
-    bar = Progress(
-        TextColumn("runs"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.description}"),
-        Remaining(),
-        console=terminal(err=True),
-        transient=True,
-        disable=not sys.stderr.isatty(),
-    )
+    failures = TextColumn("[red]{task.fields[told]}[/red]")
+    bar = progress_bar(MofNCompleteColumn(), failures, TimeRemainingColumn())
     with bar:
-        task = bar.add_task("", total=None)
+        task = bar.add_task("runs", total=None, told="")
 
         def progress(done: int, failed: int, total: int) -> None:
-            told = f"[red]{failed} failed[/red]" if failed else ""
-            bar.update(task, completed=done, total=total, description=told)
+            told = f"{failed} failed" if failed else ""
+            bar.update(task, completed=done, total=total, told=told)
 
         yield progress, lambda sentence: typer.echo(sentence, err=True)
 
