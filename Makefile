@@ -56,7 +56,7 @@ hard-cases: $(VENV)/.test
 robots: $(VENV)/.test
 	$(BIN)/sphshell-pin check-robot --all --write docs/robots.md
 
-report: $(VENV)/.test
+report: $(VENV)/.bench
 	$(BIN)/sphshell-pin report --out $(OUT)/report
 
 sweep-survival: $(VENV)/.test

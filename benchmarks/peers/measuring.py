@@ -1,4 +1,4 @@
-"""Runs engines over scenes; the two ratios that matter most."""
+"""Runs engines over scenes; the ratios of their costs to ours."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class Field:
             # Settings go from coarse to fine: the next one takes at least as long as the last.
             if k and now - start + (now - before) > budget:
                 left = len(facts["knobs"]) - k
-                rows.append(Row(scene, engine, note=f"{left} settings left out: {budget:g} s used"))
+                rows.append(Row(scene, engine, note=f"{left} more left out: {budget:g} s used"))
                 break
             before = now
             row = self.row_of(base, knob)

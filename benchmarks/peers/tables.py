@@ -88,10 +88,11 @@ def page(rows: list[Row], ratios: list[Ratio], quick: bool = False) -> str:
     parts = [
         INTRODUCTION.replace("COMMAND", command),
         f"{machine_line()}: {versions}.\n",
-        "## The two ratios\n",
+        "## How much more a peer costs\n",
     ]
     parts.append(
-        "| what | peer | peer's cost / ours | errors, peer / ours | settings, peer / ours |"
+        "| what | peer | peer's cost / ours | errors, or depth pressed, peer / ours "
+        "| settings, peer / ours |"
     )
     parts.append("|---|---|---|---|---|")
     for ratio in ratios:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 import warnings
 from collections.abc import Iterator
@@ -166,3 +167,18 @@ def plain(text: str) -> str:
     from rich.markup import escape
 
     return escape(text)
+
+
+def length_of(option: str, text: str | None) -> float | None:
+    """Return a length [m] written as a number, or as a number with its unit."""
+    if text is None:
+        return None
+    from sphshell_pin.errors import InvalidParameter
+    from sphshell_pin.units import metres_per_unit
+
+    found = re.fullmatch(r"\s*([0-9.+eE-]*[0-9.])\s*([a-zA-Zµ]*)\s*", text)
+    try:
+        number = float(found[1] if found else text)
+    except ValueError:
+        raise InvalidParameter(option, text, "must be a length: 0.012 (metres), 12mm") from None
+    return number * (metres_per_unit(found[2]) if found and found[2] else 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ from sphshell_pin.cli.app import (
     MISSED,
     app,
     faults,
+    length_of,
     make_table,
     plain,
     progress_bar,
@@ -43,12 +45,14 @@ def check_robot_(
             "the longest limb."
         ),
     ] = None,
-    radius: Annotated[float | None, typer.Option(help="Of the sphere \\[m].")] = None,
+    radius: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
+    ] = None,
     free_flyer: Annotated[
         bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
     ] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer postures and runs.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random postures.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random postures.")] = 0,
     json: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write all figures to this file.")
     ] = None,
@@ -58,8 +62,9 @@ def check_robot_(
 ) -> None:
     """Check contact on robots: forces, momentum, energy, derivatives, contacts missed.
 
-    A sphere is put on the robot, a curved shell under it, and what comes out is compared to ways
-    apart from the compiled core. Exit code 1 if a check fails.
+    A sphere is put on the robot, a curved shell under it, and what comes out is compared with
+    results that the compiled core has no part in. Exit code 1: a check failed; 2: a robot could
+    not be checked.
 
     Example: sphshell-pin check-robot panda my_robot.urdf
     """
@@ -74,10 +79,12 @@ def check_robot_(
         names = study.all_names() if every else list(robot or [])
         study.check_known(names)
         for path in (json, write):
-            if path is not None and not path.parent.is_dir():
-                raise SphshellError(f"{path}: there is no folder {path.parent} to write to")
+            if path is not None:
+                _check_writable(path)
         sizes = study.QUICK if quick else study.Sizes()
-        reports, stopped = _check(names, frame, radius, free_flyer, seed, sizes)
+        reports, stopped = _check(
+            names, frame, length_of("--radius", radius), free_flyer, seed, sizes
+        )
         _print(reports)
         if stopped:
             left = len(names) - len(reports)
@@ -89,9 +96,22 @@ def check_robot_(
             told = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
             study.write(write, study.as_markdown(reports, f"{told} --write {write}"))
         verdicts = [one.verdict for one in reports]
-        # A robot that was asked for by name and cannot be checked is wrong input.
-        unread = not every and study.NOT_CHECKED in verdicts
+        # A robot that was asked for by name and cannot be checked is wrong input, and so is what
+        # no robot there is can be checked with.
+        unread = study.NOT_CHECKED in verdicts and (not every or len(set(verdicts)) == 1)
         raise typer.Exit(MISSED if study.FAILED in verdicts else ERROR if unread else 0)
+
+
+def _check_writable(path: Path) -> None:
+    """Raise SphshellError if no file can be written there, before minutes go into its content."""
+    from sphshell_pin.errors import SphshellError
+
+    if not path.parent.is_dir():
+        raise SphshellError(f"{path}: there is no folder {path.parent} to write to")
+    if path.is_dir():
+        raise SphshellError(f"{path}: is a folder; give the name of a file in it")
+    if not os.access(path.parent, os.W_OK):
+        raise SphshellError(f"{path}: nothing may be written to the folder {path.parent}")
 
 
 def _check(
@@ -105,7 +125,8 @@ def _check(
     """Return the reports, and whether Ctrl-C came before the last."""
     from rich.progress import MofNCompleteColumn
 
-    from sphshell_pin.study.robot_check import check_robot
+    from sphshell_pin.errors import FrameNotFound
+    from sphshell_pin.study.robot_check import RobotReport, check_robot
 
     bar = progress_bar(MofNCompleteColumn())
     reports: list[RobotReport] = []
@@ -117,8 +138,8 @@ def _check(
                 def tell(title: str, name: str = name) -> None:
                     bar.update(task, description=f"{Path(name).name}: {title}")
 
-                reports.append(
-                    check_robot(
+                try:
+                    report = check_robot(
                         name,
                         frame=frame,
                         radius=radius,
@@ -127,7 +148,12 @@ def _check(
                         sizes=sizes,
                         progress=tell,
                     )
-                )
+                except FrameNotFound as error:
+                    if len(names) == 1:
+                        raise
+                    # The others may have it.
+                    report = RobotReport(name, reason=str(error))
+                reports.append(report)
                 bar.advance(task)
         except KeyboardInterrupt:
             return reports, True

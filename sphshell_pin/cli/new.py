@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.cli.app import app, faults, terminal
+from sphshell_pin.cli.app import app, faults, length_of, terminal
 from sphshell_pin.cli.files import BodyOption, FaceOption, faces_of
 
 if TYPE_CHECKING:
@@ -77,7 +76,7 @@ def new(
                 robot,
                 surface,
                 frame=frame,
-                radius=_length(radius),
+                radius=length_of("--radius", radius),
                 unit=unit,
                 bodies=body,
                 faces=faces_of(face),
@@ -93,21 +92,6 @@ def new(
         except UnitMissing as error:
             raise SphshellError(f"the unit {error.must('--unit {}')}") from error
         _show(made)
-
-
-def _length(text: str | None) -> float | None:
-    """Return a length [m] written as a number, or as a number with its unit."""
-    if text is None:
-        return None
-    from sphshell_pin.errors import InvalidParameter
-    from sphshell_pin.units import metres_per_unit
-
-    found = re.fullmatch(r"\s*([0-9.+eE-]*[0-9.])\s*([a-zA-Zµ]*)\s*", text)
-    try:
-        number = float(found[1] if found else text)
-    except ValueError:
-        raise InvalidParameter("--radius", text, "must be a length: 0.012 (metres), 12mm") from None
-    return number * (metres_per_unit(found[2]) if found and found[2] else 1.0)
 
 
 def _show(made: NewScenario) -> None:

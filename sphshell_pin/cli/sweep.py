@@ -49,22 +49,22 @@ def sweep(
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="Table, .parquet or .h5.", show_default="results/<scenario>/sweep.parquet"
-        ),
+        typer.Option(help="Table, .parquet or .h5; by default sweep.parquet in results/SCENARIO."),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(help="Processes.", show_default="one per processor")
+        int | None,
+        typer.Option(help="Processes; by default one per processor; 0: this one alone."),
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler that does the runs instead.")
+        str | None, typer.Option(help="Address of a Dask scheduler whose workers do the runs.")
     ] = None,
     plot: Annotated[
         list[str] | None,
-        typer.Option(metavar="FIGURE", help="Draw this figure; may be given several times."),
+        typer.Option(metavar="FIGURE", help="Figure to draw; may be given several times."),
     ] = None,
     pictures: Annotated[
-        bool, typer.Option("--pictures/--no-pictures", help="Draw the table.")
+        bool,
+        typer.Option("--pictures/--no-pictures", help="Draw curves or maps of the table."),
     ] = True,
     verdicts: Annotated[
         bool, typer.Option("--verdicts", help="A column for each expectation: met or not.")

@@ -19,7 +19,7 @@ from sphshell_pin.dynamics.controllers import Callback, Controller
 from sphshell_pin.dynamics.rollout import Plan, Rollout
 from sphshell_pin.dynamics.scene import ContactPair
 from sphshell_pin.dynamics.simulation import GLANCE, CtrlC, Simulation
-from sphshell_pin.dynamics.variations import Variations
+from sphshell_pin.dynamics.variations import Variations, check_names_of, has_length
 from sphshell_pin.errors import (
     DeepStart,
     InvalidParameter,
@@ -34,6 +34,8 @@ _OneController = Controller | Callback | None
 
 # So many runs, for each thread, are made ready while others run.
 _AHEAD = 32
+# More would only wait for each other, and a system may not start them.
+_MOST_THREADS = 1024
 
 
 def roll_out(
@@ -52,34 +54,44 @@ def roll_out(
 ) -> Rollout:
     """Make the runs of Simulation.rollout, which see."""
     began = time.perf_counter()
-    workers = thread_count(threads)
+    workers = _worker_count(threads)
     duration = check_not_negative("duration", duration, "s")
+    vary = check_names_of(vary)
     starts = _states(simulation, q0s, v0s, vary, controller)
+    # Start and end are rows whatever the time between rows.
+    rows = record_dt if record_dt is not None else (duration or None)
+    settings = {0.0: simulation.core_settings(duration, 0.0, record_dt=rows, t0=t0)}
     controllers = _one_each(controller, len(starts))
+    _check_controllers(simulation, controllers, control_dt, starts)
     variations = Variations(simulation.scene, vary, len(starts))
     failures = _deep_starts(simulation, variations, starts)
     plan = Plan(starts, [None] * len(starts), variations, failures, t0)
-    # Start and end are rows whatever the time between rows.
-    rows = record_dt if record_dt is not None else (duration or None)
-    settings: dict[float, _core.RunSettings] = {}
 
-    def add(run: int) -> None:
+    def make_ready(run: int) -> tuple[Any, ...]:
         q0, v0 = starts[run]
         varied = Simulation(variations.scene(run), simulation.integrator)
         core_controller, hold = varied.bind(controllers[run], control_dt, q0)
         if hold not in settings:
             settings[hold] = varied.core_settings(duration, hold, record_dt=rows, t0=t0)
-        core.add(_core_pairs(varied, q0, v0), core_controller, q0, v0, settings[hold])
+        return _core_pairs(varied, q0, v0), core_controller, q0, v0, settings[hold]
 
+    workers = max(min(workers, len(starts)), 1)
     core = _core.Rollout(simulation.scene.model, workers)
-    tasks = _Tasks(core, workers, progress, len(starts), len(failures))
+    tasks = _Tasks(core, workers, progress, len(starts), failures)
     try:
         with CtrlC() as ctrl_c:
             for run in range(len(starts)):
-                if run not in failures:
-                    plan.numbers[run] = tasks.added
-                    add(run)
-                    tasks.make_room(ctrl_c)
+                if run in failures:
+                    continue
+                try:
+                    task = make_ready(run)
+                except Exception as fault:
+                    # A contact source is asked about the start, and may raise.
+                    failures[run] = _not_begun(fault)
+                    continue
+                core.add(*task)
+                plan.numbers[run] = tasks.added
+                tasks.make_room(ctrl_c)
             tasks.wait(0, ctrl_c)
     except KeyboardInterrupt:
         core.stop()
@@ -105,11 +117,11 @@ class _Tasks:
         workers: int,
         progress: Callable[[float], object] | None,
         count: int,
-        failed: int,
+        failures: Mapping[int, SphshellError],
     ) -> None:
         self.added = self.done = 0
         self._core, self._ahead = core, _AHEAD * workers
-        self._progress, self._count, self._failed = progress, count, failed
+        self._progress, self._count, self._failures = progress, count, failures
         self._told = 0.0
 
     def make_room(self, ctrl_c: CtrlC) -> None:
@@ -122,16 +134,55 @@ class _Tasks:
         """Wait until `left` runs or fewer are not done."""
         while True:
             self.done = self._core.wait(left, GLANCE)
-            finished = self.done + self._failed == self._count
+            over = self.done + len(self._failures)
+            finished = over == self._count
             if self._progress is not None and (
                 finished or time.perf_counter() - self._told > GLANCE
             ):
                 self._told = time.perf_counter()
-                self._progress((self.done + self._failed) / self._count)
+                self._progress(1.0 if finished else over / self._count)
             if ctrl_c.pressed:
                 raise KeyboardInterrupt
             if self.added - self.done <= left:
                 return
+
+
+def _worker_count(threads: int | None) -> int:
+    """Return how many threads are wanted."""
+    workers = thread_count(threads)
+    if workers > _MOST_THREADS:
+        raise InvalidParameter("threads", threads, f"must be {_MOST_THREADS} at most")
+    return workers
+
+
+def _not_begun(fault: Exception) -> SphshellError:
+    """Return why a run could not begin: a fault of this package, or of a user's routine."""
+    if isinstance(fault, SphshellError):
+        return fault
+    told = [f"{type(fault).__name__}: {fault}", *getattr(fault, "__notes__", ())]
+    return SphshellError(f"the run could not begin, its routine raised {', '.join(told)}")
+
+
+def _check_controllers(
+    simulation: Simulation,
+    controllers: Sequence[_OneController],
+    control_dt: float | None,
+    starts: list[tuple[Array, Array]],
+) -> None:
+    """Refuse a controller that cannot be, each of them once, before anything runs."""
+    seen = set[int]()
+    for run, controller in enumerate(controllers):
+        if id(controller) in seen:
+            continue
+        seen.add(id(controller))
+        try:
+            simulation.bind(controller, control_dt, starts[run][0])
+        except InvalidParameter as error:
+            if run == 0:
+                raise
+            raise InvalidParameter(
+                f"the controller of run {run}", controller, str(error), given="cannot be taken:"
+            ) from None
 
 
 def _one_each(controller: Any, count: int) -> Sequence[_OneController]:
@@ -149,7 +200,7 @@ def _one_each(controller: Any, count: int) -> Sequence[_OneController]:
 
 
 def _states(
-    simulation: Simulation, q0s: Any, v0s: Any, vary: Mapping[str, Any] | None, controller: Any
+    simulation: Simulation, q0s: Any, v0s: Any, vary: Mapping[str, Any], controller: Any
 ) -> list[tuple[Array, Array]]:
     """Return the checked starts; what is given once holds for all runs."""
     model = simulation.scene.model
@@ -159,7 +210,7 @@ def _states(
             continue
         try:
             table = as_floats(given)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InvalidParameter(name, given, f"must be numbers, (n, {size})") from None
         if table.ndim not in (1, 2) or table.shape[-1] != size:
             raise InvalidParameter(
@@ -169,9 +220,7 @@ def _states(
     if "q0s" not in tables:
         raise InvalidParameter("q0s", q0s, f"must be numbers, (n, {model.nq})")
     counts = {name: len(table) for name, table in tables.items() if table.ndim == 2}
-    lengths = {
-        f"vary['{name}']": len(v) for name, v in (vary or {}).items() if hasattr(v, "__len__")
-    }
+    lengths = {f"vary['{name}']": len(v) for name, v in vary.items() if has_length(v)}
     if isinstance(controller, list | tuple):
         lengths["controller"] = len(controller)
     count = next(iter({**counts, **lengths}.values()), 1)
@@ -186,7 +235,7 @@ def _states(
             starts.append(simulation.scene.check_state(row["q0s"], row.get("v0s")))
         except InvalidParameter as error:
             raise InvalidParameter(
-                f"the start of run {run}", error.value, f"cannot be taken: {error}", given=""
+                f"the start of run {run}", error.value, str(error), given="cannot be taken:"
             ) from None
     return starts
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NoReturn, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _STOPPED = 0
+# What the interpreter tells before the exception itself.
+_TRACEBACK = re.compile(r'Traceback .*\n(  File ".*", line \d+, in .*\n)*')
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,11 @@ class Rollout(Sequence[Result]):
             if number is None:
                 continue
             left = core.outcome(number)
+            if not len(left["q"]):  # what made it ready ran out of memory
+                plan.numbers[run] = None
+                plan.failures[run] = SphshellError(f"the run could not begin: {left['fault']}")
+                self.failures[run] = plan.failures[run]
+                continue
             self.t[run], self.steps[run] = left["time"], left["steps"]
             self.q[run], self.v[run] = left["q"], left["v"]
             self.residual[run] = left["residual"]
@@ -98,7 +106,9 @@ class Rollout(Sequence[Result]):
                 mean = summary["impulse"] / duration if duration else 0.0
                 for name, value in {**summary, "mean_force": mean}.items():
                     column = f"{pair.name}.{name}"
-                    self.figures.setdefault(column, np.full(count, math.nan))[run] = value
+                    if column not in self.figures:
+                        self.figures[column] = np.full(count, math.nan)
+                    self.figures[column][run] = value
             through += [(run, simulation.scene.pairs[k].name) for k in left["through"]]
             why = self._why_failed(run, left)
             if why is not None:
@@ -131,12 +141,19 @@ class Rollout(Sequence[Result]):
         run = range(len(self))[index]
         number = self._plan.numbers[run]
         if number is None:
-            raise self.failures[run]
+            raise self._plan.failures[run].with_traceback(None)
         return self._result(run, SimpleNamespace(**self._core.outcome(number)), number)
 
     def __iter__(self) -> Iterator[Result]:
         """Go through the results of all runs."""
         return (self[run] for run in range(len(self)))
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be pickled: the runs are with the compiled core."""
+        raise TypeError(
+            "a Rollout cannot be pickled or copied: keep its to_dataframe(), or save a run with "
+            "rollout[i].save(path)"
+        )
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return a pandas DataFrame with a row for each run: what was varied, and its figures.
@@ -150,7 +167,7 @@ class Rollout(Sequence[Result]):
         columns: dict[str, Any] = {"run": np.arange(len(self))}
         for name, values in self.varied.items():
             array = np.asarray(values)
-            if array.dtype.kind == "f":
+            if array.dtype.kind == "f" and array.ndim < 3:  # poses are matrices
                 parts = array.T if array.ndim == 2 else [array]
                 suffixes = [f".{i}" for i in range(len(parts))] if array.ndim == 2 else [""]
                 columns |= {f"{name}{s}": part for s, part in zip(suffixes, parts, strict=True)}
@@ -167,8 +184,7 @@ class Rollout(Sequence[Result]):
         assert number is not None
         view = SimpleNamespace(**left)
         if view.fault:
-            # The interpreter's text of an exception ends with what it is.
-            why = view.fault.strip().splitlines()[-1]
+            why = " ".join(_TRACEBACK.sub("", view.fault, count=1).split()).rstrip(":")
             return RunFailed(view.time, why, self._result(run, view, number))
         reason = why_ended(view.status, view, self._simulation.scene)
         if reason is not None:

@@ -133,7 +133,7 @@ class Simulation:
         v0s : (n, nv), or (nv,) for all runs; at rest unless given
         duration, controller, control_dt, t0 : as of `run`; `controller` may be a list of n. A
             callable is asked for all runs in turn, and holds up the other threads meanwhile
-        threads : how many; all processors unless given
+        threads : how many, no more than runs; all processors unless given
         vary : parameters that differ from run to run: names to n values each. Names are
             "PAIR.law" and "PAIR.friction" (n laws, n frictions or None), "PAIR.law.FIELD" and
             "PAIR.friction.FIELD" (n numbers; the fields of the law or friction that the pair has),

@@ -18,6 +18,22 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound
 _Change = Callable[[ContactPair, Any], ContactPair]
 
 
+def check_names_of(vary: Any) -> Mapping[str, Any]:
+    """Return `vary`, {} for None; raise InvalidParameter unless it maps names to values."""
+    if vary is None:
+        return {}
+    if not isinstance(vary, Mapping) or not all(isinstance(name, str) for name in vary):
+        raise InvalidParameter(
+            "vary", vary, "must map names to n values, as {'PAIR.law.stiffness': [1e5, 2e5]}"
+        )
+    return vary
+
+
+def has_length(values: Any) -> bool:
+    """Whether `values` are several; an array without dimensions only looks as if."""
+    return hasattr(values, "__len__") and getattr(values, "ndim", 1) > 0
+
+
 class Variations:
     """The pairs of `scene` in each of `count` runs; `vary` is that of Simulation.rollout.
 
@@ -25,16 +41,16 @@ class Variations:
     of values and for values out of range, which says in which run.
     """
 
-    def __init__(self, scene: Scene, vary: Mapping[str, Any] | None, count: int) -> None:
+    def __init__(self, scene: Scene, vary: Mapping[str, Any], count: int) -> None:
         self._scene = scene
         self._parts: list[tuple[str, int, _Change, Sequence[Any]]] = []
         valid = _names_of(scene)
         # A whole law comes before its fields.
-        for name in sorted(vary or {}, key=lambda name: name.count(".")):
+        for name in sorted(vary, key=lambda name: name.count(".")):
             if name not in valid:
                 raise NameNotFound("varied parameter", name, "the scene", list(valid))
             pair, change, shape = valid[name]
-            values = _values(name, (vary or {})[name], count, shape)
+            values = _values(name, vary[name], count, shape)
             self._parts.append((name, pair, change, values))
         for run in range(count if self._parts else 0):
             self.pairs(run)
@@ -87,7 +103,7 @@ def _values(name: str, given: Any, count: int, shape: tuple[int, ...] | None) ->
     """Return one value for each run."""
     called = f"vary['{name}']"
     if shape is None:
-        if isinstance(given, str | bytes) or not hasattr(given, "__len__"):
+        if isinstance(given, str | bytes | Mapping) or not has_length(given):
             raise InvalidParameter(called, given, f"must be a list of {count} values, one a run")
         if len(given) != count:
             raise InvalidParameter(
@@ -96,7 +112,7 @@ def _values(name: str, given: Any, count: int, shape: tuple[int, ...] | None) ->
         return list(given)
     try:
         values = as_floats(given)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidParameter(called, given, f"must be {count} numbers, one a run") from None
     if values.shape != (count, *shape):
         wanted = (count, *shape)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import os
+import pickle
 import re
 import signal
 import threading
@@ -199,6 +201,72 @@ def test_a_failed_run_is_noted_and_the_rest_kept() -> None:
     assert np.isnan(rollout.figures[f"{PAIR}.peak_force"][3])
 
 
+def test_controllers_are_checked_before_anything_runs() -> None:
+    asked: list[float] = []
+
+    def ask(t, q, v, contacts):  # type: ignore[no-untyped-def]
+        asked.append(t)
+        return np.zeros(1)
+
+    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
+    controllers = [ask] * 199 + [sp.JointPD(-1.0, 1.0)]
+    with pytest.raises(InvalidParameter, match="controller of run 199"):
+        simulation.rollout(np.full((200, 1), 0.1), None, 0.01, threads=1, controller=controllers)
+    assert not asked
+
+
+def test_what_a_routine_raised_is_told_whole() -> None:
+    class Silent(Exception):
+        pass
+
+    def raising(error: Exception):  # type: ignore[no-untyped-def]
+        def controller(t, q, v, contacts):  # type: ignore[no-untyped-def]
+            raise error
+
+        return controller
+
+    faults = [ValueError("one,\n  File two,\nthree"), Silent(), KeyboardInterrupt()]
+    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
+    rollout = simulation.rollout([[1.0]] * 3, None, 0.01, controller=[raising(e) for e in faults])
+    told = [str(why).partition("its routine raised ")[2] for why in rollout.failures.values()]
+    assert told == ["ValueError: one, File two, three", "Silent", "KeyboardInterrupt"]
+
+
+def plate_by_hand(pose_i, pose_j):  # type: ignore[no-untyped-def]
+    """Contact of a ball with the plane z = 0, which refuses to look beyond x = 1."""
+    x, y, z = pose_i.translation
+    if x > 1:
+        raise ValueError("too far for me")
+    return [[x, y, 0.0]], [[0.0, 0.0, 1.0]], [R - z]
+
+
+@pytest.mark.parametrize("friction", [models.FRICTION, BRISTLES], ids=["coulomb", "bristle"])
+def test_contact_sources_over_threads(friction) -> None:
+    scene = sp.Scene(models.ball())
+    scene.add_contact_source(plate_by_hand, "ball", "universe", law=models.LAW, friction=friction)
+    simulation = sp.Simulation(scene, sp.Adaptive())
+    q0s, v0s = starts(6)
+    q0s[[1, 4], 0] = 2.0
+    rollout = simulation.rollout(q0s, v0s, 0.02, threads=4, record_dt=5e-3)
+    assert list(rollout.failures) == [1, 4]
+    for why in rollout.failures.values():
+        assert "ValueError: too far for me" in str(why)
+    for run in (0, 2, 3, 5):
+        alone = simulation.run(q0s[run], v0s[run], 0.02, record_dt=5e-3)
+        assert_same_bits(rollout[run], alone)
+
+
+def test_frictions_of_all_kinds_side_by_side() -> None:
+    q0s, v0s = starts(3)
+    kinds = [None, models.FRICTION, BRISTLES]
+    rollout = sp.Simulation(ball_on_plate(), sp.Implicit()).rollout(
+        q0s, v0s, 0.05, threads=3, vary={f"{PAIR}.friction": kinds}, record_dt=1e-2
+    )
+    for run, friction in enumerate(kinds):
+        alone = sp.Simulation(ball_on_plate(friction), sp.Implicit())
+        assert_same_bits(rollout[run], alone.run(q0s[run], v0s[run], 0.05, record_dt=1e-2))
+
+
 def test_deep_starts_in_a_solid_are_seen_as_run_sees_them() -> None:
     box = trimesh.creation.box(extents=(0.4, 0.4, 0.4))
     scene = sp.Scene(models.ball())
@@ -232,6 +300,11 @@ def test_a_law_too_weak_is_told_once() -> None:
         ({"tip.placement": [np.eye(4)] * 3}, InvalidParameter, "pinocchio.SE3"),
         ({"tip.law": 3}, InvalidParameter, "list of 3 values"),
         ({"tip.law": [3, 3, 3]}, InvalidParameter, "must be a law"),
+        ({"tip.law": {1: 2, 3: 4, 5: 6}}, InvalidParameter, "list of 3 values"),
+        ({"tip.law.stiffness": np.array(1e5)}, InvalidParameter, "(3,)"),
+        ({"tip.law.stiffness": [10**400] * 3}, InvalidParameter, "3 numbers"),
+        ({3: [1.0] * 3}, InvalidParameter, "map names to n values"),
+        ("tip.law", InvalidParameter, "map names to n values"),
     ],
 )
 def test_wrong_variations_say_what_and_where(vary, fault, sentence) -> None:
@@ -248,7 +321,11 @@ def test_wrong_variations_say_what_and_where(vary, fault, sentence) -> None:
         (np.zeros((3, 7)), None, {}, "run 0"),
         ([models.free_q([0, 0, 1])] * 3, np.zeros((2, 6)), {}, "rows"),
         ([models.free_q([0, 0, 1])] * 3, None, {"controller": [None] * 2}, "3, one a run"),
+        ([models.free_q([0, 0, 1])] * 3, None, {"controller": [None, None, 3]}, "of run 2"),
         ([models.free_q([0, 0, 1])] * 3, None, {"threads": 0}, "threads"),
+        ([models.free_q([0, 0, 1])] * 3, None, {"threads": 100_000}, "1024 at most"),
+        (np.empty((0, 7)), None, {"record_dt": -1.0}, "record_dt"),
+        ([[10**400] * 7], None, {}, "q0s"),
         ([models.free_q([0, 0, 1])] * 3, None, {"duration": -1.0}, "duration"),
         ("nonsense", None, {}, "q0s"),
     ],
@@ -265,6 +342,9 @@ def test_progress_grows_to_one() -> None:
     sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(q0s, v0s, 0.2, progress=shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
+    shares.clear()
+    sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(q0s[:0], None, progress=shares.append)
+    assert shares == [1.0]
 
 
 def test_ctrl_c_keeps_what_is_done() -> None:
@@ -332,7 +412,11 @@ def test_a_table_of_the_runs() -> None:
         q0s,
         v0s,
         0.05,
-        vary={f"{PAIR}.law.stiffness": stiffness, f"{PAIR}.sphere.offset": np.zeros((3, 3))},
+        vary={
+            f"{PAIR}.law.stiffness": stiffness,
+            f"{PAIR}.sphere.offset": np.zeros((3, 3)),
+            f"{PAIR}.placement": [pin.SE3.Identity()] * 3,
+        },
     )
     table = rollout.to_dataframe()
     assert isinstance(table, pandas.DataFrame)
@@ -351,3 +435,6 @@ def test_no_runs_and_slices() -> None:
     assert rollout[-1].t.tolist() == [0.0, 0.01]
     with pytest.raises(IndexError):
         rollout[3]
+    for attempt in (pickle.dumps, copy.copy, copy.deepcopy):
+        with pytest.raises(TypeError, match="to_dataframe"):
+            attempt(rollout)

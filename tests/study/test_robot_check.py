@@ -303,7 +303,10 @@ def test_exit_codes_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         ([tmp_path / "no.urdf"], "no such file"),
         (["ball", "--frame", "nose"], "no frame 'nose'"),
         (["ball", "--radius", "0"], "radius = 0.0 must be positive"),
+        (["ball", "--radius", "wide"], "--radius = 'wide' must be a length"),
         (["ball", "--json", tmp_path / "no" / "x.json"], "there is no folder"),
+        (["ball", "--json", tmp_path], "is a folder"),
+        ([tmp_path], "is a folder, not a URDF file"),
     ):
         result = run(*wrong)
         assert result.exit_code == 2, result.output
@@ -315,6 +318,11 @@ def test_exit_codes_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert result.exit_code == 2
     assert "1 of 2 robots pass" in result.output
     assert re.search(r"not a URDF that can be read", result.output)
+    assert result.output.count("broken.urdf: ") == 1
+    result = run("ball", "three_link_finger", "--frame", "tip", "--radius", "12mm", "--quick")
+    assert result.exit_code == 2  # the finger is checked, though the ball has no such frame
+    assert "ball: no frame 'tip'" in result.output
+    assert "1 of 2 robots pass" in result.output
     found = {k: Finding(1.0, "there") for k in CHECKS}
     report = RobotReport("ball", "tip", 0.01, 7, 6, found)
     monkeypatch.setattr(robot_check, "check_robot", lambda *a, **k: report)

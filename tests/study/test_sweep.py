@@ -14,7 +14,8 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError, SweepError
-from sphshell_pin.study.sweep import plan_sweep, sweep
+from sphshell_pin.study.sweep import axes_of, plan_sweep, sweep
+from sphshell_pin.study.sweep.table import varied_columns
 from sphshell_pin.study.sweep.worker import prepare
 from tests.study.resting import GRAVITY, RADIUS, SCENARIO, check_once, entries, write
 
@@ -161,7 +162,12 @@ def test_a_torn_journal_goes_on_and_a_damaged_one_is_refused(folder):
         sweep(path, SMALL, workers=0, out=out)
         assert out.read_bytes() == whole
         check_once(out, 4)
-    for damaged in (lines[0] + b"#\n" + lines[2], b"a,b\n1,2\n", b"something of mine"):
+    for damaged in (
+        lines[0] + b"#\n" + lines[2],
+        lines[0] + b'{"run": 0}\n' + lines[2],
+        b"a,b\n1,2\n",
+        b"something of mine",
+    ):
         journal.write_bytes(damaged)
         with pytest.raises(SweepError, match="no entry of a sweep's journal"):
             sweep(path, SMALL, workers=0, out=out)
@@ -253,6 +259,9 @@ def test_wrong_arguments_are_told_and_leave_nothing(folder):
         sweep(path, SMALL, out=folder / "table.csv")
     with pytest.raises(InvalidParameter, match="0 or more"):
         sweep(path, SMALL, workers=-1)
+    for wrong in (1.5, "2", True):
+        with pytest.raises(InvalidParameter, match="whole number"):
+            sweep(path, SMALL, workers=wrong)
     with pytest.raises(InvalidParameter, match="scheduler"):
         sweep(path, SMALL, workers=2, scheduler="tcp://127.0.0.1:8786")
     with pytest.raises(InvalidParameter, match="tcp://host:8786"):
@@ -260,3 +269,39 @@ def test_wrong_arguments_are_told_and_leave_nothing(folder):
     with pytest.raises(ResultError, match="cannot be written"):
         sweep(path, SMALL, out=path / "below_a_file" / "table.parquet")
     assert not list(folder.glob("nothing*"))
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".h5"])
+def test_only_a_table_of_a_sweep_is_replaced(folder, suffix):
+    path, out = folder / "resting.toml", folder / f"place{suffix}"
+    journal = out.with_name(f"{out.name}.journal")
+    if suffix == ".h5":
+        with pytest.importorskip("h5py").File(out, "w") as file:
+            file["sweep"] = [1]
+    else:
+        pd.DataFrame({"precious": [1]}).to_parquet(out)
+    for content in (out.read_bytes(), b"precious"):
+        out.write_bytes(content)
+        with pytest.raises(ResultError, match="no sweep wrote"):
+            sweep(path, SMALL, workers=0, out=out)
+        assert out.read_bytes() == content
+        assert not journal.exists()
+    out.unlink()
+    out.mkdir()
+    with pytest.raises(ResultError, match="is a folder"):
+        sweep(path, SMALL, workers=0, out=out)
+    out.rmdir()
+    sweep(path, SMALL, workers=0, out=out)
+    before = out.read_bytes()
+    journal.unlink()
+    sweep(path, SMALL, workers=0, out=out)
+    assert out.read_bytes() == before
+
+
+def test_whole_numbers_without_end_are_columns():
+    few = varied_columns(axes_of({"a": [1, 2]}), [(1,), (2,)])
+    huge = varied_columns(axes_of({"a": [1, 10**30]}), [(1,), (10**30,)])
+    endless = varied_columns(axes_of({"a": [1, 10**400]}), [(1,), (10**400,)])
+    assert few["a"].dtype == np.int64
+    assert huge["a"].tolist() == [1.0, 1e30]
+    assert endless["a"].tolist() == ["1", str(10**400)]

@@ -70,9 +70,13 @@ def test_the_last_key_turns_fastest_unless_all_go_together():
         (["k=0:2:log:4"], "positive"),
         (["k=2:2:4"], "differ"),
         (["k=1,2,1"], "given twice"),
+        (["k=1e3,1000"], "given twice"),
+        (["k=1:1e400:3"], "finite"),
         (["k=1,2", "k=3"], "given twice"),
         ({"k": []}, "at least one"),
         ({"k": [None]}, "numbers, words"),
+        ({"k": 3}, "list of values"),
+        ("no_equals", "no_equals"),
     ],
 )
 def test_wrong_values_are_told(vary, words):
@@ -96,6 +100,7 @@ def test_too_many_runs_and_keys_of_different_lengths_are_told():
         (["contact.shell=plate2,plate3"], ScenarioError, "plate"),
         ([f"{KEY}=1e4,2e4", "contact.ball-plate.law.stiffness=1"], InvalidParameter, "twice"),
         (["contact.law.damping=1,2"], InvalidParameter, "set as well"),
+        (["figures.depth=figures.py:depth,figures.py:count"], InvalidParameter, "column"),
     ],
 )
 def test_a_wrong_key_or_value_is_told_before_anything_runs(tmp_path, vary, kind, words):

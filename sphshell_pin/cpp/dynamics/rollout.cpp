@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <exception>
+#include <system_error>
 
 namespace sphshell {
 namespace {
@@ -32,7 +33,11 @@ void move_behind(Record& all, Record more) {
 }  // namespace
 
 Rollout::Rollout(const pinocchio::Model& model, int threads) : model_(model) {
-  for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
+  try {
+    while (static_cast<int>(threads_.size()) < threads) threads_.emplace_back([this] { work(); });
+  } catch (const std::system_error&) {
+    if (threads_.empty()) throw;  // the system gives no more: these do the work
+  }
 }
 
 void Rollout::add(Task task) {
@@ -85,27 +90,32 @@ void Rollout::work() {
 
 Outcome Rollout::run(Task task) const {
   Outcome out;
-  Simulation run(model_, std::move(task.pairs), task.settings, std::move(task.controller),
-                 std::move(task.q0), std::move(task.v0));
   try {
-    while (out.status == Simulation::Status::Running && !stopped_) {
-      out.status = run.advance(kGlance);
-      if (out.status != Simulation::Status::Running || run.full())
-        move_behind(out.record, run.take());
+    Simulation run(model_, std::move(task.pairs), task.settings, std::move(task.controller),
+                   std::move(task.q0), std::move(task.v0));
+    try {
+      while (out.status == Simulation::Status::Running && !stopped_) {
+        out.status = run.advance(kGlance);
+        if (out.status != Simulation::Status::Running || run.full())
+          move_behind(out.record, run.take());
+      }
+    } catch (const std::exception& error) {
+      out.fault = error.what();
     }
+    if (out.status == Simulation::Status::Running) move_behind(out.record, run.take());
+    out.time = run.time();
+    out.last_step = run.last_step();
+    out.wall_time = run.wall_time();
+    out.steps = run.steps();
+    out.rejected = run.rejected();
+    out.evaluations = run.evaluations();
+    out.q = run.q();
+    out.v = run.v();
+    out.summaries = run.summaries();
   } catch (const std::exception& error) {
+    // An exception that left a thread would end the process: of a short memory, say.
     out.fault = error.what();
   }
-  if (out.status == Simulation::Status::Running) move_behind(out.record, run.take());
-  out.time = run.time();
-  out.last_step = run.last_step();
-  out.wall_time = run.wall_time();
-  out.steps = run.steps();
-  out.rejected = run.rejected();
-  out.evaluations = run.evaluations();
-  out.q = run.q();
-  out.v = run.v();
-  out.summaries = run.summaries();
   return out;
 }
 

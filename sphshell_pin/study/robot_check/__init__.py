@@ -88,7 +88,7 @@ def check_robot(
     except (MissingExtra, NameNotFound):
         raise
     except _load_fault() as error:
-        return RobotReport(str(robot), reason=str(error))
+        return RobotReport(str(robot), reason=str(error).removeprefix(f"{robot}: "))
     rng = _random(seed, subject.name)
     try:
         setting = setting_of(subject, rng, frame, radius)

@@ -46,7 +46,8 @@ def check_known(robots: Iterable[str]) -> None:
     for robot in robots:
         if is_path(robot):
             if not Path(robot).is_file():
-                raise SphshellError(f"{robot}: no such file")
+                what = "is a folder, not a URDF file" if Path(robot).is_dir() else "no such file"
+                raise SphshellError(f"{robot}: {what}")
         elif robot not in known:
             raise NameNotFound("robot", robot, "sphshell_pin.robots", known, "sphshell-pin list")
 

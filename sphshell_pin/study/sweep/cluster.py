@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import queue
 import re
 import uuid
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from itertools import islice
 from typing import Any
 
@@ -41,10 +42,12 @@ class ClusterPool:
         self.deaths = 0
         """Runs that were given up with their workers, and tried again."""
         try:
+            _greet(address)
             self._client = self._distributed.Client(
                 address, timeout=_CONNECT_TIMEOUT, set_as_default=False
             )
-        except (OSError, ValueError, TypeError) as fault:
+        # Whoever answers in place of a scheduler may be misread in any way.
+        except Exception as fault:
             raise SweepError(
                 f"no Dask scheduler answers at {address}: start one with dask scheduler, and give "
                 f"the address that it prints ({' '.join(str(fault).split())})"
@@ -122,3 +125,15 @@ class ClusterPool:
             return False
         self._note(f"the Dask scheduler at {self._address} has no workers: waiting for some")
         return True
+
+
+def _greet(address: str) -> None:
+    """Connect to `address` and leave: a client that cannot takes half a minute to give up."""
+    connect = need("distributed.comm").connect
+
+    async def come_and_go() -> None:
+        (await connect(address, timeout=_CONNECT_TIMEOUT)).abort()
+
+    # In a thread of its own: this one may have an event loop that runs, as notebooks do.
+    with ThreadPoolExecutor(1) as helper:
+        helper.submit(asyncio.run, come_and_go()).result()

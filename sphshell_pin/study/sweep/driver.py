@@ -40,6 +40,7 @@ from sphshell_pin.study.sweep.job import (
 from sphshell_pin.study.sweep.journal import SUFFIX, Journal
 from sphshell_pin.study.sweep.local import Here, LocalPool
 from sphshell_pin.study.sweep.table import (
+    check_place,
     check_suffix,
     columns_of,
     frame_of,
@@ -198,6 +199,13 @@ def plan_sweep(
     if verdicts:
         check_expectations(built)
         figures += [f"met.{name}" for name in verdict_names(fixed)]
+    for axis in axes:
+        if axis.key in figures:
+            raise InvalidParameter(
+                "vary",
+                axis.key,
+                "is what a column of figures is called: give each routine a figure of its own",
+            )
     shipped = path == shipped_scenarios().get(path.stem)
     files, used = digest_files(path.parent, names), versions()
     head = {
@@ -240,6 +248,7 @@ def run_plan(
     need("pandas")
     if out is not None:
         check_suffix(out)
+        check_place(out)
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         # A worker that loads the script of its parent must not begin the sweep again.
         raise SweepError('a script must call sweep below if __name__ == "__main__":')
@@ -338,6 +347,6 @@ def _count_workers(workers: int | None, scheduler: str | None) -> int:
             if hasattr(os, "sched_getaffinity")
             else os.cpu_count() or 1
         )
-    if workers < 0:
-        raise InvalidParameter("workers", workers, "must be 0 or more")
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 0:
+        raise InvalidParameter("workers", workers, "must be a whole number, 0 or more")
     return workers

@@ -51,15 +51,22 @@ def axes_of(vary: Vary | Iterable[str]) -> tuple[Axis, ...]:
     InvalidParameter
         A text that says no values, a key or a value given twice, or nothing to vary.
     """
+    if isinstance(vary, str):
+        vary = [vary]
     axes: list[Axis] = []
     for key, given in vary.items() if isinstance(vary, Mapping) else map(_split, vary):
+        if not isinstance(given, Iterable):
+            raise InvalidParameter(f"vary {key}", given, "must be a list of values, or a text")
         values = _parse(key, given) if isinstance(given, str) else tuple(map(_plain, given))
         if not values:
             raise InvalidParameter("vary", key, "must have at least one value", key)
-        texts = [text_of(value) for value in values]
-        twice = next((one for one in texts if texts.count(one) > 1), None)
-        if twice is not None:
-            raise InvalidParameter(f"vary {key}", twice, "is given twice")
+        # 1 and 1.0 are one value, true is another; as text: a nan is not even equal to itself.
+        texts = [text_of(_as_number(value)) for value in values]
+        seen = set[str]()
+        for value, text in zip(values, texts, strict=True):
+            if text in seen:
+                raise InvalidParameter(f"vary {key}", text_of(value), "is given twice")
+            seen.add(text)
         if key in (axis.key for axis in axes):
             raise InvalidParameter("vary", key, "is given twice: put all its values together")
         axes.append(Axis(key, values))
@@ -98,6 +105,12 @@ def text_of(value: Value) -> str:
     return value if isinstance(value, str) else repr(value)
 
 
+def _as_number(value: Value) -> Value:
+    """Return an int as the float of the same value, where there is one."""
+    whole = isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 2**53
+    return float(value) if whole else value
+
+
 def _split(text: str) -> tuple[str, str]:
     key, equals, values = text.partition("=")
     if not equals or not key.strip() or not values.strip():
@@ -122,6 +135,8 @@ def _range(key: str, text: str, parts: list[str]) -> tuple[Value, ...]:
     if not (len(parts) == 3 or log) or not all(_NUMBER.fullmatch(one) for one in ends):
         raise InvalidParameter(f"vary {key}", text, "must be lo:hi:n or lo:hi:log:n")
     low, high = map(float, ends)
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise InvalidParameter(f"vary {key}", text, "must have finite ends")
     if not count.isdecimal() or not 2 <= int(count) <= MOST_RUNS:
         raise InvalidParameter(f"vary {key}", text, "must end in a number of values, 2 or more")
     if low == high:

@@ -28,6 +28,10 @@ _DIFFERENCES = {
 }
 
 
+# What a line tells of a run.
+_OF_RUN = {"run", "status", "error", "figures", "wall_time", "worker"}
+
+
 class Journal:
     """The journal at `path` of the sweep that `head` describes; this process alone may write it.
 
@@ -118,7 +122,7 @@ class Journal:
         for i, line in enumerate(lines):
             try:
                 entry = json.loads(line)
-                if not isinstance(entry, dict) or (i > 0 and "run" not in entry):
+                if not isinstance(entry, dict) or (i > 0 and set(entry) != _OF_RUN):
                     raise ValueError
             except ValueError:
                 if 0 < i == len(lines) - 1:

@@ -39,6 +39,19 @@ def check_suffix(path: Path) -> None:
     need("pyarrow" if suffix in PARQUET else "h5py")
 
 
+def check_place(path: Path) -> None:
+    """Refuse a folder, and a file that no sweep wrote: a table would take its place.
+
+    Raises
+    ------
+    ResultError
+    """
+    if path.is_dir():
+        raise ResultError(path, "is a folder: give another --out")
+    if path.is_file() and path.stat().st_size and not _is_table(path):
+        raise ResultError(path, "is a file that no sweep wrote: give another --out, or delete it")
+
+
 def columns_of(
     axes: Sequence[Axis],
     points: Sequence[tuple[Value, ...]],
@@ -104,6 +117,17 @@ def write_table(path: Path, columns: Columns, description: Mapping[str, Any]) ->
                 os.unlink(aside)
 
 
+def _is_table(path: Path) -> bool:
+    """Whether the file has the description that write_table leaves."""
+    try:
+        if path.suffix.lower() in PARQUET:
+            return DATASET.encode() in (need("pyarrow.parquet").read_schema(path).metadata or {})
+        with need("h5py").File(path) as file:
+            return DATASET in file and "description" in file[DATASET].attrs
+    except (OSError, ValueError):  # pyarrow's faults are ValueErrors
+        return False
+
+
 def _write_parquet(path: Path, columns: Columns, description: str) -> None:
     arrow, parquet = need("pyarrow"), need("pyarrow.parquet")
     arrays = {
@@ -140,10 +164,12 @@ def _varied(values: Sequence[Value]) -> NDArray[Any]:
     kinds = {type(value) for value in values}
     if kinds == {bool}:
         return np.array(values, dtype=np.bool_)
-    if kinds == {int}:
-        return np.array(values, dtype=np.int64)
-    if kinds <= {int, float}:
-        return np.array(values, dtype=np.float64)
+    with contextlib.suppress(OverflowError):  # whole numbers of Python have no end
+        if kinds == {int}:
+            return np.array(values, dtype=np.int64)
+    with contextlib.suppress(OverflowError):
+        if kinds <= {int, float}:
+            return np.array(values, dtype=np.float64)
     return _texts([str(value) for value in values])
 
 
