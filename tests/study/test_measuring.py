@@ -112,3 +112,13 @@ def test_spread():
     heard = []
     timing.part(heard.append, 0.25, 0.5)(0.5)
     assert heard == [0.375]
+
+
+def test_what_does_not_fit_together_runs_one_after_another(monkeypatch):
+    names = [sizes.OURS, sizes.OURS_FLAT, sizes.COAL]
+    monkeypatch.setattr(sizes, "installed", lambda: (list(names), []))
+    monkeypatch.setattr(sizes, "available", lambda: 2.0 * 968 * sizes.MEMORY_PER_TRIANGLE)
+    rows, notes = sizes.measure((22, 100), 1)
+    assert [(row.name, row.triangles) for row in rows] == [(name, 968) for name in names]
+    assert "one contestant after another" in notes[0]
+    assert "20000 triangles are left out" in notes[1]
