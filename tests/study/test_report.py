@@ -218,7 +218,13 @@ def test_whole_report(small, tmp_path):
     assert verdicts["swing_energy"] == "False"
     data = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert {"processor", "cores", "system", "packages", "date", "command"} <= set(data["machine"])
-    assert set(data["files"]) == {f.name for f in tmp_path.glob("*.csv")}
+    pictures = list(tmp_path.glob("*.png"))
+    assert set(data["files"]) == {f.name for f in (*tmp_path.glob("*.csv"), *pictures)}
+    assert len(pictures) == 7
+    for picture in pictures:
+        header = picture.read_bytes()[:24]
+        assert header[:8] == b"\x89PNG\r\n\x1a\n"
+        assert int.from_bytes(header[16:20], "big") > 800  # its width
 
 
 @pytest.mark.browser

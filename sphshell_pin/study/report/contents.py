@@ -86,9 +86,14 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """An inline SVG, what it shows for those who cannot see it, and its caption."""
+    """An inline SVG, what it shows for those who cannot see it, and its caption.
 
+    It is written as NAME.png, too.
+    """
+
+    name: str
     svg: str
+    png: bytes
     description: str
     caption: str
 

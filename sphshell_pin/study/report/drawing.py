@@ -63,6 +63,15 @@ def drawing(width: float, height: float) -> Iterator[Any]:
         yield figure
 
 
+def pictured(figure: Any, name: str) -> tuple[str, str, bytes]:
+    """Return the name, SVG and PNG of a picture."""
+    svg = to_svg(figure, name)
+    stream = io.BytesIO()
+    figure.patch.set_visible(True)
+    figure.savefig(stream, format="png", dpi=160, facecolor="white")
+    return name, svg, stream.getvalue()
+
+
 def to_svg(figure: Any, name: str) -> str:
     """Return the figure as an SVG element of a page, with the page's colours.
 

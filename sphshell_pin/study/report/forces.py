@@ -27,7 +27,7 @@ from sphshell_pin.study.report.drawing import (
     guide,
     label_ends,
     logarithmic,
-    to_svg,
+    pictured,
 )
 
 KEY, TITLE = "forces", "Error of the contact force"
@@ -228,17 +228,17 @@ def picture(names: list[str], rows: list[Any], *, against_time: bool) -> Picture
         what = "time of a query [us]" if against_time else "elements"
         figure.supxlabel(what, fontsize=SMALL + 1)
         figure.supylabel("error of the force / force", fontsize=SMALL + 1)
-        svg = to_svg(figure, "force_time" if against_time else "force_elements")
+        made = pictured(figure, "force_time" if against_time else "force_elements")
     if against_time:
         return Picture(
-            svg,
+            *made,
             "Error of the force against the time of a query, three methods on four surfaces.",
             "What an error costs: mean error against the median time of a query on one core, from "
             "coarse to fine meshes along each line.",
         )
     best = number(error_at(of(rows, "bowl", SMOOTH)))
     return Picture(
-        svg,
+        *made,
         f"Error of the force against the number of elements; smooth reaches {best} on the bowl at "
         f"h/r = {AT}.",
         "Mean error (line) and up to the largest (band) against the number of elements, with the "

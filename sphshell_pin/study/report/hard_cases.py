@@ -20,8 +20,8 @@ from sphshell_pin.study.report.drawing import (
     RED,
     SMALL,
     drawing,
+    pictured,
     power_of_ten,
-    to_svg,
 )
 
 KEY, TITLE = "hard_cases", "Hard cases"
@@ -130,9 +130,9 @@ def picture(rows: list[Any]) -> Picture:
         axis.tick_params(axis="y", length=0)
         axis.grid(visible=True, axis="x")
         axis.set_xlabel("error / bound")
-        svg = to_svg(figure, "hard_cases")
+        made = pictured(figure, "hard_cases")
     return Picture(
-        svg,
+        *made,
         f"Error over bound of {len(rows)} verdicts in {len(groups)} groups.",
         "A dot is a verdict: its error over what bounds it; no error at all is at the left edge.",
     )

@@ -27,8 +27,8 @@ from sphshell_pin.study.report.drawing import (
     guide,
     label_ends,
     logarithmic,
+    pictured,
     power_of_ten,
-    to_svg,
 )
 
 KEY, TITLE = "integrators", "Work and precision of the integrators"
@@ -209,9 +209,9 @@ def picture(cases: list[Any], rows: list[Any]) -> Picture:
         for axis in panels[len(cases) :]:
             axis.set_visible(False)
         figure.supylabel("CPU seconds per simulated second", fontsize=SMALL + 1)
-        svg = to_svg(figure, "integrators")
+        made = pictured(figure, "integrators")
     return Picture(
-        svg,
+        *made,
         "CPU time against error of five integrators, one panel per case.",
         "More precise to the right, dearer upwards; every line goes from coarse to fine settings. "
         f"Settings with an error above {LARGEST_DRAWN} are left to the table.",

@@ -24,6 +24,7 @@ from sphshell_pin.study.report.machine import describe
 from sphshell_pin.study.report.page import render
 
 PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
+_OWN = (".csv", ".png")
 Tell = Callable[[str, float], None]  # told the section's title and the share of all that is done
 
 
@@ -138,15 +139,18 @@ def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
 def write(report: Report, out: Path) -> None:
     """Write page, tables and data to the folder `out`; whole files take the place of old ones."""
     tables = [table for section in report.sections for table in section.tables]
-    files = {f"{table.name}.csv": csv_text(table) for table in tables}
-    files[f"{FINDINGS}.csv"] = findings_text(report.sections)
-    files[DATA] = json_text(report, sorted(files))
-    files[PAGE] = render(report.sections, report.machine)
+    texts = {f"{table.name}.csv": csv_text(table) for table in tables}
+    texts[f"{FINDINGS}.csv"] = findings_text(report.sections)
+    pictures = [picture for section in report.sections for picture in section.pictures]
+    files = {name: text.encode() for name, text in texts.items()}
+    files |= {f"{picture.name}.png": picture.png for picture in pictures}
+    files[DATA] = json_text(report, sorted(files)).encode()
+    files[PAGE] = render(report.sections, report.machine).encode()
     stale = set(_files_of_old(out)) - set(files)
     try:
         beside = {name: out / f".{name}.new" for name in files}
-        for name, text in files.items():
-            beside[name].write_text(text, encoding="utf-8")
+        for name, content in files.items():
+            beside[name].write_bytes(content)
         for name, path in beside.items():
             os.replace(path, out / name)
         for name in stale:
@@ -156,10 +160,10 @@ def write(report: Report, out: Path) -> None:
 
 
 def _files_of_old(out: Path) -> list[str]:
-    """Return the tables of the report that is in the folder."""
+    """Return the tables and pictures of the report that is in the folder."""
     try:
         names = json.loads((out / DATA).read_text(encoding="utf-8"))["files"]
-        return [name for name in names if Path(name).name == name and name.endswith(".csv")]
+        return [name for name in names if Path(name).name == name and name.endswith(_OWN)]
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return []
 

@@ -26,7 +26,7 @@ from sphshell_pin.study.report.drawing import (
     VIOLET,
     drawing,
     logarithmic,
-    to_svg,
+    pictured,
 )
 
 KEY, TITLE = "peers", "Other engines"
@@ -250,9 +250,9 @@ def picture(rows: list[Any]) -> Picture:
             handles, labels, loc="outside upper center", ncols=len(labels), frameon=False,
             fontsize=SMALL,
         )  # fmt: skip
-        svg = to_svg(figure, "peers")
+        made = pictured(figure, "peers")
     return Picture(
-        svg,
+        *made,
         f"CPU time against errors of the bowl swing for {', '.join(map(name_of, engines))}.",
         "The swing in the bowl, triangles of 0.3 r: a dot is a setting of an engine; more precise "
         "to the right, dearer upwards.",

@@ -30,7 +30,7 @@ from sphshell_pin.study.report.drawing import (
     guide,
     label_ends,
     logarithmic,
-    to_svg,
+    pictured,
 )
 
 KEY, TITLE = "queries", "Time and memory of a query"
@@ -241,10 +241,10 @@ def picture(rows: list[Any]) -> Picture:
                 start = (min(count) * 3, 0.4 * min(value(r) for r in rows if value(r) > 0))
                 guide(axis, start, max(count) / 30, 1, "~ triangles")
             label_ends(axis, ends, gap=0.06)
-        svg = to_svg(figure, "queries")
+        made = pictured(figure, "queries")
     largest = max(r.triangles for r in rows)
     return Picture(
-        svg,
+        *made,
         f"Query time and memory from a thousand to {number(largest)} triangles for "
         f"{', '.join(sorted({r.name for r in rows}, key=list(COLORS).index))}.",
         "Left: median time of a query, with quartiles. Right: memory held after the first query.",

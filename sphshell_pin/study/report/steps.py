@@ -27,7 +27,7 @@ from sphshell_pin.study.report.drawing import (
     SMALL,
     VIOLET,
     drawing,
-    to_svg,
+    pictured,
 )
 from sphshell_pin.study.report.drawing import (
     TEXT as SIZE,
@@ -206,9 +206,9 @@ def picture(parts: dict[str, dict[str, Any]], bare: Any) -> Picture:
             handles=handles, loc="outside upper center", ncols=len(handles), frameon=False,
             fontsize=SMALL, handlelength=1.0, handleheight=1.0,
         )  # fmt: skip
-        svg = to_svg(figure, "steps")
+        made = pictured(figure, "steps")
     return Picture(
-        svg,
+        *made,
         "Bars of the parts of a step for three scenes, and the time of the bare dynamics.",
         "Medians of the parts of a step; dashed: nothing but ABA and integrate.",
     )
