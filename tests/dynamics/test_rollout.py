@@ -347,6 +347,15 @@ def test_progress_grows_to_one() -> None:
     assert shares == [1.0]
 
 
+@pytest.fixture
+def keyboard():
+    """Let SIGINT interrupt, as on a terminal; a shell's background jobs ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("keyboard")
 def test_ctrl_c_keeps_what_is_done() -> None:
     q0s, v0s = starts(400)
     simulation = sp.Simulation(ball_on_plate(), sp.SemiImplicitEuler(1e-5))
