@@ -9,6 +9,7 @@ ball has 2/5.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import ClassVar
@@ -30,7 +31,7 @@ DROP: Vector = (0.0, 0.0, -GRAVITY)
 
 
 @dataclass(frozen=True)
-class BallScene:
+class BallScene(ABC):
     """A ball on a surface: SI units, world frame.
 
     `rolls`: whether the ball can turn (else it moves along x, y, z alone); `mu` = 0 means no
@@ -75,9 +76,9 @@ class BallScene:
         """Return the runs that make up the scene; their errors are joined by `joined`."""
         return (self,)
 
+    @abstractmethod
     def errors(self, found: Trajectory) -> dict[str, float]:
         """Return the errors of a run by name; dimensionless unless the name has a unit."""
-        raise NotImplementedError
 
     @staticmethod
     def joined(errors: list[dict[str, float]]) -> dict[str, float]:
