@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def report(
     context: typer.Context,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Under three minutes: fewer rounds and sizes.")
+        bool, typer.Option("--quick", help="Some four minutes: fewer rounds and sizes.")
     ] = False,
     peers: Annotated[
         bool, typer.Option("--peers", help="The same scenes in other engines, too.")
