@@ -10,6 +10,7 @@ from functools import cache
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
+import matplotlib.image
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -225,6 +226,9 @@ def test_whole_report(small, tmp_path):
         header = picture.read_bytes()[:24]
         assert header[:8] == b"\x89PNG\r\n\x1a\n"
         assert int.from_bytes(header[16:20], "big") > 800  # its width
+        # The page's own colours: none of the stand-ins is left, each red 161 and green 0.
+        shown = np.round(matplotlib.image.imread(picture)[..., :3] * 255)
+        assert not np.any((shown[..., 0] == 161) & (shown[..., 1] == 0))
 
 
 @pytest.mark.browser

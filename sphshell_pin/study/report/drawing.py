@@ -7,6 +7,7 @@ import io
 import math
 import re
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ BLUE, GREEN, ORANGE, RED, VIOLET, GREY = SERIES
 _NAMES = {INK: "ink", FAINT: "faint", RULE: "rule", PAPER: "paper"} | {
     color: f"s{k}" for k, color in enumerate(SERIES, 1)
 }
+_COLOURED = ("color", "facecolor", "edgecolor", "markerfacecolor", "markeredgecolor")
 SMALL, TEXT = 8.0, 9.0
 _STYLE: Any = {
     "font.family": "sans-serif",
@@ -67,9 +69,37 @@ def pictured(figure: Any, name: str) -> tuple[str, str, bytes]:
     """Return the name, SVG and PNG of a picture."""
     svg = to_svg(figure, name)
     stream = io.BytesIO()
+    _take_colours(figure)
     figure.patch.set_visible(True)
     figure.savefig(stream, format="png", dpi=160, facecolor="white")
     return name, svg, stream.getvalue()
+
+
+def _take_colours(figure: Any) -> None:
+    """Give a figure the light colours of the page in place of the stand-ins."""
+    from matplotlib.artist import getp
+    from matplotlib.colors import to_hex, to_rgba_array
+
+    css = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+    light: dict[str, str] = {}
+    for variable, value in re.findall(r"--(\w+): (#\w+);", css):
+        light.setdefault(variable, value)  # the light colours come first
+    artists = figure.findobj()
+    # The boxes behind texts are nobody's children.
+    boxes = [one.get_bbox_patch() for one in artists if hasattr(one, "get_bbox_patch")]
+    for artist in (*artists, *(box for box in boxes if box is not None)):
+        for what in _COLOURED:
+            if not (hasattr(artist, f"set_{what}") and hasattr(artist, f"get_{what}")):
+                continue
+            try:
+                given = to_rgba_array(getp(artist, what))
+            except (TypeError, ValueError):
+                continue  # "none", "auto": not one of ours
+            if not any(to_hex(one) in _NAMES for one in given):
+                continue
+            taken = to_rgba_array([light.get(_NAMES.get(to_hex(one), ""), one) for one in given])
+            taken[:, 3] = given[:, 3]
+            getattr(artist, f"set_{what}")(taken if len(taken) > 1 else tuple(taken[0]))
 
 
 def to_svg(figure: Any, name: str) -> str:
