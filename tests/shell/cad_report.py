@@ -18,12 +18,17 @@ from tests.shell import cad_shapes as shapes
 from tests.shell.cad_cases import (
     KNOWN,
     REAL_FILES,
-    REAL_FOLDER,
     force_errors,
     order,
     rms,
     stated_and_measured,
 )
+from tests.shell.surfaces import DATA, MORE_DATA
+
+
+def file_of(name: str) -> Path:
+    """Where a real file is, or would be."""
+    return next((f / name for f in (DATA, MORE_DATA) if (f / name).is_file()), MORE_DATA / name)
 
 
 def report_files(names: list[str], samples: int) -> None:
@@ -36,10 +41,10 @@ def report_files(names: list[str], samples: int) -> None:
     )
     for name in names:
         start = time.perf_counter()
-        shell = Shell.from_file(REAL_FOLDER / name, REAL_FILES[name])
+        shell = Shell.from_file(file_of(name), REAL_FILES[name])
         took = time.perf_counter() - start
         stated, says, held = stated_and_measured(shell)
-        shape = read_model(REAL_FOLDER / name).shape
+        shape = read_model(file_of(name)).shape
         found = deviation(shell, ExactShape(shape), samples).largest
         area, volume = shapes.area_and_volume(shape)
         health = shell.health
@@ -80,5 +85,5 @@ if __name__ == "__main__":
     parser.add_argument("names", nargs="*", default=list(REAL_FILES))
     chosen = parser.parse_args()
     require_kernel("this report")
-    report_files([n for n in chosen.names if (REAL_FOLDER / n).is_file()], chosen.samples)
+    report_files([n for n in chosen.names if file_of(n).is_file()], chosen.samples)
     report_forces(chosen.levels)

@@ -17,12 +17,12 @@ from tests.shell import cad_shapes as shapes
 from tests.shell.cad_cases import (
     KNOWN,
     REAL_FILES,
-    REAL_FOLDER,
     force_errors,
     order,
     rms,
     stated_and_measured,
 )
+from tests.shell.surfaces import surface_file
 
 
 @pytest.mark.parametrize("make", ["ball", "cone", "ring", "rounded_box", "drilled_plate", "roof"])
@@ -49,14 +49,12 @@ def real(name):
     require_kernel("this test")
     from sphshell_pin.shell.cad.reading import read_model
 
-    path = REAL_FOLDER / name
+    path = surface_file(name)
     return Shell.from_file(path, REAL_FILES[name]), ExactShape(read_model(path).shape)
 
 
 @pytest.mark.parametrize("name", REAL_FILES)
 def test_real_files_are_as_near_as_they_say(name):
-    if not (REAL_FOLDER / name).is_file():
-        pytest.skip(f"{name} is not here")
     shell, exact = real(name)
     stated, measured, held = stated_and_measured(shell)
     found = deviation(shell, exact, 20)
@@ -70,10 +68,7 @@ def test_curved_elements_do_not_overshoot_at_narrow_bends():
 
     A flat element may end in one and be near all along; curved to the normal there it is not.
     """
-    path = REAL_FOLDER / "bladex_upper.iges"
-    if not path.is_file():
-        pytest.skip(f"{path.name} is not here")
-    shell, exact = real(path.name)
+    shell, exact = real("bladex_upper.iges")
     points, _, _ = curved_mesh(shell, 2)
     corners = shell.vertices[shell.triangles]
     off = points.reshape(len(corners), -1, 3) - corners[:, :1]
