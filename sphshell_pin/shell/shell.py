@@ -29,6 +29,7 @@ from sphshell_pin.shell.topology import Topology
 if TYPE_CHECKING:
     from sphshell_pin.contact.contact_set import ContactSet
     from sphshell_pin.shell.cleaning import CleanedSurface
+    from sphshell_pin.shell.curvature import CurvatureReport
     from sphshell_pin.shell.health import ShellHealth
     from sphshell_pin.shell.raw import Floats, Ints
 
@@ -345,6 +346,19 @@ class Shell(Topology):
             self.core.curve(None if given is None else given.reshape(-1, 3))
         core: _core.Shell = self.core
         return core
+
+    def curvature_report(self) -> CurvatureReport:
+        """Return how far the curved elements stand off the flat ones, and which stayed flat.
+
+        It makes the curved elements, if no query has. `health` shows the report from then on.
+        """
+        from sphshell_pin.shell.curvature import curvature_report
+
+        report = self.health.curvature
+        if report is None:
+            report = curvature_report(self)
+            self.health = self.health.labelled(curvature=report)
+        return report
 
     def closest_points(
         self, points: npt.ArrayLike, threads: int | None = 1, method: str = "smooth"
