@@ -216,16 +216,17 @@ CubicCurve CurvedFacet::side(const Facet& f, int k) const {
   return {f.corner[k], f.corner[next_corner(k)] - f.corner[k] + 3 * a, 3 * b - 6 * a, 3 * (a - b)};
 }
 
-CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals)
+CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals,
+                         const std::vector<std::uint8_t>& straight)
     : normals_(normals.empty() ? estimate_normals(shell) : std::move(normals)) {
-  bend_edges(shell);
+  bend_edges(shell, straight);
   lift_middles(shell);
   list_corners(shell);
   build_cones(shell);
 }
 
 // One curve per edge, from the normals of all facets that meet there, so that they share it.
-void CurvedShell::bend_edges(const Shell& shell) {
+void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight) {
   const Topology& topology = shell.topology();
   const std::vector<Triangle>& triangles = shell.triangles();
   const std::vector<Vec3>& p = shell.vertices();
@@ -249,8 +250,10 @@ void CurvedShell::bend_edges(const Shell& shell) {
     }
     const Vec3 d = p[edge.last_vertex] - p[edge.first_vertex];
     const bool border = edge.kind == EdgeClass::Boundary;
-    const std::array<Vec3, 2> lift = lifts_of(d, {first, border ? borders[edge.first_vertex] : d},
-                                              {last, border ? borders[edge.last_vertex] : d});
+    std::array<Vec3, 2> lift = lifts_of(d, {first, border ? borders[edge.first_vertex] : d},
+                                        {last, border ? borders[edge.last_vertex] : d});
+    for (int i = 0; i < edge.count && !straight.empty(); ++i)
+      if (straight[topology.incidence[edge.begin + i]]) lift = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 0; i < edge.count; ++i) {
       const int h = topology.incidence[edge.begin + i], g = shell.facet_half_edge(h);
       Vec3* side = facets_[triangle_of(g)].lift[side_of(g)];
