@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,7 @@ pytest.importorskip("OCP")
 from sphshell_pin import Shell
 from sphshell_pin.shell.cad import require_kernel
 from sphshell_pin.shell.curved import curved_mesh
-from tests.oracle.cad import ExactShape, deviation
+from tests.oracle.cad import ExactShape, curved_places, deviation
 from tests.shell import cad_shapes as shapes
 from tests.shell.cad_cases import (
     KNOWN,
@@ -61,6 +62,37 @@ def test_real_files_are_as_near_as_they_say(name):
     assert held == (measured <= stated)
     assert found.flat.max() <= 1.05 * measured
     assert found.back.max() <= 1.05 * measured
+
+
+@pytest.mark.parametrize("name", REAL_FILES)
+def test_curved_elements_of_real_files_are_as_near_as_stated(name):
+    shell, exact = real(name)
+    stated, _, _ = stated_and_measured(shell)
+    for where, points in curved_places(shell, 40).items():
+        if len(points):  # the sphere has no border
+            assert exact.closest(points).distances.max() <= stated, where
+
+
+@pytest.mark.parametrize("turns", [(0.9, 0.9, 0.9, 0.9), (0.9, -0.9, 0.9), (0.9,), (0.5, 0.7)])
+@pytest.mark.parametrize("scale", [1.0, 2.5])
+def test_long_elements_beside_nearly_tangent_joints(turns, scale, tmp_path):
+    """Joints of less than a degree are taken as tangent: the normals there are mean ones.
+
+    A long side that ends there would be bent off its plane, which the straight one is on.
+    """
+    shape = shapes.bent_bar(turns)
+    path = shapes.write_brep(tmp_path / "bar.brep", shape)
+    stated = 1e-5
+    shell = Shell.from_file(path, "mm", scale, chord_error=stated)
+    exact = ExactShape(shape, 1e-3 * scale)
+    for where, points in curved_places(shell, 60).items():
+        assert exact.closest(points).distances.max() <= stated * scale, where
+    (note,) = [note for note in shell.health.notes if note.startswith("curved elements")]
+    assert "held" in note
+    assert "not held" not in note
+    # What was kept straight stays so in a copy.
+    again = pickle.loads(pickle.dumps(shell)).transformed(scale=2.0)
+    assert again.core_for("smooth").lifts == pytest.approx(2 * shell.core_for("smooth").lifts)
 
 
 def test_curved_elements_do_not_overshoot_at_narrow_bends():

@@ -35,8 +35,8 @@ MOST_ROUNDS = 6
 SAME_PLACE = 1e-6
 """A corner this near to a node, as a share of the size, is it: cleaning welds within less."""
 
-CURVE_STEPS = 4
-"""Of Newton's method towards the nearest point of an edge; it starts next to it."""
+CURVE_SEEDS, CURVE_STEPS = 9, 4
+"""Places along an edge from the nearest of which Newton's method goes on; its steps."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def hold_curvature(
     else:
         found = places.errors(make(replace(surface, straight=straight)))
     count = _count_sides(surface, straight)
-    note = _note(found, cad.stated, factor, count, bent)
+    note = _note(found, cad.stated, cad.model.metres, count, bent)
     health = surface.health.labelled(notes=(*surface.health.notes, note))
     return replace(surface, straight=straight if count else None, health=health)
 
@@ -239,12 +239,16 @@ def _note(found: Errors, stated: float, factor: float, count: int, bent: float) 
 
 
 def _from_curve(curve: Any, points: Floats, start: float, end: float) -> float:
-    """Largest distance of points (3, 3) along a side from the curve next to them."""
+    """Largest distance of points (3, 3) along a side from the curve between two parameters."""
     place, tangent = gp_Pnt(), gp_Vec()
+    # Its speed may be anything: the middle of the side need not be near that of the parameters.
+    seeds = np.linspace(start, end, CURVE_SEEDS)
+    along = np.array([curve.Value(at).Coord() for at in seeds.tolist()])
     low, high = curve.FirstParameter(), curve.LastParameter()
     largest = 0.0
-    for share, point in zip(ALONG, points, strict=True):
-        at, nearest = (1 - share) * start + share * end, np.inf
+    for point in points:
+        away = np.linalg.norm(along - point, axis=1)
+        nearest, at = float(away.min()), float(seeds[np.argmin(away)])
         for _ in range(CURVE_STEPS):
             curve.D1(at, place, tangent)
             offset, way = point - place.Coord(), np.array(tangent.Coord())
