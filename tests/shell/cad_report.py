@@ -13,7 +13,7 @@ from pathlib import Path
 
 from sphshell_pin import Shell
 from sphshell_pin.shell.cad import require_kernel
-from tests.oracle.cad import ExactShape, deviation
+from tests.oracle.cad import ExactShape, curved_places, deviation
 from tests.shell import cad_shapes as shapes
 from tests.shell.cad_cases import (
     KNOWN,
@@ -37,7 +37,8 @@ def report_files(names: list[str], samples: int) -> None:
 
     print(
         f"{'file':34s} {'s':>5s} {'elements':>8s} {'stated':>8s} {'says':>8s} | "
-        f"{'flat':>8s} {'back':>8s} {'smooth':>8s} {'back':>8s} | area off  volume off"
+        f"{'flat':>8s} {'back':>8s} {'smooth':>8s} {'back':>8s} | "
+        f"curved: {'border':>8s} {'sides':>8s} {'inside':>8s} | area off  volume off"
     )
     for name in names:
         start = time.perf_counter()
@@ -45,7 +46,12 @@ def report_files(names: list[str], samples: int) -> None:
         took = time.perf_counter() - start
         stated, says, held = stated_and_measured(shell)
         shape = read_model(file_of(name)).shape
-        found = deviation(shell, ExactShape(shape), samples).largest
+        exact = ExactShape(shape)
+        found = deviation(shell, exact, samples).largest
+        curved = [
+            float(exact.closest(places).distances.max(initial=0.0)) if len(places) else 0.0
+            for places in curved_places(shell, samples // 10).values()
+        ]
         area, volume = shapes.area_and_volume(shape)
         health = shell.health
         off = f"{health.area / (area * 1e-6) - 1:+.1e}"
@@ -53,7 +59,10 @@ def report_files(names: list[str], samples: int) -> None:
         print(
             f"{name:34s} {took:5.1f} {len(shell.elements):8d} {stated:8.2e} {says:8.2e} | "
             + " ".join(f"{one:8.2e}" for one in (found[0], found[2], found[1], found[3]))
-            + f" | {off} {'held' if held and max(found[0], found[2]) <= stated else 'NOT HELD'}",
+            + " |         "
+            + " ".join(f"{one:8.2e}" for one in curved)
+            + f" | {off} "
+            + ("held" if held and max(found[0], found[2], *curved) <= stated else "NOT HELD"),
             flush=True,
         )
 
@@ -86,4 +95,5 @@ if __name__ == "__main__":
     chosen = parser.parse_args()
     require_kernel("this report")
     report_files([n for n in chosen.names if file_of(n).is_file()], chosen.samples)
-    report_forces(chosen.levels)
+    if chosen.levels:
+        report_forces(chosen.levels)

@@ -159,6 +159,39 @@ def test_explain_shows_the_report():
         assert any("20 curved elements bend" in one for one in found.warnings) == shown
 
 
+class Core:
+    """A compiled surface with codes of its own about how it bends."""
+
+    def __init__(self, core, **codes):
+        self._core = core
+        self.__dict__.update(codes)
+
+    def __getattr__(self, name):
+        return getattr(self._core, name)
+
+
+def test_reasons_and_normals_set_aside_are_counted_by_element():
+    shell = sp.Shell(*plate(3))
+    shell.core = Core(
+        shell.core,
+        # Two triangles to an element: one that is curved makes it curved.
+        bending=np.array([1, 1, 2, 2, 2, 2, 0, 2, 1, 1, 1, 1, 1, 1, 9, 9, 1, 1], np.uint8),
+        normals_set_aside=np.isin(np.arange(54), (40, 41)).reshape(18, 3),
+    )
+    report = shell.curvature_report()
+    assert (report.elements, report.curved, report.flat) == (9, 1, 8)
+    whys, counts = zip(*report.flat_because, strict=True)
+    assert counts == (5, 2, 1)
+    assert "turns" in whys[0]
+    assert "witness" in whys[1]
+    assert report.normals_set_aside == 2
+    corner = shell.vertices[shell.triangles.ravel()[40]]
+    assert report.set_aside_at == tuple(corner)
+    text = str(shell.health)
+    assert "2 elements: straightened" in text
+    assert "2 given normals" in text
+
+
 def test_the_report_is_lazy():
     shell = ball(4)
     assert shell.health.curvature is None

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from OCP.gp import gp_Pnt, gp_Vec
 
-from sphshell_pin.shell.cad.face_mesh import ALONG, FaceMesh
+from sphshell_pin.shell.cad.face_mesh import ALONG, CURVED, FaceMesh
 from sphshell_pin.shell.cad.reference import corner_weights
-from sphshell_pin.shell.cad.tessellation import MARGIN
 from sphshell_pin.shell.curved import points_at
 
 if TYPE_CHECKING:
@@ -35,8 +34,9 @@ MOST_ROUNDS = 6
 SAME_PLACE = 1e-6
 """A corner this near to a node, as a share of the size, is it: cleaning welds within less."""
 
-CURVE_SEEDS, CURVE_STEPS = 9, 4
-"""Places along an edge from the nearest of which Newton's method goes on; its steps."""
+CURVE_SEEDS, CURVE_STEPS, SETTLED = 9, 4, 0.01
+"""Places along an edge from the nearest of which Newton's method goes on; its steps; the share of
+the chord error below which a step changes the distance by nothing to speak of."""
 
 
 @dataclass(frozen=True)
@@ -67,20 +67,20 @@ def hold_curvature(
 ) -> CleanedSurface:
     """Return a CAD surface whose curved elements are as near as its flat ones, with a note of it.
 
-    A curved side, or the sides of a curved middle, farther off than the stated chord error are kept
-    straight, unless straight ones are no nearer.
+    A curved side, or the sides of a curved middle, farther off than the share CURVED of the stated
+    chord error are kept straight, unless straight ones are no nearer.
 
     factor : metres per unit of the model; make : makes a shell of the surface
     """
     places = _Places(surface, cad, factor)
-    limit = MARGIN * cad.stated
+    limit = CURVED * cad.stated
     straight = np.zeros((len(surface.triangles), 3), np.bool_)
     bent = 0.0
     for _ in range(MOST_ROUNDS):
         found = places.errors(make(replace(surface, straight=straight)))
         bad, farthest = _too_far(found, places, limit)
         bent = max(bent, farthest)
-        if not bad.any():
+        if not (bad & ~straight).any():
             break
         straight |= bad
     else:
@@ -149,7 +149,8 @@ class _Places:
             if on_sides[triangle, side]:
                 first = side * len(ALONG)
                 along = points[triangle, first : first + len(ALONG)]
-                borders[triangle, side] = _from_curve(curve, along, start, end)
+                near = SETTLED * self._tolerance
+                borders[triangle, side] = _from_curve(curve, along, start, end, near)
         return Errors(self._sides.spread(sides), middles, borders)
 
     def _find_curves(
@@ -238,8 +239,11 @@ def _note(found: Errors, stated: float, factor: float, count: int, bent: float) 
     return note
 
 
-def _from_curve(curve: Any, points: Floats, start: float, end: float) -> float:
-    """Largest distance of points (3, 3) along a side from the curve between two parameters."""
+def _from_curve(curve: Any, points: Floats, start: float, end: float, settled: float) -> float:
+    """Largest distance of points (3, 3) along a side from the curve between two parameters.
+
+    Newton's steps shorter than `settled` are the last.
+    """
     place, tangent = gp_Pnt(), gp_Vec()
     # Its speed may be anything: the middle of the side need not be near that of the parameters.
     seeds = np.linspace(start, end, CURVE_SEEDS)
@@ -256,6 +260,9 @@ def _from_curve(curve: Any, points: Floats, start: float, end: float) -> float:
             square = float(way @ way)
             if square == 0.0:
                 break
-            at = min(max(at + float(offset @ way) / square, low), high)
+            along_curve = float(offset @ way)
+            at = min(max(at + along_curve / square, low), high)
+            if along_curve**2 <= settled**2 * square:
+                break
         largest = max(largest, nearest)
     return largest

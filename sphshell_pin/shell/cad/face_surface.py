@@ -65,6 +65,10 @@ class FaceSurface:
         Newton's steps go on while they are longer than `tolerance`: less changes the distance by
         far less, as the surface is nearly flat within it.
         """
+        if self.flat and len(points):
+            place, by_u, by_v = (row[0] for row in self.derivatives(uv[:1]))
+            upright = np.cross(by_u, by_v)
+            return np.asarray(np.abs((points - place) @ (upright / np.linalg.norm(upright))))
         distance = np.full(len(points), np.inf)
         at, left = uv.copy(), np.arange(len(points))
         for _ in range(MOST_STEPS):
