@@ -342,7 +342,8 @@ class Shell(Topology):
         if method == "smooth":
             # With no smooth edges every element is flat, whatever normals came with it.
             given = self.normals if self.crease_angle > 0 else None
-            self.core.curve(None if given is None else given.reshape(-1, 3))
+            exact = self.element_face is not None  # CAD's own
+            self.core.curve(None if given is None else given.reshape(-1, 3), exact)
         core: _core.Shell = self.core
         return core
 

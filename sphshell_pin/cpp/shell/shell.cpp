@@ -156,8 +156,8 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
   return {at.point, normal, sign * distance, facet.element};
 }
 
-void Shell::curve(std::vector<Vec3> normals) {
-  if (!curved_) curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals));
+void Shell::curve(std::vector<Vec3> normals, bool exact) {
+  if (!curved_) curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals), exact);
 }
 
 std::size_t Shell::bytes() const {
