@@ -23,10 +23,11 @@ FLAT_BECAUSE = (
     "curved",
     "no side of them bends: nothing around them turns",
     "straightened: their neighbours do not bear witness to a bend",
+    "kept straight: curved ones would leave the exact CAD face",
 )
-"""What the codes of `_core.Shell.bending` mean."""
+"""What the codes of `_core.Shell.bending` mean, and one more."""
 
-OTHER_REASON = "for another reason"
+OFF_FACE = 3
 
 LARGE_OF_HEIGHT = 0.2
 """A curved element this far off, as a share of its smallest height, is one to look at. Sides that
@@ -121,7 +122,7 @@ def curvature_report(shell: Shell) -> CurvatureReport:
     height, longest = _heights(shell)
     code = _bending(shell)
     curved = int((code == CURVED).sum())
-    reasons = [(_reason(one), int((code == one).sum())) for one in np.unique(code) if one != CURVED]
+    reasons = [(FLAT_BECAUSE[one], int((code == one).sum())) for one in np.unique(code) if one != CURVED]
     aside, aside_at = _set_aside(shell)
     return CurvatureReport(
         elements=shell.num_elements,
@@ -219,26 +220,21 @@ def _heights(shell: Shell) -> tuple[Floats, Floats]:
 def _bending(shell: Shell) -> Bytes:
     """Return for each element (m,) whether it is curved, or why it is flat, as FLAT_BECAUSE."""
     core = shell.core_for("smooth")
-    codes = getattr(core, "bending", None)
-    if codes is None:
-        codes = np.where(core.lifts.any(axis=(1, 2)), CURVED, CURVED + 1)
+    codes = core.bending
+    if shell.straight is not None:
+        codes = np.where((codes != CURVED) & shell.straight.any(axis=1), np.uint8(OFF_FACE), codes)
     # Curved if any triangle of it is; else the most telling reason.
     lowest = np.full(shell.num_elements, 255, np.uint8)
     highest = np.zeros(shell.num_elements, np.uint8)
-    np.minimum.at(lowest, shell.triangle_element, codes.astype(np.uint8))
-    np.maximum.at(highest, shell.triangle_element, codes.astype(np.uint8))
+    np.minimum.at(lowest, shell.triangle_element, codes)
+    np.maximum.at(highest, shell.triangle_element, codes)
     return np.where(lowest == CURVED, lowest, highest)
-
-
-def _reason(code: int) -> str:
-    return FLAT_BECAUSE[code] if code < len(FLAT_BECAUSE) else OTHER_REASON
 
 
 def _set_aside(shell: Shell) -> tuple[int, Place | None]:
     """How many given normals the elements contradict, and where one of them is."""
-    aside = getattr(shell.core_for("smooth"), "normals_set_aside", None)
-    corners = np.zeros(0, np.int64) if aside is None else np.flatnonzero(np.ravel(aside))
-    if not len(corners):
+    corners = np.flatnonzero(shell.core_for("smooth").normals_set_aside)
+    if shell.normals is None or not len(corners):
         return 0, None
     return len(corners), _place(shell.vertices[shell.triangles.ravel()[corners[0]]])
 

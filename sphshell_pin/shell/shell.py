@@ -355,8 +355,9 @@ class Shell(Topology):
         if method == "smooth":
             # With no smooth edges every element is flat, whatever normals came with it.
             given = self.normals if self.crease_angle > 0 else None
+            exact = self.element_face is not None  # CAD's own
             straight = None if self.straight is None else self.straight.ravel().view(np.uint8)
-            self.core.curve(None if given is None else given.reshape(-1, 3), straight)
+            self.core.curve(None if given is None else given.reshape(-1, 3), exact, straight)
         core: _core.Shell = self.core
         return core
 

@@ -10,7 +10,7 @@ import pytest
 
 from sphshell_pin.shell import CleanedSurface
 
-DATA = Path(__file__).parents[1] / "data"
+DATA = Path(__file__).parents[1] / "data" / "corpus"
 """Other people's surfaces whose licences allow a copy; README.md there has origins and licences."""
 
 MORE_DATA = Path(os.environ.get("SPHSHELL_SURFACES", Path(__file__).parents[3] / "shared" / "data"))

@@ -90,6 +90,8 @@ def test_long_elements_beside_nearly_tangent_joints(turns, scale, tmp_path):
     (note,) = [note for note in shell.health.notes if note.startswith("curved elements")]
     assert "held" in note
     assert "not held" not in note
+    report = shell.curvature_report()
+    assert sum(count for _, count in report.flat_because) == report.flat > 0
     # What was kept straight stays so in a copy.
     again = pickle.loads(pickle.dumps(shell)).transformed(scale=2.0)
     assert again.core_for("smooth").lifts == pytest.approx(2 * shell.core_for("smooth").lifts)

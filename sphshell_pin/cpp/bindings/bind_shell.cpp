@@ -157,13 +157,15 @@ void bind_shell(nanobind::module_& m) {
            nb::arg("face").none() = nb::none(), nb::arg("normals").none() = nb::none())
       .def(
           "curve",
-          [](Shell& shell, std::optional<Points> normals, std::optional<Bytes> straight) {
+          [](Shell& shell, std::optional<Points> normals, bool exact,
+             std::optional<Bytes> straight) {
             std::vector<std::uint8_t> sides;
             if (straight) sides.assign(straight->data(), straight->data() + straight->shape(0));
             // Under the GIL: two threads may ask for the first curved query at once.
-            shell.curve(normals ? rows(*normals) : std::vector<Vec3>(), sides);
+            shell.curve(normals ? rows(*normals) : std::vector<Vec3>(), exact, sides);
           },
-          nb::arg("normals").none(), nb::arg("straight").none() = nb::none())
+          nb::arg("normals").none(), nb::arg("exact") = false,
+          nb::arg("straight").none() = nb::none())
       .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"),
            nb::arg("gradient") = false)
       .def("contacts_batch", &contacts_batch, nb::arg("centers"), nb::arg("radii"),
@@ -197,6 +199,25 @@ void bind_shell(nanobind::module_& m) {
             return to_array(std::move(out), {n, 3, 3});
           },
           nb::rv_policy::automatic)
+      .def_prop_ro(
+          "bending",
+          [](const Shell& s) {
+            std::vector<std::uint8_t> out(s.curved() ? s.triangles().size() : 0);
+            for (std::size_t t = 0; t < out.size(); ++t)
+              out[t] = static_cast<std::uint8_t>(s.curved()->bending(s, static_cast<int>(t)));
+            return to_array(std::move(out));
+          },
+          nb::rv_policy::automatic)
+      .def_prop_ro(
+          "normals_set_aside",
+          [](const Shell& s) {
+            std::vector<std::uint8_t> out;
+            if (s.curved()) out.assign(s.curved()->divided().begin(), s.curved()->divided().end());
+            const std::size_t n = out.size() / 3;
+            return to_array(std::move(out), {n, 3});
+          },
+          nb::rv_policy::automatic)
+      .def_prop_ro("creases", [](const Shell& s) { return s.curved() ? s.curved()->creases() : 0; })
       .def_prop_ro("bytes", &Shell::bytes)
       .def_prop_ro(
           "element_patch", [](const Shell& s) { return to_array(s.topology().patch); },

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "shell/creases.hpp"
 #include "shell/vertex_normals.hpp"
 
 namespace sphshell {
@@ -29,6 +30,7 @@ void add_distinct(std::vector<Vec3>& normals, const Vec3& n) {
 struct EdgeEnd {
   const std::vector<Vec3>& normals;
   Vec3 direction;
+  bool limited;  // a fan there was divided: no more lean than the other end bears out
 };
 
 // The unit vector nearest to the direction, forward along chord d, that is tangent to the planes of
@@ -43,6 +45,19 @@ bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
   out.normalize();
   if (out.dot(d) < 0) out = -out;
   return out.dot(d) >= kMostLean * d.norm();
+}
+
+// A cubic between tangents that lean by a and b from its chord has no inflection unless one leans
+// more than twice as much as the other. The unit tangent that leans no more than twice as much as
+// `other`.
+Vec3 limited_lean(const Vec3& tangent, const Vec3& other, const Vec3& forward) {
+  const auto lean_of = [&](const Vec3& t) {
+    return std::atan2(forward.cross(t).norm(), forward.dot(t));
+  };
+  const double most = 2 * lean_of(other);
+  if (lean_of(tangent) <= most) return tangent;
+  const Vec3 aside = (tangent - tangent.dot(forward) * forward).normalized();
+  return std::cos(most) * forward + std::sin(most) * aside;
 }
 
 // Lifts of the two control points of an edge with chord d, tangent to the planes of all normals at
@@ -62,6 +77,11 @@ std::array<Vec3, 2> lifts_of(const Vec3& d, const EdgeEnd& first, const EdgeEnd&
   if (std::min(at_first, at_last) <= 1e-9 * std::max(at_first, at_last)) return straight;
   Vec3 begin, end;
   if (!tangent_of(d, first, begin) || !tangent_of(d, last, end)) return straight;
+  if (first.limited || last.limited) {
+    const Vec3 forward = d / length, before = begin;
+    begin = limited_lean(begin, end, forward);
+    end = limited_lean(end, before, forward);
+  }
   const auto handle = [&](const Vec3& tangent) -> Vec3 {
     return 2 * length / (3 * (1 + tangent.dot(d) / length)) * tangent - d / 3;
   };
@@ -216,13 +236,27 @@ CubicCurve CurvedFacet::side(const Facet& f, int k) const {
   return {f.corner[k], f.corner[next_corner(k)] - f.corner[k] + 3 * a, 3 * b - 6 * a, 3 * (a - b)};
 }
 
-CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals,
-                         const std::vector<std::uint8_t>& straight)
-    : normals_(normals.empty() ? estimate_normals(shell) : std::move(normals)) {
+CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact,
+                         const std::vector<std::uint8_t>& straight) {
+  const bool given = !normals.empty();
+  normals_ = given ? std::move(normals) : estimate_normals(shell);
+  divided_.assign(normals_.size(), 0);
+  if (!exact) {
+    CornerNormals found = divide_at_creases(shell, std::move(normals_), given);
+    normals_ = std::move(found.normals);
+    divided_ = std::move(found.set_aside);
+    creases_ = found.creases;
+  }
   bend_edges(shell, straight);
   lift_middles(shell);
   list_corners(shell);
   build_cones(shell);
+}
+
+Bending CurvedShell::bending(const Shell& shell, int triangle) const {
+  if (!facets_[triangle_of(shell.facet_half_edge(3 * triangle))].flat) return Bending::Curved;
+  const char* corner = &divided_[3 * triangle];
+  return corner[0] || corner[1] || corner[2] ? Bending::Crease : Bending::Planar;
 }
 
 // One curve per edge, from the normals of all facets that meet there, so that they share it.
@@ -238,6 +272,7 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
   for (const Edge& edge : topology.edges) {
     first.clear();
     last.clear();
+    bool limited = false;
     const auto forward = [&](int h) {
       return triangles[triangle_of(h)][side_of(h)] == edge.first_vertex;
     };
@@ -247,11 +282,13 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
       const Vec3& there = normals_[3 * triangle_of(h) + next_corner(side_of(h))];
       add_distinct(first, forward(h) ? here : there);
       add_distinct(last, forward(h) ? there : here);
+      limited = limited || divided_[h] || divided_[3 * triangle_of(h) + next_corner(side_of(h))];
     }
     const Vec3 d = p[edge.last_vertex] - p[edge.first_vertex];
     const bool border = edge.kind == EdgeClass::Boundary;
-    std::array<Vec3, 2> lift = lifts_of(d, {first, border ? borders[edge.first_vertex] : d},
-                                        {last, border ? borders[edge.last_vertex] : d});
+    std::array<Vec3, 2> lift =
+        lifts_of(d, {first, border ? borders[edge.first_vertex] : d, limited},
+                 {last, border ? borders[edge.last_vertex] : d, limited});
     for (int i = 0; i < edge.count && !straight.empty(); ++i)
       if (straight[topology.incidence[edge.begin + i]]) lift = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 0; i < edge.count; ++i) {

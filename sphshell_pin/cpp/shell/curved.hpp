@@ -52,6 +52,13 @@ struct CurvedFacet {
   CubicCurve side(const Facet& f, int k) const;
 };
 
+// Whether an element is curved, or why it is not.
+enum class Bending : int {
+  Curved = 0,
+  Planar = 1,  // no normal at its corners leans
+  Crease = 2,  // the elements around do not bear witness to the bend that its normals had
+};
+
 struct Corners {
   const int *first, *last;
   const int* begin() const { return first; }
@@ -61,9 +68,10 @@ struct Corners {
 class CurvedShell {
  public:
   // normals: unit, per triangle corner (3 per triangle), wound like the triangles; empty:
-  // estimated within smooth patches. straight: per half-edge (3 triangle + side) 1 for sides to
-  // stay straight whatever the normals; empty: none.
-  CurvedShell(const Shell& shell, std::vector<Vec3> normals,
+  // estimated within smooth patches. exact: they are the surface's own and stand; others are
+  // divided where the elements around contradict them. straight: per half-edge (3 triangle + side)
+  // 1 for sides to stay straight whatever the normals; empty: none.
+  CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact,
               const std::vector<std::uint8_t>& straight);
 
   const LargeArray<CurvedFacet>& facets() const { return facets_; }  // in the order of the tree
@@ -72,6 +80,10 @@ class CurvedShell {
   // Tangents of the edges that leave vertex i, beside Topology::neighbours.
   const std::vector<Vec3>& tangents() const { return tangents_; }
   const std::vector<Vec3>& normals() const { return normals_; }  // per corner, 3 triangle + k
+  // Per corner: its normal was set aside, as a crease that the elements show divides its fan.
+  const std::vector<char>& divided() const { return divided_; }
+  int creases() const { return creases_; }  // edges that became creases so
+  Bending bending(const Shell& shell, int triangle) const;
   // The corners (3 facet + k) that meet at a vertex.
   Corners corners_of(int vertex) const {
     return {&corners_[corner_begin_[vertex]], &corners_[corner_begin_[vertex + 1]]};
@@ -90,6 +102,8 @@ class CurvedShell {
   void build_cones(const Shell& shell);
 
   std::vector<Vec3> normals_;
+  std::vector<char> divided_;
+  int creases_ = 0;
   LargeArray<CurvedFacet> facets_;
   LargeArray<NormalCone> cones_;
   std::vector<Vec3> tangents_;
