@@ -82,7 +82,8 @@ class Creases {
   void weigh_runs();
   double held(int vertex, const Vec3& direction, const std::vector<char>& joints) const;
   bool add_creases();
-  void extend_lines(std::vector<int> ends);
+  template <class May>
+  void extend_lines(std::vector<int> ends, May&& may);
   bool separate_walls();
   void lean_as_other_ends(const Fans& fans);
 
@@ -338,6 +339,37 @@ double Creases::held(int vertex, const Vec3& direction, const std::vector<char>&
   return sum;
 }
 
+// The joints of one line are decided about together: a crease that ended inside a fan would not
+// divide it.
+template <class May>
+void Creases::extend_lines(std::vector<int> ends, May&& may) {
+  const auto& edges = shell_.topology().edges;
+  while (!ends.empty()) {
+    const int e = ends.back();
+    ends.pop_back();
+    for (int end : {edges[e].first_vertex, edges[e].last_vertex}) {
+      const Vec3 onward =
+          end == edges[e].last_vertex ? joints_[e].direction : Vec3(-joints_[e].direction);
+      int next = -1;
+      double straightest = kOnward;
+      at_vertex(end, [&](int other) {
+        const Vec3& d = joints_[other].direction;
+        const double cosine = onward.dot(edges[other].first_vertex == end ? d : Vec3(-d));
+        if (other == e || cosine < straightest) return;
+        straightest = cosine;
+        next = other;
+      });
+      if (next < 0 || crease_[next] || !may(next)) continue;
+      const double here = joints_[e].angle, there = joints_[next].angle;
+      if (here * there <= 0 || std::abs(here) > kSameTurn * std::abs(there) ||
+          std::abs(there) > kSameTurn * std::abs(here))
+        continue;
+      crease_[next] = 1;
+      ends.push_back(next);
+    }
+  }
+}
+
 // What is not smooth becomes a crease, unless its elements would bulge there by less than those
 // around do: the worst first, since it spoils what its neighbours claim. False where nothing is
 // left.
@@ -373,39 +405,12 @@ bool Creases::add_creases() {
   if (doubtful.empty()) return false;
   std::fill(around.begin(), around.end(), 0.0);
   for (const auto& [e, harm] : doubtful) spread(e, harm);
+  std::vector<int> added;
   for (const auto& [e, harm] : doubtful)
-    if (harm >= largest(e) / 2) crease_[e] = 1;
+    if (harm >= largest(e) / 2) added.push_back(static_cast<int>(e));
+  for (int e : added) crease_[e] = 1;
+  extend_lines(std::move(added), [&](int e) { return !smooth_[e]; });
   return true;
-}
-
-// The joints of one line are decided about together: a crease that ended inside a fan would not
-// divide it.
-void Creases::extend_lines(std::vector<int> ends) {
-  const auto& edges = shell_.topology().edges;
-  while (!ends.empty()) {
-    const int e = ends.back();
-    ends.pop_back();
-    for (int end : {edges[e].first_vertex, edges[e].last_vertex}) {
-      const Vec3 onward =
-          end == edges[e].last_vertex ? joints_[e].direction : Vec3(-joints_[e].direction);
-      int next = -1;
-      double straightest = kOnward;
-      at_vertex(end, [&](int other) {
-        const Vec3& d = joints_[other].direction;
-        const double cosine = onward.dot(edges[other].first_vertex == end ? d : Vec3(-d));
-        if (other == e || cosine < straightest) return;
-        straightest = cosine;
-        next = other;
-      });
-      if (next < 0 || crease_[next] || core_[next] || alike_[next] || !explained_[next]) continue;
-      const double here = joints_[e].angle, there = joints_[next].angle;
-      if (here * there <= 0 || std::abs(here) > kSameTurn * std::abs(there) ||
-          std::abs(there) > kSameTurn * std::abs(here))
-        continue;
-      crease_[next] = 1;
-      ends.push_back(next);
-    }
-  }
 }
 
 // Where a wall ends in a fillet each takes its own normal: they agree, and the wall stays straight.
@@ -421,7 +426,7 @@ bool Creases::separate_walls() {
   }
   for (int e : added) crease_[e] = 1;
   if (added.empty()) return false;
-  extend_lines(std::move(added));
+  extend_lines(std::move(added), [&](int e) { return explained_[e] && !alike_[e]; });
   return true;
 }
 
