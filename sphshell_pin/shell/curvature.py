@@ -122,7 +122,9 @@ def curvature_report(shell: Shell) -> CurvatureReport:
     height, longest = _heights(shell)
     code = _bending(shell)
     curved = int((code == CURVED).sum())
-    reasons = [(FLAT_BECAUSE[one], int((code == one).sum())) for one in np.unique(code) if one != CURVED]
+    reasons = [
+        (FLAT_BECAUSE[one], int((code == one).sum())) for one in np.unique(code) if one != CURVED
+    ]
     aside, aside_at = _set_aside(shell)
     return CurvatureReport(
         elements=shell.num_elements,
