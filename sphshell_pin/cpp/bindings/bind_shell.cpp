@@ -157,11 +157,15 @@ void bind_shell(nanobind::module_& m) {
            nb::arg("face").none() = nb::none(), nb::arg("normals").none() = nb::none())
       .def(
           "curve",
-          [](Shell& shell, std::optional<Points> normals, bool exact) {
+          [](Shell& shell, std::optional<Points> normals, bool exact,
+             std::optional<Bytes> straight) {
+            std::vector<std::uint8_t> sides;
+            if (straight) sides.assign(straight->data(), straight->data() + straight->shape(0));
             // Under the GIL: two threads may ask for the first curved query at once.
-            shell.curve(normals ? rows(*normals) : std::vector<Vec3>(), exact);
+            shell.curve(normals ? rows(*normals) : std::vector<Vec3>(), exact, sides);
           },
-          nb::arg("normals").none(), nb::arg("exact") = false)
+          nb::arg("normals").none(), nb::arg("exact") = false,
+          nb::arg("straight").none() = nb::none())
       .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"),
            nb::arg("gradient") = false)
       .def("contacts_batch", &contacts_batch, nb::arg("centers"), nb::arg("radii"),

@@ -236,7 +236,8 @@ CubicCurve CurvedFacet::side(const Facet& f, int k) const {
   return {f.corner[k], f.corner[next_corner(k)] - f.corner[k] + 3 * a, 3 * b - 6 * a, 3 * (a - b)};
 }
 
-CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact) {
+CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact,
+                         const std::vector<std::uint8_t>& straight) {
   const bool given = !normals.empty();
   normals_ = given ? std::move(normals) : estimate_normals(shell);
   divided_.assign(normals_.size(), 0);
@@ -246,7 +247,7 @@ CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exa
     divided_ = std::move(found.set_aside);
     creases_ = found.creases;
   }
-  bend_edges(shell);
+  bend_edges(shell, straight);
   lift_middles(shell);
   list_corners(shell);
   build_cones(shell);
@@ -259,7 +260,7 @@ Bending CurvedShell::bending(const Shell& shell, int triangle) const {
 }
 
 // One curve per edge, from the normals of all facets that meet there, so that they share it.
-void CurvedShell::bend_edges(const Shell& shell) {
+void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight) {
   const Topology& topology = shell.topology();
   const std::vector<Triangle>& triangles = shell.triangles();
   const std::vector<Vec3>& p = shell.vertices();
@@ -285,9 +286,11 @@ void CurvedShell::bend_edges(const Shell& shell) {
     }
     const Vec3 d = p[edge.last_vertex] - p[edge.first_vertex];
     const bool border = edge.kind == EdgeClass::Boundary;
-    const std::array<Vec3, 2> lift =
+    std::array<Vec3, 2> lift =
         lifts_of(d, {first, border ? borders[edge.first_vertex] : d, limited},
                  {last, border ? borders[edge.last_vertex] : d, limited});
+    for (int i = 0; i < edge.count && !straight.empty(); ++i)
+      if (straight[topology.incidence[edge.begin + i]]) lift = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 0; i < edge.count; ++i) {
       const int h = topology.incidence[edge.begin + i], g = shell.facet_half_edge(h);
       Vec3* side = facets_[triangle_of(g)].lift[side_of(g)];

@@ -1,6 +1,7 @@
 // Curved elements over the triangles of a shell: cubic patches that meet the vertex normals.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "shell/shell.hpp"
@@ -68,8 +69,10 @@ class CurvedShell {
  public:
   // normals: unit, per triangle corner (3 per triangle), wound like the triangles; empty:
   // estimated within smooth patches. exact: they are the surface's own and stand; others are
-  // divided where the elements around contradict them.
-  CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact);
+  // divided where the elements around contradict them. straight: per half-edge (3 triangle + side)
+  // 1 for sides to stay straight whatever the normals; empty: none.
+  CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact,
+              const std::vector<std::uint8_t>& straight);
 
   const LargeArray<CurvedFacet>& facets() const { return facets_; }  // in the order of the tree
   const LargeArray<NormalCone>& cones() const { return cones_; }
@@ -92,7 +95,7 @@ class CurvedShell {
   }
 
  private:
-  void bend_edges(const Shell& shell);
+  void bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight);
   void lift_middles(const Shell& shell);
   void list_corners(const Shell& shell);
   int corner_beyond(const Shell& shell, int half_edge) const;

@@ -156,8 +156,10 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
   return {at.point, normal, sign * distance, facet.element};
 }
 
-void Shell::curve(std::vector<Vec3> normals, bool exact) {
-  if (!curved_) curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals), exact);
+void Shell::curve(std::vector<Vec3> normals, bool exact,
+                  const std::vector<std::uint8_t>& straight) {
+  if (!curved_)
+    curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals), exact, straight);
 }
 
 std::size_t Shell::bytes() const {

@@ -87,8 +87,8 @@ class Shell {
   double tan_vertex_cone(int vertex, const Vec3& axis, const Vec3* tangents = nullptr) const;
 
   // Curved elements, made when first asked for: unit normals per triangle corner, or none; exact:
-  // they are the surface's own.
-  void curve(std::vector<Vec3> normals, bool exact);
+  // they are the surface's own; `straight` as of CurvedShell.
+  void curve(std::vector<Vec3> normals, bool exact, const std::vector<std::uint8_t>& straight = {});
   const CurvedShell* curved() const { return curved_.get(); }
 
   double size() const { return size_; }  // box diagonal [m]
