@@ -107,12 +107,14 @@ FLANK, NEAREST = np.sqrt(0.8), np.sqrt(1.8)
 
 
 def assert_two_flanks(shell: Shell) -> None:
-    """Contacts at x = +-FLANK and the pass at the origin between them, in closed form."""
+    """Contacts at x = +-FLANK and the saddle at the origin between them, in closed form."""
     found = find(shell, [0.0, 0.0, HEIGHT], WIDE)
     assert found.weight.tolist() == [1.0, 1.0, -1.0]
     order = np.argsort(found.point[:, 0])
     exact = np.array([[-FLANK, 0.0, 0.4], [0.0, 0.0, 0.0], [FLANK, 0.0, 0.4]])
-    assert np.abs(found.point[order] - exact).max() <= 2e-3
+    # The saddle is the place of a side that is nearest, so only its depth is exact.
+    assert np.abs(found.point[order] - exact)[[0, 2]].max() <= 1e-4
+    assert np.abs(found.point[order] - exact)[1].max() <= 1e-2
     depths = WIDE - np.array([NEAREST, HEIGHT, NEAREST])
     assert np.abs(found.depth[order] - depths).max() <= 2e-4
     upward = 2 * depths[0] ** 1.5 / NEAREST - depths[1] ** 1.5
