@@ -31,7 +31,7 @@ def check_options(crease_angle: float, side: str) -> None:
 
 
 def check_size(size: float) -> None:
-    """Raise InvalidShell unless the diagonal of the box [m] is one that the search tree can hold."""
+    """Raise InvalidShell unless the search tree can hold a box with this diagonal [m]."""
     least, most = SIZES
     if not least <= size <= most:
         raise InvalidShell(

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "contact/tolerances.hpp"
 #include "shell/curved.hpp"
 
 namespace sphshell {
@@ -114,7 +115,8 @@ inline double nearest_on_side(const CubicCurve& side, const Vec3& x) {
     double steepest = 0;
     for (double value : part.quintic.q) steepest = std::max(steepest, std::abs(value));
     try_at(part.from + part.width / 2);
-    if (steepest * part.width < 1e-16 * least || count + 2 > kMost || part.width < 1e-9) continue;
+    if (steepest * part.width < kLevelSide * least || count + 2 > kMost || part.width < 1e-9)
+      continue;
     const auto [first, second] = part.quintic.halves();
     parts[count++] = {second, part.from + part.width / 2, part.width / 2};
     parts[count++] = {first, part.from, part.width / 2};

@@ -184,6 +184,8 @@ void Components::pair_minima(const Shell& shell, const Sphere& sphere, bool want
   std::sort(tree_.begin(), tree_.end(), [](const Link& a, const Link& b) { return lower(b, a); });
   start_pieces(minima.size());
   absorbed_.assign(minima.size(), 0);
+  leader_.resize(minima.size());
+  std::iota(leader_.begin(), leader_.end(), 0);
   for (const Link& link : tree_) {
     const int a = root(link.from), b = root(link.to);
     const int i = deepest_[a], j = deepest_[b];
@@ -202,8 +204,12 @@ void Components::pair_minima(const Shell& shell, const Sphere& sphere, bool want
     absorbed_.push_back(0);
   }
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < minima.size(); ++i)
-    if (!absorbed_[i]) minima[kept++] = minima[i];
+  for (std::size_t i = 0; i < minima.size(); ++i) {
+    if (absorbed_[i]) continue;
+    int& place = minima[i].contact.place;
+    if (place >= 0) place = leader_of(place);
+    minima[kept++] = minima[i];
+  }
   minima.erase(minima.begin() + kept, minima.end());
 }
 
@@ -217,12 +223,14 @@ void Components::show_as_one(std::vector<Minimum>& minima, int deeper, int shall
   };
   Contact &a = minima[deeper].contact, &b = minima[shallower].contact;
   if (!near(a) || !near(b)) return;
-  if (a.place < 0) a.place = deeper;
-  const int from = b.place;
-  saddle.place = b.place = a.place;
-  if (from < 0) return;
-  for (Minimum& other : minima)
-    if (other.contact.place == from) other.contact.place = a.place;
+  a.place = saddle.place = deeper;
+  b.place = shallower;
+  leader_[leader_of(shallower)] = leader_of(deeper);
+}
+
+int Components::leader_of(int minimum) {
+  while (leader_[minimum] != minimum) minimum = leader_[minimum] = leader_[leader_[minimum]];
+  return minimum;
 }
 
 }  // namespace sphshell

@@ -58,14 +58,16 @@ class Components {
   void flood(const Shell& shell, const Sphere& sphere);
   void pair_minima(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
                    std::vector<Minimum>& minima);
-  static void show_as_one(std::vector<Minimum>& minima, int deeper, int shallower, bool flat,
-                          Contact& saddle);
+  int leader_of(int minimum);
+  void show_as_one(std::vector<Minimum>& minima, int deeper, int shallower, bool flat,
+                   Contact& saddle);
 
   FacetTable cells_;                   // the first of them hold the minima, in their order
   std::vector<int> parent_, deepest_;  // per cell; deepest_: minimum of its piece, or -1
   std::vector<int> by_x_;
   std::vector<Link> open_, tree_;
-  std::vector<char> absorbed_;  // beside the minima
+  std::vector<char> absorbed_;  // beside the minima and saddles
+  std::vector<int> leader_;     // beside the minima: towards the one that it is shown with
 };
 
 }  // namespace sphshell

@@ -104,6 +104,23 @@ void find_elements(const Shell& shell, const Sphere& sphere, BroadPhase& broad,
             [](const Contact& a, const Contact& b) { return a.element < b.element; });
 }
 
+Contact nothing_at(Contact first) {
+  first.normal.setZero(), first.dn_dc.setZero();
+  first.depth = 0;
+  return first;
+}
+
+void add_to(Contact& whole, const Contact& c) {
+  whole.depth += c.weight * c.depth;
+  whole.normal += c.weight * c.normal;
+  whole.dn_dc += c.dn_dc;
+}
+
+void finish(Contact& whole, const Vec3& centre, double radius) {
+  whole.normal.normalize();
+  whole.point = centre - (radius - whole.depth) * whole.normal;
+}
+
 }  // namespace
 
 struct Query::Parts {
@@ -174,26 +191,33 @@ bool leads(const std::vector<Contact>& contacts, std::size_t i) {
 
 Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3& centre,
                  double radius) {
-  Contact whole = contacts[i];
-  if (whole.place < 0) return whole;
-  whole.normal.setZero(), whole.dn_dc.setZero();
-  whole.depth = 0, whole.weight = 1;
-  for (const Contact& c : contacts) {
-    if (c.place != whole.place) continue;
-    whole.depth += c.weight * c.depth;
-    whole.normal += c.weight * c.normal;
-    whole.dn_dc += c.dn_dc;
-  }
-  whole.normal.normalize();
-  whole.point = centre - (radius - whole.depth) * whole.normal;
+  if (contacts[i].place < 0) return contacts[i];
+  Contact whole = nothing_at(contacts[i]);
+  for (const Contact& c : contacts)
+    if (c.place == whole.place) add_to(whole, c);
+  finish(whole, centre, radius);
   return whole;
 }
 
 void merge_places(const std::vector<Contact>& contacts, const Vec3& centre, double radius,
                   std::vector<Contact>& shown) {
   shown.clear();
-  for (std::size_t i = 0; i < contacts.size(); ++i)
-    if (leads(contacts, i)) shown.push_back(whole_of(contacts, i, centre, radius));
+  int places = 0;
+  for (const Contact& c : contacts) places = std::max(places, c.place + 1);
+  std::vector<int> at(places, -1);
+  for (const Contact& c : contacts) {
+    if (c.place < 0) {
+      shown.push_back(c);
+      continue;
+    }
+    if (at[c.place] < 0) {
+      at[c.place] = static_cast<int>(shown.size());
+      shown.push_back(nothing_at(c));
+    }
+    add_to(shown[at[c.place]], c);
+  }
+  for (int i : at)
+    if (i >= 0) finish(shown[i], centre, radius);
 }
 
 }  // namespace sphshell

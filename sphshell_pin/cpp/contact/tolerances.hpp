@@ -30,11 +30,15 @@ constexpr double kOverlap = 1e-9;
 // certainly above this (1: a plane). Below, it is divided.
 constexpr double kConvex = 0.05;
 
-// Parts of a cell are no longer divided where the depth varies by less than this share of itself
-// (an error of the potential below 1e-6 of its size cannot be felt), ...
-constexpr double kLevel = 1e-8;
+// Parts of a cell are no longer divided where they cannot be nearer than what is known by more than
+// this share of the depth (the potential changes by 2.5 times this share: far below 1e-6), ...
+constexpr double kLevel = 1e-7;
 // ... or after so many halvings, which ill-shaped cells reach.
 constexpr int kMostHalvings = 5;
+
+// Parts of a side are no longer divided where the square of the distance varies by less than this
+// share: the depth is exact to half of it.
+constexpr double kLevelSide = 1e-14;
 
 // A saddle no shallower than the shallower minimum, to this share of the radius, parts nothing.
 constexpr double kNoSaddle = 1e-13;
