@@ -11,7 +11,7 @@ BroadPhase::BroadPhase(bool follow) : follow_(follow) {
 }
 
 void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
-                      const Sphere& sphere) {
+                      const Sphere& sphere, const CellBounds* cells) {
   double margin = 0;
   if (follow_) {
     const bool same = followed_ == &shell && followed_radius_ == sphere.radius;
@@ -32,14 +32,14 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, d
     prefetch(all + first);
     prefetch(all + first + 3);
   });
-  keep_in_cone(shell, cones, bulge, sphere, margin);
+  keep_in_cone(shell, cones, bulge, sphere, margin, cells);
 }
 
 // The centre may stand inside the cone of normals of the features that a facet decides about
 // (Johnson and Cohen, I3D 2001), wherever it is within the margin and however far within it the
 // element bulges from its triangle.
 void BroadPhase::keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
-                              const Sphere& sphere, double margin) {
+                              const Sphere& sphere, double margin, const CellBounds* cells) {
   const Facet* facets = shell.facets().data();
   const Vec3 local = sphere.centre - shell.origin();
   const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
@@ -59,6 +59,7 @@ void BroadPhase::keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& 
     if (square * 0.999999f - height * height > allowed * allowed) continue;
     prefetch(&facets[f]);
     prefetch(reinterpret_cast<const char*>(&facets[f]) + 64);
+    if (cells != nullptr) prefetch(&cells[f]);
     candidates.push_back(f);
   }
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "contact/contact.hpp"
+#include "shell/cell_bounds.hpp"
 #include "shell/shell.hpp"
 
 namespace sphshell {
@@ -13,15 +14,16 @@ class BroadPhase {
   explicit BroadPhase(bool follow);
 
   // Facets in the order of the tree: `near` those whose box meets the sphere, widened by `bulge`,
-  // `candidates` those of them that may hold a minimum of the distance.
+  // `candidates` those of them that may hold a minimum of the distance. Memory of their `cells`, if
+  // given, is on its way as well.
   void find(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
-            const Sphere& sphere);
+            const Sphere& sphere, const CellBounds* cells = nullptr);
 
   std::vector<int> near, candidates;
 
  private:
   void keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
-                    const Sphere& sphere, double margin);
+                    const Sphere& sphere, double margin, const CellBounds* cells);
 
   bool follow_;
   // The lists hold while the centre is within margin_ of anchor_; -1: they hold nothing.

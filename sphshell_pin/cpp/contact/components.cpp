@@ -10,17 +10,15 @@
 namespace sphshell {
 namespace {
 
-Minimum saddle_at(const Shell& shell, int f, int k, double t, const Sphere& sphere,
-                  bool want_dn_dc) {
+Minimum on_side(const Shell& shell, int f, int k, double t, const Sphere& sphere, bool want_dn_dc) {
   const Facet& facet = shell.facets()[f];
   const CubicCurve side = shell.curved()->facets()[f].side(facet, k);
   const bool vertex = t == 0 || t == 1;
   Contact contact = contact_at(side.point(t), facet.normal, sphere, facet.element,
                                vertex ? Feature::Vertex : Feature::Edge);
-  contact.weight = -1;
   if (want_dn_dc)
-    contact.dn_dc = -dn_dc_of(contact, sphere.radius,
-                              vertex ? Mat3(Mat3::Zero()) : dx_dc_of(side, t, sphere.centre));
+    contact.dn_dc = dn_dc_of(contact, sphere.radius,
+                             vertex ? Mat3(Mat3::Zero()) : dx_dc_of(side, t, sphere.centre));
   return {contact, f, t == 1 ? next_corner(k) : k, false};
 }
 
@@ -105,7 +103,8 @@ void Components::link_equal_places(const Sphere& sphere, const std::vector<Minim
       if ((point(by_x_[a]) - point(by_x_[b])).squaredNorm() > same * same) continue;
       const auto [deeper, other] = std::minmax(by_x_[a], by_x_[b]);
       const int facet = minima[other].facet;
-      open_.push_back({minima[deeper].contact.depth, true, deeper, facet, facet, 0, 0});
+      open_.push_back(
+          {minima[other].contact.depth, LinkKind::Place, deeper, facet, facet, 0, 0, other});
     }
   std::make_heap(open_.begin(), open_.end(), lower);
 }
@@ -135,7 +134,8 @@ void Components::add_links(const Shell& shell, const Sphere& sphere, int f, int 
     for (int i = edge.begin; i < edge.begin + edge.count; ++i) {
       const int g = triangle_of(shell.facet_half_edge(topology.incidence[i]));
       if (g == f) continue;
-      open_.push_back({reach - distance, false, cell, g, triangle_of(first), side_of(first), 0});
+      open_.push_back(
+          {reach - distance, LinkKind::Bound, cell, g, triangle_of(first), side_of(first), 0, 0});
       std::push_heap(open_.begin(), open_.end(), lower);
     }
   }
@@ -151,12 +151,12 @@ void Components::flood(const Shell& shell, const Sphere& sphere) {
     Link link = open_.back();
     open_.pop_back();
     if (link.depth <= 0) break;
-    if (!link.exact) {
+    if (link.kind == LinkKind::Bound) {
       const Facet& facet = shell.facets()[link.facet];
       const CubicCurve side = shell.curved()->facets()[link.facet].side(facet, link.side);
       link.t = nearest_on_side(side, sphere.centre);
       link.depth = sphere.radius - (side.point(link.t) - sphere.centre).norm();
-      link.exact = true;
+      link.kind = LinkKind::Side;
       open_.push_back(link);
       std::push_heap(open_.begin(), open_.end(), lower);
       continue;
@@ -197,7 +197,12 @@ void Components::pair_minima(const Shell& shell, const Sphere& sphere, bool want
       absorbed_[shallower] = 1;
       continue;
     }
-    Minimum saddle = saddle_at(shell, link.facet, link.side, link.t, sphere, want_dn_dc);
+    Minimum saddle = link.kind == LinkKind::Side
+                         ? on_side(shell, link.facet, link.side, link.t, sphere, want_dn_dc)
+                         : minima[link.minimum];
+    saddle.contact.weight = -1;
+    saddle.contact.dn_dc *= -1;
+    saddle.contact.place = -1;
     show_as_one(minima, deeper, shallower, shell.curved()->facets()[link.facet].flat,
                 saddle.contact);
     minima.push_back(saddle);

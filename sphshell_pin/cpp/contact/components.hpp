@@ -41,13 +41,16 @@ class Components {
              std::vector<Minimum>& minima);
 
  private:
-  // A side over which two cells meet: the depth at its nearest place, or an upper bound of it.
+  // Where two cells meet: over a side, at its nearest place, first only bounded from above; or at
+  // the nearest place of both.
+  enum class LinkKind { Bound, Side, Place };
   struct Link {
     double depth;
-    bool exact;
-    int from, to;  // cells; `to` is a facet until the link is exact
+    LinkKind kind;
+    int from, to;  // cells; `to` is a facet until the link is used
     int facet, side;
-    double t;
+    double t;     // along the side
+    int minimum;  // of a place
   };
 
   void add_links(const Shell& shell, const Sphere& sphere, int facet, int cell);

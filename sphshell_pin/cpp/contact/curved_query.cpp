@@ -12,10 +12,14 @@ namespace sphshell {
 void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& broad, bool want_dn_dc,
                        std::vector<Minimum>& minima) {
   const CurvedShell& surface = *shell.curved();
-  broad.find(shell, surface.cones(), surface.bulge(), sphere);
+  // Where nothing is bent there is no need to look.
+  const CellBounds* cells = surface.bulge() > 0 ? surface.cells().data() : nullptr;
+  const CellBounds flat{};
+  broad.find(shell, surface.cones(), surface.bulge(), sphere, cells);
   outlooks_.clear();
   for (int f : broad.candidates) {
-    const Outlook outlook(f, shell.facets()[f], surface.cones()[f], surface.cells()[f], sphere);
+    const Outlook outlook(f, shell.facets()[f], surface.cones()[f], cells ? cells[f] : flat,
+                          sphere);
     if (outlook.empty()) continue;
     for (int line = 0; line < int(sizeof(CurvedFacet)); line += 64)
       prefetch(reinterpret_cast<const char*>(&surface.facets()[f]) + line);

@@ -51,7 +51,7 @@ struct Eigenvalues {
 
 // Bounds on the derivatives of an element x(p) over its flat facet, p in its plane, with normal n;
 // from control points, so they hold all over it.
-struct CellBounds {
+struct alignas(16) CellBounds {
   float low, high;  // n . x'' along any direction [1/m]
   float sway;       // size of the part of x'' in the plane [1/m]
   float stretch;    // size of the part of x' - p' in the plane

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -30,10 +31,14 @@ COUNT = int(os.environ.get("SPHSHELL_SPHERES", "1500"))
 WALKS = COUNT // 10
 SUFFIXES = (".stl", ".obj", ".ply", ".off")
 
-# Not understood yet. In the first lot elements cross, overlap or fold over; in the second the
-# larger spheres lie on elements that bend far more than they do.
-CROSSED = "the potential of some spheres jumps, by up to the whole of a contact's"
-BENT = "the potential of some of the larger spheres jumps"
+LONG_WALKS = int(os.environ.get("SPHSHELL_WALKS", "1"))
+
+# The theorem of fixed cells links cells over the sides that they share. Where elements pass through
+# each other, two pieces of the surface touch in a line that is no side: what the sphere holds of one
+# may come to be nearest where the other one is, and no link is there that takes as much.
+CROSSED = {
+    "manifold_openscad-nonmanifold-crash.obj": "elements pass through each other: no side is there",
+}
 
 
 def cases(known: dict[str, str]):
@@ -177,14 +182,7 @@ def jump(before: ContactSet, after: ContactSet, move: Array) -> float:
     return max(lost - most, 0.0) / potential if potential > 0 else 0.0
 
 
-BESIDE = {
-    "trimesh_featuretype.STL": CROSSED,
-    "trimesh_joined_tetrahedra.obj": CROSSED,
-    "manifold_openscad-nonmanifold-crash.obj": CROSSED,
-}
-
-
-@pytest.mark.parametrize("name", cases(BESIDE))
+@pytest.mark.parametrize("name", cases(CROSSED))
 def test_potential_beside_each_sphere(name: str) -> None:
     """A centre 1e-9 r further has the same potential; many stand exactly over sides and corners."""
     some, rng, jumps = spheres(name), np.random.default_rng(1), {}
@@ -215,12 +213,7 @@ def steepest_between(
     return start, end
 
 
-ALONG = dict.fromkeys(
-    ("bladex_upper.stl", "c3d_fandisk.obj", "c3d_stanford-bunny.obj", "fcpw_dragon.obj"), BENT
-) | dict.fromkeys(BESIDE, CROSSED)
-
-
-@pytest.mark.parametrize("name", cases(ALONG))
+@pytest.mark.parametrize("name", cases(CROSSED))
 def test_potential_along_walks(name: str) -> None:
     """Over a tenth of its radius a sphere crosses many borders; the potential jumps at none."""
     some, rng, jumps = spheres(name), np.random.default_rng(2), {}
@@ -232,6 +225,44 @@ def test_potential_along_walks(name: str) -> None:
         share = jump(look(start), look(end), end - start)
         if not share <= 1e-6:
             jumps[i] = share
+    assert not jumps
+
+
+def roll(some: Spheres, i: int, rng: np.random.Generator, length: float, depth: float):
+    """Centres (n, 3) of sphere i, a tenth of a radius apart, as it rolls `depth` deep over the
+    surface for `length`, both in radii; it turns back where it would leave the surface."""
+    radius, center = some.radii[i], some.centers[i]
+    along, path = rng.normal(size=3), []
+    for _ in range(round(10 * length)):
+        found = some.shell.contacts(center, radius, method="smooth")
+        if not len(found):
+            break
+        normal = found.normal[0]
+        along = along - along @ normal * normal
+        along /= np.linalg.norm(along)
+        center = center + (found.depth[0] - depth * radius) * normal
+        path.append(center)
+        center = center + 0.1 * radius * along
+        if not len(some.shell.contacts(center, radius, method="smooth")):
+            center, along = path[-1], rng.normal(size=3)
+    return np.array(path)
+
+
+@pytest.mark.parametrize("name", cases(CROSSED))
+def test_potential_along_long_walks(name: str) -> None:
+    """Over 30 radii at a twentieth of one; SPHSHELL_WALKS=100 takes more than the usual walk."""
+    some, rng, jumps = spheres(name), np.random.default_rng(3), {}
+    for i in rng.integers(COUNT, size=LONG_WALKS):
+        radius = some.radii[i]
+
+        def find(center: Array, radius: float = radius) -> ContactSet:
+            return some.shell.contacts(center, radius, method="smooth")
+
+        for start, end in pairwise(roll(some, i, rng, 30.0, 0.05)):
+            a, b = steepest_between(find, start, end, 1e-9 * radius)
+            share = jump(find(a), find(b), b - a)
+            if not share <= 1e-6:
+                jumps[int(i)] = share
     assert not jumps
 
 
