@@ -95,24 +95,28 @@ class CellSearch {
     bend_ = std::hypot(std::max(std::abs(bounds.low), std::abs(bounds.high)), bounds.sway);
     Vec3 uuu = 6 * patch_.c30, uuv = 2 * patch_.c21, uvv = 2 * patch_.c12, vvv = 6 * patch_.c03;
     twist_ = third(uuu, uuv, uvv, vvv);
+    static constexpr double kCorner[3][2] = {{0, 0}, {1, 0}, {0, 1}};
     for (int k = 0; k < 3; ++k) {
+      const Vec3 point = facet.corner[k] - x;
+      if (point.squaredNorm() >= least_) continue;
+      least_ = point.squaredNorm();
+      out_ = {Feature::Vertex, k, 0.0, {kCorner[k][0], kCorner[k][1], point}};
+    }
+    level_ = nothing_below(kWhole);
+    for (int k = 0; k < 3 && !level_; ++k) {
       CubicCurve side = curved.side(facet, k);
       side.c0 -= x;
       const double t = nearest_on_side(side, Vec3::Zero());
       const Vec3 point = side.point(t);
-      const double distance2 = point.squaredNorm();
-      if (distance2 >= least_) continue;
-      least_ = distance2;
+      if (point.squaredNorm() >= least_) continue;
+      least_ = point.squaredNorm();
       const auto [u, v] = on_side(k, t);
-      const bool corner = t == 0 || t == 1;
-      const int index = t == 1 ? next_corner(k) : k;
-      out_ = {corner ? Feature::Vertex : Feature::Edge, index, t, {u, v, point}};
+      out_ = {Feature::Edge, k, t, {u, v, point}};
     }
   }
 
   bool run() {
-    static const Vec2 kWhole[3] = {{0, 0}, {1, 0}, {0, 1}};
-    look_into(kWhole, 0);
+    if (!level_) look_into(kWhole, 0);
     return least_ < radius_ * radius_;
   }
 
@@ -150,9 +154,7 @@ class CellSearch {
     if (bound >= least_ * (1 - kSame)) return;
     if (low > 0 || halvings == kMostHalvings) return descend(middle);
     if (halvings == 0) descend(middle);  // what it finds spares parts
-    // What a part may hold beyond what is known cannot be felt.
-    const double depth = std::max(0.0, radius_ - std::sqrt(least_));
-    if (least2_of(patch_, corner) >= least_ - 2 * kLevel * distance * depth) return;
+    if (nothing_below(corner)) return;
     const Vec2 half[3] = {(corner[0] + corner[1]) / 2, (corner[1] + corner[2]) / 2,
                           (corner[2] + corner[0]) / 2};
     // The part in the middle first: what it finds spares the others.
@@ -160,6 +162,12 @@ class CellSearch {
     look_into({corner[0], half[0], half[2]}, halvings + 1);
     look_into({half[0], corner[1], half[1]}, halvings + 1);
     look_into({half[2], half[1], corner[2]}, halvings + 1);
+  }
+
+  // What a part may hold beyond what is known cannot be felt.
+  bool nothing_below(const Vec2 (&corner)[3]) const {
+    const double distance = std::sqrt(least_), depth = std::max(0.0, radius_ - distance);
+    return least2_of(patch_, corner) >= least_ - 2 * kLevel * distance * depth;
   }
 
   // Downhill at every step, and never out of the cell.
@@ -189,11 +197,13 @@ class CellSearch {
     out_ = {Feature::Face, 0, 0.0, found};
   }
 
+  const Vec2 kWhole[3] = {{0, 0}, {1, 0}, {0, 1}};
   const FacetAxes axes_;
   CubicPatch patch_;
   Eigenvalues whole_{0, 0, 0};      // bounds on the second derivative of |x|^2 / 2
   double radius_, least_;           // least: square of the distance of out_
   double steepest_, bend_, twist_;  // bounds on the derivatives of x, over the facet
+  bool level_;  // all of it is as near as its nearest corner
   Nearest& out_;
 };
 

@@ -68,12 +68,14 @@ void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc
   }
   minima.erase(minima.begin() + kept, minima.end());
   if (minima.size() < 2) return;
-  open_.clear(), tree_.clear();
+  tree_.clear();
   start_pieces(minima.size());
+  if (pieces_.size() < minima.size()) pieces_.resize(minima.size());
+  for (std::size_t i = 0; i < minima.size(); ++i) pieces_[i].cells = 1, pieces_[i].open.clear();
   link_equal_places(sphere, minima);
-  for (int cell = 0; cell < static_cast<int>(minima.size()); ++cell)
-    add_links(shell, sphere, minima[cell].facet, cell);
-  flood(shell, sphere);
+  for (int i = 0; i < static_cast<int>(minima.size()); ++i)
+    add_links(shell, sphere, minima[i].facet, i, pieces_[i]);
+  flood(shell, sphere, minima.size());
   pair_minima(shell, sphere, want_dn_dc, minima);
 }
 
@@ -103,10 +105,9 @@ void Components::link_equal_places(const Sphere& sphere, const std::vector<Minim
       if ((point(by_x_[a]) - point(by_x_[b])).squaredNorm() > same * same) continue;
       const auto [deeper, other] = std::minmax(by_x_[a], by_x_[b]);
       const int facet = minima[other].facet;
-      open_.push_back(
+      pieces_[deeper].open.push_back(
           {minima[other].contact.depth, LinkKind::Place, deeper, facet, facet, 0, 0, other});
     }
-  std::make_heap(open_.begin(), open_.end(), lower);
 }
 
 bool Components::lower(const Link& a, const Link& b) {
@@ -115,7 +116,8 @@ bool Components::lower(const Link& a, const Link& b) {
                               : a.side > b.side;
 }
 
-void Components::add_links(const Shell& shell, const Sphere& sphere, int f, int cell) {
+void Components::add_links(const Shell& shell, const Sphere& sphere, int f, int cell,
+                           Piece& piece) {
   const Topology& topology = shell.topology();
   const Facet& facet = shell.facets()[f];
   const CurvedFacet& curved = shell.curved()->facets()[f];
@@ -134,48 +136,76 @@ void Components::add_links(const Shell& shell, const Sphere& sphere, int f, int 
     for (int i = edge.begin; i < edge.begin + edge.count; ++i) {
       const int g = triangle_of(shell.facet_half_edge(topology.incidence[i]));
       if (g == f) continue;
-      open_.push_back(
+      piece.open.push_back(
           {reach - distance, LinkKind::Bound, cell, g, triangle_of(first), side_of(first), 0, 0});
-      std::push_heap(open_.begin(), open_.end(), lower);
+      std::push_heap(piece.open.begin(), piece.open.end(), lower);
     }
   }
 }
 
-// Water rises from all minima at once: the highest link of all that lead on is the highest that
-// leads out of its piece, so some largest spanning forest has it (Prim). Only cells that lie
-// between the minima are looked at. Bounds are made exact where they come up first.
-void Components::flood(const Shell& shell, const Sphere& sphere) {
-  std::size_t pieces = parent_.size();
-  while (pieces > 1 && !open_.empty()) {
-    std::pop_heap(open_.begin(), open_.end(), lower);
-    Link link = open_.back();
-    open_.pop_back();
-    if (link.depth <= 0) break;
-    if (link.kind == LinkKind::Bound) {
-      const Facet& facet = shell.facets()[link.facet];
-      const CubicCurve side = shell.curved()->facets()[link.facet].side(facet, link.side);
-      link.t = nearest_on_side(side, sphere.centre);
-      link.depth = sphere.radius - (side.point(link.t) - sphere.centre).norm();
-      link.kind = LinkKind::Side;
-      open_.push_back(link);
-      std::push_heap(open_.begin(), open_.end(), lower);
-      continue;
+// The highest link that leads out of a piece belongs to some largest spanning forest (Prim). The
+// smaller pieces go first, and all in turn: what remains when one piece is left, or those that are
+// left lead nowhere inside the sphere, is not looked at.
+void Components::flood(const Shell& shell, const Sphere& sphere, std::size_t minima) {
+  active_.resize(minima);
+  std::iota(active_.begin(), active_.end(), 0);
+  for (int size = 16; active_.size() > 1; size *= 2) {
+    for (std::size_t i = 0; i < active_.size(); ++i) {
+      int piece = active_[i];
+      if (root(piece) != piece) continue;
+      while (piece >= 0 && pieces_[piece].cells < size) piece = advance(shell, sphere, piece);
     }
-    bool added = false;
-    const int facet = link.to;
-    link.to = cells_.number(facet, added);
-    if (added) {
-      parent_.push_back(link.to);
-      deepest_.push_back(-1);
-      add_links(shell, sphere, facet, link.to);
-    }
-    const int a = root(link.from), b = root(link.to);
-    if (a == b) continue;
-    parent_[b] = a;
-    if (deepest_[a] >= 0 && deepest_[b] >= 0) --pieces;
-    deepest_[a] = std::max(deepest_[a], deepest_[b]);
-    tree_.push_back(link);
+    active_.erase(std::remove_if(active_.begin(), active_.end(),
+                                 [&](int p) { return root(p) != p || pieces_[p].open.empty(); }),
+                  active_.end());
   }
+}
+
+// Takes one more link into account; returns the piece then, -1 once it leads nowhere. Bounds are
+// made exact where they come up first.
+int Components::advance(const Shell& shell, const Sphere& sphere, int piece) {
+  std::vector<Link>& open = pieces_[piece].open;
+  if (open.empty()) return -1;
+  std::pop_heap(open.begin(), open.end(), lower);
+  Link link = open.back();
+  open.pop_back();
+  if (link.depth <= 0) {
+    open.clear();
+    return -1;
+  }
+  if (link.kind == LinkKind::Bound) {
+    const Facet& facet = shell.facets()[link.facet];
+    const CubicCurve side = shell.curved()->facets()[link.facet].side(facet, link.side);
+    link.t = nearest_on_side(side, sphere.centre);
+    link.depth = sphere.radius - (side.point(link.t) - sphere.centre).norm();
+    link.kind = LinkKind::Side;
+    open.push_back(link);
+    std::push_heap(open.begin(), open.end(), lower);
+    return piece;
+  }
+  bool added = false;
+  const int facet = link.to;
+  link.to = cells_.number(facet, added);
+  if (added) {
+    parent_.push_back(piece);
+    ++pieces_[piece].cells;
+    tree_.push_back(link);
+    add_links(shell, sphere, facet, link.to, pieces_[piece]);
+    return piece;
+  }
+  const int other = root(link.to);
+  if (other == piece) return piece;
+  tree_.push_back(link);
+  const int kept = pieces_[piece].open.size() < pieces_[other].open.size() ? other : piece;
+  const int gone = kept == piece ? other : piece;
+  for (const Link& more : pieces_[gone].open) {
+    pieces_[kept].open.push_back(more);
+    std::push_heap(pieces_[kept].open.begin(), pieces_[kept].open.end(), lower);
+  }
+  pieces_[kept].cells += pieces_[gone].cells;
+  pieces_[gone].open.clear();
+  parent_[gone] = kept;
+  return kept;
 }
 
 // The shallower of two minima ends at the saddle that merges their pieces (Kruskal).

@@ -53,22 +53,30 @@ class Components {
     int minimum;  // of a place
   };
 
-  void add_links(const Shell& shell, const Sphere& sphere, int facet, int cell);
+  // The cells found so far from one minimum, and the links that lead on, as a heap.
+  struct Piece {
+    int cells;
+    std::vector<Link> open;
+  };
+
   static bool lower(const Link& a, const Link& b);
   int root(int cell);
   void start_pieces(std::size_t minima);
+  void add_links(const Shell& shell, const Sphere& sphere, int facet, int cell, Piece& piece);
   void link_equal_places(const Sphere& sphere, const std::vector<Minimum>& minima);
-  void flood(const Shell& shell, const Sphere& sphere);
+  void flood(const Shell& shell, const Sphere& sphere, std::size_t minima);
+  int advance(const Shell& shell, const Sphere& sphere, int piece);
   void pair_minima(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
                    std::vector<Minimum>& minima);
-  int leader_of(int minimum);
   void show_as_one(std::vector<Minimum>& minima, int deeper, int shallower, bool flat,
                    Contact& saddle);
+  int leader_of(int minimum);
 
   FacetTable cells_;                   // the first of them hold the minima, in their order
   std::vector<int> parent_, deepest_;  // per cell; deepest_: minimum of its piece, or -1
-  std::vector<int> by_x_;
-  std::vector<Link> open_, tree_;
+  std::vector<Piece> pieces_;          // beside the minima, and as many more as were ever needed
+  std::vector<int> by_x_, active_;
+  std::vector<Link> tree_;
   std::vector<char> absorbed_;  // beside the minima and saddles
   std::vector<int> leader_;     // beside the minima: towards the one that it is shown with
 };

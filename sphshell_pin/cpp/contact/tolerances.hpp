@@ -39,6 +39,8 @@ constexpr int kMostHalvings = 5;
 // Parts of a side are no longer divided where the square of the distance varies by less than this
 // share: the depth is exact to half of it.
 constexpr double kLevelSide = 1e-14;
+// Round-off of the derivative's coefficients, as a share of distance times length.
+constexpr double kQuinticRoundOff = 4e-16;
 
 // A saddle no shallower than the shallower minimum, to this share of the radius, parts nothing.
 constexpr double kNoSaddle = 1e-13;

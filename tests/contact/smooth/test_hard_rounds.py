@@ -64,12 +64,12 @@ def assert_two_flanks(shell: Shell) -> None:
 
 
 def test_trough_narrower_than_the_sphere() -> None:
-    """Trough of a curvature radius below r; a contact on each flank, and the pass between them."""
+    """Trough of a curvature radius below r; a contact on each flank, and the saddle between them."""
     assert_two_flanks(given(graph(lambda x, y: x * x / 2, lambda x, y: (x, 0 * y), 1.5, 30)))
 
 
 def test_saddle_narrower_than_the_sphere() -> None:
-    """Saddle of a curvature radius below r; a contact on each rising flank, and the pass."""
+    """Saddle of a curvature radius below r; a contact on each rising flank, and the saddle."""
     height, slopes = lambda x, y: (x * x - y * y) / 2, lambda x, y: (x, -y)
     assert_two_flanks(given(graph(height, slopes, 1.5, 30)))
 
