@@ -21,7 +21,13 @@ from sphshell_pin.checks import (
 )
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.closest_points import ClosestPoints
-from sphshell_pin.shell.options import CREASE_ANGLE, SIDES, check_options, thread_count
+from sphshell_pin.shell.options import (
+    CREASE_ANGLE,
+    SIDES,
+    check_options,
+    check_size,
+    thread_count,
+)
 from sphshell_pin.shell.topology import Topology
 
 # Readers, writers, cleaning and tessellation load with the first shell that needs them: importing
@@ -253,6 +259,7 @@ class Shell(Topology):
         corners = self.vertices[in_use]
         self.box = read_only(np.stack([corners.min(axis=0), corners.max(axis=0)]))
         self.size = float(np.linalg.norm(self.box[1] - self.box[0]))
+        check_size(self.size)
         self.health: ShellHealth = surface.health.labelled(name=self.name, size=self.size)
         self.core = _core.Shell(
             self.vertices,
@@ -301,18 +308,23 @@ class Shell(Topology):
         number = Method.from_name(method)
         if gradient and number is Method.ELEMENTS:
             raise InvalidParameter("gradient", gradient, "is not known with method 'elements'")
-        found = self.core_for(method).contacts(centre, radius, int(number), bool(gradient))
-        point, normal, depth, element, feature, weight, turn = (read_only(c) for c in found)
-        return ContactSet(
-            point=point,
-            normal=normal,
-            depth=depth,
-            element=element,
-            patch=read_only(self.element_patch[element]),
-            feature=feature,
-            weight=weight,
-            turn=turn if gradient else None,
-        )
+        shown, terms = self.core_for(method).contacts(centre, radius, int(number), bool(gradient))
+
+        def contact_set(columns: Any, terms: ContactSet | None = None) -> ContactSet:
+            point, normal, depth, element, feature, weight, turn = (read_only(c) for c in columns)
+            return ContactSet(
+                point=point,
+                normal=normal,
+                depth=depth,
+                element=element,
+                patch=read_only(self.element_patch[element]),
+                feature=feature,
+                weight=weight,
+                turn=turn if gradient else None,
+                summed=terms,
+            )
+
+        return contact_set(shown, None if terms is None else contact_set(terms))
 
     def contacts_batch(
         self,

@@ -42,27 +42,36 @@ std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& tria
                                  crease_angle, static_cast<Side>(side), cad);
 }
 
-auto contacts(const Shell& shell, const Vec3& centre, double radius, int method, bool turns) {
-  Query query;
-  if (turns) query.want_turns();
-  query.find(shell, centre, radius, static_cast<Method>(method));
-  const std::size_t k = query.contacts.size();
-  std::vector<double> point, normal, depth, weight, turn;
+nb::tuple columns(const std::vector<Contact>& contacts, bool dn_dc) {
+  const std::size_t k = contacts.size();
+  std::vector<double> point, normal, depth, weight, slope;
   std::vector<int> element;
   std::vector<std::uint8_t> feature;
-  for (const Contact& c : query.contacts) {
+  for (const Contact& c : contacts) {
     append(point, c.point);
     append(normal, c.normal);
     depth.push_back(c.depth);
     element.push_back(c.element);
     feature.push_back(static_cast<std::uint8_t>(c.feature));
     weight.push_back(c.weight);
-    for (int k = 0; turns && k < 3; ++k) append(turn, c.turn.row(k));
+    for (int k = 0; dn_dc && k < 3; ++k) append(slope, c.dn_dc.row(k));
   }
   return nb::make_tuple(to_array(std::move(point), {k, 3}), to_array(std::move(normal), {k, 3}),
                         to_array(std::move(depth)), to_array(std::move(element)),
                         to_array(std::move(feature)), to_array(std::move(weight)),
-                        to_array(std::move(turn), {turns ? k : 0, 3, 3}));
+                        to_array(std::move(slope), {dn_dc ? k : 0, 3, 3}));
+}
+
+// The contacts as shown, and those that are summed, where these are more.
+nb::tuple contacts(const Shell& shell, const Vec3& centre, double radius, int method, bool dn_dc) {
+  Query query;
+  if (dn_dc) query.want_dn_dc();
+  std::vector<Contact> shown;
+  merge_places(query.find(shell, centre, radius, static_cast<Method>(method)), centre, radius,
+               shown);
+  const bool same = shown.size() == query.contacts.size();
+  return nb::make_tuple(columns(shown, dn_dc),
+                        same ? nb::object(nb::none()) : columns(query.contacts, dn_dc));
 }
 
 // Splits 0..n over threads; each writes only to its own rows, so results do not depend on threads.
@@ -87,9 +96,12 @@ auto contacts_batch(const Shell& shell, const Points& centres, const Doubles& ra
     nb::gil_scoped_release release;
     in_parallel(n, threads, [&](std::size_t begin, std::size_t end) {
       Query query;
+      std::vector<Contact> shown;
       for (std::size_t i = begin; i < end; ++i) {
-        for (const Contact& c :
-             query.find(shell, row(centres, i), radii(i), static_cast<Method>(method)))
+        const Vec3 centre = row(centres, i);
+        merge_places(query.find(shell, centre, radii(i), static_cast<Method>(method)), centre,
+                     radii(i), shown);
+        for (const Contact& c : shown)
           depth[i] = std::max(depth[i], c.depth), count[i] += c.weight > 0;
       }
     });

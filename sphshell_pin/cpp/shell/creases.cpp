@@ -26,8 +26,11 @@ constexpr double kRounded = 1.2e-7;
 constexpr double kBeyond = 0.3;
 // Normals closer than this [rad] are one.
 constexpr double kSameNormal = 1e-3;
+// A given normal is a mean of its elements' if it is nearer to one than this share of what they
+// lean.
+constexpr double kAveraged = 0.1;
 // Where joints turn this much [rad], no normals of a file make one surface of them.
-constexpr double kSurelySharp = M_PI / 3;
+constexpr double kSurelySharp = 1.2;
 // A wall ends in a fillet where its element bends by less than this share of the fillet's, and is
 // longer by this factor.
 constexpr double kWall = 0.1, kLonger = 2.5;
@@ -73,6 +76,7 @@ class Creases {
   static int opposite(int h) { return Fans::before(h); }
 
   void list_joints();
+  void find_witnesses(const Fans& fans);
   void start();
   Fans fans() const;
   void normals_of(const Fans& fans);
@@ -99,6 +103,7 @@ class Creases {
   std::vector<Vec3> original_, normals_;
   std::vector<int> original_count_;  // per corner: of its fan before it was divided
   std::vector<char> divided_;        // per corner
+  std::vector<char> witness_;        // per corner: its given normal is no mean of its elements'
   std::vector<Joint> joints_;        // per edge
   std::vector<int> edge_at_;         // beside Topology::neighbours
   std::vector<char> crease_;         // per edge, as all that follows
@@ -147,6 +152,7 @@ void Creases::start() {
   for (std::size_t c = 0; c < original_.size(); ++c)
     original_count_[c] = before.count(before.of(static_cast<int>(c)));
   if (!given_) return;
+  find_witnesses(before);
   // Averaged normals of a cube are those of a sphere: only the angle can tell. Where it is moderate
   // the normals stand, unless they were averaged over a sharper edge beside it.
   const auto sharpen = [&](double angle, auto&& also) {
@@ -165,6 +171,32 @@ void Creases::start() {
       const int h = joint.half_edge[0];
       return !whole(h) || !whole(Fans::after(h));
     });
+  }
+}
+
+// Normals that are no mean of the elements' say something that the elements do not.
+void Creases::find_witnesses(const Fans& fans) {
+  witness_.assign(original_.size(), 0);
+  const std::vector<Vec3>& facet_normal = shell_.topology().face_normal;
+  for (int f = 0; f < fans.size(); ++f) {
+    if (fans.count(f) == 0) continue;
+    const Vec3& normal = original_[*fans.begin(f)];
+    Vec3 alike = Vec3::Zero(), by_area = Vec3::Zero(), by_angle = Vec3::Zero();
+    double lean = 0;
+    for (const int* c = fans.begin(f); c != fans.end(f); ++c) {
+      const Vec3& p = points()[vertex(*c)];
+      const Vec3 a = points()[vertex(Fans::after(*c))] - p,
+                 b = points()[vertex(Fans::before(*c))] - p;
+      const Vec3& n = facet_normal[*c / 3];
+      const double area = a.cross(b).norm();
+      alike += n, by_area += area * n, by_angle += std::atan2(area, a.dot(b)) * n;
+      lean = std::max(lean, (normal - n).norm());
+    }
+    bool is_mean = false;
+    for (const Vec3& mean :
+         {alike, by_area, by_angle, max_normal(shell_, fans.begin(f), fans.end(f))})
+      is_mean = is_mean || (mean.normalized() - normal).norm() <= kAveraged * lean;
+    for (const int* c = fans.begin(f); c != fans.end(f); ++c) witness_[*c] = !is_mean;
   }
 }
 
@@ -215,7 +247,11 @@ Claim Creases::claim(const Fans& fans, int h) const {
   const double at_first = -normals_[o].dot(a), at_last = -normals_[o].dot(b);
   const double far_first = a.dot(along), far_last = b.dot(along);
   const double bend_first = normals_[i].dot(along), bend_last = normals_[j].dot(along);
-  const double rise = (at_first - bend_first * far_first + at_last - bend_last * far_last) / 2;
+  // The nearer end tells more: the other lies where a cone has become narrower, say.
+  const double weight_first = std::sqrt(b.norm()), weight_last = std::sqrt(a.norm());
+  const double rise = (weight_first * (at_first - bend_first * far_first) +
+                       weight_last * (at_last - bend_last * far_last)) /
+                      (weight_first + weight_last);
   const double along_side = (bend_last - bend_first) / length;
   const double across = 2 * (far_last * at_first - far_first * at_last) / length;
   Claim out;
@@ -325,7 +361,12 @@ void Creases::weigh_runs() {
                               [&](std::size_t e) { return total(e) >= kEnough; }),
                open.end());
   }
-  for (std::size_t e = 0; e < count; ++e) core_[e] = core_[e] && total(e) >= kEnough;
+  const auto is_borne_out = [&](std::size_t e) {
+    const auto [h, g] = joints_[e].half_edge;
+    return given_ && witness_[opposite(h)] && witness_[opposite(g)];
+  };
+  for (std::size_t e = 0; e < count; ++e)
+    core_[e] = core_[e] && (total(e) >= kEnough || is_borne_out(e));
 }
 
 // How many of the joints at a vertex lie along a direction: the sum of their squared cosines.

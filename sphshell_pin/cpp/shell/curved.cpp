@@ -251,6 +251,7 @@ CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exa
   lift_middles(shell);
   list_corners(shell);
   build_cones(shell);
+  bound_cells(shell);
 }
 
 Bending CurvedShell::bending(const Shell& shell, int triangle) const {
@@ -413,6 +414,14 @@ void CurvedShell::build_cones(const Shell& shell) {
       for (const Vec3& lift : side) largest = std::max(largest, lift.norm());
     facets_[f].bulge = largest * 8 / 9;
     bulge_ = std::max(bulge_, facets_[f].bulge);
+  }
+}
+
+void CurvedShell::bound_cells(const Shell& shell) {
+  cells_.assign(facets_.size(), CellBounds{});
+  for (std::size_t f = 0; f < facets_.size(); ++f) {
+    const Facet& facet = shell.facets()[f];
+    if (!facets_[f].flat) cells_[f] = bounds_of(facet, facets_[f].patch(facet), facets_[f].bulge);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "shell/cell_bounds.hpp"
 #include "shell/shell.hpp"
 
 namespace sphshell {
@@ -76,6 +77,7 @@ class CurvedShell {
 
   const LargeArray<CurvedFacet>& facets() const { return facets_; }  // in the order of the tree
   const LargeArray<NormalCone>& cones() const { return cones_; }
+  const LargeArray<CellBounds>& cells() const { return cells_; }
   double bulge() const { return bulge_; }  // the largest of them [m]
   // Tangents of the edges that leave vertex i, beside Topology::neighbours.
   const std::vector<Vec3>& tangents() const { return tangents_; }
@@ -89,7 +91,7 @@ class CurvedShell {
     return {&corners_[corner_begin_[vertex]], &corners_[corner_begin_[vertex + 1]]};
   }
   std::size_t bytes() const {
-    return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone)) +
+    return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone) + sizeof(CellBounds)) +
            (tangents_.size() + normals_.size()) * sizeof(Vec3) +
            (corners_.size() + corner_begin_.size()) * sizeof(int);
   }
@@ -100,12 +102,14 @@ class CurvedShell {
   void list_corners(const Shell& shell);
   int corner_beyond(const Shell& shell, int half_edge) const;
   void build_cones(const Shell& shell);
+  void bound_cells(const Shell& shell);
 
   std::vector<Vec3> normals_;
   std::vector<char> divided_;
   int creases_ = 0;
   LargeArray<CurvedFacet> facets_;
   LargeArray<NormalCone> cones_;
+  LargeArray<CellBounds> cells_;
   std::vector<Vec3> tangents_;
   std::vector<int> corner_begin_, corners_;
   double bulge_ = 0;
