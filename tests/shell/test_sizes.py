@@ -23,7 +23,7 @@ def wavy(scale: float) -> Shell:
 
 @pytest.mark.parametrize("exponent", [-46, -45, -38, -20, -13, 15, 20, 38, 39, 100])
 def test_sizes_out_of_range_are_refused(exponent: int) -> None:
-    with pytest.raises(InvalidShell, match=r"diagonal of .* m: it must be between 1e-12 and 1e\+15"):
+    with pytest.raises(InvalidShell, match=r"diagonal of .* m: it must be between 1e-12"):
         wavy(10.0**exponent)
 
 
