@@ -33,9 +33,9 @@ SUFFIXES = (".stl", ".obj", ".ply", ".off")
 
 LONG_WALKS = int(os.environ.get("SPHSHELL_WALKS", "1"))
 
-# The theorem of fixed cells links cells over sides that they share. Where elements pass through
-# each other, two pieces of the surface touch in a line that is no side: what the sphere holds of one
-# may come to be nearest where the other one is, and no link is there that takes as much.
+# The theorem of fixed cells links cells over the sides they share. Where elements pass through each
+# other, two pieces of the surface touch in a line that is no side: what the sphere holds of one may
+# come to be nearest where the other one is, and no link is there that takes as much.
 CROSSED = {
     "manifold_openscad-nonmanifold-crash.obj": "elements pass through each other: no side is there",
 }
