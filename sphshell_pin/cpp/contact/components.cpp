@@ -139,7 +139,7 @@ void Components::add_links(const Shell& shell, const Sphere& sphere, int f, int 
         std::clamp((sphere.centre - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
     const double distance = (facet.corner[k] + t * d - sphere.centre).norm();
     if (distance >= reach) continue;
-    // A side is seen from one of its facets, so that a place has one name.
+    // A side is seen from the first of its triangles, so that a place has one name.
     const auto link_to = [&](int h, int name) {
       open.push_back({reach - distance, LinkKind::Bound, cell, triangle_of(h), triangle_of(name),
                       side_of(name), 0, 0});
@@ -147,7 +147,8 @@ void Components::add_links(const Shell& shell, const Sphere& sphere, int f, int 
     };
     const int here = 3 * f + k;
     if (beyond >= 0) {
-      link_to(beyond, std::min(here, beyond));
+      const bool first = shell.triangle_of_facet(f) < shell.triangle_of_facet(triangle_of(beyond));
+      link_to(beyond, first ? here : beyond);
       continue;
     }
     const Topology& topology = shell.topology();

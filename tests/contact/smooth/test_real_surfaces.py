@@ -239,6 +239,8 @@ def roll(some: Spheres, i: int, rng: np.random.Generator, length: float, depth: 
             break
         normal = found.normal[0]
         along = along - along @ normal * normal
+        if np.linalg.norm(along) < 1e-6:
+            along = np.cross(normal, rng.normal(size=3))
         along /= np.linalg.norm(along)
         center = center + (found.depth[0] - depth * radius) * normal
         path.append(center)
