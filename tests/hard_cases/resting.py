@@ -120,7 +120,8 @@ def cone(half_angle: float, columns: int, rows: int, flat: bool) -> sp.Shell:
 def ring_depth(half_angle: float, columns: int, flat: bool, stiffness: float) -> float:
     """Return by how much the ball at rest overlaps the round cone, r - z sin a [m].
 
-    A ring of contact counts once: k depth sin a = m g. Of n flat facets the ball touches each, and
+    A ring of contact counts once: k depth sin a = m g, but for the sum of what the bent elements'
+    minima and the saddles between them differ by. Of n flat facets the ball touches each, and
     between them n passes, of which the highest n - 1 count:
     k (n depth_f sin f - (n - 1) depth sin a) = m g, where tan f = tan a cos(pi / n) is the facet's
     own angle.
@@ -163,17 +164,18 @@ def seated(
 def coned() -> list[Verdict]:
     verdicts = []
     for integrator in (sp.Implicit(), sp.LinearlyImplicitEuler(1e-3)):
-        for columns, flat, bound in ((64, True, 1e-6), (64, False, 2e-3)):
+        for columns, flat, bound in ((64, True, 1e-6), (64, False, 5e-3)):
             depth, right, up, _ = seated(integrator, columns, flat, free=False)
             surface = "flat facets" if flat else "columns of bent elements"
             tried = f"{type(integrator).__name__}, {columns} {surface}, on the axis"
             law = "64 contacts less 63 passes" if flat else "k depth sin a = m g"
             verdicts.append(compare("cone", tried, law, right, depth, bound))
             verdicts.append(compare("cone", tried, "forces up = m g", WEIGHT, up, 1e-6))
-    integrator = sp.LinearlyImplicitEuler(1e-3)
+    # Beside the axis the force jumps where links of the ring tie: the steps must resolve that.
+    integrator = sp.LinearlyImplicitEuler(1e-4)
     depth, right, _, aside = seated(integrator, 64, False, free=True)
     tried = f"{type(integrator).__name__}, 64 columns, free"
-    verdicts.append(compare("cone", tried, "k depth sin a = m g", right, depth, 2e-3))
+    verdicts.append(compare("cone", tried, "k depth sin a = m g", right, depth, 5e-3))
     verdicts.append(at_most("cone", tried, "stays on the axis, of the depth", aside / right, 0.05))
     return verdicts
 

@@ -146,6 +146,7 @@ class Scene {
   Multibody body_;
   std::vector<Pair> pairs_;
   std::vector<Query> queries_;
+  std::vector<Contact> merged_;
   std::vector<ContactTracker> trackers_;
   std::vector<PairState> states_;
   std::vector<Excursion> excursions_;

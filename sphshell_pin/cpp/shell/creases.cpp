@@ -2,119 +2,28 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
-#include "shell/fans.hpp"
+#include "shell/crease_search.hpp"
 
 namespace sphshell {
 namespace {
 
-// A joint of a curved surface turns by what the elements on its two sides, each by itself, have
-// turned when they reach it, but for this share; and its two sides bend alike within this factor.
-constexpr double kUneven = 0.3, kAlike = 5;
-// Helmholtz's principle (Desolneux, Moisan, Morel, Int. J. Computer Vision 40 (2000) 7): a run of
-// joints is a curved surface if joints that have nothing to do with each other would agree as well
-// in one of a thousand cases only. One joint agrees to the share s by chance with probability
-// kChance * s, and is worth no more than the least probability, so that a run has two at least.
-constexpr double kChance = 1.5, kLeastProbability = 0.01, kEnough = 7;  // of -log of the product
-constexpr int kLongestRun = 6;                                          // to either side
-// Coordinates are known to this share of the box at best: single precision.
-constexpr double kRounded = 1.2e-7;
-// A fan goes on beyond its corner where a side leads away from the opposite edge by this sine.
-constexpr double kBeyond = 0.3;
 // Normals closer than this [rad] are one.
 constexpr double kSameNormal = 1e-3;
-// A given normal is a mean of its elements' if it is nearer to one than this share of what they
-// lean.
-constexpr double kAveraged = 0.1;
 // Where joints turn this much [rad], no normals of a file make one surface of them.
 constexpr double kSurelySharp = 1.2;
 // A wall ends in a fillet where its element bends by less than this share of the fillet's, and is
 // longer by this factor.
 constexpr double kWall = 0.1, kLonger = 2.5;
 // A crease goes on along a joint in the same direction (cosine) that turns alike (factor).
-constexpr double kOnward = 0.85, kSameTurn = 1.3;
+constexpr float kOnward = 0.85f, kSameTurn = 1.3f;
 constexpr int kMostRounds = 40;
 
-// What an element says by itself about the surface where it reaches one of its sides.
-struct Claim {
-  float turn;       // from its plane to the side [rad], > 0 convex
-  float curvature;  // across the side [1/m]
-  float height;     // of the opposite corner over the side [m]
-  bool known;       // there are elements beyond the opposite corner to tell
-};
+}  // namespace
 
-struct Joint {
-  Vec3 direction;
-  int half_edge[2];  // none where < 0: an edge that is no joint of two elements wound alike
-  double angle;      // [rad], > 0 convex
-  bool exists() const { return half_edge[0] >= 0; }
-};
-
-// The side of a joint that bends more, of those that are known.
-int curved_side(const std::array<Claim, 2>& claims) {
-  const auto& [a, b] = claims;
-  return a.known && (!b.known || std::abs(a.curvature) >= std::abs(b.curvature)) ? 0 : 1;
-}
-
-class Creases {
- public:
-  Creases(const Shell& shell, std::vector<Vec3> normals, bool given)
-      : shell_(shell), given_(given), original_(std::move(normals)) {
-    list_joints();
-    start();
-  }
-
-  CornerNormals divide();
-
- private:
-  const std::vector<Vec3>& points() const { return shell_.vertices(); }
-  int vertex(int corner) const { return shell_.triangles()[corner / 3][corner % 3]; }
-  // The corner opposite a half-edge.
-  static int opposite(int h) { return Fans::before(h); }
-
-  void list_joints();
-  void find_witnesses(const Fans& fans);
-  void start();
-  Fans fans() const;
-  void normals_of(const Fans& fans);
-  Claim claim(const Fans& fans, int h) const;
-  bool reaches_beyond(const Fans& fans, int h) const;
-  void judge();
-  void weigh_runs();
-  double held(int vertex, const Vec3& direction, const std::vector<char>& joints) const;
-  bool add_creases();
-  template <class May>
-  void extend_lines(std::vector<int> ends, May&& may);
-  bool separate_walls();
-  void lean_as_other_ends(const Fans& fans);
-
-  template <class Visit>
-  void at_vertex(int vertex, Visit&& visit) const {
-    const Topology& topology = shell_.topology();
-    for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i)
-      visit(edge_at_[i]);
-  }
-
-  const Shell& shell_;
-  bool given_;
-  std::vector<Vec3> original_, normals_;
-  std::vector<int> original_count_;  // per corner: of its fan before it was divided
-  std::vector<char> divided_;        // per corner
-  std::vector<char> witness_;        // per corner: its given normal is no mean of its elements'
-  std::vector<Joint> joints_;        // per edge
-  std::vector<int> edge_at_;         // beside Topology::neighbours
-  std::vector<char> crease_;         // per edge, as all that follows
-  std::vector<char> explained_, alike_, core_, smooth_;
-  std::vector<double> off_;
-  std::vector<float> evidence_, most_;
-  std::vector<std::array<float, 2>> run_;  // evidence beyond either side
-  std::vector<std::array<Claim, 2>> claims_;
-};
-
-void Creases::list_joints() {
+void CreaseSearch::list_joints() {
   const Topology& topology = shell_.topology();
   const std::size_t count = topology.edges.size();
   joints_.resize(count);
@@ -125,8 +34,9 @@ void Creases::list_joints() {
     edge_at_[fill[edge.first_vertex]++] = static_cast<int>(e);
     edge_at_[fill[edge.last_vertex]++] = static_cast<int>(e);
     Joint& joint = joints_[e];
-    joint.direction = (points()[edge.last_vertex] - points()[edge.first_vertex]).normalized();
-    joint.angle = edge.angle;
+    joint.direction =
+        (points()[edge.last_vertex] - points()[edge.first_vertex]).normalized().cast<float>();
+    joint.angle = static_cast<float>(edge.angle);
     joint.half_edge[0] = joint.half_edge[1] = -1;
     if (edge.count != 2 || edge.on_rim()) continue;
     joint.half_edge[0] = topology.incidence[edge.begin];
@@ -135,7 +45,7 @@ void Creases::list_joints() {
 }
 
 // The fans that the normals come with, and the edges that are creases at any rate.
-void Creases::start() {
+void CreaseSearch::start() {
   const Topology& topology = shell_.topology();
   crease_.assign(joints_.size(), 1);
   const auto differ = [&](int i, int j) {
@@ -158,7 +68,7 @@ void Creases::start() {
   const auto sharpen = [&](double angle, auto&& also) {
     bool any = false;
     for (std::size_t e = 0; e < joints_.size(); ++e)
-      if (!crease_[e] && std::abs(joints_[e].angle) >= angle && also(joints_[e]))
+      if (!crease_[e] && std::abs(shell_.topology().edges[e].angle) >= angle && also(joints_[e]))
         crease_[e] = any = true;
     return any;
   };
@@ -174,33 +84,7 @@ void Creases::start() {
   }
 }
 
-// Normals that are no mean of the elements' say something that the elements do not.
-void Creases::find_witnesses(const Fans& fans) {
-  witness_.assign(original_.size(), 0);
-  const std::vector<Vec3>& facet_normal = shell_.topology().face_normal;
-  for (int f = 0; f < fans.size(); ++f) {
-    if (fans.count(f) == 0) continue;
-    const Vec3& normal = original_[*fans.begin(f)];
-    Vec3 alike = Vec3::Zero(), by_area = Vec3::Zero(), by_angle = Vec3::Zero();
-    double lean = 0;
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) {
-      const Vec3& p = points()[vertex(*c)];
-      const Vec3 a = points()[vertex(Fans::after(*c))] - p,
-                 b = points()[vertex(Fans::before(*c))] - p;
-      const Vec3& n = facet_normal[*c / 3];
-      const double area = a.cross(b).norm();
-      alike += n, by_area += area * n, by_angle += std::atan2(area, a.dot(b)) * n;
-      lean = std::max(lean, (normal - n).norm());
-    }
-    bool is_mean = false;
-    for (const Vec3& mean :
-         {alike, by_area, by_angle, max_normal(shell_, fans.begin(f), fans.end(f))})
-      is_mean = is_mean || (mean.normalized() - normal).norm() <= kAveraged * lean;
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) witness_[*c] = !is_mean;
-  }
-}
-
-Fans Creases::fans() const {
+Fans CreaseSearch::fans() const {
   return Fans(shell_, [&](const Edge& edge) {
     return !crease_[static_cast<std::size_t>(&edge - shell_.topology().edges.data())];
   });
@@ -208,7 +92,7 @@ Fans Creases::fans() const {
 
 // Fans that were divided have the normal of their own elements, and so have open fans beside them,
 // whose normals were fitted across what is a crease now.
-void Creases::normals_of(const Fans& fans) {
+void CreaseSearch::normals_of(const Fans& fans) {
   normals_ = original_;
   divided_.assign(original_.size(), 0);
   const int corners = static_cast<int>(original_.size());
@@ -234,174 +118,28 @@ void Creases::normals_of(const Fans& fans) {
   }
 }
 
-// The surface at a side, from the normal at the opposite corner, if each of the two chords from
-// there leans alike at both ends: exact where it is quadratic.
-Claim Creases::claim(const Fans& fans, int h) const {
-  const int i = h, j = Fans::after(h), o = opposite(h);
-  const Vec3 &p = points()[vertex(i)], &q = points()[vertex(j)], &r = points()[vertex(o)];
-  const Vec3 a = p - r, b = q - r;
-  Vec3 along = q - p;
-  const double length = along.norm();
-  along /= length;
-  const double height = a.cross(b).norm() / length;
-  const double at_first = -normals_[o].dot(a), at_last = -normals_[o].dot(b);
-  const double far_first = a.dot(along), far_last = b.dot(along);
-  const double bend_first = normals_[i].dot(along), bend_last = normals_[j].dot(along);
-  // The nearer end tells more: the other lies where a cone has become narrower, say.
-  const double weight_first = std::sqrt(b.norm()), weight_last = std::sqrt(a.norm());
-  const double rise = (weight_first * (at_first - bend_first * far_first) +
-                       weight_last * (at_last - bend_last * far_last)) /
-                      (weight_first + weight_last);
-  const double along_side = (bend_last - bend_first) / length;
-  const double across = 2 * (far_last * at_first - far_first * at_last) / length;
-  Claim out;
-  out.turn = static_cast<float>(std::asin(std::clamp(rise / height, -1.0, 1.0)));
-  out.curvature =
-      static_cast<float>((across + far_first * far_last * along_side) / (height * height));
-  out.height = static_cast<float>(height);
-  out.known = reaches_beyond(fans, h) || (given_ && !divided_[o]);
-  return out;
-}
-
-bool Creases::reaches_beyond(const Fans& fans, int h) const {
-  const int o = opposite(h), fan = fans.of(o);
-  const Vec3& r = points()[vertex(o)];
-  const Vec3 along = points()[vertex(Fans::after(h))] - points()[vertex(h)];
-  const Vec3 outward = along.cross(shell_.topology().face_normal[h / 3]);
-  const double least = kBeyond * kBeyond * outward.squaredNorm();
-  for (const int* c = fans.begin(fan); c != fans.end(fan); ++c)
-    for (int k : {Fans::after(*c), Fans::before(*c)}) {
-      const Vec3 d = points()[vertex(k)] - r;
-      const double away = -d.dot(outward);
-      if (away > 0 && away * away >= least * d.squaredNorm()) return true;
-    }
-  return false;
-}
-
-// Which joints the claims of their two sides explain, and what that is worth as evidence.
-void Creases::judge() {
-  const Fans now = fans();
-  normals_of(now);
-  const std::size_t count = joints_.size();
-  for (auto* list : {&explained_, &alike_, &core_, &smooth_}) list->assign(count, 0);
-  off_.assign(count, 0);
-  most_.assign(count, 0);
-  evidence_.assign(count, 0);
-  claims_.resize(count);
-  for (std::size_t e = 0; e < count; ++e) {
-    const Joint& joint = joints_[e];
-    if (crease_[e] || joint.angle == 0) continue;  // planar: nothing turns
-    const Claim a = claim(now, joint.half_edge[0]), b = claim(now, joint.half_edge[1]);
-    claims_[e] = {a, b};
-    const double most =
-        std::max({std::abs(joint.angle), double(std::abs(a.turn)), double(std::abs(b.turn))});
-    double rest = joint.angle - (a.known ? a.turn : 0) - (b.known ? b.turn : 0);
-    // A side of which nothing is known may be anything from flat to as curved as the other.
-    const double free = a.known == b.known ? 0
-                        : a.known          ? a.curvature * b.height
-                                           : b.curvature * a.height;
-    rest -= std::clamp(rest, std::min(free, 0.0), std::max(free, 0.0));
-    off_[e] = std::abs(rest);
-    most_[e] = static_cast<float>(most);
-    explained_[e] = (a.known || b.known) && off_[e] <= kUneven * most;
-    const double ca = std::abs(a.curvature), cb = std::abs(b.curvature);
-    alike_[e] = explained_[e] && a.known && b.known && a.curvature * b.curvature > 0 &&
-                std::max(ca, cb) <= kAlike * std::min(ca, cb);
-    core_[e] = alike_[e] && std::abs(joint.angle) >= most / 2;
-    if (!core_[e]) continue;
-    const double noise = kRounded * shell_.size() / std::min(a.height, b.height);
-    evidence_[e] = static_cast<float>(
-        -std::log(std::clamp(kChance * (off_[e] + noise) / most, kLeastProbability, 1.0)));
-  }
-  weigh_runs();
-  // At the end of a run one side alone tells.
-  for (std::size_t e = 0; e < count; ++e) {
-    if (crease_[e]) continue;
-    smooth_[e] = core_[e];
-    if (core_[e] || !explained_[e]) continue;
-    const int far = vertex(opposite(joints_[e].half_edge[curved_side(claims_[e])]));
-    smooth_[e] = held(far, joints_[e].direction, core_) >= 0.5;
-  }
-}
-
-// Adds up the evidence along runs of core joints, from joint to joint across the elements between.
-void Creases::weigh_runs() {
-  const std::size_t count = joints_.size();
-  run_.assign(count, {0, 0});
-  std::vector<std::array<float, 2>> next;
-  const auto total = [&](std::size_t e) { return evidence_[e] + run_[e][0] + run_[e][1]; };
-  const auto middle = [&](std::size_t e) -> Vec3 {
-    const Edge& edge = shell_.topology().edges[e];
-    return (points()[edge.first_vertex] + points()[edge.last_vertex]) / 2;
-  };
-  std::vector<std::size_t> open;  // joints that do not have enough yet
-  for (std::size_t e = 0; e < count; ++e)
-    if (core_[e]) open.push_back(e);
-  for (int step = 0; step < kLongestRun && !open.empty(); ++step) {
-    next.assign(open.size(), {0, 0});
-    for (std::size_t n = 0; n < open.size(); ++n) {
-      const std::size_t e = open[n];
-      const Vec3 here = middle(e);
-      for (int side = 0; side < 2; ++side) {
-        float& most = next[n][side];
-        at_vertex(vertex(opposite(joints_[e].half_edge[side])), [&](int other) {
-          if (!core_[other]) return;
-          const double cosine = joints_[e].direction.dot(joints_[other].direction);
-          if (cosine * cosine < 0.5) return;
-          // The side of the other joint that leads on, away from this one.
-          const int beyond = vertex(opposite(joints_[other].half_edge[1]));
-          const int back = vertex(opposite(joints_[other].half_edge[0]));
-          const bool second = (points()[beyond] - points()[back]).dot(middle(other) - here) > 0;
-          most = std::max(most, evidence_[other] + run_[other][second ? 1 : 0]);
-        });
-      }
-    }
-    for (std::size_t n = 0; n < open.size(); ++n) run_[open[n]] = next[n];
-    open.erase(std::remove_if(open.begin(), open.end(),
-                              [&](std::size_t e) { return total(e) >= kEnough; }),
-               open.end());
-  }
-  const auto is_borne_out = [&](std::size_t e) {
-    const auto [h, g] = joints_[e].half_edge;
-    return given_ && witness_[opposite(h)] && witness_[opposite(g)];
-  };
-  for (std::size_t e = 0; e < count; ++e)
-    core_[e] = core_[e] && (total(e) >= kEnough || is_borne_out(e));
-}
-
-// How many of the joints at a vertex lie along a direction: the sum of their squared cosines.
-double Creases::held(int vertex, const Vec3& direction, const std::vector<char>& joints) const {
-  double sum = 0;
-  at_vertex(vertex, [&](int e) {
-    if (!joints[e]) return;
-    const double cosine = joints_[e].direction.dot(direction);
-    sum += cosine * cosine;
-  });
-  return sum;
-}
-
 // The joints of one line are decided about together: a crease that ended inside a fan would not
 // divide it.
 template <class May>
-void Creases::extend_lines(std::vector<int> ends, May&& may) {
+void CreaseSearch::extend_lines(std::vector<int> ends, May&& may) {
   const auto& edges = shell_.topology().edges;
   while (!ends.empty()) {
     const int e = ends.back();
     ends.pop_back();
     for (int end : {edges[e].first_vertex, edges[e].last_vertex}) {
-      const Vec3 onward =
-          end == edges[e].last_vertex ? joints_[e].direction : Vec3(-joints_[e].direction);
+      const float sign = end == edges[e].last_vertex ? 1 : -1;
+      const Eigen::Vector3f onward = sign * joints_[e].direction;
       int next = -1;
-      double straightest = kOnward;
+      float straightest = kOnward;
       at_vertex(end, [&](int other) {
-        const Vec3& d = joints_[other].direction;
-        const double cosine = onward.dot(edges[other].first_vertex == end ? d : Vec3(-d));
+        const float cosine = (edges[other].first_vertex == end ? 1.0f : -1.0f) *
+                             onward.dot(joints_[other].direction);
         if (other == e || cosine < straightest) return;
         straightest = cosine;
         next = other;
       });
       if (next < 0 || crease_[next] || !may(next)) continue;
-      const double here = joints_[e].angle, there = joints_[next].angle;
+      const float here = joints_[e].angle, there = joints_[next].angle;
       if (here * there <= 0 || std::abs(here) > kSameTurn * std::abs(there) ||
           std::abs(there) > kSameTurn * std::abs(here))
         continue;
@@ -414,7 +152,7 @@ void Creases::extend_lines(std::vector<int> ends, May&& may) {
 // What is not smooth becomes a crease, unless its elements would bulge there by less than those
 // around do: the worst first, since it spoils what its neighbours claim. False where nothing is
 // left.
-bool Creases::add_creases() {
+bool CreaseSearch::add_creases() {
   const std::size_t count = joints_.size();
   const auto vertices_of = [&](std::size_t e) {
     const auto [h, g] = joints_[e].half_edge;
@@ -437,7 +175,7 @@ bool Creases::add_creases() {
     if (smooth_[e]) spread(e, std::abs(joints_[e].angle) * height(e));
   std::vector<std::pair<std::size_t, double>> doubtful;
   for (std::size_t e = 0; e < count; ++e) {
-    const double angle = std::abs(joints_[e].angle);
+    const float angle = std::abs(joints_[e].angle);
     if (crease_[e] || smooth_[e] || angle == 0) continue;
     // A crease can mend no more than the joint's own turn.
     const double harm = (explained_[e] ? angle : std::min(off_[e], angle)) * height(e);
@@ -455,7 +193,7 @@ bool Creases::add_creases() {
 }
 
 // Where a wall ends in a fillet each takes its own normal: they agree, and the wall stays straight.
-bool Creases::separate_walls() {
+bool CreaseSearch::separate_walls() {
   std::vector<int> added;
   for (std::size_t e = 0; e < joints_.size(); ++e) {
     if (crease_[e] || !smooth_[e] || core_[e] || alike_[e]) continue;
@@ -473,7 +211,7 @@ bool Creases::separate_walls() {
 
 // Divided fans lean along each side that leads across smooth joints as the side's other end does;
 // else as their own elements.
-void Creases::lean_as_other_ends(const Fans& fans) {
+void CreaseSearch::lean_as_other_ends(const Fans& fans) {
   const std::vector<Vec3> plain = normals_;
   for (int f = 0; f < fans.size(); ++f) {
     if (fans.count(f) == 0 || !divided_[*fans.begin(f)]) continue;
@@ -498,7 +236,7 @@ void Creases::lean_as_other_ends(const Fans& fans) {
   }
 }
 
-CornerNormals Creases::divide() {
+CornerNormals CreaseSearch::divide() {
   const auto before = std::count(crease_.begin(), crease_.end(), 1);
   for (int round = 0; round < kMostRounds; ++round) {
     judge();
@@ -515,10 +253,8 @@ CornerNormals Creases::divide() {
   return out;
 }
 
-}  // namespace
-
 CornerNormals divide_at_creases(const Shell& shell, std::vector<Vec3> normals, bool given) {
-  return Creases(shell, std::move(normals), given).divide();
+  return CreaseSearch(shell, std::move(normals), given).divide();
 }
 
 }  // namespace sphshell

@@ -1,0 +1,91 @@
+// Inside of creases.cpp and crease_evidence.cpp: what is known of every edge while creases are
+// sought.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <utility>
+#include <vector>
+
+#include "shell/creases.hpp"
+#include "shell/fans.hpp"
+
+namespace sphshell {
+
+// What an element says by itself about the surface where it reaches one of its sides.
+struct Claim {
+  float turn;       // from its plane to the side [rad], > 0 convex
+  float curvature;  // across the side [1/m]
+  float height;     // of the opposite corner over the side [m]
+  bool known;       // there are elements beyond the opposite corner to tell
+};
+
+// An edge. Single precision: there is one for every edge of the surface at a time.
+struct Joint {
+  Eigen::Vector3f direction;
+  int half_edge[2];  // none where < 0: an edge that is no joint of two elements wound alike
+  float angle;       // [rad], > 0 convex
+  bool exists() const { return half_edge[0] >= 0; }
+};
+
+// The side of a joint that bends more, of those that are known.
+inline int curved_side(const std::array<Claim, 2>& claims) {
+  const auto& [a, b] = claims;
+  return a.known && (!b.known || std::abs(a.curvature) >= std::abs(b.curvature)) ? 0 : 1;
+}
+
+class CreaseSearch {
+ public:
+  CreaseSearch(const Shell& shell, std::vector<Vec3> normals, bool given)
+      : shell_(shell), given_(given), original_(std::move(normals)) {
+    list_joints();
+    start();
+  }
+
+  CornerNormals divide();
+
+ private:
+  const std::vector<Vec3>& points() const { return shell_.vertices(); }
+  int vertex(int corner) const { return shell_.triangles()[corner / 3][corner % 3]; }
+  // The corner opposite a half-edge.
+  static int opposite(int h) { return Fans::before(h); }
+
+  void list_joints();
+  void find_witnesses(const Fans& fans);
+  void start();
+  Fans fans() const;
+  void normals_of(const Fans& fans);
+  Claim claim(const Fans& fans, int h) const;
+  bool reaches_beyond(const Fans& fans, int h) const;
+  void judge();
+  void weigh_runs();
+  float held(int vertex, const Eigen::Vector3f& direction, const std::vector<char>& joints) const;
+  bool add_creases();
+  template <class May>
+  void extend_lines(std::vector<int> ends, May&& may);
+  bool separate_walls();
+  void lean_as_other_ends(const Fans& fans);
+
+  template <class Visit>
+  void at_vertex(int vertex, Visit&& visit) const {
+    const Topology& topology = shell_.topology();
+    for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i)
+      visit(edge_at_[i]);
+  }
+
+  const Shell& shell_;
+  bool given_;
+  std::vector<Vec3> original_, normals_;
+  std::vector<int> original_count_;  // per corner: of its fan before it was divided
+  std::vector<char> divided_;        // per corner
+  std::vector<char> witness_;        // per corner: its given normal is no mean of its elements'
+  std::vector<Joint> joints_;        // per edge
+  std::vector<int> edge_at_;         // beside Topology::neighbours
+  std::vector<char> crease_;         // per edge, as all that follows
+  std::vector<char> explained_, alike_, core_, smooth_;
+  std::vector<float> off_, evidence_;
+  std::vector<std::array<float, 2>> run_;  // evidence beyond either side
+  std::vector<std::array<Claim, 2>> claims_;
+};
+
+}  // namespace sphshell
