@@ -99,8 +99,8 @@ class Shell(Topology):
         from sphshell_pin.shell.raw import raw_surface
 
         check_options(crease_angle, side)
-        raw = raw_surface(vertices, elements, normals)
-        surface = clean_surface(raw) if clean else take_surface(raw)
+        made = clean_surface if clean else take_surface
+        surface = made(raw_surface(vertices, elements, normals))
         self._set(surface, crease_angle, side, name, None, None)
 
     @classmethod
