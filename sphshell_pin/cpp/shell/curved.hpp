@@ -1,6 +1,7 @@
 // Curved elements over the triangles of a shell: cubic patches that meet the vertex normals.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "shell/shell.hpp"
@@ -37,18 +38,44 @@ struct CubicPatch {
   Vec3 inward(int k, double t) const;
 };
 
-// A cubic Bezier triangle, by what lifts its control points off those of the flat facet:
-// lift[k][0] and lift[k][1] at a third and two thirds of side k, middle at the centre.
-struct CurvedFacet {
-  Vec3 lift[3][2];
-  Vec3 middle;
-  double bulge;  // at most this far from the flat facet [m]
-  Owned owned;   // as Facet::owned, where coplanar neighbours may still be curved
-  bool flat;     // no lift: the exact flat facet
+// A cubic Bezier triangle, by what lifts its control points off those of the flat facet. The six of
+// the sides are kept as integers of 48 bits with a common exponent for each side: to 1e-14 of the
+// longest, which is round-off beside the facet. Both neighbours of a side keep the same numbers, so
+// the surface has no gaps.
+class CurvedFacet {
+ public:
+  double rise =
+      0;        // of the inner control point along the facet's normal, above that of a PN triangle
+  Owned owned;  // as Facet::owned, where coplanar neighbours may still be curved
+  float bulge;  // at most this far from the flat facet [m]
+  bool flat;    // no lift: the exact flat facet
+
+  // At a third (i = 0) and two thirds (1) of side k; and at the centre.
+  Vec3 lift(int k, int i) const;
+  Vec3 middle(const Facet& f) const;
+  void set_side(int k, const Vec3& first, const Vec3& last);
 
   CubicPatch patch(const Facet& f) const;
   // Side k as a curve from its corner at t = 0 to the next at t = 1.
   CubicCurve side(const Facet& f, int k) const;
+
+ private:
+  std::int16_t exponent_[3];
+  std::int16_t high_[3][6];
+  std::uint32_t low_[3][6];
+};
+
+// Tangents of the edges that leave a vertex, beside Topology::neighbours.
+class Tangents {
+ public:
+  Vec3 operator[](int i) const;
+
+ private:
+  friend class CurvedShell;
+  const LargeArray<Facet>* flat_ = nullptr;
+  const LargeArray<CurvedFacet>* curved_ = nullptr;
+  // 2 half-edge (3 facet + side) of the edge, + 1 if that comes towards the vertex.
+  LargeArray<int> spoke_;
 };
 
 struct Corners {
@@ -57,8 +84,23 @@ struct Corners {
   const int* end() const { return last; }
 };
 
+// Normals at triangle corners (3 triangle + k). Most corners of a vertex share one.
+class CornerNormals {
+ public:
+  CornerNormals() = default;
+  CornerNormals(const Shell& shell, const std::vector<Vec3>& normals);
+  const Vec3& operator[](int corner) const { return distinct_[which_[corner]]; }
+
+ private:
+  LargeArray<Vec3> distinct_;
+  LargeArray<int> which_;
+};
+
 class CurvedShell {
  public:
+  CurvedShell(const CurvedShell&) = delete;  // tangents_ refers to facets_
+  CurvedShell& operator=(const CurvedShell&) = delete;
+
   // normals: unit, per triangle corner (3 per triangle), wound like the triangles; empty:
   // estimated within smooth patches.
   CurvedShell(const Shell& shell, std::vector<Vec3> normals);
@@ -66,17 +108,14 @@ class CurvedShell {
   const LargeArray<CurvedFacet>& facets() const { return facets_; }  // in the order of the tree
   const LargeArray<NormalCone>& cones() const { return cones_; }
   double bulge() const { return bulge_; }  // the largest of them [m]
-  // Tangents of the edges that leave vertex i, beside Topology::neighbours.
-  const std::vector<Vec3>& tangents() const { return tangents_; }
-  const std::vector<Vec3>& normals() const { return normals_; }  // per corner, 3 triangle + k
+  const Tangents& tangents() const { return tangents_; }
   // The corners (3 facet + k) that meet at a vertex.
   Corners corners_of(int vertex) const {
     return {&corners_[corner_begin_[vertex]], &corners_[corner_begin_[vertex + 1]]};
   }
   std::size_t bytes() const {
     return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone)) +
-           (tangents_.size() + normals_.size()) * sizeof(Vec3) +
-           (corners_.size() + corner_begin_.size()) * sizeof(int);
+           (tangents_.spoke_.size() + corners_.size() + corner_begin_.size()) * sizeof(int);
   }
 
  private:
@@ -86,11 +125,11 @@ class CurvedShell {
   int corner_beyond(const Shell& shell, int half_edge) const;
   void build_cones(const Shell& shell);
 
-  std::vector<Vec3> normals_;
+  CornerNormals normals_;  // let go when the elements are bent
   LargeArray<CurvedFacet> facets_;
   LargeArray<NormalCone> cones_;
-  std::vector<Vec3> tangents_;
-  std::vector<int> corner_begin_, corners_;
+  Tangents tangents_;
+  LargeArray<int> corner_begin_, corners_;
   double bulge_ = 0;
 };
 
