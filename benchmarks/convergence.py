@@ -159,8 +159,8 @@ def relative_forces(shell: Shell, method: str, centres: Array) -> Array:
     """Return the forces (n, 3) of the law k depth^1.5, divided by the exact magnitude."""
     forces = np.empty((len(centres), 3))
     for i, centre in enumerate(centres):
-        found = shell.contacts(centre, RADIUS, method=method)
-        forces[i] = (found.depth / DEPTH) ** EXPONENT @ found.normal
+        terms = shell.contacts(centre, RADIUS, method=method).terms
+        forces[i] = (terms.weight * (terms.depth / DEPTH) ** EXPONENT) @ terms.normal
     return forces
 
 

@@ -199,6 +199,19 @@ def test_check_has_a_verdict_for_every_usable_file(tmp_path):
     assert "ok, with " in told.output.splitlines()[-1]
 
 
+def test_check_tells_how_far_curved_elements_stand_off(tmp_path):
+    path = tmp_path / "bent.obj"  # two triangles whose normals are those of a ball of radius 1
+    corners = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1)]
+    lines = ["v {} {} {}".format(*p) for p in corners] + ["vn {} {} {}".format(*p) for p in corners]
+    path.write_text("\n".join([*lines, "f 1//1 2//2 3//3", "f 2//2 1//1 4//4", ""]))
+    told = call("check", path, "--unit", "m")
+    assert told.exit_code == 0
+    assert "curved" in told.output
+    flat = "2 of 2 elements" not in told.output
+    # An octahedron's faces: 0.42 below the ball, 1.22 high; or flat, if the normals are set aside.
+    assert flat or "ok, with 1 thing to look at" in told.output.splitlines()[-1]
+
+
 def test_check_asks_for_the_unit_as_the_command_line_states_it(tmp_path):
     path = tmp_path / "triangle.obj"
     path.write_text("v 0 0 0\nv 30 0 0\nv 0 40 0\nf 1 2 3\n")

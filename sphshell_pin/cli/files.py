@@ -46,7 +46,7 @@ def check(
     body: BodyOption = None,
     face: FaceOption = None,
 ) -> None:
-    """Print the health of a surface file: what was found in it, and what was repaired.
+    """Print the health of a surface file: what was found, what was repaired, how far it is curved.
 
     Example: sphshell-pin check blade.stl --unit mm
     """
@@ -66,6 +66,7 @@ def check(
             )
         except UnitMissing as error:
             raise SphshellError(f"the unit {error.must('--unit {}')}") from error
+        shell.curvature_report()
         terminal().print(str(shell.health), markup=False, highlight=False)
 
 

@@ -45,6 +45,13 @@ def run(
     recording: Annotated[
         bool, typer.Option("--recording/--no-recording", help="Write recording.html.")
     ] = True,
+    audit_cad: Annotated[
+        bool,
+        typer.Option(
+            "--audit-cad",
+            help="Compare every contact with that on the exact faces of the CAD file.",
+        ),
+    ] = False,
     set_: SetOption = None,
 ) -> None:
     """Run a scenario and write its results folder.
@@ -67,6 +74,7 @@ def run(
                 built,
                 out,
                 recording=recording,
+                audit_cad=audit_cad,
                 progress=lambda fraction: bar.update(task, completed=fraction),
             )
         _print_report(report)
@@ -137,6 +145,22 @@ def _print_report(report: RunReport) -> None:
     )
     if energy["relative_residual"] > SUSPICIOUS_RESIDUAL:
         typer.echo("warning: the energy does not add up: reduce dt (see explain)", err=True)
+    if report.audit is not None:
+        audited = make_table(
+            "contact", "recorded", "on no face", "depth off", "rms", "normal off", "rms"
+        )
+        for one in report.audit.pairs:
+            audited.add_row(
+                plain(one.name),
+                f"{one.contacts}",
+                f"{one.unmatched}",
+                f"{one.depth_largest:.3g} m",
+                f"{one.depth_rms:.3g} m",
+                f"{one.normal_largest:.3g} rad",
+                f"{one.normal_rms:.3g} rad",
+            )
+        console.print("contacts beside those on the exact CAD faces, largest and rms difference")
+        console.print(audited)
     if report.verdicts:
         expected = make_table("figure", "expected", "measured", "verdict")
         for verdict in report.verdicts:

@@ -30,6 +30,13 @@ def view(
     open_: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page in the web browser.")
     ] = True,
+    color: Annotated[
+        str,
+        typer.Option(
+            help="Colours of the shells: surface, patches, or distance (of curved elements from "
+            "the flat ones)."
+        ),
+    ] = "surface",
     of: Annotated[
         str | None,
         typer.Option("--scenario", help="Scenario that a finished run is shown in."),
@@ -51,5 +58,6 @@ def view(
             host=host,
             port=port,
             open=open_,
+            color=color,  # type: ignore[arg-type]
             told=lambda url: typer.echo(f"{url}  (Ctrl-C ends the run)"),
         )

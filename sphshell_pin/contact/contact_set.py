@@ -45,11 +45,13 @@ class ContactSet:
     With k contacts: `point` (k, 3) on the shell [m]; `normal` (k, 3) unit, from the shell to the
     sphere's centre; `depth` (k,) > 0 [m]; `element` (k,) row of shell.elements (of an edge or a
     vertex, one of those that share it); `patch` (k,) smooth piece of the surface; `feature` (k,)
-    values of Feature; `weight` (k,) by which a contact's force counts: 1 (to 0.001 where
-    neighbours' contacts are nearly one and were merged), but -1 at a pass, a place
-    where contacts flow together (method "smooth" only, where the sphere reaches a concave crease
-    between them); `turn` (k, 3, 3), if asked for: derivative of weight * normal with respect to
-    the centre [1/m].
+    values of Feature; `weight` (k,) by which a contact's force counts: 1, but -1 at a saddle,
+    where two components of the surface inside the sphere merge (method "smooth" only, where the
+    sphere reaches a concave crease between them); `turn` (k, 3, 3), if asked for: derivative of
+    weight * normal with respect to the centre [1/m].
+
+    Minima that are nearly one, as beside the joint of two curved elements, are shown as one
+    contact. `terms` are the minima and saddles themselves: force and energy are their sums.
     """
 
     point: Array
@@ -60,6 +62,12 @@ class ContactSet:
     feature: NDArray[np.uint8]
     weight: Array
     turn: Array | None = None
+    summed: ContactSet | None = None
+
+    @property
+    def terms(self) -> ContactSet:
+        """The minima and saddles that are summed: the set itself, unless some are shown as one."""
+        return self if self.summed is None else self.summed
 
     def __len__(self) -> int:
         """Return the number of contacts."""
@@ -67,30 +75,30 @@ class ContactSet:
 
     def force(self, law: NormalLaw) -> Array:
         """Return the elastic push (3,) on the sphere [N], in the shell's frame: no damping."""
-        push = np.array([law.normal_force(depth) for depth in self.depth])
-        return np.asarray((self.weight * push) @ self.normal)
+        terms = self.terms
+        push = np.array([law.normal_force(depth) for depth in terms.depth])
+        return np.asarray((terms.weight * push) @ terms.normal)
 
     def energy(self, law: NormalLaw) -> float:
         """Return the elastic energy [J]: `force` is minus its gradient."""
-        stored = np.array([law.energy(depth) for depth in self.depth])
-        return float(np.where(self.weight > 0, 1.0, self.weight) @ stored)
+        terms = self.terms
+        return float(terms.weight @ np.array([law.energy(depth) for depth in terms.depth]))
 
     def force_gradient(self, law: NormalLaw) -> Array:
         """Return the derivative (3, 3) of `force` with respect to the sphere's centre [N/m].
 
         Of contacts that were found with gradient=True; it is symmetric. With n the normal, t the
-        turn and F the law's elastic force: the sum of F t - F' weight n n^T.
+        turn and F the law's elastic force: the sum over `terms` of F t - F' weight n n^T.
         """
-        if self.turn is None:
+        terms = self.terms
+        if terms.turn is None:
             raise InvalidParameter(
                 "contacts", self, "know no turn: ask for them with gradient=True"
             )
         total = np.zeros((3, 3))
         for depth, normal, weight, turn in zip(
-            self.depth, self.normal, self.weight, self.turn, strict=True
+            terms.depth, terms.normal, terms.weight, terms.turn, strict=True
         ):
-            # A merged contact's depth changes by |weight| along its normal, a pass's by one.
-            along = weight * min(abs(weight), 1.0)
             total += law.normal_force(depth) * turn
-            total -= law.normal_stiffness(depth) * along * np.outer(normal, normal)
+            total -= law.normal_stiffness(depth) * weight * np.outer(normal, normal)
         return total

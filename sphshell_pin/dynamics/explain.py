@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
@@ -93,7 +93,7 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     model = scene.model
     check_moved_mass(model)
     gravity = float(np.linalg.norm(model.gravity.linear))
-    pairs = explain_pairs(scene, q, v)
+    pairs = tuple(map(_with_curvature, scene.pairs, explain_pairs(scene, q, v)))
     warnings: list[str] = []
     for pair, figures in zip(scene.pairs, pairs, strict=True):
         warnings += _warnings_of(scene, pair, figures)
@@ -121,6 +121,14 @@ def explain_pairs(scene: Scene, q: Array, v: Array) -> tuple[PairExplanation, ..
     data, mass_matrix = _mass_at(scene, q, v)
     gravity = float(np.linalg.norm(scene.model.gravity.linear))
     return tuple(_explain_pair(scene, pair, data, mass_matrix, v, gravity) for pair in scene.pairs)
+
+
+def _with_curvature(pair: ContactPair, figures: PairExplanation) -> PairExplanation:
+    """Say how far the curved elements of a pair, if it has any, stand off the flat ones."""
+    if pair.shell is None or pair.method != "smooth":
+        return figures
+    said = [f"{label}: {text}" for label, text in pair.shell.curvature_report().rows()]
+    return replace(figures, modelled=(*figures.modelled, *said))
 
 
 def relaxation_time(pair: ContactPair, figures: PairExplanation) -> float:

@@ -91,7 +91,7 @@ class SceneContacts:
     keeps its number, which no other of its pair had or will have, while it moves over elements and
     smooth edges; at a single state it is the place in the list of its pair.
 
-    At a pass, where contacts flow together, `normal_force` is negative: the contacts push less
+    At a saddle, where contacts merge, `normal_force` is negative: the contacts push less
     than they would one by one.
     """
 

@@ -25,6 +25,8 @@ from sphshell_pin.errors import (
     SphshellError,
     WeakLawWarning,
 )
+from sphshell_pin.scenario.audit import CadAudit, check_audit
+from sphshell_pin.scenario.audit import audit_cad as compare_with_cad
 from sphshell_pin.scenario.build import Built, build
 from sphshell_pin.scenario.figures import Verdict, check_expectations, judge, measure_energy
 from sphshell_pin.scenario.reading import shipped_scenarios
@@ -60,6 +62,8 @@ class RunReport:
     verdicts: tuple[Verdict, ...]
     stopped: SphshellError | None
     """Why the run ended early: Interrupted or SimulationDiverged."""
+    audit: CadAudit | None = None
+    """What the contacts are off those on the exact CAD faces, if that was asked for."""
 
 
 def run_scenario(
@@ -68,6 +72,7 @@ def run_scenario(
     *,
     changes: Mapping[str, str] | None = None,
     recording: bool = True,
+    audit_cad: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> RunReport:
     """Build and run the scenario called `name` (shipped, or a path) and write its results folder.
@@ -75,7 +80,8 @@ def run_scenario(
     `out` is the folder, results/<name> by default; `changes` are values by dotted key. An
     interrupted or diverged run is written like any other, and `stopped` says so; where the folder
     has the results of a complete run, it is written to the subfolder `stopped`. Files take the
-    place of an earlier run's all at once, when all are made.
+    place of an earlier run's all at once, when all are made. With `audit_cad` each contact with a
+    CAD surface is compared with that on the exact faces (see `scenario.audit`).
 
     Raises
     ------
@@ -83,9 +89,11 @@ def run_scenario(
         The scenario cannot be built.
     ResultError
         The folder cannot be written; told before the run starts.
+    SphshellError
+        There is no CAD surface to audit.
     """
     built = build(name, changes)
-    return run_built(built, out, recording=recording, progress=progress)
+    return run_built(built, out, recording=recording, audit_cad=audit_cad, progress=progress)
 
 
 def run_built(
@@ -93,10 +101,13 @@ def run_built(
     out: str | PathLike[str] | None = None,
     *,
     recording: bool = True,
+    audit_cad: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> RunReport:
     """Run a scenario that is already built; see `run_scenario`."""
     check_expectations(built)
+    if audit_cad:
+        check_audit(built)
     folder, made = prepare_folder(Path("results") / built.name if out is None else out)
     try:
         result, stopped = simulate(built, progress)
@@ -106,7 +117,10 @@ def run_built(
             notes.append(f"the complete results of an earlier run stay in {folder}")
             folder, more = prepare_folder(folder / STOPPED)
             made = [*more, *made]
-        files = _write_all(built, result, folder, verdicts, stopped, notes, recording=recording)
+        audit = compare_with_cad(built, result) if audit_cad else None
+        files = _write_all(
+            built, result, folder, verdicts, stopped, notes, recording=recording, audit=audit
+        )
     except BaseException:
         # A start that was refused leaves no folder behind.
         with contextlib.suppress(OSError):
@@ -115,7 +129,7 @@ def run_built(
         raise
     if fault is not None:
         raise fault
-    return RunReport(built, result, folder, tuple(files), tuple(notes), verdicts, stopped)
+    return RunReport(built, result, folder, tuple(files), tuple(notes), verdicts, stopped, audit)
 
 
 def _judge(built: Built, result: Any) -> tuple[tuple[Verdict, ...], Exception | None]:
@@ -200,6 +214,7 @@ def _write_all(
     notes: list[str],
     *,
     recording: bool,
+    audit: CadAudit | None,
 ) -> list[Path]:
     """Make all files aside, then put them in place of an earlier run's; return their paths."""
     try:
@@ -208,8 +223,8 @@ def _write_all(
             desk.mkdir()
             attic.mkdir()
             result.save(desk / "run.npz", home=folder)
-            write_contacts(desk / "contacts.csv", result)
-            _write_summary(desk / "summary.json", built, result, verdicts, stopped)
+            write_contacts(desk / "contacts.csv", result, audit)
+            _write_summary(desk / "summary.json", built, result, verdicts, stopped, audit)
             files = [desk / name for name in ("run.npz", "contacts.csv", "summary.json")]
             files += _try_view(notes, "figures", lambda: _write_figures(result, desk, built))
             if recording:
@@ -279,9 +294,9 @@ def _write_recording(result: Any, desk: Path, built: Built) -> list[Path]:
     return [path]
 
 
-def write_contacts(path: str | PathLike[str], result: Any) -> None:
+def write_contacts(path: str | PathLike[str], result: Any, audit: CadAudit | None = None) -> None:
     """Write the contact log of `result` as comma-separated values, one row for each contact."""
-    columns = result.contact_columns()
+    columns = result.contact_columns() | ({} if audit is None else audit.columns())
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
@@ -294,6 +309,7 @@ def _write_summary(
     result: Any,
     verdicts: Iterable[Verdict],
     stopped: SphshellError | None,
+    audit: CadAudit | None,
 ) -> None:
     import coal
     import pinocchio as pin
@@ -311,6 +327,7 @@ def _write_summary(
             {"figure": v.figure, "expected": v.expected, "measured": v.measured, "met": v.met}
             for v in verdicts
         ],
+        **({} if audit is None else {"cad_audit": audit.figures()}),
         "versions": {
             "sphshell_pin": sphshell_pin.__version__,
             "pinocchio": pin.__version__,

@@ -54,6 +54,7 @@ class CleanedSurface:
     health : what was found and done
     element_face : (m,) row in `face_names` of the CAD face each element lies on, or None
     face_names : of the CAD faces
+    straight : (t, 3) sides that stay straight whatever the normals say, or None
     """
 
     vertices: Floats
@@ -65,6 +66,7 @@ class CleanedSurface:
     health: ShellHealth
     element_face: Ints | None = None
     face_names: tuple[str, ...] = ()
+    straight: Mask | None = None
 
     def moved(self, scale: float, rotation: Floats, translation: Floats) -> CleanedSurface:
         """Return the surface made larger, then turned by (3, 3), then moved by (3,) [m]."""

@@ -7,8 +7,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from sphshell_pin.shell.raw import Floats, Ints
+    from sphshell_pin.shell.raw import Floats, Ints, Longs
     from sphshell_pin.shell.shell import Shell
+
+
+def points_on(shell: Shell, rows: Longs, divisions: int) -> Floats:
+    """Points (n, k, 3) [m] of n triangles of `shell`, curved as the method "smooth" has them.
+
+    The k points of each are those of a grid that cuts each side into `divisions` pieces: corner 0
+    first, then by steps towards corner 2, by steps towards corner 1.
+    """
+    u, v = (np.array(_grid(divisions)) / divisions).T
+    return points_at(shell, rows, np.stack([1 - u - v, u, v], axis=1))
+
+
+def points_at(shell: Shell, rows: Longs, weights: Floats) -> Floats:
+    """Points (n, k, 3) [m] of n curved triangles at barycentric weights (k, 3)."""
+    w, u, v = weights.T
+    # Bernstein's polynomials of the control points that are lifted off the flat triangle.
+    sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
+    inner = np.stack([*sides, 6 * u * v * w])
+    corners, lifts = shell.vertices[shell.triangles[rows]], shell.core_for("smooth").lifts[rows]
+    points = np.einsum("kc,tcx->tkx", weights, corners) + np.einsum("bk,tbx->tkx", inner, lifts)
+    return np.asarray(points)
 
 
 def curved_mesh(shell: Shell, divisions: int = 4) -> tuple[Floats, Ints, Ints]:
@@ -18,23 +39,19 @@ def curved_mesh(shell: Shell, divisions: int = 4) -> tuple[Floats, Ints, Ints]:
     (t * divisions^2, 3) and the triangle (t * divisions^2,) of the shell each belongs to; points
     are not shared between triangles of the shell.
     """
-    n = divisions
-    lifts = shell.core_for("smooth").lifts
-    corners = shell.vertices[shell.triangles]
-    grid = [(i, j) for i in range(n + 1) for j in range(n + 1 - i)]
+    n, count = divisions, len(shell.triangles)
+    grid = _grid(n)
     number = {place: k for k, place in enumerate(grid)}
-    u, v = (np.array(grid) / n).T
-    w = 1 - u - v
-    weights = np.stack([w, u, v])
-    # Bernstein's polynomials of the control points that are lifted off the flat triangle.
-    sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
-    inner = np.stack([*sides, 6 * u * v * w])
-    points = np.einsum("ck,tcx->tkx", weights, corners) + np.einsum("bk,tbx->tkx", inner, lifts)
+    points = points_on(shell, np.arange(count), n)
     small = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in grid if i + j < n]
     small += [
         (number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]) for i, j in grid if i + j < n - 1
     ]
-    count = len(corners)
     triangles = np.arange(count)[:, None, None] * len(grid) + np.array(small)
     owner = np.repeat(np.arange(count), len(small)).astype(np.int32)
     return points.reshape(-1, 3), triangles.reshape(-1, 3).astype(np.int32), owner
+
+
+def _grid(divisions: int) -> list[tuple[int, int]]:
+    """Return the steps along u and v of the points of a grid on a triangle."""
+    return [(i, j) for i in range(divisions + 1) for j in range(divisions + 1 - i)]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sphshell_pin.shell.raw import Floats
+
+if TYPE_CHECKING:
+    from sphshell_pin.shell.curvature import CurvatureReport
 
 Place = tuple[float, float, float]
 
@@ -52,6 +55,7 @@ class ShellHealth:
         element's; not of unit length, made so; turned with their element
     opposing_normals, largest_normal_angle : more than 90 degrees off their element; the worst [rad]
     notes : what the reader of the file has to say
+    curvature : of the curved elements, once `Shell.curvature_report` has measured them
     """
 
     name: str = "shell"
@@ -106,6 +110,7 @@ class ShellHealth:
     opposing_normals: int = 0
     largest_normal_angle: float = 0.0
     notes: tuple[str, ...] = ()
+    curvature: CurvatureReport | None = None
 
     @property
     def is_closed(self) -> bool:
@@ -190,14 +195,14 @@ class ShellHealth:
             (
                 self.holes,
                 f"{_many(self.holes, 'hole')} in the surface, the largest of {self.hole_edges} "
-                f"open edges and {self.largest_hole_area:.3g} m^2 near {_at(self.hole_at)}: unless "
-                "it is meant, an element is missing or has a wrong number of corners",
+                f"open edges and {self.largest_hole_area:.3g} m^2 near {place_text(self.hole_at)}: "
+                "unless it is meant, an element is missing or has a wrong number of corners",
             ),
             (
                 self.non_manifold_edges,
                 f"{_many(self.non_manifold_edges, 'edge')} of three or more elements "
-                f"(non-manifold), one near {_at(self.non_manifold_at)}: inside and outside are not "
-                "defined there",
+                f"(non-manifold), one near {place_text(self.non_manifold_at)}: inside and outside "
+                "are not defined there",
             ),
             (
                 self.one_sided_components,
@@ -215,7 +220,8 @@ class ShellHealth:
                 f"(the worst by {_degrees(self.largest_normal_angle):.3g} degrees)",
             ),
         ]
-        return tuple(sentence for count, sentence in said if count)
+        found = tuple(sentence for count, sentence in said if count)
+        return found if self.curvature is None else (*found, *self.curvature.problems)
 
     def summary(self) -> str:
         """One line: what the surface is."""
@@ -256,6 +262,7 @@ class ShellHealth:
             ),
             ("worst shape", f"{self.worst_shape:.3g} (2 area / longest edge^2)"),
             ("normals", self._normals()),
+            *(() if self.curvature is None else self.curvature.rows()),
             *(("note", note) for note in self.notes),
             *(("repaired", sentence) for sentence in self.repairs),
             *(("look at", sentence) for sentence in self.problems),
@@ -287,6 +294,7 @@ class ShellHealth:
 
         return replace(
             self,
+            curvature=None,
             scale=self.scale * scale,
             size=self.size * scale,
             area=self.area * scale**2,
@@ -320,5 +328,6 @@ def _degrees(angle: float) -> float:
     return angle * 57.29577951308232
 
 
-def _at(place: Place | None) -> str:
+def place_text(place: Place | None) -> str:
+    """Return a place [m] as text."""
     return "an unknown place" if place is None else "({:.4g}, {:.4g}, {:.4g}) m".format(*place)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import InvalidParameter, InvalidShell, UnitMissing
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions, require_kernel
@@ -12,13 +13,18 @@ from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers import READERS, read_shl, reader_for
 from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
 
+if TYPE_CHECKING:
+    from sphshell_pin.shell.cad.surface import CadSurface
+
 Scale = str | float | None
 
 
 def load_surface(
     path: str | os.PathLike[str], unit: str | None, scale: Scale, cad: CadOptions
-) -> tuple[CleanedSurface, str, float]:
-    """Read and clean a surface file: in metres, the unit taken, metres per file unit.
+) -> tuple[CleanedSurface, str, float, CadSurface | None]:
+    """Read and clean a surface file.
+
+    Returns the surface in metres, the unit taken, metres per file unit, and of CAD the faces.
 
     Raises
     ------
@@ -35,16 +41,16 @@ def load_surface(
     MissingExtra
         If the library that reads CAD files is not installed.
     """
-    raw, taken, factor = _load_raw(path, unit, scale, cad)
+    raw, taken, factor, faces = _load_raw(path, unit, scale, cad)
     try:
-        return clean_surface(raw), taken, factor
+        return clean_surface(raw), taken, factor, faces
     except InvalidShell as error:
         raise InvalidShell(f"{path}: {error}") from error
 
 
 def _load_raw(
     path: str | os.PathLike[str], unit: str | None, scale: Scale, cad: CadOptions
-) -> tuple[RawSurface, str, float]:
+) -> tuple[RawSurface, str, float, CadSurface | None]:
     if unit is not None:
         metres_per_unit(unit)  # an unknown unit is said before a long file is read
     number = _check_scale(scale)
@@ -52,7 +58,7 @@ def _load_raw(
     if suffix not in CAD_SUFFIXES:
         cad.check_unused(suffix)
     if suffix == ".shl":
-        return _load_shl(file, unit, scale, number)
+        return *_load_shl(file, unit, scale, number), None
     if isinstance(scale, str):
         raise InvalidParameter("scale", scale, f"must be a number for {suffix} files (no SCALE)")
     notes = [] if number == 1.0 else [f"scaled by {number:.6g} as asked"]
@@ -60,14 +66,14 @@ def _load_raw(
         require_kernel(f"reading {suffix} files")
         from sphshell_pin.shell.cad.surface import read_cad
 
-        raw, taken, factor = read_cad(file, unit, cad)
-        return raw.scaled(number).noting(*notes), taken, factor * number
+        raw, faces = read_cad(file, unit, cad)
+        return raw.scaled(number).noting(*notes), faces.unit, faces.factor * number, faces
     raw = READERS[suffix](file)
     if unit is None:
         size = box_diagonal(raw.vertices[raw.corners.ravel()])
         raise UnitMissing(file, size, METRES_PER_UNIT)
     factor = metres_per_unit(unit) * number
-    return raw.scaled(factor).noting(*notes), unit, factor
+    return raw.scaled(factor).noting(*notes), unit, factor, None
 
 
 def _load_shl(

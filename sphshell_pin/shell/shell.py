@@ -21,7 +21,13 @@ from sphshell_pin.checks import (
 )
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.closest_points import ClosestPoints
-from sphshell_pin.shell.options import CREASE_ANGLE, SIDES, check_options, thread_count
+from sphshell_pin.shell.options import (
+    CREASE_ANGLE,
+    SIDES,
+    check_options,
+    check_size,
+    thread_count,
+)
 from sphshell_pin.shell.topology import Topology
 
 # Readers, writers, cleaning and tessellation load with the first shell that needs them: importing
@@ -29,8 +35,9 @@ from sphshell_pin.shell.topology import Topology
 if TYPE_CHECKING:
     from sphshell_pin.contact.contact_set import ContactSet
     from sphshell_pin.shell.cleaning import CleanedSurface
+    from sphshell_pin.shell.curvature import CurvatureReport
     from sphshell_pin.shell.health import ShellHealth
-    from sphshell_pin.shell.raw import Floats, Ints
+    from sphshell_pin.shell.raw import Floats, Ints, Mask
 
 
 class Shell(Topology):
@@ -62,6 +69,8 @@ class Shell(Topology):
         a face and across tangent joints edges are smooth, whatever the crease angle, unless that is
         0
     face_names : of the CAD faces
+    straight : (t, 3) sides kept straight whatever the normals say, as curved ones would leave the
+        exact CAD faces; or None
     box : (2, 3) lowest and highest corner [m]; size : its diagonal [m]
     health : ShellHealth; source : path of the file, or None; unit : its unit, or None
     core : the compiled surface that queries run on
@@ -82,6 +91,7 @@ class Shell(Topology):
     source_element: Ints
     element_face: Ints | None
     face_names: tuple[str, ...]
+    straight: Mask | None
     box: Floats
 
     def __init__(
@@ -132,8 +142,8 @@ class Shell(Topology):
         scale : of a .shl file: "apply" its SCALE (default where no unit is stated), "ignore" it
             (default otherwise), or a number to use instead; of other files a number by which the
             surface is made larger. `health` says which was used
-        chord_error : of CAD: largest distance between the flat elements and the exact surface [m],
-            1e-3 of the box diagonal unless given; `health` says what was measured
+        chord_error : of CAD: largest distance between the elements, flat or curved, and the exact
+            surface [m], 1e-3 of the box diagonal unless given; `health` says what was measured
         bodies : of CAD: names of the bodies to take; all unless given
         faces : of CAD: names of the faces to take, or their numbers in the file (from 1); all
             unless given
@@ -160,13 +170,21 @@ class Shell(Topology):
 
         check_options(crease_angle, side)
         options = CadOptions(chord_error, bodies, faces, sew)
-        surface, taken_unit, factor = load_surface(path, unit, scale, options)
+        surface, taken_unit, factor, cad = load_surface(path, unit, scale, options)
         found = surface.health.labelled(source=str(path), unit=taken_unit, scale=factor)
-        called = Path(path).stem if name is None else name
-        shell = cls.__new__(cls)
         surface = replace(surface, health=found)
-        shell._set(surface, crease_angle, side, called, str(path), taken_unit)
-        return shell
+        called = Path(path).stem if name is None else name
+
+        def make(of: CleanedSurface) -> Shell:
+            shell = cls.__new__(cls)
+            shell._set(of, crease_angle, side, called, str(path), taken_unit)
+            return shell
+
+        if cad is not None and crease_angle > 0.0:
+            from sphshell_pin.shell.cad.curved_error import hold_curvature
+
+            surface = hold_curvature(surface, cad, factor / cad.factor * cad.model.metres, make)
+        return make(surface)
 
     @classmethod
     def from_geometry(
@@ -237,12 +255,14 @@ class Shell(Topology):
         if surface.element_face is not None:
             self.element_face = read_only(np.ascontiguousarray(surface.element_face, np.int32))
         self.face_names = tuple(surface.face_names)
+        self.straight = None if surface.straight is None else read_only(surface.straight.copy())
         # Without cleaning there may be vertices no element uses.
         in_use = np.zeros(len(vertices), np.bool_)
         in_use[triangles] = True
         corners = vertices if in_use.all() else vertices[in_use]
         self.box = read_only(np.stack([corners.min(axis=0), corners.max(axis=0)]))
         self.size = float(np.linalg.norm(self.box[1] - self.box[0]))
+        check_size(self.size)
         self.health: ShellHealth = surface.health.labelled(name=self.name, size=self.size)
         self.core = _core.Shell(
             vertices,
@@ -295,18 +315,23 @@ class Shell(Topology):
         number = Method.from_name(method)
         if gradient and number is Method.ELEMENTS:
             raise InvalidParameter("gradient", gradient, "is not known with method 'elements'")
-        found = self.core_for(method).contacts(centre, radius, int(number), bool(gradient))
-        point, normal, depth, element, feature, weight, turn = (read_only(c) for c in found)
-        return ContactSet(
-            point=point,
-            normal=normal,
-            depth=depth,
-            element=element,
-            patch=read_only(self.element_patch[element]),
-            feature=feature,
-            weight=weight,
-            turn=turn if gradient else None,
-        )
+        shown, terms = self.core_for(method).contacts(centre, radius, int(number), bool(gradient))
+
+        def contact_set(columns: Any, terms: ContactSet | None = None) -> ContactSet:
+            point, normal, depth, element, feature, weight, turn = (read_only(c) for c in columns)
+            return ContactSet(
+                point=point,
+                normal=normal,
+                depth=depth,
+                element=element,
+                patch=read_only(self.element_patch[element]),
+                feature=feature,
+                weight=weight,
+                turn=turn if gradient else None,
+                summed=terms,
+            )
+
+        return contact_set(shown, None if terms is None else contact_set(terms))
 
     def contacts_batch(
         self,
@@ -349,9 +374,24 @@ class Shell(Topology):
         if method == "smooth":
             # With no smooth edges every element is flat, whatever normals came with it.
             given = self.normals if self.crease_angle > 0 else None
-            self.core.curve(None if given is None else given.reshape(-1, 3))
+            exact = self.element_face is not None  # CAD's own
+            straight = None if self.straight is None else self.straight.ravel().view(np.uint8)
+            self.core.curve(None if given is None else given.reshape(-1, 3), exact, straight)
         core: _core.Shell = self.core
         return core
+
+    def curvature_report(self) -> CurvatureReport:
+        """Return how far the curved elements stand off the flat ones, and which stayed flat.
+
+        It makes the curved elements, if no query has. `health` shows the report from then on.
+        """
+        from sphshell_pin.shell.curvature import curvature_report
+
+        report = self.health.curvature
+        if report is None:
+            report = curvature_report(self)
+            self.health = self.health.labelled(curvature=report)
+        return report
 
     def closest_points(
         self, points: npt.ArrayLike, threads: int | None = 1, method: str = "smooth"

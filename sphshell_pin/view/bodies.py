@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pinocchio as pin
 
+from sphshell_pin.view.distance import draw_distance
 from sphshell_pin.view.nodes import (
     line_segments,
     material,
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene import ContactPair
 
 SPHERE_COLOR = 0x2F6FDE
+
+COLORINGS = ("distance", "patches")
+"""Ways to colour a shell; of several that are on the first is seen."""
 
 ShellKey = tuple[int, int, bytes, bool]
 SphereKey = tuple[int, bytes, float]
@@ -51,7 +55,7 @@ class DrawnShell:
         self.node = visualizer[f"{index}_{node_name(shell.name)}"]
         self._curved = pair.method == "smooth"
         self._offset = pair.shell_placement
-        self._coloured = False
+        self._colorings: dict[str, bool] = {}
         draw_shell(self.node, shell, index, curved=self._curved)
         self._move = mover(self.node)
 
@@ -59,14 +63,28 @@ class DrawnShell:
         """Place it where forward kinematics left its joint in `data`."""
         self._move((data.oMi[self.joint] * self._offset).homogeneous)
 
-    def show_patches(self, on: bool) -> None:
-        """Give each patch a colour of its own; they are drawn when first asked for."""
-        if on and not self._coloured:
-            draw_patches(self.node, self.shell, curved=self._curved)
-            self._coloured = True
-        show(self.node["surface"], not on)
-        if self._coloured:
-            show(self.node["patches"], on)
+    @property
+    def largest_distance(self) -> float:
+        """The largest distance of its curved elements from the flat ones [m], 0 without any."""
+        return self.shell.curvature_report().largest if self._curved else 0.0
+
+    def show_coloring(self, part: str, on: bool, largest: float = 0.0) -> None:
+        """Show or hide one of COLORINGS; each is drawn when it is first asked for.
+
+        largest : distance of the last colour [m], of "distance"
+        """
+        if on and part not in self._colorings:
+            if part == "patches":
+                draw_patches(self.node, self.shell, curved=self._curved)
+            elif self._curved:
+                draw_distance(self.node, self.shell, largest)
+            else:
+                return
+        if on or part in self._colorings:
+            self._colorings[part] = on
+        seen = next((name for name in COLORINGS if self._colorings.get(name)), "surface")
+        for name in ("surface", *self._colorings):
+            show(self.node[name], name == seen)
 
 
 class DrawnSphere:

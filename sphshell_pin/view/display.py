@@ -10,6 +10,7 @@ import pinocchio as pin
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, ContactColumns
 from sphshell_pin.view.bodies import (
+    COLORINGS,
     DrawnShell,
     DrawnSphere,
     ShellKey,
@@ -18,6 +19,7 @@ from sphshell_pin.view.bodies import (
     sphere_key,
 )
 from sphshell_pin.view.camera import REACH, View, look, set_surroundings
+from sphshell_pin.view.distance import range_text
 from sphshell_pin.view.nodes import (
     FloatArray,
     material,
@@ -38,9 +40,9 @@ if TYPE_CHECKING:
 TRAIL_COLOR = 0x8E1B8E
 
 
-Part = Literal["robot", "spheres", "arrows", "points", "wireframe", "patches", "trails"]
+Part = Literal["robot", "spheres", "arrows", "points", "wireframe", "patches", "distance", "trails"]
 PARTS: tuple[Part, ...] = get_args(Part)
-"""What `Display.show` can show and hide; all but "patches" are shown at first."""
+"""What `Display.show` can show and hide; all but COLORINGS are shown at first."""
 
 
 class Display:
@@ -79,7 +81,7 @@ class Display:
             view = choose_view(scene, neutral[None, :], visual_model=visual_model)
         self.view = view
         self.arrow_scale = ArrowScale() if arrow_scale is None else arrow_scale
-        self._hidden: set[Part] = {"patches"}
+        self._hidden: set[Part] = {"patches", "distance"}
         self._shells: dict[ShellKey, DrawnShell] = {}
         self._spheres: dict[SphereKey, DrawnSphere] = {}
         self._draw_shells()
@@ -112,6 +114,21 @@ class Display:
     def data(self) -> pin.Data:
         """The joints' placements of the last `update`."""
         return self._data
+
+    @property
+    def largest_distance(self) -> float:
+        """The distance between curved and flat elements that has the last colour [m].
+
+        It is the largest of all shells.
+        """
+        return max((shell.largest_distance for shell in self._shells.values()), default=0.0)
+
+    @property
+    def coloring(self) -> str | None:
+        """What the colours of the shells mean, if they are those of "distance"."""
+        if "distance" in self._hidden:
+            return None
+        return range_text(self.largest_distance)
 
     @property
     def trail_width(self) -> float:
@@ -176,8 +193,8 @@ class Display:
                 self._show_of_shell(shell, part, on)
 
     def _show_of_shell(self, shell: DrawnShell, part: Part, on: bool) -> None:
-        if part == "patches":
-            shell.show_patches(on)
+        if part in COLORINGS:
+            shell.show_coloring(part, on, self.largest_distance if on else 0.0)
         else:
             show(shell.node["elements" if part == "wireframe" else "trail"], on)
 
@@ -190,8 +207,11 @@ class Display:
                 for part in ("wireframe", "trails"):
                     if part in self._hidden:
                         self._show_of_shell(drawn, part, False)
-                if "patches" not in self._hidden:
-                    drawn.show_patches(True)
+        colorings: tuple[Part, ...] = ("patches", "distance")
+        for coloring in colorings:
+            if coloring not in self._hidden:
+                for drawn in self._shells.values():
+                    self._show_of_shell(drawn, coloring, True)
 
     def _draw_spheres(self) -> None:
         self._spheres.clear()

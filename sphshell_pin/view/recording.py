@@ -23,6 +23,7 @@ from sphshell_pin.view.arrows import (
 from sphshell_pin.view.bodies import SPHERE_COLOR
 from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, spaced
 from sphshell_pin.view.display import TRAIL_COLOR, Display, choose_view
+from sphshell_pin.view.distance import RAMP, Coloring, check_coloring
 from sphshell_pin.view.nodes import FloatArray, require_meshcat
 from sphshell_pin.view.page import FilmWindow, render_page
 
@@ -48,6 +49,7 @@ def write_recording(
     speed: float = 1.0,
     title: str | None = None,
     arrows: ArrowKind = "components",
+    color: Coloring = "surface",
 ) -> Path:
     """Write `result` as one self-contained HTML file at `path`, and return the path.
 
@@ -63,6 +65,7 @@ def write_recording(
         speed=speed,
         title=title or Path(path).stem,
         arrows=arrows,
+        color=color,
     )
     return write_page(path, page)
 
@@ -76,6 +79,7 @@ def render_recording(
     speed: float = 1.0,
     title: str = "A finished run",
     arrows: ArrowKind = "components",
+    color: Coloring = "surface",
 ) -> str:
     """Return `result` as one self-contained HTML page.
 
@@ -84,11 +88,14 @@ def render_recording(
     frames are kept per second of the page, `speed` seconds of simulated time pass in one second of
     it. Each frame shows the recorded row nearest in time, or, where a touch begins and ends between
     two frames, that touch at its peak. `arrows` is "components" (normal and friction) or "total".
+    `color` says what the colours of the shells show: nothing ("surface"), the patches ("patches"),
+    or how far curved elements stand off the flat ones ("distance").
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
-    positive or a geometry model that does not fit.
+    positive, another `color`, or a geometry model that does not fit.
     """
     meshcat = require_meshcat()
+    check_coloring(color)
     for name, value in (("fps", fps), ("speed", speed)):
         if not (np.isfinite(value) and value > 0.0):
             raise InvalidParameter(name, value, "must be positive")
@@ -123,6 +130,8 @@ def render_recording(
         arrow_scale=scale,
         pool=min(most, MOST_ARROWS),
     )
+    if color != "surface":
+        display.show(color, True)
     for frame, row in enumerate(rows):
         window.frame = frame
         display.update(result.q[row], contacts.at(int(row)))
@@ -132,7 +141,7 @@ def render_recording(
     return render_page(
         window.commands(times),
         title,
-        _legend(scene, scale, arrows, shown, trailed),
+        _legend(scene, scale, arrows, shown, trailed) + _color_keys(display),
         {"start": float(result.t[0]), "speed": float(speed), "digits": _digits(speed, fps)},
     )
 
@@ -221,6 +230,12 @@ def _legend(
     if trailed:
         legend.append((_css(TRAIL_COLOR), "path on the shell"))
     return legend
+
+
+def _color_keys(display: Display) -> list[tuple[str, str]]:
+    """Return what the legend says of the colours of shells."""
+    meaning = display.coloring
+    return [] if meaning is None else [(f"linear-gradient(90deg, {', '.join(RAMP)})", meaning)]
 
 
 def _css(color: int) -> str:

@@ -78,15 +78,16 @@ def difference(a, b, radius: float) -> float:  # type: ignore[no-untyped-def]
 
 
 def force_sum(contacts, exponent: float = 1.5) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
-    """Sum of weight depth^exponent normal over the contacts (stiffness one)."""
-    push = contacts.weight * contacts.depth**exponent
-    return np.asarray((push[:, None] * contacts.normal).sum(axis=0))
+    """Sum of weight depth^exponent normal over the minima and saddles (stiffness one)."""
+    terms = contacts.terms
+    push = terms.weight * terms.depth**exponent
+    return np.asarray((push[:, None] * terms.normal).sum(axis=0))
 
 
 def energy(contacts, exponent: float = 1.5) -> float:  # type: ignore[no-untyped-def]
-    """Elastic potential of that force: a pass counts off, a merged contact is one."""
-    count = np.where(contacts.weight > 0, 1.0, contacts.weight)
-    return float((count * contacts.depth ** (exponent + 1)).sum() / (exponent + 1))
+    """Elastic potential of that force: a saddle counts off."""
+    terms = contacts.terms
+    return float((terms.weight * terms.depth ** (exponent + 1)).sum() / (exponent + 1))
 
 
 def shell_of(mesh: tuple[NDArray[np.float64], NDArray[np.int32]], **options: object) -> Shell:

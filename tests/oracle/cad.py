@@ -247,6 +247,45 @@ def deviation(shell: Shell, exact: ExactShape, samples: int, seed: int = 0) -> D
     )
 
 
+def curved_places(shell: Shell, count: int, seed: int = 0) -> dict[str, Array]:
+    """Points (n, 3) [m] of the curved elements: on border sides of faces, on other sides, inside.
+
+    Half of them where elements stand off the flat ones most, half anywhere; on sides at both
+    extremes of an S and in the middle.
+    """
+    corners = shell.vertices[shell.triangles]
+    face = np.asarray(shell.element_face)[shell.triangle_element]
+    ends = np.stack([shell.triangles, np.roll(shell.triangles, -1, axis=1)], axis=2)
+    keys = np.column_stack([np.sort(ends.reshape(-1, 2), axis=1), np.repeat(face, 3)])
+    _, number, owners = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    border = (owners[number.ravel()] == 1).reshape(-1, 3)
+    points = curved_mesh(shell, 24)[0].reshape(len(corners), -1, 3)
+    grid = [(i, j) for i in range(25) for j in range(25 - i)]
+    at = {place: k for k, place in enumerate(grid)}
+    along = (5, 12, 19)
+    sides = [
+        [at[i, 0] for i in along],
+        [at[24 - i, i] for i in along],
+        [at[0, 24 - i] for i in along],
+    ]
+    inside = [at[8, 8], at[4, 4], at[16, 4], at[4, 16]]
+    weights = np.array([[24 - i - j, i, j] for i, j in grid]) / 24
+    off = np.linalg.norm(points - np.einsum("kc,tcx->tkx", weights, corners), axis=2)
+    rng, found = np.random.default_rng(seed), {}
+    for name in ("border", "sides", "inside"):
+        if name == "inside":
+            rows, columns = np.indices((len(corners), len(inside))).reshape(2, -1)
+            columns = np.array(inside)[columns]
+        else:
+            triangle, side = np.nonzero(border if name == "border" else ~border)
+            rows, columns = triangle.repeat(3), np.array(sides)[side].ravel()
+        some = rng.choice(len(rows), min(count - count // 2, len(rows)), replace=False)
+        most = np.argsort(-off[rows, columns], kind="stable")[: count // 2]
+        pick = np.concatenate([most, some])
+        found[name] = points[rows[pick], columns[pick]]
+    return found
+
+
 def _parts(shape: Any, kind: Any) -> list[Any]:
     explorer, found = TopExp_Explorer(shape, kind), []
     while explorer.More():

@@ -26,6 +26,7 @@ from sphshell_pin.errors import (
 from sphshell_pin.scenario import build, judge, knobs_of, rebuild, shipped_scenarios
 from sphshell_pin.scenario.new import new_scenario
 from sphshell_pin.scenario.run import simulate
+from tests.shell.surfaces import surface_file
 
 SURFACES = next(iter(shipped_scenarios().values())).parent / "surfaces"
 BLADE, BOWL = SURFACES / "bladex_upper.stl", SURFACES / "bowl.shl"
@@ -102,9 +103,7 @@ def test_what_is_written_works(robot, surface, options, tmp_path):
 @pytest.mark.parametrize("robot", ["ball", "arm"])
 def test_a_cad_file_works_without_a_unit(robot, tmp_path):
     pytest.importorskip("OCP")
-    step = Path(__file__).parents[3] / "shared" / "data" / "trimesh_featuretype.STEP"
-    if not step.is_file():
-        pytest.skip("the corpus of CAD files is not here")
+    step = surface_file("trimesh_featuretype.STEP")
     name = arm_urdf(tmp_path) if robot == "arm" else robot
     built = new_scenario(name, step, radius=0.012, out=tmp_path / "a.toml").built
     result, stopped = simulate(built)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from tests.shell import cad_shapes as shapes
 
 Array = NDArray[np.float64]
 
-REAL_FOLDER = Path(__file__).parents[3] / "shared" / "data"
 REAL_FILES = {
     "gmsh_mesh_T106_V3.step": None,
     "gmsh_capot.brep": "mm",

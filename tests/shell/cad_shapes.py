@@ -9,6 +9,7 @@ import numpy as np
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakePolygon,
     BRepBuilderAPI_NurbsConvert,
     BRepBuilderAPI_Transform,
 )
@@ -18,6 +19,7 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeBox,
     BRepPrimAPI_MakeCone,
     BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakePrism,
     BRepPrimAPI_MakeSphere,
     BRepPrimAPI_MakeTorus,
 )
@@ -77,6 +79,22 @@ def drilled_plate() -> Any:
     axis = gp_Ax2(gp_Pnt(20.0, 20.0, -1.0), gp_Dir(0.0, 0.0, 1.0))
     hole = BRepPrimAPI_MakeCylinder(axis, 10.0, 7.0).Shape()
     return BRepAlgoAPI_Cut(box(40.0, 40.0, 5.0), hole).Shape()
+
+
+def bent_bar(turns: tuple[float, ...], length: float = 20.0) -> Any:
+    """A bar 5 mm wide whose upper side is made of planes that turn by few degrees each."""
+    x, y, angle = 0.0, 0.0, 0.0
+    outline = BRepBuilderAPI_MakePolygon()
+    outline.Add(gp_Pnt(x, y, 0.0))
+    for turn in (0.0, *turns):
+        angle += np.deg2rad(turn)
+        x, y = x + length * np.cos(angle), y + length * np.sin(angle)
+        outline.Add(gp_Pnt(x, y, 0.0))
+    for corner in ((x, -30.0), (0.0, -30.0)):
+        outline.Add(gp_Pnt(*corner, 0.0))
+    outline.Close()
+    base = BRepBuilderAPI_MakeFace(outline.Wire()).Face()
+    return BRepPrimAPI_MakePrism(base, gp_Vec(0.0, 0.0, 5.0)).Shape()
 
 
 def nurbs(shape: Any) -> Any:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from sphshell_pin.shell import CleanedSurface
 
-DATA = Path(__file__).parents[3] / "shared" / "data"
+DATA = Path(__file__).parents[1] / "data" / "corpus"
+"""Other people's surfaces whose licences allow a copy; README.md there has origins and licences."""
+
+MORE_DATA = Path(os.environ.get("SPHSHELL_SURFACES", Path(__file__).parents[3] / "shared" / "data"))
+"""Where further ones may be that are not in the repository: ../shared/data beside the clone."""
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 CUBE_QUADS = [
@@ -19,6 +25,14 @@ CUBE_QUADS = [
     [0, 2, 6, 4],
     [1, 5, 7, 3],
 ]
+
+
+def surface_file(name: str) -> Path:
+    """Return the path of other people's surface `name`, or skip the test that needs it."""
+    for folder in (DATA, MORE_DATA):
+        if (folder / name).is_file():
+            return folder / name
+    pytest.skip(f"{name} is not in the repository, for its licence, nor in {MORE_DATA}")
 
 
 def plate(n, height=0.0):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from functools import cache
 
 import numpy as np
@@ -12,17 +13,17 @@ pytest.importorskip("OCP")
 from sphshell_pin import Shell
 from sphshell_pin.shell.cad import require_kernel
 from sphshell_pin.shell.curved import curved_mesh
-from tests.oracle.cad import ExactShape, deviation
+from tests.oracle.cad import ExactShape, curved_places, deviation
 from tests.shell import cad_shapes as shapes
 from tests.shell.cad_cases import (
     KNOWN,
     REAL_FILES,
-    REAL_FOLDER,
     force_errors,
     order,
     rms,
     stated_and_measured,
 )
+from tests.shell.surfaces import surface_file
 
 
 @pytest.mark.parametrize("make", ["ball", "cone", "ring", "rounded_box", "drilled_plate", "roof"])
@@ -49,14 +50,12 @@ def real(name):
     require_kernel("this test")
     from sphshell_pin.shell.cad.reading import read_model
 
-    path = REAL_FOLDER / name
+    path = surface_file(name)
     return Shell.from_file(path, REAL_FILES[name]), ExactShape(read_model(path).shape)
 
 
 @pytest.mark.parametrize("name", REAL_FILES)
 def test_real_files_are_as_near_as_they_say(name):
-    if not (REAL_FOLDER / name).is_file():
-        pytest.skip(f"{name} is not here")
     shell, exact = real(name)
     stated, measured, held = stated_and_measured(shell)
     found = deviation(shell, exact, 20)
@@ -65,15 +64,45 @@ def test_real_files_are_as_near_as_they_say(name):
     assert found.back.max() <= 1.05 * measured
 
 
+@pytest.mark.parametrize("name", REAL_FILES)
+def test_curved_elements_of_real_files_are_as_near_as_stated(name):
+    shell, exact = real(name)
+    stated, _, _ = stated_and_measured(shell)
+    for where, points in curved_places(shell, 40).items():
+        if len(points):  # the sphere has no border
+            assert exact.closest(points).distances.max() <= stated, where
+
+
+@pytest.mark.parametrize("turns", [(0.9, 0.9, 0.9, 0.9), (0.9, -0.9, 0.9), (0.9,), (0.5, 0.7)])
+@pytest.mark.parametrize("scale", [1.0, 2.5])
+def test_long_elements_beside_nearly_tangent_joints(turns, scale, tmp_path):
+    """Joints of less than a degree are taken as tangent: the normals there are mean ones.
+
+    A long side that ends there would be bent off its plane, which the straight one is on.
+    """
+    shape = shapes.bent_bar(turns)
+    path = shapes.write_brep(tmp_path / "bar.brep", shape)
+    stated = 1e-5
+    shell = Shell.from_file(path, "mm", scale, chord_error=stated)
+    exact = ExactShape(shape, 1e-3 * scale)
+    for where, points in curved_places(shell, 60).items():
+        assert exact.closest(points).distances.max() <= stated * scale, where
+    (note,) = [note for note in shell.health.notes if note.startswith("curved elements")]
+    assert "held" in note
+    assert "not held" not in note
+    report = shell.curvature_report()
+    assert sum(count for _, count in report.flat_because) == report.flat > 0
+    # What was kept straight stays so in a copy.
+    again = pickle.loads(pickle.dumps(shell)).transformed(scale=2.0)
+    assert again.core_for("smooth").lifts == pytest.approx(2 * shell.core_for("smooth").lifts)
+
+
 def test_curved_elements_do_not_overshoot_at_narrow_bends():
     """This blade has bends of 12 degrees within a millimetre.
 
     A flat element may end in one and be near all along; curved to the normal there it is not.
     """
-    path = REAL_FOLDER / "bladex_upper.iges"
-    if not path.is_file():
-        pytest.skip(f"{path.name} is not here")
-    shell, exact = real(path.name)
+    shell, exact = real("bladex_upper.iges")
     points, _, _ = curved_mesh(shell, 2)
     corners = shell.vertices[shell.triangles]
     off = points.reshape(len(corners), -1, 3) - corners[:, :1]

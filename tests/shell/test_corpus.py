@@ -1,11 +1,14 @@
 """Real files that others wrote: what is known about each of them is found."""
 
+import hashlib
+import re
+
 import numpy as np
 import pytest
 
 from sphshell_pin.shell import Shell
 
-from .surfaces import DATA
+from .surfaces import DATA, surface_file
 
 # elements given, elements kept, open edges, non-manifold, without area, duplicates, components
 FILES = {
@@ -27,10 +30,27 @@ FILES = {
 
 
 def load(name):
-    path = DATA / name
-    if not path.exists():
-        pytest.skip(f"the corpus of other people's surfaces is absent: {path}")
-    return Shell.from_file(path, unit="mm")
+    return Shell.from_file(surface_file(name), unit="mm")
+
+
+def test_the_readme_of_the_files_is_true():
+    """Every file is listed with its sum and a licence that is there; nothing else is copied."""
+    text = (DATA / "README.md").read_text(encoding="utf-8")
+    entries = text.split("\n## ")[1:]
+    listed = {}
+    for entry in entries:
+        name, licence, total = (
+            re.search(pattern, entry)[1]
+            for pattern in (r"^(\S+)\n", r"- licence: `(\S+)`", r"- sha256: ([0-9a-f]{64})\b")
+        )
+        notice = (DATA / licence).read_text(encoding="utf-8")
+        assert any(line.startswith("Copyright ") for line in notice.splitlines()[:3])
+        listed[name] = total
+    there = [
+        p for p in DATA.iterdir() if p.is_file() and p.name not in ("README.md", ".gitattributes")
+    ]
+    assert listed == {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in there}
+    assert sum(p.stat().st_size for p in there) < 4e6
 
 
 @pytest.mark.parametrize("name", FILES)

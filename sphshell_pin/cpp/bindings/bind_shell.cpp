@@ -42,27 +42,36 @@ std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& tria
                                  crease_angle, static_cast<Side>(side), cad);
 }
 
-auto contacts(const Shell& shell, const Vec3& centre, double radius, int method, bool turns) {
-  Query query;
-  if (turns) query.want_turns();
-  query.find(shell, centre, radius, static_cast<Method>(method));
-  const std::size_t k = query.contacts.size();
-  std::vector<double> point, normal, depth, weight, turn;
+nb::tuple columns(const std::vector<Contact>& contacts, bool dn_dc) {
+  const std::size_t k = contacts.size();
+  std::vector<double> point, normal, depth, weight, slope;
   std::vector<int> element;
   std::vector<std::uint8_t> feature;
-  for (const Contact& c : query.contacts) {
+  for (const Contact& c : contacts) {
     append(point, c.point);
     append(normal, c.normal);
     depth.push_back(c.depth);
     element.push_back(c.element);
     feature.push_back(static_cast<std::uint8_t>(c.feature));
     weight.push_back(c.weight);
-    for (int k = 0; turns && k < 3; ++k) append(turn, c.turn.row(k));
+    for (int k = 0; dn_dc && k < 3; ++k) append(slope, c.dn_dc.row(k));
   }
   return nb::make_tuple(to_array(std::move(point), {k, 3}), to_array(std::move(normal), {k, 3}),
                         to_array(std::move(depth)), to_array(std::move(element)),
                         to_array(std::move(feature)), to_array(std::move(weight)),
-                        to_array(std::move(turn), {turns ? k : 0, 3, 3}));
+                        to_array(std::move(slope), {dn_dc ? k : 0, 3, 3}));
+}
+
+// The contacts as shown, and those that are summed, where these are more.
+nb::tuple contacts(const Shell& shell, const Vec3& centre, double radius, int method, bool dn_dc) {
+  Query query;
+  if (dn_dc) query.want_dn_dc();
+  std::vector<Contact> shown;
+  merge_places(query.find(shell, centre, radius, static_cast<Method>(method)), centre, radius,
+               shown);
+  const bool same = shown.size() == query.contacts.size();
+  return nb::make_tuple(columns(shown, dn_dc),
+                        same ? nb::object(nb::none()) : columns(query.contacts, dn_dc));
 }
 
 constexpr std::size_t kGrain = 64;  // fewer queries are not worth a thread
@@ -76,9 +85,12 @@ auto contacts_batch(const Shell& shell, const Points& centres, const Doubles& ra
     nb::gil_scoped_release release;
     in_parallel(n, threads, kGrain, [&](std::size_t begin, std::size_t end) {
       Query query;
+      std::vector<Contact> shown;
       for (std::size_t i = begin; i < end; ++i) {
-        for (const Contact& c :
-             query.find(shell, row(centres, i), radii(i), static_cast<Method>(method)))
+        const Vec3 centre = row(centres, i);
+        merge_places(query.find(shell, centre, radii(i), static_cast<Method>(method)), centre,
+                     radii(i), shown);
+        for (const Contact& c : shown)
           depth[i] = std::max(depth[i], c.depth), count[i] += c.weight > 0;
       }
     });
@@ -152,11 +164,15 @@ void bind_shell(nanobind::module_& m) {
            nb::arg("face").none() = nb::none(), nb::arg("normals").none() = nb::none())
       .def(
           "curve",
-          [](Shell& shell, std::optional<Points> normals) {
+          [](Shell& shell, std::optional<Points> normals, bool exact,
+             std::optional<Bytes> straight) {
+            std::vector<std::uint8_t> sides;
+            if (straight) sides.assign(straight->data(), straight->data() + straight->shape(0));
             // Under the GIL: two threads may ask for the first curved query at once.
-            shell.curve(normals ? rows(*normals) : std::vector<Vec3>());
+            shell.curve(normals ? rows(*normals) : std::vector<Vec3>(), exact, sides);
           },
-          nb::arg("normals").none())
+          nb::arg("normals").none(), nb::arg("exact") = false,
+          nb::arg("straight").none() = nb::none())
       .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"),
            nb::arg("gradient") = false)
       .def("contacts_batch", &contacts_batch, nb::arg("centers"), nb::arg("radii"),
@@ -215,6 +231,25 @@ void bind_shell(nanobind::module_& m) {
             return to_array(std::move(out), {n, 3, 3});
           },
           nb::rv_policy::automatic)
+      .def_prop_ro(
+          "bending",
+          [](const Shell& s) {
+            std::vector<std::uint8_t> out(s.curved() ? s.triangles().size() : 0);
+            for (std::size_t t = 0; t < out.size(); ++t)
+              out[t] = static_cast<std::uint8_t>(s.curved()->bending(s, static_cast<int>(t)));
+            return to_array(std::move(out));
+          },
+          nb::rv_policy::automatic)
+      .def_prop_ro(
+          "normals_set_aside",
+          [](const Shell& s) {
+            std::vector<std::uint8_t> out;
+            if (s.curved()) out.assign(s.curved()->divided().begin(), s.curved()->divided().end());
+            const std::size_t n = out.size() / 3;
+            return to_array(std::move(out), {n, 3});
+          },
+          nb::rv_policy::automatic)
+      .def_prop_ro("creases", [](const Shell& s) { return s.curved() ? s.curved()->creases() : 0; })
       .def_prop_ro("bytes", &Shell::bytes)
       .def_prop_ro(
           "element_patch", [](const Shell& s) { return to_array(s.topology().patch); },

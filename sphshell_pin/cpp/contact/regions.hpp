@@ -3,15 +3,9 @@
 
 #include <algorithm>
 
-#include "contact/query.hpp"
+#include "shell/shell.hpp"
 
 namespace sphshell {
-
-// Round-off of a coordinate test, as a share of shell size + radius. Regions overlap by this much,
-// so that no position falls between two of them; what is claimed twice is then told apart.
-constexpr double kTolerance = 1e-14;
-// Two minima of the distance closer than this share of the radius are one.
-constexpr double kSamePoint = 1e-10;
 
 // Position of the sphere's centre against side k of a facet, in the facet's plane.
 struct SideTest {
@@ -19,7 +13,7 @@ struct SideTest {
   bool not_within;               // outside it, round-off included
   bool before, after;            // past the side's first, second end (round-off included)
   bool past_first, past_second;  // ... by more than round-off
-  double t;                      // foot along the side, 0 to 1
+  double t;                      // closest point along the side, 0 to 1
 };
 
 inline SideTest test_side(const Facet& facet, int k, const Vec3& centre, double tolerance2) {
@@ -69,31 +63,6 @@ inline bool vertex_is_minimum(const Shell& shell, int vertex, const Vec3& centre
     if (along > 0 && along * along > tolerance * tolerance * edge.squaredNorm()) return false;
   }
   return true;
-}
-
-inline Vec3 direction(const Vec3& point, const Vec3& centre, const Vec3& if_equal) {
-  const Vec3 d = centre - point;
-  const double length = d.norm();
-  return length > 0 ? Vec3(d / length) : if_equal;
-}
-
-// The contact at a point of the shell; `outward`: there, where the centre is as good as at it.
-inline Contact contact_at(const Vec3& point, const Vec3& outward, const Vec3& centre, double radius,
-                          int element, Feature feature) {
-  const Vec3 from = centre - point;
-  const double distance = from.norm();
-  const Vec3 normal = distance > 1e-9 * radius ? Vec3(from / distance)
-                      : from.dot(outward) < 0  ? Vec3(-outward)
-                                               : outward;
-  return {point, normal, radius - distance, element, feature};
-}
-
-// How the normal turns with the centre, where the contact point follows it by `slide` (3, 3).
-inline Mat3 turn_of(const Contact& contact, double radius, const Mat3& slide) {
-  const double distance = radius - contact.depth;
-  if (!(distance > 0)) return Mat3::Zero();
-  const Vec3& n = contact.normal;
-  return (Mat3::Identity() - n * n.transpose() - slide) / distance;
 }
 
 }  // namespace sphshell

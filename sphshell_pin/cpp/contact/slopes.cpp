@@ -53,7 +53,7 @@ void add_turning(const ContactSite& site, const Mat3& normal_by_place,
                  const Eigen::RowVector3d& weight_by_place, ContactSlopes& out) {
   const Contact& contact = site.contact;
   const Vec3 spin = site.twist.tail<3>();
-  const Mat3 normal_rate_by_velocity = contact.turn / contact.weight;
+  const Mat3 normal_rate_by_velocity = contact.dn_dc / contact.weight;
   const Vec3 normal_rate =
       normal_rate_by_velocity * (site.twist.head<3>() + spin.cross(site.place));
   const Mat3 n = cross_matrix(contact.normal), by_velocity = n * normal_rate_by_velocity;
@@ -80,8 +80,8 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   Mat3 normal_by = Mat3::Zero(), point_by = Mat3::Zero();
   Eigen::RowVector3d depth_by = -n.transpose(), weight_by = Eigen::RowVector3d::Zero();
   if (site.follows) {
-    weight_by = n.transpose() * contact.turn;
-    normal_by = (contact.turn - n * weight_by) / weight;
+    weight_by = n.transpose() * contact.dn_dc;
+    normal_by = (contact.dn_dc - n * weight_by) / weight;
     depth_by *= std::abs(weight);
     point_by = Mat3::Identity() + n * depth_by - (site.radius - contact.depth) * normal_by;
   }

@@ -36,7 +36,7 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
     places_[i].taken = false;
     for (std::size_t j = 0; j < contacts.size(); ++j) {
       const Contact& c = contacts[j];
-      if (places_[i].pass != (c.weight < 0)) continue;
+      if (places_[i].saddle != (c.weight < 0)) continue;
       const double apart = (places_[i].point - c.point).norm();
       if (apart < std::max({places_[i].reach, disc(c, radius), moved}))
         links_.push_back({apart, static_cast<int>(i), static_cast<int>(j)});
@@ -74,7 +74,7 @@ void ContactTracker::keep_side(Contact& c, const Place& place, double radius) {
   if (c.rim || place.rim || (place.depth <= radius && !on_faces)) return;
   c.normal = -c.normal;
   c.depth = 2 * radius - c.depth;
-  c.turn = -c.turn;
+  c.dn_dc = -c.dn_dc;
   pushed_through_ = true;
 }
 

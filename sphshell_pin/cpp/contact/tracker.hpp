@@ -15,7 +15,7 @@ class ContactTracker {
   struct Place {
     Vec3 point, normal;  // the normal points where the sphere is pushed
     double depth, reach;
-    bool pass, rim;
+    bool saddle, rim;
     Feature feature;
     int number;
     bool taken = false;  // by a contact of the last match()

@@ -84,11 +84,11 @@ void Bristles::deal(std::size_t k, const std::vector<Contact>& contacts, const s
   }
   // Where a minimum and a pass meet and end, what was stretched in them goes to the next contact.
   for (int pass = 0; pass < known; ++pass) {
-    if (!places[pass].pass || places[pass].taken) continue;
+    if (!places[pass].saddle || places[pass].taken) continue;
     const int twin = nearest(
         places[pass].point, known,
         [&](std::size_t p) {
-          return !places[p].pass && !places[p].taken && !is_used(static_cast<int>(p));
+          return !places[p].saddle && !places[p].taken && !is_used(static_cast<int>(p));
         },
         point_of_place);
     const int heir = nearest(

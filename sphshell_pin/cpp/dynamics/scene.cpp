@@ -26,7 +26,7 @@ Scene::Scene(const pinocchio::Model& model, std::vector<Pair> pairs)
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
     if (pair.friction.has_state()) {
       bristles_.add(k);
-      if (turns_known(pair)) queries_[k].want_turns();
+      if (turns_known(pair)) queries_[k].want_dn_dc();
     }
     for (int j : {pair.joint_i, pair.joint_j})
       if (j > 0 && std::find(pushed_.begin(), pushed_.end(), j) == pushed_.end())
@@ -53,7 +53,7 @@ void Scene::restart() {
 
 void Scene::want_turns() {
   for (std::size_t k = 0; k < pairs_.size(); ++k)
-    if (turns_known(pairs_[k])) queries_[k].want_turns();
+    if (turns_known(pairs_[k])) queries_[k].want_dn_dc();
 }
 
 void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool numbered) {
@@ -202,7 +202,7 @@ Vec3 Scene::turning(const ActiveContact& active, const Vec3& stretch) const {
   const Vec3 centre_rate = state.world_from_j.rotation().transpose() *
                            relative_velocity(pair, state.world_from_j.act(state.centre));
   const Contact& contact = active.contact;
-  const Vec3 normal_rate = contact.turn * centre_rate / contact.weight;
+  const Vec3 normal_rate = contact.dn_dc * centre_rate / contact.weight;
   return contact.normal.cross(normal_rate).cross(stretch);
 }
 
@@ -221,7 +221,7 @@ void Scene::push(const ActiveContact& active) {
   if (f.normal == 0) ++state.clamped;
   state.depth = std::max(state.depth, m.depth);
   state.normal_force += weight * f.normal;
-  const double share = active.contact.energy_weight();
+  const double share = active.contact.weight;
   powers_.damping += weight * damping_power(f, m);
   powers_.friction += weight * friction_power(f, m);
   powers_.elastic += share * pair.law.energy(m.depth);
@@ -229,24 +229,38 @@ void Scene::push(const ActiveContact& active) {
     powers_.bristles += 0.5 * share * pair.friction.stiffness * f.bristle.squaredNorm();
 }
 
+// Contacts of one place as one, with the sum of their forces.
 void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows) {
   if (active_.empty()) return;
   if (!needs_velocity_) body_.kinematics(q, v);
-  for (const ActiveContact& active : active_) {
-    const Contact& contact = active.contact;
-    const Vec3 &point = active.point, &normal = active.meeting.normal;
-    const Vec3 friction = contact.weight * active.force.friction;
-    const Vec3 relative = relative_velocity(pairs_[active.pair], point);
+  for (std::size_t i = 0, begin = 0; i < active_.size(); ++i) {
+    const ActiveContact& active = active_[i];
+    if (i > 0 && active.pair != active_[i - 1].pair) begin = i;
+    const std::vector<Contact>& contacts = queries_[active.pair].contacts;
+    if (!leads(contacts, i - begin)) continue;
+    const Pair& pair = pairs_[active.pair];
+    const PairState& state = states_[active.pair];
+    const Contact whole = whole_of(contacts, i - begin, state.centre, pair.radius);
+    const Vec3 point = state.world_from_j.act(whole.point);
+    const Vec3 normal = state.world_from_j.rotation() * whole.normal;
+    Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      if (k != i - begin && (whole.place < 0 || contacts[k].place != whole.place)) continue;
+      const ActiveContact& other = active_[begin + k];
+      push += other.contact.weight * other.force.normal * other.meeting.normal;
+      friction += other.contact.weight * other.force.friction;
+    }
+    const Vec3 relative = relative_velocity(pair, point);
     const Vec3 slip = relative - relative.dot(normal) * normal;
     rows.push_back({double(active.pair),
                     {point.x(), point.y(), point.z()},
                     {normal.x(), normal.y(), normal.z()},
-                    active.meeting.depth,
-                    contact.weight * active.force.normal,
+                    whole.depth,
+                    push.dot(normal),
                     {friction.x(), friction.y(), friction.z()},
                     {slip.x(), slip.y(), slip.z()},
-                    double(contact.element),
-                    double(contact.feature),
+                    double(whole.element),
+                    double(whole.feature),
                     double(active.number)});
   }
 }

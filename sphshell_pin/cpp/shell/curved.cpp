@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <numeric>
 #include <utility>
 
+#include "shell/creases.hpp"
 #include "shell/free_memory.hpp"
 #include "shell/in_parallel.hpp"
 #include "shell/vertex_normals.hpp"
@@ -32,6 +31,7 @@ void add_distinct(std::vector<Vec3>& normals, const Vec3& n) {
 struct EdgeEnd {
   const std::vector<Vec3>& normals;
   Vec3 direction;
+  bool limited;  // a fan there was divided: no more lean than the other end bears out
 };
 
 // The unit vector nearest to the direction, forward along chord d, that is tangent to the planes of
@@ -46,6 +46,19 @@ bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
   out.normalize();
   if (out.dot(d) < 0) out = -out;
   return out.dot(d) >= kMostLean * d.norm();
+}
+
+// A cubic between tangents that lean by a and b from its chord has no inflection unless one leans
+// more than twice as much as the other. The unit tangent that leans no more than twice as much as
+// `other`.
+Vec3 limited_lean(const Vec3& tangent, const Vec3& other, const Vec3& forward) {
+  const auto lean_of = [&](const Vec3& t) {
+    return std::atan2(forward.cross(t).norm(), forward.dot(t));
+  };
+  const double most = 2 * lean_of(other);
+  if (lean_of(tangent) <= most) return tangent;
+  const Vec3 aside = (tangent - tangent.dot(forward) * forward).normalized();
+  return std::cos(most) * forward + std::sin(most) * aside;
 }
 
 // Lifts of the two control points of an edge with chord d, tangent to the planes of all normals at
@@ -65,6 +78,11 @@ std::array<Vec3, 2> lifts_of(const Vec3& d, const EdgeEnd& first, const EdgeEnd&
   if (std::min(at_first, at_last) <= 1e-9 * std::max(at_first, at_last)) return straight;
   Vec3 begin, end;
   if (!tangent_of(d, first, begin) || !tangent_of(d, last, end)) return straight;
+  if (first.limited || last.limited) {
+    const Vec3 forward = d / length, before = begin;
+    begin = limited_lean(begin, end, forward);
+    end = limited_lean(end, before, forward);
+  }
   const auto handle = [&](const Vec3& tangent) -> Vec3 {
     return 2 * length / (3 * (1 + tangent.dot(d) / length)) * tangent - d / 3;
   };
@@ -186,19 +204,7 @@ class Continuation {
 
 }  // namespace
 
-Vec3 CubicPatch::inward(int k, double t) const {
-  switch (k) {
-    case 0:
-      return along_v(t, 0) - t * along_u(t, 0);
-    case 1:
-      // From side 1 (w = 0) towards corner 0: minus u and v in proportion to where one stands.
-      return -((1 - t) * along_u(1 - t, t) + t * along_v(1 - t, t));
-    default:
-      return along_u(0, 1 - t) - (1 - t) * along_v(0, 1 - t);
-  }
-}
-
-CornerNormals::CornerNormals(const Shell& shell, const std::vector<Vec3>& normals)
+SharedNormals::SharedNormals(const Shell& shell, const std::vector<Vec3>& normals)
     : which_(normals.size()) {
   LargeArray<int> latest(shell.vertices().size(), -1);
   for (std::size_t c = 0; c < normals.size(); ++c) {
@@ -211,91 +217,36 @@ CornerNormals::CornerNormals(const Shell& shell, const std::vector<Vec3>& normal
   }
 }
 
-Vec3 CurvedFacet::lift(int k, int i) const {
-  // 2^exponent, by its bits: it is far from the ends of the range.
-  const std::uint64_t bits = static_cast<std::uint64_t>(exponent_[k] + 1023) << 52;
-  double unit;
-  std::memcpy(&unit, &bits, sizeof unit);
-  Vec3 out;
-  for (int axis = 0; axis < 3; ++axis) {
-    const int at = 3 * i + axis;
-    const std::int64_t number = std::int64_t(high_[k][at]) * (std::int64_t(1) << 32) + low_[k][at];
-    out[axis] = static_cast<double>(number) * unit;
+CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact,
+                         const std::vector<std::uint8_t>& straight) {
+  const bool given = !normals.empty();
+  if (!given) normals = estimate_normals(shell);
+  divided_.assign(normals.size(), 0);
+  if (!exact) {
+    CornerNormals found = divide_at_creases(shell, std::move(normals), given);
+    normals = std::move(found.normals);
+    divided_ = std::move(found.set_aside);
+    creases_ = found.creases;
   }
-  return out;
-}
-
-void CurvedFacet::set_side(int k, const Vec3& first, const Vec3& last) {
-  const double largest = std::max(first.cwiseAbs().maxCoeff(), last.cwiseAbs().maxCoeff());
-  int exponent = 0;
-  if (largest > 0) std::frexp(largest, &exponent);
-  exponent = std::max(exponent - 47, -1000);  // 47 bits and a sign; below, all is zero
-  exponent_[k] = static_cast<std::int16_t>(exponent);
-  constexpr std::int64_t kMost = (std::int64_t(1) << 47) - 1;
-  for (int at = 0; at < 6; ++at) {
-    const double lift = at < 3 ? first[at] : last[at - 3];
-    const std::int64_t number =
-        std::clamp<std::int64_t>(std::llround(std::ldexp(lift, -exponent)), -kMost, kMost);
-    high_[k][at] = static_cast<std::int16_t>(number >> 32);
-    low_[k][at] = static_cast<std::uint32_t>(number);
-  }
-}
-
-Vec3 CurvedFacet::middle(const Facet& f) const {
-  Vec3 sum = Vec3::Zero();
-  for (int i = 0; i < 6; ++i) sum += 0.25 * lift(i / 2, i % 2);
-  return sum + rise * f.normal;
-}
-
-// From Bernstein's polynomials to powers.
-CubicPatch CurvedFacet::patch(const Facet& f) const {
-  const Vec3 a = lift(0, 0), b = lift(0, 1);  // side 0, from corner 0 to 1
-  const Vec3 c = lift(1, 0), d = lift(1, 1);
-  const Vec3 e = lift(2, 1), g = lift(2, 0);  // side 2, seen from corner 0 as well
-  const Vec3 middle =
-      0.25 * a + 0.25 * b + 0.25 * c + 0.25 * d + 0.25 * g + 0.25 * e + rise * f.normal;
-  CubicPatch out;
-  out.c00 = f.corner[0];
-  out.c10 = f.corner[1] - f.corner[0] + 3 * a;
-  out.c01 = f.corner[2] - f.corner[0] + 3 * e;
-  out.c20 = 3 * b - 6 * a;
-  out.c02 = 3 * g - 6 * e;
-  out.c11 = 6 * (middle - a - e);
-  out.c30 = 3 * (a - b);
-  out.c03 = 3 * (e - g);
-  out.c21 = 3 * (2 * a - b + c + e - 2 * middle);
-  out.c12 = 3 * (2 * e - g + d + a - 2 * middle);
-  return out;
-}
-
-CubicCurve CurvedFacet::side(const Facet& f, int k) const {
-  const Vec3 a = lift(k, 0), b = lift(k, 1);
-  return {f.corner[k], f.corner[next_corner(k)] - f.corner[k] + 3 * a, 3 * b - 6 * a, 3 * (a - b)};
-}
-
-Vec3 Tangents::operator[](int i) const {
-  const int h = spoke_[i] / 2, f = triangle_of(h), k = side_of(h);
-  const Facet& facet = (*flat_)[f];
-  const CurvedFacet& curved = (*curved_)[f];
-  const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
-  if (spoke_[i] % 2 == 0) return d + 3 * curved.lift(k, 0);
-  return 3 * curved.lift(k, 1) - d;
-}
-
-CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals)
-    : normals_(shell, normals.empty() ? estimate_normals(shell) : normals) {
+  normals_ = SharedNormals(shell, normals);
   // A large part of what building takes at its highest.
   std::vector<Vec3>().swap(normals);
   give_back_freed_memory(shell.triangles().size());
-  bend_edges(shell);
+  bend_edges(shell, straight);
   lift_middles(shell);
   normals_ = {};
-  list_corners(shell);
   build_cones(shell);
+  bound_cells(shell);
+}
+
+Bending CurvedShell::bending(const Shell& shell, int triangle) const {
+  if (!facets_[triangle_of(shell.facet_half_edge(3 * triangle))].flat) return Bending::Curved;
+  const char* corner = &divided_[3 * triangle];
+  return corner[0] || corner[1] || corner[2] ? Bending::Crease : Bending::Planar;
 }
 
 // One curve per edge, from the normals of all facets that meet there, so that they share it.
-void CurvedShell::bend_edges(const Shell& shell) {
+void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight) {
   const Topology& topology = shell.topology();
   const std::vector<Triangle>& triangles = shell.triangles();
   const std::vector<Vec3>& p = shell.vertices();
@@ -309,6 +260,7 @@ void CurvedShell::bend_edges(const Shell& shell) {
   for (const Edge& edge : topology.edges) {
     first.clear();
     last.clear();
+    bool limited = false;
     const auto forward = [&](int h) {
       return triangles[triangle_of(h)][side_of(h)] == edge.first_vertex;
     };
@@ -318,11 +270,15 @@ void CurvedShell::bend_edges(const Shell& shell) {
       const Vec3& there = normals_[3 * triangle_of(h) + next_corner(side_of(h))];
       add_distinct(first, forward(h) ? here : there);
       add_distinct(last, forward(h) ? there : here);
+      limited = limited || divided_[h] || divided_[3 * triangle_of(h) + next_corner(side_of(h))];
     }
     const Vec3 d = p[edge.last_vertex] - p[edge.first_vertex];
     const bool border = edge.kind == EdgeClass::Boundary;
-    const std::array<Vec3, 2> lift = lifts_of(d, {first, border ? borders[edge.first_vertex] : d},
-                                              {last, border ? borders[edge.last_vertex] : d});
+    std::array<Vec3, 2> lift =
+        lifts_of(d, {first, border ? borders[edge.first_vertex] : d, limited},
+                 {last, border ? borders[edge.last_vertex] : d, limited});
+    for (int i = 0; i < edge.count && !straight.empty(); ++i)
+      if (straight[topology.incidence[edge.begin + i]]) lift = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 0; i < edge.count; ++i) {
       const int h = topology.incidence[edge.begin + i], g = shell.facet_half_edge(h);
       facets_[triangle_of(g)].set_side(side_of(g), lift[forward(h) ? 0 : 1],
@@ -381,18 +337,6 @@ int CurvedShell::corner_beyond(const Shell& shell, int h) const {
   return 3 * u + previous_corner(l);
 }
 
-void CurvedShell::list_corners(const Shell& shell) {
-  const std::vector<Triangle>& triangles = shell.triangles();
-  corner_begin_.assign(shell.vertices().size() + 1, 0);
-  for (const Triangle& t : triangles)
-    for (int v : t) ++corner_begin_[v + 1];
-  std::partial_sum(corner_begin_.begin(), corner_begin_.end(), corner_begin_.begin());
-  LargeArray<int> fill(corner_begin_.begin(), corner_begin_.end() - 1);
-  corners_.resize(3 * triangles.size());
-  for (std::size_t h = 0; h < corners_.size(); ++h)
-    corners_[fill[triangles[h / 3][h % 3]]++] = shell.facet_half_edge(static_cast<int>(h));
-}
-
 // Bounds from Bezier control points: the patch lies in their hull.
 void CurvedShell::build_cones(const Shell& shell) {
   const LargeArray<Facet>& flat = shell.facets();
@@ -437,6 +381,14 @@ void CurvedShell::build_cones(const Shell& shell) {
     facets_[f].bulge = static_cast<float>(largest * (8.0 / 9 + 1e-6));
   });
   for (const CurvedFacet& curved : facets_) bulge_ = std::max<double>(bulge_, curved.bulge);
+}
+
+void CurvedShell::bound_cells(const Shell& shell) {
+  cells_.assign(facets_.size(), CellBounds{});
+  for_each_in_parallel(facets_.size(), [&](std::size_t f) {
+    const Facet& facet = shell.facets()[f];
+    if (!facets_[f].flat) cells_[f] = bounds_of(facet, facets_[f].patch(facet), facets_[f].bulge);
+  });
 }
 
 }  // namespace sphshell

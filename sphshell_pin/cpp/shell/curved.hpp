@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "shell/cell_bounds.hpp"
 #include "shell/shell.hpp"
 
 namespace sphshell {
@@ -44,8 +45,7 @@ struct CubicPatch {
 // the surface has no gaps.
 class CurvedFacet {
  public:
-  double rise =
-      0;        // of the inner control point along the facet's normal, above that of a PN triangle
+  double rise;  // of the middle along the facet's normal, above that of a PN triangle [m]
   Owned owned;  // as Facet::owned, where coplanar neighbours may still be curved
   float bulge;  // at most this far from the flat facet [m]
   bool flat;    // no lift: the exact flat facet
@@ -78,17 +78,18 @@ class Tangents {
   LargeArray<int> spoke_;
 };
 
-struct Corners {
-  const int *first, *last;
-  const int* begin() const { return first; }
-  const int* end() const { return last; }
+// Whether an element is curved, or why it is not.
+enum class Bending : int {
+  Curved = 0,
+  Planar = 1,  // no normal at its corners leans
+  Crease = 2,  // the elements around do not bear witness to the bend that its normals had
 };
 
 // Normals at triangle corners (3 triangle + k). Most corners of a vertex share one.
-class CornerNormals {
+class SharedNormals {
  public:
-  CornerNormals() = default;
-  CornerNormals(const Shell& shell, const std::vector<Vec3>& normals);
+  SharedNormals() = default;
+  SharedNormals(const Shell& shell, const std::vector<Vec3>& normals);
   const Vec3& operator[](int corner) const { return distinct_[which_[corner]]; }
 
  private:
@@ -102,34 +103,40 @@ class CurvedShell {
   CurvedShell& operator=(const CurvedShell&) = delete;
 
   // normals: unit, per triangle corner (3 per triangle), wound like the triangles; empty:
-  // estimated within smooth patches.
-  CurvedShell(const Shell& shell, std::vector<Vec3> normals);
+  // estimated within smooth patches. exact: they are the surface's own and stand; others are
+  // divided where the elements around contradict them. straight: per half-edge (3 triangle + side)
+  // 1 for sides to stay straight whatever the normals; empty: none.
+  CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact,
+              const std::vector<std::uint8_t>& straight);
 
   const LargeArray<CurvedFacet>& facets() const { return facets_; }  // in the order of the tree
   const LargeArray<NormalCone>& cones() const { return cones_; }
+  const LargeArray<CellBounds>& cells() const { return cells_; }
   double bulge() const { return bulge_; }  // the largest of them [m]
   const Tangents& tangents() const { return tangents_; }
-  // The corners (3 facet + k) that meet at a vertex.
-  Corners corners_of(int vertex) const {
-    return {&corners_[corner_begin_[vertex]], &corners_[corner_begin_[vertex + 1]]};
-  }
+  // Per corner: its normal was set aside, as a crease that the elements show divides its fan.
+  const std::vector<char>& divided() const { return divided_; }
+  int creases() const { return creases_; }  // edges that became creases so
+  Bending bending(const Shell& shell, int triangle) const;
   std::size_t bytes() const {
-    return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone)) +
-           (tangents_.spoke_.size() + corners_.size() + corner_begin_.size()) * sizeof(int);
+    return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone) + sizeof(CellBounds)) +
+           tangents_.spoke_.size() * sizeof(int) + divided_.size();
   }
 
  private:
-  void bend_edges(const Shell& shell);
+  void bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight);
   void lift_middles(const Shell& shell);
-  void list_corners(const Shell& shell);
   int corner_beyond(const Shell& shell, int half_edge) const;
   void build_cones(const Shell& shell);
+  void bound_cells(const Shell& shell);
 
-  CornerNormals normals_;  // let go when the elements are bent
+  SharedNormals normals_;  // let go when the elements are bent
+  std::vector<char> divided_;
+  int creases_ = 0;
   LargeArray<CurvedFacet> facets_;
   LargeArray<NormalCone> cones_;
+  LargeArray<CellBounds> cells_;
   Tangents tangents_;
-  LargeArray<int> corner_begin_, corners_;
   double bulge_ = 0;
 };
 

@@ -181,9 +181,10 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
   return {at.point, normal, sign * distance, facet.element};
 }
 
-void Shell::curve(std::vector<Vec3> normals) {
+void Shell::curve(std::vector<Vec3> normals, bool exact,
+                  const std::vector<std::uint8_t>& straight) {
   if (curved_) return;
-  curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals));
+  curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals), exact, straight);
   give_back_freed_memory(triangles_.size());
 }
 

@@ -87,8 +87,9 @@ class Shell {
   // edges at the vertex; `tangents` (beside Topology::neighbours) replace the straight edges.
   double tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tangents = nullptr) const;
 
-  // Curved elements, made when first asked for: unit normals per triangle corner, or none.
-  void curve(std::vector<Vec3> normals);
+  // Curved elements, made when first asked for: unit normals per triangle corner, or none; exact:
+  // they are the surface's own; `straight` as of CurvedShell.
+  void curve(std::vector<Vec3> normals, bool exact, const std::vector<std::uint8_t>& straight = {});
   const CurvedShell* curved() const { return curved_.get(); }
 
   double size() const { return size_; }  // box diagonal [m]

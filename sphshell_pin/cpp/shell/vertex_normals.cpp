@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "shell/disjoint_sets.hpp"
+#include "shell/fans.hpp"
 
 namespace sphshell {
 namespace {
@@ -20,83 +20,6 @@ constexpr double kSmallTurn = 0.005, kLikely = 0.25;
 // Edges are long beyond this many times those that lead on from them: surely, and where no fit says
 // otherwise.
 constexpr double kFarLonger = 4, kLonger = 2.5;
-
-// Corners 3 triangle + k joined where they share a vertex and a smooth edge.
-DisjointSets fans_of(const Shell& shell) {
-  const std::vector<Triangle>& triangles = shell.triangles();
-  const Topology& topology = shell.topology();
-  DisjointSets fans(3 * triangles.size());
-  for (const Edge& edge : topology.edges) {
-    if (edge.count != 2 || !(edge.inner || edge.kind == EdgeClass::Smooth)) continue;
-    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
-    const int h0 = h, h1 = 3 * triangle_of(h) + next_corner(side_of(h));
-    const int g0 = g, g1 = 3 * triangle_of(g) + next_corner(side_of(g));
-    const auto vertex = [&](int c) { return triangles[c / 3][c % 3]; };
-    const bool opposed = vertex(h0) == vertex(g1);
-    fans.join(h0, opposed ? g1 : g0);
-    fans.join(h1, opposed ? g0 : g1);
-  }
-  return fans;
-}
-
-// The fans of a shell, each with its corners.
-class Fans {
- public:
-  explicit Fans(const Shell& shell) : shell_(shell), sets_(fans_of(shell)) {
-    const int corners = 3 * static_cast<int>(shell.triangles().size());
-    begin_.assign(corners + 1, 0);
-    root_.resize(corners);
-    for (int c = 0; c < corners; ++c) ++begin_[(root_[c] = sets_.find(c)) + 1];
-    for (int c = 0; c < corners; ++c) begin_[c + 1] += begin_[c];
-    std::vector<int> fill(begin_.begin(), begin_.end() - 1);
-    members_.resize(corners);
-    for (int c = 0; c < corners; ++c) members_[fill[root_[c]]++] = c;
-  }
-
-  int size() const { return static_cast<int>(root_.size()); }  // fans are numbered below this
-  const int* begin(int fan) const { return &members_[begin_[fan]]; }
-  const int* end(int fan) const { return &members_[begin_[fan + 1]]; }
-
-  // The vertices two edges or less from the fan's own, through triangles that smooth edges join
-  // and not past a sharp vertex.
-  void vertices_around(int fan, const std::vector<char>& sharp, std::vector<int>& out) const {
-    const int own = vertex(*begin(fan));
-    out.clear();
-    const auto add_triangles = [&](int f) {
-      for (const int* c = begin(f); c != end(f); ++c)
-        for (int k = 0; k < 3; ++k) out.push_back(vertex(*c / 3 * 3 + k));
-    };
-    for (const int* c = begin(fan); c != end(fan); ++c) {
-      const int t = *c / 3;
-      for (int k = 0; k < 3; ++k)
-        if (!sharp[root_[3 * t + k]]) add_triangles(root_[3 * t + k]);
-    }
-    std::sort(out.begin(), out.end());
-    out.erase(std::unique(out.begin(), out.end()), out.end());
-    out.erase(std::remove(out.begin(), out.end(), own), out.end());
-  }
-
-  int vertex(int corner) const { return shell_.triangles()[corner / 3][corner % 3]; }
-
- private:
-  const Shell& shell_;
-  DisjointSets sets_;
-  std::vector<int> begin_, root_, members_;
-};
-
-// Max, J. Graphics Tools 4 (1999) 1: exact where the vertices lie on a sphere.
-Vec3 max_normal(const Shell& shell, const int* begin, const int* end) {
-  Vec3 sum = Vec3::Zero();
-  for (const int* c = begin; c != end; ++c) {
-    const Triangle& t = shell.triangles()[*c / 3];
-    const int k = *c % 3;
-    const std::vector<Vec3>& p = shell.vertices();
-    const Vec3 a = p[t[next_corner(k)]] - p[t[k]], b = p[t[previous_corner(k)]] - p[t[k]];
-    const double weight = a.cross(b).norm() / (a.squaredNorm() * b.squaredNorm());
-    sum += weight * shell.topology().face_normal[*c / 3];
-  }
-  return sum.normalized();
-}
 
 // Where a long edge of a fan bends that goes on in short ones only, the normal is turned upright on
 // it. Max's would make a wall bulge that ends in a fillet; but a tessellation has long edges where
@@ -197,9 +120,23 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
 
 }  // namespace
 
+Vec3 max_normal(const Shell& shell, const int* begin, const int* end) {
+  Vec3 sum = Vec3::Zero();
+  for (const int* c = begin; c != end; ++c) {
+    const Triangle& t = shell.triangles()[*c / 3];
+    const int k = *c % 3;
+    const std::vector<Vec3>& p = shell.vertices();
+    const Vec3 a = p[t[next_corner(k)]] - p[t[k]], b = p[t[previous_corner(k)]] - p[t[k]];
+    const double weight = a.cross(b).norm() / (a.squaredNorm() * b.squaredNorm());
+    sum += weight * shell.topology().face_normal[*c / 3];
+  }
+  return sum.normalized();
+}
+
 std::vector<Vec3> estimate_normals(const Shell& shell) {
   const Topology& topology = shell.topology();
-  const Fans fans(shell);
+  const Fans fans(shell,
+                  [](const Edge& edge) { return edge.inner || edge.kind == EdgeClass::Smooth; });
   const int count = fans.size();
   std::vector<Vec3> normals(static_cast<std::size_t>(count));
   const auto set = [&](std::vector<Vec3>& to, int fan, const Vec3& normal) {

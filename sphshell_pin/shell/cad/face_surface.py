@@ -14,6 +14,9 @@ from sphshell_pin.shell.raw import Floats
 MOST_STEPS = 8
 """Of Newton's method towards a foot point; it starts next to it."""
 
+MOST_FOOT_STEPS = 40
+"""Of Newton's method towards a stationary point of the distance."""
+
 SINGULAR = 1e-10
 """Where |du x dv| is below this share of the largest |du| |dv|, a surface has no normal."""
 
@@ -62,6 +65,10 @@ class FaceSurface:
         Newton's steps go on while they are longer than `tolerance`: less changes the distance by
         far less, as the surface is nearly flat within it.
         """
+        if self.flat and len(points):
+            place, by_u, by_v = (row[0] for row in self.derivatives(uv[:1]))
+            upright = np.cross(by_u, by_v)
+            return np.asarray(np.abs((points - place) @ (upright / np.linalg.norm(upright))))
         distance = np.full(len(points), np.inf)
         at, left = uv.copy(), np.arange(len(points))
         for _ in range(MOST_STEPS):
@@ -84,6 +91,33 @@ class FaceSurface:
             if left.size == 0:
                 break
         return distance
+
+    def foot(self, point: Floats, uv: Floats, settled: float) -> Floats | None:
+        """Parameters (2,) at which the way to `point` (3,) is upright, next to `uv` (2,), or None.
+
+        A closest point or a saddle of the distance, without the trimming. Newton's method ends with
+        a step shorter than `settled`: what is left is about its square.
+        """
+        place, u, v, uu, vv, uv_ = gp_Pnt(), gp_Vec(), gp_Vec(), gp_Vec(), gp_Vec(), gp_Vec()
+        at = np.array(uv, np.float64)
+        for _ in range(MOST_FOOT_STEPS):
+            self._surface.D2(*at.tolist(), place, u, v, uu, vv, uv_)
+            offset, by_u, by_v = (np.array(one.Coord()) for one in (place, u, v))
+            offset -= point
+            bend_uu, bend_vv, bend_uv = (offset @ np.array(one.Coord()) for one in (uu, vv, uv_))
+            first = np.array([[by_u @ by_u, by_u @ by_v], [by_u @ by_v, by_v @ by_v]])
+            scale = first[0, 0] * first[1, 1]
+            if not np.linalg.det(first) > SINGULAR * scale:
+                return None
+            slope = np.array([offset @ by_u, offset @ by_v])
+            full = first + np.array([[bend_uu, bend_uv], [bend_uv, bend_vv]])
+            # At a centre of curvature all directions are alike: the tangent plane decides.
+            flat = abs(np.linalg.det(full)) <= 1e-6 * scale
+            step = -np.linalg.solve(first if flat else full, slope)
+            at = np.clip(at + step, self._lowest, self._highest)
+            if np.linalg.norm(step[0] * by_u + step[1] * by_v) <= settled:
+                return at
+        return None
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -87,7 +87,7 @@ class ExactSurface:
                 continue
             chosen = self._face[triangle] == face
             rows = mesh.triangles[self._row[triangle[chosen]]]
-            weights = _weights(mesh.points[rows], near[chosen] / metres)
+            weights = corner_weights(mesh.points[rows], near[chosen] / metres)
             uv = np.einsum("nk,nkx->nx", weights, mesh.parameters(rows))
             step = 1e-12 * self._cad.size
             found[chosen] = mesh.surface.distances(points[chosen] / metres, uv, step) * metres
@@ -119,7 +119,7 @@ def _areas(corners: Floats) -> Floats:
     return np.asarray(0.5 * np.linalg.norm(spans, axis=1))
 
 
-def _weights(corners: Floats, points: Floats) -> Floats:
+def corner_weights(corners: Floats, points: Floats) -> Floats:
     """Barycentric weights (n, 3) of points in the planes of their triangles (n, 3, 3)."""
     spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     square = np.maximum(np.einsum("nx,nx->n", spans, spans), np.finfo(float).tiny)

@@ -77,8 +77,14 @@ class CadSurface:
         )
 
 
-def read_cad(path: Path, unit: str | None, options: CadOptions) -> tuple[RawSurface, str, float]:
-    """Read and tessellate a CAD file: in metres, the unit taken, metres per file unit.
+def read_cad(path: Path, unit: str | None, options: CadOptions) -> tuple[RawSurface, CadSurface]:
+    """Read and tessellate a CAD file: its polygons in metres; see `load_cad` for the errors."""
+    surface = load_cad(path, unit, options)
+    return surface.polygons().noting(*surface.notes()), surface
+
+
+def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
+    """Read, sew and tessellate a CAD file.
 
     Raises
     ------
@@ -89,12 +95,6 @@ def read_cad(path: Path, unit: str | None, options: CadOptions) -> tuple[RawSurf
     InvalidParameter, NameNotFound
         If an option is out of range, or names a body or face that is not there.
     """
-    surface = load_cad(path, unit, options)
-    return surface.polygons().noting(*surface.notes()), surface.unit, surface.factor
-
-
-def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
-    """Read, sew and tessellate; see `read_cad` for the errors."""
     model = read_model(path).selected(options.bodies, options.faces)
     size = box_size(model.shape)
     held, taken, told = take_unit(path, model.unit, unit, size)

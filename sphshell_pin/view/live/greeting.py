@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from sphshell_pin.checks import check_finite
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import FRICTION_COLOR, NORMAL_COLOR
+from sphshell_pin.view.distance import RAMP
 from sphshell_pin.view.live.picture import CONE_COLOR
 from sphshell_pin.view.nodes import Json
 
@@ -49,5 +50,6 @@ def greeting(player: Player, picture: str | None) -> Json:
         "speeds": [SLOWEST, FASTEST],
         "window": STRIP_SECONDS,
         "picture": picture,
+        "ramp": list(RAMP),
         "colors": {name: f"#{color:06x}" for name, color in _COLORS.items()},
     }

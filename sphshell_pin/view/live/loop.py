@@ -407,4 +407,5 @@ class Live:
             "arrows": self.picture.magnification,
             "scale": str(self.picture.arrow_scale),
             "cut": self.picture.cut,
+            "coloring": self.picture.display.coloring,
         }

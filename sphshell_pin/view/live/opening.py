@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
+from sphshell_pin.view.distance import Coloring, check_coloring
 from sphshell_pin.view.live.greeting import check_speed
 from sphshell_pin.view.live.loop import Live
 
@@ -31,6 +32,7 @@ def preview(
     host: str = "127.0.0.1",
     port: int = 0,
     open: bool = True,
+    color: Coloring = "surface",
     told: Callable[[str], object] = print,
 ) -> None:
     """Show `what` in a live page until Ctrl-C.
@@ -55,15 +57,19 @@ def preview(
         Where the page is served; port 0 takes any that is free.
     open
         Open the page in the web browser, where there is a screen.
+    color
+        What the colours of the shells show: nothing ("surface"), the patches ("patches"), or how
+        far curved elements stand off the flat ones ("distance"). The page can change it.
     told
         Called with the page's address.
 
     Raises
     ------
     SphshellError
-        `what` cannot be built or read, or the port is taken.
+        `what` cannot be built or read, the port is taken, or `color` is none of these.
     """
     check_speed(speed)  # before anything is built
+    check_coloring(color)
     live = Live(
         player_of(what, changes=changes, scenario=scenario),
         visualizer,
@@ -73,6 +79,8 @@ def preview(
         running=not paused,
         wait=True,
     )
+    if color != "surface":
+        live.picture.show(color, True)
     try:
         told(live.url)
         if live.server.is_open:

@@ -22,9 +22,9 @@ def query(shell, center):
 
 def label(contacts):
     """What the contacts are with: a change of it is the passing of some border."""
-    merged = contacts.weight != 1
-    rows = zip(contacts.element, contacts.feature, merged, strict=True)
-    return sorted((int(e), int(f), bool(m)) for e, f, m in rows)
+    terms = contacts.terms
+    rows = zip(terms.element, terms.feature, terms.weight, strict=True)
+    return sorted((int(e), int(f), float(w)) for e, f, w in rows)
 
 
 def crossing(shell, start, end, width: float):

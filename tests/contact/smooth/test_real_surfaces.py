@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,10 +31,14 @@ COUNT = int(os.environ.get("SPHSHELL_SPHERES", "1500"))
 WALKS = COUNT // 10
 SUFFIXES = (".stl", ".obj", ".ply", ".off")
 
-# Not understood yet. In the first lot elements cross, overlap or fold over; in the second the
-# larger spheres lie on elements that bend far more than they do.
-CROSSED = "the potential of some spheres jumps, by up to the whole of a contact's"
-BENT = "the potential of some of the larger spheres jumps"
+LONG_WALKS = int(os.environ.get("SPHSHELL_WALKS", "1"))
+
+# The theorem of fixed cells links cells over sides that they share. Where elements pass through
+# each other, two pieces of the surface touch in a line that is no side: what the sphere holds of one
+# may come to be nearest where the other one is, and no link is there that takes as much.
+CROSSED = {
+    "manifold_openscad-nonmanifold-crash.obj": "elements pass through each other: no side is there",
+}
 
 
 def cases(known: dict[str, str]):
@@ -118,14 +124,12 @@ def faults(found: ContactSet, center: Array, radius: float) -> list[str]:
     feet = found.point + (radius - found.depth)[:, None] * found.normal
     if np.abs(feet - center).max(initial=0) > 1e-9 * radius:
         wrong.append("point")
-    # One, and nearly one where minima are merged; a pass joins a whole number of pieces.
-    whole = (found.weight < 0) & (found.weight == np.round(found.weight))
-    if not (whole | (np.abs(found.weight - 1.0) < 1e-2)).all():
+    if not np.isin(found.weight, (1.0, -1.0)).all():
         wrong.append("weight")
-    if len(found) and np.where(found.weight > 0, 1.0, found.weight).sum() < 1:
+    if len(found) and not found.weight.sum() == found.terms.weight.sum() >= 1:
         wrong.append("fewer than one piece")
     # The deepest piece counts in full.
-    if len(found) and not energy(found) > (1 - 1e-9) * found.depth.max() ** 2.5 / 2.5:
+    if len(found) and not energy(found) > (1 - 1e-9) * found.terms.depth.max() ** 2.5 / 2.5:
         wrong.append("potential")
     return wrong
 
@@ -168,7 +172,7 @@ def test_nothing_is_missed(name: str) -> None:
 def change(before: ContactSet, after: ContactSet, move: Array) -> tuple[float, float, float]:
     """Potential that the forces do not account for, potential, and largest force times move."""
     v0, v1, f0, f1 = energy(before), energy(after), force_sum(before), force_sum(after)
-    size = max(sum(abs(c.weight) * c.depth**1.5) for c in (before, after))
+    size = max(sum(c.terms.depth**1.5) for c in (before, after))
     return abs(v1 - v0 + (f0 + f1) @ move / 2), max(v0, v1), size * float(np.linalg.norm(move))
 
 
@@ -178,14 +182,7 @@ def jump(before: ContactSet, after: ContactSet, move: Array) -> float:
     return max(lost - most, 0.0) / potential if potential > 0 else 0.0
 
 
-BESIDE = {
-    "trimesh_featuretype.STL": CROSSED,
-    "trimesh_joined_tetrahedra.obj": CROSSED,
-    "manifold_openscad-nonmanifold-crash.obj": CROSSED,
-}
-
-
-@pytest.mark.parametrize("name", cases(BESIDE))
+@pytest.mark.parametrize("name", cases(CROSSED))
 def test_potential_beside_each_sphere(name: str) -> None:
     """A centre 1e-9 r further has the same potential; many stand exactly over sides and corners."""
     some, rng, jumps = spheres(name), np.random.default_rng(1), {}
@@ -198,14 +195,17 @@ def test_potential_beside_each_sphere(name: str) -> None:
     assert not jumps
 
 
-def steepest(some: Spheres, i: int, move: Array) -> tuple[Array, Array]:
-    """The two centres 1e-9 r apart, from that of sphere i to `move` further, between which the
-    potential changes most beside what the forces account for, by halving; as moves."""
-    start, end = np.zeros(3), move
-    first, last = some.find(i, start), some.find(i, end)
-    while np.linalg.norm(end - start) > 1e-9 * some.radii[i]:
+def steepest_between(
+    find: Callable[[Array], ContactSet], start: Array, end: Array, width: float
+) -> tuple[Array, Array]:
+    """The two centres `width` apart, between `start` and `end`, between which the potential changes
+    most beside what the forces account for, by halving."""
+    first, last = find(start), find(end)
+    while np.linalg.norm(end - start) > width:
         middle = (start + end) / 2
-        found = some.find(i, middle)
+        if (middle == start).all() or (middle == end).all():
+            break
+        found = find(middle)
         if change(first, found, middle - start)[0] > change(found, last, end - middle)[0]:
             end, last = middle, found
         else:
@@ -213,22 +213,56 @@ def steepest(some: Spheres, i: int, move: Array) -> tuple[Array, Array]:
     return start, end
 
 
-ALONG = dict.fromkeys(
-    ("bladex_upper.stl", "c3d_fandisk.obj", "c3d_stanford-bunny.obj", "fcpw_dragon.obj"), BENT
-) | dict.fromkeys(BESIDE, CROSSED)
-
-
-@pytest.mark.parametrize("name", cases(ALONG))
+@pytest.mark.parametrize("name", cases(CROSSED))
 def test_potential_along_walks(name: str) -> None:
     """Over a tenth of its radius a sphere crosses many borders; the potential jumps at none."""
     some, rng, jumps = spheres(name), np.random.default_rng(2), {}
     for i in range(WALKS):
         move = rng.normal(size=3)
         move *= 0.1 * some.radii[i] / np.linalg.norm(move)
-        start, end = steepest(some, i, move)
-        share = jump(some.find(i, start), some.find(i, end), end - start)
+        look = partial(some.find, i)
+        start, end = steepest_between(look, np.zeros(3), move, 1e-9 * some.radii[i])
+        share = jump(look(start), look(end), end - start)
         if not share <= 1e-6:
             jumps[i] = share
+    assert not jumps
+
+
+def roll(some: Spheres, i: int, rng: np.random.Generator, length: float, depth: float):
+    """Centres (n, 3) of sphere i, a tenth of a radius apart, as it rolls `depth` deep over the
+    surface for `length`, both in radii; it turns back where it would leave the surface."""
+    radius, center = some.radii[i], some.centers[i]
+    along, path = rng.normal(size=3), []
+    for _ in range(round(10 * length)):
+        found = some.shell.contacts(center, radius, method="smooth")
+        if not len(found):
+            break
+        normal = found.normal[0]
+        along = along - along @ normal * normal
+        along /= np.linalg.norm(along)
+        center = center + (found.depth[0] - depth * radius) * normal
+        path.append(center)
+        center = center + 0.1 * radius * along
+        if not len(some.shell.contacts(center, radius, method="smooth")):
+            center, along = path[-1], rng.normal(size=3)
+    return np.array(path)
+
+
+@pytest.mark.parametrize("name", cases(CROSSED))
+def test_potential_along_long_walks(name: str) -> None:
+    """Over 30 radii at a twentieth of one; SPHSHELL_WALKS=100 takes more than the usual walk."""
+    some, rng, jumps = spheres(name), np.random.default_rng(3), {}
+    for i in rng.integers(COUNT, size=LONG_WALKS):
+        radius = some.radii[i]
+
+        def find(center: Array, radius: float = radius) -> ContactSet:
+            return some.shell.contacts(center, radius, method="smooth")
+
+        for start, end in pairwise(roll(some, i, rng, 30.0, 0.05)):
+            a, b = steepest_between(find, start, end, 1e-9 * radius)
+            share = jump(find(a), find(b), b - a)
+            if not share <= 1e-6:
+                jumps[int(i)] = share
     assert not jumps
 
 

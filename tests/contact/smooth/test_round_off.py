@@ -43,11 +43,12 @@ def test_first_touch_of_an_edge_is_no_push_from_behind(size: float) -> None:
 
 
 def test_a_touch_whose_edge_misses_it_by_round_off() -> None:
-    """Here the edge is one unit in the last place too far, and an element beside it is not."""
+    """Here the edge is one unit in the last place too far, and an element beside it is not: it may
+    touch or not, but not from behind."""
     radius = 0.007161000064252406
     vertices, elements = tetrahedron(0.5, at=(-0.125, -0.125, -0.125))[:2]
     shell = Shell(vertices * radius, elements, side="outside")
     found = shell.contacts(CENTRE, radius)
     assert (found.normal @ CENTRE > 0).all()
     assert (found.depth < 1e-15).all()
-    assert len(found.depth) == 1
+    assert len(found.depth) <= 1

@@ -8,6 +8,7 @@ import { Picture } from "./scene.js";
 const PARTS = {
   robot: "Robot", spheres: "Spheres", arrows: "Force arrows", points: "Contact points",
   trails: "Trails", cones: "Friction cones", wireframe: "Wireframe", patches: "Patch colours",
+  distance: "Curved-flat distance",
 };
 const AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
 const RETRY = 1000; // [ms]
@@ -70,6 +71,7 @@ function greet(data) {
     return;
   }
   hello = data;
+  element("ramp-swatch").style.background = `linear-gradient(90deg, ${data.ramp.join(", ")})`;
   document.title = data.title;
   element("title").textContent = data.title;
   element("title").title = data.title;
@@ -152,6 +154,8 @@ function show(data) {
   element("run-word").textContent = data.running ? "Pause" : "Run";
   element("scale").textContent = data.scale;
   element("cut").hidden = !data.cut;
+  element("coloring").hidden = !data.coloring;
+  element("coloring").lastChild.textContent = data.coloring ?? "";
   sliders.speed.follow(data.speed);
   sliders.arrows.follow(data.arrows);
   for (const [key, value] of Object.entries(data.knobs)) knobs.get(key)?.follow(value);

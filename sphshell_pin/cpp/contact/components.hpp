@@ -1,0 +1,84 @@
+// Components of the surface inside the sphere: each counts once.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "contact/minimum.hpp"
+
+namespace sphshell {
+
+// From a facet to a small number; keeps its memory.
+class FacetTable {
+ public:
+  void clear();
+  // The number of a facet, a new one where it had none: then `added` is set.
+  int number(int facet, bool& added);
+  int size() const { return count_; }
+
+ private:
+  struct Slot {
+    int facet, number;
+    std::uint32_t round;
+  };
+  Slot& slot(int facet);
+  std::vector<Slot> slots_;
+  std::uint32_t round_ = 0;
+  int count_ = 0;
+};
+
+// The theorem of fixed cells (docs/contact.md, "Components and saddles"): with a_i the depth at the
+// nearest place of cell i and p_ij that at the nearest place of a side that cells i and j share,
+//
+//   V = sum_i U(a_i) - largest total of U(p_ij) over a spanning forest of the links
+//
+// cannot jump. A cell whose nearest place is on a shared side adds as much as that link takes: only
+// the others are minima, and the links between their pieces saddles.
+class Components {
+ public:
+  // Leaves one minimum a cell, deepest first, and adds the saddles, of weight -1.
+  void merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+             std::vector<Minimum>& minima);
+
+ private:
+  // Where two cells meet: over a side, at its nearest place, first only bounded from above; or at
+  // the nearest place of both.
+  enum class LinkKind { Bound, Side, Place };
+  struct Link {
+    double depth;
+    LinkKind kind;
+    int from, to;  // cells; `to` is a facet until the link is used
+    int facet, side;
+    double t;     // along the side
+    int minimum;  // of a place
+  };
+
+  // The cells found so far from one minimum, and the links that lead on, as a heap.
+  struct Piece {
+    int cells;
+    std::vector<Link> open;
+  };
+
+  static bool lower(const Link& a, const Link& b);
+  int root(int cell);
+  void start_pieces(std::size_t minima);
+  void add_links(const Shell& shell, const Sphere& sphere, int facet, int cell, Piece& piece);
+  void link_equal_places(const Sphere& sphere, const std::vector<Minimum>& minima);
+  void flood(const Shell& shell, const Sphere& sphere, std::size_t minima);
+  int advance(const Shell& shell, const Sphere& sphere, int piece);
+  void pair_minima(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+                   std::vector<Minimum>& minima);
+  void show_as_one(std::vector<Minimum>& minima, int deeper, int shallower, bool flat,
+                   Contact& saddle);
+  int leader_of(int minimum);
+
+  FacetTable cells_;                   // the first of them hold the minima, in their order
+  std::vector<int> parent_, deepest_;  // per cell; deepest_: minimum of its piece, or -1
+  std::vector<Piece> pieces_;          // beside the minima, and as many more as were ever needed
+  std::vector<int> by_x_, active_;
+  std::vector<Link> tree_;
+  std::vector<char> absorbed_;  // beside the minima and saddles
+  std::vector<int> leader_;     // beside the minima: towards the one that it is shown with
+};
+
+}  // namespace sphshell

@@ -1,0 +1,51 @@
+// Contacts with curved elements: the minima of the distance that the cells hold.
+#pragma once
+
+#include <vector>
+
+#include "contact/broad_phase.hpp"
+#include "contact/components.hpp"
+#include "contact/minimum.hpp"
+#include "shell/curved.hpp"
+
+namespace sphshell {
+
+class CurvedQuery {
+ public:
+  void find(const Shell& shell, const Sphere& sphere, BroadPhase& broad, bool want_dn_dc,
+            std::vector<Minimum>& minima);
+
+ private:
+  // What the place of the centre over a facet, and the slope of the distance in the middle of its
+  // cell, say of where the cell may hold a minimum.
+  struct Outlook {
+    int facet;
+    double height;   // of the centre above the facet's plane [m]
+    bool within;     // the distance may be stationary within the cell,
+    bool side[3];    // ... least on side k,
+    bool corner[3];  // ... or in corner k
+    bool convex;     // it is convex all over the cell
+
+    Outlook(int f, const Facet& facet, const NormalCone& cone, const CellBounds& bounds,
+            const Sphere& sphere);
+    bool empty() const {
+      return !(within || side[0] || side[1] || side[2] || corner[0] || corner[1] || corner[2]);
+    }
+  };
+  struct Task {
+    const Shell& shell;
+    const Sphere& sphere;
+    bool want_dn_dc;
+    std::vector<Minimum>& minima;
+  };
+
+  void add_flat(const Task& task, const Outlook& outlook);
+  void add_bent(const Task& task, const Outlook& outlook);
+  void add_edge(const Task& task, int facet, int side);
+  void add_vertex(const Task& task, int facet, int corner);
+
+  std::vector<Outlook> outlooks_;
+  Components components_;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,201 @@
+#include "contact/flat_query.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "contact/regions.hpp"
+#include "shell/triangle.hpp"
+
+namespace sphshell {
+
+FlatQuery::FlatQuery() {
+  faces_.reserve(64);
+  edges_.reserve(64);
+  vertices_.reserve(64);
+}
+
+void FlatQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& broad, bool want_dn_dc,
+                     std::vector<Minimum>& minima) {
+  broad.find(shell, shell.cones(), 0, sphere);
+  decide(shell, sphere, broad.candidates);
+  if (faces_.empty() && edges_.empty() && vertices_.empty()) return;
+  drop_neighbours(shell);
+  list(shell, sphere, want_dn_dc, minima);
+  if (minima.size() < 2) return;
+  const double same = kSamePoint * sphere.radius + 16 * sphere.tolerance;
+  merge_equal_points(same, minima);
+  drop_crossed(shell, sphere, broad.near, same, minima);
+}
+
+// A face, an edge or a vertex holds a minimum where the centre lies in its normal cone with respect
+// to every triangle that meets there: triangles are convex, so this is exact.
+void FlatQuery::decide(const Shell& shell, const Sphere& sphere,
+                       const std::vector<int>& candidates) {
+  faces_.clear(), edges_.clear(), vertices_.clear();
+  const Vec3& centre = sphere.centre;
+  const double tolerance2 = sphere.tolerance * sphere.tolerance;
+  const double wide_reach2 = sphere.radius * sphere.radius * (1 + 1e-12);
+  for (int f : candidates) {
+    const Facet& facet = shell.facets()[f];
+    const double height = facet.normal.dot(centre - facet.corner[0]);
+    if (height * height >= wide_reach2) continue;
+    SideTest side[3];
+    bool inside = true;
+    for (int k = 0; k < 3; ++k) {
+      side[k] = test_side(facet, k, centre, tolerance2);
+      inside = inside && !side[k].beyond;
+    }
+    if (inside) faces_.push_back({f});
+    for (int k = 0; k < 3; ++k) {
+      if (facet.owned.twin[k] != kNotMine && side[k].not_within && !side[k].past_first &&
+          !side[k].past_second) {
+        const Vec3& a = facet.corner[k];
+        if (sphere.reaches(a + side[k].t * (facet.corner[next_corner(k)] - a)) &&
+            edge_is_minimum(shell, facet.owned.twin[k], centre, tolerance2)) {
+          const Triangle& t = shell.triangles()[shell.triangle_of_facet(f)];
+          edges_.push_back({f, k, t[k], t[next_corner(k)]});
+        }
+      }
+      if (facet.owned.vertex[k] >= 0 && side[k].before && side[previous_corner(k)].after &&
+          sphere.reaches(facet.corner[k]) &&
+          vertex_is_minimum(shell, facet.owned.vertex[k], centre, sphere.tolerance))
+        vertices_.push_back({f, k, facet.owned.vertex[k]});
+    }
+  }
+}
+
+// A facet is convex: where its face holds the nearest point, its own edges and corners cannot, and
+// likewise an edge and its ends. Both are found only within round-off of their common border.
+void FlatQuery::drop_neighbours(const Shell& shell) {
+  if (edges_.empty() && vertices_.empty()) return;
+  taken_edges_.clear();
+  taken_vertices_.clear();
+  for (const OnFace& face : faces_) {
+    const Triangle& t = shell.triangles()[shell.triangle_of_facet(face.facet)];
+    for (int k = 0; k < 3; ++k) {
+      taken_edges_.push_back(std::minmax(t[k], t[next_corner(k)]));
+      taken_vertices_.push_back(t[k]);
+    }
+  }
+  std::sort(taken_edges_.begin(), taken_edges_.end());
+  const auto edge_taken = [&](const OnEdge& e) {
+    return std::binary_search(taken_edges_.begin(), taken_edges_.end(),
+                              std::pair<int, int>(std::minmax(e.from, e.to)));
+  };
+  edges_.erase(std::remove_if(edges_.begin(), edges_.end(), edge_taken), edges_.end());
+  for (const OnEdge& e : edges_) {
+    taken_vertices_.push_back(e.from);
+    taken_vertices_.push_back(e.to);
+  }
+  std::sort(taken_vertices_.begin(), taken_vertices_.end());
+  const auto vertex_taken = [&](const OnVertex& v) {
+    return std::binary_search(taken_vertices_.begin(), taken_vertices_.end(), v.vertex);
+  };
+  vertices_.erase(std::remove_if(vertices_.begin(), vertices_.end(), vertex_taken),
+                  vertices_.end());
+}
+
+void FlatQuery::list(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+                     std::vector<Minimum>& minima) {
+  const Vec3& centre = sphere.centre;
+  const LargeArray<Facet>& facets = shell.facets();
+  const auto add = [&](int f, int index, const Contact& contact, bool behind, const Mat3& dx_dc) {
+    minima.push_back({contact, f, index, behind});
+    Contact& added = minima.back().contact;
+    if (want_dn_dc && added.feature != Feature::Face)
+      added.dn_dc = dn_dc_of(added, sphere.radius, dx_dc);
+  };
+  // A planar face has one nearest point, whichever of its facets hold it.
+  std::sort(faces_.begin(), faces_.end(), [&](const OnFace& x, const OnFace& y) {
+    const Facet &a = facets[x.facet], &b = facets[y.facet];
+    return a.planar_face != b.planar_face ? a.planar_face < b.planar_face : a.element < b.element;
+  });
+  for (std::size_t i = 0; i < faces_.size(); ++i) {
+    const Facet& facet = facets[faces_[i].facet];
+    if (i > 0 && facets[faces_[i - 1].facet].planar_face == facet.planar_face) continue;
+    const double height = facet.normal.dot(centre - facet.corner[0]);
+    if (std::abs(height) >= sphere.radius) continue;
+    const Vec3 normal = height < 0 ? Vec3(-facet.normal) : facet.normal;
+    add(faces_[i].facet, 0,
+        {centre - height * facet.normal, normal, sphere.radius - std::abs(height), facet.element,
+         Feature::Face},
+        height < 0, Mat3::Zero());
+  }
+  for (const OnEdge& on : edges_) {
+    const Facet& facet = facets[on.facet];
+    const Vec3& a = facet.corner[on.side];
+    const Vec3 along = facet.corner[next_corner(on.side)] - a;
+    const double t = std::clamp((centre - a).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    add(on.facet, on.side,
+        contact_at(a + t * along, facet.normal, sphere, facet.element, Feature::Edge), false,
+        along * along.transpose() / along.squaredNorm());
+  }
+  for (const OnVertex& on : vertices_) {
+    const Facet& facet = facets[on.facet];
+    add(on.facet, on.corner,
+        contact_at(shell.vertices()[on.vertex], facet.normal, sphere, facet.element,
+                   Feature::Vertex),
+        false, Mat3::Zero());
+  }
+}
+
+void FlatQuery::remove_dropped(std::vector<Minimum>& minima) const {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < minima.size(); ++i)
+    if (!dropped_[i]) minima[kept++] = minima[i];
+  minima.resize(kept);
+}
+
+// The simplest feature wins (face, edge, vertex: the order in which minima were listed).
+void FlatQuery::merge_equal_points(double tolerance, std::vector<Minimum>& minima) {
+  by_x_.resize(minima.size());
+  std::iota(by_x_.begin(), by_x_.end(), 0);
+  const auto x = [&](int i) { return minima[i].contact.point.x(); };
+  std::sort(by_x_.begin(), by_x_.end(), [&](int i, int j) { return x(i) < x(j); });
+  dropped_.assign(minima.size(), 0);
+  for (std::size_t a = 0; a < by_x_.size(); ++a)
+    for (std::size_t b = a + 1; b < by_x_.size() && x(by_x_[b]) - x(by_x_[a]) <= tolerance; ++b) {
+      const auto [first, second] = std::minmax(by_x_[a], by_x_[b]);
+      Contact& kept = minima[first].contact;
+      const Contact& other = minima[second].contact;
+      if ((kept.point - other.point).squaredNorm() > tolerance * tolerance) continue;
+      kept.element = std::min(kept.element, other.element);
+      dropped_[second] = 1;
+    }
+  remove_dropped(minima);
+}
+
+// Elements may overlap or cross without sharing an edge. Where another one passes through a contact
+// point and comes nearer to the centre, the distance has no minimum there. The deepest contact is
+// the nearest point of all, so a single one needs no such test.
+void FlatQuery::drop_crossed(const Shell& shell, const Sphere& sphere, const std::vector<int>& near,
+                             double tolerance, std::vector<Minimum>& minima) {
+  if (minima.size() < 2) return;
+  const Vec3& centre = sphere.centre;
+  const auto crossed = [&](const Vec3& point, const std::vector<int>& facets) {
+    const double nearer = std::max(0.0, (centre - point).norm() - tolerance);
+    return std::any_of(facets.begin(), facets.end(), [&](int f) {
+      const Facet& facet = shell.facets()[f];
+      if (std::abs(facet.normal.dot(point - facet.corner[0])) > tolerance) return false;
+      const Vec3 here = closest_on_triangle(point, facet.corner, facet.normal).point;
+      if ((point - here).squaredNorm() > tolerance * tolerance) return false;
+      const Vec3 best = closest_on_triangle(centre, facet.corner, facet.normal).point;
+      return (centre - best).squaredNorm() < nearer * nearer;
+    });
+  };
+  // With many facets at hand it is cheaper to ask the tree for those at each point.
+  const bool ask = near.size() > 256;
+  dropped_.assign(minima.size(), 0);
+  for (std::size_t i = 0; i < minima.size(); ++i) {
+    const Vec3& point = minima[i].contact.point;
+    if (ask) {
+      at_point_.clear();
+      shell.bvh().near(point, 2 * tolerance, at_point_, [](int) {});
+    }
+    dropped_[i] = crossed(point, ask ? at_point_ : near);
+  }
+  remove_dropped(minima);
+}
+
+}  // namespace sphshell

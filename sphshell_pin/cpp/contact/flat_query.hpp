@@ -1,0 +1,48 @@
+// The exact polyhedron: one contact at every local minimum of the distance over the surface.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "contact/broad_phase.hpp"
+#include "contact/minimum.hpp"
+
+namespace sphshell {
+
+class FlatQuery {
+ public:
+  FlatQuery();
+
+  void find(const Shell& shell, const Sphere& sphere, BroadPhase& broad, bool want_dn_dc,
+            std::vector<Minimum>& minima);
+
+ private:
+  // A facet whose plane the centre projects into, and an edge or a vertex that it stands over.
+  struct OnFace {
+    int facet;
+  };
+  struct OnEdge {
+    int facet, side, from, to;  // from, to: its vertices
+  };
+  struct OnVertex {
+    int facet, corner, vertex;
+  };
+
+  void decide(const Shell& shell, const Sphere& sphere, const std::vector<int>& candidates);
+  void drop_neighbours(const Shell& shell);
+  void list(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+            std::vector<Minimum>& minima);
+  void merge_equal_points(double tolerance, std::vector<Minimum>& minima);
+  void drop_crossed(const Shell& shell, const Sphere& sphere, const std::vector<int>& near,
+                    double tolerance, std::vector<Minimum>& minima);
+  void remove_dropped(std::vector<Minimum>& minima) const;
+
+  std::vector<OnFace> faces_;
+  std::vector<OnEdge> edges_;
+  std::vector<OnVertex> vertices_;
+  std::vector<std::pair<int, int>> taken_edges_;
+  std::vector<int> taken_vertices_, by_x_, at_point_;
+  std::vector<char> dropped_;
+};
+
+}  // namespace sphshell

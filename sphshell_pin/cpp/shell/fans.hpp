@@ -1,0 +1,78 @@
+// The corners that meet at a vertex, joined where the surface goes on smoothly between them.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "shell/disjoint_sets.hpp"
+#include "shell/shell.hpp"
+
+namespace sphshell {
+
+// A corner (3 triangle + k) belongs to one fan. Fans are numbered below size(); most numbers are
+// empty.
+class Fans {
+ public:
+  // is_smooth(edge): whether the two triangles of an edge join the fans at its ends.
+  template <class IsSmooth>
+  Fans(const Shell& shell, IsSmooth&& is_smooth) : shell_(shell) {
+    const std::vector<Triangle>& triangles = shell.triangles();
+    const Topology& topology = shell.topology();
+    const int corners = 3 * static_cast<int>(triangles.size());
+    DisjointSets sets(corners);
+    for (const Edge& edge : topology.edges) {
+      if (edge.count != 2 || !is_smooth(edge)) continue;
+      const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+      const int h1 = after(h), g1 = after(g);
+      const bool opposed = vertex(h) == vertex(g1);
+      sets.join(h, opposed ? g1 : g);
+      sets.join(h1, opposed ? g : g1);
+    }
+    begin_.assign(corners + 1, 0);
+    fan_of_.resize(corners);
+    for (int c = 0; c < corners; ++c) ++begin_[(fan_of_[c] = sets.find(c)) + 1];
+    for (int c = 0; c < corners; ++c) begin_[c + 1] += begin_[c];
+    std::vector<int> fill(begin_.begin(), begin_.end() - 1);
+    members_.resize(corners);
+    for (int c = 0; c < corners; ++c) members_[fill[fan_of_[c]]++] = c;
+  }
+
+  static int after(int corner) { return 3 * triangle_of(corner) + next_corner(side_of(corner)); }
+  static int before(int corner) {
+    return 3 * triangle_of(corner) + previous_corner(side_of(corner));
+  }
+
+  int size() const { return static_cast<int>(fan_of_.size()); }
+  int of(int corner) const { return fan_of_[corner]; }
+  int count(int fan) const { return begin_[fan + 1] - begin_[fan]; }
+  const int* begin(int fan) const { return &members_[begin_[fan]]; }
+  const int* end(int fan) const { return members_.data() + begin_[fan + 1]; }
+  int vertex(int corner) const { return shell_.triangles()[corner / 3][corner % 3]; }
+
+  // The vertices two edges or less from the fan's own, through triangles that smooth edges join
+  // and not past a sharp vertex.
+  void vertices_around(int fan, const std::vector<char>& sharp, std::vector<int>& out) const {
+    const int own = vertex(*begin(fan));
+    out.clear();
+    for (const int* c = begin(fan); c != end(fan); ++c)
+      for (int k = 0; k < 3; ++k) {
+        const int beside = fan_of_[*c / 3 * 3 + k];
+        if (sharp[beside]) continue;
+        for (const int* d = begin(beside); d != end(beside); ++d)
+          for (int l = 0; l < 3; ++l) out.push_back(vertex(*d / 3 * 3 + l));
+      }
+    std::sort(out.begin(), out.end());
+    out.erase(std::unique(out.begin(), out.end()), out.end());
+    out.erase(std::remove(out.begin(), out.end(), own), out.end());
+  }
+
+ private:
+  const Shell& shell_;
+  std::vector<int> begin_, fan_of_, members_;
+};
+
+// The normal of a fan, exact where the vertices lie on a sphere (Max, J. Graphics Tools 4 (1999)
+// 1).
+Vec3 max_normal(const Shell& shell, const int* begin, const int* end);
+
+}  // namespace sphshell

@@ -1,0 +1,268 @@
+"""How far curved elements are from the exact faces, and keeping those straight that are too far.
+
+The tessellation is measured flat. Contact uses the elements curved to meet the normals at their
+corners, and where these do not stand for the whole side, as beside a joint that is nearly tangent,
+a curved side may leave a face that the straight one is on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from OCP.gp import gp_Pnt, gp_Vec
+
+from sphshell_pin.shell.cad.face_mesh import ALONG, CURVED, FaceMesh
+from sphshell_pin.shell.cad.reference import corner_weights
+from sphshell_pin.shell.curved import points_at
+
+if TYPE_CHECKING:
+    from sphshell_pin.shell.cad.surface import CadSurface
+    from sphshell_pin.shell.cleaning import CleanedSurface
+    from sphshell_pin.shell.raw import Floats, Longs, Mask
+    from sphshell_pin.shell.shell import Shell
+
+_ON_SIDES = [np.roll([1 - share, share, 0.0], side) for side in range(3) for share in ALONG]
+WEIGHTS = np.array([*_ON_SIDES, [1 / 3, 1 / 3, 1 / 3]])
+"""Where triangles are measured (k, 3): along the sides 0, 1 and 2, and in the middle."""
+
+MOST_ROUNDS = 6
+"""Times sides are straightened and measured again: a straight side changes middles beside it."""
+
+SAME_PLACE = 1e-6
+"""A corner this near to a node, as a share of the size, is it: cleaning welds within less."""
+
+CURVE_SEEDS, CURVE_STEPS, SETTLED = 9, 4, 0.01
+"""Places along an edge from the nearest of which Newton's method goes on; its steps; the share of
+the chord error below which a step changes the distance by nothing to speak of."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Largest distances of elements from the exact faces [units of the model].
+
+    sides (t, 3), middles (t,) : from the surface below; borders (t, 3) : of sides on the border of
+    a face from its exact curve, 0 for the others
+    """
+
+    sides: Floats
+    middles: Floats
+    borders: Floats
+
+    @property
+    def surface(self) -> float:
+        """The largest distance from a surface."""
+        return float(max(self.sides.max(initial=0.0), self.middles.max(initial=0.0)))
+
+    @property
+    def border(self) -> float:
+        """The largest distance from a border."""
+        return float(self.borders.max(initial=0.0))
+
+
+def hold_curvature(
+    surface: CleanedSurface, cad: CadSurface, factor: float, make: Callable[[CleanedSurface], Shell]
+) -> CleanedSurface:
+    """Return a CAD surface whose curved elements are as near as its flat ones, with a note of it.
+
+    A curved side, or the sides of a curved middle, farther off than the share CURVED of the stated
+    chord error are kept straight, unless straight ones are no nearer.
+
+    factor : metres per unit of the model; make : makes a shell of the surface
+    """
+    places = _Places(surface, cad, factor)
+    limit = CURVED * cad.stated
+    straight = np.zeros((len(surface.triangles), 3), np.bool_)
+    bent = 0.0
+    for _ in range(MOST_ROUNDS):
+        found = places.errors(make(replace(surface, straight=straight)))
+        bad, farthest = _too_far(found, places, limit)
+        bent = max(bent, farthest)
+        if not (bad & ~straight).any():
+            break
+        straight |= bad
+    else:
+        found = places.errors(make(replace(surface, straight=straight)))
+    count = _count_sides(surface, straight)
+    note = _note(found, cad.stated, cad.model.metres, count, bent)
+    health = surface.health.labelled(notes=(*surface.health.notes, note))
+    return replace(surface, straight=straight if count else None, health=health)
+
+
+class _Places:
+    """Where the triangles of a surface lie on the faces of its model."""
+
+    def __init__(self, surface: CleanedSurface, cad: CadSurface, factor: float) -> None:
+        self._factor, self._tolerance = factor, cad.stated
+        meshes = cad.found.meshes
+        counts = [0 if mesh is None else len(mesh.triangles) for mesh in meshes]
+        starts = np.cumsum([0, *counts])
+        polygon = surface.source_element[surface.triangle_element]
+        face = np.searchsorted(starts, polygon, side="right") - 1
+        self.corners = surface.vertices[surface.triangles] / factor
+        self._sides = _own_sides(surface.triangles, face)
+        self._of_face: list[tuple[FaceMesh, Longs, Floats]] = []
+        self._curves: list[tuple[int, int, Any, float, float]] = []
+        on_border = self._sides.on_border
+        for row in np.unique(face).tolist():
+            mesh = meshes[row]
+            assert mesh is not None  # it has triangles
+            own = np.flatnonzero(face == row)
+            nodes = mesh.triangles[polygon[own] - starts[row]]
+            at = np.repeat(nodes, 3, axis=0)
+            weights = corner_weights(mesh.points[at], self.corners[own].reshape(-1, 3))
+            uv = np.einsum("nk,nkx->nx", weights, mesh.parameters(at)).reshape(-1, 3, 2)
+            self._of_face.append((mesh, own, uv))
+            self._find_curves(mesh, own, nodes, on_border[own], SAME_PLACE * cad.size)
+
+    def errors(self, shell: Shell) -> Errors:
+        """Measure the curved elements of `shell`, whose triangles are those of the surface."""
+        rows = np.arange(len(self.corners))
+        points = points_at(shell, rows, WEIGHTS) / self._factor
+        return self._measure(points, self._sides.first, rows >= 0)
+
+    def flat_errors(self, rows: Longs) -> Errors:
+        """Measure the flat triangles `rows` alone: the others have errors of 0."""
+        some = np.zeros(len(self.corners), np.bool_)
+        some[rows] = True
+        points = np.einsum("kc,tcx->tkx", WEIGHTS, self.corners)
+        return self._measure(points, np.repeat(some[:, None], 3, axis=1), some)
+
+    def _measure(self, points: Floats, on_sides: Mask, in_middles: Mask) -> Errors:
+        """Errors of points (t, k, 3) at WEIGHTS of all triangles; only where wanted (t, 3), (t,).
+
+        A side that triangles of a face share needs to be measured in one of them.
+        """
+        count = len(self.corners)
+        sides, middles, borders = np.zeros((count, 3)), np.zeros(count), np.zeros((count, 3))
+        for mesh, own, corners_uv in self._of_face:
+            wanted = np.repeat(on_sides[own], len(ALONG), axis=1)
+            wanted = np.column_stack([wanted, in_middles[own]])
+            uv = np.einsum("kc,tcx->tkx", WEIGHTS, corners_uv)
+            found = np.zeros(wanted.shape)
+            found[wanted] = mesh.surface.distances(points[own][wanted], uv[wanted], self._tolerance)
+            sides[own] = found[:, :-1].reshape(-1, 3, len(ALONG)).max(axis=2)
+            middles[own] = found[:, -1]
+        for triangle, side, curve, start, end in self._curves:
+            if on_sides[triangle, side]:
+                first = side * len(ALONG)
+                along = points[triangle, first : first + len(ALONG)]
+                near = SETTLED * self._tolerance
+                borders[triangle, side] = _from_curve(curve, along, start, end, near)
+        return Errors(self._sides.spread(sides), middles, borders)
+
+    def _find_curves(
+        self, mesh: FaceMesh, own: Longs, nodes: Longs, on_border: Mask, near: float
+    ) -> None:
+        """Find the exact curve of each side on the border of a face, and its parameters there."""
+        known = {}
+        for border in mesh.borders:
+            ends = zip(border.nodes[:-1].tolist(), border.nodes[1:].tolist(), strict=True)
+            for k, (a, b) in enumerate(ends):
+                known[a, b] = border.curve, border.at[k], border.at[k + 1]
+                known[b, a] = border.curve, border.at[k + 1], border.at[k]
+        away = np.linalg.norm(self.corners[own][:, :, None] - mesh.points[nodes][:, None], axis=3)
+        node = np.take_along_axis(nodes, away.argmin(axis=2), axis=1)
+        node[away.min(axis=2) > near] = -1  # a corner that cleaning has put into a side
+        for row, side in np.argwhere(on_border).tolist():
+            pair = int(node[row, side]), int(node[row, (side + 1) % 3])
+            if pair in known:
+                self._curves.append((int(own[row]), side, *known[pair]))
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """Sides within faces, all (t, 3).
+
+    The `number` of each, whether it is the `first` of its number, and whether it is `on_border` of
+    its face.
+    """
+
+    number: Longs
+    first: Mask
+    on_border: Mask
+
+    def spread(self, values: Floats) -> Floats:
+        """Give all triangles (t, 3) what the first one of each side has."""
+        largest = np.zeros(int(self.number.max(initial=-1)) + 1)
+        np.maximum.at(largest, self.number.ravel(), values.ravel())
+        return np.asarray(largest[self.number])
+
+
+def _own_sides(triangles: Any, face: Longs) -> _Sides:
+    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
+    keys = np.column_stack([ends.reshape(-1, 2), np.repeat(face, 3)])
+    _, index, number, count = np.unique(
+        keys, axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    number = number.reshape(-1, 3)
+    first = np.zeros(number.size, np.bool_)
+    first[index] = True
+    return _Sides(number, first.reshape(-1, 3), np.asarray(count[number] == 1, np.bool_))
+
+
+def _too_far(found: Errors, places: _Places, limit: float) -> tuple[Mask, float]:
+    """Sides (t, 3) to straighten, and the largest distance that goes with them."""
+    far = (found.sides > limit) | (found.borders > limit)
+    far_middle = found.middles > limit
+    rows = np.flatnonzero(far.any(axis=1) | far_middle)
+    bad = np.zeros(far.shape, np.bool_)
+    if not len(rows):
+        return bad, 0.0
+    flat = places.flat_errors(rows)
+    off, off_flat = (np.maximum(one.sides, one.borders) for one in (found, flat))
+    bad = far & (off > off_flat)
+    bad |= (far_middle & (found.middles > flat.middles))[:, None]
+    largest = np.maximum(off.max(axis=1), found.middles)
+    return bad, float(largest[bad.any(axis=1)].max(initial=0.0))
+
+
+def _count_sides(surface: CleanedSurface, straight: Mask) -> int:
+    rows, side = np.nonzero(straight)
+    ends = surface.triangles[rows, side], surface.triangles[rows, (side + 1) % 3]
+    return len(np.unique(np.sort(np.stack(ends, axis=1), axis=1), axis=0))
+
+
+def _note(found: Errors, stated: float, factor: float, count: int, bent: float) -> str:
+    error = max(found.surface, found.border)
+    note = (
+        f"curved elements {error * factor:.3g} m off ({found.surface * factor:.3g} m from the "
+        f"surfaces, {found.border * factor:.3g} m from their borders): "
+        + ("held" if error <= stated else f"not held, by a factor {error / stated:.3g}")
+    )
+    if count:
+        sides = "side is" if count == 1 else "sides are"
+        note += f"; {count} {sides} kept straight, bent to the normals up to {bent * factor:.3g} m"
+        note += " off"
+    return note
+
+
+def _from_curve(curve: Any, points: Floats, start: float, end: float, settled: float) -> float:
+    """Largest distance of points (3, 3) along a side from the curve between two parameters.
+
+    Newton's steps shorter than `settled` are the last.
+    """
+    place, tangent = gp_Pnt(), gp_Vec()
+    # Its speed may be anything: the middle of the side need not be near that of the parameters.
+    seeds = np.linspace(start, end, CURVE_SEEDS)
+    along = np.array([curve.Value(at).Coord() for at in seeds.tolist()])
+    low, high = curve.FirstParameter(), curve.LastParameter()
+    largest = 0.0
+    for point in points:
+        away = np.linalg.norm(along - point, axis=1)
+        nearest, at = float(away.min()), float(seeds[np.argmin(away)])
+        for _ in range(CURVE_STEPS):
+            curve.D1(at, place, tangent)
+            offset, way = point - place.Coord(), np.array(tangent.Coord())
+            nearest = min(nearest, float(np.linalg.norm(offset)))
+            square = float(way @ way)
+            if square == 0.0:
+                break
+            along_curve = float(offset @ way)
+            at = min(max(at + along_curve / square, low), high)
+            if along_curve**2 <= settled**2 * square:
+                break
+        largest = max(largest, nearest)
+    return largest

@@ -1,0 +1,101 @@
+"""What the tests of hard cases share; `python -m tests.contact.smooth.hard_cases` prints them.
+
+Each docstring is a row "case; what happens". The sphere has radius one unless said otherwise.
+"""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from sphshell_pin import Shell
+from tests.contact.helpers import energy, force_sum
+from tests.contact.smooth.surfaces import jittered_grid
+from tests.contact.smooth.test_real_surfaces import faults, jump
+
+Array = NDArray[np.float64]
+
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+DEPTH = 0.04
+
+
+def fails(why: str):
+    """Mark of a test that the present code fails."""
+    return pytest.mark.xfail(strict=True, reason=why)
+
+
+def find(shell: Shell, center, radius: float = 1.0):
+    """Contacts, after a look at what holds of any."""
+    found = shell.contacts(center, radius, method="smooth")
+    assert not faults(found, np.asarray(center), radius)
+    return found
+
+
+def push(shell: Shell, center, radius: float = 1.0) -> Array:
+    """Force in units of that at DEPTH r."""
+    return force_sum(find(shell, center, radius)) / (DEPTH * radius) ** 1.5
+
+
+def stored(shell: Shell, center, depth: float, radius: float = 1.0) -> float:
+    """Potential in units of that of one contact of `depth`."""
+    return energy(find(shell, center, radius)) / (depth**2.5 / 2.5)
+
+
+def assert_no_jump(shell: Shell, center, radius: float = 1.0, force: float = 1e-5) -> None:
+    """1e-9 r further the potential is the same, and so is the force."""
+    rng, here = np.random.default_rng(0), find(shell, center, radius)
+    size = here.depth.max() ** 1.5
+    for _ in range(20):
+        move = rng.normal(size=3)
+        move *= 1e-9 * radius / np.linalg.norm(move)
+        there = find(shell, center + move, radius)
+        assert jump(here, there, move) <= 1e-6
+        change = np.linalg.norm(force_sum(there) - force_sum(here))
+        assert change <= force * size
+
+
+def directions(rng: np.random.Generator, count: int) -> Array:
+    """Random unit vectors (count, 3)."""
+    out = rng.normal(size=(count, 3))
+    return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
+
+
+def graph(height, slopes, half: float, cells: int):
+    """Vertices, elements and normals of z = height(x, y) over a square."""
+    x, y, elements = jittered_grid((-half, half), (-half, half), cells, cells, 1)
+    along_x, along_y = slopes(x, y)
+    normals = np.stack([-along_x, -along_y, np.ones_like(x)], axis=1)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return np.stack([x, y, height(x, y)], axis=1), elements, normals
+
+
+def given(mesh, **options) -> Shell:
+    """Shell with the normals that came with a mesh."""
+    return Shell(mesh[0], mesh[1], normals=mesh[2], **options)
+
+
+FILES = ("rounds", "sheets", "meshes")
+
+
+def table() -> list[tuple[str, str]]:
+    """Case and what happens, of all tests of hard cases."""
+    rows = []
+    for name in FILES:
+        module = import_module(f"tests.contact.smooth.test_hard_{name}")
+        found = [f for key, f in inspect.getmembers(module, inspect.isfunction) if "test_" in key]
+        mine = [f for f in found if f.__module__ == module.__name__ and f.__name__[:5] == "test_"]
+        for test in sorted(mine, key=lambda f: f.__code__.co_firstlineno):
+            case, happens = (inspect.getdoc(test) or "").rstrip(".").split("; ")
+            rows.append((case, happens))
+    return rows
+
+
+if __name__ == "__main__":
+    print("\n".join(f"| {case} | {happens} |" for case, happens in table()))

@@ -1,0 +1,107 @@
+"""Curved elements are never worse than flat ones: creases stay, and what is round stays round."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from sphshell_pin import Shell
+from tests.contact.smooth.parts import (
+    Part,
+    averaged_normals,
+    distance_to_fillet,
+    extruded,
+    fillet,
+    random_extruded,
+    random_turned,
+    turned,
+)
+
+COUNT = 100  # of each family
+
+
+@pytest.mark.parametrize("make", [random_turned, random_extruded])
+def test_random_parts(make) -> None:
+    """Kinks of 3 to 29 degrees between stretches of 0.2 to 20 radii. A few polygons may turn as
+    evenly as a sampled curve does."""
+    worse = [seed for seed in range(COUNT) if make(seed).is_worse_than_flat()]
+    assert len(worse) <= 0.02 * COUNT, worse
+
+
+@pytest.mark.parametrize("sides", [16, 32, 48])
+@pytest.mark.parametrize("length", [5.0, 20.0])
+def test_shaft_with_a_cone(sides: int, length: float) -> None:
+    """Off the cylinder by less than the flat triangles are, whatever the cone's angle."""
+    rng = np.random.default_rng(0)
+    for lean in (5, 10, 15, 20, 28):
+        profile = np.array([[1, 0], [1, length], [1 + 2 * np.tan(np.radians(lean)), length + 2]])
+        curved, flat = turned(profile, sides, rng).errors()
+        assert curved <= flat, (lean, curved, flat)
+
+
+def fillet_part(chords: int, turn: float, wall: float, rows: int) -> Part:
+    rng = np.random.default_rng(chords)
+    part = extruded(fillet(chords, turn, wall), 3.0, rows, rng)
+    exact = distance_to_fillet(part.places[:, :2], turn, wall)
+    return Part(part.vertices, part.elements, part.places, exact)
+
+
+@pytest.mark.parametrize("wall", [3.0, 20.0])
+@pytest.mark.parametrize("rows", [1, 3])
+def test_fillets(wall: float, rows: int) -> None:
+    """Never worse than flat; from five chords on, far better."""
+    for chords, degrees in ((2, 50), (3, 80), (4, 90), (5, 90), (6, 90), (8, 90)):
+        curved, flat = fillet_part(chords, np.radians(degrees), wall, rows).errors()
+        assert curved <= flat * (1 + 1e-9), (chords, curved, flat)
+        if chords >= 5:
+            assert curved <= 0.65 * flat, (chords, curved, flat)
+
+
+@pytest.mark.parametrize("wall", [3.0, 20.0])
+@pytest.mark.parametrize("rows", [1, 3])
+def test_chamfers_stay_flat(wall: float, rows: int) -> None:
+    for degrees in (10, 30, 50):
+        section = fillet(1, np.radians(degrees), wall)
+        part = extruded(section, 3.0, rows, np.random.default_rng(degrees))
+        assert part.errors()[0] <= 1e-12
+
+
+def outward(points):
+    """Vertices and elements of the convex hull of points (n, 3), wound outward."""
+    hull = ConvexHull(points)
+    number = np.full(len(points), -1)
+    number[hull.vertices] = np.arange(len(hull.vertices))
+    vertices, elements = points[hull.vertices], number[hull.simplices]
+    a, b, c = (vertices[elements[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - vertices.mean(axis=0)) < 0
+    elements[inward] = elements[inward][:, ::-1]
+    return vertices, elements
+
+
+def solids():
+    for size in ((0.1, 0.1, 0.4), (1, 1, 1), (0.01, 1, 1)):
+        yield f"box {size}", np.array(np.meshgrid(*[(0, s) for s in size])).reshape(3, -1).T * 1.0
+    for n in (3, 4, 5, 6, 8, 12):
+        angle = 2 * np.pi * np.arange(n) / n
+        ring = np.stack([np.cos(angle), np.sin(angle)], 1)
+        yield f"prism {n}", np.concatenate([np.c_[ring, np.full(n, z)] for z in (0.0, 3.0)])
+    for n in (10, 24, 60):
+        rng = np.random.default_rng(n)
+        yield f"solid {n}", rng.normal(size=(n, 3))
+
+
+@pytest.mark.parametrize(("name", "points"), list(solids()), ids=[name for name, _ in solids()])
+def test_smooth_shaded_solids(name: str, points) -> None:
+    """Normals that were averaged over the edges are set aside, and the report counts them."""
+    vertices, elements = outward(points)
+    shell = Shell(vertices, elements, normals=averaged_normals(vertices, elements))
+    size = np.linalg.norm(np.ptp(vertices, axis=0))
+    rng = np.random.default_rng(0)
+    low, high = vertices.min(axis=0) - 0.3 * size, vertices.max(axis=0) + 0.3 * size
+    places = rng.uniform(low, high, (1000, 3))
+    curved, flat = (
+        np.abs(shell.closest_points(places, method=m).distances) for m in ("smooth", "facets")
+    )
+    assert np.abs(curved - flat).max() <= 1e-3 * size
+    assert shell.core_for("smooth").normals_set_aside.any()

@@ -1,0 +1,201 @@
+"""How far curved elements stand off the flat ones: the report, and who shows it."""
+
+import pickle
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.shell.curvature import curvature_report
+from sphshell_pin.shell.curved import curved_mesh
+
+from .surfaces import CUBE, CUBE_QUADS, plate
+
+
+def ball(rows=8, radius=2.0):
+    """A sphere of quads and triangles at its poles, with its own normals."""
+    lat = np.linspace(0, np.pi, rows + 1)
+    lon = np.linspace(0, 2 * np.pi, 2 * rows, endpoint=False)
+    points = [(0.0, 0.0, 1.0)]
+    for a in lat[1:-1]:
+        points += [(np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)) for b in lon]
+    points.append((0.0, 0.0, -1.0))
+    n, last = len(lon), len(points) - 1
+    elements = [[0, 1 + j, 1 + (j + 1) % n] for j in range(n)]
+    for i in range(rows - 2):
+        a, b = 1 + i * n, 1 + (i + 1) * n
+        for j in range(n):
+            k = (j + 1) % n
+            elements += [[a + j, b + j, b + k], [a + j, b + k, a + k]]
+    elements += [[last, last - n + (j + 1) % n, last - n + j] for j in range(n)]
+    normals = np.array(points)
+    return sp.Shell(radius * normals, elements, normals)
+
+
+def icosahedron():
+    """A sphere of 20 triangles, with its own normals."""
+    g = (1 + 5**0.5) / 2
+    corners = np.array([[0, a, b * g] for a in (-1, 1) for b in (-1, 1)], float)
+    corners = np.concatenate([np.roll(corners, k, axis=1) for k in range(3)])
+    corners /= np.linalg.norm(corners, axis=1, keepdims=True)
+    away = np.linalg.norm(corners[:, None] - corners, axis=2)
+    next_to = (away > 0) & (away < 1.1)
+    triangles = [
+        (i, j, k)
+        for i in range(12)
+        for j in range(i)
+        for k in range(j)
+        if next_to[i, j] and next_to[j, k] and next_to[i, k]
+    ]
+    return sp.Shell(corners, triangles, corners, crease_angle=np.deg2rad(60.0))
+
+
+def test_largest_distance_on_a_ball():
+    shell = ball(8, 2.0)
+    report = shell.curvature_report()
+    assert (report.elements, report.flat, report.flat_because) == (shell.num_elements, 0, ())
+    # The exact ball stands off most over the middle of a triangle's circumscribed circle, if that
+    # is inside, else over its longest side; curved elements of this size are near it to 1e-3.
+    p = shell.vertices[shell.triangles]
+    sides = np.roll(p, -1, axis=1) - p
+    a, b, c = np.sort(np.linalg.norm(sides, axis=2), axis=1).T
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    circle = np.where(a * a + b * b > c * c, a * b * c / (4 * area), c / 2)
+    expected = (2.0 - np.sqrt(4.0 - circle**2)).max()
+    assert report.largest == pytest.approx(expected, rel=0.02)
+    assert np.linalg.norm(report.at) == pytest.approx(2.0, rel=1e-3)
+    assert report.of_size == pytest.approx(report.largest / shell.size)
+    # The triangle there, and its smallest height.
+    near = np.argmin(np.linalg.norm(p.mean(axis=1) - report.at, axis=1))
+    assert report.of_height == pytest.approx(report.largest / (2 * area[near] / c[near]), rel=1e-6)
+    assert not report.problems
+
+
+def test_the_largest_distance_is_that_of_a_fine_sampling():
+    rng = np.random.default_rng(4)
+    points, quads = plate(6)
+    points[:, 2] = 0.05 * np.sin(4 * points[:, 0]) * np.cos(3 * points[:, 1])
+    points[:, :2] += 0.02 * rng.uniform(-1, 1, (len(points), 2))
+    shell = sp.Shell(points, quads)
+    fine, _, _ = curved_mesh(shell, 40)
+    fine = fine.reshape(len(shell.triangles), -1, 3)
+    corners = shell.vertices[shell.triangles]
+    upright = np.einsum("tkx,tx->tk", fine - corners[:, :1], shell.triangle_normals)
+    report = shell.curvature_report()
+    # On this sheet the nearest point of an element is below the point, but along its rim.
+    assert report.largest >= 0.999 * np.abs(upright)[:, 41:].max()
+    assert report.largest == pytest.approx(np.abs(upright).max(), rel=0.02)
+
+
+def test_planes_are_flat():
+    report = sp.Shell(*plate(3)).curvature_report()
+    assert (report.curved, report.flat, report.largest, report.at) == (0, 9, 0.0, None)
+    ((why, count),) = report.flat_because
+    assert count == 9
+    assert "turns" in why
+    creased = sp.Shell(CUBE, CUBE_QUADS).curvature_report()
+    assert (creased.curved, creased.largest) == (0, 0.0)
+    exact = ball(6).curvature_report()
+    flat = sp.Shell(ball(6).vertices, ball(6).elements, ball(6).normals, crease_angle=0.0)
+    assert exact.largest > 0.0
+    assert flat.curvature_report().largest == 0.0
+
+
+def test_elements_that_bend_much_are_things_to_look_at():
+    shell = icosahedron()
+    assert not shell.health.problems
+    report = shell.curvature_report()
+    assert report.large == 20
+    # The exact ball is 0.2 off these faces, whose height is 0.91.
+    assert report.of_height == pytest.approx(0.2047 / 0.9106, rel=0.15)
+    assert shell.health.curvature is report
+    assert shell.health.problems == report.problems
+    assert not shell.health.ok
+    assert "verdict      ok, with 1 thing to look at" in str(shell.health)
+    # Another size: the same shares.
+    larger = shell.transformed(scale=3.0)
+    assert larger.health.curvature is None
+    again = larger.curvature_report()
+    assert again.largest == pytest.approx(3 * report.largest)
+    assert (again.large, again.of_size) == (20, pytest.approx(report.of_size))
+    assert pickle.loads(pickle.dumps(shell)).curvature_report() == report
+
+
+def test_averaged_normals_on_a_box_are_not_taken_in_silence():
+    """Such normals push the walls out by most of the box's width: flat, or something to look at."""
+    vertices = (CUBE - 0.5) * [0.1, 0.1, 0.4]
+    shell = sp.Shell(vertices, CUBE_QUADS, np.sign(CUBE - 0.5) / 3**0.5)
+    report = shell.curvature_report()
+    assert report.largest < 1e-3 or report.large == 6
+    assert bool(report.problems) == (report.large > 0)
+
+
+def test_needles_along_a_bend_are_nothing_to_look_at():
+    """Their bulge is larger than their height, but they turn by little."""
+    angle = np.linspace(0, np.pi / 8, 2)
+    z = np.arange(4) * 1e-4
+    vertices = np.array([[np.cos(a), np.sin(a), h] for a in angle for h in z])
+    quads = [[k, 4 + k, 5 + k, 1 + k] for k in range(3)]
+    normals = vertices * [1, 1, 0]
+    report = sp.Shell(vertices, quads, normals).curvature_report()
+    assert report.of_height > 1.0
+    assert not report.problems
+
+
+def test_explain_shows_the_report():
+    model = pin.Model()
+    frame = pin.JointModelTranslation()
+    joint = model.addJoint(0, frame, pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    model.addFrame(pin.Frame("tip", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    for method, shown in (("smooth", True), ("facets", False)):
+        scene = sp.Scene(model)
+        law = sp.ImpactLaw(1e6, 1.5, 0.0, 1e-3)
+        scene.add_contact(sp.Sphere(0.1, frame="tip"), icosahedron(), law=law, method=method)
+        found = scene.explain(np.array([0.0, 0.0, 1.2]), np.zeros(3))
+        text = str(found)
+        assert ("off the flat ones by up to" in text) == shown
+        assert any("20 curved elements bend" in one for one in found.warnings) == shown
+
+
+class Core:
+    """A compiled surface with codes of its own about how it bends."""
+
+    def __init__(self, core, **codes):
+        self._core = core
+        self.__dict__.update(codes)
+
+    def __getattr__(self, name):
+        return getattr(self._core, name)
+
+
+def test_reasons_and_normals_set_aside_are_counted_by_element():
+    points, quads = plate(3)
+    shell = sp.Shell(points, quads, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+    shell.core = Core(
+        shell.core,
+        # Two triangles to an element: one that is curved makes it curved.
+        bending=np.array([1, 1, 2, 2, 2, 2, 0, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1], np.uint8),
+        normals_set_aside=np.isin(np.arange(54), (40, 41)).reshape(18, 3),
+    )
+    report = shell.curvature_report()
+    assert (report.elements, report.curved, report.flat) == (9, 1, 8)
+    whys, counts = zip(*report.flat_because, strict=True)
+    assert counts == (5, 3)
+    assert "turns" in whys[0]
+    assert "witness" in whys[1]
+    assert report.normals_set_aside == 2
+    corner = shell.vertices[shell.triangles.ravel()[40]]
+    assert report.set_aside_at == tuple(corner)
+    text = str(shell.health)
+    assert "3 elements: straightened" in text
+    assert "2 given normals" in text
+
+
+def test_the_report_is_lazy():
+    shell = ball(4)
+    assert shell.health.curvature is None
+    assert "off the flat ones" not in str(shell.health)
+    assert curvature_report(shell) == shell.curvature_report()
+    assert "off the flat ones" in str(shell.health)

@@ -1,0 +1,138 @@
+"""Shells coloured by how far curved elements stand off the flat ones."""
+
+import meshcat
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.shell.curved import curved_mesh
+from sphshell_pin.view.display import Display
+from sphshell_pin.view.distance import check_coloring, draw_distance, ramp_colors
+from sphshell_pin.view.page import FilmWindow
+from sphshell_pin.view.recording import render_recording
+from tests.shell.surfaces import plate
+from tests.shell.test_curvature import ball
+
+
+def scene_of(*shells, method="smooth"):
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "tip")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+    model.addFrame(pin.Frame("tip", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    law = sp.ImpactLaw(1e6, 1.5, 0.0, 1e-3)
+    for shell in shells:
+        scene.add_contact(sp.Sphere(0.1, frame="tip"), shell, law=law, method=method)
+    return scene
+
+
+class Sheet:
+    """A display, and what was drawn in it."""
+
+    def __init__(self, scene):
+        self.window = FilmWindow()
+        self.display = Display(scene, visualizer=meshcat.Visualizer(window=self.window))
+
+    def drawn(self, name):
+        """Positions (n, 3) and colours (n, 3) of the objects called `name`."""
+        found = []
+        for command in self.window.commands(np.array([0.0, 1.0])):
+            if command["type"] == "set_object" and command["path"].endswith("/" + name):
+                attributes = command["object"]["geometries"][0]["data"]["attributes"]
+                found.append(
+                    [
+                        np.frombuffer(attributes[key]["array"].data, "<f4").reshape(-1, 3)
+                        for key in ("position", "color")
+                    ]
+                )
+        return found
+
+    def visible(self, name):
+        """Whether the nodes called `name` are shown."""
+        return [
+            command["value"]
+            for command in self.window.commands(np.array([0.0, 1.0]))
+            if command["type"] == "set_property" and command["path"].endswith("/" + name)
+        ]
+
+
+def test_colours_run_from_none_to_the_largest_distance():
+    shell = ball(8)
+    sheet = Sheet(scene_of(shell))
+    assert sheet.display.coloring is None
+    assert not sheet.drawn("distance")
+    sheet.display.show("distance", True)
+    ((points, colors),) = sheet.drawn("distance")
+    largest = shell.curvature_report().largest
+    np.testing.assert_allclose(points, curved_mesh(shell, 6)[0], atol=1e-6)
+    on_flat = np.abs(points[:, None] - shell.vertices[None]).sum(axis=2).min(axis=1) < 1e-6
+    none, most = ramp_colors(np.array([0.0, largest]), largest)
+    np.testing.assert_allclose(colors[on_flat], np.tile(none, (on_flat.sum(), 1)), atol=1e-6)
+    # The lightest point is next to the place of the report, or to one that is as far off.
+    lightest = colors[:, 1].argmax()
+    np.testing.assert_allclose(colors[lightest], most, atol=0.05)
+    assert f"{1e3 * largest:.3g} mm" in sheet.display.coloring
+    assert sheet.visible("distance") == [True]
+    assert sheet.visible("surface") == [False]
+    sheet.display.show("patches", True)
+    assert (sheet.visible("distance"), sheet.visible("patches")) == ([True], [False])
+    sheet.display.show("distance", False)
+    assert (sheet.visible("distance"), sheet.visible("patches")) == ([False], [True])
+    assert sheet.display.coloring is None
+    sheet.display.show("patches", False)
+    assert sheet.visible("surface") == [True]
+
+
+def test_all_shells_share_one_range():
+    small, large = ball(8, 0.5), ball(8, 2.0)
+    sheet = Sheet(scene_of(small, large))
+    sheet.display.show("distance", True)
+    lightest = [colors[:, 1].max() for _, colors in sheet.drawn("distance")]
+    assert sheet.display.largest_distance == large.curvature_report().largest
+    # The distances of the small one are a quarter of the other's: the second of five colours.
+    expected = ramp_colors(np.array([0.25]), 1.0)[0, 1]
+    assert min(lightest) == pytest.approx(expected, abs=0.03)
+    assert max(lightest) > 0.85
+
+
+@pytest.mark.parametrize(("shell", "method"), [(plate(3), "smooth"), (plate(3), "facets")])
+def test_flat_shells_have_one_colour(shell, method):
+    sheet = Sheet(scene_of(sp.Shell(*shell), method=method))
+    sheet.display.show("distance", True)
+    assert sheet.display.largest_distance == 0.0
+    found = sheet.drawn("distance")
+    assert len(found) == (method == "smooth")
+    for _, colors in found:
+        assert np.ptp(colors, axis=0).max() == 0.0
+
+
+def test_many_elements_have_one_colour_each(monkeypatch):
+    shell = ball(8)
+    monkeypatch.setattr("sphshell_pin.view.distance.MOST_CURVED", 10)
+    window = FilmWindow()
+    draw_distance(meshcat.Visualizer(window=window), shell, shell.curvature_report().largest)
+    (command,) = [c for c in window.commands(np.array([0.0, 1.0])) if c["type"] == "set_object"]
+    data = command["object"]["geometries"][0]["data"]["attributes"]["color"]["array"].data
+    colors = np.frombuffer(data, "<f4").reshape(-1, 3, 3)
+    assert len(colors) == len(shell.triangles)
+    assert np.ptp(colors, axis=1).max() == 0.0
+    assert np.ptp(colors[:, 0], axis=0).max() > 0.1
+
+
+def test_a_recording_states_the_range():
+    shell = ball(8)
+    scene = scene_of(shell)
+    integrator = sp.SemiImplicitEuler(1e-3)
+    result = sp.Simulation(scene, integrator).run(np.array([0.0, 0.0, 2.2]), np.zeros(3), 0.01)
+    text = f"distance of curved from flat: 0 to {1e3 * shell.curvature_report().largest:.3g} mm"
+    assert text in render_recording(result, scene, color="distance")
+    assert text not in render_recording(result, scene)
+    with pytest.raises(InvalidParameter, match="surface, patches, distance"):
+        render_recording(result, scene, color="depth")
+
+
+def test_other_colours_are_refused():
+    with pytest.raises(InvalidParameter, match="must be one of"):
+        check_coloring("red")
