@@ -15,6 +15,8 @@ _Longs = NDArray[np.int64]
 pinocchio_version: str
 coal_version: str
 
+_Columns = tuple[_Doubles, _Doubles, _Doubles, _Ints, _Bytes, _Doubles, _Doubles]
+
 class Shell:
     def __init__(
         self,
@@ -31,7 +33,7 @@ class Shell:
     ) -> None: ...
     def contacts(
         self, center: _Doubles, radius: float, method: int, gradient: bool = False
-    ) -> tuple[_Doubles, _Doubles, _Doubles, _Ints, _Bytes, _Doubles, _Doubles]: ...
+    ) -> tuple[_Columns, _Columns | None]: ...
     def contacts_batch(
         self, centers: _Doubles, radii: _Doubles, method: int, threads: int
     ) -> tuple[_Doubles, _Ints]: ...

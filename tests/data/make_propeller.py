@@ -46,7 +46,10 @@ def blade(turn: float):
         lower = np.stack([chord * (arc - 0.5), -0.3 * thick * 4 * arc * (1 - arc)], 1)[-2:0:-1]
         s, t = np.concatenate([upper, lower]).T
         across, axial = s * np.cos(pitch) - t * np.sin(pitch), s * np.sin(pitch) + t * np.cos(pitch)
-        x, y = radius * np.cos(turn) - across * np.sin(turn), radius * np.sin(turn) + across * np.cos(turn)
+        x, y = (
+            radius * np.cos(turn) - across * np.sin(turn),
+            radius * np.sin(turn) + across * np.cos(turn),
+        )
         loft.AddWire(wire(np.stack([x, y, axial], 1)).Wire())
     loft.Build()
     return loft.Shape()

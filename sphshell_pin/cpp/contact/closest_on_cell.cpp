@@ -102,7 +102,8 @@ class CellSearch {
       least_ = point.squaredNorm();
       out_ = {Feature::Vertex, k, 0.0, {kCorner[k][0], kCorner[k][1], point}};
     }
-    level_ = nothing_below(kWhole);
+    whole2_ = least2_of(patch_, kWhole);
+    level_ = nothing_below(whole2_);
     for (int k = 0; k < 3 && !level_; ++k) {
       CubicCurve side = curved.side(facet, k);
       side.c0 -= x;
@@ -154,7 +155,7 @@ class CellSearch {
     if (bound >= least_ * (1 - kSame)) return;
     if (low > 0 || halvings == kMostHalvings) return descend(middle);
     if (halvings == 0) descend(middle);  // what it finds spares parts
-    if (nothing_below(corner)) return;
+    if (nothing_below(halvings == 0 ? whole2_ : least2_of(patch_, corner))) return;
     const Vec2 half[3] = {(corner[0] + corner[1]) / 2, (corner[1] + corner[2]) / 2,
                           (corner[2] + corner[0]) / 2};
     // The part in the middle first: what it finds spares the others.
@@ -165,9 +166,9 @@ class CellSearch {
   }
 
   // What a part may hold beyond what is known cannot be felt.
-  bool nothing_below(const Vec2 (&corner)[3]) const {
+  bool nothing_below(double bound2) const {
     const double distance = std::sqrt(least_), depth = std::max(0.0, radius_ - distance);
-    return least2_of(patch_, corner) >= least_ - 2 * kLevel * distance * depth;
+    return bound2 >= least_ - 2 * kLevel * distance * depth;
   }
 
   // Downhill at every step, and never out of the cell.
@@ -203,7 +204,8 @@ class CellSearch {
   Eigenvalues whole_{0, 0, 0};      // bounds on the second derivative of |x|^2 / 2
   double radius_, least_;           // least: square of the distance of out_
   double steepest_, bend_, twist_;  // bounds on the derivatives of x, over the facet
-  bool level_;  // all of it is as near as its nearest corner
+  double whole2_;  // least2_of the whole cell
+  bool level_;                      // all of it is as near as its nearest corner
   Nearest& out_;
 };
 

@@ -49,6 +49,11 @@ int FacetTable::number(int facet, bool& added) {
   return at.number;
 }
 
+int FacetTable::find(int facet) {
+  const Slot& at = slot(facet);
+  return at.round == round_ ? at.number : kNone;
+}
+
 void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
                        std::vector<Minimum>& minima) {
   std::sort(minima.begin(), minima.end(), [](const Minimum& x, const Minimum& y) {
@@ -74,7 +79,7 @@ void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc
   for (std::size_t i = 0; i < minima.size(); ++i) pieces_[i].cells = 1, pieces_[i].open.clear();
   link_equal_places(sphere, minima);
   for (int i = 0; i < static_cast<int>(minima.size()); ++i)
-    add_links(shell, sphere, minima[i].facet, i, pieces_[i]);
+    add_links(shell, sphere, minima[i].facet, i, i);
   flood(shell, sphere, minima.size());
   pair_minima(shell, sphere, want_dn_dc, minima);
 }
@@ -82,6 +87,11 @@ void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc
 int Components::root(int cell) {
   while (parent_[cell] != cell) cell = parent_[cell] = parent_[parent_[cell]];
   return cell;
+}
+
+bool Components::is_in(int facet, int piece) {
+  const int cell = cells_.find(facet);
+  return cell != FacetTable::kNone && root(cell) == piece;
 }
 
 void Components::start_pieces(std::size_t minima) {
@@ -116,30 +126,37 @@ bool Components::lower(const Link& a, const Link& b) {
                               : a.side > b.side;
 }
 
-void Components::add_links(const Shell& shell, const Sphere& sphere, int f, int cell,
-                           Piece& piece) {
-  const Topology& topology = shell.topology();
+void Components::add_links(const Shell& shell, const Sphere& sphere, int f, int cell, int piece) {
   const Facet& facet = shell.facets()[f];
-  const CurvedFacet& curved = shell.curved()->facets()[f];
-  const double reach = sphere.radius + curved.bulge;
-  const int triangle = shell.triangle_of_facet(f);
+  const CellBounds& bounds = shell.curved()->cells()[f];
+  const double reach = sphere.radius + bounds.bulge;
+  std::vector<Link>& open = pieces_[piece].open;
   for (int k = 0; k < 3; ++k) {
-    const Edge& edge = topology.edges[topology.edge_of[3 * triangle + k]];
-    if (edge.count < 2) continue;
+    const int beyond = bounds.beyond[k];
+    if (beyond == kBoundary || (beyond >= 0 && is_in(triangle_of(beyond), piece))) continue;
     const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
     const double t =
         std::clamp((sphere.centre - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
     const double distance = (facet.corner[k] + t * d - sphere.centre).norm();
     if (distance >= reach) continue;
-    // A side is always seen from the same of its facets, so that a place has one name.
-    const int first = shell.facet_half_edge(topology.incidence[edge.begin]);
-    for (int i = edge.begin; i < edge.begin + edge.count; ++i) {
-      const int g = triangle_of(shell.facet_half_edge(topology.incidence[i]));
-      if (g == f) continue;
-      piece.open.push_back(
-          {reach - distance, LinkKind::Bound, cell, g, triangle_of(first), side_of(first), 0, 0});
-      std::push_heap(piece.open.begin(), piece.open.end(), lower);
+    // A side is seen from the first of its triangles, so that a place has one name.
+    const auto link_to = [&](int h, int name) {
+      open.push_back({reach - distance, LinkKind::Bound, cell, triangle_of(h), triangle_of(name),
+                      side_of(name), 0, 0});
+      std::push_heap(open.begin(), open.end(), lower);
+    };
+    const int here = 3 * f + k;
+    if (beyond >= 0) {
+      const bool first = shell.triangle_of_facet(f) < shell.triangle_of_facet(triangle_of(beyond));
+      link_to(beyond, first ? here : beyond);
+      continue;
     }
+    const Topology& topology = shell.topology();
+    const int h = 3 * shell.triangle_of_facet(f) + k;
+    const Edge& edge = topology.edges[topology.edge_of[h]];
+    const int name = shell.facet_half_edge(topology.incidence[edge.begin]);
+    for (int i = edge.begin; i < edge.begin + edge.count; ++i)
+      if (topology.incidence[i] != h) link_to(shell.facet_half_edge(topology.incidence[i]), name);
   }
 }
 
@@ -173,6 +190,7 @@ int Components::advance(const Shell& shell, const Sphere& sphere, int piece) {
     open.clear();
     return -1;
   }
+  if (is_in(link.to, piece)) return piece;
   if (link.kind == LinkKind::Bound) {
     const Facet& facet = shell.facets()[link.facet];
     const CubicCurve side = shell.curved()->facets()[link.facet].side(facet, link.side);
@@ -190,7 +208,7 @@ int Components::advance(const Shell& shell, const Sphere& sphere, int piece) {
     parent_.push_back(piece);
     ++pieces_[piece].cells;
     tree_.push_back(link);
-    add_links(shell, sphere, facet, link.to, pieces_[piece]);
+    add_links(shell, sphere, facet, link.to, piece);
     return piece;
   }
   const int other = root(link.to);

@@ -14,7 +14,11 @@ class FacetTable {
   void clear();
   // The number of a facet, a new one where it had none: then `added` is set.
   int number(int facet, bool& added);
+  // The number of a facet, or kNone.
+  int find(int facet);
   int size() const { return count_; }
+
+  static constexpr int kNone = -1;
 
  private:
   struct Slot {
@@ -61,8 +65,9 @@ class Components {
 
   static bool lower(const Link& a, const Link& b);
   int root(int cell);
+  bool is_in(int facet, int piece);
   void start_pieces(std::size_t minima);
-  void add_links(const Shell& shell, const Sphere& sphere, int facet, int cell, Piece& piece);
+  void add_links(const Shell& shell, const Sphere& sphere, int facet, int cell, int piece);
   void link_equal_places(const Sphere& sphere, const std::vector<Minimum>& minima);
   void flood(const Shell& shell, const Sphere& sphere, std::size_t minima);
   int advance(const Shell& shell, const Sphere& sphere, int piece);

@@ -83,16 +83,17 @@ CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
   const double differs = std::max(bend.high, -bend.low) * reach + bounds.stretch * (size + bulge) +
                          kSingle * (std::abs(height) + bulge) + sphere.tolerance;
   within = descent.squaredNorm() <= differs * differs;
-  bool outward[3], backward[3];  // along side k the distance may not fall; nor back along it
+  bool forward[3], backward[3];  // along side k the distance may not fall; nor back along it
   for (int k = 0; k < 3; ++k) {
-    const double limit = differs * std::sqrt(length2[k]), along = descent.dot(edge[k]);
-    outward[k] = along <= limit, backward[k] = -along <= limit;
-    side[k] =
-        near_side[k] && outward[k] && backward[k] && at.normal.dot(edge[k].cross(descent)) <= limit;
+    const double limit2 = differs * differs * length2[k];
+    const double along = descent.dot(edge[k]), inward = at.normal.dot(edge[k].cross(descent));
+    const bool steep = along * along > limit2;
+    forward[k] = !steep || along < 0, backward[k] = !steep || along > 0;
+    side[k] = near_side[k] && !steep && (inward < 0 || inward * inward <= limit2);
   }
   for (int k = 0; k < 3; ++k)
     corner[k] =
-        near_side[k] && near_side[previous_corner(k)] && outward[k] && backward[previous_corner(k)];
+        near_side[k] && near_side[previous_corner(k)] && forward[k] && backward[previous_corner(k)];
 }
 
 // Where the distance is convex all over the cell, Newton's method finds what is within it, and the

@@ -33,8 +33,8 @@ constexpr double kConvex = 0.05;
 // Parts of a cell are no longer divided where they cannot be nearer than what is known by more than
 // this share of the depth (the potential changes by 2.5 times this share: far below 1e-6), ...
 constexpr double kLevel = 1e-7;
-// ... or after so many halvings, which ill-shaped cells reach.
-constexpr int kMostHalvings = 5;
+// ... or after so many halvings, which slivers reach: the best descent from all parts is taken.
+constexpr int kMostHalvings = 3;
 
 // Parts of a side are no longer divided where the square of the distance varies by less than this
 // share: the depth is exact to half of it.

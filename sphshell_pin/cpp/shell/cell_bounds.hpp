@@ -49,9 +49,10 @@ struct Eigenvalues {
   }
 };
 
-// Bounds on the derivatives of an element x(p) over its flat facet, p in its plane, with normal n;
-// from control points, so they hold all over it.
-struct alignas(16) CellBounds {
+// What a query reads of most cells: one cache line. Bounds on the derivatives of an element x(p)
+// over its flat facet, p in its plane, with normal n; from control points, so they hold all over
+// it.
+struct alignas(64) CellBounds {
   float low, high;  // n . x'' along any direction [1/m]
   float sway;       // size of the part of x'' in the plane [1/m]
   float stretch;    // size of the part of x' - p' in the plane
@@ -60,7 +61,9 @@ struct alignas(16) CellBounds {
   // In the middle: x less the flat facet's, and the direction in the plane in which n . x rises.
   float offset[3], lean[3];
 
-  bool flat() const { return bulge == 0; }
+  // Across side k: the half-edge (3 facet + side) of the one facet there, or a code of Owned, with
+  // kNotMine where there are several.
+  int beyond[3];
 
   // Of the second derivative of |x - c|^2 / 2, seen from a centre at `height` above the plane and
   // at most `aside` from the flat facet along it.
@@ -75,6 +78,8 @@ struct alignas(16) CellBounds {
     return out;
   }
 };
+
+static_assert(sizeof(CellBounds) == 64);
 
 CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge);
 

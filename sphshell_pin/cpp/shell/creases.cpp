@@ -35,7 +35,7 @@ constexpr double kSurelySharp = 1.2;
 // longer by this factor.
 constexpr double kWall = 0.1, kLonger = 2.5;
 // A crease goes on along a joint in the same direction (cosine) that turns alike (factor).
-constexpr double kOnward = 0.8, kSameTurn = 2;
+constexpr double kOnward = 0.85, kSameTurn = 1.3;
 constexpr int kMostRounds = 40;
 
 // What an element says by itself about the surface where it reaches one of its sides.

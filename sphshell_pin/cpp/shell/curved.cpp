@@ -384,10 +384,19 @@ void CurvedShell::build_cones(const Shell& shell) {
 }
 
 void CurvedShell::bound_cells(const Shell& shell) {
+  const Topology& topology = shell.topology();
   cells_.assign(facets_.size(), CellBounds{});
   for_each_in_parallel(facets_.size(), [&](std::size_t f) {
     const Facet& facet = shell.facets()[f];
     if (!facets_[f].flat) cells_[f] = bounds_of(facet, facets_[f].patch(facet), facets_[f].bulge);
+    for (int k = 0; k < 3; ++k) {
+      const int h = 3 * shell.triangle_of_facet(static_cast<int>(f)) + k;
+      const Edge& edge = topology.edges[topology.edge_of[h]];
+      const int* all = &topology.incidence[edge.begin];
+      cells_[f].beyond[k] = edge.count == 1  ? kBoundary
+                            : edge.count > 2 ? kNotMine
+                                             : shell.facet_half_edge(all[all[0] == h ? 1 : 0]);
+    }
   });
 }
 

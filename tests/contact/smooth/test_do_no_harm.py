@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
 from sphshell_pin import Shell
+from tests import meshes
 from tests.contact.smooth.parts import (
     Part,
     averaged_normals,
@@ -17,6 +20,7 @@ from tests.contact.smooth.parts import (
     random_turned,
     turned,
 )
+from tests.contact.smooth.surfaces import SURFACES, mean_edge, shell_of
 
 COUNT = 100  # of each family
 
@@ -105,3 +109,72 @@ def test_smooth_shaded_solids(name: str, points) -> None:
     )
     assert np.abs(curved - flat).max() <= 1e-3 * size
     assert shell.core_for("smooth").normals_set_aside.any()
+
+
+@pytest.mark.parametrize("radii", [(0.002, 0.01), (0.01, 0.04)])
+def test_propeller(radii: tuple[float, float]) -> None:
+    """Blades on a shaft with a cone, few long triangles: whatever lies a twentieth of its radius or
+    more inside the flat elements touches the curved ones."""
+    shell = Shell.from_file(Path(__file__).parents[2] / "data" / "propeller.stl", unit="mm")
+    rng, count = np.random.default_rng(0), 2000
+    corners = shell.vertices[shell.triangles]
+    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(spans, axis=1)
+    which = rng.choice(len(areas), count, p=areas / areas.sum())
+    on_flat = np.einsum("nk,nkx->nx", rng.dirichlet([1.0, 1.0, 1.0], count), corners[which])
+    radius = np.exp(rng.uniform(*np.log(radii), count))
+    outside = ((1 - rng.uniform(0.05, 0.2, count)) * radius)[:, None] * shell.triangle_normals[
+        which
+    ]
+    depth, _ = shell.contacts_batch(on_flat + outside, radius)
+    assert (depth > 0).all()
+
+
+def test_turned_parts_with_averaged_normals() -> None:
+    """The normals of a file bear witness no more than the elements do."""
+    parts = [make(seed) for seed in range(COUNT) for make in (random_turned, random_extruded)]
+    worse = [
+        number
+        for number, part in enumerate(parts)
+        if part.is_worse_than_flat(averaged_normals(part.vertices, part.elements))
+    ]
+    assert len(worse) <= 0.02 * len(parts), worse
+
+
+def coarse_sphere(level: int):
+    vertices, elements = meshes.icosphere(level, 1.0)
+    return vertices, elements, vertices.copy()
+
+
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_coarse_spheres_with_good_normals_stay_curved(level: int) -> None:
+    """From twenty elements on."""
+    vertices, elements, normals = coarse_sphere(level)
+    shell = Shell(vertices, elements, normals=normals)
+    assert not shell.core_for("smooth").normals_set_aside.any()
+    rng = np.random.default_rng(0)
+    places = rng.normal(size=(500, 3))
+    places *= 1.3 / np.linalg.norm(places, axis=1)[:, None]
+    off = np.abs(shell.closest_points(places).distances - 0.3).max()
+    assert off <= (0.03, 1.5e-3, 1e-4)[level]
+
+
+@pytest.mark.parametrize("name", sorted(SURFACES))
+@pytest.mark.parametrize("exact", [True, False])
+def test_no_creases_on_smooth_surfaces(name: str, exact: bool) -> None:
+    """Jittered vertices and random diagonals, at sides of 0.3: next to nothing is set aside."""
+    core = shell_of(name, 0.3, exact).core_for("smooth")
+    assert core.normals_set_aside.mean() <= 1e-3
+
+
+def test_noise_above_the_curvature_stays_flat() -> None:
+    """Where the joints turn by noise, elements stay flat; where by curvature, they bend."""
+    vertices, elements, normals = SURFACES["dome"].mesh(0.3)
+    side = mean_edge(vertices, elements)
+    noise = np.random.default_rng(0).normal(size=len(vertices))[:, None] * normals
+    curved = []
+    for share in (0.002, 0.05):
+        core = Shell(vertices + share * side * noise, elements).core_for("smooth")
+        curved.append(np.mean(core.bending == 0))
+    assert curved[0] >= 0.99
+    assert curved[1] <= 0.1

@@ -33,9 +33,9 @@ SUFFIXES = (".stl", ".obj", ".ply", ".off")
 
 LONG_WALKS = int(os.environ.get("SPHSHELL_WALKS", "1"))
 
-# The theorem of fixed cells links cells over sides that they share. Where elements pass through
-# each other, two pieces of the surface touch in a line that is no side: what the sphere holds of one
-# may come to be nearest where the other one is, and no link is there that takes as much.
+# The theorem of fixed cells links cells over the sides they share. Where elements pass through each
+# other, two pieces of the surface touch in a line that is no side: what the sphere holds of one may
+# come to be nearest where the other one is, and no link is there that takes as much.
 CROSSED = {
     "manifold_openscad-nonmanifold-crash.obj": "elements pass through each other: no side is there",
 }
@@ -239,6 +239,8 @@ def roll(some: Spheres, i: int, rng: np.random.Generator, length: float, depth: 
             break
         normal = found.normal[0]
         along = along - along @ normal * normal
+        if np.linalg.norm(along) < 1e-6:
+            along = np.cross(normal, rng.normal(size=3))
         along /= np.linalg.norm(along)
         center = center + (found.depth[0] - depth * radius) * normal
         path.append(center)

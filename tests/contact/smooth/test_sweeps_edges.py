@@ -1,0 +1,245 @@
+"""A sphere is swept over curved creases, borders and vertices: its force does not jump."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sphshell_pin import Shell
+from tests import meshes
+from tests.contact.smooth.surfaces import SURFACES, can
+from tests.contact.smooth.sweeps import (
+    DEPTHS,
+    LIMIT,
+    UP,
+    assert_as_defined,
+    assert_continuous,
+    changes,
+    segment,
+    sweep,
+)
+from tests.contact.smooth.test_potential import query
+from tests.contact.smooth.test_true_edges import cone
+
+
+def lens(half: float, rows: int, columns: int):
+    """Two caps of a sphere of radius four that meet in a circle of radius `half`, and their normals
+    per corner: a round crease."""
+    drop = np.sqrt(16.0 - half**2)
+    polar = np.arcsin(half / 4) * np.arange(1, rows + 1) / rows
+    turn = 2 * np.pi * np.arange(columns) / columns
+    polar, turn = (g.ravel() for g in np.meshgrid(polar, turn, indexing="ij"))
+    upper = 4 * np.stack(
+        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=1
+    )
+    upper = np.concatenate([[[0.0, 0.0, 4.0]], upper])
+    triangles = cone(columns, 0.5, rows)[1]
+    upper[-columns:, 2] = drop
+    below = np.arange(len(upper)) + len(upper)
+    below[-columns:] = np.arange(len(upper) - columns, len(upper))
+    vertices = np.concatenate([upper - [0, 0, drop], (upper - [0, 0, drop]) * [1, 1, -1]])
+    normals = np.concatenate([upper[triangles], (upper * [1, 1, -1])[triangles][:, ::-1]]) / 4
+    triangles = np.concatenate([triangles, below[triangles][:, ::-1]])
+    used, triangles = np.unique(triangles, return_inverse=True)
+    return vertices[used], triangles.reshape(-1, 3).astype(np.int32), normals
+
+
+def curved_sheet(name: str):
+    """Open sheets with curved borders: vertices, elements, normals."""
+    if name == "cap":
+        vertices, elements = meshes.dome(8, size=4.0, radius=4.0)
+        return vertices, elements, (vertices + [0.0, 0.0, 4.0]) / 4
+    if name == "gutter":
+        flat, elements = meshes.random_plate(200, seed=3, size=4.0, slivers=False)
+        x, y, _ = flat.T
+        normals = np.stack([np.sin(x / 3), 0 * x, np.cos(x / 3)], axis=1)
+        return 3 * normals + np.stack([0 * x, y, 0 * x - 3], axis=1), elements, normals
+    return SURFACES[{"tube": "cylinder outside", "wave": "wavy above"}[name]].mesh(0.6)
+
+
+@cache
+def edged(kind: str, exact: bool = True) -> Shell:
+    """Shells with borders and true edges, with exact normals or estimated ones."""
+    if kind in ("can", "cup"):
+        vertices, elements, normals = can()
+        side, crease = {"can": "outside", "cup": "inside"}[kind], 30.0
+    elif kind in ("lens", "inside a lens"):
+        half, rows, columns = (1.6, 4, 24) if kind == "lens" else (3.95, 14, 64)
+        vertices, elements, normals = lens(half, rows, columns)
+        side, crease = ("outside" if kind == "lens" else "inside"), 12.0
+    elif kind in ("tube", "cap", "wave", "gutter"):
+        vertices, elements, normals = curved_sheet(kind)
+        side, crease = "both", 30.0
+    else:
+        vertices, elements = {
+            "sheet": lambda: meshes.grid_plate(3, 3, size=4.0),
+            "l plate": lambda: meshes.l_plate(2),
+            "cube": lambda: meshes.cube(4.0),
+            "box": lambda: meshes.cube(4.0),
+            "cone": lambda: cone(40, 0.8, 3),
+        }[kind]()
+        if kind in ("l plate", "cone"):
+            vertices = 4 * vertices
+        side, crease, exact = {"cube": "outside", "box": "inside"}.get(kind, "both"), 30.0, False
+    return Shell(
+        vertices,
+        elements,
+        normals=normals if exact else None,
+        crease_angle=np.radians(crease),
+        side=side,
+    )
+
+
+def deepest(shell, center) -> float:
+    return query(shell, center).depth.max(initial=0.0)
+
+
+def along_edges(shell, depth: float, count: int, seed: int = 0, reach: float = 0.3):
+    """Paths near borders and creases, through a place of the given depth in a random direction."""
+    rng = np.random.default_rng(seed)
+    sign = {"both": 0, "outside": 1, "inside": -1}[shell.side]
+    edges = shell.edge_vertices[np.flatnonzero(shell.edge_class > 0)]
+    inner = shell.vertices.mean(axis=0)
+    while count:
+        a, b = shell.vertices[rng.choice(edges)]
+        place = a + rng.choice([0.0, rng.uniform(), 1.0]) * (b - a)
+        out = rng.normal(size=3)
+        out /= np.linalg.norm(out)
+        if sign * out @ (place - inner) < 0:
+            out = -out
+        low, high = 0.7, 1.8
+        if not deepest(shell, place + low * out) > depth > deepest(shell, place + high * out):
+            continue
+        while high - low > 1e-9:
+            middle = (low + high) / 2
+            if deepest(shell, place + middle * out) > depth:
+                low = middle
+            else:
+                high = middle
+        along = rng.normal(size=3)
+        along *= reach / np.linalg.norm(along)
+        path = segment(place + low * out - along, place + low * out + along, 9)
+        # At the surface itself no normal is defined, and behind it a one-sided shell pushes back.
+        distance = shell.closest_points(path).distances
+        if (sign * distance if sign else distance).min() > 0.7:
+            count -= 1
+            yield path
+
+
+EDGED = [
+    (kind, exact)
+    for kind in ("can", "cup", "lens", "inside a lens", "tube", "cap", "wave", "gutter")
+    for exact in (True, False)
+] + [(kind, False) for kind in ("sheet", "l plate", "cube", "box", "cone")]
+
+
+@pytest.mark.parametrize(("kind", "exact"), EDGED)
+def test_edges(kind: str, exact: bool) -> None:
+    """Curved creases, borders, and bodies with plane sides."""
+    shell = edged(kind, exact)
+    for depth in DEPTHS:
+        assert_continuous(shell, along_edges(shell, depth, 9), depth, 5)
+
+
+def star(kind: str, facets: int, slope: float):
+    """Facets round a vertex at the origin, at irregular angles: a tip, a pit, or a saddle whose
+    edges rise and fall by turns."""
+    vertices, triangles = cone(facets, np.radians(slope))
+    turn = np.arctan2(vertices[1:, 1], vertices[1:, 0])
+    turn += np.random.default_rng(1).uniform(-0.2, 0.2, facets) * 2 * np.pi / facets
+    vertices[1:, 0], vertices[1:, 1] = np.cos(turn), np.sin(turn)
+    if kind == "saddle":
+        vertices[1::2, 2] *= -1
+    return 4 * vertices * [1, 1, -1 if kind == "pit" else 1], triangles
+
+
+def lowered(shell, center, depth: float):
+    """The centre moved up or down until its deepest contact has the given depth."""
+    for _ in range(12):
+        found = query(shell, center)
+        lift = (found.depth[0] - depth) / found.normal[0, 2] if len(found) else -0.05
+        center = center + lift * UP
+        if 0 <= abs(lift) < 1e-9:
+            break
+    return center
+
+
+def over_vertex(shell, depth: float):
+    """Paths over the vertex at the origin and past it, of constant depth and of constant height."""
+    rng = np.random.default_rng(5)
+    share = np.linspace(-1, 1, 12)
+    for aside in (1e-3, 0.02, 0.1):
+        turn = rng.uniform(0, 2 * np.pi)
+        along = np.array([np.cos(turn), np.sin(turn), 0.0])
+        foot = aside * np.array([-along[1], along[0], 0.0]) + UP
+        path = foot + 0.6 * (share * abs(share))[:, None] * along
+        if aside == 0.02:
+            yield path + (lowered(shell, foot, depth) - foot)
+        else:
+            yield np.array([lowered(shell, center, depth) for center in path])
+
+
+STARS = [
+    (kind, facets, slope)
+    for kind in ("tip", "pit", "saddle")
+    for facets in (3, 4, 6, 12)
+    for slope in (2, 10, 40)
+    if (kind, facets) != ("saddle", 3)
+]
+
+
+def assert_jumps_as_defined(shell, paths, depth: float) -> None:
+    """The potential does not jump, and the force only where that of the definition does: where
+    passes close a ring round a pit and two are equally high, either may be the last."""
+    for path in paths:
+        pairs = sweep(shell, path)
+        for pair, (force, potential) in zip(pairs, changes(shell, pairs, depth), strict=True):
+            assert potential <= LIMIT, (potential, pair[0].tolist())
+            if force > LIMIT:
+                # A little off the tie, which round-off decides.
+                off = 1e-10 * (pair[1] - pair[0]) / np.linalg.norm(pair[1] - pair[0])
+                assert_as_defined(shell, [pair[0] - off, pair[1] + off], depth)
+
+
+@pytest.mark.parametrize(("kind", "facets", "slope"), STARS)
+def test_vertices(kind: str, facets: int, slope: float) -> None:
+    """Pyramids from outside and inside, and saddles of up and down folds, all creases."""
+    shell = Shell(*star(kind, facets, slope), crease_angle=np.radians(0.3))
+    for depth in DEPTHS:
+        paths = list(over_vertex(shell, depth))
+        if kind == "pit":
+            assert_jumps_as_defined(shell, paths, depth)
+        else:
+            assert_continuous(shell, paths, depth)
+        assert_as_defined(shell, [path[k] for path in paths for k in (3, 6)], depth)
+
+
+@pytest.mark.parametrize(("kind", "facets", "slope"), [s for s in STARS if s[2] <= 10])
+def test_vertices_that_count_as_smooth(kind: str, facets: int, slope: float) -> None:
+    """The same flat facets with their own normals and the crease angle of 30 degrees: the potential
+    does not jump, nor, but in pits, the force."""
+    vertices, triangles = star(kind, facets, slope)
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    shell = Shell(vertices, triangles, normals=np.repeat(normals[:, None], 3, axis=1))
+    for depth in DEPTHS:
+        for path in over_vertex(shell, depth):
+            pairs = sweep(shell, path)
+            change = changes(shell, pairs, depth)[:, 1 if kind == "pit" else 0]
+            assert change.max() <= LIMIT, (change.max(), pairs[change.argmax()][0].tolist())
+
+
+def test_corner_of_a_box() -> None:
+    """Three walls at right angles, touched one, two and three at a time."""
+    shell = edged("box")
+    rng = np.random.default_rng(6)
+    for depth in DEPTHS:
+        corner = 2.0 - (1 - depth) * np.ones(3)
+        along = rng.normal(size=(6, 3))
+        along *= 0.02 / np.linalg.norm(along, axis=1)[:, None]
+        paths = [segment(corner - d, corner + 0.8 * d, 9) for d in along]
+        assert_continuous(shell, paths, depth)
+        assert_as_defined(shell, [c for path in paths for c in path[:4]], depth)
