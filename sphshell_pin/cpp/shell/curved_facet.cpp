@@ -41,10 +41,11 @@ void CurvedFacet::set_side(int k, const Vec3& first, const Vec3& last) {
   exponent = std::max(exponent - 47, -1000);  // 47 bits and a sign; below, all is zero
   exponent_[k] = static_cast<std::int16_t>(exponent);
   constexpr std::int64_t kMost = (std::int64_t(1) << 47) - 1;
+  const double units = std::ldexp(1.0, -exponent);  // of one metre
   for (int at = 0; at < 6; ++at) {
-    const double lift = at < 3 ? first[at] : last[at - 3];
-    const std::int64_t number =
-        std::clamp<std::int64_t>(std::llround(std::ldexp(lift, -exponent)), -kMost, kMost);
+    const double lift = units * (at < 3 ? first[at] : last[at - 3]);
+    const auto nearest = static_cast<std::int64_t>(lift + std::copysign(0.5, lift));
+    const std::int64_t number = std::clamp(nearest, -kMost, kMost);
     high_[k][at] = static_cast<std::int16_t>(number >> 32);
     low_[k][at] = static_cast<std::uint32_t>(number);
   }
