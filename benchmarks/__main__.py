@@ -6,6 +6,7 @@ import argparse
 
 import numpy as np
 
+from sphshell_pin.benchmarks.building import SHEETS, building
 from sphshell_pin.benchmarks.query import against_peers, against_size
 from sphshell_pin.benchmarks.step import ingredients, step_cost
 from sphshell_pin.benchmarks.timing import machine, measure_import, one_core, ratio
@@ -30,6 +31,7 @@ def main() -> None:
     print(machine())
     against_peers(rounds)
     against_size(rounds)
+    building(max(1, rounds // 8), SHEETS[:1])
     step_cost(2 * rounds)
     ingredients(2 * rounds)
     import_time(max(5, rounds // 2))

@@ -18,8 +18,8 @@ from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.corner_normals import settle_normals, unit_normals
 from sphshell_pin.shell.health import Place, ShellHealth
 from sphshell_pin.shell.joints import settle_joints
-from sphshell_pin.shell.orientation import Borders, Oriented, find_borders, orient, split_elements
-from sphshell_pin.shell.polygons import Polygons, examine_quads, triangle_shapes, without_area
+from sphshell_pin.shell.orientation import Borders, Oriented, as_triangles, find_borders, orient
+from sphshell_pin.shell.polygons import Polygons, examine_quads, without_area
 from sphshell_pin.shell.raw import Floats, Ints, Mask, RawSurface, raw_surface
 
 WELD_TOLERANCE = 1e-7
@@ -97,24 +97,25 @@ def clean_surface(raw: RawSurface) -> CleanedSurface:
         "notes": raw.notes,
     }
     table = unit_normals(raw, found)
-    used, compact = _used_vertices(raw.corners, len(raw.vertices))
-    vertices = np.ascontiguousarray(raw.vertices[used])
+    polygons, vertices = _without_unused(Polygons.from_raw(raw), raw.vertices)
     size = box_diagonal(vertices)
     if size == 0.0:
         raise InvalidShell("all vertices of the surface lie in one place: there is no element")
     tolerance = WELD_TOLERANCE * size
     representative, distance = _core.mend_weld(vertices, tolerance)
     found["weld_tolerance"] = tolerance
-    found["welded_vertices"] = int((representative != np.arange(len(vertices))).sum())
+    welded = int((representative != np.arange(len(vertices), dtype=np.int32)).sum())
+    found["welded_vertices"] = welded
     found["weld_distance"] = float(distance)
-    polygons = Polygons.from_raw(raw).with_corners(representative[compact])
+    if welded:
+        polygons = polygons.with_corners(representative[polygons.corners])
     polygons, table = _mend(polygons, vertices, table, tolerance, size, found)
     oriented = orient(polygons, vertices)
-    used, compact = _used_vertices(oriented.polygons.corners, len(vertices))
+    polygons, vertices = _without_unused(oriented.polygons, vertices)
     # Those merged into another vertex are counted there.
-    found["unused_vertices"] = len(raw.vertices) - found["welded_vertices"] - len(used)
-    oriented = replace(oriented, polygons=oriented.polygons.with_corners(compact))
-    return _with_faces(_assemble(oriented, vertices[used], table, found), raw)
+    found["unused_vertices"] = len(raw.vertices) - welded - len(vertices)
+    oriented = replace(oriented, polygons=polygons)
+    return _with_faces(_assemble(oriented, vertices, table, found), raw)
 
 
 def take_surface(raw: RawSurface) -> CleanedSurface:
@@ -154,12 +155,20 @@ def box_diagonal(points: Floats) -> float:
     return float(np.linalg.norm([np.ptp(np.ascontiguousarray(points[:, k])) for k in range(3)]))
 
 
-def _used_vertices(corners: Ints, count: int) -> tuple[Ints, Ints]:
-    """Return the vertices in use, ascending, and the corners renumbered over them."""
+def _in_use(corners: Ints, count: int) -> Mask:
+    """(count,) which vertices are corners."""
     in_use = np.zeros(count, np.bool_)
     in_use[corners] = True
+    return in_use
+
+
+def _without_unused(polygons: Polygons, vertices: Floats) -> tuple[Polygons, Floats]:
+    """Return the polygons over the vertices they use, in the same order, and those."""
+    in_use = _in_use(polygons.corners, len(vertices))
+    if in_use.all():
+        return polygons, np.ascontiguousarray(vertices)
     place = np.cumsum(in_use, dtype=np.int32) - np.int32(1)
-    return np.flatnonzero(in_use).astype(np.int32), place[corners]
+    return polygons.renumbered(place), vertices[in_use]
 
 
 def _mend(
@@ -196,16 +205,8 @@ def _drop_flat(
     polygons: Polygons, vertices: Floats, given: Mask, found: dict[str, Any]
 ) -> Polygons:
     """Without repeated corners and without elements that have no area."""
-    while True:
-        repeated = polygons.corners == polygons.corners[polygons.next_slot]
-        if not repeated.any():
-            # A corner whose two neighbours are one vertex is the tip of a spike.
-            repeated = (
-                polygons.corners[polygons.previous_slot] == polygons.corners[polygons.next_slot]
-            )
-            if not repeated.any():
-                break
-        polygons = polygons.drop_slots(repeated)
+    while (repeated := _core.mend_repeats(polygons.offsets, polygons.corners)).size:
+        polygons = polygons.drop_slots(repeated.view(np.bool_))
         polygons = polygons.keep(polygons.counts >= 3)
         if len(polygons) == 0:
             break
@@ -225,8 +226,11 @@ def _drop_flat(
 
 
 def _drop_duplicates(polygons: Polygons, given: Mask, found: dict[str, Any]) -> Polygons:
-    first, opposite = _core.mend_duplicates(polygons.offsets, polygons.corners)
-    single = first == np.arange(len(polygons))
+    edges = polygons.edges
+    first, opposite = _core.mend_duplicates(
+        polygons.offsets, polygons.corners, edges.slot_edge, edges.users
+    )
+    single = first == np.arange(len(polygons), dtype=np.int32)
     found["duplicate_elements"] += int((~single).sum())
     found["opposite_duplicates"] += int(opposite.sum())
     polygons = polygons.keep(single)
@@ -239,13 +243,12 @@ def _split_t_junctions(
     polygons: Polygons, vertices: Floats, table: Floats | None, tolerance: float
 ) -> tuple[Polygons, Floats | None, int]:
     """With the vertices that lie on open edges made corners there; and how many."""
-    slot_edge, ends, users = _core.mend_edges(polygons.offsets, polygons.corners, len(vertices))
-    open_edge = users == 1
+    open_edge = polygons.edges.users == 1
     if not open_edge.any():
         return polygons, table, 0
-    slots = np.flatnonzero(open_edge[slot_edge])
+    slots = np.flatnonzero(open_edge[polygons.edges.slot_edge])
     # Both sides of a crack are open: only ends of open edges can be T-junctions.
-    candidates = np.unique(ends[open_edge])
+    candidates = np.unique(polygons.edges.ends[open_edge])
     at, vertex, parameter = _core.mend_t_junctions(
         polygons.offsets,
         polygons.corners,
@@ -316,36 +319,32 @@ def _assemble(
     turn_normals: bool = True,
 ) -> CleanedSurface:
     polygons = oriented.polygons
-    split = split_elements(polygons, vertices)
-    triangles = np.ascontiguousarray(polygons.corners[split.slots], np.int32)
-    corners = vertices[triangles]
-    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = 0.5 * np.linalg.norm(spans, axis=1)
+    triangles, triangle_element = as_triangles(polygons, vertices)
     normals = None
     if table is not None and polygons.normal_row is not None:
-        normals = settle_normals(table, polygons, split, spans, found, turn_normals)
+        normals = settle_normals(table, polygons, vertices, found, turn_normals)
     elements = np.full((len(polygons), 4), -1, np.int32)
-    place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
-    elements[polygons.polygon_of_slot, place] = polygons.corners
-    in_use = np.bincount(polygons.corners, minlength=len(vertices)) > 0
+    if polygons.only_triangles:
+        elements[:, :3] = triangles
+    else:
+        place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
+        elements[polygons.polygon_of_slot, place] = polygons.corners
+    in_use = _in_use(triangles, len(vertices))
     borders = find_borders(polygons, vertices, oriented.component)
-    number = len(oriented.closed)
-    component_area = np.bincount(oriented.component[split.element], areas, number).astype(
-        np.float64
-    )
+    starts = np.arange(0, triangles.size + 1, 3)
     health = ShellHealth(
         **found,
-        **_holes(borders, component_area),
+        **_holes(borders, oriented.area),
         vertices=len(vertices),
         elements=len(polygons),
         triangles=len(triangles),
-        quads=int((polygons.counts == 4).sum()),
-        size=box_diagonal(vertices[in_use]),
-        area=float(areas.sum()),
+        quads=len(triangles) - len(polygons),
+        size=box_diagonal(vertices if in_use.all() else vertices[in_use]),
+        area=float(oriented.area.sum()),
         volume=oriented.volume,
         flipped_elements=int(oriented.flipped.sum()),
         reversed_components=oriented.reversed_components,
-        components=number,
+        components=len(oriented.closed),
         closed_components=int(oriented.closed.sum()),
         cavities=oriented.cavities,
         one_sided_components=int(oriented.one_sided.sum()),
@@ -355,10 +354,10 @@ def _assemble(
         non_manifold_edges=borders.non_manifold,
         non_manifold_at=_place(borders.non_manifold_at),
         euler_number=int(in_use.sum()) - borders.edges + len(polygons),
-        worst_shape=float(triangle_shapes(*(corners[:, k] for k in range(3))).min()),
+        worst_shape=float(_core.mend_shapes(starts, triangles.reshape(-1), vertices).min()),
     )
     return CleanedSurface(
-        vertices, elements, triangles, split.element, normals, polygons.source, health
+        vertices, elements, triangles, triangle_element, normals, polygons.source, health
     )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.shell.orientation import Split
+from sphshell_pin.shell.orientation import split_elements
 from sphshell_pin.shell.polygons import Polygons
 from sphshell_pin.shell.raw import Floats, Mask, RawSurface
 
@@ -38,17 +38,19 @@ def unit_normals(raw: RawSurface, found: dict[str, Any]) -> Floats | None:
 def settle_normals(
     table: Floats,
     polygons: Polygons,
-    split: Split,
-    spans: Floats,
+    vertices: Floats,
     found: dict[str, Any],
     turn: bool = True,
 ) -> Floats:
     """Return normals (t, 3, 3) of the triangle corners, on the side of their elements.
 
     All corners of an element are turned together, if their sum points against the element's own
-    normal. spans : (t, 3) twice the area vector of the triangles. Missing normals become the
-    element's. What was found goes into `found`, under the names of ShellHealth.
+    normal. Missing normals become the element's. What was found goes into `found`, under the names
+    of ShellHealth.
     """
+    split = split_elements(polygons, vertices)
+    corners = vertices[polygons.corners[split.slots]]
+    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sums = [np.bincount(split.element, spans[:, k], len(polygons)) for k in range(3)]
     vectors = np.stack(sums, axis=1).astype(np.float64)
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)

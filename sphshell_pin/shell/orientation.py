@@ -8,7 +8,7 @@ import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.shell.polygons import Polygons, examine_quads
-from sphshell_pin.shell.raw import Bytes, Floats, Ints, Longs, Mask
+from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,9 @@ class Split:
 
 def split_elements(polygons: Polygons, vertices: Floats) -> Split:
     """Triangles of polygons with three or four corners."""
+    if polygons.only_triangles:
+        count = len(polygons)
+        return Split(np.arange(3 * count).reshape(-1, 3), np.arange(count, dtype=np.int32))
     counts = polygons.counts
     starts = np.cumsum(counts - 2) - (counts - 2)
     slots = np.empty((int((counts - 2).sum()), 3), np.int64)
@@ -45,6 +48,14 @@ def split_elements(polygons: Polygons, vertices: Floats) -> Split:
     return Split(slots, element)
 
 
+def as_triangles(polygons: Polygons, vertices: Floats) -> tuple[Ints, Ints]:
+    """Vertices (t, 3) of the triangles of `split_elements`, and the polygon (t,) of each."""
+    if polygons.only_triangles:
+        return polygons.corners.reshape(-1, 3), np.arange(len(polygons), dtype=np.int32)
+    split = split_elements(polygons, vertices)
+    return polygons.corners[split.slots], split.element
+
+
 @dataclass(frozen=True)
 class Oriented:
     """The outcome of `orient`.
@@ -59,6 +70,7 @@ class Oriented:
     reversed_components : components turned as a whole
     cavities : closed components inside another one, wound inward (away from the material)
     volume : enclosed by the closed components [m^3]
+    area : (components,) [m^2]
     """
 
     polygons: Polygons
@@ -69,6 +81,7 @@ class Oriented:
     reversed_components: int
     cavities: int
     volume: float
+    area: Floats
 
 
 def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> Oriented:
@@ -78,38 +91,35 @@ def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> 
     its inside, and so on by turns. An open one keeps the winding most of its area has. With
     `keep_winding` nothing is turned, and a component counts as closed only if it need not be.
     """
+    edges = polygons.edges
     component, flipped, one_sided = _core.mend_flood_fill(
-        polygons.offsets, polygons.corners, len(vertices)
+        polygons.offsets, polygons.corners, edges.slot_edge, edges.users
     )
-    flip: Mask = flipped.astype(np.bool_)
+    flip: Mask = flipped.view(np.bool_)
     number = len(one_sided)
-    split = split_elements(polygons, vertices)
-    corners = vertices[polygons.corners[split.slots]]
-    vector_area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.sqrt(np.einsum("tx,tx->t", vector_area, vector_area))
-    owner = component[split.element]
-    turn = flip[split.element]
-
-    closed = _closed_components(polygons, vertices, component, flip, number)
+    closed = _closed_components(polygons, component, flip, number)
     closed &= one_sided == 0
     if keep_winding:
         odd_ones = np.bincount(component, flip, number)
         closed &= (odd_ones == 0) | (odd_ones == np.bincount(component, minlength=number))
+    triangles, element = as_triangles(polygons, vertices)
     # The volume about a point near the surface loses the least to rounding.
-    centre = vertices.mean(axis=0)
-    share = np.einsum("tx,tx->t", corners[:, 0] - centre, vector_area) / 3.0
-    volume = np.bincount(owner, np.where(turn, -share, share), number)
-    depth = _nesting(polygons, vertices, split, area, component, closed)
-    inward = depth % 2 == 1
-    turned_area = np.bincount(owner, np.where(turn, area, -area), number)
-    total_area = np.bincount(owner, area, number)
+    volume, total_area, turned_area, largest = _core.mend_sums(
+        vertices, triangles, element, component, flipped, number, vertices.mean(axis=0)
+    )
+    # The middle of the largest triangle: the place least likely to lie on another component.
+    places = vertices[triangles[largest]].mean(axis=1)
+    inward = _nesting(vertices, triangles, component[element], places, closed) % 2 == 1
     reverse = np.where(
         closed, (volume < 0.0) != inward, turned_area > 1e-9 * np.maximum(total_area, 1e-300)
     )
     flip ^= reverse[component]
     if keep_winding:
         flip[:] = False
-    whole = np.bincount(component, flip, number) == np.bincount(component, minlength=number)
+    reversed_components = 0
+    if flip.any():
+        turned = np.bincount(component, flip, number)
+        reversed_components = int((turned == np.bincount(component, minlength=number)).sum())
     sign = np.where(inward, -1.0, 1.0)
     return Oriented(
         polygons=polygons.reverse(flip),
@@ -117,21 +127,19 @@ def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> 
         closed=closed,
         one_sided=one_sided.astype(np.bool_),
         flipped=flip,
-        reversed_components=int(whole.sum()),
+        reversed_components=reversed_components,
         cavities=0 if keep_winding else int((closed & inward).sum()),
         volume=float((np.abs(volume) * sign)[closed].sum()),
+        area=total_area,
     )
 
 
-def _closed_components(
-    polygons: Polygons, vertices: Floats, component: Ints, flip: Mask, number: int
-) -> Mask:
+def _closed_components(polygons: Polygons, component: Ints, flip: Mask, number: int) -> Mask:
     """(components,) True where the directed edges of a component cancel."""
-    slot_edge, _, users = _core.mend_edges(polygons.offsets, polygons.corners, len(vertices))
+    slot_edge = polygons.edges.slot_edge
     closed = np.ones(number, np.bool_)
-    slot_users = users[slot_edge]
     # Edges of two polygons cancel by construction; only the others need to be added up.
-    odd = np.flatnonzero(slot_users != 2)
+    odd = np.flatnonzero((polygons.edges.users != 2)[slot_edge])
     owner = component[polygons.polygon_of_slot[odd]]
     following = polygons.corners[polygons.next_slot[odd]]
     sign = np.where(polygons.corners[odd] < following, 1, -1)
@@ -143,26 +151,14 @@ def _closed_components(
     return closed
 
 
-def _nesting(
-    polygons: Polygons,
-    vertices: Floats,
-    split: Split,
-    area: Floats,
-    component: Ints,
-    closed: Mask,
-) -> Ints:
-    """(components,) how many other closed components enclose each closed one."""
-    owner = component[split.element]
+def _nesting(vertices: Floats, triangles: Ints, owner: Ints, places: Floats, closed: Mask) -> Ints:
+    """(components,) how many other closed components enclose the place (3,) of each closed one.
+
+    owner : (t,) component of each triangle
+    """
     if int(closed.sum()) < 2:
         return np.zeros(len(closed), np.int32)
-    # The middle of the largest triangle: the place least likely to lie on another component.
-    order = np.lexsort((area, owner))
-    last = np.flatnonzero(np.diff(owner[order], append=len(closed)))
-    queries = vertices[polygons.corners[split.slots[order[last]]]].mean(axis=1)
-    triangles = np.ascontiguousarray(polygons.corners[split.slots], np.int32)
-    depth: Ints = _core.mend_nesting(
-        vertices, triangles, np.ascontiguousarray(owner), queries, closed.astype(np.uint8)
-    )
+    depth: Ints = _core.mend_nesting(vertices, triangles, owner, places, closed.astype(np.uint8))
     return depth
 
 
@@ -194,8 +190,8 @@ class Borders:
 
 def find_borders(polygons: Polygons, vertices: Floats, component: Ints) -> Borders:
     """Count the edges of oriented polygons and follow the open ones."""
-    slot_edge, ends, users = _core.mend_edges(polygons.offsets, polygons.corners, len(vertices))
-    single: Bytes = users == 1
+    slot_edge, users = polygons.edges.slot_edge, polygons.edges.users
+    single: Mask = users == 1
     slots = np.flatnonzero(single[slot_edge])
     start = polygons.corners[slots]
     stop = polygons.corners[polygons.next_slot[slots]]
@@ -220,5 +216,5 @@ def find_borders(polygons: Polygons, vertices: Floats, component: Ints) -> Borde
         loop_area=np.sqrt((area**2).sum(axis=1)),
         loop_centre=centre,
         loop_component=owner,
-        non_manifold_at=vertices[ends[many[0]]].mean(axis=0) if many.size else None,
+        non_manifold_at=vertices[polygons.edges.ends[many[0]]].mean(axis=0) if many.size else None,
     )

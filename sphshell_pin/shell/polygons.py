@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from sphshell_pin import _core
 from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask, RawSurface
 
 FLAT_AREA = 1e-12
@@ -14,6 +15,22 @@ FLAT_AREA = 1e-12
 
 EQUAL_SHAPE = 1e-9
 """Shapes (2 area / longest edge^2) nearer than this count as equal."""
+
+
+@dataclass(frozen=True)
+class EdgeTable:
+    """Edges of polygons, in ascending order of their ends.
+
+    Attributes
+    ----------
+    slot_edge : (c,) edge from each corner to the next; -1 where both are one vertex
+    ends : (E, 2) vertices, the lower one first
+    users : (E,) how many corners have the edge
+    """
+
+    slot_edge: Ints
+    ends: Ints
+    users: Ints
 
 
 @dataclass(frozen=True)
@@ -48,6 +65,17 @@ class Polygons:
         return np.diff(self.offsets)
 
     @cached_property
+    def only_triangles(self) -> bool:
+        """True if all have three corners: `corners` is a table of triangles then."""
+        return len(self.corners) == 3 * len(self) and bool((self.counts == 3).all())
+
+    @cached_property
+    def edges(self) -> EdgeTable:
+        """Edges of all polygons."""
+        count = int(self.corners.max()) + 1
+        return EdgeTable(*_core.mend_edges(self.offsets, self.corners, count))
+
+    @cached_property
     def polygon_of_slot(self) -> Ints:
         """(c,) which polygon a corner belongs to."""
         return np.repeat(np.arange(len(self), dtype=np.int32), self.counts)
@@ -59,16 +87,18 @@ class Polygons:
         following[self.offsets[1:] - 1] = self.offsets[:-1]
         return following
 
-    @cached_property
-    def previous_slot(self) -> Longs:
-        """(c,) slot of the corner before."""
-        before = np.arange(-1, len(self.corners) - 1)
-        before[self.offsets[:-1]] = self.offsets[1:] - 1
-        return before
-
     def with_corners(self, corners: Ints) -> Polygons:
         """Return the same polygons over other vertices."""
         return Polygons(self.offsets, np.ascontiguousarray(corners), self.source, self.normal_row)
+
+    def renumbered(self, place: Ints) -> Polygons:
+        """Return the same polygons, vertex v called place[v], which must keep the order."""
+        polygons = self.with_corners(place[self.corners])
+        if "edges" in self.__dict__:  # found already: cached_property keeps them there
+            edges = self.edges
+            known = EdgeTable(edges.slot_edge, place[edges.ends], edges.users)
+            polygons.__dict__["edges"] = known
+        return polygons
 
     def take(self, polygons: Longs) -> Polygons:
         """Return the polygons named, in that order."""
@@ -130,21 +160,11 @@ class Polygons:
         return Polygons(offsets, self.corners[slots], source, rows)
 
 
-def triangle_shapes(a: Floats, b: Floats, c: Floats) -> Floats:
-    """2 area / longest edge^2 of triangles with corners (..., 3); 0 for a point."""
-    ab, ac, bc = b - a, c - a, c - b
-    area = np.sqrt(_squares(np.cross(ab, ac)))
-    longest = np.maximum(np.maximum(_squares(ab), _squares(ac)), _squares(bc))
-    return np.asarray(area / np.where(longest > 0.0, longest, 1.0), np.float64)
-
-
 def without_area(polygons: Polygons, vertices: Floats) -> Mask:
     """(m,) which polygons have no area at all: their corners lie on one line, or in one point."""
-    flat = np.zeros(len(polygons), np.bool_)
-    triangles = np.flatnonzero(polygons.counts == 3)
-    a, b, c = (vertices[polygons.corners[polygons.offsets[triangles] + k]] for k in range(3))
-    flat[triangles] = triangle_shapes(a, b, c) <= 2.0 * FLAT_AREA
-    larger = np.flatnonzero(polygons.counts > 3)
+    shapes = _core.mend_shapes(polygons.offsets, polygons.corners, vertices)
+    flat: Mask = shapes <= 2.0 * FLAT_AREA
+    larger = np.flatnonzero(shapes < 0.0)
     if larger.size:
         few = polygons.take(larger)
         starts = few.offsets[:-1]

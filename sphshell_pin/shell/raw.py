@@ -80,8 +80,8 @@ def raw_surface(vertices: object, elements: object, normals: object = None) -> R
 
 def check_indices(offsets: Longs, corners: Ints, num_vertices: int) -> None:
     """Raise InvalidShell if a polygon names a vertex that does not exist."""
-    wrong = np.flatnonzero((corners < 0) | (corners >= num_vertices))
-    if wrong.size:
+    if corners.min() < 0 or corners.max() >= num_vertices:
+        wrong = np.flatnonzero((corners < 0) | (corners >= num_vertices))
         slot = int(wrong[0])
         element = int(np.searchsorted(offsets, slot, side="right")) - 1
         raise InvalidShell(
@@ -101,8 +101,9 @@ def _vertices(vertices: object) -> Floats:
         )
     if not 3 <= len(points) <= LARGEST_COUNT:
         raise InvalidShell(f"a surface needs at least 3 vertices; {len(points)} given")
-    wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if wrong.size:
+    finite = np.isfinite(points)
+    if not finite.all():
+        wrong = np.flatnonzero(~finite.all(axis=1))
         raise InvalidShell(
             f"vertex {int(wrong[0])} is not finite: {points[wrong[0]].tolist()}"
             + (f" ({wrong.size} such vertices)" if wrong.size > 1 else "")
@@ -123,9 +124,13 @@ def _polygons(elements: object) -> tuple[Longs, Ints]:
         raise InvalidShell("a surface needs at least one element; none given")
     if not np.issubdtype(rows.dtype, np.integer):
         raise InvalidShell(f"elements must hold integer vertex indices; they are {rows.dtype}")
-    if rows.min() < -1 or rows.max() > LARGEST_COUNT:
+    lowest = rows.min()
+    if lowest < -1 or rows.max() > LARGEST_COUNT:
         element, place = np.argwhere((rows < -1) | (rows > LARGEST_COUNT))[0]
         raise InvalidShell(f"element {element} uses vertex {rows[element, place]}: no such vertex")
+    if lowest >= 0:
+        starts = np.arange(len(rows) + 1, dtype=np.int64) * rows.shape[1]
+        return starts, np.array(rows, np.int32, order="C").reshape(-1)
     used = rows >= 0
     counts = used.sum(axis=1)
     ragged = np.flatnonzero((counts < 3) | (used[:, 1:] & ~used[:, :-1]).any(axis=1))

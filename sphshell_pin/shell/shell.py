@@ -109,8 +109,8 @@ class Shell(Topology):
         from sphshell_pin.shell.raw import raw_surface
 
         check_options(crease_angle, side)
-        raw = raw_surface(vertices, elements, normals)
-        surface = clean_surface(raw) if clean else take_surface(raw)
+        made = clean_surface if clean else take_surface
+        surface = made(raw_surface(vertices, elements, normals))
         self._set(surface, crease_angle, side, name, None, None)
 
     @classmethod
@@ -243,38 +243,45 @@ class Shell(Topology):
         self.crease_angle = float(crease_angle)
         self.source = source
         self.unit = unit
-        self.vertices = read_only(np.array(surface.vertices, np.float64, order="C"))
-        self.elements = read_only(np.array(surface.elements, np.int32, order="C"))
-        self.triangles = read_only(np.array(surface.triangles, np.int32, order="C"))
-        self.triangle_element = read_only(np.array(surface.triangle_element, np.int32))
-        self.source_element = read_only(np.array(surface.source_element, np.int32))
-        self.normals = None if surface.normals is None else read_only(surface.normals.copy())
+        vertices = np.ascontiguousarray(surface.vertices, np.float64)
+        triangles = np.ascontiguousarray(surface.triangles, np.int32)
+        triangle_element = np.ascontiguousarray(surface.triangle_element, np.int32)
+        self.elements = read_only(np.ascontiguousarray(surface.elements, np.int32))
+        self.source_element = read_only(np.ascontiguousarray(surface.source_element, np.int32))
+        self.normals = None
+        if surface.normals is not None:
+            self.normals = read_only(np.ascontiguousarray(surface.normals))
         self.element_face = None
         if surface.element_face is not None:
-            self.element_face = read_only(np.array(surface.element_face, np.int32))
+            self.element_face = read_only(np.ascontiguousarray(surface.element_face, np.int32))
         self.face_names = tuple(surface.face_names)
         self.straight = None if surface.straight is None else read_only(surface.straight.copy())
         # Without cleaning there may be vertices no element uses.
-        in_use = np.bincount(self.triangles.ravel(), minlength=len(self.vertices)) > 0
-        corners = self.vertices[in_use]
+        in_use = np.zeros(len(vertices), np.bool_)
+        in_use[triangles] = True
+        corners = vertices if in_use.all() else vertices[in_use]
         self.box = read_only(np.stack([corners.min(axis=0), corners.max(axis=0)]))
         self.size = float(np.linalg.norm(self.box[1] - self.box[0]))
         check_size(self.size)
         self.health: ShellHealth = surface.health.labelled(name=self.name, size=self.size)
         self.core = _core.Shell(
-            self.vertices,
-            self.triangles,
-            self.triangle_element,
+            vertices,
+            triangles,
+            triangle_element,
             crease_angle,
             SIDES.index(side),
-            *self._joints(),
+            *self._joints(triangle_element),
         )
+        # The compiled surface has its own copies: these are views of them.
+        self.vertices = self.core.vertices
+        self.triangles = self.core.triangles
+        self.triangle_element = self.core.triangle_element
 
-    def _joints(self) -> tuple[Ints | None, Floats | None]:
+    def _joints(self, triangle_element: Ints) -> tuple[Ints | None, Floats | None]:
         """CAD face of each triangle (t,) and corner normals (3 t, 3), which say what is smooth."""
         if self.element_face is None or self.normals is None or self.crease_angle == 0.0:
             return None, None
-        return self.element_face[self.triangle_element], self.normals.reshape(-1, 3)
+        return self.element_face[triangle_element], self.normals.reshape(-1, 3)
 
     def contacts(
         self,

@@ -1,7 +1,9 @@
 // Python face of the surface cleaning loops. Arrays go in as they are, come out as new arrays.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -72,16 +74,52 @@ void bind_mending(nb::module_& module) {
 
   module.def(
       "mend_duplicates",
-      [](In<std::int64_t> offsets, In<std::int32_t> corners) {
+      [](In<std::int64_t> offsets, In<std::int32_t> corners, In<std::int32_t> slot_edge,
+         In<std::int32_t> users) {
         sphshell::Duplicates result;
         {
           nb::gil_scoped_release released;
-          result = sphshell::duplicate_polygons(view(offsets, corners));
+          result = sphshell::duplicate_polygons(view(offsets, corners), slot_edge.data(),
+                                                users.data(), users.shape(0));
         }
         return nb::make_tuple(give(std::move(result.first)), give(std::move(result.opposite)));
       },
-      "offsets"_a, "corners"_a,
+      "offsets"_a, "corners"_a, "slot_edge"_a, "users"_a,
       "(first polygon with the same corners (m,), wound the other way (m,)).");
+
+  module.def(
+      "mend_repeats",
+      [](In<std::int64_t> offsets, In<std::int32_t> corners) {
+        return give(sphshell::repeated_corners(view(offsets, corners)));
+      },
+      "offsets"_a, "corners"_a, "Which corners (c,) repeat the next one; empty if none does.");
+
+  module.def(
+      "mend_shapes",
+      [](In<std::int64_t> offsets, In<std::int32_t> corners, InRows<double, 3> points) {
+        return give(sphshell::triangle_shapes(view(offsets, corners), points.data()));
+      },
+      "offsets"_a, "corners"_a, "points"_a,
+      "2 area / longest edge^2 (m,) of triangles; -1 of polygons with more corners.");
+
+  module.def(
+      "mend_sums",
+      [](InRows<double, 3> points, InRows<std::int32_t, 3> triangles,
+         std::optional<In<std::int32_t>> polygon, In<std::int32_t> component, In<std::uint8_t> flip,
+         std::size_t components, In<double> centre) {
+        sphshell::ComponentSums sums;
+        {
+          nb::gil_scoped_release released;
+          sums = sphshell::component_sums(points.data(), triangles.data(),
+                                          polygon ? polygon->data() : nullptr, triangles.shape(0),
+                                          component.data(), flip.data(), components, centre.data());
+        }
+        return nb::make_tuple(give(std::move(sums.volume)), give(std::move(sums.area)),
+                              give(std::move(sums.turned_area)), give(std::move(sums.largest)));
+      },
+      "points"_a, "triangles"_a, "triangle_polygon"_a.none(), "component"_a, "flip"_a,
+      "components"_a, "centre"_a,
+      "(volume, area, turned area, largest triangle) of each component.");
 
   module.def(
       "mend_clip_ears",
@@ -120,17 +158,18 @@ void bind_mending(nb::module_& module) {
 
   module.def(
       "mend_flood_fill",
-      [](In<std::int64_t> offsets, In<std::int32_t> corners, std::size_t vertex_count) {
+      [](In<std::int64_t> offsets, In<std::int32_t> corners, In<std::int32_t> slot_edge,
+         In<std::int32_t> users) {
         sphshell::Orientation result;
         {
           nb::gil_scoped_release released;
-          const auto polygons = view(offsets, corners);
-          result = sphshell::flood_fill(polygons, sphshell::edge_table(polygons, vertex_count));
+          result = sphshell::flood_fill(view(offsets, corners), slot_edge.data(), users.data(),
+                                        users.shape(0));
         }
         return nb::make_tuple(give(std::move(result.component)), give(std::move(result.flip)),
                               give(std::move(result.one_sided)));
       },
-      "offsets"_a, "corners"_a, "vertex_count"_a,
+      "offsets"_a, "corners"_a, "slot_edge"_a, "users"_a,
       "(component (m,), flip (m,), one-sided (components,)) across edges of two polygons.");
 
   module.def(

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
-#include <thread>
 
 #include "bindings/arrays.hpp"
 #include "contact/query.hpp"
 #include "shell/curved.hpp"
+#include "shell/in_parallel.hpp"
 #include "shell/shell.hpp"
 
 #include <nanobind/eigen/dense.h>
@@ -18,9 +18,9 @@ namespace sphshell {
 namespace {
 
 std::vector<Vec3> rows(const Points& table) {
-  std::vector<Vec3> out(table.shape(0));
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = row(table, i);
-  return out;
+  static_assert(sizeof(Vec3) == 3 * sizeof(double));
+  const auto* first = reinterpret_cast<const Vec3*>(table.data());
+  return {first, first + table.shape(0)};
 }
 
 std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& triangles,
@@ -28,9 +28,9 @@ std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& tria
                                   const std::optional<Ints>& face,
                                   const std::optional<Points>& normals) {
   std::vector<Vec3> points = rows(vertices);
-  std::vector<Triangle> corners(triangles.shape(0));
-  for (std::size_t t = 0; t < corners.size(); ++t)
-    corners[t] = {triangles(t, 0), triangles(t, 1), triangles(t, 2)};
+  static_assert(sizeof(Triangle) == 3 * sizeof(int));
+  const auto* first = reinterpret_cast<const Triangle*>(triangles.data());
+  std::vector<Triangle> corners(first, first + triangles.shape(0));
   std::vector<int> owner(element.data(), element.data() + element.shape(0));
   CadFaces cad;
   if (face && normals) {
@@ -74,18 +74,7 @@ nb::tuple contacts(const Shell& shell, const Vec3& centre, double radius, int me
                         same ? nb::object(nb::none()) : columns(query.contacts, dn_dc));
 }
 
-// Splits 0..n over threads; each writes only to its own rows, so results do not depend on threads.
-template <class Work>
-void in_parallel(std::size_t n, int threads, Work&& work) {
-  const int cores = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
-  const std::size_t wanted = static_cast<std::size_t>(std::clamp(threads, 1, cores));
-  const std::size_t workers = std::clamp<std::size_t>(wanted, 1, n / 64 + 1);
-  std::vector<std::thread> pool;
-  for (std::size_t w = 1; w < workers; ++w)
-    pool.emplace_back([&, w] { work(n * w / workers, n * (w + 1) / workers); });
-  work(0, n / workers);
-  for (std::thread& thread : pool) thread.join();
-}
+constexpr std::size_t kGrain = 64;  // fewer queries are not worth a thread
 
 auto contacts_batch(const Shell& shell, const Points& centres, const Doubles& radii, int method,
                     int threads) {
@@ -94,7 +83,7 @@ auto contacts_batch(const Shell& shell, const Points& centres, const Doubles& ra
   std::vector<int> count(n, 0);
   {
     nb::gil_scoped_release release;
-    in_parallel(n, threads, [&](std::size_t begin, std::size_t end) {
+    in_parallel(n, threads, kGrain, [&](std::size_t begin, std::size_t end) {
       Query query;
       std::vector<Contact> shown;
       for (std::size_t i = begin; i < end; ++i) {
@@ -130,7 +119,7 @@ auto closest_points(const Shell& shell, const Points& points, bool smooth, int t
   std::vector<int> element(n);
   {
     nb::gil_scoped_release release;
-    in_parallel(n, threads, [&](std::size_t begin, std::size_t end) {
+    in_parallel(n, threads, kGrain, [&](std::size_t begin, std::size_t end) {
       Query query;
       for (std::size_t i = begin; i < end; ++i) {
         SurfacePoint at = shell.closest_point(row(points, i));
@@ -144,6 +133,12 @@ auto closest_points(const Shell& shell, const Points& points, bool smooth, int t
   }
   return nb::make_tuple(to_array(std::move(point), {n, 3}), to_array(std::move(normal), {n, 3}),
                         to_array(std::move(distance)), to_array(std::move(element)));
+}
+
+// An array over the shell's own memory, which lives as long as the array.
+template <class T>
+auto view(nb::handle shell, const T* data, std::initializer_list<std::size_t> shape) {
+  return nb::ndarray<nb::numpy, const T>(data, shape, shell);
 }
 
 template <class T, class Get>
@@ -184,6 +179,27 @@ void bind_shell(nanobind::module_& m) {
            nb::arg("method"), nb::arg("threads"))
       .def("closest_points", &closest_points, nb::arg("points"), nb::arg("smooth"),
            nb::arg("threads") = 1)
+      .def_prop_ro(
+          "vertices",
+          [](nb::handle self) {
+            const auto& vertices = nb::cast<const Shell&>(self).vertices();
+            return view(self, vertices.data()->data(), {vertices.size(), 3});
+          },
+          nb::rv_policy::automatic)
+      .def_prop_ro(
+          "triangles",
+          [](nb::handle self) {
+            const auto& triangles = nb::cast<const Shell&>(self).triangles();
+            return view(self, triangles.data()->data(), {triangles.size(), 3});
+          },
+          nb::rv_policy::automatic)
+      .def_prop_ro(
+          "triangle_element",
+          [](nb::handle self) {
+            const auto& element = nb::cast<const Shell&>(self).element();
+            return view(self, element.data(), {element.size()});
+          },
+          nb::rv_policy::automatic)
       .def_prop_ro("num_elements", &Shell::num_elements)
       .def_prop_ro("num_patches", [](const Shell& s) { return s.topology().num_patches; })
       .def_prop_ro(
@@ -195,8 +211,8 @@ void bind_shell(nanobind::module_& m) {
               const CurvedFacet& curved = s.curved()->facets()[f];
               double* to = &out[21 * std::size_t(s.triangle_of_facet(int(f)))];
               for (int k = 0; k < 6; ++k)
-                std::copy_n(curved.lift[k / 2][k % 2].data(), 3, to + 3 * k);
-              std::copy_n(curved.middle.data(), 3, to + 18);
+                std::copy_n(curved.lift(k / 2, k % 2).data(), 3, to + 3 * k);
+              std::copy_n(curved.middle(s.facets()[f]).data(), 3, to + 18);
             }
             return to_array(std::move(out), {n, 7, 3});
           },
@@ -205,9 +221,13 @@ void bind_shell(nanobind::module_& m) {
           "corner_normals",
           [](const Shell& s) {
             std::vector<double> out;
-            if (s.curved())
-              for (const Vec3& n : s.curved()->normals()) append(out, n);
-            const std::size_t n = out.size() / 9;
+            const std::size_t n = s.curved() ? s.triangles().size() : 0;
+            for (std::size_t t = 0; t < n; ++t) {
+              const int f = triangle_of(s.facet_half_edge(static_cast<int>(3 * t)));
+              const CubicPatch patch = s.curved()->facets()[f].patch(s.facets()[f]);
+              for (const auto& [u, v] : {std::pair(0, 0), {1, 0}, {0, 1}})
+                append(out, patch.along_u(u, v).cross(patch.along_v(u, v)).normalized());
+            }
             return to_array(std::move(out), {n, 3, 3});
           },
           nb::rv_policy::automatic)
@@ -259,8 +279,9 @@ void bind_shell(nanobind::module_& m) {
       .def_prop_ro(
           "edge_angle",
           [](const Shell& s) {
-            return per_edge<double>(
-                s, 1, [](const Edge& e, std::vector<double>& out) { out.push_back(e.angle); });
+            return per_edge<double>(s, 1, [&](const Edge& e, std::vector<double>& out) {
+              out.push_back(s.topology().angle(s.vertices(), s.triangles(), e));
+            });
           },
           nb::rv_policy::automatic)
       .def_prop_ro(

@@ -180,7 +180,7 @@ void CurvedQuery::add_vertex(const Task& task, int f, int k) {
   const Facet& facet = shell.facets()[f];
   if (!sphere.reaches(facet.corner[k])) return;
   const Topology& topology = shell.topology();
-  const std::vector<Vec3>& tangents = shell.curved()->tangents();
+  const Tangents& tangents = shell.curved()->tangents();
   const int vertex = shell.curved()->facets()[f].owned.vertex[k];
   const Vec3 from = sphere.centre - facet.corner[k];
   for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i)

@@ -36,7 +36,7 @@ void CreaseSearch::list_joints() {
     Joint& joint = joints_[e];
     joint.direction =
         (points()[edge.last_vertex] - points()[edge.first_vertex]).normalized().cast<float>();
-    joint.angle = static_cast<float>(edge.angle);
+    joint.angle = static_cast<float>(topology.angle(points(), shell_.triangles(), edge));
     joint.half_edge[0] = joint.half_edge[1] = -1;
     if (edge.count != 2 || edge.on_rim()) continue;
     joint.half_edge[0] = topology.incidence[edge.begin];
@@ -68,7 +68,7 @@ void CreaseSearch::start() {
   const auto sharpen = [&](double angle, auto&& also) {
     bool any = false;
     for (std::size_t e = 0; e < joints_.size(); ++e)
-      if (!crease_[e] && std::abs(shell_.topology().edges[e].angle) >= angle && also(joints_[e]))
+      if (!crease_[e] && std::abs(joints_[e].angle) >= angle && also(joints_[e]))
         crease_[e] = any = true;
     return any;
   };

@@ -5,10 +5,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "shell/creases.hpp"
+#include "shell/free_memory.hpp"
+#include "shell/in_parallel.hpp"
 #include "shell/vertex_normals.hpp"
 
 namespace sphshell {
@@ -122,10 +123,11 @@ Net control_points(const Facet& f, const CurvedFacet& curved) {
   for (int i = 0; i < 4; ++i)
     for (int j = 0; i + j < 4; ++j)
       net[i][j] = ((3 - i - j) * f.corner[0] + i * f.corner[1] + j * f.corner[2]) / 3;
-  net[1][0] += curved.lift[0][0], net[2][0] += curved.lift[0][1];
-  net[2][1] += curved.lift[1][0], net[1][2] += curved.lift[1][1];
-  net[0][2] += curved.lift[2][0], net[0][1] += curved.lift[2][1];
-  net[1][1] += curved.middle;
+  const auto lift = [&](int k, int i) { return curved.lift(k, i); };
+  net[1][0] += lift(0, 0), net[2][0] += lift(0, 1);
+  net[2][1] += lift(1, 0), net[1][2] += lift(1, 1);
+  net[0][2] += lift(2, 0), net[0][1] += lift(2, 1);
+  net[1][1] += curved.middle(f);
   return net;
 }
 
@@ -139,14 +141,16 @@ double tan_opening_of(const Net& net, const Vec3& axis) {
       a[n] = net[i + 1][j] - net[i][j];
       b[n] = net[i][j + 1] - net[i][j];
     }
-  double widest = 0;
+  double most = 0, beside = 1;  // of the widest: squares of what is across the axis, and along it
   for (int i = 0; i < 6; ++i)
     for (int j = i; j < 6; ++j) {
       const Vec3 normal = a[i].cross(b[j]) + a[j].cross(b[i]);
       const double along = normal.dot(axis);
-      widest = std::max(widest, along > 0 ? normal.cross(axis).norm() / along : kAny);
+      if (!(along > 0)) return kAny;
+      const double across2 = normal.cross(axis).squaredNorm(), along2 = along * along;
+      if (across2 * beside > most * along2) most = across2, beside = along2;
     }
-  return widest;
+  return std::sqrt(most / beside);
 }
 
 // Where a patch, continued beyond its sides, misses a vertex with its normal, and what lifting its
@@ -200,56 +204,37 @@ class Continuation {
 
 }  // namespace
 
-Vec3 CubicPatch::inward(int k, double t) const {
-  switch (k) {
-    case 0:
-      return along_v(t, 0) - t * along_u(t, 0);
-    case 1:
-      // From side 1 (w = 0) towards corner 0: minus u and v in proportion to where one stands.
-      return -((1 - t) * along_u(1 - t, t) + t * along_v(1 - t, t));
-    default:
-      return along_u(0, 1 - t) - (1 - t) * along_v(0, 1 - t);
+SharedNormals::SharedNormals(const Shell& shell, const std::vector<Vec3>& normals)
+    : which_(normals.size()) {
+  LargeArray<int> latest(shell.vertices().size(), -1);
+  for (std::size_t c = 0; c < normals.size(); ++c) {
+    int& last = latest[shell.triangles()[c / 3][c % 3]];
+    if (last < 0 || distinct_[last] != normals[c]) {
+      last = static_cast<int>(distinct_.size());
+      distinct_.push_back(normals[c]);
+    }
+    which_[c] = last;
   }
-}
-
-// From Bernstein's polynomials to powers.
-CubicPatch CurvedFacet::patch(const Facet& f) const {
-  const Vec3 &a = lift[0][0], &b = lift[0][1];  // side 0, from corner 0 to 1
-  const Vec3 &c = lift[1][0], &d = lift[1][1];
-  const Vec3 &e = lift[2][1], &g = lift[2][0];  // side 2, seen from corner 0 as well
-  CubicPatch out;
-  out.c00 = f.corner[0];
-  out.c10 = f.corner[1] - f.corner[0] + 3 * a;
-  out.c01 = f.corner[2] - f.corner[0] + 3 * e;
-  out.c20 = 3 * b - 6 * a;
-  out.c02 = 3 * g - 6 * e;
-  out.c11 = 6 * (middle - a - e);
-  out.c30 = 3 * (a - b);
-  out.c03 = 3 * (e - g);
-  out.c21 = 3 * (2 * a - b + c + e - 2 * middle);
-  out.c12 = 3 * (2 * e - g + d + a - 2 * middle);
-  return out;
-}
-
-CubicCurve CurvedFacet::side(const Facet& f, int k) const {
-  const Vec3 &a = lift[k][0], &b = lift[k][1];
-  return {f.corner[k], f.corner[next_corner(k)] - f.corner[k] + 3 * a, 3 * b - 6 * a, 3 * (a - b)};
 }
 
 CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact,
                          const std::vector<std::uint8_t>& straight) {
   const bool given = !normals.empty();
-  normals_ = given ? std::move(normals) : estimate_normals(shell);
-  divided_.assign(normals_.size(), 0);
+  if (!given) normals = estimate_normals(shell);
+  divided_.assign(normals.size(), 0);
   if (!exact) {
-    CornerNormals found = divide_at_creases(shell, std::move(normals_), given);
-    normals_ = std::move(found.normals);
+    CornerNormals found = divide_at_creases(shell, std::move(normals), given);
+    normals = std::move(found.normals);
     divided_ = std::move(found.set_aside);
     creases_ = found.creases;
   }
+  normals_ = SharedNormals(shell, normals);
+  // A large part of what building takes at its highest.
+  std::vector<Vec3>().swap(normals);
+  give_back_freed_memory(shell.triangles().size());
   bend_edges(shell, straight);
   lift_middles(shell);
-  list_corners(shell);
+  normals_ = {};
   build_cones(shell);
   bound_cells(shell);
 }
@@ -266,8 +251,10 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
   const std::vector<Triangle>& triangles = shell.triangles();
   const std::vector<Vec3>& p = shell.vertices();
   facets_.resize(triangles.size());
-  tangents_.assign(topology.neighbours.size(), Vec3::Zero());
-  std::vector<int> fill(topology.neighbour_begin.begin(), topology.neighbour_begin.end() - 1);
+  tangents_.flat_ = &shell.facets();
+  tangents_.curved_ = &facets_;
+  tangents_.spoke_.resize(topology.neighbours.size());
+  LargeArray<int> fill(topology.neighbour_begin.begin(), topology.neighbour_begin.end() - 1);
   const std::vector<Vec3> borders = border_directions(shell);
   std::vector<Vec3> first, last;
   for (const Edge& edge : topology.edges) {
@@ -294,13 +281,13 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
       if (straight[topology.incidence[edge.begin + i]]) lift = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 0; i < edge.count; ++i) {
       const int h = topology.incidence[edge.begin + i], g = shell.facet_half_edge(h);
-      Vec3* side = facets_[triangle_of(g)].lift[side_of(g)];
-      side[0] = lift[forward(h) ? 0 : 1];
-      side[1] = lift[forward(h) ? 1 : 0];
+      facets_[triangle_of(g)].set_side(side_of(g), lift[forward(h) ? 0 : 1],
+                                       lift[forward(h) ? 1 : 0]);
     }
     // Beside Topology::neighbours, which was filled in the same order.
-    tangents_[fill[edge.first_vertex]++] = d + 3 * lift[0];
-    tangents_[fill[edge.last_vertex]++] = 3 * lift[1] - d;
+    const int h = topology.incidence[edge.begin], spoke = 2 * shell.facet_half_edge(h);
+    tangents_.spoke_[fill[edge.first_vertex]++] = spoke + (forward(h) ? 0 : 1);
+    tangents_.spoke_[fill[edge.last_vertex]++] = spoke + (forward(h) ? 1 : 0);
   }
 }
 
@@ -309,17 +296,12 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
 // vertices opposite. Corners alone do not say how the curvature changes across an element.
 void CurvedShell::lift_middles(const Shell& shell) {
   for (CurvedFacet& curved : facets_) {
-    curved.middle.setZero();
+    curved.rise = 0;
     curved.flat = true;
-    for (const auto& side : curved.lift)
-      for (const Vec3& lift : side) {
-        curved.middle += 0.25 * lift;
-        curved.flat = curved.flat && lift.isZero(0);
-      }
+    for (int k = 0; k < 6; ++k) curved.flat = curved.flat && curved.lift(k / 2, k % 2).isZero(0);
   }
-  std::vector<double> rise(facets_.size(), 0);
-  for (std::size_t f = 0; f < facets_.size(); ++f) {
-    if (facets_[f].flat) continue;
+  for_each_in_parallel(facets_.size(), [&](std::size_t f) {
+    if (facets_[f].flat) return;
     const Facet& facet = shell.facets()[f];
     const Continuation continuation(facet, facets_[f].patch(facet));
     const int t = shell.triangle_of_facet(static_cast<int>(f));
@@ -332,12 +314,9 @@ void CurvedShell::lift_middles(const Shell& shell) {
     }
     // Neighbours whose normals contradict it must not pull an element away from its own sides.
     double most = 0;
-    for (const auto& side : facets_[f].lift)
-      for (const Vec3& lift : side) most = std::max(most, lift.norm());
-    if (square > 0) rise[f] = std::clamp(along / square, -most, most);
-  }
-  for (std::size_t f = 0; f < facets_.size(); ++f)
-    facets_[f].middle += rise[f] * shell.facets()[f].normal;
+    for (int i = 0; i < 6; ++i) most = std::max(most, facets_[f].lift(i / 2, i % 2).norm());
+    if (square > 0) facets_[f].rise = std::clamp(along / square, -most, most);
+  });
 }
 
 // The corner (3 triangle + k) opposite half-edge h, where the surface goes on beyond it: not across
@@ -358,18 +337,6 @@ int CurvedShell::corner_beyond(const Shell& shell, int h) const {
   return 3 * u + previous_corner(l);
 }
 
-void CurvedShell::list_corners(const Shell& shell) {
-  const std::vector<Triangle>& triangles = shell.triangles();
-  corner_begin_.assign(shell.vertices().size() + 1, 0);
-  for (const Triangle& t : triangles)
-    for (int v : t) ++corner_begin_[v + 1];
-  std::partial_sum(corner_begin_.begin(), corner_begin_.end(), corner_begin_.begin());
-  std::vector<int> fill(corner_begin_.begin(), corner_begin_.end() - 1);
-  corners_.resize(3 * triangles.size());
-  for (std::size_t h = 0; h < corners_.size(); ++h)
-    corners_[fill[triangles[h / 3][h % 3]]++] = shell.facet_half_edge(static_cast<int>(h));
-}
-
 // Bounds from Bezier control points: the patch lies in their hull.
 void CurvedShell::build_cones(const Shell& shell) {
   const LargeArray<Facet>& flat = shell.facets();
@@ -382,7 +349,7 @@ void CurvedShell::build_cones(const Shell& shell) {
   });
   for (std::size_t f = 0; f < facets_.size(); ++f) facets_[f].owned = owned[f];
   cones_ = shell.cones();
-  for (std::size_t f = 0; f < cones_.size(); ++f) {
+  for_each_in_parallel(cones_.size(), [&](std::size_t f) {
     const Facet& facet = flat[f];
     const Vec3& axis = facet.normal;
     const Net net = control_points(facet, facets_[f]);
@@ -398,7 +365,7 @@ void CurvedShell::build_cones(const Shell& shell) {
         tangent = kAny;
       }
       if (mine.vertex[k] >= 0)
-        tangent = std::max(tangent, shell.tan_vertex_cone(mine.vertex[k], axis, tangents_.data()));
+        tangent = std::max(tangent, shell.tan_vertex_cone(mine.vertex[k], axis, &tangents_));
     }
     NormalCone& cone = cones_[f];
     const Vec3 middle = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
@@ -409,18 +376,17 @@ void CurvedShell::build_cones(const Shell& shell) {
     cone.reach = static_cast<float>(reach);
     cone.tan_opening = widened_opening(tangent);
     // The lifted points weigh 1 - b0^3 - b1^3 - b2^3 <= 8/9 in all.
-    double largest = facets_[f].middle.norm();
-    for (const auto& side : facets_[f].lift)
-      for (const Vec3& lift : side) largest = std::max(largest, lift.norm());
-    facets_[f].bulge = largest * 8 / 9;
-    bulge_ = std::max(bulge_, facets_[f].bulge);
-  }
+    double largest = facets_[f].middle(facet).norm();
+    for (int i = 0; i < 6; ++i) largest = std::max(largest, facets_[f].lift(i / 2, i % 2).norm());
+    facets_[f].bulge = static_cast<float>(largest * (8.0 / 9 + 1e-6));
+  });
+  for (const CurvedFacet& curved : facets_) bulge_ = std::max<double>(bulge_, curved.bulge);
 }
 
 void CurvedShell::bound_cells(const Shell& shell) {
   const Topology& topology = shell.topology();
   cells_.assign(facets_.size(), CellBounds{});
-  for (std::size_t f = 0; f < facets_.size(); ++f) {
+  for_each_in_parallel(facets_.size(), [&](std::size_t f) {
     const Facet& facet = shell.facets()[f];
     if (!facets_[f].flat) cells_[f] = bounds_of(facet, facets_[f].patch(facet), facets_[f].bulge);
     for (int k = 0; k < 3; ++k) {
@@ -431,7 +397,7 @@ void CurvedShell::bound_cells(const Shell& shell) {
                             : edge.count > 2 ? kNotMine
                                              : shell.facet_half_edge(all[all[0] == h ? 1 : 0]);
     }
-  }
+  });
 }
 
 }  // namespace sphshell

@@ -39,18 +39,43 @@ struct CubicPatch {
   Vec3 inward(int k, double t) const;
 };
 
-// A cubic Bezier triangle, by what lifts its control points off those of the flat facet:
-// lift[k][0] and lift[k][1] at a third and two thirds of side k, middle at the centre.
-struct CurvedFacet {
-  Vec3 lift[3][2];
-  Vec3 middle;
-  double bulge;  // at most this far from the flat facet [m]
-  Owned owned;   // as Facet::owned, where coplanar neighbours may still be curved
-  bool flat;     // no lift: the exact flat facet
+// A cubic Bezier triangle, by what lifts its control points off those of the flat facet. The six of
+// the sides are kept as integers of 48 bits with a common exponent for each side: to 1e-14 of the
+// longest, which is round-off beside the facet. Both neighbours of a side keep the same numbers, so
+// the surface has no gaps.
+class CurvedFacet {
+ public:
+  double rise;  // of the middle along the facet's normal, above that of a PN triangle [m]
+  Owned owned;  // as Facet::owned, where coplanar neighbours may still be curved
+  float bulge;  // at most this far from the flat facet [m]
+  bool flat;    // no lift: the exact flat facet
+
+  // At a third (i = 0) and two thirds (1) of side k; and at the centre.
+  Vec3 lift(int k, int i) const;
+  Vec3 middle(const Facet& f) const;
+  void set_side(int k, const Vec3& first, const Vec3& last);
 
   CubicPatch patch(const Facet& f) const;
   // Side k as a curve from its corner at t = 0 to the next at t = 1.
   CubicCurve side(const Facet& f, int k) const;
+
+ private:
+  std::int16_t exponent_[3];
+  std::int16_t high_[3][6];
+  std::uint32_t low_[3][6];
+};
+
+// Tangents of the edges that leave a vertex, beside Topology::neighbours.
+class Tangents {
+ public:
+  Vec3 operator[](int i) const;
+
+ private:
+  friend class CurvedShell;
+  const LargeArray<Facet>* flat_ = nullptr;
+  const LargeArray<CurvedFacet>* curved_ = nullptr;
+  // 2 half-edge (3 facet + side) of the edge, + 1 if that comes towards the vertex.
+  LargeArray<int> spoke_;
 };
 
 // Whether an element is curved, or why it is not.
@@ -60,14 +85,23 @@ enum class Bending : int {
   Crease = 2,  // the elements around do not bear witness to the bend that its normals had
 };
 
-struct Corners {
-  const int *first, *last;
-  const int* begin() const { return first; }
-  const int* end() const { return last; }
+// Normals at triangle corners (3 triangle + k). Most corners of a vertex share one.
+class SharedNormals {
+ public:
+  SharedNormals() = default;
+  SharedNormals(const Shell& shell, const std::vector<Vec3>& normals);
+  const Vec3& operator[](int corner) const { return distinct_[which_[corner]]; }
+
+ private:
+  LargeArray<Vec3> distinct_;
+  LargeArray<int> which_;
 };
 
 class CurvedShell {
  public:
+  CurvedShell(const CurvedShell&) = delete;  // tangents_ refers to facets_
+  CurvedShell& operator=(const CurvedShell&) = delete;
+
   // normals: unit, per triangle corner (3 per triangle), wound like the triangles; empty:
   // estimated within smooth patches. exact: they are the surface's own and stand; others are
   // divided where the elements around contradict them. straight: per half-edge (3 triangle + side)
@@ -79,39 +113,30 @@ class CurvedShell {
   const LargeArray<NormalCone>& cones() const { return cones_; }
   const LargeArray<CellBounds>& cells() const { return cells_; }
   double bulge() const { return bulge_; }  // the largest of them [m]
-  // Tangents of the edges that leave vertex i, beside Topology::neighbours.
-  const std::vector<Vec3>& tangents() const { return tangents_; }
-  const std::vector<Vec3>& normals() const { return normals_; }  // per corner, 3 triangle + k
+  const Tangents& tangents() const { return tangents_; }
   // Per corner: its normal was set aside, as a crease that the elements show divides its fan.
   const std::vector<char>& divided() const { return divided_; }
   int creases() const { return creases_; }  // edges that became creases so
   Bending bending(const Shell& shell, int triangle) const;
-  // The corners (3 facet + k) that meet at a vertex.
-  Corners corners_of(int vertex) const {
-    return {&corners_[corner_begin_[vertex]], &corners_[corner_begin_[vertex + 1]]};
-  }
   std::size_t bytes() const {
     return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone) + sizeof(CellBounds)) +
-           (tangents_.size() + normals_.size()) * sizeof(Vec3) +
-           (corners_.size() + corner_begin_.size()) * sizeof(int);
+           tangents_.spoke_.size() * sizeof(int) + divided_.size();
   }
 
  private:
   void bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight);
   void lift_middles(const Shell& shell);
-  void list_corners(const Shell& shell);
   int corner_beyond(const Shell& shell, int half_edge) const;
   void build_cones(const Shell& shell);
   void bound_cells(const Shell& shell);
 
-  std::vector<Vec3> normals_;
+  SharedNormals normals_;  // let go when the elements are bent
   std::vector<char> divided_;
   int creases_ = 0;
   LargeArray<CurvedFacet> facets_;
   LargeArray<NormalCone> cones_;
   LargeArray<CellBounds> cells_;
-  std::vector<Vec3> tangents_;
-  std::vector<int> corner_begin_, corners_;
+  Tangents tangents_;
   double bulge_ = 0;
 };
 

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <unordered_map>
 #include <utility>
 
 #include "shell/disjoint_sets.hpp"
+#include "shell/half_edges.hpp"
+#include "shell/large_array.hpp"
+#include "shell/topology.hpp"
 
 namespace sphshell {
 namespace {
@@ -53,6 +55,13 @@ class CellTable {
   std::vector<std::int32_t> heads_;
   std::size_t mask_ = 0;
 };
+
+std::array<Vec3, 3> corners_of(const double* points, const std::int32_t* vertices) {
+  std::array<Vec3, 3> out;
+  for (int k = 0; k < 3; ++k)
+    out[k] = Eigen::Map<const Vec3>(points + 3 * static_cast<std::size_t>(vertices[k]));
+  return out;
+}
 
 // A cell this many tolerances wide: few points share a cell, and few lie near a cell's border.
 constexpr double kCellInTolerances = 64.0;
@@ -111,98 +120,143 @@ Weld weld(const double* points, std::size_t count, double tolerance) {
 }
 
 EdgeTable edge_table(const PolygonView& polygons, std::size_t vertex_count) {
-  // Counting sort by the lower vertex, then a small sort inside each bucket: linear in practice.
-  const std::size_t slots = static_cast<std::size_t>(polygons.offsets[polygons.count]);
-  struct Half {
-    std::int32_t high;
-    std::int64_t slot;
-  };
-  std::vector<std::int32_t> low(slots), high(slots);
-  std::vector<std::int64_t> start(vertex_count + 1, 0);
-  for (std::size_t p = 0; p < polygons.count; ++p) {
-    for (std::int64_t s = polygons.offsets[p]; s < polygons.offsets[p + 1]; ++s) {
-      const std::int32_t a = polygons.corners[s], b = polygons.corners[polygons.next(p, s)];
-      low[s] = std::min(a, b);
-      high[s] = std::max(a, b);
-      if (a != b) ++start[low[s] + 1];
-    }
-  }
-  std::partial_sum(start.begin(), start.end(), start.begin());
-  std::vector<Half> halves(static_cast<std::size_t>(start[vertex_count]));
-  std::vector<std::int64_t> fill(start.begin(), start.end() - 1);
-  for (std::size_t s = 0; s < slots; ++s) {
-    if (low[s] != high[s]) halves[fill[low[s]]++] = {high[s], static_cast<std::int64_t>(s)};
-  }
+  const auto slots = static_cast<std::size_t>(polygons.offsets[polygons.count]);
+  // The corner after each slot's own: slots are asked for in order, their polygons found as we go.
+  LargeArray<std::int32_t> following(slots);
+  for (std::size_t p = 0; p < polygons.count; ++p)
+    for (std::int64_t s = polygons.offsets[p]; s < polygons.offsets[p + 1]; ++s)
+      following[s] = polygons.corners[polygons.next(p, s)];
   EdgeTable out;
   out.slot_edge.assign(slots, -1);
-  for (std::size_t v = 0; v < vertex_count; ++v) {
-    const auto first = halves.begin() + start[v], last = halves.begin() + start[v + 1];
-    std::sort(first, last, [](const Half& a, const Half& b) {
-      return a.high != b.high ? a.high < b.high : a.slot < b.slot;
-    });
-    for (auto half = first; half != last; ++half) {
-      if (half == first || half->high != (half - 1)->high) {
-        out.ends.push_back(static_cast<std::int32_t>(v));
-        out.ends.push_back(half->high);
-        out.users.push_back(0);
-      }
-      out.slot_edge[half->slot] = static_cast<std::int32_t>(out.users.size()) - 1;
-      ++out.users.back();
-    }
-  }
+  out.ends.reserve(slots + 16);
+  out.users.reserve(slots / 2 + 8);
+  for_each_edge(
+      slots, vertex_count,
+      [&](std::size_t s) { return std::pair(polygons.corners[s], following[s]); },
+      [&](int low, int high, const std::uint64_t* first, const std::uint64_t* last) {
+        for (auto* word = first; word != last; ++word)
+          out.slot_edge[static_cast<std::uint32_t>(*word)] =
+              static_cast<std::int32_t>(out.users.size());
+        out.ends.push_back(low);
+        out.ends.push_back(high);
+        out.users.push_back(static_cast<std::int32_t>(last - first));
+      });
   return out;
 }
 
-Duplicates duplicate_polygons(const PolygonView& polygons) {
+Duplicates duplicate_polygons(const PolygonView& polygons, const std::int32_t* slot_edge,
+                              const std::int32_t* users, std::size_t edge_count) {
   Duplicates out;
   out.first.resize(polygons.count);
+  std::iota(out.first.begin(), out.first.end(), 0);
   out.opposite.assign(polygons.count, 0);
-  // Canonical cycle: from the lowest corner towards its lower neighbour.
-  std::vector<std::int32_t> canonical(static_cast<std::size_t>(polygons.offsets[polygons.count]));
-  std::vector<std::uint8_t> backwards(polygons.count, 0);
-  CellTable table(polygons.count);
-  std::vector<std::int32_t> chain(polygons.count, -1);
+  // Equal cycles have the same edges: only polygons are compared that agree about which of theirs
+  // fewest polygons use. They are chained, each to the one before.
+  LargeArray<std::int32_t> latest(edge_count, -1), before(polygons.count, -1);
   for (std::size_t p = 0; p < polygons.count; ++p) {
     const std::int64_t from = polygons.offsets[p], n = polygons.offsets[p + 1] - from;
-    const std::int32_t* c = polygons.corners + from;
-    const std::int64_t lowest = std::min_element(c, c + n) - c;
-    const bool back = c[(lowest + n - 1) % n] < c[(lowest + 1) % n];
-    backwards[p] = back;
-    std::uint64_t hash = static_cast<std::uint64_t>(n);
-    for (std::int64_t k = 0; k < n; ++k) {
-      const std::int32_t corner = c[(lowest + (back ? n - k : k)) % n];
-      canonical[from + k] = corner;
-      hash = mix(hash ^ static_cast<std::uint64_t>(corner));
+    std::int32_t edge = -1;
+    for (std::int64_t s = from; s < from + n; ++s) {
+      const std::int32_t e = slot_edge[s];
+      if (e >= 0 && (edge < 0 || std::pair(users[e], e) < std::pair(users[edge], edge))) edge = e;
     }
-    hash &= ~(std::uint64_t{1} << 63);  // the all-ones key marks a free place
-    out.first[p] = static_cast<std::int32_t>(p);
-    for (std::int32_t q = table.find(hash); q >= 0; q = chain[q]) {
-      const std::int64_t other = polygons.offsets[q];
-      if (polygons.offsets[q + 1] - other != n) continue;
-      if (std::equal(&canonical[from], &canonical[from] + n, &canonical[other])) {
-        out.first[p] = q;
-        out.opposite[p] = backwards[p] != backwards[q];
-        break;
-      }
+    if (edge < 0 || users[edge] < 2) continue;
+    // Canonical cycle: from the lowest corner towards its lower neighbour.
+    const auto canonical = [&](std::size_t q, bool& back) {
+      const std::int32_t* c = polygons.corners + polygons.offsets[q];
+      const std::int64_t lowest = std::min_element(c, c + n) - c;
+      back = c[(lowest + n - 1) % n] < c[(lowest + 1) % n];
+      return [=](std::int64_t k) { return c[(lowest + (back ? n - k : k)) % n]; };
+    };
+    bool back = false;
+    const auto own = canonical(p, back);
+    std::int32_t q = latest[edge];
+    for (; q >= 0; q = before[q]) {
+      if (polygons.offsets[q + 1] - polygons.offsets[q] != n) continue;
+      bool other_back = false, equal = true;
+      const auto other = canonical(static_cast<std::size_t>(q), other_back);
+      for (std::int64_t k = 0; equal && k < n; ++k) equal = own(k) == other(k);
+      if (!equal) continue;
+      out.first[p] = q;
+      out.opposite[p] = back != other_back;
+      break;
     }
-    if (out.first[p] == static_cast<std::int32_t>(p)) {
-      chain[p] = table.push(hash, static_cast<std::int32_t>(p));
-    }
+    if (q < 0) before[p] = std::exchange(latest[edge], static_cast<std::int32_t>(p));
   }
   return out;
 }
 
-Orientation flood_fill(const PolygonView& polygons, const EdgeTable& edges) {
-  constexpr std::int64_t kNone = -1;
-  const std::size_t edge_count = edges.users.size();
-  std::vector<std::int64_t> users(2 * edge_count, kNone);
-  std::vector<std::int32_t> slot_polygon(edges.slot_edge.size());
+std::vector<std::uint8_t> repeated_corners(const PolygonView& polygons) {
+  std::vector<std::uint8_t> out;
+  for (const std::int64_t back : {1, 2}) {
+    for (std::size_t p = 0; p < polygons.count; ++p) {
+      const std::int64_t from = polygons.offsets[p], n = polygons.offsets[p + 1] - from;
+      for (std::int64_t k = 0; k < n; ++k) {
+        const std::int32_t* c = polygons.corners + from;
+        // A corner that the next one repeats; or the tip between two that are one vertex.
+        const bool repeated =
+            back == 1 ? c[k] == c[(k + 1) % n] : c[(k + n - 1) % n] == c[(k + 1) % n];
+        if (!repeated) continue;
+        if (out.empty()) out.assign(static_cast<std::size_t>(polygons.offsets[polygons.count]), 0);
+        out[from + k] = 1;
+      }
+    }
+    if (!out.empty()) break;
+  }
+  return out;
+}
+
+std::vector<double> triangle_shapes(const PolygonView& polygons, const double* points) {
+  std::vector<double> out(polygons.count, -1.0);
+  for (std::size_t p = 0; p < polygons.count; ++p) {
+    const std::int64_t from = polygons.offsets[p];
+    if (polygons.offsets[p + 1] - from != 3) continue;
+    const auto [a, b, c] = corners_of(points, polygons.corners + from);
+    const double area = (b - a).cross(c - a).norm();
+    const double longest =
+        std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
+    out[p] = area / (longest > 0.0 ? longest : 1.0);
+  }
+  return out;
+}
+
+ComponentSums component_sums(const double* points, const std::int32_t* triangles,
+                             const std::int32_t* triangle_polygon, std::size_t triangle_count,
+                             const std::int32_t* component, const std::uint8_t* flip,
+                             std::size_t component_count, const double* centre) {
+  ComponentSums out;
+  out.volume.assign(component_count, 0.0);
+  out.area = out.turned_area = out.volume;
+  out.largest.assign(component_count, 0);
+  std::vector<double> most(component_count, -1.0);
+  const Vec3 middle(centre[0], centre[1], centre[2]);
+  for (std::size_t t = 0; t < triangle_count; ++t) {
+    const std::size_t p = triangle_polygon == nullptr ? t : triangle_polygon[t];
+    const auto [a, b, c] = corners_of(points, triangles + 3 * t);
+    const Vec3 vector_area = 0.5 * (b - a).cross(c - a);
+    const double area = vector_area.norm(), share = (a - middle).dot(vector_area) / 3.0;
+    const std::int32_t owner = component[p];
+    out.volume[owner] += flip[p] ? -share : share;
+    out.area[owner] += area;
+    out.turned_area[owner] += flip[p] ? area : -area;
+    if (area >= most[owner]) most[owner] = area, out.largest[owner] = static_cast<std::int32_t>(t);
+  }
+  return out;
+}
+
+Orientation flood_fill(const PolygonView& polygons, const std::int32_t* slot_edge,
+                       const std::int32_t* users, std::size_t edge_count) {
+  struct User {
+    std::int32_t slot, polygon;
+  };
+  constexpr User kNone{-1, -1};
+  LargeArray<User> pair(2 * edge_count, kNone);
   for (std::size_t p = 0; p < polygons.count; ++p) {
     for (std::int64_t s = polygons.offsets[p]; s < polygons.offsets[p + 1]; ++s) {
-      slot_polygon[s] = static_cast<std::int32_t>(p);
-      const std::int32_t edge = edges.slot_edge[s];
-      if (edge < 0 || edges.users[edge] != 2) continue;
-      users[2 * edge + (users[2 * edge] == kNone ? 0 : 1)] = s;
+      const std::int32_t edge = slot_edge[s];
+      if (edge < 0 || users[edge] != 2) continue;
+      pair[2 * edge + (pair[2 * edge].slot < 0 ? 0 : 1)] = {static_cast<std::int32_t>(s),
+                                                            static_cast<std::int32_t>(p)};
     }
   }
   Orientation out;
@@ -218,12 +272,12 @@ Orientation flood_fill(const PolygonView& polygons, const EdgeTable& edges) {
     for (std::size_t head = 0; head < queue.size(); ++head) {
       const std::int32_t p = queue[head];
       for (std::int64_t s = polygons.offsets[p]; s < polygons.offsets[p + 1]; ++s) {
-        const std::int32_t edge = edges.slot_edge[s];
-        if (edge < 0 || edges.users[edge] != 2) continue;
-        const std::int64_t twin = users[2 * edge] == s ? users[2 * edge + 1] : users[2 * edge];
-        const std::int32_t q = slot_polygon[twin];
+        const std::int32_t edge = slot_edge[s];
+        if (edge < 0 || users[edge] != 2) continue;
+        const User& twin = pair[2 * edge + (pair[2 * edge].slot == s ? 1 : 0)];
+        const std::int32_t q = twin.polygon;
         if (q == p) continue;  // a seam of a polygon with itself tells nothing
-        const bool same_way = polygons.corners[s] == polygons.corners[twin];
+        const bool same_way = polygons.corners[s] == polygons.corners[twin.slot];
         const std::uint8_t wanted = out.flip[p] ^ static_cast<std::uint8_t>(same_way);
         if (out.component[q] < 0) {
           out.component[q] = label;
@@ -250,104 +304,6 @@ std::vector<std::int32_t> connected_components(std::size_t nodes, const std::int
     label[i] = label[root];
   }
   return label;
-}
-
-std::vector<std::int32_t> nesting_depth(const double* points, const std::int32_t* triangles,
-                                        const std::int32_t* triangle_component,
-                                        std::size_t triangle_count, const double* queries,
-                                        const std::uint8_t* closed, std::size_t component_count) {
-  // Parity of crossings of a ray from each query, in a generic direction so that rays do not run
-  // along the axis-aligned faces and edges CAD is full of. The queries are sorted into a grid
-  // across the ray, so each triangle meets only those near it.
-  std::vector<std::int32_t> depth(component_count, 0);
-  std::vector<std::int32_t> active;
-  for (std::size_t c = 0; c < component_count; ++c) {
-    if (closed[c]) active.push_back(static_cast<std::int32_t>(c));
-  }
-  if (active.size() < 2) return depth;
-  using Vec = std::array<double, 3>;
-  constexpr std::array<Vec, 3> kAxes = {{{0.81649658, -0.35355339, 0.45643546},
-                                         {0.27735010, 0.93541435, 0.22839193},
-                                         {-0.50770552, -0.05988616, 0.85945101}}};
-  const auto turned = [&](const double* p) {
-    Vec out{};
-    for (int k = 0; k < 3; ++k) {
-      out[k] = kAxes[k][0] * p[0] + kAxes[k][1] * p[1] + kAxes[k][2] * p[2];
-    }
-    return out;
-  };
-  std::vector<Vec> query(component_count);
-  std::array<double, 2> low{}, high{};
-  low.fill(std::numeric_limits<double>::infinity());
-  high.fill(-std::numeric_limits<double>::infinity());
-  for (const std::int32_t c : active) {
-    query[c] = turned(queries + 3 * static_cast<std::size_t>(c));
-    for (int k = 0; k < 2; ++k) {
-      low[k] = std::min(low[k], query[c][k]);
-      high[k] = std::max(high[k], query[c][k]);
-    }
-  }
-  const auto cells = static_cast<std::int64_t>(std::ceil(std::sqrt(double(active.size()))));
-  const auto cell_of = [&](double x, int k) {
-    const double width = std::max(high[k] - low[k], 1e-300);
-    const double at = std::floor((x - low[k]) / width * static_cast<double>(cells));
-    return static_cast<std::int64_t>(std::clamp(at, 0.0, static_cast<double>(cells - 1)));
-  };
-  std::vector<std::vector<std::int32_t>> grid(static_cast<std::size_t>(cells * cells));
-  for (const std::int32_t c : active) {
-    grid[cell_of(query[c][0], 0) * cells + cell_of(query[c][1], 1)].push_back(c);
-  }
-  std::unordered_map<std::uint64_t, bool> odd;
-  for (std::size_t t = 0; t < triangle_count; ++t) {
-    const std::int32_t owner = triangle_component[t];
-    if (!closed[owner]) continue;
-    std::array<std::int32_t, 3> index{};
-    std::array<Vec, 3> corner{};
-    std::array<double, 2> from{low[0], low[1]}, to{high[0], high[1]};
-    for (int k = 0; k < 3; ++k) {
-      index[k] = triangles[3 * t + k];
-      corner[k] = turned(points + 3 * static_cast<std::size_t>(index[k]));
-    }
-    bool outside = false;
-    for (int k = 0; k < 2; ++k) {
-      const auto [least, most] = std::minmax({corner[0][k], corner[1][k], corner[2][k]});
-      outside = outside || least > high[k] || most < low[k];
-      from[k] = least;
-      to[k] = most;
-    }
-    if (outside) continue;
-    for (std::int64_t x = cell_of(from[0], 0); x <= cell_of(to[0], 0); ++x) {
-      for (std::int64_t y = cell_of(from[1], 1); y <= cell_of(to[1], 1); ++y) {
-        for (const std::int32_t c : grid[x * cells + y]) {
-          if (c == owner) continue;
-          const Vec& q = query[c];
-          bool inside = false;
-          for (int k = 0; k < 3; ++k) {
-            // Low index first, so that both users of an edge compute the very same number.
-            int a = k, b = (k + 1) % 3;
-            if (index[a] > index[b]) std::swap(a, b);
-            if ((corner[a][1] > q[1]) == (corner[b][1] > q[1])) continue;
-            const double share = (q[1] - corner[a][1]) / (corner[b][1] - corner[a][1]);
-            if (q[0] < corner[a][0] + share * (corner[b][0] - corner[a][0])) inside = !inside;
-          }
-          if (!inside) continue;
-          const Vec &a = corner[0], &b = corner[1], &d = corner[2];
-          const double ux = b[0] - a[0], uy = b[1] - a[1], vx = d[0] - a[0], vy = d[1] - a[1];
-          const double area = ux * vy - uy * vx;
-          if (area == 0.0) continue;
-          const double s = ((q[0] - a[0]) * vy - (q[1] - a[1]) * vx) / area;
-          const double r = ((q[1] - a[1]) * ux - (q[0] - a[0]) * uy) / area;
-          if (a[2] + s * (b[2] - a[2]) + r * (d[2] - a[2]) <= q[2]) continue;
-          const std::uint64_t key = (std::uint64_t(c) << 32) | std::uint64_t(owner);
-          odd[key] = !odd[key];
-        }
-      }
-    }
-  }
-  for (const auto& [key, value] : odd) {
-    if (value) ++depth[key >> 32];
-  }
-  return depth;
 }
 
 }  // namespace sphshell

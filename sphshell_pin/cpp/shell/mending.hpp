@@ -44,8 +44,31 @@ struct Duplicates {
   std::vector<std::uint8_t> opposite;  // 1 if it is wound the other way than that first one
 };
 
-// Polygons with equal corner cycles, of either winding.
-Duplicates duplicate_polygons(const PolygonView& polygons);
+// Polygons with equal corner cycles, of either winding; slot_edge and users are those of their
+// edge table.
+Duplicates duplicate_polygons(const PolygonView& polygons, const std::int32_t* slot_edge,
+                              const std::int32_t* users, std::size_t edge_count);
+
+// Per slot 1 where the next corner repeats its own; where no polygon has such, 1 where a spike has
+// its tip, between two corners that are one vertex. Empty where there is neither.
+std::vector<std::uint8_t> repeated_corners(const PolygonView& polygons);
+
+// 2 area / longest edge^2 of each triangle, 0 for a point; -1 of polygons with more corners.
+std::vector<double> triangle_shapes(const PolygonView& polygons, const double* points);
+
+struct ComponentSums {
+  std::vector<double> volume;         // enclosed, with the sign of the winding [m^3]
+  std::vector<double> area;           // [m^2]
+  std::vector<double> turned_area;    // of the polygons that are to be turned less the others
+  std::vector<std::int32_t> largest;  // the last of the largest triangles
+};
+
+// Sums over the triangles (t, 3) of each component, polygons turned where `flip` says so; volumes
+// about `centre`. triangle_polygon: (t,) polygon of each, or null where each is its own.
+ComponentSums component_sums(const double* points, const std::int32_t* triangles,
+                             const std::int32_t* triangle_polygon, std::size_t triangle_count,
+                             const std::int32_t* component, const std::uint8_t* flip,
+                             std::size_t component_count, const double* centre);
 
 struct EarClips {
   std::vector<std::int64_t> triangle_slots;  // (t, 3) slots, not vertices: normals can follow
@@ -77,8 +100,10 @@ struct Orientation {
   std::vector<std::uint8_t> one_sided;  // per component: 1 if no consistent winding exists
 };
 
-// Flood fill across the edges that exactly two different polygons use.
-Orientation flood_fill(const PolygonView& polygons, const EdgeTable& edges);
+// Flood fill across the edges that exactly two different polygons use; slot_edge and users are
+// those of their edge table.
+Orientation flood_fill(const PolygonView& polygons, const std::int32_t* slot_edge,
+                       const std::int32_t* users, std::size_t edge_count);
 
 // Labels the connected components of an undirected graph, numbered by their first node.
 std::vector<std::int32_t> connected_components(std::size_t nodes, const std::int32_t* pairs,

@@ -1,11 +1,14 @@
 #include "shell/shell.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "shell/curved.hpp"
+#include "shell/free_memory.hpp"
+#include "shell/in_parallel.hpp"
 #include "shell/triangle.hpp"
 
 namespace sphshell {
@@ -24,6 +27,7 @@ Shell::Shell(std::vector<Vec3> vertices, std::vector<Triangle> triangles, std::v
   for (std::size_t f = 0; f < order_.size(); ++f) facet_of_[order_[f]] = static_cast<int>(f);
   build_facets(order_);
   build_cones();
+  give_back_freed_memory(triangles_.size());
 }
 
 void Shell::build_facets(const std::vector<int>& order) {
@@ -36,7 +40,7 @@ void Shell::build_facets(const std::vector<int>& order) {
   const std::vector<Owned> owned = assign_owners(
       [&](int t, int u) { return topology_.planar_face[t] == topology_.planar_face[u]; });
   facets_.resize(order.size());
-  for (std::size_t f = 0; f < order.size(); ++f) {
+  for_each_in_parallel(order.size(), [&](std::size_t f) {
     const int t = order[f];
     Facet& facet = facets_[f];
     for (int k = 0; k < 3; ++k) facet.corner[k] = vertices_[triangles_[t][k]];
@@ -44,7 +48,7 @@ void Shell::build_facets(const std::vector<int>& order) {
     facet.owned = owned[f];
     facet.planar_face = topology_.planar_face[t];
     facet.element = element_[t];
-  }
+  });
 }
 
 // The first triangle that has an edge or a vertex decides about it.
@@ -79,30 +83,51 @@ std::vector<Owned> Shell::assign_owners(const std::function<bool(int t, int u)>&
 // Bound on the angle between `axis` and any direction u that points away from all edges at the
 // vertex. Seen along the axis the edges leave no gap wider than g, so one of them is within g/2 of
 // u's shadow; it rises by at most phi, hence tan(angle) <= tan(phi) / cos(g/2).
-double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Vec3* tangents) const {
+double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tangents) const {
   constexpr double kAny = std::numeric_limits<double>::infinity();
   if (topology_.vertex_on_rim[vertex]) return kAny;
   const Vec3 first = axis.unitOrthogonal(), second = axis.cross(first);
-  std::vector<double> bearing;
+  // A direction in the plane, of unit length; `turn` grows with its angle, by 4 all round and by 2
+  // half round.
+  struct Bearing {
+    double turn, x, y;
+    bool operator<(const Bearing& other) const { return turn < other.turn; }
+  };
+  constexpr std::size_t kUsual = 16;
+  std::array<Bearing, kUsual> usual;
+  std::vector<Bearing> many;
+  const int begin = topology_.neighbour_begin[vertex], end = topology_.neighbour_begin[vertex + 1];
+  const auto count = static_cast<std::size_t>(end - begin);
+  if (count > kUsual) many.resize(count);
+  Bearing* const bearing = count > kUsual ? many.data() : usual.data();
   double rise = 0;
-  for (int i = topology_.neighbour_begin[vertex]; i < topology_.neighbour_begin[vertex + 1]; ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const int at = begin + static_cast<int>(i);
     const Vec3 edge =
-        tangents ? tangents[i] : Vec3(vertices_[topology_.neighbours[i]] - vertices_[vertex]);
-    const double x = edge.dot(first), y = edge.dot(second), flat = std::hypot(x, y);
-    if (flat == 0) return kAny;
+        tangents ? (*tangents)[at] : Vec3(vertices_[topology_.neighbours[at]] - vertices_[vertex]);
+    double x = edge.dot(first), y = edge.dot(second);
+    const double flat = std::sqrt(x * x + y * y);
+    if (!(flat > 0)) return kAny;
     rise = std::max(rise, std::abs(edge.dot(axis)) / flat);
-    bearing.push_back(std::atan2(y, x));
+    x /= flat, y /= flat;
+    const double across = x / (std::abs(x) + std::abs(y));
+    bearing[i] = {y >= 0 ? 1 - across : 3 + across, x, y};
   }
-  std::sort(bearing.begin(), bearing.end());
-  double gap = bearing.front() + 2 * M_PI - bearing.back();
-  for (std::size_t i = 1; i < bearing.size(); ++i) gap = std::max(gap, bearing[i] - bearing[i - 1]);
-  const double narrow = std::cos(0.5 * gap);
+  std::sort(bearing, bearing + count);
+  double least = 1;  // cosine of the widest gap
+  for (std::size_t i = 0; i < count; ++i) {
+    const Bearing& here = bearing[i];
+    const Bearing& next = bearing[i + 1 < count ? i + 1 : 0];
+    if (next.turn - here.turn + (i + 1 < count ? 0 : 4) >= 2) return kAny;
+    least = std::min(least, here.x * next.x + here.y * next.y);
+  }
+  const double narrow = std::sqrt(std::max(0.0, 0.5 * (1 + least)));
   return narrow > 0.05 ? rise / narrow : kAny;
 }
 
 void Shell::build_cones() {
   cones_.resize(facets_.size());
-  for (std::size_t f = 0; f < facets_.size(); ++f) {
+  for_each_in_parallel(facets_.size(), [&](std::size_t f) {
     const Facet& facet = facets_[f];
     double tangent = 0;
     for (int k = 0; k < 3; ++k) {
@@ -127,7 +152,7 @@ void Shell::build_cones() {
     }
     cone.reach = static_cast<float>(reach + 1e-6 * size_);
     cone.tan_opening = widened_opening(tangent);
-  }
+  });
 }
 
 SurfacePoint Shell::closest_point(const Vec3& point) const {
@@ -158,8 +183,9 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
 
 void Shell::curve(std::vector<Vec3> normals, bool exact,
                   const std::vector<std::uint8_t>& straight) {
-  if (!curved_)
-    curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals), exact, straight);
+  if (curved_) return;
+  curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals), exact, straight);
+  give_back_freed_memory(triangles_.size());
 }
 
 std::size_t Shell::bytes() const {

@@ -58,6 +58,7 @@ struct SurfacePoint {
 };
 
 class CurvedShell;
+class Tangents;
 
 class Shell {
  public:
@@ -84,7 +85,7 @@ class Shell {
   std::vector<Owned> assign_owners(const std::function<bool(int t, int u)>& flat) const;
   // Bound on the tangent of the angle between `axis` and any direction that points away from all
   // edges at the vertex; `tangents` (beside Topology::neighbours) replace the straight edges.
-  double tan_vertex_cone(int vertex, const Vec3& axis, const Vec3* tangents = nullptr) const;
+  double tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tangents = nullptr) const;
 
   // Curved elements, made when first asked for: unit normals per triangle corner, or none; exact:
   // they are the surface's own; `straight` as of CurvedShell.

@@ -5,8 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "shell/disjoint_sets.hpp"
+#include "shell/half_edges.hpp"
+#include "shell/large_array.hpp"
 
 namespace sphshell {
 namespace {
@@ -48,32 +51,32 @@ Vec3 area_vector(const std::vector<Vec3>& v, const Triangle& t) {
   return (v[t[next_corner(apex)]] - p).cross(v[t[previous_corner(apex)]] - p);
 }
 
-void build_edges(const std::vector<Triangle>& triangles, Topology& out) {
-  struct Key {
-    int a, b, half_edge;
+void build_edges(std::size_t vertices, const std::vector<Triangle>& triangles, Topology& out) {
+  const std::size_t half_edges = 3 * triangles.size();
+  out.edge_of.resize(half_edges);
+  out.incidence.reserve(half_edges);
+  LargeArray<Edge> edges;
+  edges.reserve(half_edges);
+  const auto ends = [&](std::size_t h) {
+    const Triangle& t = triangles[h / 3];
+    const int k = static_cast<int>(h % 3);
+    return std::pair(t[k], t[next_corner(k)]);
   };
-  std::vector<Key> keys;
-  keys.reserve(3 * triangles.size());
-  for (std::size_t t = 0; t < triangles.size(); ++t)
-    for (int k = 0; k < 3; ++k) {
-      const int a = triangles[t][k], b = triangles[t][next_corner(k)];
-      keys.push_back({std::min(a, b), std::max(a, b), static_cast<int>(3 * t + k)});
+  const auto add = [&](int low, int high, const std::uint64_t* first, const std::uint64_t* last) {
+    Edge edge{};
+    edge.first_vertex = low, edge.last_vertex = high;
+    edge.begin = static_cast<int>(out.incidence.size());
+    edge.count = static_cast<int>(last - first);
+    edge.kind = EdgeClass::Boundary;
+    for (const std::uint64_t* word = first; word != last; ++word) {
+      const int h = static_cast<int>(static_cast<std::uint32_t>(*word));
+      out.incidence.push_back(h);
+      out.edge_of[h] = static_cast<int>(edges.size());
     }
-  std::sort(keys.begin(), keys.end(), [](const Key& x, const Key& y) {
-    return x.a != y.a ? x.a < y.a : x.b != y.b ? x.b < y.b : x.half_edge < y.half_edge;
-  });
-  out.edge_of.resize(keys.size());
-  out.incidence.resize(keys.size());
-  for (std::size_t i = 0; i < keys.size();) {
-    std::size_t j = i;
-    for (; j < keys.size() && keys[j].a == keys[i].a && keys[j].b == keys[i].b; ++j) {
-      out.incidence[j] = keys[j].half_edge;
-      out.edge_of[keys[j].half_edge] = static_cast<int>(out.edges.size());
-    }
-    out.edges.push_back({keys[i].a, keys[i].b, static_cast<int>(i), static_cast<int>(j - i),
-                         EdgeClass::Boundary, false, 0.0});
-    i = j;
-  }
+    edges.push_back(edge);
+  };
+  for_each_edge(half_edges, vertices, ends, add);
+  out.edges.assign(edges.begin(), edges.end());
 }
 
 // Coplanar neighbours become one face with one normal: that of their summed areas, so that a
@@ -82,7 +85,7 @@ void build_edges(const std::vector<Triangle>& triangles, Topology& out) {
 void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                         const std::vector<int>& element, double tolerance, Topology& out) {
   const int n = static_cast<int>(triangles.size());
-  std::vector<Vec3> area(n);
+  LargeArray<Vec3> area(n);
   for (int t = 0; t < n; ++t) area[t] = area_vector(vertices, triangles[t]);
   DisjointSets sets(triangles.size());
   for (Edge& edge : out.edges) {
@@ -126,8 +129,12 @@ void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Tri
   }
 }
 
-void classify_edges(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-                    double crease_angle, const CadFaces& cad, Topology& out) {
+double angle_between(const Vec3& m, const Vec3& n) {
+  return std::atan2(m.cross(n).norm(), m.dot(n));
+}
+
+void classify_edges(const std::vector<Triangle>& triangles, double crease_angle,
+                    const CadFaces& cad, Topology& out) {
   for (Edge& edge : out.edges) {
     if (edge.count == 1) continue;  // boundary already
     if (edge.count > 2) {
@@ -140,14 +147,10 @@ void classify_edges(const std::vector<Vec3>& vertices, const std::vector<Triangl
       edge.kind = EdgeClass::NonManifold;  // no common orientation (a Moebius strip's seam)
       continue;
     }
-    const Vec3& m = out.face_normal[t];
-    const Vec3& n = out.face_normal[u];
-    const Vec3& far = vertices[triangles[u][previous_corner(side_of(g))]];
-    const double angle = std::atan2(m.cross(n).norm(), m.dot(n));
-    const bool convex = (far - vertices[edge.first_vertex]).dot(m) <= 0;
-    edge.angle = convex ? angle : -angle;
-    const bool smooth = out.planar_face[t] == out.planar_face[u] ||
-                        (cad.face.empty() ? angle < crease_angle : cad.smooth(h, g));
+    const bool smooth =
+        out.planar_face[t] == out.planar_face[u] ||
+        (cad.face.empty() ? angle_between(out.face_normal[t], out.face_normal[u]) < crease_angle
+                          : cad.smooth(h, g));
     edge.kind = smooth ? EdgeClass::Smooth : EdgeClass::Crease;
   }
 }
@@ -204,6 +207,16 @@ Eigen::AlignedBox3d bounds(const std::vector<Vec3>& vertices,
   return box;
 }
 
+double Topology::angle(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+                       const Edge& edge) const {
+  if (edge.count != 2 || edge.kind == EdgeClass::NonManifold) return 0;
+  const int h = incidence[edge.begin], g = incidence[edge.begin + 1];
+  const Vec3& m = face_normal[triangle_of(h)];
+  const Vec3& far = vertices[triangles[triangle_of(g)][previous_corner(side_of(g))]];
+  const double angle = angle_between(m, face_normal[triangle_of(g)]);
+  return (far - vertices[edge.first_vertex]).dot(m) <= 0 ? angle : -angle;
+}
+
 bool CadFaces::smooth(int h, int g) const {
   const int t = triangle_of(h), u = triangle_of(g);
   if (face[t] == face[u]) return true;
@@ -215,10 +228,10 @@ bool CadFaces::smooth(int h, int g) const {
 
 Topology::Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                    const std::vector<int>& element, double crease_angle, const CadFaces& cad) {
-  build_edges(triangles, *this);
+  build_edges(vertices.size(), triangles, *this);
   build_planar_faces(vertices, triangles, element,
                      kPlanarTolerance * coordinate_scale(vertices, triangles), *this);
-  classify_edges(vertices, triangles, crease_angle, cad, *this);
+  classify_edges(triangles, crease_angle, cad, *this);
   build_patches(element, *this);
   build_vertices(vertices, triangles, *this);
 }

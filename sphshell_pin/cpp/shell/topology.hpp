@@ -26,10 +26,9 @@ inline int previous_corner(int k) { return k == 0 ? 2 : k - 1; }
 
 struct Edge {
   int first_vertex, last_vertex;  // first < last
-  int begin, count;               // its half-edges: incidence[begin .. begin + count)
-  EdgeClass kind;
-  bool inner;    // the diagonal inside one element: no edge of the surface
-  double angle;  // between the two normals [rad], > 0 convex, < 0 concave, 0 where not manifold
+  int begin, count : 28;          // its half-edges: incidence[begin .. begin + count)
+  EdgeClass kind : 3;
+  bool inner : 1;  // the diagonal inside one element: no edge of the surface
 
   bool on_rim() const { return kind == EdgeClass::Boundary || kind == EdgeClass::NonManifold; }
 };
@@ -66,6 +65,10 @@ struct Topology {
     for (int i = 0; i < edge.count; ++i) sum += face_normal[triangle_of(incidence[edge.begin + i])];
     return sum;
   }
+
+  // Between the two normals of an edge [rad], > 0 convex, < 0 concave, 0 where not manifold.
+  double angle(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
+               const Edge& edge) const;
 
   // crease_angle [rad]; triangles of one element are contiguous in `element`.
   Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,

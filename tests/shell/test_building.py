@@ -1,0 +1,69 @@
+"""What building a large shell leaves: the same bits for any number of threads, little memory."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from sphshell_pin import Shell
+
+
+def sheet(cells: int = 120):
+    """Vertices (n, 3) and triangles (m, 3) of a wavy sheet."""
+    x, y = (k.ravel() for k in np.meshgrid(*2 * [np.linspace(-1, 1, cells + 1)]))
+    i = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
+    a, b, c, d = (k.ravel() for k in (i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]))
+    triangles = np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
+    return np.c_[x, y, 0.1 * np.sin(3 * x) * np.cos(4 * y)], triangles.astype(np.int32)
+
+
+def digest() -> str:
+    """Of the curved elements of the sheet and of contacts all over it."""
+    vertices, triangles = sheet()
+    shell = Shell(vertices, triangles)
+    found = hashlib.sha256(shell.core_for("smooth").lifts.tobytes())
+    for at in vertices[::97]:
+        for method in ("smooth", "facets"):
+            contacts = shell.contacts(at + [0.003, 0.002, 0.045], 0.05, method=method)
+            found.update(contacts.point.tobytes() + contacts.depth.tobytes())
+    return found.hexdigest()
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "sched_setaffinity") or len(os.sched_getaffinity(0)) < 2,
+    reason="needs two cores, and a system that lends one of them alone",
+)
+def test_the_same_bits_on_one_core_and_on_all() -> None:
+    one = f"import os; os.sched_setaffinity(0, {{{min(os.sched_getaffinity(0))}}})"
+    script = f"{one}; from tests.shell.test_building import digest; print(digest())"
+    alone = subprocess.run(
+        [sys.executable, "-c", script], check=True, capture_output=True, text=True
+    )
+    assert alone.stdout.strip() == digest()
+
+
+def test_bytes_of_a_triangle() -> None:
+    """The compiled surface, curved elements included."""
+    vertices, triangles = sheet()
+    shell = Shell(vertices, triangles)
+    shell.contacts(vertices[0], 0.05)
+    assert shell.core.bytes <= 550 * len(triangles)
+
+
+def test_arrays_outlive_their_shell() -> None:
+    """They are views of the compiled surface."""
+    vertices, triangles = sheet(8)
+    shell = Shell(vertices, triangles)
+    kept = shell.vertices, shell.triangles, shell.triangle_element
+    assert not any(array.flags.writeable for array in kept)
+    del shell
+    again = [Shell(*sheet(8)) for _ in range(20)]  # would take the memory, were it free
+    assert np.array_equal(kept[0], vertices)
+    assert np.array_equal(kept[1], triangles)
+    assert np.array_equal(kept[2], np.arange(len(triangles)))
+    assert len(again) == 20
