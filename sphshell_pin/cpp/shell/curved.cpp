@@ -45,6 +45,12 @@ bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
   if (normals.size() == 2) out = normals[0].cross(normals[1]);
   out.normalize();
   if (out.dot(d) < 0) out = -out;
+  if (normals.size() == 2 && end.limited) {
+    // Normals that differ by little do not determine their common line: it may lean too much.
+    const Vec3 mean = (normals[0] + normals[1]).normalized();
+    const Vec3 level = (d - d.dot(mean) * mean).normalized();
+    if (!(out.dot(d) >= level.dot(d))) out = level;
+  }
   return out.dot(d) >= kMostLean * d.norm();
 }
 
