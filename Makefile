@@ -8,7 +8,7 @@ CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 OUT ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench hard-cases work-precision lint format report robots sweep-survival rollouts wheel docs clean
+.PHONY: help demo test bench hard-cases work-precision lint format report robots sweep-survival rollouts real-surfaces wheel docs clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -23,6 +23,7 @@ help:
 # make robots check every robot and write docs/robots.md
 # make sweep-survival  500 runs five ways, workers killed and the sweep resumed: the same bytes
 # make rollouts        print the speed-up of 10 000 runs over threads
+# make real-surfaces FOLDER=...  jumps and energies over the surfaces of a folder
 # make clean  remove everything that was built
 
 $(BIN)/python:
@@ -64,6 +65,9 @@ sweep-survival: $(VENV)/.test
 
 rollouts: $(VENV)/.test
 	$(BIN)/python -m benchmarks.rollout
+
+real-surfaces: $(VENV)/.test
+	$(BIN)/python -m benchmarks.real_surfaces $(or $(FOLDER),tests/data/corpus)
 
 work-precision: $(VENV)/.test
 	$(BIN)/python -m benchmarks.work_precision --write

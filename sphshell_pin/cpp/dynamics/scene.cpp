@@ -172,8 +172,8 @@ std::vector<Contact>& Scene::find(std::size_t k) {
       pair.joint_i == 0 ? centre : body_.world_from_joint(pair.joint_i).act(centre));
   query.find(*pair.shell, state.centre, pair.radius, pair.method);
   // Friction belongs to a place, and its spring should not part and join at every border between
-  // elements: contacts that are nearly one are one. The elastic energy is that of their depths' sum,
-  // off by the square of what they differ by, 1e-4 at most.
+  // elements: contacts that are nearly one are one. The elastic energy is that of their depths'
+  // sum, off by the square of what they differ by, 1e-4 at most.
   if (pair.friction.active() && query.contacts.size() > 1) {
     merge_places(query.contacts, state.centre, pair.radius, merged_);
     query.contacts.swap(merged_);

@@ -53,6 +53,7 @@ CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge) 
                  up(slope),
                  up(bulge),
                  {},
+                 {},
                  {}};
   for (int k = 0; k < 3; ++k) {
     out.offset[k] = static_cast<float>(offset[k]);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "shell/crease_search.hpp"
+#include "shell/in_parallel.hpp"
 
 namespace sphshell {
 namespace {
@@ -105,9 +106,9 @@ void CreaseSearch::judge() {
   off_.assign(count, 0);
   evidence_.assign(count, 0);
   claims_.resize(count);
-  for (std::size_t e = 0; e < count; ++e) {
+  for_each_in_parallel(count, [&](std::size_t e) {
     const Joint& joint = joints_[e];
-    if (crease_[e] || joint.angle == 0) continue;  // planar: nothing turns
+    if (crease_[e] || joint.angle == 0) return;  // planar: nothing turns
     const Claim a = claim(now, joint.half_edge[0]), b = claim(now, joint.half_edge[1]);
     claims_[e] = {a, b};
     const float most = std::max({std::abs(joint.angle), std::abs(a.turn), std::abs(b.turn)});
@@ -123,11 +124,11 @@ void CreaseSearch::judge() {
     alike_[e] = explained_[e] && a.known && b.known && (a.curvature > 0) == (b.curvature > 0) &&
                 std::max(ca, cb) <= kAlike * std::min(ca, cb);
     core_[e] = alike_[e] && std::abs(joint.angle) >= most / 2;
-    if (!core_[e]) continue;
+    if (!core_[e]) return;
     const double noise = kRounded * shell_.size() / std::min(a.height, b.height);
     evidence_[e] = static_cast<float>(
         -std::log(std::clamp(kChance * (off_[e] + noise) / most, kLeastProbability, 1.0)));
-  }
+  });
   weigh_runs();
   // At the end of a run one side alone tells.
   for (std::size_t e = 0; e < count; ++e) {

@@ -8,6 +8,9 @@
 
 namespace sphshell {
 
+constexpr int kAllCores = 1 << 10;
+constexpr std::size_t kGrain = 4096;  // rounds: below, a thread costs more than it saves
+
 // Splits 0..n over threads: work(begin, end), at least `grain` rounds for each. Each round writes
 // only to places of its own, so results do not depend on the threads.
 template <class Work>
@@ -25,8 +28,6 @@ void in_parallel(std::size_t n, int threads, std::size_t grain, Work&& work) {
 // One round after the other, over all cores: building a large shell.
 template <class Round>
 void for_each_in_parallel(std::size_t n, Round&& round) {
-  constexpr int kAllCores = 1 << 10;
-  constexpr std::size_t kGrain = 4096;  // below, a thread costs more than it saves
   in_parallel(n, kAllCores, kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) round(i);
   });

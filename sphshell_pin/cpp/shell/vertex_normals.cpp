@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "shell/fans.hpp"
+#include "shell/in_parallel.hpp"
 
 namespace sphshell {
 namespace {
@@ -15,6 +16,8 @@ namespace {
 constexpr double kMostUneven = 0.1;
 // Smallest pivot of the scaled normal equations: below, the points do not tell the terms apart.
 constexpr double kLeastPivot = 1e-6;
+// A tilt of the frame that settles it [rad].
+constexpr double kSettledTilt = 1e-7;
 // Normals agree within this angle [rad] and share of the spread of the normals around.
 constexpr double kSmallTurn = 0.005, kLikely = 0.25;
 // Edges are long beyond this many times those that lead on from them: surely, and where no fit says
@@ -113,6 +116,8 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
     const Row fit = solver.solve(along.cwiseQuotient(size)).cwiseQuotient(size);
     if (round > 0 && heights2 - fit.dot(along) > kMostUneven * heights2) return false;
     n = (n - fit[0] * east - fit[1] * north).normalized();
+    // What a further round would turn it by is smaller than this by as much as it is small.
+    if (round > 0 && fit.template head<2>().squaredNorm() < kSettledTilt * kSettledTilt) break;
   }
   normal = n;
   return true;
@@ -174,10 +179,7 @@ std::vector<Vec3> estimate_normals(const Shell& shell) {
     }
   }
   normals = out;
-  std::vector<int> around;
-  std::vector<Vec3> points;
-  for (int fan = 0; fan < count; ++fan) {
-    if (settled[fan]) continue;
+  const auto fit = [&](int fan, std::vector<int>& around, std::vector<Vec3>& points) {
     fans.vertices_around(fan, sharp, around);
     points.clear();
     for (int v : around) points.push_back(shell.vertices()[v]);
@@ -202,7 +204,14 @@ std::vector<Vec3> estimate_normals(const Shell& shell) {
     else
       turn_upright(shell, fans.begin(fan), fans.end(fan), kLonger, normal);
     set(out, fan, normal);
-  }
+  };
+  in_parallel(static_cast<std::size_t>(count), kAllCores, kGrain,
+              [&](std::size_t begin, std::size_t end) {
+                std::vector<int> around;
+                std::vector<Vec3> points;
+                for (std::size_t fan = begin; fan < end; ++fan)
+                  if (!settled[fan]) fit(static_cast<int>(fan), around, points);
+              });
   return out;
 }
 
