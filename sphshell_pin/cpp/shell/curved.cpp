@@ -34,6 +34,11 @@ struct EdgeEnd {
   bool limited;  // a fan there was divided: no more lean than the other end bears out
 };
 
+// The angle [rad] between a tangent and a chord.
+double lean_of(const Vec3& tangent, const Vec3& d) {
+  return std::atan2(d.cross(tangent).norm(), d.dot(tangent));
+}
+
 // The unit vector nearest to the direction, forward along chord d, that is tangent to the planes of
 // all normals: with one of them its projection, with two their common line. False where there is
 // none.
@@ -46,10 +51,11 @@ bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
   out.normalize();
   if (out.dot(d) < 0) out = -out;
   if (normals.size() == 2 && end.limited) {
-    // Normals that differ by little do not determine their common line: it may lean too much.
+    // Normals that differ by little do not determine their common line: where it leans more than
+    // twice as much as their mean says, that does.
     const Vec3 mean = (normals[0] + normals[1]).normalized();
     const Vec3 level = (d - d.dot(mean) * mean).normalized();
-    if (!(out.dot(d) >= level.dot(d))) out = level;
+    if (!(lean_of(out, d) <= 2 * lean_of(level, d))) out = level;
   }
   return out.dot(d) >= kMostLean * d.norm();
 }
@@ -58,11 +64,8 @@ bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
 // more than twice as much as the other. The unit tangent that leans no more than twice as much as
 // `other`.
 Vec3 limited_lean(const Vec3& tangent, const Vec3& other, const Vec3& forward) {
-  const auto lean_of = [&](const Vec3& t) {
-    return std::atan2(forward.cross(t).norm(), forward.dot(t));
-  };
-  const double most = 2 * lean_of(other);
-  if (lean_of(tangent) <= most) return tangent;
+  const double most = 2 * lean_of(other, forward);
+  if (lean_of(tangent, forward) <= most) return tangent;
   const Vec3 aside = (tangent - tangent.dot(forward) * forward).normalized();
   return std::cos(most) * forward + std::sin(most) * aside;
 }
