@@ -1,7 +1,7 @@
 """Query time, building time and memory against the number of triangles, ours and others'.
 
 Each contestant lives in a process of its own, so that its memory can be told; all of them on one
-core, told in turn to time their queries. One that gets too slow or too big is left out of larger
+core, asked in turn to time their queries. One that gets too slow or too big is left out of larger
 sheets. `python -m benchmarks.sizes` prints the table.
 """
 

@@ -21,7 +21,7 @@ Every command has `--help`; `--debug` before the command shows the traceback of 
 |---|---|
 | 0 | fine |
 | 1 | an expected figure was missed, or a part of what was asked for failed |
-| 2 | an error, told in one sentence |
+| 2 | an error, reported in one sentence |
 | 130 | interrupted; what was computed until then is kept |
 
 This page is written by `python docs/site/commands.py`, from the help texts.
