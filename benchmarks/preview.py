@@ -21,14 +21,16 @@ from sphshell_pin.benchmarks.timing import machine
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live import LiveRun
 from sphshell_pin.view.live import Live
+from sphshell_pin.view.live.server import Server
 
 GREETING = (
-    b"GET /socket HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    "GET /socket?token={token} HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n"
+    "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
 )
 
 
-def fast_browser(port: int, count: multiprocessing.Value) -> None:
+def fast_browser(port: int, token: str, count: multiprocessing.Value) -> None:
     """Take every frame, and ask for the next at once; in a process of its own."""
     import asyncio
     import json
@@ -36,7 +38,8 @@ def fast_browser(port: int, count: multiprocessing.Value) -> None:
     from tornado.websocket import websocket_connect
 
     async def visit() -> None:
-        page = await websocket_connect(f"ws://127.0.0.1:{port}/socket", max_message_size=2**28)
+        address = f"ws://127.0.0.1:{port}/socket?token={token}"
+        page = await websocket_connect(address, max_message_size=2**28)
         while (message := await page.read_message()) is not None:
             if isinstance(message, bytes):
                 count.value += 1
@@ -46,20 +49,21 @@ def fast_browser(port: int, count: multiprocessing.Value) -> None:
 
 
 @contextmanager
-def audience(port: int, kinds: tuple[str, ...]) -> Iterator[multiprocessing.Value]:
+def audience(server: Server, kinds: tuple[str, ...]) -> Iterator[multiprocessing.Value]:
     """Let browsers of these kinds, "fast" and "deaf", look on; yield what the fast one counts."""
     count = multiprocessing.Value("q", 0)
+    port, token = server.port, server.access.token
     processes, deaf = [], []
     for kind in kinds:
         if kind == "fast":
-            arguments = (port, count)
+            arguments = (port, token, count)
             processes.append(multiprocessing.Process(target=fast_browser, args=arguments))
             processes[-1].daemon = True
             processes[-1].start()
         else:
             deaf.append(socket.create_connection(("127.0.0.1", port)))
             deaf[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-            deaf[-1].sendall(GREETING)
+            deaf[-1].sendall(GREETING.format(token=token).encode())
     try:
         yield count
     finally:
@@ -92,7 +96,7 @@ def measure(scenario: str, kinds: tuple[str, ...], seconds: float) -> str:
     frame, advance = Stopwatch(live, "frame"), Stopwatch(live.player, "advance")
     live.start()
     try:
-        with audience(live.server.port, kinds) as count:
+        with audience(live.server, kinds) as count:
             while kinds and (not live.server.watched or ("fast" in kinds and count.value < 30)):
                 time.sleep(0.05)
             time.sleep(0.5)

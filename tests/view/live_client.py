@@ -5,6 +5,7 @@ import contextlib
 import json
 import urllib.error
 import urllib.request
+from urllib.parse import urlsplit
 
 import umsgpack
 from tornado.httpclient import HTTPRequest
@@ -13,20 +14,25 @@ from tornado.websocket import WebSocketClosedError, websocket_connect
 PATIENCE = 20.0
 
 
+def inside(url, name, scheme="http"):
+    """Return the address of a file of the page at `url`."""
+    return urlsplit(url)._replace(scheme=scheme, path=f"/{name}").geturl()
+
+
 def get(url, **headers):
     """Return status and body of a page."""
     try:
         with urllib.request.urlopen(urllib.request.Request(url, headers=headers)) as answer:
             return answer.status, answer.read(), dict(answer.headers)
     except urllib.error.HTTPError as refused:
-        return refused.code, refused.read(), {}
+        return refused.code, refused.read(), dict(refused.headers)
 
 
 class Client:
     """One websocket; keeps what it was told."""
 
     def __init__(self, url, answers=True):
-        self.address = url.replace("http:", "ws:") + "socket"
+        self.address = inside(url, "socket", "ws")
         self.answers = answers
         self.hello, self.state, self.closed = None, None, False
         self.errors, self.rows, self.scenes, self.ends = [], [], [], 0

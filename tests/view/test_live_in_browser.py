@@ -1,5 +1,7 @@
 """The live page in a real browser: pixels, clicks, keys, sliders, several tabs, no network."""
 
+from urllib.parse import urljoin
+
 import numpy as np
 import pytest
 
@@ -26,7 +28,7 @@ class Tab:
         self.page.on(
             "request",
             lambda request: (
-                request.url.startswith((live.url, "data:", "blob:"))
+                request.url.startswith((urljoin(live.url, "/"), "data:", "blob:"))
                 or self.complaints.append(request.url)
             ),
         )
@@ -226,7 +228,8 @@ def test_a_second_tab_follows(opened):
 def test_garbage_from_a_page_is_told_there_and_stops_nothing(opened):
     live, tab = opened(BallPlayer())
     tab.page.evaluate("""async () => {
-        const socket = new WebSocket(`ws://${location.host}/socket`);
+        const address = new URL("socket", document.baseURI).href;
+        const socket = new WebSocket(address.replace("http", "ws"));
         await new Promise((done) => { socket.onopen = done; });
         for (const one of ["}{", "[]", '{"type": "speed", "value": "x"}']) socket.send(one);
         socket.send(new Uint8Array(100));

@@ -14,7 +14,7 @@ from tornado.websocket import WebSocketClosedError
 from sphshell_pin.errors import InvalidParameter, SphshellError
 from sphshell_pin.view.live import Live
 from sphshell_pin.view.live.events import LARGEST_MESSAGE
-from tests.view.live_client import Client, get
+from tests.view.live_client import Client, get, inside
 from tests.view.live_player import BallPlayer
 from tests.view.test_live_events import BAD
 
@@ -36,16 +36,16 @@ def goes_on(live, patience=20.0):
 def test_the_page_is_served_whole_and_nothing_else(live):
     status, page, headers = get(live.url)
     assert status == 200
-    assert "default-src 'self'" in headers["Content-Security-Policy"]
+    assert "default-src 'none'" in headers["Content-Security-Policy"]
     for name in ("style.css", "page.js", "scene.js", "chart.js", "controls.js", "viewer.js"):
-        status, body, _ = get(live.url + name)
+        status, body, _ = get(inside(live.url, name))
         assert status == 200
         assert body
     text = page.decode()
     assert "http://" not in text
     assert "https://" not in text
     for name in ("server.py", "..%2fserver.py", "%2e%2e/loop.py", "/etc/passwd", "page/index.html"):
-        assert get(live.url + name)[0] == 404
+        assert get(inside(live.url, name))[0] == 404
 
 
 def test_other_sites_are_refused(live):
@@ -178,8 +178,8 @@ def raw_socket(live):
     connection = socket.create_connection(("127.0.0.1", live.server.port))
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     connection.sendall(
-        b"GET /socket HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n"
-        b"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        f"GET /{live.server.access.token}/socket HTTP/1.1\r\nHost: 127.0.0.1\r\n".encode()
+        + b"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
         b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
     )
     return connection

@@ -93,12 +93,12 @@ class Live:
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         # First of all the port: a picture takes time.
-        self.server = Server(self, host, port)
+        framed = None if self._foreign is None else self._foreign.url
+        self.server = Server(self, host, port, framed)
         try:
             canvas = meshcat.Visualizer(window=self._foreign or self._window)
             self.picture = Picture(player, canvas)
-            url = None if self._foreign is None else self._foreign.url
-            self._panel.greet(greeting(player, url))
+            self._panel.greet(greeting(player, framed))
             self.draw()
         except BaseException:
             self.server.stop()
@@ -106,7 +106,7 @@ class Live:
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """Where the page is; it ends with a token, without which nobody may look or play."""
         return self.server.url
 
     @property
@@ -151,7 +151,8 @@ class Live:
 
     def _repr_html_(self) -> str:
         """Show the page in a notebook's cell."""
-        return f'<iframe src="{self.url}" style="width: 100%; height: 720px; border: 0"></iframe>'
+        address = self.server.frame_url
+        return f'<iframe src="{address}" style="width: 100%; height: 720px; border: 0"></iframe>'
 
     def __enter__(self) -> Live:
         return self.start()

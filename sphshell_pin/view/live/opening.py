@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
+import contextlib
+import html
 import os
 import sys
+import tempfile
 import webbrowser
 from collections.abc import Callable, Mapping
 from os import PathLike
@@ -61,7 +65,7 @@ def preview(
         What the colours of the shells show: nothing ("surface"), the patches ("patches"), or how
         far curved elements stand off the flat ones ("distance"). The page can change it.
     told
-        Called with the page's address.
+        Called with the page's address, which ends with a token: who has it may look and play.
 
     Raises
     ------
@@ -85,7 +89,10 @@ def preview(
         told(live.url)
         if live.server.is_open:
             port = live.server.port
-            print(f"everybody who reaches port {port} may look and play", file=sys.stderr)
+            print(
+                f"everybody who has this address and reaches port {port} may look and play",
+                file=sys.stderr,
+            )
         if open:
             open_browser(live.url)
         live.run()
@@ -147,12 +154,21 @@ def result_file(what: str | PathLike[str]) -> Path | None:
 
 
 def open_browser(url: str) -> None:
-    """Open `url` in the web browser, unless there is no screen to show it on."""
+    """Open `url` in the web browser, unless there is no screen to show it on.
+
+    Other users see the arguments of the browser, but not the file that sends it to `url`.
+    """
     on_a_screen = sys.platform in ("darwin", "win32") or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )
-    if on_a_screen:
-        try:
-            webbrowser.open(url)
-        except webbrowser.Error:
-            return
+    if not on_a_screen:
+        return
+    # At home, as a browser in a sandbox of its own (snap, flatpak) has another /tmp.
+    home = Path.home()
+    folder = home if os.access(home, os.W_OK) else None
+    number, name = tempfile.mkstemp(".html", "sphshell-pin-view-", folder)  # for this user alone
+    atexit.register(Path(name).unlink, missing_ok=True)
+    with os.fdopen(number, "w", encoding="utf-8") as file:
+        file.write(f'<meta http-equiv="refresh" content="0; url={html.escape(url)}">\n')
+    with contextlib.suppress(webbrowser.Error):
+        webbrowser.open(Path(name).as_uri())

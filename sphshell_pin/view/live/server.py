@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import collections
 import errno
-import ipaddress
 import json
 import os
 import socket
@@ -14,9 +13,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
-from urllib.parse import urlsplit
 
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
+from sphshell_pin.view.live.access import Access
 from sphshell_pin.view.live.events import LARGEST_MESSAGE, BadMessage, Event, read_event
 from sphshell_pin.view.nodes import require_meshcat
 
@@ -25,16 +24,16 @@ MOST_EVENTS = 2_000  # waiting to be handled; more are refused
 
 MOST_UNSAID = 50  # answers to a browser that does not read; more are dropped
 
+# A stranger may connect, too: not so often, nor for so long, that no file can be opened any more.
+MOST_CONNECTIONS = 200
+SILENCE = 10.0  # [s] until the next request, or the rest of one
+
 # A browser says what it has drawn. This many frames go out unanswered; after the time [s], as in
 # a tab that is hidden and draws nothing, the next one goes out all the same.
 FRAMES_AHEAD = 2
 PATIENCE = 1.0
 
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
-_POLICY = (
-    "default-src 'self'; script-src 'self' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
-    "img-src 'self' data: blob:; connect-src 'self' ws: wss: data: blob:; frame-src *"
-)
 
 
 class Source(Protocol):
@@ -50,11 +49,13 @@ class Source(Protocol):
 class Server:
     """Serves the page and one websocket per browser at `url`, until `stop`.
 
-    Events of all browsers are gathered by `events`. Raises MissingExtra without meshcat,
-    SphshellError where the port is taken.
+    Events of all browsers are gathered by `events`. `framed` is the address of a picture that the
+    page has in a frame. Raises MissingExtra without meshcat, SphshellError where the port is taken.
     """
 
-    def __init__(self, source: Source, host: str = "127.0.0.1", port: int = 0) -> None:
+    def __init__(
+        self, source: Source, host: str = "127.0.0.1", port: int = 0, framed: str | None = None
+    ) -> None:
         viewer = Path(require_meshcat().__file__).parent / "viewer" / "dist" / "main.min.js"
         try:
             import tornado.netutil
@@ -86,7 +87,7 @@ class Server:
             ) from fault
         address, self.port = sockets[0].getsockname()[:2]
         self.host = host
-        self._local = ipaddress.ip_address(address.partition("%")[0]).is_loopback
+        self.access = Access(host, address, framed)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(
             target=self._serve, args=(sockets, viewer), daemon=True, name="live-page"
@@ -95,14 +96,22 @@ class Server:
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """Where the page is; whoever has this address may look and play."""
+        return self._address(self.access.token)
+
+    @property
+    def frame_url(self) -> str:
+        """Where the page is for another page, such as a notebook, that shows it in a frame."""
+        return self._address(self.access.frame_token)
+
+    def _address(self, token: str) -> str:
         name = "localhost" if self.host in ("", "0.0.0.0", "::") else self.host
-        return f"http://{f'[{name}]' if ':' in name else name}:{self.port}/"
+        return f"http://{f'[{name}]' if ':' in name else name}:{self.port}/?token={token}"
 
     @property
     def is_open(self) -> bool:
         """Whether other machines may reach the page."""
-        return not self._local
+        return self.access.is_open
 
     @property
     def watched(self) -> bool:
@@ -146,17 +155,6 @@ class Server:
         self._events.append((client, {"type": "release"}))
         self.arrived.set()
 
-    def is_own(self, host: str) -> bool:
-        """Tell whether `host`, of a request's header, is a name of this server."""
-        if self._local:
-            # Any other name that leads here was made to, by a page that wants to listen in.
-            # The port may differ: a tunnel ends at one of its own.
-            from tornado.httputil import split_host_and_port
-
-            name = split_host_and_port(host.lower())[0]
-            return name in ("127.0.0.1", "localhost", "[::1]", self.host.lower())
-        return True
-
     def _call(self, routine: Callable[[], Any]) -> None:
         if not self._loop.is_closed():
             try:
@@ -184,21 +182,36 @@ class Server:
         import tornado.httpserver
         import tornado.web
 
+        class HTTPServer(tornado.httpserver.HTTPServer):
+            def handle_stream(self, stream: Any, address: Any) -> None:
+                if len(self._connections) >= MOST_CONNECTIONS:
+                    stream.close()
+                else:
+                    super().handle_stream(stream, address)
+
         asyncio.set_event_loop(self._loop)
         socket_handler, file_handler = _handlers()
         files = {name.name: name for name in PAGE.iterdir() if name.suffix in _TYPES}
         files |= {"": PAGE / "index.html", "viewer.js": viewer}
+        shared = {"server": self, "files": files}
         application = tornado.web.Application(
             [
-                (r"/socket", socket_handler, {"server": self}),
-                (r"/(.*)", file_handler, {"server": self, "files": files}),
+                (r"/(?:[^/]*/)?socket", socket_handler, shared),
+                (r".*", file_handler, shared),
             ],
             websocket_max_message_size=4 * LARGEST_MESSAGE,
             websocket_ping_interval=15,
             websocket_ping_timeout=15,
             log_function=lambda _: None,
+            access=self.access,
         )
-        self._http = tornado.httpserver.HTTPServer(application, max_body_size=LARGEST_MESSAGE)
+        self._http = HTTPServer(
+            application,
+            max_body_size=LARGEST_MESSAGE,
+            max_header_size=LARGEST_MESSAGE,
+            idle_connection_timeout=SILENCE,
+            body_timeout=SILENCE,
+        )
         self._http.add_sockets(sockets)
         try:
             self._loop.run_forever()
@@ -218,35 +231,56 @@ def _handlers() -> tuple[type, type]:
     import tornado.web
     import tornado.websocket
 
-    class FileHandler(tornado.web.RequestHandler):
-        """The files of the page, and nothing else of the disk."""
+    class Guarded(tornado.web.RequestHandler):
+        """What both have in common: nobody without the token, no frames, no tracebacks."""
 
         def initialize(self, server: Server, files: dict[str, Path]) -> None:
             self._server, self._files = server, files
 
-        def get(self, name: str) -> None:
-            if not self._server.is_own(self.request.host):
-                raise tornado.web.HTTPError(403)
-            path = self._files.get(name)
-            if path is None:
-                raise tornado.web.HTTPError(404)
-            self.set_header("Content-Type", f"{_TYPES[path.suffix]}; charset=utf-8")
-            self.set_header("Content-Security-Policy", _POLICY)
-            self.set_header("Cache-Control", "no-cache")
-            self.write(path.read_bytes())
+        def set_default_headers(self) -> None:
+            self._set_headers()
+
+        def _set_headers(self, **checked: str) -> None:
+            for name, value in self.application.settings["access"].headers(**checked).items():
+                self.set_header(name, value)
+
+        def prepare(self) -> None:
+            try:
+                self.token, self.name = self._server.access.check(self.request)
+            except PermissionError as refused:
+                self.refused = str(refused)
+                raise tornado.web.HTTPError(403) from None
+
+        def write_error(self, status_code: int, **_: Any) -> None:
+            self.set_header("Content-Type", "text/plain")
+            self.finish(f"{status_code}: {getattr(self, 'refused', 'there is nothing here')}\n")
+
+        def log_exception(self, kind: Any, value: Any, traceback: Any) -> None:
+            if not isinstance(value, tornado.web.HTTPError):
+                super().log_exception(kind, value, traceback)
 
         def data_received(self, chunk: bytes) -> None:
             """Take no uploads."""
 
-        def write_error(self, status_code: int, **_: Any) -> None:
-            self.set_header("Content-Type", "text/plain")
-            self.finish(f"{status_code}: there is nothing here\n")
+    class FileHandler(Guarded):
+        """The files of the page, and nothing else of the disk."""
 
-    class SocketHandler(tornado.websocket.WebSocketHandler):
+        def get(self) -> None:
+            path = self._files.get(self.name)
+            if path is None:
+                raise tornado.web.HTTPError(404)
+            self._set_headers(host=self.request.host.lower(), token=self.token)
+            self.set_header("Content-Type", f"{_TYPES[path.suffix]}; charset=utf-8")
+            content = path.read_bytes()
+            if path.suffix == ".html":
+                content = content.replace(b"@@token@@", self.token.encode())
+            self.write(content)
+
+    class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
         """One browser: what it has been told, and what it says."""
 
-        def initialize(self, server: Server) -> None:
-            self._server = server
+        def initialize(self, server: Server, files: dict[str, Path]) -> None:
+            super().initialize(server, files)
             self.wake = asyncio.Event()
             self._scene, self._panel = 0, 0
             self._sent, self._seen = 0, 0
@@ -254,16 +288,8 @@ def _handlers() -> tuple[type, type]:
             self._answers: set[asyncio.Future[None]] = set()
             self._pump_task: asyncio.Future[None] | None = None
 
-        def prepare(self) -> None:
-            # Checked here, as versions of tornado differ in when they ask check_origin.
-            host = self.request.headers.get("Host", "")
-            origin = self.request.headers.get("Origin")
-            same = origin is None or urlsplit(origin).netloc.lower() == host.lower()
-            if not (same and self._server.is_own(host)):
-                raise tornado.web.HTTPError(403)
-
         def check_origin(self, _origin: str) -> bool:
-            return True
+            return True  # checked in prepare, as versions of tornado differ in when they ask
 
         def open(self, *_: str, **__: str) -> None:
             self.set_nodelay(True)

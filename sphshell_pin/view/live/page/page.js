@@ -25,8 +25,9 @@ function send(event) {
 // Connection
 
 function connect() {
-  const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-  socket = new WebSocket(`${scheme}//${location.host}/socket`);
+  const address = new URL("socket", document.baseURI);
+  address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+  socket = new WebSocket(address.href);
   socket.binaryType = "arraybuffer";
   messages = seen = 0;
   let ended = false;
