@@ -98,17 +98,22 @@ def test_without_meshcat_it_says_what_to_install(tmp_path):
     assert done.stderr.count("\n") == 1
 
 
-def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch):
+def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch, tmp_path):
     opened = []
     monkeypatch.setattr(webbrowser, "open", opened.append)
     monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv("HOME", str(tmp_path))
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    opening.open_browser("http://x/")
+    opening.open_browser("http://x/?token=secret")
     assert opened == []
     monkeypatch.setenv("DISPLAY", ":0")
-    opening.open_browser("http://x/")
-    assert opened == ["http://x/"]
+    opening.open_browser("http://x/?token=secret")
+    # Everybody sees a program's arguments, nobody else the file.
+    (file,) = tmp_path.iterdir()
+    assert opened == [file.as_uri()]
+    assert "url=http://x/?token=secret" in file.read_text()
+    assert file.stat().st_mode & 0o077 == 0
 
 
 def test_importing_the_page_loads_nothing_heavy():

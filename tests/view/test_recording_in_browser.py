@@ -20,6 +20,7 @@ FLAGS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
+    "--host-resolver-rules=MAP evil.example 127.0.0.1",  # a name that was made to lead here
 ]
 SIZE = {"width": 800, "height": 500}
 

@@ -215,6 +215,10 @@ class Server:
         self._http.add_sockets(sockets)
         try:
             self._loop.run_forever()
+            pending = asyncio.all_tasks(self._loop)
+            for task in pending:
+                task.cancel()
+            self._loop.run_until_complete(asyncio.gather(*pending, return_exceptions=True))
         finally:
             self._loop.close()
 
@@ -241,6 +245,7 @@ def _handlers() -> tuple[type, type]:
             self._set_headers()
 
         def _set_headers(self, **checked: str) -> None:
+            self.clear_header("X-Frame-Options")
             for name, value in self.application.settings["access"].headers(**checked).items():
                 self.set_header(name, value)
 
