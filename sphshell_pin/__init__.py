@@ -8,7 +8,11 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
+from sphshell_pin._interrupts import end_command_at_once, interrupts_delayed
+
+end_command_at_once()
+with interrupts_delayed():
+    from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
 
 if TYPE_CHECKING:
     from sphshell_pin.contact import BristleFriction as BristleFriction

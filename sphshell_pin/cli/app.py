@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sphshell_pin._interrupts import interrupts_heard
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -57,7 +59,7 @@ def faults(context: typer.Context) -> Iterator[None]:
     """Turn faults into one sentence on stderr and an exit code, unless --debug asks for more."""
     debug = bool(context.find_root().obj)
     try:
-        with _plain_warnings():
+        with interrupts_heard(), _plain_warnings():
             yield
     except (typer.Exit, typer.Abort):
         raise

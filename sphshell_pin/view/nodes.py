@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.errors import MissingExtra
 
 FloatArray = NDArray[np.float64]
@@ -37,7 +38,8 @@ class Command:
 def require_meshcat() -> Any:
     """Return the `meshcat` package; raise MissingExtra where it is not installed."""
     try:
-        import meshcat
+        with interrupts_delayed():
+            import meshcat
     except ImportError as missing:
         raise MissingExtra("meshcat", "view", "the picture of a scene") from missing
     return meshcat

@@ -10,6 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
@@ -55,7 +56,8 @@ class GeometryRobot:
     def __init__(
         self, visualizer: Any, model: pin.Model, geometry_model: pin.GeometryModel
     ) -> None:
-        from pinocchio.visualize import MeshcatVisualizer
+        with interrupts_delayed():
+            from pinocchio.visualize import MeshcatVisualizer
 
         check_geometry_model(model, geometry_model)
         viewer = MeshcatVisualizer(model, pin.GeometryModel(), geometry_model)

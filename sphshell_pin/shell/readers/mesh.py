@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import Floats, RawSurface
 from sphshell_pin.shell.readers.text import finish, pack_polygons, read_text
@@ -19,7 +20,8 @@ from sphshell_pin.shell.readers.text import finish, pack_polygons, read_text
 
 def read_stl(path: Path) -> RawSurface:
     """Read a binary or text .stl file: a soup of triangles."""
-    import trimesh
+    with interrupts_delayed():
+        import trimesh
 
     try:
         # From memory: a file that cannot be opened is then told from one that cannot be parsed.
