@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import hashlib
 import json
-import os
-import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from sphshell_pin.atomic import AtomicFolder, Busy
 from sphshell_pin.dynamics.result import Origin
 from sphshell_pin.errors import (
     Interrupted,
@@ -32,6 +32,7 @@ from sphshell_pin.scenario.figures import Verdict, check_expectations, judge, me
 from sphshell_pin.scenario.reading import shipped_scenarios
 
 RECORDING = "recording.html"
+SUMMARY = "summary.json"
 STOPPED = "stopped"
 """Subfolder for what a run computed that stopped early, beside an earlier one's results."""
 
@@ -39,7 +40,7 @@ STOPPED = "stopped"
 RESULTS = (
     "run.npz",
     "contacts.csv",
-    "summary.json",
+    SUMMARY,
     "force_and_depth.png",
     "energy.png",
     "contact_path.png",
@@ -80,15 +81,16 @@ def run_scenario(
     `out` is the folder, results/<name> by default; `changes` are values by dotted key. An
     interrupted or diverged run is written like any other, and `stopped` says so; where the folder
     has the results of a complete run, it is written to the subfolder `stopped`. Files take the
-    place of an earlier run's all at once, when all are made. With `audit_cad` each contact with a
-    CAD surface is compared with that on the exact faces (see `scenario.audit`).
+    place of an earlier run's all at once, when all are on disk (see `sphshell_pin.atomic`). With
+    `audit_cad` each contact with a CAD surface is compared with that on the exact faces (see
+    `scenario.audit`).
 
     Raises
     ------
     ScenarioError, NameNotFound, MissingExtra
         The scenario cannot be built.
     ResultError
-        The folder cannot be written; told before the run starts.
+        The folder cannot be written, or another run is writing it; told before the run starts.
     SphshellError
         There is no CAD surface to audit.
     """
@@ -108,28 +110,30 @@ def run_built(
     check_expectations(built)
     if audit_cad:
         check_audit(built)
-    folder, made = prepare_folder(Path("results") / built.name if out is None else out)
-    try:
+    folder = Path("results") / built.name if out is None else Path(out)
+    with contextlib.ExitStack() as held:
+        place = held.enter_context(_results_folder(folder))
         result, stopped = simulate(built, progress)
         verdicts, fault = _judge(built, result) if stopped is None else ((), None)
         notes: list[str] = []
         if stopped is not None and _holds_complete(folder):
             notes.append(f"the complete results of an earlier run stay in {folder}")
-            folder, more = prepare_folder(folder / STOPPED)
-            made = [*more, *made]
+            folder = folder / STOPPED
+            place = held.enter_context(_results_folder(folder))
         audit = compare_with_cad(built, result) if audit_cad else None
-        files = _write_all(
-            built, result, folder, verdicts, stopped, notes, recording=recording, audit=audit
-        )
-    except BaseException:
-        # A start that was refused leaves no folder behind.
-        with contextlib.suppress(OSError):
-            for one in made:
-                one.rmdir()
-        raise
+        try:
+            desk = place.desk()
+            names = _write_all(
+                built, result, desk, folder, verdicts, stopped, notes,
+                recording=recording, audit=audit,
+            )  # fmt: skip
+            place.replace(desk, RESULTS)
+        except OSError as error:
+            raise _not_written(folder, error) from None
     if fault is not None:
         raise fault
-    return RunReport(built, result, folder, tuple(files), tuple(notes), verdicts, stopped, audit)
+    files = tuple(folder / name for name in names)
+    return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit)
 
 
 def _judge(built: Built, result: Any) -> tuple[tuple[Verdict, ...], Exception | None]:
@@ -171,34 +175,33 @@ def origin_of(built: Built) -> Origin:
     return Origin(scenario, settings)
 
 
-def prepare_folder(out: str | PathLike[str]) -> tuple[Path, list[Path]]:
-    """Make the results folder and prove that it can be written; return it, and what was made.
+@contextlib.contextmanager
+def _results_folder(folder: Path) -> Iterator[AtomicFolder]:
+    """Hold the results folder; ResultError where it cannot be made, or another run has it."""
+    with contextlib.ExitStack() as held:
+        try:
+            place = held.enter_context(AtomicFolder(folder, last=SUMMARY, inner=[STOPPED]))
+        except Busy as busy:
+            raise ResultError(
+                folder, f"{busy}: wait until it ends, or give another folder with --out"
+            ) from None
+        except OSError as error:
+            raise ResultError(
+                folder,
+                f"the results folder cannot be written: {error.strerror}; give another with --out",
+            ) from None
+        yield place
 
-    The folders made are listed from the innermost.
 
-    Raises
-    ------
-    ResultError
-        It cannot be.
-    """
-    folder = Path(out)
-    try:
-        made = [one for one in (folder, *folder.parents) if not one.exists()]
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise ResultError(
-            folder,
-            f"the results folder cannot be written: {error.strerror}; give another with --out",
-        ) from None
-    return folder, made
+def _not_written(folder: Path, error: OSError) -> ResultError:
+    cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
+    return ResultError(folder, f"the results cannot be written: {cause.strerror or cause}")
 
 
 def _holds_complete(folder: Path) -> bool:
     """Whether `folder` has results that a run which stopped early must not replace."""
     try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
         return bool(summary["complete"])
     except (OSError, ValueError, KeyError, TypeError):
         # Somebody's results without a summary count as complete.
@@ -208,6 +211,7 @@ def _holds_complete(folder: Path) -> bool:
 def _write_all(
     built: Built,
     result: Any,
+    desk: Path,
     folder: Path,
     verdicts: Iterable[Verdict],
     stopped: SphshellError | None,
@@ -215,50 +219,18 @@ def _write_all(
     *,
     recording: bool,
     audit: CadAudit | None,
-) -> list[Path]:
-    """Make all files aside, then put them in place of an earlier run's; return their paths."""
-    try:
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
-            desk, attic = Path(scratch) / "new", Path(scratch) / "old"
-            desk.mkdir()
-            attic.mkdir()
-            result.save(desk / "run.npz", home=folder)
-            write_contacts(desk / "contacts.csv", result, audit)
-            _write_summary(desk / "summary.json", built, result, verdicts, stopped, audit)
-            files = [desk / name for name in ("run.npz", "contacts.csv", "summary.json")]
-            files += _try_view(notes, "figures", lambda: _write_figures(result, desk, built))
-            if recording:
-                files += _try_view(notes, RECORDING, lambda: _write_recording(result, desk, built))
-            names = [file.name for file in files]
-            if RECORDING not in names and (folder / RECORDING).exists():
-                notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
-            _exchange(folder, desk, attic, names)
-    except OSError as error:
-        raise ResultError(
-            folder, f"the results cannot be written: {error.strerror or error}"
-        ) from None
-    return [folder / name for name in names]
-
-
-def _exchange(folder: Path, desk: Path, attic: Path, names: list[str]) -> None:
-    """Move an earlier run's files from `folder` to `attic` and `names` in from `desk`.
-
-    Whatever breaks in, the folder holds one run's files: all the new ones, or all the old.
-    """
-    placed: list[str] = []
-    try:
-        for name in {*RESULTS, *names}:
-            if (folder / name).exists():
-                os.replace(folder / name, attic / name)
-        for name in names:
-            placed.append(name)
-            os.replace(desk / name, folder / name)
-    except BaseException:
-        for name in placed:
-            (folder / name).unlink(missing_ok=True)
-        for old in attic.iterdir():
-            os.replace(old, folder / old.name)
-        raise
+) -> list[str]:
+    """Write all files that `folder` is to have to the `desk`; return their names."""
+    result.save(desk / "run.npz", home=folder)
+    write_contacts(desk / "contacts.csv", result, audit)
+    files = _try_view(notes, "figures", lambda: _write_figures(result, desk, built))
+    if recording:
+        files += _try_view(notes, RECORDING, lambda: _write_recording(result, desk, built))
+    names = ["run.npz", "contacts.csv", SUMMARY, *(file.name for file in files)]
+    if RECORDING not in names and (folder / RECORDING).exists():
+        notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
+    _write_summary(desk, built, result, verdicts, stopped, audit)
+    return names
 
 
 def _try_view(notes: list[str], what: str, write: Callable[[], list[Path]]) -> list[Path]:
@@ -267,6 +239,10 @@ def _try_view(notes: list[str], what: str, write: Callable[[], list[Path]]) -> l
         return write()
     except MissingExtra as error:
         notes.append(str(error))
+    except ResultError as error:
+        if isinstance(error.__cause__, OSError):
+            raise  # drawn, but not written: no room for the numbers either
+        notes.append(f"{what} could not be made: {error}")
     except (Exception, KeyboardInterrupt) as error:
         reason = f"{type(error).__name__}: {error}".removesuffix(": ")
         notes.append(f"{what} could not be made: {reason}")
@@ -304,7 +280,7 @@ def write_contacts(path: str | PathLike[str], result: Any, audit: CadAudit | Non
 
 
 def _write_summary(
-    path: Path,
+    desk: Path,
     built: Built,
     result: Any,
     verdicts: Iterable[Verdict],
@@ -334,10 +310,16 @@ def _write_summary(
             "coal": coal.__version__,
             "numpy": np.__version__,
         },
+        "files": {file.name: _digest(file) for file in sorted(desk.iterdir())},
         "settings": result.origin.settings,
     }
     text = json.dumps(_plain(summary), indent=2, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    (desk / SUMMARY).write_text(text + "\n", encoding="utf-8")
+
+
+def _digest(path: Path) -> str:
+    with open(path, "rb") as file:
+        return f"sha256:{hashlib.file_digest(file, 'sha256').hexdigest()}"
 
 
 def _plain(value: Any) -> Any:
