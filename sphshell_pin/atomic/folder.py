@@ -119,6 +119,8 @@ class AtomicFolder:
         OSError
             The files cannot be put there; the old ones stay.
         """
+        for left in desk.glob(".*.writing"):  # an `atomic_file` that Ctrl-C ended at its start
+            left.unlink()
         new = sorted(os.listdir(desk))
         ours = {*new, *old}
         for name in ours:

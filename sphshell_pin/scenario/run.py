@@ -93,6 +93,8 @@ def run_scenario(
         The folder cannot be written, or another run is writing it; told before the run starts.
     SphshellError
         There is no CAD surface to audit.
+    KeyboardInterrupt
+        On Ctrl-C while the results are written; its text says so if they are there.
     """
     built = build(name, changes)
     return run_built(built, out, recording=recording, audit_cad=audit_cad, progress=progress)
@@ -123,16 +125,20 @@ def run_built(
         audit = compare_with_cad(built, result) if audit_cad else None
         try:
             desk = place.desk()
-            names = _write_all(
-                built, result, desk, folder, verdicts, stopped, notes,
-                recording=recording, audit=audit,
-            )  # fmt: skip
+            result.save(desk / "run.npz", home=folder)
+            write_contacts(desk / "contacts.csv", result, audit)
+            interrupted = _draw(built, result, desk, notes, recording=recording)
+            _write_summary(desk, built, result, verdicts, stopped, audit)
+            files = tuple(folder / name for name in RESULTS if (desk / name).exists())
+            if folder / RECORDING not in files and (folder / RECORDING).exists():
+                notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
             place.replace(desk, RESULTS)
         except OSError as error:
             raise _not_written(folder, error) from None
     if fault is not None:
         raise fault
-    files = tuple(folder / name for name in names)
+    if interrupted:
+        raise KeyboardInterrupt(f"the results are in {folder}, but not all pictures of them")
     return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit)
 
 
@@ -208,66 +214,46 @@ def _holds_complete(folder: Path) -> bool:
         return any((folder / name).exists() for name in RESULTS)
 
 
-def _write_all(
-    built: Built,
-    result: Any,
-    desk: Path,
-    folder: Path,
-    verdicts: Iterable[Verdict],
-    stopped: SphshellError | None,
-    notes: list[str],
-    *,
-    recording: bool,
-    audit: CadAudit | None,
-) -> list[str]:
-    """Write all files that `folder` is to have to the `desk`; return their names."""
-    result.save(desk / "run.npz", home=folder)
-    write_contacts(desk / "contacts.csv", result, audit)
-    files = _try_view(notes, "figures", lambda: _write_figures(result, desk, built))
-    if recording:
-        files += _try_view(notes, RECORDING, lambda: _write_recording(result, desk, built))
-    names = ["run.npz", "contacts.csv", SUMMARY, *(file.name for file in files)]
-    if RECORDING not in names and (folder / RECORDING).exists():
-        notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
-    _write_summary(desk, built, result, verdicts, stopped, audit)
-    return names
+def _draw(built: Built, result: Any, desk: Path, notes: list[str], *, recording: bool) -> bool:
+    """Write the pictures; note which of them cannot be made, for the numbers are worth more.
+
+    Returns whether Ctrl-C ended it. Raises ResultError for one that cannot be written.
+    """
+    writers = {"figures": _write_figures, RECORDING: _write_recording}
+    for what in writers if recording else ["figures"]:
+        try:
+            writers[what](result, desk, built)
+        except KeyboardInterrupt:
+            return True
+        except MissingExtra as error:
+            notes.append(str(error))
+        except ResultError as error:
+            if isinstance(error.__cause__, OSError):
+                raise
+            notes.append(f"{what} could not be made: {error}")
+        except Exception as error:
+            reason = f"{type(error).__name__}: {error}".removesuffix(": ")
+            notes.append(f"{what} could not be made: {reason}")
+    return False
 
 
-def _try_view(notes: list[str], what: str, write: Callable[[], list[Path]]) -> list[Path]:
-    """Return what `write` made; where it fails, note why: the numbers are worth more."""
-    try:
-        return write()
-    except MissingExtra as error:
-        notes.append(str(error))
-    except ResultError as error:
-        if isinstance(error.__cause__, OSError):
-            raise  # drawn, but not written: no room for the numbers either
-        notes.append(f"{what} could not be made: {error}")
-    except (Exception, KeyboardInterrupt) as error:
-        reason = f"{type(error).__name__}: {error}".removesuffix(": ")
-        notes.append(f"{what} could not be made: {reason}")
-    return []
-
-
-def _write_figures(result: Any, desk: Path, built: Built) -> list[Path]:
+def _write_figures(result: Any, desk: Path, built: Built) -> None:
     from sphshell_pin.plot import save_figures
 
-    return list(save_figures(result, desk, scene=built.scene))
+    save_figures(result, desk, scene=built.scene)
 
 
-def _write_recording(result: Any, desk: Path, built: Built) -> list[Path]:
+def _write_recording(result: Any, desk: Path, built: Built) -> None:
     from sphshell_pin.view.recording import write_recording
 
-    path = desk / RECORDING
     write_recording(
-        path,
+        desk / RECORDING,
         result,
         built.scene,
         visual_model=built.visual_model,
         speed=built.scenario.run.recording_speed,
         title=built.scenario.title,
     )
-    return [path]
 
 
 def write_contacts(path: str | PathLike[str], result: Any, audit: CadAudit | None = None) -> None:
@@ -310,7 +296,7 @@ def _write_summary(
             "coal": coal.__version__,
             "numpy": np.__version__,
         },
-        "files": {file.name: _digest(file) for file in sorted(desk.iterdir())},
+        "files": {name: _digest(desk / name) for name in RESULTS if (desk / name).exists()},
         "settings": result.origin.settings,
     }
     text = json.dumps(_plain(summary), indent=2, allow_nan=False)

@@ -52,6 +52,7 @@ def _hear(event: str, arguments: tuple[object, ...]) -> None:
         return
     writes = (
         event == "open"
+        and not isinstance(arguments[0], int)  # a file that is open already
         and isinstance(arguments[2], int)
         and (arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT))
     )
@@ -126,3 +127,9 @@ def contents(folder: Path) -> dict[str, bytes]:
         for path in sorted(folder.rglob("*"))
         if path.is_file()
     }
+
+
+def visible(folder: Path) -> dict[str, bytes]:
+    """Return every file below `folder` that is not hidden."""
+    found = contents(folder)
+    return {name: data for name, data in found.items() if not f"/{name}".count("/.")}

@@ -92,10 +92,7 @@ def make_report(
     new_figure(1.0, 1.0)  # raises now what would be raised at the end
     with _report_folder(out) as place:
         report = _measure(quick, with_peers, command, tell)
-        try:
-            _write(report, out, place)
-        except OSError as error:
-            raise ResultError(out, f"cannot be written: {error.strerror or error}") from None
+        _write(report, out, place)
     return report
 
 
@@ -166,10 +163,13 @@ def _write(report: Report, out: Path, place: AtomicFolder) -> None:
     files |= {f"{picture.name}.png": picture.png for picture in pictures}
     files[DATA] = json_text(report, sorted(files)).encode()
     files[PAGE] = render(report.sections, report.machine).encode()
-    desk = place.desk()
-    for name, content in files.items():
-        (desk / name).write_bytes(content)
-    place.replace(desk, [PAGE, DATA, *_files_of_old(out)])
+    try:
+        desk = place.desk()
+        for name, content in files.items():
+            (desk / name).write_bytes(content)
+        place.replace(desk, [PAGE, DATA, *_files_of_old(out)])
+    except OSError as error:
+        raise ResultError(out, f"cannot be written: {error.strerror or error}") from None
 
 
 def _files_of_old(out: Path) -> list[str]:
