@@ -157,7 +157,7 @@ def _draw(table: Any, figures: list[str], file: Path, *, all_: bool) -> list[Pat
     Unless `all_` are wanted, only the first that any run has is drawn.
     """
     from sphshell_pin.errors import MissingExtra
-    from sphshell_pin.plot.figure import RESOLUTION
+    from sphshell_pin.plot.figure import write_figure
     from sphshell_pin.plot.sweep import plot_sweep
 
     paths: list[Path] = []
@@ -166,7 +166,7 @@ def _draw(table: Any, figures: list[str], file: Path, *, all_: bool) -> list[Pat
     for name in figures:
         path = file.with_name(f"{file.stem}.{name.replace('/', '_')}.png")
         try:
-            plot_sweep(table, name).savefig(path, dpi=RESOLUTION)
+            write_figure(path, plot_sweep(table, name))
         except MissingExtra as missing:
             typer.echo(str(missing), err=True)
             break

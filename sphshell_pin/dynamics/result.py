@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import tempfile
 from dataclasses import dataclass, fields
 from os import PathLike
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
 from sphshell_pin.errors import MissingExtra, ResultError
@@ -201,16 +201,10 @@ class Result:
             "origin": _told(self.origin, Path(target.parent if home is None else home)),
         }
         arrays["header"] = np.array(json.dumps(header))
-        part_file = None
         try:
-            handle, part_file = tempfile.mkstemp(suffix=".part", dir=target.parent)
-            with os.fdopen(handle, "wb") as stream:
+            with atomic_file(target) as stream:
                 np.savez_compressed(stream, allow_pickle=False, **arrays)
-            os.chmod(part_file, 0o644)
-            os.replace(part_file, target)
         except OSError as error:
-            if part_file is not None and os.path.exists(part_file):
-                os.unlink(part_file)
             raise ResultError(path, f"cannot write the results: {error.strerror}") from error
         return target
 

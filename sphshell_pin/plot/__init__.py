@@ -8,9 +8,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sphshell_pin.errors import NameNotFound, ResultError
+from sphshell_pin.errors import NameNotFound
 from sphshell_pin.plot.contact_map import QUANTITIES, plot_contact_map
-from sphshell_pin.plot.figure import NO_CONTACT, RESOLUTION
+from sphshell_pin.plot.figure import NO_CONTACT, write_figure
 from sphshell_pin.plot.over_time import (
     MOST_PAIRS,
     plot_energy,
@@ -93,10 +93,5 @@ def save_figures(
     paths = []
     for name, figure in figures.items():
         path = Path(folder) / name
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            figure.savefig(path, dpi=RESOLUTION)
-        except OSError as fault:
-            raise ResultError(path, f"cannot be written ({fault.strerror})") from fault
-        paths.append(path)
+        paths.append(write_figure(path, figure))
     return paths

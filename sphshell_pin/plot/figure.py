@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from importlib import import_module
+from os import PathLike
+from pathlib import Path
 from typing import Any, Literal
 
-from sphshell_pin.errors import MissingExtra
+from sphshell_pin.atomic import atomic_file
+from sphshell_pin.errors import MissingExtra, ResultError
 
 NO_CONTACT = "No contact in this run."
 RESOLUTION = 130  # dots per inch of the files
@@ -25,6 +29,19 @@ def new_figure(
     from sphshell_pin.plot.shown import ShownFigure
 
     return ShownFigure(figsize=(width, height), layout=layout)
+
+
+def write_figure(path: str | PathLike[str], figure: Any) -> Path:
+    """Write `figure` as a .png file, whole or not at all; ResultError if it cannot be written."""
+    path, picture = Path(path), io.BytesIO()
+    figure.savefig(picture, format="png", dpi=RESOLUTION)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_file(path) as file:
+            file.write(picture.getbuffer())
+    except OSError as fault:
+        raise ResultError(path, f"cannot be written ({fault.strerror})") from fault
+    return path
 
 
 def say(axis: Any, sentence: str) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
@@ -407,10 +408,8 @@ def _run(plan: Plan) -> RunSection:
 
 def _write(path: Path, text: str) -> None:
     """Put `text` in place of the file at `path`, whole or not at all."""
-    aside = path.with_name(f".{path.name}.writing-{os.getpid()}")
     try:
-        aside.write_text(text, encoding="utf-8")
-        os.replace(aside, path)
+        with atomic_file(path) as file:
+            file.write(text.encode())
     except OSError as error:
-        aside.unlink(missing_ok=True)
         raise ScenarioError(path, "", f"cannot be written: {error.strerror}") from None

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import hashlib
 import json
-import os
-import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from sphshell_pin.atomic import AtomicFolder, Busy
 from sphshell_pin.dynamics.result import Origin
 from sphshell_pin.errors import (
     Interrupted,
@@ -32,6 +32,7 @@ from sphshell_pin.scenario.figures import Verdict, check_expectations, judge, me
 from sphshell_pin.scenario.reading import shipped_scenarios
 
 RECORDING = "recording.html"
+SUMMARY = "summary.json"
 STOPPED = "stopped"
 """Subfolder for what a run computed that stopped early, beside an earlier one's results."""
 
@@ -39,7 +40,7 @@ STOPPED = "stopped"
 RESULTS = (
     "run.npz",
     "contacts.csv",
-    "summary.json",
+    SUMMARY,
     "force_and_depth.png",
     "energy.png",
     "contact_path.png",
@@ -80,17 +81,20 @@ def run_scenario(
     `out` is the folder, results/<name> by default; `changes` are values by dotted key. An
     interrupted or diverged run is written like any other, and `stopped` says so; where the folder
     has the results of a complete run, it is written to the subfolder `stopped`. Files take the
-    place of an earlier run's all at once, when all are made. With `audit_cad` each contact with a
-    CAD surface is compared with that on the exact faces (see `scenario.audit`).
+    place of an earlier run's all at once, when all are on disk (see `sphshell_pin.atomic`). With
+    `audit_cad` each contact with a CAD surface is compared with that on the exact faces (see
+    `scenario.audit`).
 
     Raises
     ------
     ScenarioError, NameNotFound, MissingExtra
         The scenario cannot be built.
     ResultError
-        The folder cannot be written; told before the run starts.
+        The folder cannot be written, or another run is writing it; told before the run starts.
     SphshellError
         There is no CAD surface to audit.
+    KeyboardInterrupt
+        On Ctrl-C while the results are written; its text says so if they are there.
     """
     built = build(name, changes)
     return run_built(built, out, recording=recording, audit_cad=audit_cad, progress=progress)
@@ -108,28 +112,34 @@ def run_built(
     check_expectations(built)
     if audit_cad:
         check_audit(built)
-    folder, made = prepare_folder(Path("results") / built.name if out is None else out)
-    try:
+    folder = Path("results") / built.name if out is None else Path(out)
+    with contextlib.ExitStack() as held:
+        place = held.enter_context(_results_folder(folder))
         result, stopped = simulate(built, progress)
         verdicts, fault = _judge(built, result) if stopped is None else ((), None)
         notes: list[str] = []
         if stopped is not None and _holds_complete(folder):
             notes.append(f"the complete results of an earlier run stay in {folder}")
-            folder, more = prepare_folder(folder / STOPPED)
-            made = [*more, *made]
+            folder = folder / STOPPED
+            place = held.enter_context(_results_folder(folder))
         audit = compare_with_cad(built, result) if audit_cad else None
-        files = _write_all(
-            built, result, folder, verdicts, stopped, notes, recording=recording, audit=audit
-        )
-    except BaseException:
-        # A start that was refused leaves no folder behind.
-        with contextlib.suppress(OSError):
-            for one in made:
-                one.rmdir()
-        raise
+        try:
+            desk = place.desk()
+            result.save(desk / "run.npz", home=folder)
+            write_contacts(desk / "contacts.csv", result, audit)
+            interrupted = _draw(built, result, desk, notes, recording=recording)
+            _write_summary(desk, built, result, verdicts, stopped, audit)
+            files = tuple(folder / name for name in RESULTS if (desk / name).exists())
+            if folder / RECORDING not in files and (folder / RECORDING).exists():
+                notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
+            place.replace(desk, RESULTS)
+        except OSError as error:
+            raise _not_written(folder, error) from None
     if fault is not None:
         raise fault
-    return RunReport(built, result, folder, tuple(files), tuple(notes), verdicts, stopped, audit)
+    if interrupted:
+        raise KeyboardInterrupt(f"the results are in {folder}, but not all pictures of them")
+    return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit)
 
 
 def _judge(built: Built, result: Any) -> tuple[tuple[Verdict, ...], Exception | None]:
@@ -171,127 +181,79 @@ def origin_of(built: Built) -> Origin:
     return Origin(scenario, settings)
 
 
-def prepare_folder(out: str | PathLike[str]) -> tuple[Path, list[Path]]:
-    """Make the results folder and prove that it can be written; return it, and what was made.
+@contextlib.contextmanager
+def _results_folder(folder: Path) -> Iterator[AtomicFolder]:
+    """Hold the results folder; ResultError where it cannot be made, or another run has it."""
+    with contextlib.ExitStack() as held:
+        try:
+            place = held.enter_context(AtomicFolder(folder, last=SUMMARY, inner=[STOPPED]))
+        except Busy as busy:
+            raise ResultError(
+                folder, f"{busy}: wait until it ends, or give another folder with --out"
+            ) from None
+        except OSError as error:
+            raise ResultError(
+                folder,
+                f"the results folder cannot be written: {error.strerror}; give another with --out",
+            ) from None
+        yield place
 
-    The folders made are listed from the innermost.
 
-    Raises
-    ------
-    ResultError
-        It cannot be.
-    """
-    folder = Path(out)
-    try:
-        made = [one for one in (folder, *folder.parents) if not one.exists()]
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise ResultError(
-            folder,
-            f"the results folder cannot be written: {error.strerror}; give another with --out",
-        ) from None
-    return folder, made
+def _not_written(folder: Path, error: OSError) -> ResultError:
+    cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
+    return ResultError(folder, f"the results cannot be written: {cause.strerror or cause}")
 
 
 def _holds_complete(folder: Path) -> bool:
     """Whether `folder` has results that a run which stopped early must not replace."""
     try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
         return bool(summary["complete"])
     except (OSError, ValueError, KeyError, TypeError):
         # Somebody's results without a summary count as complete.
         return any((folder / name).exists() for name in RESULTS)
 
 
-def _write_all(
-    built: Built,
-    result: Any,
-    folder: Path,
-    verdicts: Iterable[Verdict],
-    stopped: SphshellError | None,
-    notes: list[str],
-    *,
-    recording: bool,
-    audit: CadAudit | None,
-) -> list[Path]:
-    """Make all files aside, then put them in place of an earlier run's; return their paths."""
-    try:
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
-            desk, attic = Path(scratch) / "new", Path(scratch) / "old"
-            desk.mkdir()
-            attic.mkdir()
-            result.save(desk / "run.npz", home=folder)
-            write_contacts(desk / "contacts.csv", result, audit)
-            _write_summary(desk / "summary.json", built, result, verdicts, stopped, audit)
-            files = [desk / name for name in ("run.npz", "contacts.csv", "summary.json")]
-            files += _try_view(notes, "figures", lambda: _write_figures(result, desk, built))
-            if recording:
-                files += _try_view(notes, RECORDING, lambda: _write_recording(result, desk, built))
-            names = [file.name for file in files]
-            if RECORDING not in names and (folder / RECORDING).exists():
-                notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
-            _exchange(folder, desk, attic, names)
-    except OSError as error:
-        raise ResultError(
-            folder, f"the results cannot be written: {error.strerror or error}"
-        ) from None
-    return [folder / name for name in names]
+def _draw(built: Built, result: Any, desk: Path, notes: list[str], *, recording: bool) -> bool:
+    """Write the pictures; note which of them cannot be made, for the numbers are worth more.
 
-
-def _exchange(folder: Path, desk: Path, attic: Path, names: list[str]) -> None:
-    """Move an earlier run's files from `folder` to `attic` and `names` in from `desk`.
-
-    Whatever breaks in, the folder holds one run's files: all the new ones, or all the old.
+    Returns whether Ctrl-C ended it. Raises ResultError for one that cannot be written.
     """
-    placed: list[str] = []
-    try:
-        for name in {*RESULTS, *names}:
-            if (folder / name).exists():
-                os.replace(folder / name, attic / name)
-        for name in names:
-            placed.append(name)
-            os.replace(desk / name, folder / name)
-    except BaseException:
-        for name in placed:
-            (folder / name).unlink(missing_ok=True)
-        for old in attic.iterdir():
-            os.replace(old, folder / old.name)
-        raise
+    writers = {"figures": _write_figures, RECORDING: _write_recording}
+    for what in writers if recording else ["figures"]:
+        try:
+            writers[what](result, desk, built)
+        except KeyboardInterrupt:
+            return True
+        except MissingExtra as error:
+            notes.append(str(error))
+        except ResultError as error:
+            if isinstance(error.__cause__, OSError):
+                raise
+            notes.append(f"{what} could not be made: {error}")
+        except Exception as error:
+            reason = f"{type(error).__name__}: {error}".removesuffix(": ")
+            notes.append(f"{what} could not be made: {reason}")
+    return False
 
 
-def _try_view(notes: list[str], what: str, write: Callable[[], list[Path]]) -> list[Path]:
-    """Return what `write` made; where it fails, note why: the numbers are worth more."""
-    try:
-        return write()
-    except MissingExtra as error:
-        notes.append(str(error))
-    except (Exception, KeyboardInterrupt) as error:
-        reason = f"{type(error).__name__}: {error}".removesuffix(": ")
-        notes.append(f"{what} could not be made: {reason}")
-    return []
-
-
-def _write_figures(result: Any, desk: Path, built: Built) -> list[Path]:
+def _write_figures(result: Any, desk: Path, built: Built) -> None:
     from sphshell_pin.plot import save_figures
 
-    return list(save_figures(result, desk, scene=built.scene))
+    save_figures(result, desk, scene=built.scene)
 
 
-def _write_recording(result: Any, desk: Path, built: Built) -> list[Path]:
+def _write_recording(result: Any, desk: Path, built: Built) -> None:
     from sphshell_pin.view.recording import write_recording
 
-    path = desk / RECORDING
     write_recording(
-        path,
+        desk / RECORDING,
         result,
         built.scene,
         visual_model=built.visual_model,
         speed=built.scenario.run.recording_speed,
         title=built.scenario.title,
     )
-    return [path]
 
 
 def write_contacts(path: str | PathLike[str], result: Any, audit: CadAudit | None = None) -> None:
@@ -304,7 +266,7 @@ def write_contacts(path: str | PathLike[str], result: Any, audit: CadAudit | Non
 
 
 def _write_summary(
-    path: Path,
+    desk: Path,
     built: Built,
     result: Any,
     verdicts: Iterable[Verdict],
@@ -334,10 +296,16 @@ def _write_summary(
             "coal": coal.__version__,
             "numpy": np.__version__,
         },
+        "files": {name: _digest(desk / name) for name in RESULTS if (desk / name).exists()},
         "settings": result.origin.settings,
     }
     text = json.dumps(_plain(summary), indent=2, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    (desk / SUMMARY).write_text(text + "\n", encoding="utf-8")
+
+
+def _digest(path: Path) -> str:
+    with open(path, "rb") as file:
+        return f"sha256:{hashlib.file_digest(file, 'sha256').hexdigest()}"
 
 
 def _plain(value: Any) -> Any:

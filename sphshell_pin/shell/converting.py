@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from sphshell_pin.atomic import atomic_path
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions, require_kernel
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES
 from sphshell_pin.shell.raw import Floats
 from sphshell_pin.shell.readers import SUFFIXES, reader_for
 from sphshell_pin.shell.shell import Shell
+from sphshell_pin.shell.writers import encoded
 from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
 
 SAMPLES = 5000
@@ -115,34 +116,22 @@ def convert(
         require_kernel(f"converting {suffix} to {goal.suffix.lower()} files")
     first = _surface(file, unit_in, options)
     unit = unit_out or (first.unit if first.unit in METRES_PER_UNIT else "mm")
-    name = ""
+    carried = goal.suffix.lower() == ".shl" or goal.suffix.lower() in CAD_SUFFIXES
+    brep = goal.suffix.lower() in BREP_SUFFIXES
     try:
-        handle, name = tempfile.mkstemp(
-            prefix=f".{goal.stem}.", suffix=goal.suffix, dir=goal.parent
-        )
-        os.close(handle)
-        _write(Path(name), unit, first, options)
-        carried = goal.suffix.lower() == ".shl" or goal.suffix.lower() in CAD_SUFFIXES
-        brep = goal.suffix.lower() in BREP_SUFFIXES
-        second = _surface(Path(name), unit if brep or not carried else None, CadOptions())
-        rng = np.random.default_rng(0)
-        conversion = Conversion(
-            source=Held(file, first.unit, *first.count, *first.extent),
-            target=Held(goal, unit, *second.count, *second.extent),
-            forth=second.distances(first.samples(SAMPLES, rng)),
-            back=first.distances(second.samples(SAMPLES, rng)),
-            notes=first.notes,
-        )
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)
-        os.replace(name, goal)
+        with atomic_path(goal, goal.suffix) as written:
+            _write(written, unit, first, options)
+            second = _surface(written, unit if brep or not carried else None, CadOptions())
+            rng = np.random.default_rng(0)
+            return Conversion(
+                source=Held(file, first.unit, *first.count, *first.extent),
+                target=Held(goal, unit, *second.count, *second.extent),
+                forth=second.distances(first.samples(SAMPLES, rng)),
+                back=first.distances(second.samples(SAMPLES, rng)),
+                notes=first.notes,
+            )
     except OSError as error:
         raise ShellFileError(goal, f"cannot be written ({error.strerror})") from error
-    finally:
-        if name and os.path.exists(name):
-            os.unlink(name)
-    return conversion
 
 
 def _surface(path: Path, unit: str | None, options: CadOptions) -> Any:
@@ -156,7 +145,7 @@ def _surface(path: Path, unit: str | None, options: CadOptions) -> Any:
 
 def _write(path: Path, unit: str, source: Any, options: CadOptions) -> None:
     if path.suffix.lower() not in CAD_SUFFIXES:
-        source.shell().to_file(path, unit)
+        path.write_bytes(encoded(path, source.shell(), unit))
         return
     from sphshell_pin.shell.cad.units import MILLIMETRE
     from sphshell_pin.shell.cad.writing import faceted, parts_of, write_cad

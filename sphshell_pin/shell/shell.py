@@ -452,21 +452,9 @@ class Shell(Topology):
         ShellFileError
             If the file cannot be written.
         """
-        from sphshell_pin.shell.writers import Written, corners_of_elements, write_surface
-        from sphshell_pin.units import metres_per_unit
+        from sphshell_pin.shell.writers import write_surface
 
-        scale = metres_per_unit(unit)
-        written = Written(
-            vertices=self.vertices / scale,
-            elements=self.elements,
-            triangles=self.triangles,
-            normals=corners_of_elements(
-                self.normals, self.elements, self.triangles, self.triangle_element
-            ),
-            scale=scale,
-            name=self.name,
-        )
-        write_surface(path, written)
+        write_surface(path, self, unit)
 
     @property
     def is_closed(self) -> bool:

@@ -1,21 +1,26 @@
 """Writing surfaces: .shl versions 1 and 2, .stl, .obj, .ply, .off.
 
-A file appears whole or not at all: it is written beside its place and then moved there.
+A file appears whole or not at all.
 """
 
 from __future__ import annotations
 
 import os
 import struct
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.raw import Floats, Ints
+from sphshell_pin.units import metres_per_unit
+
+if TYPE_CHECKING:
+    from sphshell_pin.shell.shell import Shell
 
 
 @dataclass(frozen=True)
@@ -46,38 +51,43 @@ class Written:
         ]
 
 
-def write_surface(path: str | os.PathLike[str], surface: Written) -> None:
-    """Write `surface` in the format its suffix names.
+def write_surface(path: str | os.PathLike[str], shell: Shell, unit: str) -> None:
+    """Write `shell` in the format the suffix names, see `Shell.to_file`."""
+    path = Path(path)
+    data = encoded(path, shell, unit)
+    try:
+        with atomic_file(path) as file:
+            file.write(data)
+    except OSError as error:
+        raise ShellFileError(path, f"cannot be written ({error.strerror})") from error
+
+
+def encoded(path: Path, shell: Shell, unit: str) -> bytes:
+    """Return the contents of a file of `shell`, in the format the suffix of `path` names.
 
     Raises
     ------
     InvalidParameter
-        Of an unknown suffix; the message lists the known ones.
-    ShellFileError
-        If the file cannot be written; a file that was there before is left as it was.
+        Of an unknown suffix or unit; the message lists the known ones.
     """
-    path = Path(path)
+    scale = metres_per_unit(unit)
+    surface = Written(
+        vertices=shell.vertices / scale,
+        elements=shell.elements,
+        triangles=shell.triangles,
+        normals=corners_of_elements(
+            shell.normals, shell.elements, shell.triangles, shell.triangle_element
+        ),
+        scale=scale,
+        name=shell.name,
+    )
     try:
         form = WRITERS[path.suffix.lower()]
     except KeyError:
         raise InvalidParameter(
             "path", str(path), f"must end in one of: {', '.join(WRITERS)}"
         ) from None
-    data = form(surface)
-    temporary = ""
-    try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        # mkstemp makes files only their owner can read; use what a plain open() would give.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, path)
-    except OSError as error:
-        if temporary and os.path.exists(temporary):
-            os.unlink(temporary)
-        raise ShellFileError(path, f"cannot be written ({error.strerror})") from error
+    return form(surface)
 
 
 def corners_of_elements(

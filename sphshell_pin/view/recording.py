@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.view.arrows import (
     FRICTION_COLOR,
@@ -249,16 +248,11 @@ def _digits(speed: float, fps: float) -> int:
 
 def write_page(path: str | PathLike[str], page: str) -> Path:
     """Write `page` at `path`, whole or not at all; ResultError if it cannot be."""
-    path, scratch = Path(path), None
+    path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, scratch = tempfile.mkstemp(dir=path.parent, suffix=".html.part")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(page)
-        os.chmod(scratch, 0o644)
-        os.replace(scratch, path)
+        with atomic_file(path) as file:
+            file.write(page.encode())
     except OSError as fault:
-        if scratch is not None:
-            Path(scratch).unlink(missing_ok=True)
         raise ResultError(path, f"the recording cannot be written ({fault.strerror})") from fault
     return path

@@ -159,30 +159,6 @@ def test_results_without_a_summary_count_as_complete(built, tmp_path, monkeypatc
     assert contents(out) == {"run.npz": b"somebody's"}
 
 
-@pytest.mark.parametrize("fault", [OSError(5, "Input/output error"), KeyboardInterrupt()])
-@pytest.mark.parametrize("after", range(1, 12))
-def test_a_break_half_way_leaves_one_runs_files(fault, after, built, tmp_path, monkeypatch):
-    out = tmp_path / "out"
-    run_built(built, out, recording=False)
-    (out / "recording.html").write_text("of the first run")
-    before = contents(out)
-    changed = build(built.path, {"run.duration": "0.02"})
-    real, count = os.replace, 0
-
-    def replace(*paths):
-        nonlocal count
-        count += 1
-        if count == after:
-            raise fault
-        real(*paths)
-
-    monkeypatch.setattr("sphshell_pin.scenario.run.os.replace", replace)
-    with pytest.raises((ResultError, KeyboardInterrupt)):
-        run_built(changed, out, recording=False)
-    assert contents(out) == before
-    assert set(os.listdir(out)) == set(before)
-
-
 def test_a_refused_start_leaves_no_folder(tmp_path):
     deep = build(write(tmp_path), {"robot.start.root_joint": "[0.01, 0.02, 0.0, 0, 0, 0, 1]"})
     with pytest.raises(DeepStart):

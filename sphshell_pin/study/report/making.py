@@ -8,14 +8,14 @@ import dataclasses
 import io
 import json
 import math
-import os
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from sphshell_pin.atomic import AtomicFolder, Busy
 from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
 from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.study.report import forces, hard_cases, integrators, peers, queries, steps
@@ -90,7 +90,26 @@ def make_report(
         Where the folder cannot be written.
     """
     new_figure(1.0, 1.0)  # raises now what would be raised at the end
-    _check_folder(out)
+    with _report_folder(out) as place:
+        report = _measure(quick, with_peers, command, tell)
+        _write(report, out, place)
+    return report
+
+
+@contextlib.contextmanager
+def _report_folder(out: Path) -> Iterator[AtomicFolder]:
+    """Hold the folder of a report; ResultError where it cannot be made, or another has it."""
+    with contextlib.ExitStack() as held:
+        try:
+            place = held.enter_context(AtomicFolder(out, last=DATA))
+        except Busy as busy:
+            raise ResultError(out, f"{busy}: wait until it ends, or give another --out") from None
+        except OSError as error:
+            raise ResultError(out, f"cannot hold a report: {error.strerror}") from None
+        yield place
+
+
+def _measure(quick: bool, with_peers: bool, command: str, tell: Tell | None) -> Report:
     begin = time.perf_counter()
     machine = describe(command)
     parts = (*PARTS, PEERS) if with_peers else PARTS
@@ -111,9 +130,7 @@ def make_report(
     if not with_peers:
         sections.append(peers.left_out())
     machine["measured in"] = f"{time.perf_counter() - begin:.0f} s{', quick' if quick else ''}"
-    report = Report(sections, machine)
-    write(report, out)
-    return report
+    return Report(sections, machine)
 
 
 def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
@@ -136,8 +153,8 @@ def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
     return dataclasses.replace(section, seconds=time.perf_counter() - begin)
 
 
-def write(report: Report, out: Path) -> None:
-    """Write page, tables and data to the folder `out`; whole files take the place of old ones."""
+def _write(report: Report, out: Path, place: AtomicFolder) -> None:
+    """Write page, tables and data; all of them take the place of an earlier report's at once."""
     tables = [table for section in report.sections for table in section.tables]
     texts = {f"{table.name}.csv": csv_text(table) for table in tables}
     texts[f"{FINDINGS}.csv"] = findings_text(report.sections)
@@ -146,17 +163,13 @@ def write(report: Report, out: Path) -> None:
     files |= {f"{picture.name}.png": picture.png for picture in pictures}
     files[DATA] = json_text(report, sorted(files)).encode()
     files[PAGE] = render(report.sections, report.machine).encode()
-    stale = set(_files_of_old(out)) - set(files)
     try:
-        beside = {name: out / f".{name}.new" for name in files}
+        desk = place.desk()
         for name, content in files.items():
-            beside[name].write_bytes(content)
-        for name, path in beside.items():
-            os.replace(path, out / name)
-        for name in stale:
-            (out / name).unlink(missing_ok=True)
+            (desk / name).write_bytes(content)
+        place.replace(desk, [PAGE, DATA, *_files_of_old(out)])
     except OSError as error:
-        raise ResultError(out, f"cannot be written: {error.strerror}") from None
+        raise ResultError(out, f"cannot be written: {error.strerror or error}") from None
 
 
 def _files_of_old(out: Path) -> list[str]:
@@ -166,17 +179,6 @@ def _files_of_old(out: Path) -> list[str]:
         return [name for name in names if Path(name).name == name and name.endswith(_OWN)]
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return []
-
-
-def _check_folder(out: Path) -> None:
-    """Make the folder; raise where no file can be made in it."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        probe = out / f".{DATA}.new"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise ResultError(out, f"cannot hold a report: {error.strerror}") from None
 
 
 def csv_text(table: Table) -> str:

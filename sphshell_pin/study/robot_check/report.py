@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from sphshell_pin.atomic import atomic_file
 from sphshell_pin.errors import ResultError
 from sphshell_pin.study.robot_check.checks import CHECKS, Sizes
 from sphshell_pin.testing.finding import Finding
@@ -141,18 +140,12 @@ def as_json(reports: Sequence[RobotReport], seed: int, sizes: Sizes) -> str:
 
 def write(path: str | PathLike[str], text: str) -> Path:
     """Write a text file, whole or not at all; ResultError if that cannot be done."""
-    target, part = Path(path), None
     try:
-        handle, part = tempfile.mkstemp(suffix=".part", dir=target.parent)
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        os.chmod(part, 0o644)
-        os.replace(part, target)
+        with atomic_file(path) as stream:
+            stream.write(text.encode())
     except OSError as error:
-        if part is not None and os.path.exists(part):
-            os.unlink(part)
         raise ResultError(path, f"cannot be written: {error.strerror}") from error
-    return target
+    return Path(path)
 
 
 def _number(value: float) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -11,7 +12,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol
 
-from sphshell_pin.errors import InvalidParameter, ScenarioError, SphshellError, SweepError
+from sphshell_pin.errors import (
+    InvalidParameter,
+    ResultError,
+    ScenarioError,
+    SphshellError,
+    SweepError,
+)
 from sphshell_pin.scenario import (
     Built,
     Scenario,
@@ -22,7 +29,6 @@ from sphshell_pin.scenario import (
 from sphshell_pin.scenario.build import build_scenario
 from sphshell_pin.scenario.figures import check_expectations
 from sphshell_pin.scenario.reading import look_up
-from sphshell_pin.scenario.run import prepare_folder
 from sphshell_pin.study.sweep.cluster import ClusterPool
 from sphshell_pin.study.sweep.extras import need
 from sphshell_pin.study.sweep.grid import Axis, Value, Vary, axes_of, points_of, text_of
@@ -261,7 +267,7 @@ def run_plan(
 
     journal = None
     if out is not None:
-        prepare_folder(out.parent)
+        _make_folder(out.parent)
         journal = Journal(out.with_name(out.name + SUFFIX), plan.head)
     outcomes = {} if journal is None else dict(journal.outcomes)
     if retry_failed:
@@ -304,6 +310,18 @@ def run_plan(
         failed=failed,
         notes=tuple(notes),
     )
+
+
+def _make_folder(folder: Path) -> None:
+    """Make the folder of the table, and prove that it can be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as fault:
+        raise ResultError(
+            folder, f"the folder cannot be written: {fault.strerror}; give another with --out"
+        ) from None
 
 
 def _check_keys(axes: Iterable[Axis], changes: Mapping[str, str], path: Path) -> None:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.study.sweep.extras import need
 from sphshell_pin.study.sweep.grid import Axis, Value
@@ -99,22 +98,11 @@ def write_table(path: Path, columns: Columns, description: Mapping[str, Any]) ->
     """
     write = _write_parquet if path.suffix.lower() in PARQUET else _write_hdf5
     text = json.dumps(description, sort_keys=True)
-    aside = None
     try:
-        handle, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
-        os.close(handle)
-        write(Path(aside), columns, text)
-        # A temporary file is for its owner's eyes; a table has the rights of any new file.
-        os.chmod(aside, 0o666 & ~_umask())
-        with open(aside, "rb") as file:
-            os.fsync(file.fileno())
-        os.replace(aside, path)
+        with atomic_file(path) as file:
+            write(file, columns, text)
     except OSError as fault:
         raise ResultError(path, f"cannot be written: {fault.strerror or fault}") from None
-    finally:
-        if aside is not None:
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(aside)
 
 
 def _is_table(path: Path) -> bool:
@@ -128,17 +116,17 @@ def _is_table(path: Path) -> bool:
         return False
 
 
-def _write_parquet(path: Path, columns: Columns, description: str) -> None:
+def _write_parquet(file: IO[bytes], columns: Columns, description: str) -> None:
     arrow, parquet = need("pyarrow"), need("pyarrow.parquet")
     arrays = {
         name: arrow.array(values.tolist(), arrow.string()) if _is_text(values) else values
         for name, values in columns.items()
     }
     table = arrow.table(arrays).replace_schema_metadata({DATASET: description})
-    parquet.write_table(table, path, compression="zstd")
+    parquet.write_table(table, file, compression="zstd")
 
 
-def _write_hdf5(path: Path, columns: Columns, description: str) -> None:
+def _write_hdf5(file: IO[bytes], columns: Columns, description: str) -> None:
     h5py = need("h5py")
     # One array of records: a column's name may hold the slash that would make it a folder.
     fields: list[tuple[str, Any]] = []
@@ -155,8 +143,8 @@ def _write_hdf5(path: Path, columns: Columns, description: str) -> None:
     records = np.zeros(len(columns["run"]), dtype=fields)
     for name, values in encoded.items():
         records[name] = values
-    with h5py.File(path, "w") as file:
-        dataset = file.create_dataset(DATASET, data=records, track_times=False)
+    with h5py.File(file, "w") as table:
+        dataset = table.create_dataset(DATASET, data=records, track_times=False)
         dataset.attrs["description"] = description
 
 
@@ -179,9 +167,3 @@ def _texts(values: Sequence[str]) -> NDArray[Any]:
 
 def _is_text(values: NDArray[Any]) -> bool:
     return bool(values.dtype == object)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -1,0 +1,91 @@
+"""One file, replaced whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import stat
+from collections.abc import Iterator
+from os import PathLike
+from pathlib import Path
+from typing import IO
+
+from sphshell_pin.atomic.lock import lock_file
+
+
+@contextlib.contextmanager
+def atomic_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
+    """Yield an empty file that takes the place of the one at `path` if the block ends well.
+
+    Whatever ends the process, `path` holds the old bytes or all of the new ones; after a power cut,
+    too. The new file is written as `.NAME.writing` beside the old one. One that a killed process
+    left there is written over; another process that writes the same file waits. A symbolic link
+    stays, and its target is replaced; a device or pipe is written to directly.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; nothing is left of the new one.
+    """
+    with _aside(path, "") as (file, _):
+        yield file
+
+
+@contextlib.contextmanager
+def atomic_path(path: str | PathLike[str], suffix: str) -> Iterator[Path]:
+    """Yield where to write the file, for writers that open it by its name; see `atomic_file`.
+
+    The name ends in `suffix`. The file there is to be written over, not removed.
+    """
+    with _aside(path, suffix) as (_, part):
+        yield part
+
+
+@contextlib.contextmanager
+def _aside(path: str | PathLike[str], suffix: str) -> Iterator[tuple[IO[bytes], Path]]:
+    target = Path(os.path.realpath(path))
+    mode = target.stat().st_mode if target.exists() else None
+    if mode is not None and not stat.S_ISREG(mode):
+        with open(target, "wb") as file:
+            yield file, target
+        return
+    part = target.with_name(f".{target.name}.writing{suffix}")
+    descriptor, locked = lock_file(part)
+    if not locked:
+        # Two processes must not write the same file.
+        own = part.with_name(f".{target.name}.writing-{os.getpid()}{suffix}")
+        os.rename(part, own)
+        part = own
+    with os.fdopen(descriptor, "r+b") as file:
+        try:
+            file.truncate(0)
+            yield file, part
+            file.flush()
+            if mode is not None:
+                os.chmod(part, stat.S_IMODE(mode))
+            os.fsync(file.fileno())
+            os.replace(part, target)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(part)
+            raise
+    sync_folder(target.parent)
+
+
+def sync_file(path: Path) -> None:
+    """Make the contents of a file outlast a power cut."""
+    with open(path, "rb") as file:
+        os.fsync(file.fileno())
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names in a folder outlast a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as fault:
+        if fault.errno not in (errno.EINVAL, errno.EBADF, errno.EOPNOTSUPP):
+            raise  # else a file system that knows no such thing
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,288 @@
+"""A folder of files that belong together, replaced whole or not at all.
+
+The new files are written to a folder beside the old one, and the two exchange their names in one
+system call. Files of others are linked into the new folder before. A folder that cannot be
+exchanged (see `AtomicFolder.replace`) gets the new files one by one, from a list on disk that the
+next process completes should this one be killed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from sphshell_pin.atomic.exchange import exchange
+from sphshell_pin.atomic.file import sync_file, sync_folder
+from sphshell_pin.atomic.lock import holder, lock_file, sign
+
+# In the folder where the new ones are made: they, and the list written once all are complete.
+_FILES, _READY = "files", "ready.json"
+
+
+class Busy(OSError):
+    """Another process is writing the folder; the text says which and since when."""
+
+
+class AtomicFolder:
+    """The folder at `path`, in the hands of this process alone while the `with` block lasts.
+
+    It is made if it is not there, and removed if the block fails before `replace`. What a killed
+    process left behind is cleared away at the beginning, see `replace`.
+
+    Parameters
+    ----------
+    path : of the folder; of a symbolic link its target is meant.
+    last : the file that says that the others are there. Where files are exchanged one by one, it
+        is the first to go and the last to come.
+    inner : names of folders in it that go with it into an exchange. A folder that holds any others
+        is not exchanged: they may be working directories, or large.
+
+    Raises
+    ------
+    Busy
+        Another process has it.
+    OSError
+        It cannot be made or written.
+    """
+
+    def __init__(self, path: str | PathLike[str], *, last: str, inner: Sequence[str] = ()) -> None:
+        self._folder = Path(os.path.realpath(path))
+        self._last = last
+        self._inner = frozenset(inner)
+        self._made: list[Path] = []
+        self._lock: tuple[Path, int] | None = None
+        # Those of another process are left alone where no lock says that it has ended.
+        self._suffix = ""
+
+    def __enter__(self) -> Self:
+        try:
+            folder = self._folder
+            self._made = [one for one in (folder, *folder.parents) if not one.exists()]
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                pass
+            self._take()
+            self._clear()
+        except BaseException:
+            self._end(failed=True)
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        fault: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            # What cannot be cleared away now is so by the next process.
+            with contextlib.suppress(OSError):
+                self._clear()
+        finally:
+            self._end(failed=kind is not None)
+
+    def desk(self) -> Path:
+        """Make the empty folder for the new files, and return it."""
+        beside, inside = self._places()
+        place = beside if self._may_leave() else inside
+        try:
+            place.mkdir()
+        except OSError:
+            if place == inside:
+                raise
+            place = inside
+            place.mkdir()
+        desk = place / _FILES
+        desk.mkdir()
+        return desk
+
+    def replace(self, desk: Path, old: Iterable[str]) -> None:
+        """Put all files of the `desk` in the place of those called `old`; others stay.
+
+        Whoever looks sees the old files or the new ones, and every file of others, unless the
+        folder must stay where it is: a mount point, the working directory, one in a folder that
+        cannot be written, one with folders of others, or on a file system without the exchange of
+        names or without hard links. Then `last` is missing while files are moved; should the
+        process be killed meanwhile, the next `AtomicFolder` moves the rest.
+
+        Raises
+        ------
+        OSError
+            The files cannot be put there; the old ones stay.
+        """
+        for left in desk.glob(".*.writing"):  # an `atomic_file` that Ctrl-C ended at its start
+            left.unlink()
+        new = sorted(os.listdir(desk))
+        ours = {*new, *old}
+        for name in ours:
+            if (self._folder / name).is_dir():
+                raise IsADirectoryError(errno.EISDIR, f"{name} there is a folder")
+        for name in new:
+            sync_file(desk / name)
+        beside, inside = self._places()
+        if desk.parent == beside:
+            _write_list(beside, new, old)
+            try:
+                self._link_others(self._folder, desk, ours)
+                sync_folder(desk)
+                exchange(desk, self._folder)
+            except OSError:
+                inside.mkdir()
+                shutil.move(desk, inside / _FILES)
+                for name in new:
+                    sync_file(inside / _FILES / name)
+            else:
+                sync_folder(self._folder.parent)
+                return
+        _write_list(inside, new, old)
+        self._move_in(inside)
+
+    def _take(self) -> None:
+        """Lock the folder, by a file beside it, or in it where that cannot be."""
+        beside, inside = self._folder.parent / f".{self._folder.name}.lock", self._folder / ".lock"
+        for path in (beside, inside):
+            try:
+                descriptor, locked = lock_file(path, wait=False)
+            except BlockingIOError:
+                raise Busy(f"{holder(path)} is writing it") from None
+            except OSError:
+                if path == inside:
+                    raise
+                continue
+            self._lock = path, descriptor
+            self._suffix = "" if locked else f"-{os.getpid()}"
+            sign(descriptor)
+            return
+
+    def _end(self, *, failed: bool) -> None:
+        """Let go of the folder; remove it if it was made in vain."""
+        if self._lock is not None:
+            path, descriptor = self._lock
+            self._lock = None
+            try:
+                with contextlib.suppress(OSError):
+                    os.unlink(path)
+            finally:
+                os.close(descriptor)
+        if failed:
+            with contextlib.suppress(OSError):
+                for one in self._made:
+                    one.rmdir()
+
+    def _places(self) -> tuple[Path, Path]:
+        """Return the folders in which the new files may be made: beside, and inside."""
+        name = f"writing{self._suffix}"
+        return self._folder.parent / f".{self._folder.name}.{name}", self._folder / f".{name}"
+
+    def _may_leave(self) -> bool:
+        """Whether the folder may become another one of the same name."""
+        parent = self._folder.parent
+        if os.path.ismount(self._folder) or os.stat(parent).st_dev != os.stat(self._folder).st_dev:
+            return False
+        with contextlib.suppress(OSError):  # a working directory that was removed
+            return not Path.cwd().is_relative_to(self._folder)
+        return True
+
+    def _clear(self) -> None:
+        """Complete or undo what this process, or a killed one, has begun."""
+        beside, inside = self._places()
+        if beside.is_dir():
+            ours = _read_list(beside)
+            if ours is not None and (beside / _FILES).is_dir():
+                # The new folder before an exchange, or the old one after it.
+                _bring_back(beside / _FILES, self._folder, {*ours[0], *ours[1]})
+            shutil.rmtree(beside)
+        if inside.is_dir():
+            if _read_list(inside) is not None:
+                self._move_in(inside)
+                (inside / _READY).unlink()
+            shutil.rmtree(inside)
+
+    def _move_in(self, inside: Path) -> None:
+        """Move the files into the folder, one by one; may be begun again at any time."""
+        new, old = _read_list(inside) or ((), ())
+        folder, files = self._folder, inside / _FILES
+        waiting = sorted(set(new) & set(os.listdir(files)), key=lambda name: name == self._last)
+        if waiting:
+            (folder / self._last).unlink(missing_ok=True)
+            sync_folder(folder)
+        for name in set(old) - set(new):
+            (folder / name).unlink(missing_ok=True)
+        for name in waiting:
+            if name == self._last:
+                sync_folder(folder)
+            os.replace(files / name, folder / name)
+        sync_folder(folder)
+
+    def _link_others(self, source: Path, target: Path, ours: set[str]) -> None:
+        """Link all files of `source` but `ours` into `target`, which becomes like it."""
+        about = os.stat(source)
+        os.chown(target, about.st_uid, about.st_gid)
+        shutil.copystat(source, target)
+        for entry in os.scandir(source):
+            if entry.name in ours:
+                continue
+            copy = target / entry.name
+            if not entry.is_dir(follow_symlinks=False):
+                os.link(entry, copy, follow_symlinks=False)
+            elif source == self._folder and entry.name in self._inner:
+                copy.mkdir()
+                self._link_others(Path(entry), copy, set())
+                sync_folder(copy)
+            else:
+                raise OSError(f"{entry.path} is a folder of others")
+
+
+def _write_list(place: Path, new: Iterable[str], old: Iterable[str]) -> None:
+    """Write, once all is on disk, which files are ours: those that come, and those that go."""
+    sync_folder(place / _FILES)
+    path = place / _READY
+    path.write_text(json.dumps({"new": sorted(new), "old": sorted(old)}), encoding="utf-8")
+    sync_file(path)
+    sync_folder(place)
+
+
+def _read_list(place: Path) -> tuple[list[str], list[str]] | None:
+    """Return the names that come and those that go; None if not all of it was written."""
+    try:
+        told = json.loads((place / _READY).read_text(encoding="utf-8"))
+        return list(told["new"]), list(told["old"])
+    except (FileNotFoundError, ValueError):
+        return None
+
+
+def _bring_back(left: Path, folder: Path, ours: set[str]) -> None:
+    """Remove the folder `left`; what in it is not `ours`, nor in `folder`, moves there.
+
+    Others may have written into it until the moment of the exchange.
+    """
+    for entry in list(os.scandir(left)):
+        there = folder / entry.name
+        if entry.name in ours:
+            os.unlink(entry)
+        elif entry.is_dir(follow_symlinks=False) and there.is_dir():
+            _bring_back(Path(entry), there, set())
+        elif _is_older(entry, there):
+            os.unlink(entry)
+        else:
+            os.rename(entry, there)
+    os.rmdir(left)
+
+
+def _is_older(entry: os.DirEntry[str], there: Path) -> bool:
+    """Whether the file is also `there`, the same or a newer one."""
+    try:
+        found = os.lstat(there)
+    except FileNotFoundError:
+        return False
+    mine = entry.stat(follow_symlinks=False)
+    return os.path.samestat(mine, found) or mine.st_mtime_ns <= found.st_mtime_ns

@@ -1,0 +1,265 @@
+"""What is left when a process ends at any of its file operations: whole old or whole new files."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.atomic import AtomicFolder
+from sphshell_pin.errors import ResultError, ScenarioError, ShellFileError
+from sphshell_pin.plot.figure import write_figure
+from sphshell_pin.scenario import build, new, run, run_built
+from sphshell_pin.shell.converting import convert
+from sphshell_pin.study.report import making
+from sphshell_pin.study.report.contents import Column, Section, Table
+from sphshell_pin.study.sweep.table import write_table
+from sphshell_pin.view.recording import write_page
+from tests import meshes
+from tests.scenario.files import write
+from tests.scenario.operations import contents, counted, fill, interrupt, killed_at, visible
+
+MESH = Path(__file__).parents[1] / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
+OTHERS = {"notes.txt": b"mine", "stopped/run.npz": b"stopped early"}
+
+
+@pytest.fixture
+def place():
+    """A folder in memory, where nothing waits for a disk."""
+    memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    with tempfile.TemporaryDirectory(dir=memory) as folder:
+        yield Path(folder)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Two runs as they were computed, called "old" and "new"."""
+    path = write(tmp_path_factory.mktemp("scenario"))
+    both = {}
+    for name, duration in (("old", "0.02"), ("new", "0.03")):
+        built = build(path, {"run.duration": duration})
+        both[name] = built, run.simulate(built)
+    return both
+
+
+@pytest.fixture
+def results(runs, place, monkeypatch):
+    """Writes the results of one of the runs; pictures are stand-ins, for speed."""
+    drawn = SimpleNamespace(savefig=lambda stream, **_: stream.write(b"picture" * 99))
+
+    def two_pictures(_, folder, **__):
+        return [write_figure(folder / name, drawn) for name in ("energy.png", "contact_map.png")]
+
+    monkeypatch.setattr("sphshell_pin.plot.save_figures", two_pictures)
+    monkeypatch.setattr("sphshell_pin.view.recording.render_recording", lambda *_, **__: "<html>")
+
+    def write_results(name):
+        built, computed = runs[name]
+        monkeypatch.setattr(run, "simulate", lambda *_: computed)
+        return run_built(built, place / "out", recording=name == "old")
+
+    return write_results
+
+
+def put_others(folder):
+    for name, text in OTHERS.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(text)
+
+
+def check_whole(folder):
+    """The files that the summary lists are there with the contents that it says, and no others."""
+    found = contents(folder)
+    summary = json.loads(found.pop("summary.json"))
+    assert summary["complete"]
+    assert {
+        name: f"sha256:{hashlib.sha256(data).hexdigest()}" for name, data in found.items()
+    } == summary["files"] | {
+        name: f"sha256:{hashlib.sha256(data).hexdigest()}"
+        for name, data in OTHERS.items()
+        if name in found
+    }
+
+
+def test_a_summary_lists_the_files_with_their_contents(results, place):
+    results("old")
+    check_whole(place / "out")
+    assert len(json.loads((place / "out" / "summary.json").read_text())["files"]) == 5
+
+
+def ends(place, keep, write, act=None, *, once=True):
+    """Yield n, once `write` has ended at its n-th file operation in a fresh copy of `keep`.
+
+    It is killed there; with `act` it goes on in this process, which does that.
+    """
+    n, ended = 1, True
+    while ended:
+        for one in place.iterdir():
+            shutil.rmtree(one) if one.is_dir() else one.unlink()
+        shutil.copytree(keep, place, dirs_exist_ok=True)
+        if act is None:
+            ended = killed_at(n, write)
+        else:
+            with (
+                contextlib.suppress(ResultError, ShellFileError, ScenarioError, KeyboardInterrupt),
+                counted(n, act, once=once) as heard,
+            ):
+                write()
+            ended = len(heard) >= n
+        if ended:
+            yield n
+        n += 1
+
+
+@pytest.fixture
+def two_runs(results, place, tmp_path):
+    """What the place holds before and after a new run into the folder of an old one."""
+    results("old")
+    put_others(place / "out")
+    keep = shutil.copytree(place, tmp_path / "keep")
+    before = contents(place)
+    results("new")
+    after = contents(place)
+    assert set(before) - set(after) == {"out/recording.html"}
+    check_whole(place / "out")
+    return keep, before, after
+
+
+def test_killed_at_any_operation_a_run_leaves_old_or_new_results(two_runs, results, place):
+    keep, before, after = two_runs
+    seen = []
+    for n in ends(place, keep, lambda: results("new")):
+        left = visible(place)
+        assert left in (before, after), n
+        seen.append(left == after)
+        results("new")
+        assert contents(place) == after, n
+        assert os.listdir(place) == ["out"], n
+    assert seen == sorted(seen)
+    assert False in seen
+    assert True in seen
+
+
+def test_a_full_disk_leaves_the_old_results_and_nothing_else(two_runs, results, place):
+    keep, before, after = two_runs
+    for n in ends(place, keep, lambda: results("new"), fill, once=False):
+        assert contents(place) in (before, after), n
+        assert os.listdir(place) == ["out"], n
+
+
+def test_ctrl_c_at_any_operation_leaves_old_or_new_results(two_runs, results, place):
+    keep, before, after = two_runs
+    for n in ends(place, keep, lambda: results("new"), interrupt):
+        if visible(place) != before:
+            check_whole(place / "out")  # pictures that were not drawn are not listed
+            assert set(visible(place)) <= set(after)
+        results("new")
+        assert contents(place) == after, n
+        assert os.listdir(place) == ["out"], n
+
+
+@pytest.mark.parametrize("act", [None, fill])
+def test_where_names_cannot_be_exchanged_the_next_run_goes_on(
+    act, two_runs, results, place, monkeypatch
+):
+    def missing(*_):
+        raise OSError(errno.ENOSYS, "Function not implemented")
+
+    monkeypatch.setattr("sphshell_pin.atomic.folder.exchange", missing)
+    keep, before, after = two_runs
+    out = place / "out"
+    for n in ends(place, keep, lambda: results("new"), act, once=False):
+        left = visible(place)
+        # While files are moved no summary says that they belong together.
+        assert left in (before, after) or not (out / "summary.json").exists(), n
+        assert all((out / name).read_bytes() == text for name, text in OTHERS.items()), n
+        with AtomicFolder(out, last="summary.json"):
+            pass
+        assert contents(place) in (before, after), n
+        assert os.listdir(place) == ["out"], n
+
+
+def test_killed_in_its_first_run_a_folder_is_empty_or_whole(results, place, tmp_path):
+    keep = tmp_path / "keep"
+    keep.mkdir()
+    for n in ends(place, keep, lambda: results("new")):
+        if visible(place):
+            check_whole(place / "out")
+        results("new")
+        assert os.listdir(place) == ["out"], n
+
+
+def of_report(title):
+    table = Table(title, "", (Column("a", "a"),), [(1.0,)])
+    report = making.Report([Section("x", title, tables=[table])], {})
+
+    def write_report(place):
+        with making._report_folder(place / "report") as folder:
+            making._write(report, place / "report", folder)
+
+    return write_report
+
+
+def of_sweep(seed):
+    columns = {"run": np.arange(9), "a": np.random.default_rng(seed).random(9)}
+    return lambda place: write_table(place / "table.parquet", columns, {"scenario": "drop"})
+
+
+def of_shell(side):
+    shell = sp.Shell(*meshes.cube(side))
+    return lambda place: shell.to_file(place / "box.obj")
+
+
+WRITERS = {
+    "report": (of_report("old"), of_report("new")),
+    "sweep": (of_sweep(1), of_sweep(2)),
+    "shell": (of_shell(1.0), of_shell(2.0)),
+    "convert": tuple(
+        lambda place, unit=unit: convert(MESH, place / "mesh.shl", unit) for unit in ("m", "mm")
+    ),
+    "new": tuple(
+        lambda place, text=text: new._write(place / "new.toml", text) for text in ("old", "new")
+    ),
+    "recording": tuple(
+        lambda place, text=text: write_page(place / "page.html", text) for text in ("old", "new")
+    ),
+}
+
+
+@pytest.mark.parametrize("writer", WRITERS)
+@pytest.mark.parametrize("act", [None, fill])
+def test_other_files_are_old_or_new(writer, act, place, tmp_path):
+    write_old, write_new = WRITERS[writer]
+    write_old(place)
+    keep = shutil.copytree(place, tmp_path / "keep")
+    before = contents(place)
+    write_new(place)
+    after = contents(place)
+    assert before != after
+    seen = []
+    for n in ends(place, keep, lambda: write_new(place), act, once=False):
+        left = contents(place) if act else visible(place)
+        assert left in (before, after), n
+        seen.append(left == after)
+        write_new(place)
+        assert contents(place) == after, n
+    assert False in seen
+
+
+def test_a_second_run_is_told_who_has_the_folder(runs, place, monkeypatch):
+    out = place / "out"
+    with AtomicFolder(out, last="summary.json"):
+        monkeypatch.setattr(run, "simulate", lambda *_: pytest.fail("it ran"))
+        with pytest.raises(ResultError, match=rf"process {os.getpid()}, since 20.* --out"):
+            run_built(runs["new"][0], out)
+    assert os.listdir(place) == ["out"]
