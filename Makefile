@@ -8,7 +8,7 @@ CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 OUT ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench hard-cases work-precision lint format report robots sweep-survival rollouts real-surfaces wheel docs clean
+.PHONY: help demo test bench hard-cases work-precision lint format report robots sweep-survival rollouts real-surfaces wheel docs fuzz clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -24,6 +24,7 @@ help:
 # make sweep-survival  500 runs five ways, workers killed and the sweep resumed: the same bytes
 # make rollouts        print the speed-up of 10 000 runs over threads
 # make real-surfaces FOLDER=...  jumps and energies over the surfaces of a folder
+# make fuzz SECONDS=600 SEED=1  damaged files for every reader, until one breaks it
 # make clean  remove everything that was built
 
 $(BIN)/python:
@@ -68,6 +69,9 @@ rollouts: $(VENV)/.test
 
 real-surfaces: $(VENV)/.test
 	$(BIN)/python -m benchmarks.real_surfaces $(or $(FOLDER),tests/data/corpus)
+
+fuzz: $(VENV)/.test
+	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 
 work-precision: $(VENV)/.test
 	$(BIN)/python -m benchmarks.work_precision --write

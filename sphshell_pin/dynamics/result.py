@@ -209,31 +209,32 @@ class Result:
         return target
 
     @classmethod
-    def load(cls, path: str | PathLike[str]) -> Result:
-        """Read what save() wrote; ResultError for anything else."""
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                header = json.loads(str(file["header"]))
-                arrays = {k: read_only(file[k]) for k in file.files if k != "header"}
-            log = {f.name: arrays[f"contacts.{f.name}"] for f in fields(ContactLog)}
-            energy = {f.name: arrays[f"energy.{f.name}"] for f in fields(EnergyAudit)}
-            return cls(
-                t=arrays["t"],
-                q=arrays["q"],
-                v=arrays["v"],
-                pairs=tuple(header["pairs"]),
-                contacts=ContactLog(**log),
-                events=tuple(Event(*e) for e in header["events"]),
-                energy=EnergyAudit(**energy),
-                stats=header["stats"],
-                origin=_found(header.get("origin"), Path(path).parent),
-            )
-        except OSError as error:
-            raise ResultError(
-                path, f"cannot read the results: {error.strerror or error}"
-            ) from error
-        except Exception as error:
-            raise ResultError(path, "is not a file that Result.save wrote") from error
+    def load(cls, path: str | PathLike[str], *, max_size: float = 2e9) -> Result:
+        """Read what save() wrote; nothing in the file is ever executed.
+
+        `max_size` is the memory that its arrays may need [B]: a small file may hold large ones.
+
+        Raises
+        ------
+        ResultError
+            The file cannot be read, or is not what save() writes: the text says which part of it.
+        """
+        from sphshell_pin.dynamics.result_file import read_result
+
+        header, arrays = read_result(path, max_size)
+        log = {f.name: arrays[f"contacts.{f.name}"] for f in fields(ContactLog)}
+        energy = {f.name: arrays[f"energy.{f.name}"] for f in fields(EnergyAudit)}
+        return cls(
+            t=arrays["t"],
+            q=arrays["q"],
+            v=arrays["v"],
+            pairs=tuple(header["pairs"]),
+            contacts=ContactLog(**log),
+            events=tuple(Event(*e) for e in header["events"]),
+            energy=EnergyAudit(**energy),
+            stats=header["stats"],
+            origin=_found(header.get("origin"), Path(path).parent),
+        )
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the contact log as a pandas DataFrame, one row a contact, units in the names.

@@ -107,17 +107,25 @@ def rebuild(built: Built, changes: Mapping[str, str]) -> Built:
     return build_scenario(scenario, built.path, built)
 
 
-def build_scenario(scenario: schema.Scenario, path: Path, reuse: Built | None = None) -> Built:
+def build_scenario(
+    scenario: schema.Scenario,
+    path: Path,
+    reuse: Built | None = None,
+    *,
+    function: Callable[[str, Path, str], Callable[..., Any]] = load_function,
+) -> Built:
     """Build a scenario that is already read; `path` is its file, which others stand beside.
 
     Robots, shells and functions of `reuse` are taken over where their tables are the same.
+    `function(where, path, key)` gives what "file.py:function" names: `load_function` runs the file,
+    `functions.unloaded` does not.
     """
     assembly = _assemble(scenario, path, reuse)
     functions = {} if reuse is None else dict(reuse.functions)
 
     def load(where: str, key: str) -> Callable[..., Any]:
         if where not in functions:
-            functions[where] = load_function(where, path, key)
+            functions[where] = function(where, path, key)
         return functions[where]
 
     with blamed_on(path, "robot"):

@@ -1,4 +1,7 @@
-"""The user's own functions, which a scenario names as "file.py:function"."""
+"""The user's own functions, which a scenario names as "file.py:function".
+
+They are the only code that a scenario can name, and this is the only place that executes it.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from sphshell_pin.errors import NameNotFound, ScenarioError
+from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.scenario.bodies import blamed_on
 
 
@@ -44,3 +47,18 @@ def load_function(where: str, path: Path, key: str) -> Callable[..., Any]:
         with blamed_on(path, key):
             raise NameNotFound("function", function, str(file), valid)
     return found  # type: ignore[no-any-return]
+
+
+def unloaded(where: str, path: Path, key: str) -> Callable[..., Any]:
+    """Return what stands for the function that "file.py:function" names; nothing is executed.
+
+    Called, it raises SphshellError, which says how to have the function itself.
+    """
+
+    def refuse(*arguments: Any, **keywords: Any) -> Any:
+        raise SphshellError(
+            f"{path}: {key}: '{where}' was not loaded, as no code is executed to show a finished "
+            "run: if you trust it, say Replay(result, trust_code=True)"
+        )
+
+    return refuse

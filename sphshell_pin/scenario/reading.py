@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import re
 import tomllib
 import types
 import typing
@@ -17,6 +18,10 @@ from pydantic_core import ErrorDetails
 
 from sphshell_pin.errors import NameNotFound, ScenarioError
 from sphshell_pin.scenario.schema import ERROR_CONTROLLED, LISTS, RunSection, Scenario
+
+TOO_DEEP = "is not valid TOML: its tables or lists are nested too deeply"
+# A key of a hundred parts: the time and memory of tomllib grow with their square.
+_LONG_KEY = re.compile(r"""(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""")
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -73,10 +78,16 @@ def parse_scenario(text: str, path: str | PathLike[str]) -> Scenario:
     ScenarioError
         Wrong TOML, or a key or value that no scenario may have.
     """
+    if long := _LONG_KEY.search(text):
+        line = text.count("\n", 0, long.start()) + 1
+        raise ScenarioError(path, "", f"is not valid TOML: line {line} has a key of 100 parts")
     try:
-        return _validated(tomllib.loads(text), path)
-    except tomllib.TOMLDecodeError as error:
+        data = tomllib.loads(text)
+    except ValueError as error:  # also a number of thousands of digits
         raise ScenarioError(path, "", f"is not valid TOML: {error}") from None
+    except RecursionError:
+        raise ScenarioError(path, "", TOO_DEEP) from None
+    return _validated(data, path)
 
 
 def change_scenario(
@@ -165,7 +176,7 @@ def _read_text(path: str | PathLike[str]) -> str:
 def _parse_value(text: str) -> Any:
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return text
 
 

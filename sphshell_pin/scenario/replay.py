@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,10 @@ import numpy.typing as npt
 from sphshell_pin.dynamics.result import Origin, Result
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
-from sphshell_pin.scenario.build import Built, build, build_scenario
+from sphshell_pin.scenario.build import Built, build_scenario
+from sphshell_pin.scenario.functions import load_function, unloaded
 from sphshell_pin.scenario.player import Rows
-from sphshell_pin.scenario.reading import shipped_scenarios
+from sphshell_pin.scenario.reading import find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.schema import Scenario
 
 Array = npt.NDArray[np.float64]
@@ -32,6 +33,10 @@ class Replay:
     built from the scenario it came from, with the settings of the run; `scenario`, a shipped name
     or a path, takes its place. A Result of one's own scene is played in that scene.
 
+    No Python code that a scenario names is executed, as the recorded contacts need none: a file of
+    results may be somebody else's. A pair of `scene` whose contacts a routine finds then raises an
+    error where it is evaluated. With `trust_code` the routine is loaded.
+
     Raises
     ------
     ResultError
@@ -44,14 +49,19 @@ class Replay:
         self,
         result: Result | str | PathLike[str],
         scenario: str | PathLike[str] | None = None,
+        *,
+        trust_code: bool = False,
     ) -> None:
         self.result = result if isinstance(result, Result) else Result.load(result)
         self._name = "the result" if isinstance(result, Result) else str(Path(result))
-        built = self._build(scenario)
+        built = self._build(scenario, trust_code=trust_code)
+        self.speed = 1.0
+        """Seconds of simulated time that a recording of it shows in one second."""
         if built is not None:
             self.scene: Scene = built.scene
             self.visual_model: Any = built.visual_model
             self.title = built.scenario.title or built.name
+            self.speed = built.scenario.run.recording_speed
         elif self.result.scene is not None:
             self.scene, self.visual_model = self.result.scene, None
             self.title = "A finished run"
@@ -173,11 +183,13 @@ class Replay:
             log.depth[own],
         )
 
-    def _build(self, scenario: str | PathLike[str] | None) -> Built | None:
+    def _build(self, scenario: str | PathLike[str] | None, *, trust_code: bool) -> Built | None:
+        function = load_function if trust_code else unloaded
         if scenario is not None:
-            return build(scenario)
+            path = find_scenario(scenario)
+            return build_scenario(_shown(read_scenario(path)), path, function=function)
         origin = self.result.origin
-        return None if origin is None else _build_again(origin, self._name)
+        return None if origin is None else _build_again(origin, self._name, function)
 
     def _check(self) -> None:
         """Refuse a scene in which these rows mean nothing."""
@@ -196,9 +208,27 @@ class Replay:
                 f"its contacts were {', '.join(self.result.pairs) or 'none'}, the scenario has "
                 f"{', '.join(names) or 'none'}: it is another scenario, or has changed since",
             )
+        log = self.result.contacts
+        for index, pair in enumerate(self.scene.pairs):
+            most = 0 if pair.shell is None else len(pair.shell.elements)
+            touched = int(np.max(log.element[log.pair == index], initial=-1))
+            if pair.shell is not None and touched >= most:
+                raise ResultError(
+                    self._name,
+                    f"contact '{pair.name}' touched element {touched}, but its shell has {most} "
+                    "elements: the surface has changed since",
+                )
 
 
-def _build_again(origin: Origin, name: str) -> Built:
+def _shown(scenario: Scenario) -> Scenario:
+    """Return what of `scenario` is needed to show it."""
+    given = scenario.model_dump(exclude_unset=True)
+    return Scenario.model_validate({k: v for k, v in given.items() if k not in UNSHOWN})
+
+
+def _build_again(
+    origin: Origin, name: str, function: Callable[[str, Path, str], Callable[..., Any]]
+) -> Built:
     """Build the scenario of `origin` with its settings; `name` is the result's."""
     path = Path(origin.scenario)
     if path.suffix != ".toml":
@@ -208,7 +238,7 @@ def _build_again(origin: Origin, name: str) -> Built:
         path = shipped[origin.scenario]
     settings: Mapping[str, Any] = {k: v for k, v in origin.settings.items() if k not in UNSHOWN}
     try:
-        return build_scenario(Scenario.model_validate(settings), path)
+        return build_scenario(Scenario.model_validate(settings), path, function=function)
     except SphshellError as fault:
         gone = "" if path.exists() else f"{path} is no longer there, and "
         why = f"{gone}its scenario cannot be built again ({fault}): {HOW}"

@@ -57,8 +57,7 @@ def view_result(
         replay = Replay(result)
         scene, title = replay.scene, replay.title
         visual_model = replay.visual_model if visual_model is None else visual_model
-        run = result.origin.settings.get("run", {})
-        speed = run.get("recording_speed") if speed is None else speed
+        speed = replay.speed if speed is None else speed
     scene = result.scene if scene is None else scene
     if scene is None:
         raise ResultError("the result", "has no scene to be drawn in: give view(scene=...)")

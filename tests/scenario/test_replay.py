@@ -14,6 +14,7 @@ import sphshell_pin as sp
 from sphshell_pin.errors import ResultError, SphshellError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.replay import Replay
+from sphshell_pin.view.live.opening import player_of
 from tests.scenario.files import DROP, write
 
 
@@ -173,3 +174,96 @@ def test_a_scene_of_ones_own_is_played_where_it_ran():
     assert replay.scene is scene
     with pytest.raises(ResultError, match="does not say"):
         Replay(dataclasses.replace(result, scene=None))
+
+
+ROUTINE = """
+from pathlib import Path
+
+Path(__file__).with_name("executed").touch()
+
+
+def find(pose_i, pose_j):
+    depth = 0.012 - pose_i.translation[2]
+    return [pose_i.translation], [[0.0, 0.0, 1.0]], [depth]
+
+
+def torque(t, q, v, contacts):
+    return [0.0] * 6
+
+
+def figure(result, scene):
+    return 1.0
+"""
+
+SOURCE = """
+title = "a ball falls on points of one's own"
+
+[robot]
+name = "ball"
+start = { root_joint = [0, 0, 0.0125, 0, 0, 0, 1] }
+
+[source]
+name = "ball-plate"
+find = "routine.py:find"
+frame_i = "ball"
+law = { type = "impact", stiffness = 1e6 }
+
+[controller]
+type = "python"
+function = "routine.py:torque"
+
+[run]
+duration = 0.02
+dt = 1e-4
+
+[figures]
+own = "routine.py:figure"
+"""
+
+
+@pytest.fixture
+def with_code(tmp_path):
+    """A folder with a scenario, its routine, which notes that it is executed, and its results."""
+    (tmp_path / "routine.py").write_text(ROUTINE)
+    run_built(build(write(tmp_path, SOURCE)), tmp_path / "out", recording=False)
+    (tmp_path / "executed").unlink()
+    return tmp_path
+
+
+def test_looking_at_results_executes_no_code(with_code):
+    """Somebody else's run.npz may name any file beside it."""
+    file = with_code / "out" / "run.npz"
+    result = sp.Result.load(file)
+    assert len(result.contacts)
+    for scenario in (None, with_code / "drop.toml"):
+        replay = Replay(file, scenario=scenario)
+        replay.seek(result.contacts.t[3])
+        assert len(replay.contacts)
+    result.plot("map")
+    result.plot("path")
+    result.view()
+    player_of(file)
+    # The file alone, with settings of its own and no scenario beside it.
+    (with_code / "drop.toml").unlink()
+    Replay(file)
+    assert not (with_code / "executed").exists()
+
+
+def test_the_routine_is_loaded_where_it_is_trusted(with_code):
+    file = with_code / "out" / "run.npz"
+    replay = Replay(file)
+    with pytest.raises(SphshellError, match=r"routine.py:find.*trust_code=True"):
+        replay.scene.contacts(replay.q)
+    trusted = Replay(file, trust_code=True)
+    assert (with_code / "executed").exists()
+    trusted.seek(trusted.result.contacts.t[3])
+    assert len(trusted.contacts)
+    found = trusted.scene.contacts(trusted.q, trusted.v)
+    np.testing.assert_allclose(found.depth, trusted.contacts.depth, atol=1e-12)
+
+
+def test_elements_that_the_surface_does_not_have_are_refused(folder):
+    result = sp.Result.load(folder / "out" / "run.npz")
+    log = dataclasses.replace(result.contacts, element=result.contacts.element + 1000)
+    with pytest.raises(ResultError, match=r"touched element 10\d\d, but its shell has 6 elements"):
+        Replay(dataclasses.replace(result, contacts=log))

@@ -15,6 +15,8 @@ import pytest
 from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError, SweepError
 from sphshell_pin.study.sweep import axes_of, plan_sweep, sweep
+from sphshell_pin.study.sweep.driver import run_plan
+from sphshell_pin.study.sweep.journal import Journal, _line
 from sphshell_pin.study.sweep.table import varied_columns
 from sphshell_pin.study.sweep.worker import prepare
 from tests.study.resting import GRAVITY, RADIUS, SCENARIO, check_once, entries, write
@@ -149,29 +151,93 @@ def test_words_lists_and_values_in_step(folder):
     assert shallow / deep == pytest.approx((1.62 / 9.81) ** (1 / 1.5), rel=1e-8)
 
 
-def test_a_torn_journal_goes_on_and_a_damaged_one_is_refused(folder):
-    path, out = folder / "resting.toml", folder / "torn.parquet"
+@pytest.fixture
+def finished(folder, tmp_path):
+    """A finished sweep: its scenario, its table, the lines of its journal."""
+    path, out = folder / "resting.toml", tmp_path / "table.parquet"
     sweep(path, SMALL, workers=0, out=out)
+    return path, out, journal_of(out).read_bytes().splitlines(keepends=True)
+
+
+def journal_of(table: Path) -> Path:
+    return table.with_name(table.name + ".journal")
+
+
+def test_a_torn_journal_goes_on(finished):
+    path, out, lines = finished
     whole = out.read_bytes()
-    journal = out.with_name(out.name + ".journal")
-    text = journal.read_bytes()
-    lines = text.splitlines(keepends=True)
-    for torn in (b"".join(lines[:3]) + lines[3][:40], text[:-1], lines[0][:20], b""):
+    for torn in (b"".join(lines[:3]) + lines[3][:40], b"".join(lines)[:-1], lines[0][:20], b""):
         out.unlink()
-        journal.write_bytes(torn)
+        journal_of(out).write_bytes(torn)
         sweep(path, SMALL, workers=0, out=out)
         assert out.read_bytes() == whole
         check_once(out, 4)
-    for damaged in (
-        lines[0] + b"#\n" + lines[2],
-        lines[0] + b'{"run": 0}\n' + lines[2],
-        b"a,b\n1,2\n",
-        b"something of mine",
-    ):
-        journal.write_bytes(damaged)
-        with pytest.raises(SweepError, match="no entry of a sweep's journal"):
+
+
+def test_a_journal_that_begins_with_something_else_is_left_alone(finished):
+    path, out, lines = finished
+    flipped = lines[0].replace(b'"together": false', b'"together": fblse')
+    for damaged in (b"a,b\n1,2\n", b"something of mine", flipped + lines[1]):
+        journal_of(out).write_bytes(damaged)
+        with pytest.raises(SweepError, match="line 1: does not begin a sweep's journal"):
             sweep(path, SMALL, workers=0, out=out)
-        assert journal.read_bytes() == damaged
+        assert journal_of(out).read_bytes() == damaged
+
+
+def flipped_digits(line: bytes) -> list[bytes]:
+    """Return `line` with one digit after another changed, everywhere but in the checksum."""
+    end = line.rindex(b"crc32")
+    return [
+        line[:i] + (b"7" if line[i : i + 1] != b"7" else b"8") + line[i + 1 :]
+        for i in range(end)
+        if line[i : i + 1].isdigit()
+    ]
+
+
+def test_the_run_of_a_damaged_line_is_done_again(finished):
+    path, out, lines = finished
+    whole = out.read_bytes()
+    entry = json.loads(lines[1])
+    del entry["crc32"]
+    odd = (
+        {"run": [1]},
+        {"run": 9999},
+        {"run": True},
+        {"status": "maybe"},
+        {"figures": {"figures.depth": None}},
+        {"figures": {"figures.depth": "hello"}},
+        {"more": 1},
+    )
+    plan = plan_sweep(path, SMALL)
+    digits = flipped_digits(lines[1])
+    written = [_line(entry | change) for change in odd]
+    for damaged in (*digits, *written, b"#\n", b"[" * 100_000 + b"\n", lines[1][:-3] + b"\n"):
+        journal_of(out).write_bytes(lines[0] + damaged + b"".join(lines[2:]))
+        journal = Journal(journal_of(out), plan.head, 4)
+        journal.close()
+        assert sorted(journal.outcomes) == [1, 2, 3]
+        (note,) = journal.notes
+        assert "journal, line 2: is damaged" in note
+    notes: list[str] = []
+    report = run_plan(plan, workers=0, out=out, note=notes.append)
+    assert (report.resumed, notes) == (3, [note])
+    assert out.read_bytes() == whole
+
+
+def test_a_journal_from_before_the_checksums_can_be_read(finished):
+    path, out, lines = finished
+    entries = [json.loads(line) for line in lines]
+    for entry in entries:
+        del entry["crc32"]
+    entries[0]["format"] = 1
+    old = [json.dumps(entry).encode() + b"\n" for entry in entries]
+    journal_of(out).write_bytes(b"".join(old[:3]))
+    report = run_plan(plan_sweep(path, SMALL), workers=0, out=out)
+    assert (report.resumed, report.notes) == (2, ())
+    # What was added has its checksum.
+    added = journal_of(out).read_bytes().splitlines()[3:]
+    assert [b"crc32" in line for line in added] == [True, True]
+    check_once(out, 4)
 
 
 def test_done_runs_are_not_done_again(folder):

@@ -15,7 +15,7 @@ import numpy as np
 from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import Floats, RawSurface
-from sphshell_pin.shell.readers.text import finish, pack_polygons, read_text
+from sphshell_pin.shell.readers.text import finish, indices, pack_polygons, read_text
 
 
 def read_stl(path: Path) -> RawSurface:
@@ -85,7 +85,7 @@ def read_obj(path: Path) -> RawSurface:
     offsets, flat = pack_polygons(counts, corners)
     # Forward references are legal: whether a vertex exists is known only now.
     raw = finish(path, vertices, offsets, flat)
-    which = np.array(corner_normals, np.int64)
+    which = indices(corner_normals)
     if not (which >= 0).any():
         return raw
     # A last row of zeros stands for corners without a normal.

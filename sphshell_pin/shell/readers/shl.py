@@ -236,7 +236,7 @@ def _integers(lines: _Lines, at: int, polygon: int, count: int) -> list[int]:
         return [int(token) for token in tokens]
     except ValueError:
         values = _floats(lines, at)
-        if any(value != np.floor(value) for value in values):
+        if not all(value.is_integer() for value in values):
             raise ShellFileError(
                 lines.path,
                 f"polygon {polygon + 1} must be whole numbers 'n i1 .. in', not "

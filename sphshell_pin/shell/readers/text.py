@@ -31,11 +31,19 @@ def check_finite(path: Path, vertices: Floats) -> None:
 def pack_polygons(
     counts: Sequence[int] | Longs, corners: Sequence[int] | Longs
 ) -> tuple[Longs, Ints]:
-    """Offsets and corners from corner counts and indices from 0; huge indices stay invalid."""
+    """Offsets and corners from corner counts and indices from 0, see `indices`."""
     offsets = np.zeros(len(counts) + 1, np.int64)
     np.cumsum(counts, out=offsets[1:])
-    flat = np.clip(np.asarray(corners, np.int64), -LARGEST_COUNT, LARGEST_COUNT)
-    return offsets, flat.astype(np.int32)
+    return offsets, indices(corners)
+
+
+def indices(values: Sequence[int] | Longs) -> Ints:
+    """Whole numbers as 32-bit indices; those too large for that stay invalid."""
+    try:
+        whole = np.asarray(values, np.int64)
+    except OverflowError:  # Python's have no end
+        whole = np.array([min(max(i, -1), LARGEST_COUNT) for i in values], np.int64)
+    return np.clip(whole, -LARGEST_COUNT, LARGEST_COUNT).astype(np.int32)
 
 
 def finish(

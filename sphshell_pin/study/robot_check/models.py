@@ -114,7 +114,7 @@ def _from_urdf(file: Path, name: str, shipped: str | None, *, free_flyer: bool) 
     try:
         tree = ET.parse(file)
         model = pin.buildModelFromUrdf(str(file), *root)
-    except (ET.ParseError, ValueError, RuntimeError, OSError) as error:
+    except (ET.ParseError, ValueError, RuntimeError, OSError, LookupError) as error:
         reason = " ".join(str(error).split())
         raise robots.RobotError(f"{file}: not a URDF that can be read: {reason}") from None
     notes = []
@@ -127,7 +127,10 @@ def _from_urdf(file: Path, name: str, shipped: str | None, *, free_flyer: bool) 
         )
     _keep_spheres(tree.getroot())
     text = ET.tostring(tree.getroot(), encoding="unicode")
-    spheres = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    try:
+        spheres = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    except (ValueError, RuntimeError) as error:
+        raise robots.RobotError(f"{file}: its geometry cannot be read: {error}") from None
     robot = robots.LoadedRobot(name, model, spheres, pin.GeometryModel(), pin.neutral(model))
     return Subject(name, robot, shipped, tuple(notes))
 

@@ -268,7 +268,9 @@ def run_plan(
     journal = None
     if out is not None:
         _make_folder(out.parent)
-        journal = Journal(out.with_name(out.name + SUFFIX), plan.head)
+        journal = Journal(out.with_name(out.name + SUFFIX), plan.head, len(plan.runs))
+        for sentence in journal.notes:
+            tell(sentence)
     outcomes = {} if journal is None else dict(journal.outcomes)
     if retry_failed:
         outcomes = {i: one for i, one in outcomes.items() if one.status != FAILED}

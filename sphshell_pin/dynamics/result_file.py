@@ -1,0 +1,225 @@
+"""What a results file holds, and the check that one holds it: no array is taken on trust.
+
+The file is a zip archive of arrays (.npy) that `Result.save` wrote. Somebody else's may hold
+anything: sizes are compared before memory is taken, nothing is ever unpickled.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+import zipfile
+from os import PathLike
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import from_json
+
+from sphshell_pin.errors import ResultError
+
+LARGEST_HEADER = 1 << 26  # characters; a million events need less
+
+FLOAT, INT, LONG, BYTE = (np.dtype(one) for one in ("f8", "i4", "i8", "u1"))
+
+ARRAYS: dict[str, tuple[np.dtype[Any], tuple[str | int, ...]]] = {
+    "t": (FLOAT, ("n",)),
+    "q": (FLOAT, ("n", "nq")),
+    "v": (FLOAT, ("n", "nv")),
+    "contacts.pair": (INT, ("m",)),
+    "contacts.point_world": (FLOAT, ("m", 3)),
+    "contacts.normal_world": (FLOAT, ("m", 3)),
+    "contacts.depth": (FLOAT, ("m",)),
+    "contacts.normal_force": (FLOAT, ("m",)),
+    "contacts.friction_force_world": (FLOAT, ("m", 3)),
+    "contacts.slip_velocity_world": (FLOAT, ("m", 3)),
+    "contacts.element": (INT, ("m",)),
+    "contacts.feature": (BYTE, ("m",)),
+    "contacts.number": (INT, ("m",)),
+    "contacts.t": (FLOAT, ("m",)),
+    "contacts.row": (LONG, ("m",)),
+    "energy.kinetic": (FLOAT, ("n",)),
+    "energy.potential": (FLOAT, ("n",)),
+    "energy.elastic": (FLOAT, ("n",)),
+    "energy.damping_loss": (FLOAT, ("n",)),
+    "energy.friction_loss": (FLOAT, ("n",)),
+    "energy.control_work": (FLOAT, ("n",)),
+}
+"""By name: the numbers of an array and its shape; a size of the same name is the same in all."""
+
+
+class _Part(BaseModel):
+    """A table of the header; unknown keys are left alone, as a later version may write them."""
+
+    model_config = ConfigDict(strict=True, extra="allow")
+
+
+class _Pair(_Part):
+    contact_time: float
+    impulse: float
+    peak_force: float
+    peak_force_time: float
+    max_depth: float
+    max_depth_time: float
+    touches: int
+    mean_force: float
+
+
+class _Stats(_Part):
+    # A run that goes on has none.
+    steps: int = 0
+    duration: float = 0.0
+    dt: float = 0.0
+    wall_time: float = 0.0
+    real_time_factor: float = 0.0
+    integrator: str = ""
+    pairs: dict[str, _Pair] = {}
+
+
+class _Origin(_Part):
+    scenario: str
+    settings: dict[str, Any]
+    path: str = ""
+
+
+class Header(_Part):
+    """What the file says in JSON."""
+
+    format: Literal[1]
+    pairs: list[str]
+    stats: _Stats
+    events: list[tuple[float, str, Literal["touch", "lift_off", "deep", "through"]]]
+    origin: _Origin | None = None
+
+
+def read_result(
+    path: str | PathLike[str], max_size: float
+) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """Return the header and the ARRAYS of the results at `path`.
+
+    Raises
+    ------
+    ResultError
+        The file cannot be read, is none that Result.save wrote, needs more than `max_size` [B] of
+        memory, or one of its arrays or a part of its header is not as it must be.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _read(path, archive, max_size)
+    except ResultError:
+        raise
+    except OSError as error:
+        raise ResultError(path, f"cannot read the results: {error.strerror or error}") from error
+    except Exception as error:  # whatever a damaged archive makes zipfile and numpy raise
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise ResultError(path, f"is not a file that Result.save wrote ({why})") from error
+
+
+def _read(
+    path: str | PathLike[str], archive: zipfile.ZipFile, max_size: float
+) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    files = {one.filename: one for one in archive.infolist()}
+    shapes: dict[str, tuple[int, ...]] = {}
+    for name in ("header", *ARRAYS):
+        if f"{name}.npy" not in files:
+            raise _refused(path, f"it has no array '{name}'")
+        kind, shapes[name] = _announced(path, archive, files[f"{name}.npy"], name)
+        if name == "header":
+            if kind.kind != "U" or shapes[name] != () or kind.itemsize > 4 * LARGEST_HEADER:
+                raise _refused(path, f"'header' is no text but {kind} {shapes[name]}")
+        elif kind != ARRAYS[name][0]:
+            raise _refused(path, f"'{name}' holds {kind}, not {ARRAYS[name][0]}")
+    _check_shapes(path, shapes)
+    size = sum(files[f"{name}.npy"].file_size for name in shapes)
+    if size > max_size:
+        raise ResultError(
+            path,
+            f"needs {size:.3g} bytes of memory, more than max_size = {max_size:.3g}: give a "
+            "larger max_size to Result.load if you trust the file",
+        )
+    arrays = {name: _array(archive, files[f"{name}.npy"]) for name in shapes}
+    header = _header(path, str(arrays.pop("header")))
+    _check_values(path, arrays, len(header["pairs"]))
+    return header, arrays
+
+
+def _announced(
+    path: str | PathLike[str], archive: zipfile.ZipFile, file: zipfile.ZipInfo, name: str
+) -> tuple[np.dtype[Any], tuple[int, ...]]:
+    """Return type and shape that an array announces; its bytes must be as many."""
+    with archive.open(file) as stream, warnings.catch_warnings():
+        warnings.simplefilter("error")  # numpy warns of headers that it would repair
+        version = np.lib.format.read_magic(stream)
+        if version != (1, 0):
+            raise _refused(path, f"'{name}' is an array of format {version}")
+        shape, _, kind = np.lib.format.read_array_header_1_0(stream)
+        if kind.hasobject:
+            raise _refused(path, f"'{name}' holds Python objects")
+        if any(type(n) is not int or n < 0 for n in shape):
+            raise _refused(path, f"'{name}' has the shape {shape}")
+        size = math.prod(shape) * kind.itemsize
+        if size != file.file_size - stream.tell():
+            raise _refused(
+                path, f"'{name}' announces {size} bytes and has {file.file_size - stream.tell()}"
+            )
+    return kind, shape
+
+
+def _check_shapes(path: str | PathLike[str], shapes: dict[str, tuple[int, ...]]) -> None:
+    sizes: dict[str | int, tuple[int, str]] = {3: (3, "")}
+    for name, (_, wanted) in ARRAYS.items():
+        shape = shapes[name]
+        called = f"({', '.join(map(str, wanted))}{',' * (len(wanted) == 1)})"
+        if len(shape) != len(wanted):
+            raise _refused(path, f"'{name}' has the shape {shape}, not {called}")
+        for size, letter in zip(shape, wanted, strict=True):
+            known, owner = sizes.setdefault(letter, (size, name))
+            if size != known:
+                of = f" with {letter} = {known} as of '{owner}'" if owner else ""
+                raise _refused(path, f"'{name}' has the shape {shape}, not {called}{of}")
+
+
+def _array(archive: zipfile.ZipFile, file: zipfile.ZipInfo) -> NDArray[Any]:
+    with archive.open(file) as stream:
+        array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
+        stream.read(1)  # at its end, the sum of the bytes is checked
+    array.setflags(write=False)
+    return array
+
+
+def _header(path: str | PathLike[str], text: str) -> dict[str, Any]:
+    try:
+        Header.model_validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(["header", *map(str, first["loc"])])
+        raise _refused(path, f"{where}: {first['msg']}") from None
+    header: dict[str, Any] = from_json(text)
+    known = set(header["pairs"])
+    strange = {pair for _, pair, _ in header["events"]} | set(header["stats"].get("pairs", {}))
+    if len(known) < len(header["pairs"]) or strange - known:
+        raise _refused(path, f"header.pairs does not list each pair once: {header['pairs']}")
+    return header
+
+
+def _check_values(path: str | PathLike[str], arrays: dict[str, NDArray[Any]], pairs: int) -> None:
+    for name, least, most in (
+        ("contacts.row", 0, len(arrays["t"]) - 1),
+        ("contacts.pair", 0, pairs - 1),
+        ("contacts.element", -1, np.iinfo(INT).max),
+        ("contacts.feature", 0, 2),
+    ):
+        wrong = np.flatnonzero((arrays[name] < least) | (arrays[name] > most))
+        if wrong.size:
+            value = arrays[name][wrong[0]]
+            raise _refused(path, f"'{name}'[{wrong[0]}] is {value}, not from {least} to {most}")
+    for name in ("t", "contacts.row"):
+        # Also true of numbers that are not finite.
+        falls = np.flatnonzero(~(np.diff(arrays[name]) >= 0))
+        if falls.size or not np.isfinite(arrays[name]).all():
+            raise _refused(path, f"'{name}' does not rise at row {falls[0] if falls.size else 0}")
+
+
+def _refused(path: str | PathLike[str], why: str) -> ResultError:
+    return ResultError(path, f"is not a file that Result.save wrote: {why}")

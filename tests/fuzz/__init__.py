@@ -1,0 +1,1 @@
+"""Damaged files for every reader of the package: see __main__ and docs/reliability.md."""

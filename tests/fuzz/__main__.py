@@ -1,0 +1,109 @@
+"""Damage small files of every kind that the package reads, and watch what its readers do.
+
+    python -m tests.fuzz --seconds 60 --seed 1     stop at the first fault, exit code 1
+    python -m tests.fuzz --files 50000 --go-on     list all faults
+    python -m tests.fuzz --repeat 1:4711           one input again, with its traceback
+
+A reader may read a file or refuse it with the package's own error; anything else is a fault: a
+crash, more than 20 s or 2 GB for one file, any other exception. Input k of seed s is always the
+same. The files that broke a reader are kept in the folder --out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+from tests.fuzz.inputs import KINDS, TURNS, make_input
+from tests.fuzz.watch import Failure, Report, Task, watch
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.fuzz",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--files", type=int, help="as many files, however long it takes")
+    parser.add_argument("--kind", choices=KINDS, help="files of one kind alone")
+    parser.add_argument("--go-on", action="store_true", help="do not stop at the first fault")
+    parser.add_argument("--out", type=Path, default=Path("build/fuzz"), help="default: %(default)s")
+    parser.add_argument("--repeat", metavar="SEED:K", help="read one input again, unwatched")
+    options = parser.parse_args()
+    if options.repeat:
+        return repeat(*map(int, options.repeat.split(":")))
+    return fuzz(options)
+
+
+def fuzz(options: argparse.Namespace) -> int:
+    report, told = Report(), Counter[str]()
+    start = time.time()
+
+    def failed(failure: Failure) -> bool:
+        # The same fault at the same place is shown once.
+        where = [row.strip() for row in failure.details.splitlines() if "sphshell_pin" in row][-1:]
+        mark = f"{failure.why.partition(':')[0]} {where}"
+        told[mark] += 1
+        if told[mark] == 1:
+            show(failure, options.out)
+        return not options.go_on
+
+    first = TURNS.index(options.kind) if options.kind else 0
+    step = len(TURNS) if options.kind else 1
+    until = start + (1e9 if options.files else options.seconds)
+    last = first + options.files * step if options.files else sys.maxsize
+    watch(Task(options.seed, first, last, step, until), report, failed)
+    print_table(report, time.time() - start)
+    for mark, count in told.most_common():
+        print(f"{count} x {mark}")
+    return 1 if report.failures else 0
+
+
+def show(failure: Failure, out: Path) -> None:
+    one = make_input(failure.seed, failure.k)
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / f"{one.kind}-{failure.seed}-{failure.k}{one.suffix}"
+    path.write_bytes(one.data)
+    print(f"{one.kind} {failure.seed}:{failure.k}: {failure.why}")
+    print(f"  kept as {path}; again: python -m tests.fuzz --repeat {failure.seed}:{failure.k}")
+    print("".join(f"    {row}\n" for row in failure.details.splitlines()[-6:]), flush=True)
+
+
+def print_table(report: Report, seconds: float) -> None:
+    print(f"{'kind':12}{'files':>9}{'read':>9}{'refused':>9}{'broke':>9}")
+    total = Counter[str]()
+    for kind in KINDS:
+        own = {name: report.counts[kind, name] for name in ("read", "refused", "broke")}
+        total.update(own)
+        print(f"{kind:12}{sum(own.values()):9}{''.join(f'{n:9}' for n in own.values())}")
+    files = sum(total.values())
+    print(f"{'all':12}{files:9}{''.join(f'{n:9}' for n in total.values())}")
+    print(
+        f"{seconds:.0f} s, {files / seconds:.0f} files a second; slowest {report.slowest[0]:.2f} s "
+        f"(input {report.slowest[1]}), largest process {report.peak / 2**20:.0f} MB; "
+        f"{len(report.failures)} faults"
+    )
+
+
+def repeat(seed: int, k: int) -> int:
+    from tests.fuzz.readers import read
+    from tests.fuzz.tables import prepare
+
+    one = make_input(seed, k)
+    with tempfile.TemporaryDirectory() as folder:
+        prepare(Path(folder))
+        path = Path(folder) / f"input{one.suffix}"
+        path.write_bytes(one.data)
+        start = time.monotonic()
+        print(f"{one.kind} {seed}:{k}: {read(path)} in {time.monotonic() - start:.2f} s")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,385 @@
+"""Damaged results, scenarios, sweep journals and robots."""
+
+from __future__ import annotations
+
+import functools
+import io
+import json
+import math
+import random
+import tempfile
+import tomllib
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sphshell_pin import robots
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.run import simulate
+from sphshell_pin.study.sweep.job import Outcome
+from sphshell_pin.study.sweep.journal import Journal
+from tests.fuzz.mutate import NUMBERS, alter, odd_value
+from tests.scenario.files import DROP, write
+
+PRESS = """
+title = "a finger presses on a surface file"
+gravity = [0.0, 0.0, -9.81]
+
+[[robot]]
+name = "three_link_finger"
+lock = ["distal_joint"]
+start = { knuckle = 0.3, middle_joint = 0.4 }
+speed = { knuckle = 0.1 }
+placement = { xyz = [0.0, 0.0, 0.1], rpy_deg = [0.0, 10.0, 0.0] }
+
+[[robot]]
+urdf = "finger.urdf"
+label = "other"
+placement = { xyz = [1.0, 0.0, 0.0] }
+
+[[shell]]
+name = "box"
+file = "box.off"
+unit = "m"
+magnify = 2.0
+side = "outside"
+frame = "other/base"
+
+[[shell]]
+name = "ball"
+primitive = { type = "sphere", radius = 0.1 }
+segments = 12
+
+[[contact]]
+name = "tip"
+sphere = { frame = "three_link_finger/tip", radius = 0.01, offset = [0.0, 0.0, 0.001] }
+shell = "box"
+method = "facets"
+law = { type = "hertz", radius = 1, young_1 = 1e6, poisson_1 = 0.4, young_2 = 1e9, poisson_2 = 0.3 }
+friction = { type = "bristle", mu_static = 0.6, mu_dynamic = 0.5, stiffness = 1e4, damping = 3.0 }
+
+[[contact]]
+name = "other tip"
+sphere = { frame = "other/tip", radius = 0.01 }
+shell = "ball"
+law = { type = "adams", k = 1e5, e = 2.2, c = 10.0, d = 0.1, units = "mm-N-s" }
+friction = { type = "coulomb", mu_static = 0.3 }
+
+[controller]
+type = "joint-pd"
+kp = 1.0
+kd = { "other/knuckle" = 0.1 }
+
+[run]
+duration = 0.1
+integrator = "adaptive"
+rtol = 1e-6
+record_dt = 1e-3
+
+[[knob]]
+key = "contact.tip.friction.mu_static"
+
+[expect]
+"energy.relative_residual" = { max = 1e-2 }
+"""
+
+BOX = """OFF
+8 6 0
+0 0 0\n0 0 1\n0 1 0\n0 1 1\n1 0 0\n1 0 1\n1 1 0\n1 1 1
+4 0 1 3 2\n4 4 6 7 5\n4 0 4 5 1\n4 2 3 7 6\n4 0 2 6 4\n4 1 5 7 3
+"""
+
+HEAD = {
+    "scenario": "drop",
+    "settings": "0" * 64,
+    "vary": [["run.dt", [1e-4, 2e-4, 3e-4, 4e-4]]],
+    "together": False,
+    "verdicts": False,
+    "files": {},
+    "versions": {"numpy": "2"},
+}
+OUTCOMES = (
+    Outcome(0, "done", "", {"figures.depth": 1.25e-5, "final.q.z": -0.5}, 0.25, "host:1"),
+    Outcome(1, "failed", "ScenarioError: drop.toml: run.dt: wrong", {}, 0.5, "host:2"),
+    Outcome(2, "done", "", {"figures.depth": 3.5e-5, "final.q.z": float("nan")}, 0.125, "host:1"),
+    Outcome(3, "done", "", {"figures.depth": 4.75e-5, "final.q.z": 2.0}, 0.25, "host:2"),
+)
+
+
+def prepare(folder: Path) -> None:
+    """Write the files that the scenarios need beside them."""
+    (folder / "box.off").write_text(BOX)
+    finger = robots.URDF_FOLDER / "three_link_finger.urdf"
+    (folder / "finger.urdf").write_bytes(finger.read_bytes())
+
+
+@functools.cache
+def _run() -> dict[str, np.ndarray[Any, Any]]:
+    """Return the arrays of a short run's file."""
+    with tempfile.TemporaryDirectory() as home:
+        result, _ = simulate(build(write(Path(home)), {"run.record_dt": "5e-3"}))
+        with np.load(result.save(Path(home, "run.npz")), allow_pickle=False) as file:
+            arrays = dict(file)
+    header = json.loads(str(arrays["header"]))
+    header["origin"]["path"] = "drop.toml"
+    header["stats"]["wall_time"] = 0.0
+    header["origin"]["scenario"] = "drop.toml"
+    return arrays | {"header": np.array(json.dumps(header))}
+
+
+def pack(members: dict[str, bytes]) -> bytes:
+    """Return a zip archive of `members`, the same bytes at any time."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name, data in members.items():
+            one = zipfile.ZipInfo(name, (2026, 1, 1, 0, 0, 0))
+            one.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(one, data)
+    return stream.getvalue()
+
+
+def _npy(array: Any, *, pickled: bool = False) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, array, allow_pickle=pickled)
+    return stream.getvalue()
+
+
+@functools.cache
+def npz_corpus() -> tuple[bytes, ...]:
+    return (pack({f"{name}.npy": _npy(array) for name, array in _run().items()}),)
+
+
+def damaged_npz(rng: random.Random) -> bytes:
+    """Return a result whose arrays or header were changed."""
+    arrays = dict(_run())
+    members: dict[str, bytes] = {}
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        name = rng.choice([*arrays, "header", "header"]) if arrays else "header"
+        if name == "header":
+            try:
+                header = json.loads(str(arrays.get("header", "{}")))
+                arrays["header"] = np.array(json.dumps(alter(rng, header)))
+            except (ValueError, RecursionError):
+                arrays["header"] = np.array("[" * 5000)
+        else:
+            rng.choice(_ARRAY_WAYS)(rng, arrays, name)
+    if rng.random() < 0.1:
+        members["t.npy"] = _lying_npy(rng)
+    packed = {f"{k}.npy": _npy(a, pickled=a.dtype.hasobject) for k, a in arrays.items()}
+    return pack(packed | members)
+
+
+def _lying_npy(rng: random.Random) -> bytes:
+    """Return an array whose header announces more, or something else, than follows."""
+    stream = io.BytesIO()
+    shape = rng.choice(((2**40,), (2**29,), (-1,), (51,), (2**62, 2**62), (), (0, 2**50)))
+    kind = rng.choice(("<f8", "|O", "<U100000", "<c16", "|V8", "<M8[s]", ">f8", "|S0", "<f2"))
+    header = {"descr": kind, "fortran_order": rng.random() < 0.3, "shape": shape}
+    np.lib.format.write_array_header_1_0(stream, header)
+    return stream.getvalue() + b"\0" * rng.choice((0, 8, 80, 408, 1000))
+
+
+def _drop(rng: random.Random, arrays: dict[str, Any], name: str) -> None:
+    del arrays[name]
+
+
+def _rename(rng: random.Random, arrays: dict[str, Any], name: str) -> None:
+    arrays[rng.choice(("x", "header", "../x", f"{name}.npy", *arrays))] = arrays.pop(name)
+
+
+def _copy(rng: random.Random, arrays: dict[str, Any], name: str) -> None:
+    arrays[name] = arrays[rng.choice(list(arrays))]
+
+
+def _reshape(rng: random.Random, arrays: dict[str, Any], name: str) -> None:
+    old = arrays[name]
+    ways = (
+        lambda: old.reshape(-1),
+        lambda: old[None],
+        lambda: old[..., None],
+        lambda: old.T,
+        lambda: old[: len(old) // 2],
+        lambda: old[:0],
+        lambda: np.concatenate((old, old)),
+        lambda: old[:, : old.shape[1] // 2],
+        lambda: np.concatenate((old, old), axis=1),
+        lambda: np.asfortranarray(old),
+        lambda: old[0],
+        lambda: np.flip(old),
+    )
+    try:
+        arrays[name] = np.asarray(rng.choice(ways)())
+    except (ValueError, IndexError, TypeError):
+        arrays[name] = np.array(1.0)
+
+
+def _retype(rng: random.Random, arrays: dict[str, Any], name: str) -> None:
+    kind = rng.choice(("f4", "f2", "i1", "u8", "i8", "?", "c16", "U8", "S8", "O", "M8[s]", ">f8"))
+    with np.errstate(all="ignore"):
+        try:
+            arrays[name] = arrays[name].astype(kind)
+        except (ValueError, TypeError, OverflowError):
+            arrays[name] = np.zeros(3, kind)
+
+
+def _value(rng: random.Random, arrays: dict[str, Any], name: str) -> None:
+    array = np.array(arrays[name])
+    if not array.size:
+        return
+    flat = array.reshape(-1)
+    odd = (0, -1, 1, 2, 3, 127, 255, 1e300, -1e300, 1e-300, math.nan, math.inf, 2**31 - 1, 2**62)
+    with np.errstate(all="ignore"):
+        for _ in range(rng.choice((1, 1, 5, len(flat)))):
+            try:
+                flat[rng.randrange(len(flat))] = rng.choice(odd)
+            except (ValueError, OverflowError, TypeError):
+                return
+    arrays[name] = array
+
+
+_ARRAY_WAYS = (_drop, _rename, _copy, _reshape, _reshape, _retype, _value, _value, _value)
+
+
+def toml_corpus() -> tuple[bytes, ...]:
+    return DROP.encode(), PRESS.encode()
+
+
+def damaged_toml(rng: random.Random) -> bytes:
+    """Return a scenario some of whose keys and values were changed."""
+    tree = alter(rng, tomllib.loads(rng.choice(toml_corpus()).decode()))
+    rows = [f"{_key(k)} = {_toml(v)}" for k, v in tree.items()] if isinstance(tree, dict) else []
+    return "\n".join(rows or [_toml(tree)]).encode("utf-8", "surrogatepass")
+
+
+def _key(key: str) -> str:
+    return json.dumps(key)
+
+
+def _toml(value: Any) -> str:
+    """Return `value` as TOML writes it; deep ones without the help of the stack."""
+    pieces: list[str] = []
+    waiting: list[Any] = [("value", value)]
+    while waiting:
+        kind, one = waiting.pop()
+        if kind == "text":
+            pieces.append(one)
+        elif isinstance(one, dict):
+            pieces.append("{")
+            waiting.append(("text", "}"))
+            for n, (k, v) in enumerate(reversed(one.items())):
+                waiting += [("text", ", " if n else ""), ("value", v), ("text", f"{_key(k)} = ")]
+        elif isinstance(one, list):
+            pieces.append("[")
+            waiting.append(("text", "]"))
+            for v in reversed(one):
+                waiting += [("text", ", "), ("value", v)]
+        elif isinstance(one, bool):
+            pieces.append("true" if one else "false")
+        elif isinstance(one, float):
+            pieces.append(repr(one))
+        elif isinstance(one, int):
+            pieces.append(str(one))
+        else:
+            pieces.append(json.dumps(one if isinstance(one, str) else ""))
+    return "".join(pieces)
+
+
+@functools.cache
+def journal_corpus() -> tuple[bytes, ...]:
+    with tempfile.TemporaryDirectory() as home:
+        path = Path(home) / "journal"
+        journal = Journal(path, HEAD, len(OUTCOMES))
+        journal.add(OUTCOMES)
+        journal.close()
+        return (path.read_bytes(),)
+
+
+def damaged_journal(rng: random.Random) -> bytes:
+    """Return a journal some of whose entries were changed, without an eye on their checksums."""
+    lines = journal_corpus()[0].splitlines()
+    for _ in range(rng.choice((1, 1, 2))):
+        at = rng.randrange(len(lines))
+        try:
+            lines[at] = json.dumps(alter(rng, json.loads(lines[at]))).encode()
+        except (ValueError, RecursionError):
+            lines[at] = b"[" * 100_000
+    return b"\n".join(lines) + b"\n" * rng.randrange(2)
+
+
+def urdf_corpus() -> tuple[bytes, ...]:
+    head, said = b'<?xml version="1.0"?>', b'<?xml version="1.0" encoding="utf-8"?>'
+    every = (path.read_bytes().replace(head, said) for path in sorted(robots.URDF_FOLDER.iterdir()))
+    return tuple(data for data in every if b"<mesh" not in data)
+
+
+def damaged_urdf(rng: random.Random) -> bytes:
+    """Return a robot some of whose elements, attributes and names were changed."""
+    root = ET.fromstring(rng.choice(urdf_corpus()))
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        parents = [one for one in root.iter() if len(one)]
+        every = list(root.iter())
+        parent = rng.choice(parents or every)
+        rng.choice(_XML_WAYS)(rng, parent, rng.choice(every))
+    try:
+        return ET.tostring(root)
+    except RecursionError:  # a link inside itself
+        return b"<robot>" + b"<link>" * 3000
+
+
+def _xml_drop(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
+    if len(parent):
+        parent.remove(rng.choice(list(parent)))
+
+
+def _xml_copy(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
+    parent.append(ET.fromstring(ET.tostring(other)))
+
+
+def _xml_attribute(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
+    if not other.attrib:
+        return
+    name = rng.choice(list(other.attrib))
+    way = rng.randrange(4)
+    if way == 0:
+        del other.attrib[name]
+    elif way == 1:
+        words = other.attrib[name].split() or [""]
+        words[rng.randrange(len(words))] = rng.choice(NUMBERS)
+        other.attrib[name] = " ".join(words * rng.choice((1, 1, 2)))
+    elif way == 2:
+        other.attrib[name] = rng.choice(
+            ("", "base", "tip", "universe", "root_joint", "floating", "x")
+        )
+    else:
+        value = odd_value(rng)
+        text = str(value) if not isinstance(value, list | dict) else "[]"
+        other.attrib[name] = "".join(c for c in text if c >= " ")
+
+
+def _xml_tag(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
+    other.tag = rng.choice(("link", "joint", "mimic", "geometry", "sphere", "mesh", "x", "robot"))
+
+
+def _xml_swap(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
+    parent.attrib, other.attrib = other.attrib, parent.attrib
+
+
+def _xml_kind(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
+    kinds = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical", "x")
+    other.set("type", rng.choice(kinds))
+
+
+def _xml_mesh(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
+    files = ("box.off", "package://x/y.stl", "/", "finger.urdf", "", "http://x/y.stl", "x.dae")
+    other.append(
+        ET.Element("mesh", filename=rng.choice(files), scale=rng.choice(("1 1 1", "0", "x")))
+    )
+
+
+_XML_WAYS = (
+    *(_xml_drop, _xml_copy, _xml_attribute, _xml_attribute, _xml_attribute, _xml_attribute),
+    *(_xml_tag, _xml_swap, _xml_kind, _xml_mesh),
+)

@@ -1,0 +1,79 @@
+"""Damaged files are read or refused in a sentence; every file that ever broke a reader is here."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz.inputs import KINDS, corpus_of, make_input
+from tests.fuzz.readers import read
+from tests.fuzz.tables import prepare
+from tests.fuzz.watch import Report, Task, watch
+
+BROKE = sorted((Path(__file__).parents[1] / "data" / "fuzz").iterdir())
+FILES, SECONDS = (sys.maxsize, 60.0) if os.environ.get("CI") else (500, 600.0)
+
+
+@pytest.mark.parametrize("file", BROKE, ids=lambda file: file.name)
+def test_a_file_that_once_broke_its_reader(file, tmp_path):
+    prepare(tmp_path)
+    path = Path(shutil.copy(file, tmp_path / f"input{file.suffix}"))
+    assert read(path) in ("read", "refused")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_undamaged_files_are_read(kind, tmp_path):
+    prepare(tmp_path)
+    for data in corpus_of(kind):
+        path = tmp_path / f"input{KINDS[kind][0]}"
+        path.write_bytes(data)
+        assert read(path) == "read"
+
+
+def test_damaged_files_break_no_reader():
+    report = Report()
+    watch(Task(seed=20, first=0, last=FILES, step=1, until=time.time() + SECONDS), report)
+    assert report.failures == []
+    assert sum(report.counts.values()) == FILES or os.environ.get("CI")
+
+
+def test_two_numbers_give_the_same_file():
+    assert all(make_input(3, k) == make_input(3, k) for k in range(40))
+    assert len({make_input(3, k).data for k in range(40)}) > 30
+
+
+def stumble(path: Path) -> str:
+    """Read a file as no reader should."""
+    seen = path.with_name("seen")
+    seen.touch()
+    number = seen.stat().st_size
+    with open(seen, "a") as file:
+        file.write(".")
+    if number == 1:
+        raise KeyError("no error of the package")
+    if number == 2:
+        bytearray(4 << 30)
+    if number == 3:
+        os.abort()
+    while number == 4:
+        pass
+    return "read"
+
+
+def test_the_watch_notices_what_a_reader_must_not_do():
+    report = Report()
+    until = time.time() + 600.0
+    task = Task(1, 0, 7, 1, until, reader="tests.fuzz.test_fuzz:stumble", hang=1.0)
+    watch(task, report, lambda failure: False)
+    assert [(one.k, one.why.partition(":")[0]) for one in report.failures] == [
+        (1, "KeyError"),
+        (2, "MemoryError"),
+        (3, "crash"),
+        (4, "hang"),
+    ]
+    assert "stumble" in report.failures[3].details
