@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.shell.cad.messages import pack, unpack
+from sphshell_pin.shell.cad.messages import ALIVE, pack, unpack
 from sphshell_pin.shell.cad.options import require_kernel
 
-IDLE = 10.0
+IDLE = 30.0
 """A child without a job ends after this time [s]."""
 
 GRACE = 10.0
@@ -61,7 +61,7 @@ def _answer(
 
     def alive() -> None:
         signal.setitimer(signal.ITIMER_REAL, time_limit + GRACE)
-        answers.send_bytes(b"")
+        answers.send_bytes(ALIVE)
 
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("default")
@@ -70,7 +70,8 @@ def _answer(
             require_kernel(purpose)
             from sphshell_pin.shell.cad.jobs import JOBS
 
-            os.chdir(folder)
+            if folder:
+                os.chdir(folder)
             _limit_memory(memory_limit)
             answer: tuple[Any, ...] = ("done", JOBS[job](alive, *arguments))
         except SphshellError as error:
@@ -117,7 +118,7 @@ def _limit_memory(limit: float | None) -> None:
         soft = soft if hard == resource.RLIM_INFINITY else min(soft, hard)
     try:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-    except (OSError, ValueError):
+    except (OSError, ValueError, OverflowError):
         return
 
 

@@ -19,6 +19,9 @@ from sphshell_pin.shell.cad.options import CadOptions
 from sphshell_pin.shell.cleaning import CleanedSurface
 from sphshell_pin.shell.health import ShellHealth
 
+ALIVE = b"alive"
+"""What a child sends in the middle of a long job: the limit of time begins anew."""
+
 _RECORDS: dict[str, Any] = {one.__name__: one for one in (CadOptions, CleanedSurface, ShellHealth)}
 
 

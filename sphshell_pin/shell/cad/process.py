@@ -22,7 +22,7 @@ from typing import Any
 
 from sphshell_pin import errors
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError, SphshellError
-from sphshell_pin.shell.cad.messages import pack, unpack
+from sphshell_pin.shell.cad.messages import ALIVE, pack, unpack
 from sphshell_pin.shell.cad.options import CadOptions
 
 TIME_LIMIT = 600.0
@@ -31,11 +31,17 @@ TIME_LIMIT = 600.0
 MEMORY_LIMIT = 8e9
 """Of a CAD file, unless stated [bytes]."""
 
-KEPT = 5.0
+KEPT = 20.0
 """How long a child is kept for the next file [s]; it ends by itself some seconds later."""
 
-ENDING = 5.0
+ENDING = 2.0
 """How long a child that answers no more is waited for [s]."""
+
+LONGEST = 1e6
+"""Larger limits of time are taken for this one, which the system's timers can hold [s]."""
+
+LARGEST = 1 << 32
+"""Of an answer [bytes]; two million triangles take a tenth."""
 
 MOST_JOBS = 50
 """Of one child: OpenCASCADE does not give all memory back."""
@@ -44,6 +50,7 @@ _ADVICE = (
     "the file is damaged, or meets a defect of OpenCASCADE: check it in its CAD program, or export "
     "it anew"
 )
+_NO_ANSWER = f"gets no valid answer from OpenCASCADE: {_ADVICE}"
 
 _START = """
 import signal
@@ -69,9 +76,9 @@ def run_in_child(
     ShellFileError
         If OpenCASCADE crashes, or goes beyond the limits of time or memory of `options`.
     """
-    time_limit = TIME_LIMIT if options.time_limit is None else options.time_limit
+    time_limit = TIME_LIMIT if options.time_limit is None else min(options.time_limit, LONGEST)
     memory_limit = MEMORY_LIMIT if options.memory_limit is None else options.memory_limit
-    request = pack((job, arguments, purpose, os.getcwd(), time_limit, memory_limit))
+    request = pack((job, arguments, purpose, _folder(), time_limit, memory_limit))
     child = _take()
     fine = False
     try:
@@ -84,8 +91,8 @@ def run_in_child(
             )
         try:
             kind, *content, told = unpack(answer)
-        except ValueError as error:
-            raise EOFError from error
+        except ValueError:
+            raise ShellFileError(path, _NO_ANSWER) from None
         for category, text in told:
             _warn(category, text)
         if kind == "done":
@@ -101,9 +108,7 @@ def run_in_child(
         cause = RuntimeError(f"in the CAD child:\n{trace}")
         raise ShellFileError(path, f"makes OpenCASCADE fail ({reason}): {_ADVICE}") from cause
     except EOFError:
-        why = child.why_ended()
-        if "bad_alloc" in why or "MemoryError" in why:
-            why = _short_of_memory(memory_limit)
+        why = child.why_ended(memory_limit)
         raise ShellFileError(path, why) from None
     finally:
         if fine:
@@ -152,27 +157,34 @@ class _Child:
         try:
             self._requests.send_bytes(request)
             while self._answers.poll(limit):
-                answer = self._answers.recv_bytes()
-                if answer:  # an empty one says that the child goes on
+                answer = self._answers.recv_bytes(LARGEST)
+                if answer != ALIVE:
                     return answer
         except OSError as error:
             raise EOFError from error
         return None
 
-    def why_ended(self) -> str:
+    def why_ended(self, memory_limit: float) -> str:
         """Say why the child has ended, or answers no more."""
         try:
             code = self._process.wait(ENDING)
         except subprocess.TimeoutExpired:
-            return f"gets no answer from OpenCASCADE: {_ADVICE}"
+            return _NO_ANSWER
         self._errors.seek(0)
         lines = self._errors.read().decode(errors="replace").split("\n")
         last = next((line.strip() for line in reversed(lines) if line.strip()), "no reason given")
+        if "bad_alloc" in last or "MemoryError" in last:
+            return _short_of_memory(memory_limit)
         if code < 0:
             name = signal.strsignal(-code) or "unknown"
             said = f"; {last}" if code == -signal.SIGABRT else ""
-            return f"makes OpenCASCADE crash (signal {-code}, {name.lower()}{said}): {_ADVICE}"
-        return f"cannot be read, the process of OpenCASCADE ended with code {code} ({last})"
+            return (
+                f"makes OpenCASCADE crash (signal {-code}, {name.lower()}{said}): {_ADVICE}; it "
+                f"may also need more than the memory limit of {memory_limit / 1e9:g} GB"
+            )
+        return (
+            f"gets no valid answer from OpenCASCADE, whose process ended with code {code} ({last})"
+        )
 
     def usable(self) -> bool:
         """Whether it is this process's own, runs, and may take another file."""
@@ -226,6 +238,14 @@ def _take() -> _Child:
 def _end_idle() -> None:
     while _idle:
         _idle.pop().end()
+
+
+def _folder() -> str:
+    """Return the folder that relative paths start from, "" if it is gone."""
+    try:
+        return os.getcwd()
+    except OSError:
+        return ""
 
 
 def _short_of_memory(limit: float) -> str:
