@@ -27,6 +27,15 @@ FaceOption = Annotated[
     ),
 ]
 
+TimeLimitOption = Annotated[
+    float | None,
+    typer.Option(help="Of CAD: end OpenCASCADE after this time \\[s], 600 unless given."),
+]
+MemoryLimitOption = Annotated[
+    float | None,
+    typer.Option(help="Of CAD: let OpenCASCADE take so much memory \\[bytes], 8e9 unless given."),
+]
+
 
 @app.command()
 def check(
@@ -45,6 +54,8 @@ def check(
     chord_error: ChordErrorOption = None,
     body: BodyOption = None,
     face: FaceOption = None,
+    time_limit: TimeLimitOption = None,
+    memory_limit: MemoryLimitOption = None,
 ) -> None:
     """Print the health of a surface file: what was found, what was repaired, how far it is curved.
 
@@ -62,6 +73,8 @@ def check(
                 chord_error=chord_error,
                 bodies=body,
                 faces=faces_of(face),
+                time_limit=time_limit,
+                memory_limit=memory_limit,
                 side=_side(side),
             )
         except UnitMissing as error:
@@ -84,6 +97,8 @@ def convert(
     chord_error: ChordErrorOption = None,
     body: BodyOption = None,
     face: FaceOption = None,
+    time_limit: TimeLimitOption = None,
+    memory_limit: MemoryLimitOption = None,
 ) -> None:
     """Write a surface file in another format, and measure how far apart the two are.
 
@@ -105,6 +120,8 @@ def convert(
                 chord_error=chord_error,
                 bodies=body,
                 faces=faces_of(face),
+                time_limit=time_limit,
+                memory_limit=memory_limit,
             )
         except UnitMissing as error:
             raise SphshellError(f"the unit {error.must('--unit-in {}')}") from error

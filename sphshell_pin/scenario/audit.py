@@ -14,14 +14,16 @@ import pinocchio as pin
 
 from sphshell_pin.errors import SphshellError, UnitWarning
 from sphshell_pin.scenario.build import Built
-from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions, require_kernel
+from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result import Result
     from sphshell_pin.scenario.schema import ShellSection
-    from sphshell_pin.shell.cad.trimmed import TrimmedFaces
 
 Array = npt.NDArray[np.float64]
+
+NOWHERE, ON_FACE = 0, 2
+"""Kinds of places next to a contact, as `cad.jobs.feet` tells them."""
 
 
 @dataclass(frozen=True)
@@ -83,15 +85,12 @@ def check_audit(built: Built) -> None:
     ------
     SphshellError
         No contact of the scenario is with a surface of a CAD file.
-    MissingExtra
-        The library that reads CAD files is not installed.
     """
     if not any(True for _ in _cad_pairs(built)):
         raise SphshellError(
             f"scenario '{built.name}' has no contact with a CAD surface: --audit-cad needs "
             f"a shell whose file is one of {', '.join(CAD_SUFFIXES)}"
         )
-    require_kernel("--audit-cad")
 
 
 def audit_cad(built: Built, result: Result) -> CadAudit:
@@ -100,28 +99,32 @@ def audit_cad(built: Built, result: Result) -> CadAudit:
     The same place of the surface is meant: the stationary point of the distance from the sphere's
     centre that is next to the contact, on a face inside its trimming, on an edge or a vertex.
 
-    Raises what `check_audit` does.
+    Raises
+    ------
+    SphshellError
+        As `check_audit` and `Shell.from_file` do.
     """
     check_audit(built)
     log = result.contacts
     depth_error, normal_error = (np.full(len(log.depth), np.nan) for _ in range(2))
-    pairs: list[PairAudit] = []
-    loaded: dict[str, tuple[TrimmedFaces, float]] = {}
+    by_shell: dict[str, tuple[ShellSection, list[int]]] = {}
     for index, section in _cad_pairs(built):
-        if section.name not in loaded:
-            loaded[section.name] = _faces_of(section, built.path)
-        own = np.flatnonzero(log.pair == index)
-        errors = _audit_pair(built, result, index, own, *loaded[section.name])
-        depth_error[own], normal_error[own] = errors.T
-        known = errors[np.isfinite(errors[:, 0])]
+        by_shell.setdefault(section.name, (section, []))[1].append(index)
+    for section, indices in by_shell.values():
+        own = np.flatnonzero(np.isin(log.pair, indices))
+        depth_error[own], normal_error[own] = _audit_shell(built, result, section, own).T
+    pairs: list[PairAudit] = []
+    for index, section in _cad_pairs(built):
+        errors = np.stack([depth_error, normal_error])[:, log.pair == index]
+        known = errors[:, np.isfinite(errors[0])]
         pairs.append(
             PairAudit(
                 built.scene.pairs[index].name,
                 str(section.file),
-                len(own),
-                len(own) - len(known),
-                *_largest_and_rms(known[:, 0]),
-                *_largest_and_rms(known[:, 1]),
+                errors.shape[1],
+                errors.shape[1] - known.shape[1],
+                *_largest_and_rms(known[0]),
+                *_largest_and_rms(known[1]),
             )
         )
     return CadAudit(tuple(pairs), depth_error, normal_error)
@@ -138,54 +141,62 @@ def _cad_pairs(built: Built) -> Iterator[tuple[int, ShellSection]]:
             yield index, section
 
 
-def _faces_of(section: ShellSection, path: Path) -> tuple[TrimmedFaces, float]:
-    """Return the exact faces of a shell, and metres per unit of their coordinates."""
-    from sphshell_pin.shell.cad.surface import load_cad
-    from sphshell_pin.shell.cad.trimmed import TrimmedFaces
-
-    options = CadOptions(section.chord_error, section.bodies, section.faces)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnitWarning)  # told when the shell was made
-        cad = load_cad(path.parent / str(section.file), section.unit, options)
-    scale = section.scale if isinstance(section.scale, int | float) else 1.0
-    return TrimmedFaces(cad), cad.model.metres * scale * section.magnify
-
-
-def _audit_pair(
-    built: Built,
-    result: Result,
-    index: int,
-    own: npt.NDArray[Any],
-    faces: TrimmedFaces,
-    unit: float,
+def _audit_shell(
+    built: Built, result: Result, section: ShellSection, own: npt.NDArray[np.intp]
 ) -> Array:
     """Return what depth [m] and normal [rad] of the logged contacts `own` are off (k, 2)."""
-    pair, log = built.scene.pairs[index], result.contacts
-    assert pair.sphere is not None  # pairs of shells have one
-    model, data = built.scene.model, built.scene.model.createData()
-    errors = np.full((len(own), 2), np.nan)
+    log, model = result.contacts, built.scene.model
+    data = model.createData()
+    centers, points, normals = (np.zeros((len(own), 3)) for _ in range(3))
+    radii = np.zeros(len(own))
     shown = -1
     for place, i in enumerate(own.tolist()):
+        pair = built.scene.pairs[log.pair[i]]
+        assert pair.sphere is not None  # pairs of shells have one
         if log.row[i] != shown:
             shown = int(log.row[i])
             pin.forwardKinematics(model, data, np.asarray(result.q[shown], dtype=float))
-            shell = data.oMi[pair.joint_j] * pair.shell_placement
-        normal = shell.rotation.T @ log.normal_world[i]
-        point = shell.actInv(log.point_world[i])
-        center = point + (pair.sphere.radius - log.depth[i]) * normal
-        foot = faces.foot(center / unit, point / unit)
-        if foot is None:
-            continue
-        way = center - unit * foot.point
-        exact = way if foot.normal is None else foot.normal
+        shell = data.oMi[pair.joint_j] * pair.shell_placement
+        normals[place] = shell.rotation.T @ log.normal_world[i]
+        points[place] = shell.actInv(log.point_world[i])
+        radii[place] = pair.sphere.radius
+        centers[place] = points[place] + (radii[place] - log.depth[i]) * normals[place]
+    errors = np.full((len(own), 2), np.nan)
+    for place, foot in enumerate(zip(*_feet(section, built.path, centers, points), strict=True)):
+        at, exact, kind = foot
+        way, normal = centers[place] - at, normals[place]
+        exact = exact if kind == ON_FACE else way
         length = float(np.linalg.norm(exact))
-        if length == 0.0:
+        if kind == NOWHERE or length == 0.0:
             continue
         # On the side of the surface on which the contact is.
         exact = exact * np.sign(exact @ normal) / length
-        errors[place, 0] = log.depth[i] - (pair.sphere.radius - float(way @ exact))
+        depth = log.depth[own[place]]
+        errors[place, 0] = depth - (radii[place] - float(way @ exact))
         errors[place, 1] = np.arctan2(np.linalg.norm(np.cross(exact, normal)), exact @ normal)
     return errors
+
+
+def _feet(
+    section: ShellSection, path: Path, centers: Array, points: Array
+) -> tuple[Array, Array, npt.NDArray[np.int32]]:
+    """Return the places of the exact faces next to contacts, see `cad.jobs.feet`."""
+    from sphshell_pin.shell.cad.process import run_in_child
+
+    file = path.parent / str(section.file)
+    options = CadOptions(
+        section.chord_error,
+        section.bodies,
+        section.faces,
+        time_limit=section.time_limit,
+        memory_limit=section.memory_limit,
+    )
+    scale = section.scale if isinstance(section.scale, int | float) else 1.0
+    arguments = (file, section.unit, options, (scale, section.magnify), centers, points)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnitWarning)  # told when the shell was made
+        points, normals, kinds = run_in_child("feet", arguments, file, "--audit-cad", options)
+    return points, normals, kinds
 
 
 def _largest_and_rms(values: Array) -> tuple[float, float]:

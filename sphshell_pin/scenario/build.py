@@ -239,6 +239,8 @@ def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell
                 chord_error=section.chord_error,
                 bodies=section.bodies,
                 faces=section.faces,
+                time_limit=section.time_limit,
+                memory_limit=section.memory_limit,
                 **options,
             )
         else:

@@ -127,6 +127,8 @@ class ShellSection(Section):
     chord_error: Positive | None = None
     bodies: Annotated[list[str], Field(min_length=1)] | None = None
     faces: Annotated[list[str | int], Field(min_length=1)] | None = None
+    time_limit: Positive | None = None
+    memory_limit: Positive | None = None
     segments: Count | None = None
     magnify: Positive = 1.0
     side: Literal["both", "outside", "inside"] = "both"
@@ -143,6 +145,8 @@ class ShellSection(Section):
             raise ValueError("unit and scale belong to a file; a primitive's sizes are in metres")
         if self.file is None and (self.bodies is not None or self.faces is not None):
             raise ValueError("bodies and faces belong to a CAD file, not to a primitive")
+        if self.file is None and (self.time_limit is not None or self.memory_limit is not None):
+            raise ValueError("time_limit and memory_limit belong to a CAD file, not to a primitive")
         if self.file is not None and self.segments is not None:
             raise ValueError("segments belong to a primitive, not to a file")
         return self

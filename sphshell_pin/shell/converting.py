@@ -12,7 +12,7 @@ import numpy as np
 
 from sphshell_pin.atomic import atomic_path
 from sphshell_pin.errors import InvalidParameter, ShellFileError
-from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions, require_kernel
+from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES
 from sphshell_pin.shell.raw import Floats
 from sphshell_pin.shell.readers import SUFFIXES, reader_for
@@ -78,6 +78,8 @@ def convert(
     chord_error: float | None = None,
     bodies: Sequence[str] | None = None,
     faces: Sequence[str | int] | None = None,
+    time_limit: float | None = None,
+    memory_limit: float | None = None,
 ) -> Conversion:
     """Write the surface of one file in the format the suffix of another names.
 
@@ -92,6 +94,7 @@ def convert(
     unit_in : unit of length of the source, as for `Shell.from_file`
     unit_out : that of the target; the source's unless given, mm if that has no name of its own
     chord_error, bodies, faces : of a CAD source, as for `Shell.from_file`
+    time_limit, memory_limit : of CAD on either side, as for `Shell.from_file`
 
     Raises
     ------
@@ -110,28 +113,49 @@ def convert(
     if unit_out is not None:
         metres_per_unit(unit_out)
     options = CadOptions(chord_error, bodies, faces)
+    suffixes = {suffix, goal.suffix.lower()}
     if suffix not in CAD_SUFFIXES:
         options.check_unused(suffix)
-    if {suffix, goal.suffix.lower()} & set(CAD_SUFFIXES):
-        require_kernel(f"converting {suffix} to {goal.suffix.lower()} files")
-    first = _surface(file, unit_in, options)
-    unit = unit_out or (first.unit if first.unit in METRES_PER_UNIT else "mm")
-    carried = goal.suffix.lower() == ".shl" or goal.suffix.lower() in CAD_SUFFIXES
-    brep = goal.suffix.lower() in BREP_SUFFIXES
+    limits = CadOptions(time_limit=time_limit, memory_limit=memory_limit)
+    if not suffixes & set(CAD_SUFFIXES):
+        limits.check_unused(suffix)
     try:
         with atomic_path(goal, goal.suffix) as written:
-            _write(written, unit, first, options)
-            second = _surface(written, unit if brep or not carried else None, CadOptions())
-            rng = np.random.default_rng(0)
-            return Conversion(
-                source=Held(file, first.unit, *first.count, *first.extent),
-                target=Held(goal, unit, *second.count, *second.extent),
-                forth=second.distances(first.samples(SAMPLES, rng)),
-                back=first.distances(second.samples(SAMPLES, rng)),
-                notes=first.notes,
-            )
+            arguments = (file, written, unit_in, unit_out, options)
+            if suffixes & set(CAD_SUFFIXES):
+                from sphshell_pin.shell.cad.process import run_in_child
+
+                purpose = f"converting {suffix} to {goal.suffix.lower()} files"
+                first, second, *found = run_in_child("convert", arguments, file, purpose, limits)
+            else:
+                first, second, *found = exchange(*arguments)
+            return Conversion(Held(file, *first), Held(goal, *second), *found)
     except OSError as error:
         raise ShellFileError(goal, f"cannot be written ({error.strerror})") from error
+
+
+def exchange(
+    source: Path, target: Path, unit_in: str | None, unit_out: str | None, options: CadOptions
+) -> tuple[tuple[Any, ...], tuple[Any, ...], Floats, Floats, tuple[str, ...]]:
+    """Write the surface of one file to another, read that back and compare.
+
+    Returns what a `Conversion` has, of either file without its path.
+    """
+    first = _surface(source, unit_in, options)
+    unit = unit_out or (first.unit if first.unit in METRES_PER_UNIT else "mm")
+    _write(target, unit, first, options)
+    suffix = target.suffix.lower()
+    carried = suffix == ".shl" or suffix in CAD_SUFFIXES
+    stated = unit if suffix in BREP_SUFFIXES or not carried else None
+    second = _surface(target, stated, CadOptions())
+    rng = np.random.default_rng(0)
+    return (
+        (first.unit, *first.count, *first.extent),
+        (unit, *second.count, *second.extent),
+        second.distances(first.samples(SAMPLES, rng)),
+        first.distances(second.samples(SAMPLES, rng)),
+        first.notes,
+    )
 
 
 def _surface(path: Path, unit: str | None, options: CadOptions) -> Any:

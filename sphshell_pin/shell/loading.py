@@ -4,27 +4,31 @@ from __future__ import annotations
 
 import math
 import os
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from sphshell_pin.errors import InvalidParameter, InvalidShell, UnitMissing
-from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions, require_kernel
+from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
 from sphshell_pin.shell.cleaning import CleanedSurface, box_diagonal, clean_surface
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers import READERS, read_shl, reader_for
 from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
 
-if TYPE_CHECKING:
-    from sphshell_pin.shell.cad.surface import CadSurface
-
 Scale = str | float | None
 
 
 def load_surface(
-    path: str | os.PathLike[str], unit: str | None, scale: Scale, cad: CadOptions
-) -> tuple[CleanedSurface, str, float, CadSurface | None]:
+    path: str | os.PathLike[str],
+    unit: str | None,
+    scale: Scale,
+    cad: CadOptions,
+    crease_angle: float,
+) -> tuple[CleanedSurface, str, float]:
     """Read and clean a surface file.
 
-    Returns the surface in metres, the unit taken, metres per file unit, and of CAD the faces.
+    With a crease angle above 0 the sides that curvature would take off the faces of a CAD file are
+    marked as straight.
+
+    Returns the surface in metres, the unit taken, and metres per file unit.
 
     Raises
     ------
@@ -37,49 +41,62 @@ def load_surface(
     NameNotFound
         If a body or face is not in the file.
     ShellFileError
-        If the file is missing, empty, truncated or damaged.
+        If the file is missing, empty, truncated or damaged, or if OpenCASCADE crashes on it or goes
+        beyond the limits of time or memory.
     MissingExtra
         If the library that reads CAD files is not installed.
     """
-    raw, taken, factor, faces = _load_raw(path, unit, scale, cad)
-    try:
-        return clean_surface(raw), taken, factor, faces
-    except InvalidShell as error:
-        raise InvalidShell(f"{path}: {error}") from error
-
-
-def _load_raw(
-    path: str | os.PathLike[str], unit: str | None, scale: Scale, cad: CadOptions
-) -> tuple[RawSurface, str, float, CadSurface | None]:
     if unit is not None:
         metres_per_unit(unit)  # an unknown unit is said before a long file is read
     number = _check_scale(scale)
     file, suffix = reader_for(path)
     if suffix not in CAD_SUFFIXES:
         cad.check_unused(suffix)
+    elif not isinstance(scale, str):
+        return _load_cad(file, unit, number, cad, crease_angle)
+    raw, taken, factor = _load_raw(file, suffix, unit, scale, number)
+    try:
+        return clean_surface(raw), taken, factor
+    except InvalidShell as error:
+        raise InvalidShell(f"{path}: {error}") from error
+
+
+def _load_cad(
+    file: Path, unit: str | None, number: float, cad: CadOptions, crease_angle: float
+) -> tuple[CleanedSurface, str, float]:
+    from sphshell_pin.shell.cad.framing import check_frame
+    from sphshell_pin.shell.cad.process import run_in_child
+
+    check_frame(file)
+    arguments = (file, unit, cad, number, crease_angle, _scaled(number))
+    purpose = f"reading {file.suffix.lower()} files"
+    surface, taken, factor = run_in_child("read", arguments, file, purpose, cad)
+    return surface, taken, factor
+
+
+def _load_raw(
+    file: Path, suffix: str, unit: str | None, scale: Scale, number: float
+) -> tuple[RawSurface, str, float]:
     if suffix == ".shl":
-        return *_load_shl(file, unit, scale, number), None
+        return _load_shl(file, unit, scale, number)
     if isinstance(scale, str):
         raise InvalidParameter("scale", scale, f"must be a number for {suffix} files (no SCALE)")
-    notes = [] if number == 1.0 else [f"scaled by {number:.6g} as asked"]
-    if suffix in CAD_SUFFIXES:
-        require_kernel(f"reading {suffix} files")
-        from sphshell_pin.shell.cad.surface import read_cad
-
-        raw, faces = read_cad(file, unit, cad)
-        return raw.scaled(number).noting(*notes), faces.unit, faces.factor * number, faces
     raw = READERS[suffix](file)
     if unit is None:
         size = box_diagonal(raw.vertices[raw.corners.ravel()])
         raise UnitMissing(file, size, METRES_PER_UNIT)
     factor = metres_per_unit(unit) * number
-    return raw.scaled(factor).noting(*notes), unit, factor, None
+    return raw.scaled(factor).noting(*_scaled(number)), unit, factor
+
+
+def _scaled(number: float) -> tuple[str, ...]:
+    return () if number == 1.0 else (f"scaled by {number:.6g} as asked",)
 
 
 def _load_shl(
-    file: os.PathLike[str], unit: str | None, scale: Scale, number: float
+    file: Path, unit: str | None, scale: Scale, number: float
 ) -> tuple[RawSurface, str, float]:
-    found = read_shl(file)  # type: ignore[arg-type]
+    found = read_shl(file)
     written = found.scale
     if scale is None:
         scale = "apply" if unit is None else "ignore"

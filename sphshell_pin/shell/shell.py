@@ -124,6 +124,8 @@ class Shell(Topology):
         bodies: Sequence[str] | None = None,
         faces: Sequence[str | int] | None = None,
         sew: float | None = None,
+        time_limit: float | None = None,
+        memory_limit: float | None = None,
         side: str = "both",
         crease_angle: float = CREASE_ANGLE,
         name: str | None = None,
@@ -149,12 +151,16 @@ class Shell(Topology):
             unless given
         sew : of CAD: faces whose borders are nearer than this are joined [m], 0 joins none; unless
             given, within up to 1e-4 of the box diagonal, if that closes gaps
+        time_limit, memory_limit : of CAD: after which OpenCASCADE is ended [s], 600 unless given;
+            which it may take beyond what it takes by itself [bytes], 8e9 unless given. It runs in a
+            process of its own
         side, crease_angle, name : as of Shell; the name is the file's unless given
 
         Raises
         ------
         ShellFileError
-            If the file is missing, empty, truncated or damaged.
+            If the file is missing, empty, truncated or damaged, or if OpenCASCADE crashes on it or
+            goes beyond a limit.
         InvalidParameter
             If the unit is missing or unknown, or suffix, scale, side or crease_angle is, or an
             option is out of range or does not belong to the format.
@@ -169,22 +175,14 @@ class Shell(Topology):
         from sphshell_pin.shell.loading import load_surface
 
         check_options(crease_angle, side)
-        options = CadOptions(chord_error, bodies, faces, sew)
-        surface, taken_unit, factor, cad = load_surface(path, unit, scale, options)
+        options = CadOptions(chord_error, bodies, faces, sew, time_limit, memory_limit)
+        surface, taken_unit, factor = load_surface(path, unit, scale, options, crease_angle)
         found = surface.health.labelled(source=str(path), unit=taken_unit, scale=factor)
-        surface = replace(surface, health=found)
+        shell = cls.__new__(cls)
         called = Path(path).stem if name is None else name
-
-        def make(of: CleanedSurface) -> Shell:
-            shell = cls.__new__(cls)
-            shell._set(of, crease_angle, side, called, str(path), taken_unit)
-            return shell
-
-        if cad is not None and crease_angle > 0.0:
-            from sphshell_pin.shell.cad.curved_error import hold_curvature
-
-            surface = hold_curvature(surface, cad, factor / cad.factor * cad.model.metres, make)
-        return make(surface)
+        cleaned = replace(surface, health=found)
+        shell._set(cleaned, crease_angle, side, called, str(path), taken_unit)
+        return shell
 
     @classmethod
     def from_geometry(

@@ -78,23 +78,27 @@ def test_a_body_is_converted_alone(tmp_path):
 
 
 def test_a_failed_conversion_leaves_the_old_file_and_nothing_else(plate, tmp_path, monkeypatch):
-    target = tmp_path / "out.stl"
-    target.write_bytes(b"precious")
+    convert(plate, tmp_path / "mesh.stl")
+    for name in ("out.stl", "out.iges"):
+        (tmp_path / name).write_bytes(b"precious")
     before = sorted(tmp_path.iterdir())
     with pytest.raises(NameNotFound):
-        convert(plate, target, bodies=["nothing"])
+        convert(plate, tmp_path / "out.stl", bodies=["nothing"])
+    with pytest.raises(InvalidParameter, match="unit = 'mil' must be one of"):
+        convert(plate, tmp_path / "out.iges", unit_out="mil")
 
     def fail(*_):
-        raise ShellFileError(target, "no room")
+        raise ShellFileError("out.stl", "no room")
 
     monkeypatch.setattr(converting, "_write", fail)
-    with pytest.raises(ShellFileError):
-        convert(plate, target)
-    assert target.read_bytes() == b"precious"
+    with pytest.raises(ShellFileError, match="no room"):
+        convert(tmp_path / "mesh.stl", tmp_path / "out.stl", "mm")
+    for name in ("out.stl", "out.iges"):
+        assert (tmp_path / name).read_bytes() == b"precious"
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_what_cannot_be_is_refused(plate, tmp_path, monkeypatch):
+def test_what_cannot_be_is_refused(plate, tmp_path):
     for target, told in (("out.xyz", "must end in one of"), ("plate.step", "another file")):
         with pytest.raises(InvalidParameter, match=told):
             convert(plate, tmp_path / target)
@@ -105,11 +109,11 @@ def test_what_cannot_be_is_refused(plate, tmp_path, monkeypatch):
     convert(plate, tmp_path / "out.stl")
     with pytest.raises(InvalidParameter, match="belongs to CAD files"):
         convert(tmp_path / "out.stl", tmp_path / "out.obj", "mm", chord_error=1e-4)
-    from sphshell_pin.shell.cad import writing
-
-    monkeypatch.setattr(writing, "MOST_FACETS", 10)
-    with pytest.raises(InvalidParameter, match="too many for a CAD file"):
-        convert(tmp_path / "out.stl", tmp_path / "out.step", "mm")
+    with pytest.raises(InvalidParameter, match="time_limit = 9 belongs to CAD files"):
+        convert(tmp_path / "out.stl", tmp_path / "out.obj", "mm", time_limit=9)
+    Shell(*meshes.icosphere(5, 0.02)).to_file(tmp_path / "fine.ply")
+    with pytest.raises(InvalidParameter, match="elements = 20480 are too many for a CAD file"):
+        convert(tmp_path / "fine.ply", tmp_path / "out.step", "m")
 
 
 def test_the_command_prints_what_it_measured(plate, tmp_path):

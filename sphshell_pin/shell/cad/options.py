@@ -31,17 +31,25 @@ class CadOptions:
     faces : names of the faces to take, or their numbers in the file (from 1), all unless given
     sew : faces whose borders are nearer than this are joined [m], 0 leaves them as they are; unless
         given, the smallest of a few tolerances that joins the most
+    time_limit : after which OpenCASCADE is ended [s], 600 unless given
+    memory_limit : which it may take beyond what it takes by itself [bytes], 8e9 unless given
     """
 
     chord_error: float | None = None
     bodies: Sequence[str] | None = None
     faces: Sequence[str | int] | None = None
     sew: float | None = None
+    time_limit: float | None = None
+    memory_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter if an option is out of range."""
         if self.chord_error is not None:
             check_positive("chord_error", self.chord_error, "m")
+        if self.time_limit is not None:
+            check_positive("time_limit", self.time_limit, "s")
+        if self.memory_limit is not None:
+            check_positive("memory_limit", self.memory_limit, "bytes")
         if self.sew is not None:
             try:
                 fits = 0.0 <= float(self.sew) < math.inf
@@ -62,7 +70,7 @@ class CadOptions:
 
     def check_unused(self, suffix: str) -> None:
         """Raise InvalidParameter if anything was asked for, as `suffix` is of a mesh file."""
-        for name in ("chord_error", "bodies", "faces", "sew"):
+        for name in ("chord_error", "bodies", "faces", "sew", "time_limit", "memory_limit"):
             given = getattr(self, name)
             if given is not None:
                 raise InvalidParameter(

@@ -25,8 +25,8 @@ from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from sphshell_pin.errors import ShellFileError
+from sphshell_pin.shell.cad.framing import check_frame
 from sphshell_pin.shell.cad.model import CadFace, CadModel, compound, subshapes
-from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES
 from sphshell_pin.shell.cad.units import NO_UNIT, iges_unit, step_unit
 
 IGES_FACES = (143, 144, 510)
@@ -56,13 +56,11 @@ def read_model(path: Path) -> CadModel:
         data = path.read_bytes()
     except OSError as error:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
-    suffix = path.suffix.lower()
-    kind = "STEP" if suffix in STEP_SUFFIXES else "BREP" if suffix in BREP_SUFFIXES else "IGES"
-    _check_frame(path, kind, data)
+    kind = check_frame(path)
     try:
         read = {"STEP": _read_step, "IGES": _read_iges, "BREP": _read_brep}[kind]
         model = read(path, data)
-    except ShellFileError:
+    except (ShellFileError, MemoryError):
         raise
     except Exception as error:  # whatever OpenCASCADE throws
         reason = " ".join(str(error).split()) or type(error).__name__
@@ -72,27 +70,6 @@ def read_model(path: Path) -> CadModel:
             path, "holds no surface, only curves or points at most: export faces or solids"
         )
     return model
-
-
-def _check_frame(path: Path, kind: str, data: bytes) -> None:
-    """See that a file begins and ends as its format has it: half a file may read as a whole."""
-    head, tail = data[:4096].lstrip(b"\xef\xbb\xbf \r\n\t"), data[-4096:].rstrip(b"\0\x1a \r\n\t")
-    if kind == "STEP":
-        begins = head.startswith(b"ISO-10303-21")
-        ends = re.search(rb"END-ISO-10303-21\s*;$", tail) is not None
-        missing = "END-ISO-10303-21"
-    elif kind == "IGES":
-        begins = re.match(rb"[^\r\n]{72}[SFC]", data) is not None
-        ends = re.search(rb"(^|[\r\n])[^\r\n]{72}T *\d+$", tail) is not None
-        missing = "the T line"
-    else:
-        begins = head.startswith((b"DBRep_DrawableShape", b"CASCADE Topology"))
-        ends = re.search(rb"[\r\n][-+ie]\d+ \d+$", tail) is not None
-        missing = "the line of the whole shape"
-    if not begins:
-        raise ShellFileError(path, f"is no {kind} file: it does not begin as one")
-    if not ends:
-        raise ShellFileError(path, f"is truncated: {missing} at its end is missing")
 
 
 def _read_step(path: Path, data: bytes) -> CadModel:

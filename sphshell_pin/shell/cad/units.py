@@ -125,7 +125,7 @@ def take_unit(
         f"unit '{unit}' as stated, though the file's header says '{names[0]}': the surface "
         f"measures {size * metres:.4g} m, not {size * header.shape_metres:.4g} m"
     )
-    warnings.warn(f"{path.name}: {note}", UnitWarning, stacklevel=7)
+    warnings.warn(f"{path.name}: {note}", UnitWarning, stacklevel=2)
     return replace(header, metres=stated, shape_metres=metres), unit, note
 
 

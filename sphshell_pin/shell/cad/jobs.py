@@ -1,0 +1,112 @@
+"""What a CAD child does: all that the package needs of OpenCASCADE.
+
+These run in the child's process, where a crash or a hang harms nobody; `run_in_child` calls them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sphshell_pin.errors import InvalidShell
+from sphshell_pin.shell.cad.curved_error import hold_curvature
+from sphshell_pin.shell.cad.options import CadOptions
+from sphshell_pin.shell.cad.surface import load_cad
+from sphshell_pin.shell.cad.trimmed import TrimmedFaces
+from sphshell_pin.shell.cleaning import CleanedSurface, clean_surface
+from sphshell_pin.shell.raw import Floats, Ints
+from sphshell_pin.shell.shell import Shell
+
+Alive = Callable[[], None]
+
+BETWEEN = 100
+"""Contacts after which the audit says that it goes on."""
+
+
+def read(
+    alive: Alive,
+    path: Path,
+    unit: str | None,
+    options: CadOptions,
+    scale: float,
+    crease_angle: float,
+    notes: tuple[str, ...],
+) -> tuple[CleanedSurface, str, float]:
+    """Read, tessellate and clean a CAD file.
+
+    Returns the surface [m], the unit taken, and metres per unit of the file, `scale` included.
+    """
+    del alive
+    cad = load_cad(path, unit, options)
+    raw = cad.polygons().noting(*cad.notes()).scaled(scale).noting(*notes)
+    try:
+        surface = clean_surface(raw)
+    except InvalidShell as error:
+        raise InvalidShell(f"{path}: {error}") from error
+
+    def make(of: CleanedSurface) -> Shell:
+        shell = Shell.__new__(Shell)
+        shell._set(of, crease_angle, "both", path.stem, str(path), cad.unit)
+        return shell
+
+    factor = cad.factor * scale
+    if crease_angle > 0.0:
+        surface = hold_curvature(surface, cad, factor / cad.factor * cad.model.metres, make)
+    return surface, cad.unit, factor
+
+
+def feet(
+    alive: Alive,
+    path: Path,
+    unit: str | None,
+    options: CadOptions,
+    scales: tuple[float, ...],
+    centers: Floats,
+    contacts: Floats,
+) -> tuple[Floats, Floats, Ints]:
+    """Find the stationary point on the trimmed faces next to each of k contacts.
+
+    scales : by which the faces were made larger, one after the other
+    centers, contacts : (k, 3) in the shell's frame [m]
+
+    Returns the points (k, 3) [m], the unit normals (k, 3) of the surface there, and (k,) 0 where
+    there is none, 1 for a point of an edge or a vertex, which has no normal, 2 for one of a face.
+    """
+    cad = load_cad(path, unit, options)
+    metres = cad.model.metres
+    for scale in scales:
+        metres *= scale
+    faces = TrimmedFaces(cad)
+    points, normals = np.zeros(centers.shape), np.zeros(centers.shape)
+    kinds = np.zeros(len(centers), np.int32)
+    for k, (center, contact) in enumerate(zip(centers, contacts, strict=True)):
+        if k % BETWEEN == 0:
+            alive()
+        foot = faces.foot(center / metres, contact / metres)
+        if foot is None:
+            continue
+        points[k], kinds[k] = metres * foot.point, 1
+        if foot.normal is not None:
+            normals[k], kinds[k] = foot.normal, 2
+    return points, normals, kinds
+
+
+def convert(
+    alive: Alive,
+    source: Path,
+    written: Path,
+    unit_in: str | None,
+    unit_out: str | None,
+    options: CadOptions,
+) -> tuple[Any, ...]:
+    """Write the surface of one file to another, and measure; see `converting.exchange`."""
+    from sphshell_pin.shell.converting import exchange
+
+    del alive
+    return exchange(source, written, unit_in, unit_out, options)
+
+
+JOBS: dict[str, Callable[..., Any]] = {"read": read, "feet": feet, "convert": convert}

@@ -1,0 +1,199 @@
+"""The process in which OpenCASCADE runs: whatever becomes of it, the one that asked goes on."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("OCP")
+
+from typer.testing import CliRunner
+
+from sphshell_pin import Shell
+from sphshell_pin.cli import app
+from sphshell_pin.errors import InvalidParameter, ShellFileError
+from sphshell_pin.shell.cad import process
+from sphshell_pin.shell.cad.messages import pack, unpack
+from tests.fuzz.cad import outcome
+from tests.shell import cad_shapes as shapes
+
+DAMAGED = sorted((Path(__file__).parents[1] / "data" / "damaged_cad").iterdir())
+
+JOBS = {
+    "crash": "signal.raise_signal(signal.SIGSEGV)",
+    "abort": "os.write(2, b'free(): invalid pointer'); os.abort()",
+    "hang": "re.match('(a+)+$', 'a' * 60 + 'b')",  # with the interpreter's lock, as OpenCASCADE
+    "swell": "return [bytes(10_000_000) for k in range(10_000)]",
+    "bad_alloc": "os.write(2, b'terminate called ... std::bad_alloc'); os.abort()",
+    "raise": "raise RuntimeError('Standard_NullObject')",
+    "garbage": "os.write(answers, bytes(1000))",
+    "more garbage": "os.write(answers, b'\\xff' * 1000)",
+}
+"""What a child may do in place of reading a file."""
+
+
+def start_with(job):
+    """Program of a child that does `job`, and does without OpenCASCADE."""
+    return process._START.replace(
+        "serve(int(",
+        f"""
+import os, re, types
+from sphshell_pin.shell.cad import child
+def job(*arguments):
+    {job}
+answers = os.dup(1)
+name = "sphshell_pin.shell.cad.jobs"
+sys.modules[name] = types.SimpleNamespace(JOBS=dict(read=job))
+child.require_kernel = lambda purpose: None
+serve(int(""",
+    )
+
+
+@pytest.fixture
+def box(tmp_path):
+    return shapes.write_brep(tmp_path / "box.brep", shapes.box())
+
+
+def load_with(job, box, monkeypatch, **limits):
+    with monkeypatch.context() as patch:
+        process._end_idle()
+        patch.setattr(process, "_START", start_with(JOBS[job]))
+        Shell.from_file(box, "mm", **limits)
+
+
+@pytest.mark.parametrize(
+    ("job", "told"),
+    [
+        ("crash", r"box.brep: makes OpenCASCADE crash \(signal 11, segmentation fault\): the file"),
+        ("abort", r"crash \(signal 6, aborted; free\(\): invalid pointer\): the file"),
+        ("swell", r"takes OpenCASCADE more than the memory limit of 0\.2 GB: raise memory_limit"),
+        ("bad_alloc", r"takes OpenCASCADE more than the memory limit of 0\.2 GB"),
+        ("raise", r"makes OpenCASCADE fail \(Standard_NullObject\): the file is damaged"),
+        ("garbage", "box.brep: gets no valid answer from OpenCASCADE: the file is damaged"),
+        ("more garbage", "box.brep: gets no valid answer from OpenCASCADE"),
+        ("hang", r"takes OpenCASCADE more than the time limit of 1 s: raise time_limit"),
+    ],
+)
+def test_what_becomes_of_the_child_is_told_in_a_sentence(job, told, box, monkeypatch, capfd):
+    limit = 1.0 if job == "hang" else 60.0
+    with pytest.raises(ShellFileError, match=told) as caught:
+        load_with(job, box, monkeypatch, memory_limit=2e8, time_limit=limit)
+    assert "\n" not in str(caught.value)
+    assert not process._idle  # nobody else gets that child
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("path", DAMAGED, ids=lambda path: path.name)
+def test_files_on_which_opencascade_crashed_or_hung(path):
+    assert outcome(path, time_limit=4.0) != "read"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL, signal.SIGTERM])
+def test_the_child_ends_with_its_parent(number, box, tmp_path):
+    """A script without a guard, while the child holds the interpreter's lock for ever."""
+    job = f"open({str(tmp_path / 'pid')!r}, 'w').write(f'{{os.getpid()}} '); {JOBS['hang']}"
+    code = f"""
+from sphshell_pin import Shell
+from sphshell_pin.shell.cad import process
+process._START = {start_with(job)!r}
+Shell.from_file({str(box)!r}, "mm")
+"""
+    parent = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE)
+    pid = wait_for(lambda: int((tmp_path / "pid").read_text().split(" ")[-2]))
+    os.kill(parent.pid, number)
+    assert parent.wait(30) == -number
+    assert (b"KeyboardInterrupt" in parent.communicate()[1]) == (number == signal.SIGINT)
+    wait_for(lambda: not running(pid) or None)
+
+
+def running(pid):
+    shown = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, check=False)
+    return shown.stdout[:1] not in (b"Z", b"")
+
+
+def wait_for(answer):
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline:
+        try:
+            found = answer()
+        except (OSError, ValueError, IndexError):
+            found = None
+        if found is not None:
+            return found
+        time.sleep(0.05)
+    raise AssertionError("in vain")
+
+
+def test_a_child_is_used_again_and_by_one_at_a_time(box):
+    def load():
+        return Shell.from_file(box, "mm").vertices
+
+    whole = load()
+    (first,) = process._idle
+    assert np.array_equal(load(), whole)
+    assert process._idle == [first]
+    with pytest.raises(InvalidParameter, match="unit"):
+        Shell.from_file(box)  # the fault of the caller, not of the file
+    assert process._idle == [first]
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(load())) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(np.array_equal(one, whole) for one in found)
+    assert len(found) == 2
+    assert len(process._idle) == 1
+    # A process forked of this one must not talk to its child.
+    (idle,) = process._idle
+    worker = multiprocessing.get_context("fork").Process(target=load)
+    worker.start()
+    worker.join(60)
+    assert worker.exitcode == 0
+    assert idle._process.poll() is None
+    assert np.array_equal(load(), whole)
+
+
+def test_a_relative_path_is_found_from_where_the_caller_is(box, monkeypatch):
+    Shell.from_file(box, "mm")
+    monkeypatch.chdir(box.parent)
+    assert Shell.from_file(box.name, "mm").source == "box.brep"
+
+
+def test_limits_are_checked_and_told_on_the_command_line(box, tmp_path):
+    for name in ("time_limit", "memory_limit"):
+        with pytest.raises(InvalidParameter, match=f"{name} = 0 must be positive"):
+            Shell.from_file(box, "mm", **{name: 0})
+    told = CliRunner().invoke(app, ["check", str(box), "--unit", "mm", "--time-limit", "1e-3"])
+    assert told.exit_code == 2
+    assert "time limit of 0.001 s" in told.stderr
+    target = ["convert", str(box), str(tmp_path / "box.stl"), "--unit-in", "mm"]
+    told = CliRunner().invoke(app, [*target, "--memory-limit", "1"])
+    assert told.exit_code == 2
+    assert "memory limit of 1e-09 GB" in told.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["box.brep"]
+
+
+def test_damaged_messages_are_noticed():
+    message = pack(("done", np.arange(1000.0), Path("a"), (None, 1.5, "x")))
+    kind, array, *rest = unpack(message)
+    assert (kind, rest) == ("done", [Path("a"), (None, 1.5, "x")])
+    assert np.array_equal(array, np.arange(1000.0))
+    rng = np.random.default_rng(3)
+    for place in rng.integers(len(message), size=200):
+        changed = bytearray(message)
+        changed[place] ^= 1
+        try:
+            found = unpack(bytes(changed))
+        except ValueError:
+            continue
+        assert np.array_equal(found[1], array)  # a byte that nobody reads
