@@ -8,7 +8,7 @@ CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 OUT ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench hard-cases work-precision lint format report robots sweep-survival rollouts real-surfaces wheel docs fuzz clean
+.PHONY: help demo test bench hard-cases work-precision lint format report robots sweep-survival rollouts real-surfaces wheel docs fuzz sanitize clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -25,6 +25,7 @@ help:
 # make rollouts        print the speed-up of 10 000 runs over threads
 # make real-surfaces FOLDER=...  jumps and energies over the surfaces of a folder
 # make fuzz SECONDS=600 SEED=1  damaged files for every reader, until one breaks it
+# make sanitize        run tests with checks of memory, undefined behaviour and data races
 # make clean  remove everything that was built
 
 $(BIN)/python:
@@ -89,6 +90,10 @@ format: $(VENV)/.test
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $(CPP)
+
+sanitize: $(VENV)/.test
+	.ci/sanitize address
+	.ci/sanitize thread
 
 wheel: $(BIN)/python
 	rm -rf dist

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result import Result
@@ -21,6 +21,16 @@ _LONGEST_VALUE = 200
 
 class SphshellError(Exception):
     """Root of all faults of this package; its text is one sentence a user can act on."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let it be raised in another process: `args` are the text, not what __init__ takes."""
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[SphshellError], args: tuple[Any, ...], data: dict[str, Any]) -> SphshellError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(data)
+    return error
 
 
 class InvalidParameter(SphshellError, ValueError):

@@ -20,6 +20,10 @@ class Friction(ABC):
     def core(self) -> _core.FrictionLaw:
         """The C++ twin of this law."""
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the C++ twin, which is made again: what pickle and copy take."""
+        return {k: v for k, v in self.__dict__.items() if k != "core"}
+
     def coefficient(self, slip_speed: float) -> float:
         """Return mu of steady sliding at `slip_speed` [m/s] >= 0."""
         value: float = self.core.coefficient(check_not_negative("slip_speed", slip_speed, "m/s"))

@@ -24,6 +24,10 @@ class NormalLaw(ABC):
     def core(self) -> _core.NormalLaw:
         """The C++ twin of this law."""
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the C++ twin, which is made again: what pickle and copy take."""
+        return {k: v for k, v in self.__dict__.items() if k != "core"}
+
     def normal_force(self, depth: float, gap_rate: float = 0.0) -> float:
         """Return the push [N] at `depth` [m] (0 where not positive) and `gap_rate` [m/s].
 

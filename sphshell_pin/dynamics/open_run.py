@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pinocchio as pin
@@ -57,6 +57,13 @@ class OpenRun:
         self._controller = controller
         self._rows = 0
         self._start = self.snapshot()
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be pickled: the run is with the compiled core."""
+        raise TypeError(
+            "an OpenRun cannot be pickled or copied: start another one from the state of its "
+            "snapshot(), of the same simulation"
+        )
 
     @property
     def scene(self) -> Scene:

@@ -162,6 +162,10 @@ class Scene:
         self._pairs: tuple[ContactPair, ...] = ()
         self._core: _core.Scene | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the C++ twin, which is made again: what pickle and copy take."""
+        return {**self.__dict__, "_core": None}
+
     @property
     def model(self) -> pin.Model:
         """The scene's own model, without the locked joints."""
@@ -234,7 +238,8 @@ class Scene:
 
         find(pose_i, pose_j), with the world placements (pinocchio.SE3) of both frames, returns
         points_world (k, 3) [m], normals_world (k, 3) (unit, from j to i), depths (k,) [m]; entries
-        with depth <= 0 are no contacts. It is called in every evaluation of the forces.
+        with depth <= 0 are no contacts. It is called in every evaluation of the forces. A scene
+        that is to be pickled (multiprocessing) needs a function of a module here, no lambda.
         """
         if not callable(find):
             raise InvalidParameter("find", find, "must be callable: find(pose_i, pose_j)")

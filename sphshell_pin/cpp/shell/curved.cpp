@@ -64,10 +64,10 @@ bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
 // more than twice as much as the other. The unit tangent that leans no more than twice as much as
 // `other`.
 Vec3 limited_lean(const Vec3& tangent, const Vec3& other, const Vec3& forward) {
-  const double most = 2 * lean_of(other, forward);
-  if (lean_of(tangent, forward) <= most) return tangent;
+  if (lean_of(tangent, forward) <= 2 * lean_of(other, forward)) return tangent;
   const Vec3 aside = (tangent - tangent.dot(forward) * forward).normalized();
-  return std::cos(most) * forward + std::sin(most) * aside;
+  const double along = other.dot(forward), off = forward.cross(other).norm();
+  return (along * along - off * off) * forward + 2 * along * off * aside;  // twice the angle
 }
 
 // Lifts of the two control points of an edge with chord d, tangent to the planes of all normals at

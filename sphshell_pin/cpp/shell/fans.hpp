@@ -45,7 +45,7 @@ class Fans {
   int size() const { return static_cast<int>(fan_of_.size()); }
   int of(int corner) const { return fan_of_[corner]; }
   int count(int fan) const { return begin_[fan + 1] - begin_[fan]; }
-  const int* begin(int fan) const { return &members_[begin_[fan]]; }
+  const int* begin(int fan) const { return members_.data() + begin_[fan]; }
   const int* end(int fan) const { return members_.data() + begin_[fan + 1]; }
   int vertex(int corner) const { return shell_.triangles()[corner / 3][corner % 3]; }
 
