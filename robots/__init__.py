@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.errors import MissingExtra, NameNotFound, SphshellError
+from sphshell_pin.robots.description import read_model
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -118,7 +119,8 @@ def load_urdf(
     Raises
     ------
     RobotError
-        The file or one of its meshes is missing or cannot be read.
+        The file or one of its meshes is missing or cannot be read, or the robot is too large: a
+        chain of more than 1000 links, or more degrees of freedom than 2 GB of memory hold (315).
     """
     file = Path(path)
     if not file.is_file():
@@ -127,10 +129,9 @@ def load_urdf(
     for folder in dirs:
         if not Path(folder).is_dir():
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
-    root = [pin.JointModelFreeFlyer()] if free_flyer else []
     try:
-        model = pin.buildModelFromUrdf(str(file), *root)
-    except (ValueError, RuntimeError) as error:
+        model = read_model(file, free_flyer=free_flyer)
+    except (ValueError, RuntimeError, OSError) as error:
         raise RobotError(f"{file}: not a URDF that pinocchio can read: {error}") from None
     geometry = []
     for kind in (pin.GeometryType.COLLISION, pin.GeometryType.VISUAL):

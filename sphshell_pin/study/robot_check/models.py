@@ -110,11 +110,12 @@ def _from_library(name: str, robots: Any) -> Subject:
 
 def _from_urdf(file: Path, name: str, shipped: str | None, *, free_flyer: bool) -> Subject:
     robots = importlib.import_module("sphshell_pin.robots")
-    root = [pin.JointModelFreeFlyer()] if free_flyer else []
     try:
-        tree = ET.parse(file)
-        model = pin.buildModelFromUrdf(str(file), *root)
-    except (ET.ParseError, ValueError, RuntimeError, OSError, LookupError) as error:
+        model = importlib.import_module("sphshell_pin.robots.description").read_model(
+            file, free_flyer=free_flyer
+        )
+        tree = ET.parse(file)  # well-formed and not deep: this has been checked
+    except (ValueError, RuntimeError, OSError, LookupError) as error:
         reason = " ".join(str(error).split())
         raise robots.RobotError(f"{file}: not a URDF that can be read: {reason}") from None
     notes = []

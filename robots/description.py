@@ -1,0 +1,92 @@
+"""URDF files that pinocchio may read: its parser calls itself for every link of a chain."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from os import PathLike
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+import pinocchio as pin
+
+DEEPEST = 100
+"""Elements of the file one within another; robots need seven."""
+
+LONGEST_CHAIN = 1000
+"""Links one behind another; the parser overflows the stack of 8 MB at about 3800."""
+
+MOST_LINKS = 5000
+"""Links in all: the time to read them grows with their square."""
+
+MOST_MEMORY = 2e9
+"""[B] of a pinocchio.Data, which holds eight arrays of one number per three velocities."""
+
+
+def read_model(path: str | PathLike[str], *, free_flyer: bool) -> Any:
+    """Return the pinocchio.Model of a URDF file; with `free_flyer` its root link floats.
+
+    Raises
+    ------
+    ValueError
+        The file is no URDF, or too large a one; the text says why.
+    OSError, RuntimeError
+        It cannot be opened, or pinocchio cannot make a model of it.
+    """
+    _check_size(path)
+    root = [pin.JointModelFreeFlyer()] if free_flyer else []
+    model = pin.buildModelFromUrdf(str(path), *root)
+    memory = 8 * 8.0 * model.nv**3
+    if memory > MOST_MEMORY:
+        raise ValueError(
+            f"its {model.nv} degrees of freedom need {memory * 1e-9:.3g} GB of memory, more than "
+            f"{MOST_MEMORY * 1e-9:g} GB; fix some joints, or build the pinocchio.Model yourself"
+        )
+    return model
+
+
+def _check_size(path: str | PathLike[str]) -> None:
+    """Raise ValueError for XML that no robot needs; nothing is kept but the names of links."""
+    parser = expat.ParserCreate()
+    opened: list[str] = []
+    joints: list[dict[str, str]] = []
+    links = 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal links
+        opened.append(tag)
+        if len(opened) > DEEPEST:
+            raise ValueError(f"its elements are nested more than {DEEPEST} deep")
+        links += opened[1:] == ["link"]
+        if opened[1:] == ["joint"]:
+            joints.append({})
+        elif opened[1:-1] == ["joint"] and "link" in attributes:
+            joints[-1][tag] = attributes["link"]
+
+    def entity(name: str, *_: object) -> None:
+        raise ValueError(f"it declares an entity, '{name}'; write what it stands for instead")
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda _: opened.pop()
+    parser.EntityDeclHandler = entity
+    try:
+        with Path(path).open("rb") as file:
+            parser.ParseFile(file)
+    except expat.ExpatError as error:
+        raise ValueError(f"it is not well-formed XML: {error}") from None
+    if links > MOST_LINKS:
+        raise ValueError(f"it has {links} links; at most {MOST_LINKS} can be read")
+    children = defaultdict(list)
+    for joint in joints:
+        children[joint.get("parent")].append(joint.get("child"))
+    layer = list(children.keys() - {joint.get("child") for joint in joints})
+    length = 0
+    while layer:
+        length += 1
+        # Taken out: a loop, which no URDF may have, must not go on for ever.
+        layer = [child for link in layer for child in children.pop(link, ())]
+    if length > LONGEST_CHAIN:
+        raise ValueError(
+            f"it has a chain of {length} links; at most {LONGEST_CHAIN} one behind another can be "
+            "read"
+        )

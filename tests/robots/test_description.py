@@ -1,0 +1,54 @@
+"""URDF files that would cost the process its stack or its memory are refused before."""
+
+import pytest
+
+from sphshell_pin import robots
+from sphshell_pin.study.robot_check.models import load_subject
+
+INERTIA = (
+    "<inertial><mass value='1'/>"
+    "<inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+)
+
+
+def joint(number, parent, kind="fixed"):
+    return (
+        f"<link name='l{number}'>{INERTIA}</link>"
+        f"<joint name='j{number}' type='{kind}'><parent link='l{parent}'/>"
+        f"<child link='l{number}'/><axis xyz='1 0 0'/><limit effort='1' velocity='1'/></joint>"
+    )
+
+
+def robot(inside):
+    return f"<robot name='r'><link name='l0'/>{inside}</robot>"
+
+
+ENTITIES = "".join(f"<!ENTITY e{k} '{f'&e{k - 1};' * 10 if k else 'x' * 99}'>" for k in range(9))
+
+REFUSED = {
+    "chain of 1002 links": robot("".join(joint(k, k - 1) for k in range(1, 1002))),
+    "has 5001 links": robot("".join(joint(k, 0) for k in range(1, 5001))),
+    "316 degrees of freedom need 2.02 GB": robot(
+        "".join(joint(k, 0, "revolute") for k in range(1, 317))
+    ),
+    "nested more than 100 deep": robot("<a>" * 100_000 + "</a>" * 100_000),
+    "declares an entity, 'e0'": f"<!DOCTYPE r [{ENTITIES}]>{robot('&e8;')}",
+    "not well-formed XML": robot("")[:-1],
+    # A loop; pinocchio says that a body is missing.
+    "not a URDF": robot(joint(1, 0) + joint(2, 1) + joint(3, 2).replace("'l3'", "'l1'", 2)),
+}
+
+
+@pytest.mark.parametrize("reason", REFUSED)
+@pytest.mark.parametrize("load", [robots.load_urdf, load_subject])
+def test_what_is_too_large_is_refused(tmp_path, reason, load):
+    path = tmp_path / "r.urdf"
+    path.write_text(REFUSED[reason])
+    with pytest.raises(robots.RobotError, match=rf"r\.urdf: .*{reason}"):
+        load(path)
+
+
+def test_a_chain_as_long_as_may_be_is_read(tmp_path):
+    path = tmp_path / "r.urdf"
+    path.write_text(robot("".join(joint(k, k - 1) for k in range(1, 1000))))
+    assert robots.load_urdf(path).model.nv == 0

@@ -1,0 +1,135 @@
+"""Small files must not cost much: polygons of many corners, sizes that a header only claims."""
+
+import struct
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+import trimesh  # noqa: F401  its import would be measured otherwise
+
+from sphshell_pin import Shell, _core
+from sphshell_pin.errors import ShellFileError
+from sphshell_pin.shell import clean
+
+from ..oracle.ear_clipping import clip_ears
+
+
+def on_circle(radius, angle):
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def star(count):
+    rng = np.random.default_rng(count)
+    angle = 2 * np.pi * (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / count
+    return on_circle(rng.uniform(0.3, 1.0, count), angle)
+
+
+def gear(count):
+    angle = 2 * np.pi * np.arange(count) / count
+    return on_circle(1 + 0.3 * np.cos(angle * count / 4), angle)
+
+
+def comb(count):
+    x = np.arange(count - 2.0)
+    teeth = np.column_stack([x, np.where(x % 2, 1.0, 1e-3 * x)])
+    return np.concatenate([teeth, [[count, -1.0], [0.0, -1.0]]])[::-1]
+
+
+def noisy_square(count):
+    """Return a square with corners on its sides, off by less than the tolerance."""
+    t = np.arange(count // 4) * 4 / count
+    sides = [(t, 0 * t), (0 * t + 1, t), (1 - t, 0 * t + 1), (0 * t, 1 - t)]
+    points = np.concatenate([np.column_stack(side) for side in sides])
+    return points + np.random.default_rng(1).normal(0, 1e-8, points.shape)
+
+
+def tangle(count):
+    """Return a polygon that crosses itself everywhere, counter-clockwise all the same."""
+    points = np.random.default_rng(count).random((count, 2))
+    following = np.roll(points, -1, axis=0)
+    turn = (points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]).sum()
+    return points if turn > 0 else points[::-1]
+
+
+def check_against_oracle(flat, corners, tolerance=2e-7):
+    expected, proper = clip_ears(flat, np.asarray(corners), tolerance)
+    slots, _, tangled = _core.mend_clip_ears(
+        np.array([0, len(corners)]),
+        np.asarray(corners, np.int32),
+        np.column_stack([flat, np.zeros(len(flat))]),
+        tolerance,
+    )
+    assert np.sort(slots, axis=1).tolist() == expected
+    assert bool(tangled[0]) is not bool(proper)
+
+
+@pytest.mark.parametrize("shape", [star, gear, comb, noisy_square, tangle])
+@pytest.mark.parametrize("count", [12, 60])
+def test_the_best_ear_goes_first(shape, count):
+    check_against_oracle(shape(count), range(count))
+
+
+def test_the_best_ear_goes_first_where_there_are_many():
+    # Beyond 512 corners other code finds it. With a hole, whose bridge has two banks.
+    hole = np.array([0.1, 0.07]) + 0.2 * star(40)[::-1]
+    flat = np.concatenate([gear(500), hole])
+    check_against_oracle(flat, [*range(500), 0, *range(500, 540), 500])
+
+
+@pytest.mark.parametrize("shape", [star, comb, tangle, None])
+def test_a_polygon_costs_little_more_than_its_corners(shape):
+    def cost(count):
+        times = []
+        for _ in range(2):
+            corners = np.arange(count) if shape else np.resize([0, 1, 2], count)
+            flat = shape(count) if shape else np.array([[0.0, 0], [1, 0], [0, 1]])
+            points = np.column_stack([flat, np.zeros(len(flat))])
+            start = time.thread_time()
+            surface = clean(points, [corners])
+            times.append(time.thread_time() - start)
+        assert surface.health.largest_polygon == count
+        return min(times)
+
+    # Six times as many: a square would take 36 times as long, n log n eight times.
+    assert cost(12_000) < 18 * cost(2_000)
+
+
+PLY = "ply\nformat {}\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+FACES = "element face {}\nproperty list uchar int vertex_indices\nend_header\n"
+POINTS = "0 0 0\n1 0 0\n0 1 0\n"
+MANY = 4_000_000_000
+
+CLAIMS = {
+    "binary.stl": b"\0" * 80 + struct.pack("<I", MANY) + b"\0" * 50,
+    "vertices.ply": (PLY.format("ascii 1.0", MANY) + FACES.format(1) + POINTS).encode(),
+    "faces.ply": (PLY.format("ascii 1.0", 3) + FACES.format(MANY) + POINTS).encode(),
+    "corners.ply": (PLY.format("ascii 1.0", 3) + FACES.format(1) + POINTS + f"{MANY} 0").encode(),
+    "binary.ply": (
+        (PLY.format("binary_little_endian 1.0", 3) + FACES.format(MANY)).encode() + b"\0" * 99
+    ),
+    "vertices.off": f"OFF\n{MANY} 1 0\n{POINTS}".encode(),
+    "faces.off": f"OFF\n3 {MANY} 0\n{POINTS}3 0 1 2\n".encode(),
+    "corners.off": f"OFF\n3 1 0\n{POINTS}{MANY} 0 1 2\n".encode(),
+    "points.shl": f"2000000000 1 1.0\n{POINTS}3 1 2 3\n".encode(),
+    "polygons.shl": f"3 2000000000 1.0\n{POINTS}3 1 2 3\n".encode(),
+    "corners.shl": f"3 1 1.0\n{POINTS}{MANY} 1 2 3\n".encode(),
+    "normals.shl": f"Version: 2\n3 1 2000000000 1.0\n{POINTS}3 1 2 3\n".encode(),
+}
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_a_size_that_is_only_claimed_takes_no_memory(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(CLAIMS[name])
+    unit = None if path.suffix == ".shl" else "m"
+    tracemalloc.start()
+    try:
+        if name == "normals.shl":  # such normals are ignored, and reported
+            assert len(Shell.from_file(path, unit).elements) == 1
+        else:
+            with pytest.raises(ShellFileError, match=name):
+                Shell.from_file(path, unit)
+        assert tracemalloc.get_traced_memory()[1] < 50e6
+    finally:
+        tracemalloc.stop()
