@@ -5,12 +5,12 @@ The public names are loaded when they are first used.
 
 from __future__ import annotations
 
+from sphshell_pin._interrupts import interrupts_delayed
+
+# isort: split
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from sphshell_pin._interrupts import end_command_at_once, interrupts_delayed
-
-end_command_at_once()
 with interrupts_delayed():
     from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
 
