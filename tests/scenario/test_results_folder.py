@@ -71,6 +71,17 @@ def test_a_full_disk_is_one_sentence_and_exit_code_2(tmp_path, monkeypatch):
     assert sorted(os.listdir(tmp_path)) == ["drop.toml", "out"]
 
 
+def test_ctrl_c_while_pictures_are_drawn_keeps_the_numbers(tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sphshell_pin.plot.save_figures", interrupted)
+    told = call("run", write(tmp_path), "--out", tmp_path / "out")
+    assert told.exit_code == 130
+    assert f"the results are in {tmp_path / 'out'}" in told.stderr
+    assert {*os.listdir(tmp_path / "out")} == {"run.npz", "contacts.csv", LAST}
+
+
 def test_files_of_others_stay_the_same_files(tmp_path):
     out = tmp_path / "out"
     out.mkdir(mode=0o750)
@@ -173,6 +184,25 @@ def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
     with atomic_file(tmp_path / "file") as file:
         file.write(b"new")
     assert sorted(os.listdir(tmp_path)) == ["file", "out"]
+
+
+def test_what_somebody_else_puts_beside_the_folder_is_left_alone(tmp_path):
+    (tmp_path / "precious").write_text("precious")
+    (tmp_path / ".out.lock").symlink_to("precious")
+    (tmp_path / "theirs" / "files").mkdir(parents=True)
+    (tmp_path / "theirs" / "ready.json").write_text('{"new": [], "old": []}')
+    (tmp_path / "theirs" / "files" / "bad.html").touch()
+    (tmp_path / ".out.writing").symlink_to("theirs")
+    assert put(tmp_path / "out", "new") == {"a": "new", LAST: "new"}
+    assert (tmp_path / "precious").read_text() == "precious"
+    assert (tmp_path / "theirs" / "files" / "bad.html").exists()
+
+
+def test_a_name_as_long_as_can_be(tmp_path):
+    with atomic_file(tmp_path / ("x" * 255)) as file:
+        file.write(b"new")
+    (tmp_path / ("y" * 255)).mkdir()
+    assert put(tmp_path / ("y" * 255), "new") == {"a": "new", LAST: "new"}
 
 
 def test_a_folder_called_like_a_result_is_told(tmp_path):
