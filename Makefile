@@ -8,7 +8,7 @@ CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 OUT ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench hard-cases work-precision lint format report robots sweep-survival rollouts real-surfaces wheel docs fuzz sanitize clean
+.PHONY: help demo test bench hard-cases work-precision lint format report robots sweep-survival kills rollouts real-surfaces wheel docs fuzz sanitize clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -22,6 +22,7 @@ help:
 # make report measure speed against error, a page in results/report
 # make robots check every robot and write docs/robots.md
 # make sweep-survival  500 runs five ways, workers killed and the sweep resumed: the same bytes
+# make kills           kill runs at every system call and at random times, fill disks (30 min)
 # make rollouts        print the speed-up of 10 000 runs over threads
 # make real-surfaces FOLDER=...  jumps and energies over the surfaces of a folder
 # make fuzz SECONDS=600 SEED=1  damaged files for every reader, until one breaks it
@@ -64,6 +65,9 @@ report: $(VENV)/.bench
 
 sweep-survival: $(VENV)/.test
 	$(BIN)/python -m tests.study.sweep_survival
+
+kills: $(VENV)/.test
+	$(BIN)/python -m tests.scenario.kills
 
 rollouts: $(VENV)/.test
 	$(BIN)/python -m benchmarks.rollout

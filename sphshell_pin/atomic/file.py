@@ -50,11 +50,13 @@ def _aside(path: str | PathLike[str], suffix: str) -> Iterator[tuple[IO[bytes], 
         with open(target, "wb") as file:
             yield file, target
         return
-    part = target.with_name(f".{target.name}.writing{suffix}")
+    # The longest names leave no room for more; files that share a part are written in turn.
+    name = target.name[:60]
+    part = target.with_name(f".{name}.writing{suffix}")
     descriptor, locked = lock_file(part)
     if not locked:
         # Two processes must not write the same file.
-        own = part.with_name(f".{target.name}.writing-{os.getpid()}{suffix}")
+        own = part.with_name(f".{name}.writing-{os.getpid()}{suffix}")
         os.rename(part, own)
         part = own
     with os.fdopen(descriptor, "r+b") as file:

@@ -13,6 +13,7 @@ import errno
 import json
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterable, Sequence
 from os import PathLike
@@ -195,13 +196,13 @@ class AtomicFolder:
     def _clear(self) -> None:
         """Complete or undo what this process, or a killed one, has begun."""
         beside, inside = self._places()
-        if beside.is_dir():
+        if _is_left(beside):
             ours = _read_list(beside)
             if ours is not None and (beside / _FILES).is_dir():
                 # The new folder before an exchange, or the old one after it.
                 _bring_back(beside / _FILES, self._folder, {*ours[0], *ours[1]})
             shutil.rmtree(beside)
-        if inside.is_dir():
+        if _is_left(inside):
             if _read_list(inside) is not None:
                 self._move_in(inside)
                 (inside / _READY).unlink()
@@ -240,6 +241,15 @@ class AtomicFolder:
                 sync_folder(copy)
             else:
                 raise OSError(f"{entry.path} is a folder of others")
+
+
+def _is_left(place: Path) -> bool:
+    """Whether a process of this user left a folder there, not somebody else in a shared folder."""
+    try:
+        about = os.lstat(place)
+    except OSError:
+        return False
+    return stat.S_ISDIR(about.st_mode) and about.st_uid == os.geteuid()
 
 
 def _write_list(place: Path, new: Iterable[str], old: Iterable[str]) -> None:

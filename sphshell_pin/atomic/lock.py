@@ -26,7 +26,9 @@ def lock_file(path: Path, *, wait: bool = True) -> tuple[int, bool]:
         The file cannot be opened.
     """
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        # No link of somebody else's in a shared folder may lead to the file.
+        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+        descriptor = os.open(path, flags, 0o666)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
             # Whoever had the lock may have removed or renamed the file: then others lock a new one.
