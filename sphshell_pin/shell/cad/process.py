@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import atexit
 import builtins
+import fcntl
 import os
 import signal
 import subprocess
@@ -125,7 +126,11 @@ class _Child:
         self.owner = os.getpid()
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the child)
         # The child ends when the other end of this pipe closes, be it by SIGKILL.
-        life, self._life = os.pipe()
+        ends = os.pipe()
+        # Not 0 to 2, which are free where this process has closed them: those are the child's own.
+        life, self._life = (fcntl.fcntl(one, fcntl.F_DUPFD_CLOEXEC, 3) for one in ends)
+        for one in ends:
+            os.close(one)
         program = os.fsdecode(spawn.get_executable() or sys.executable)
         try:
             self._process = subprocess.Popen(
