@@ -234,6 +234,10 @@ class RolloutInterrupted(SphshellError, KeyboardInterrupt):
         self.rollout = rollout
 
 
+class NotPicklable(SphshellError, TypeError):
+    """Something that belongs to the process that made it: it cannot be pickled or copied."""
+
+
 class SweepError(SphshellError, RuntimeError):
     """A sweep that cannot begin or go on; the runs that were done are kept."""
 

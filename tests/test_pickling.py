@@ -14,6 +14,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.errors import NotPicklable
 from tests import meshes, models
 
 Trip = Callable[[Any], Any]
@@ -121,7 +122,7 @@ def test_an_error_passes_between_processes(kind: str, trip: Trip) -> None:
 
 
 def test_an_open_run_says_why_not(trip: Trip) -> None:
-    with pytest.raises(TypeError, match=r"OpenRun cannot be pickled.*snapshot\(\)"):
+    with pytest.raises(NotPicklable, match=r"OpenRun cannot be pickled.*snapshot\(\)"):
         trip(OpenRun(sp.Simulation(bumpy_scene()), START, record_dt=1e-3))
 
 

@@ -15,7 +15,7 @@ from sphshell_pin.dynamics.controllers import Callback, Controller
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
 from sphshell_pin.dynamics.simulation import Simulation, why_ended
-from sphshell_pin.errors import FrameNotFound, InvalidParameter, WeakLawWarning
+from sphshell_pin.errors import FrameNotFound, InvalidParameter, NotPicklable, WeakLawWarning
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class OpenRun:
 
     def __reduce__(self) -> NoReturn:
         """Refuse to be pickled: the run is with the compiled core."""
-        raise TypeError(
+        raise NotPicklable(
             "an OpenRun cannot be pickled or copied: start another one from the state of its "
             "snapshot(), of the same simulation"
         )

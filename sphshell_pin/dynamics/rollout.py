@@ -21,6 +21,7 @@ from sphshell_pin.dynamics.variations import Variations
 from sphshell_pin.errors import (
     Interrupted,
     MissingExtra,
+    NotPicklable,
     RunFailed,
     SimulationDiverged,
     SphshellError,
@@ -150,7 +151,7 @@ class Rollout(Sequence[Result]):
 
     def __reduce__(self) -> NoReturn:
         """Refuse to be pickled: the runs are with the compiled core."""
-        raise TypeError(
+        raise NotPicklable(
             "a Rollout cannot be pickled or copied: keep its to_dataframe(), or save a run with "
             "rollout[i].save(path)"
         )
