@@ -26,6 +26,8 @@ DEFAULT_EXTENT = 10.0
 """Side of the square that stands for a half-space or a plane [m]."""
 
 FEWEST_SEGMENTS = 16
+MOST_OF_BALL, MOST_OF_ROD = 1000, 100_000
+"""Segments round a full circle: half a million elements, or corners of a cylinder's ends."""
 
 
 def geometry_surface(
@@ -42,7 +44,8 @@ def geometry_surface(
         Halfspace, Plane or TriangleP; or a pinocchio.GeometryObject that holds one
     chord_error : largest distance between the elements and a round solid [m]; 1e-3 of its diameter
         unless given
-    segments : elements round a full circle, instead of `chord_error`
+    segments : elements round a full circle, instead of `chord_error`; at most 1000 of a solid that
+        is round in both directions, 100 000 of a cylinder or a cone
     extent : side [m] of the square that stands for a half-space or a plane; 10 m unless given
 
     Raises
@@ -88,14 +91,29 @@ def _mesh(mesh: Any) -> RawSurface:
 
 
 def _round(
-    radius: float, error_of: Callable[[int], float], chord_error: float | None, segments: int | None
+    radius: float,
+    error_of: Callable[[int], float],
+    chord_error: float | None,
+    segments: int | None,
+    most: int,
 ) -> int:
-    """Fewest segments, a multiple of four, that keep `error_of` within the chord error."""
+    """Fewest segments, a multiple of four, that keep `error_of` within the chord error.
+
+    InvalidParameter if these are more than `most`.
+    """
     if segments is not None:
+        if segments > most:
+            raise InvalidParameter("segments", segments, f"must be at most {most} for this solid")
         return int(segments)
     wanted = chord_error if chord_error is not None else DEFAULT_CHORD_ERROR * 2.0 * radius
     # 1 - cos(pi/n) falls as n^-2: a start close below, then upwards in fours.
     count = max(4.0, math.pi * math.sqrt(error_of(1) / (4.0 * wanted)))
+    if count > most:
+        raise InvalidParameter(
+            "chord_error",
+            wanted,
+            f"needs more than {most} segments round a circle: take a larger one",
+        )
     n = max(FEWEST_SEGMENTS, 4 * math.floor(count / 4.0))
     while error_of(n) > wanted:
         n += 4
@@ -138,14 +156,16 @@ def _unit_sphere(segments: int) -> Arrays:
 
 def _sphere(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
     r = float(shape.radius)
-    points, elements, normals = _unit_sphere(_round(r, _ball(r), chord_error, segments))
+    points, elements, normals = _unit_sphere(
+        _round(r, _ball(r), chord_error, segments, MOST_OF_BALL)
+    )
     return r * points, elements, normals
 
 
 def _ellipsoid(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
     radii = np.array(shape.radii, np.float64)
     longest = float(radii.max())
-    n = _round(longest, _ball(longest), chord_error, segments)
+    n = _round(longest, _ball(longest), chord_error, segments, MOST_OF_BALL)
     points, elements, normals = _unit_sphere(n)
     # Normals go with the inverse transpose of the stretching; unused fourth corners stay zero.
     stretched = normals / radii
@@ -155,7 +175,7 @@ def _ellipsoid(shape: Any, chord_error: float | None, segments: int | None) -> A
 
 def _cylinder(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
     r, h = float(shape.radius), float(shape.halfLength)
-    body = Revolution(_round(r, _sagitta(r), chord_error, segments))
+    body = Revolution(_round(r, _sagitta(r), chord_error, segments, MOST_OF_ROD))
     bottom, top = body.ring(r, -h), body.ring(r, h)
     body.strip(bottom, top, (1.0, 0.0), (1.0, 0.0))
     body.disc(bottom, up=False)
@@ -165,7 +185,7 @@ def _cylinder(shape: Any, chord_error: float | None, segments: int | None) -> Ar
 
 def _cone(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
     r, h = float(shape.radius), float(shape.halfLength)
-    body = Revolution(_round(r, _sagitta(r), chord_error, segments))
+    body = Revolution(_round(r, _sagitta(r), chord_error, segments, MOST_OF_ROD))
     bottom, tip = body.ring(r, -h), body.ring(0.0, h)
     slant = math.hypot(r, 2.0 * h)
     normal = (2.0 * h / slant, r / slant)
@@ -176,7 +196,7 @@ def _cone(shape: Any, chord_error: float | None, segments: int | None) -> Arrays
 
 def _capsule(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
     r, h = float(shape.radius), float(shape.halfLength)
-    body = Revolution(_round(r, _ball(r), chord_error, segments))
+    body = Revolution(_round(r, _ball(r), chord_error, segments, MOST_OF_BALL))
     steps = max(1, math.ceil(body.segments / 4))
     south = arc(-0.5 * math.pi, 0.0, steps)
     north = arc(0.0, 0.5 * math.pi, steps)

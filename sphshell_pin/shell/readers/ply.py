@@ -205,7 +205,8 @@ class _Binary:
 
     def _take(self, kind: np.dtype[Any], count: int) -> npt.NDArray[Any]:
         size = kind.itemsize * count
-        if count < 0 or self._at + size > len(self._data):
+        # A row without properties has no bytes: its count needs a bound of its own.
+        if not 0 <= count <= len(self._data) or self._at + size > len(self._data):
             raise ValueError("not enough data")
         values = np.frombuffer(self._data, kind, count, self._at)
         self._at += size
