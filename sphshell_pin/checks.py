@@ -107,6 +107,14 @@ def check_type(name: str, value: Any, kind: type | tuple[type, ...], must: str) 
     raise InvalidParameter(name, value, must)
 
 
+def check_flag(name: str, value: Any) -> bool:
+    """Return the truth of `value`; InvalidParameter where it has none, as of an array."""
+    try:
+        return bool(value)
+    except (TypeError, ValueError):
+        raise InvalidParameter(name, value, "must be True or False") from None
+
+
 def check_name(name: str, value: Any) -> None:
     """Raise InvalidParameter unless `value` is a text."""
     check_type(name, value, str, "must be a name (str)")

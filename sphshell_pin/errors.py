@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import threading
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
@@ -236,6 +237,22 @@ class RolloutInterrupted(SphshellError, KeyboardInterrupt):
 
 class NotPicklable(SphshellError, TypeError):
     """Something that belongs to the process that made it: it cannot be pickled or copied."""
+
+
+class Busy(SphshellError, RuntimeError):
+    """An object for one user at a time that is in use: `what`, by which call it is (`doing`)."""
+
+    def __init__(self, what: str, doing: str, thread: int) -> None:
+        """Say that `what` is in its method `doing`, in the thread with the identifier `thread`."""
+        if thread == threading.get_ident():
+            why = f"this was called from within its own {doing}(): do it after that has returned"
+        else:
+            names = [one.name for one in threading.enumerate() if one.ident == thread]
+            why = f"thread '{names[0] if names else thread}' is in its {doing}(): wait until that "
+            why += "has returned, or make one for each thread"
+        super().__init__(f"this {what} is busy: {why}")
+        self.what = what
+        self.doing = doing
 
 
 class SweepError(SphshellError, RuntimeError):

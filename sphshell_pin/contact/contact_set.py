@@ -33,7 +33,7 @@ class Method(IntEnum):
     def from_name(cls, name: str) -> Method:
         """Look up "facets", "elements" or "smooth"; NameNotFound lists the valid ones."""
         for method in cls:
-            if method.name.lower() == name:
+            if isinstance(name, str) and method.name.lower() == name:
                 return method
         raise NameNotFound("method", str(name), "the contact query", [m.name.lower() for m in cls])
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -25,7 +24,6 @@ from sphshell_pin.errors import (
     InvalidParameter,
     RolloutInterrupted,
     SphshellError,
-    WeakLawWarning,
 )
 from sphshell_pin.shell.options import thread_count
 
@@ -249,9 +247,7 @@ def _core_pairs(simulation: Simulation, q0: Array, v0: Array) -> list[_core.Pair
     pairs = simulation.scene.pairs
     if not _has_state(pairs):
         return [pair.to_core() for pair in pairs]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", WeakLawWarning)  # told of what happens, when it has
-        return simulation.core_pairs(q0, v0)
+    return simulation.core_pairs(q0, v0, warn=False)  # told of what happens, when it has
 
 
 def _deep_starts(

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-import warnings
 from typing import Any, NoReturn
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative, check_vector
+from sphshell_pin.dynamics.busy import one_at_a_time
 from sphshell_pin.dynamics.controllers import Callback, Controller
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
 from sphshell_pin.dynamics.simulation import Simulation, why_ended
-from sphshell_pin.errors import FrameNotFound, InvalidParameter, NotPicklable, WeakLawWarning
+from sphshell_pin.errors import FrameNotFound, InvalidParameter, NotPicklable
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,9 @@ class OpenRun:
     The parameters are those of `Simulation.run`; rows are recorded every `record_dt` [s]. The
     pieces are of one run: bristles, contact numbers and the energy audit go on from one to the
     next, and with fixed steps the motion is the same, bit for bit, however it is cut.
+
+    It is for one user at a time: while a call is under way, what another thread or the run's own
+    callback asks of it raises Busy.
 
     Attributes
     ----------
@@ -49,11 +53,11 @@ class OpenRun:
     ) -> None:
         self.simulation = simulation
         self.ended: str | None = None
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", WeakLawWarning)  # Scene.explain tells it
-            self._core = simulation.to_core(
-                q0, v0, _FOR_EVER, controller, control_dt, record_dt=record_dt, t0=t0
-            )
+        self._user = _core.OneUser("OpenRun")
+        # Of a weak law Scene.explain tells.
+        self._core = simulation.to_core(
+            q0, v0, _FOR_EVER, controller, control_dt, record_dt=record_dt, t0=t0, warn=False
+        )
         self._controller = controller
         self._rows = 0
         self._start = self.snapshot()
@@ -75,6 +79,7 @@ class OpenRun:
         """Where the run stands [s]."""
         return float(self._core.time)
 
+    @one_at_a_time
     def advance(self, duration: float, wall: float = math.inf) -> Result:
         """Go on for `duration` [s], or until `wall` [s] of computing are over.
 
@@ -97,6 +102,7 @@ class OpenRun:
         self._rows += len(rows.t)
         return rows
 
+    @one_at_a_time
     def snapshot(self) -> Result:
         """Return the state where the run stands, as a result of one row."""
         return self._result([self._core.snapshot()])
@@ -107,6 +113,7 @@ class OpenRun:
         now, start = self.snapshot().energy, self._start.energy
         return float(now.total[0] - start.total[0])
 
+    @one_at_a_time
     def change(self, scene: Scene, controller: Controller | Callback | None = None) -> bool:
         """Go on with the laws, friction and radii of `scene`, and with `controller` unless None.
 
@@ -121,15 +128,14 @@ class OpenRun:
         core_controller = None
         if controller is not None and controller is not self._controller:
             core_controller = simulation.core_controller(controller, q)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", WeakLawWarning)
-            pairs = simulation.core_pairs(q, v)
+        pairs = simulation.core_pairs(q, v, warn=False)
         self._core.change(pairs, core_controller)
         if core_controller is not None:
             self._controller = controller
         self.simulation = simulation
         return True
 
+    @one_at_a_time
     def push(self, frame: str, force_world: Any) -> None:
         """Push at the origin of `frame` with a force (3,) [N] in the world, from now on.
 

@@ -23,10 +23,16 @@ from sphshell_pin.checks import (
     check_vector,
     read_only,
 )
-from sphshell_pin.contact import Friction, Method, NormalLaw, Sphere
+from sphshell_pin.contact import BristleFriction, Friction, Method, NormalLaw, Sphere
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.laws import check_law
-from sphshell_pin.dynamics.models import check_no_mimic, find_frame, reduced_model, unit_warning
+from sphshell_pin.dynamics.models import (
+    check_model,
+    check_no_mimic,
+    find_frame,
+    reduced_model,
+    unit_warning,
+)
 from sphshell_pin.dynamics.sources import Find, checked_source
 from sphshell_pin.errors import InvalidParameter, NameNotFound, UnitWarning
 from sphshell_pin.shell import Shell
@@ -73,11 +79,14 @@ class ContactPair:
             placement_j=self.shell_placement.homogeneous,
             radius=0.0 if self.sphere is None else self.sphere.radius,
             shell=None if self.shell is None else self.shell.core_for(self.method),
-            source=None if self.find is None else checked_source(self.find, self.name),
+            source=None if self.find is None else self._source(self.find),
             method=int(Method.from_name(self.method)),
             law=self.law.core,
             friction=None if self.friction is None else self.friction.core,
         )
+
+    def _source(self, find: Find) -> Find:
+        return checked_source(find, self.name, isinstance(self.friction, BristleFriction))
 
 
 @dataclass(frozen=True)
@@ -148,6 +157,7 @@ class Scene:
     def __init__(self, model: pin.Model, lock: Iterable[str] = (), q_lock: Any = None) -> None:
         if not isinstance(model, pin.Model):
             raise InvalidParameter("model", type(model).__name__, "must be a pinocchio.Model")
+        check_model(model)
         self.lock = check_names("lock", lock)
         if q_lock is None:
             q = pin.neutral(model)
@@ -159,6 +169,8 @@ class Scene:
             )
         self._model = reduced_model(model, self.lock, q) if self.lock else pin.Model(model)
         check_no_mimic(self._model)
+        # What users get, made when they first ask; `_model` is never handed out.
+        self._shown: pin.Model | None = None
         self._pairs: tuple[ContactPair, ...] = ()
         self._core: _core.Scene | None = None
 
@@ -168,8 +180,15 @@ class Scene:
 
     @property
     def model(self) -> pin.Model:
-        """The scene's own model, without the locked joints."""
-        return self._model
+        """The scene's own model, without the locked joints.
+
+        It is to be read: once it is changed, this and all that computes with the scene raises
+        InvalidParameter. Make a new scene of a changed model.
+        """
+        if self._shown is None:
+            self._shown = pin.Model(self._model)
+        self._check_unchanged()
+        return self._shown
 
     @property
     def pairs(self) -> tuple[ContactPair, ...]:
@@ -335,6 +354,7 @@ class Scene:
         InvalidParameter for other sizes, no numbers, or a joint whose quaternion or (cos, sin) pair
         is not of unit length.
         """
+        self._check_unchanged()
         model = self._model
         what = f": this model has nq = {model.nq}, nv = {model.nv}"
         if self.lock:
@@ -371,6 +391,19 @@ class Scene:
             self._core = _core.Scene(self._model, [p.to_core() for p in self._pairs])
         return self._core
 
+    def _check_unchanged(self) -> None:
+        """Raise InvalidParameter if somebody has changed the model that they got of this scene."""
+        # Some hold numbers that are not equal to themselves (nan); of them no change is noticed.
+        if self._shown is None or self._shown == self._model or self._model != self._model:
+            return
+        raise InvalidParameter(
+            "scene.model",
+            self._shown,
+            "must stay as it is, as the scene has been checked and compiled with it: change the "
+            "model first, and make a new Scene of it",
+            "was changed, but",
+        )
+
     def _add(self, pair: ContactPair) -> ContactPair:
         self._pairs = (*self._pairs, pair)
         self._core = None
@@ -391,7 +424,7 @@ class Scene:
     def with_pairs(self, pairs: tuple[ContactPair, ...]) -> Scene:
         """Return a scene of the same model, which both share, with other `pairs`."""
         other = copy(self)
-        other._pairs, other._core = pairs, None
+        other._shown, other._pairs, other._core = self.model, pairs, None
         return other
 
     def place(self, sphere: Sphere) -> pin.SE3:

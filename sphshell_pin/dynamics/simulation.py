@@ -180,15 +180,19 @@ class Simulation:
         *,
         record_dt: float | None,
         t0: float = 0.0,
+        warn: bool = True,
     ) -> _core.Simulation:
-        """Check what `run` takes, which see, and return the compiled run, not yet started."""
+        """Check what `run` takes, which see, and return the compiled run, not yet started.
+
+        With `warn`, a law that cannot stop its sphere earns a WeakLawWarning.
+        """
         q0, v0 = self.scene.check_state(q0, v0)
         duration = check_not_negative("duration", duration, "s")
         self._check_start(q0)
         core_controller, hold = self.bind(controller, control_dt, q0)
         settings = self.core_settings(duration, hold, record_dt=record_dt, t0=t0)
         return _core.Simulation(
-            self.scene.model, self.core_pairs(q0, v0), core_controller, q0, v0, settings
+            self.scene.model, self.core_pairs(q0, v0, warn), core_controller, q0, v0, settings
         )
 
     def core_settings(
@@ -224,8 +228,8 @@ class Simulation:
         """Return the C++ twin of a controller that `run` takes, started at q (nq,)."""
         return self.bind(controller, None, q)[0]
 
-    def core_pairs(self, q0: Array, v0: Array) -> list[_core.Pair]:
-        """Build the C++ twins of the pairs; a law that cannot stop its sphere earns a warning."""
+    def core_pairs(self, q0: Array, v0: Array, warn: bool = True) -> list[_core.Pair]:
+        """Build the C++ twins of the pairs; `warn` as of `to_core`."""
         pairs = [pair.to_core() for pair in self.scene.pairs]
         if pairs:
             from sphshell_pin.dynamics.explain import (
@@ -240,7 +244,7 @@ class Simulation:
                 core.relaxation = relaxation_time(pair, figure)
                 weak = weakness(pair, figure)
                 # Of a sphere at rest in touch no speed is known to judge by.
-                if weak is not None and figure.approach_speed != DEFAULT_SPEED:
+                if warn and weak is not None and figure.approach_speed != DEFAULT_SPEED:
                     warnings.warn(weak, WeakLawWarning, stacklevel=4)
         return pairs
 

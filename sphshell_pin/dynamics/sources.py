@@ -15,15 +15,24 @@ from sphshell_pin.errors import InvalidParameter, add_origin
 Array = NDArray[np.float64]
 Find = Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]
 
+# More take 0.6 kB each for every evaluation, and as a rule are a mistake of the routine.
+_MOST = 1_000_000
+# Bristles stretch from step to step: each contact is looked for among all of the step before.
+_MOST_WITH_BRISTLES = 1_000
+
 _SHAPES = "must return points (k, 3), normals (k, 3), depths (k,)"
 
 
-def checked_source(find: Find, name: str) -> Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]:
+def checked_source(
+    find: Find, name: str, bristles: bool = False
+) -> Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]:
     """Wrap a user's routine so that what reaches the core has the right shapes and unit normals.
 
-    InvalidParameter names the source `name`; what the routine itself raises passes, with a note.
+    With `bristles` the contacts have a BristleFriction, and may not be so many. InvalidParameter
+    names the source `name`; what the routine itself raises passes, with a note.
     """
     where = f"contact source '{name}'"
+    most = _MOST_WITH_BRISTLES if bristles else _MOST
 
     def checked(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[Array, Array, Array]:
         try:
@@ -34,6 +43,10 @@ def checked_source(find: Find, name: str) -> Callable[[pin.SE3, pin.SE3], tuple[
             raise
         try:
             points, normals, depths = answer
+            count = len(depths)
+            if count > most:
+                must = f"but must return {most} at most{' with BristleFriction' if bristles else ''}"
+                raise InvalidParameter(where, count, must, f"returns {count} contacts,")
             point, normal, depth = _rows(points), _rows(normals), as_floats(depths)
         except (TypeError, ValueError):
             raise InvalidParameter(where, answer, _SHAPES) from None

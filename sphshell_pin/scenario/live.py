@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative, check_vector
+from sphshell_pin.dynamics.busy import one_at_a_time
 from sphshell_pin.dynamics.open_run import OpenRun, contacts_of
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
@@ -33,6 +35,9 @@ class LiveRun:
     act on the run under way; with others it starts anew, from where it is if it can. A run that
     cannot go on says why in `ended`, and waits for `reset` or another value.
 
+    What it shows may be read in any thread; `advance`, `reset`, `change` and `push` are for one
+    thread at a time, and raise Busy in others.
+
     Raises what `Simulation.run` raises of a start that cannot be.
     """
 
@@ -42,6 +47,7 @@ class LiveRun:
         self.built = built
         self.title = built.scenario.title or built.name
         self.start = 0.0
+        self._user = _core.OneUser("LiveRun")
         self._knobs = knobs_of(built)
         self._begin(_open_run(built, built.q0, built.v0, 0.0))
 
@@ -67,7 +73,7 @@ class LiveRun:
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self._run.time
+        return float(self._row.t[0])
 
     @property
     def q(self) -> Array:
@@ -120,6 +126,7 @@ class LiveRun:
                 names.setdefault(joint, model.names[joint])
         return tuple(names.values())
 
+    @one_at_a_time
     def advance(self, duration: float, wall: float = math.inf) -> Rows:
         """Go on for `duration` [s], or until `wall` [s] of computing are over; return the rows.
 
@@ -160,10 +167,12 @@ class LiveRun:
             log.depth,
         )
 
+    @one_at_a_time
     def reset(self) -> None:
         """Start anew, with the knobs as they stand."""
         self._begin(_open_run(self.built, self.built.q0, self.built.v0, 0.0))
 
+    @one_at_a_time
     def change(self, key: str, value: float) -> None:
         """Set the number at the dotted `key` of the scenario.
 
@@ -212,6 +221,7 @@ class LiveRun:
             run.push(push[0], push[1])
             self._push = push
 
+    @one_at_a_time
     def push(self, body: str, force_world: npt.ArrayLike, seconds: float) -> None:
         """Push at the origin of the frame `body` with a force (3,) [N] in the world for a time [s].
 

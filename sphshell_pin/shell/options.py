@@ -20,7 +20,7 @@ SIZES = (1e-12, 1e15)
 
 def check_options(crease_angle: float, side: str) -> None:
     """Raise InvalidParameter unless crease_angle [rad] is in 0..pi and side a known one."""
-    if side not in SIDES:
+    if not isinstance(side, str) or side not in SIDES:
         raise InvalidParameter("side", side, f"must be one of: {', '.join(SIDES)}")
     try:
         fits = 0.0 <= float(crease_angle) <= math.pi

@@ -14,8 +14,10 @@ import numpy.typing as npt
 from sphshell_pin import _core
 from sphshell_pin.checks import (
     check_each_positive,
+    check_flag,
     check_points,
     check_positive,
+    check_type,
     check_vector,
     read_only,
 )
@@ -109,7 +111,7 @@ class Shell(Topology):
         from sphshell_pin.shell.raw import raw_surface
 
         check_options(crease_angle, side)
-        made = clean_surface if clean else take_surface
+        made = clean_surface if check_flag("clean", clean) else take_surface
         surface = made(raw_surface(vertices, elements, normals))
         self._set(surface, crease_angle, side, name, None, None)
 
@@ -311,9 +313,10 @@ class Shell(Topology):
         centre = check_vector("center", center, 3, " [m]")
         radius = check_positive("radius", radius, "m")
         number = Method.from_name(method)
+        gradient = check_flag("gradient", gradient)
         if gradient and number is Method.ELEMENTS:
             raise InvalidParameter("gradient", gradient, "is not known with method 'elements'")
-        shown, terms = self.core_for(method).contacts(centre, radius, int(number), bool(gradient))
+        shown, terms = self.core_for(method).contacts(centre, radius, int(number), gradient)
 
         def contact_set(columns: Any, terms: ContactSet | None = None) -> ContactSet:
             point, normal, depth, element, feature, weight, turn = (read_only(c) for c in columns)
@@ -361,10 +364,8 @@ class Shell(Topology):
 
         places = check_points("centers", centers)
         sizes = check_each_positive("radii", radii, len(places), "m")
-        workers = thread_count(threads)
-        depth, count = self.core_for(method).contacts_batch(
-            places, sizes, int(Method.from_name(method)), workers
-        )
+        workers, number = thread_count(threads), Method.from_name(method)
+        depth, count = self.core_for(method).contacts_batch(places, sizes, int(number), workers)
         return depth, count
 
     def core_for(self, method: str) -> _core.Shell:
@@ -452,6 +453,7 @@ class Shell(Topology):
         """
         from sphshell_pin.shell.writers import write_surface
 
+        check_type("path", path, (str, os.PathLike), "must be a path")
         write_surface(path, self, unit)
 
     @property

@@ -4,6 +4,9 @@
 #include <memory>
 
 #include "bindings/arrays.hpp"
+#include "bindings/callbacks.hpp"
+#include "bindings/evaluations.hpp"
+#include "bindings/one_user.hpp"
 #include "bindings/records.hpp"
 #include "dynamics/linearization.hpp"
 #include "dynamics/simulation.hpp"
@@ -24,25 +27,6 @@ SE3 to_se3(const Eigen::Matrix4d& m) {
   return SE3(Eigen::Matrix3d(m.topLeftCorner<3, 3>()), Vec3(m.topRightCorner<3, 1>()));
 }
 
-// The callable returns points, normals and depths, checked and converted by its Python wrapper.
-ContactSource make_source(nb::object find) {
-  auto shared = std::shared_ptr<nb::object>(new nb::object(std::move(find)), [](nb::object* p) {
-    nb::gil_scoped_acquire acquire;
-    delete p;
-  });
-  return [shared](const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& out) {
-    nb::gil_scoped_acquire acquire;
-    const nb::object result = (*shared)(to_python(pose_i), to_python(pose_j));
-    const auto points = nb::cast<RowPoints>(result[0]);
-    const auto normals = nb::cast<RowPoints>(result[1]);
-    const auto depths = nb::cast<VectorX>(result[2]);
-    for (Eigen::Index i = 0; i < depths.size(); ++i)
-      if (depths[i] > 0)
-        out.push_back({points.row(i).transpose(), normals.row(i).transpose(), depths[i],
-                       static_cast<int>(i), Feature::Face});
-  };
-}
-
 std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matrix4d& placement_i,
                                 int joint_j, const Eigen::Matrix4d& placement_j, double radius,
                                 std::shared_ptr<Shell> shell, nb::object source, int method,
@@ -55,32 +39,12 @@ std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matr
   pair->placement_j = to_se3(placement_j);
   pair->radius = radius;
   pair->shell = std::move(shell);
-  if (!source.is_none()) pair->source = make_source(std::move(source));
+  if (!source.is_none()) pair->source = PythonSource(std::move(source));
   pair->method = static_cast<Method>(method);
   pair->law = law;
   if (friction) pair->friction = *friction;
   return pair;
 }
-
-// A Python callable tau(t, q, v, contacts): contacts as rows, its Python wrapper gives them names.
-class PythonController : public Controller {
- public:
-  explicit PythonController(nb::object callable) : callable_(std::move(callable)) {}
-  ~PythonController() override {
-    nb::gil_scoped_acquire acquire;
-    callable_.reset();
-  }
-  bool follows_time() const override { return true; }
-  void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override {
-    std::vector<ContactRow> rows;
-    scene.log(q, v, rows);
-    nb::gil_scoped_acquire acquire;
-    tau = nb::cast<VectorX>(callable_(t, q, v, rows_to_array(std::move(rows))));
-  }
-
- private:
-  nb::object callable_;
-};
 
 std::vector<Vec3> to_points(const RowPoints& rows) {
   std::vector<Vec3> out;
@@ -94,66 +58,142 @@ void evaluate_alone(Scene& scene, const VectorX& q, const VectorX& v) {
   scene.evaluate(q, v, VectorX::Zero(scene.bristle_size()));
 }
 
+// A run for one user at a time.
+struct Run {
+  OneUser user{"run"};
+  Simulation simulation;
+
+  Run(const pinocchio::Model& model, std::vector<Pair> pairs, const RunSettings& settings,
+      std::shared_ptr<Controller> controller, VectorX q0, VectorX v0)
+      : simulation(model, std::move(pairs), settings, std::move(controller), std::move(q0),
+                   std::move(v0)) {}
+};
+
+// What Python enters with `with`.
+class PythonUse {
+ public:
+  PythonUse(OneUser& user, std::string doing) : user_(user), doing_(std::move(doing)) {}
+  void enter() { user_.enter(doing_.c_str()); }
+  void leave() { user_.leave(); }
+
+ private:
+  OneUser& user_;
+  const std::string doing_;
+};
+
+// A property, for one user at a time.
+template <auto get>
+auto alone(Run& run) {
+  const Use use(run.user, "state");
+  return std::decay_t<decltype((run.simulation.*get)())>((run.simulation.*get)());
+}
+
+int visit_pair(const Pair& pair, visitproc visit, void* arg) {
+  if (const auto* source = pair.source.target<PythonSource>()) Py_VISIT(source->find().ptr());
+  return 0;
+}
+
+int visit_evaluations(const Evaluations& evaluations, visitproc visit, void* arg) {
+  return evaluations.for_each_pairs(
+      [&](const std::vector<Pair>& pairs) { return visit_sources(pairs, visit, arg); });
+}
+
+int visit_controller(const PythonController& controller, visitproc visit, void* arg) {
+  Py_VISIT(controller.callable().ptr());
+  return 0;
+}
+
+// A run holds its controller by the object that Python has of it.
+int visit_run(const Run& run, visitproc visit, void* arg) {
+  if (const Controller* controller = run.simulation.controller())
+    Py_VISIT(nb::find(*controller).ptr());
+  return visit_sources(run.simulation.pairs(), visit, arg);
+}
+
+template <class T, int (*visit_parts)(const T&, visitproc, void*)>
+PyType_Slot* slots() {
+  static PyType_Slot all[] = {{Py_tp_traverse, reinterpret_cast<void*>(&traverse<T, visit_parts>)},
+                              {0, nullptr}};
+  return all;
+}
+
 }  // namespace
 }  // namespace sphshell
 
 void bind_dynamics(nanobind::module_& m) {
   using namespace sphshell;
-  nb::class_<Pair>(m, "Pair")
+  nb::class_<Pair>(m, "Pair", nb::type_slots(slots<Pair, visit_pair>()))
       .def_rw("relaxation", &Pair::relaxation)
       .def(nb::new_(&make_pair), nb::arg("name"), nb::arg("joint_i"), nb::arg("placement_i"),
            nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("shell").none(),
            nb::arg("source").none(), nb::arg("method"), nb::arg("law"), nb::arg("friction").none());
 
-  nb::class_<Scene>(m, "Scene")
+  nb::class_<Evaluations>(m, "Scene", nb::type_slots(slots<Evaluations, visit_evaluations>()))
       .def(
           "__init__",
-          [](Scene* scene, nb::handle model, const std::vector<const Pair*>& pairs) {
-            new (scene) Scene(model_of(model), copies(pairs));
+          [](Evaluations* self, nb::handle model, const std::vector<const Pair*>& pairs) {
+            new (self) Evaluations(model_of(model), copies(pairs));
           },
           nb::arg("model"), nb::arg("pairs"))
       .def("external_forces",
-           [](Scene& scene, const VectorX& q, const VectorX& v) {
-             evaluate_alone(scene, q, v);
-             const Forces none(scene.touching() ? 0 : scene.external().size(),
-                               pinocchio::Force::Zero());
-             return to_python(scene.touching() ? scene.external() : none);
+           [](Evaluations& self, const VectorX& q, const VectorX& v) {
+             return self.at(q, v, [&](Scene& scene) {
+               evaluate_alone(scene, q, v);
+               const Forces none(scene.touching() ? 0 : scene.external().size(),
+                                 pinocchio::Force::Zero());
+               return to_python(scene.touching() ? scene.external() : none);
+             });
            })
       .def("contacts",
-           [](Scene& scene, const VectorX& q, const VectorX& v) {
-             std::vector<ContactRow> rows;
-             evaluate_alone(scene, q, v);
-             scene.log(q, v, rows);
-             return rows_to_array(std::move(rows));
+           [](Evaluations& self, const VectorX& q, const VectorX& v) {
+             return self.at(q, v, [&](Scene& scene) {
+               std::vector<ContactRow> rows;
+               evaluate_alone(scene, q, v);
+               scene.log(q, v, rows);
+               return rows_to_array(std::move(rows));
+             });
            })
       .def("contact_derivatives",
-           [](Scene& scene, const VectorX& q, const VectorX& v) {
-             Linearization linearization(scene);
-             evaluate_alone(scene, q, v);
-             MatrixX by_q, by_v;
-             linearization.forces(q, v, by_q, by_v);
-             return std::pair(by_q, by_v);
+           [](Evaluations& self, const VectorX& q, const VectorX& v) {
+             return self.at(q, v, [&](Scene& scene) {
+               Linearization linearization(scene);
+               evaluate_alone(scene, q, v);
+               MatrixX by_q, by_v;
+               linearization.forces(q, v, by_q, by_v);
+               return std::pair(by_q, by_v);
+             });
            })
-      .def_prop_ro("bristle_size", &Scene::bristle_size)
+      .def_prop_ro("bristle_size",
+                   [](Evaluations& self) {
+                     return self.with_scene([](Scene& scene) { return scene.bristle_size(); });
+                   })
       .def("rates",
-           [](Scene& scene, const VectorX& q, const VectorX& v, const VectorX& z,
+           [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
               const VectorX& tau) {
-             scene.restart();
-             scene.evaluate(q, v, z);
-             VectorX out(v.size() + z.size());
-             out << scene.acceleration(q, v, tau), scene.bristle_rates();
-             return out;
+             return self.at(q, v, [&](Scene& scene) {
+               check_count("z", z.size(), scene.bristle_size());
+               check_count("tau", tau.size(), v.size());
+               scene.restart();
+               scene.evaluate(q, v, z);
+               VectorX out(v.size() + z.size());
+               out << scene.acceleration(q, v, tau), scene.bristle_rates();
+               return out;
+             });
            })
       .def(
           "rate_jacobian",
-          [](Scene& scene, const VectorX& q, const VectorX& v, const VectorX& z, const VectorX& tau,
-             int repeat) {
-            Linearization linearization(scene);
-            scene.restart();
-            scene.evaluate(q, v, z);
-            MatrixX jacobian;
-            for (int i = 0; i < repeat; ++i) linearization.rates(q, v, z, tau, jacobian);
-            return jacobian;
+          [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
+             const VectorX& tau, int repeat) {
+            return self.at(q, v, [&](Scene& scene) {
+              check_count("z", z.size(), scene.bristle_size());
+              check_count("tau", tau.size(), v.size());
+              Linearization linearization(scene);
+              scene.restart();
+              scene.evaluate(q, v, z);
+              MatrixX jacobian;
+              for (int i = 0; i < repeat; ++i) linearization.rates(q, v, z, tau, jacobian);
+              return jacobian;
+            });
           },
           nb::arg("q"), nb::arg("v"), nb::arg("z"), nb::arg("tau"), nb::arg("repeat") = 1);
 
@@ -163,7 +203,8 @@ void bind_dynamics(nanobind::module_& m) {
   nb::class_<JointPd, Controller>(m, "JointPd")
       .def(nb::init<VectorX, VectorX, VectorX, bool, VectorX>(), nb::arg("kp"), nb::arg("kd"),
            nb::arg("q_ref"), nb::arg("gravity"), nb::arg("actuated"));
-  nb::class_<PythonController, Controller>(m, "PythonController")
+  nb::class_<PythonController, Controller>(
+      m, "PythonController", nb::type_slots(slots<PythonController, visit_controller>()))
       .def(nb::init<nb::object>(), nb::arg("callable"));
   nb::class_<CartesianImpedance, Controller>(m, "CartesianImpedance")
       .def(
@@ -216,51 +257,73 @@ void bind_dynamics(nanobind::module_& m) {
           nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"), nb::arg("atol"),
           nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"));
 
-  nb::class_<Simulation>(m, "Simulation")
+  nb::class_<OneUser>(m, "OneUser").def(nb::init<std::string>(), nb::arg("what"));
+  // Entered and left in one instruction of Python each, so that Ctrl-C cannot come between.
+  nb::class_<PythonUse>(m, "Use")
+      .def(nb::init<OneUser&, std::string>(), nb::arg("user"), nb::arg("doing"),
+           nb::keep_alive<1, 2>())
+      .def("__enter__", &PythonUse::enter)
+      .def("__exit__", [](PythonUse& self, nb::args) { self.leave(); });
+
+  nb::class_<Run>(m, "Simulation", nb::type_slots(slots<Run, visit_run>()))
       .def(
           "__init__",
-          [](Simulation* self, nb::handle model, const std::vector<const Pair*>& pairs,
+          [](Run* self, nb::handle model, const std::vector<const Pair*>& pairs,
              std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
              const RunSettings& settings) {
-            new (self) Simulation(model_of(model), copies(pairs), settings, std::move(controller),
-                                  std::move(q0), std::move(v0));
+            const pinocchio::Model& own = model_of(model);
+            check_count("q0", q0.size(), own.nq);
+            check_count("v0", v0.size(), own.nv);
+            new (self) Run(own, copies(pairs), settings, std::move(controller), std::move(q0),
+                           std::move(v0));
           },
           nb::arg("model"), nb::arg("pairs"), nb::arg("controller").none(), nb::arg("q0"),
           nb::arg("v0"), nb::arg("settings"))
       .def(
           "advance",
-          [](Simulation& self, double wall_seconds, double until) {
-            nb::gil_scoped_release release;
-            return static_cast<int>(self.advance(wall_seconds, until));
+          [](Run& self, double wall_seconds, double until) {
+            const Use use(self.user, "advance");
+            const ReleaseGil released;
+            return static_cast<int>(self.simulation.advance(wall_seconds, until));
           },
           nb::arg("wall_seconds"), nb::arg("until") = std::numeric_limits<double>::infinity())
       .def(
           "change",
-          [](Simulation& self, const std::vector<const Pair*>& pairs,
+          [](Run& self, const std::vector<const Pair*>& pairs,
              std::shared_ptr<Controller> controller) {
-            self.change(copies(pairs), std::move(controller));
+            const Use use(self.user, "change");
+            self.simulation.change(copies(pairs), std::move(controller));
           },
           nb::arg("pairs"), nb::arg("controller").none())
-      .def("push", &Simulation::push, nb::arg("joint"), nb::arg("point"), nb::arg("force_world"))
+      .def(
+          "push",
+          [](Run& self, int joint, const Vec3& point, const Vec3& force_world) {
+            const Use use(self.user, "push");
+            self.simulation.push(joint, point, force_world);
+          },
+          nb::arg("joint"), nb::arg("point"), nb::arg("force_world"))
       .def("take",
-           [](Simulation& self) {
-             const auto& model = self.model();
-             return to_dict(self.take(), model.nq, model.nv);
+           [](Run& self) {
+             const Use use(self.user, "take");
+             const auto& model = self.simulation.model();
+             return to_dict(self.simulation.take(), model.nq, model.nv);
            })
       .def("snapshot",
-           [](Simulation& self) {
-             const auto& model = self.model();
-             return to_dict(self.snapshot(), model.nq, model.nv);
+           [](Run& self) {
+             const Use use(self.user, "snapshot");
+             const auto& model = self.simulation.model();
+             return to_dict(self.simulation.snapshot(), model.nq, model.nv);
            })
-      .def_prop_ro("progress", &Simulation::progress)
-      .def_prop_ro("time", &Simulation::time)
-      .def_prop_ro("q", &Simulation::q)
-      .def_prop_ro("v", &Simulation::v)
-      .def_prop_ro("steps", &Simulation::steps)
-      .def_prop_ro("full", &Simulation::full)
-      .def_prop_ro("rejected", &Simulation::rejected)
-      .def_prop_ro("evaluations", &Simulation::evaluations)
-      .def_prop_ro("last_step", &Simulation::last_step)
-      .def_prop_ro("wall_time", &Simulation::wall_time)
-      .def_prop_ro("summaries", [](const Simulation& self) { return to_list(self.summaries()); });
+      .def_prop_ro("progress", &alone<&Simulation::progress>)
+      .def_prop_ro("time", &alone<&Simulation::time>)
+      .def_prop_ro("q", &alone<&Simulation::q>)
+      .def_prop_ro("v", &alone<&Simulation::v>)
+      .def_prop_ro("steps", &alone<&Simulation::steps>)
+      .def_prop_ro("full", &alone<&Simulation::full>)
+      .def_prop_ro("rejected", &alone<&Simulation::rejected>)
+      .def_prop_ro("evaluations", &alone<&Simulation::evaluations>)
+      .def_prop_ro("last_step", &alone<&Simulation::last_step>)
+      .def_prop_ro("wall_time", &alone<&Simulation::wall_time>)
+      .def_prop_ro("summaries",
+                   [](Run& self) { return to_list(alone<&Simulation::summaries>(self)); });
 }

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "bindings/gil.hpp"
 #include "shell/mending.hpp"
 
 namespace nb = nanobind;
@@ -50,7 +51,7 @@ void bind_mending(nb::module_& module) {
       [](InRows<double, 3> points, double tolerance) {
         sphshell::Weld result;
         {
-          nb::gil_scoped_release released;
+          const sphshell::ReleaseGil released;
           result = sphshell::weld(points.data(), points.shape(0), tolerance);
         }
         return nb::make_tuple(give(std::move(result.representative)), result.largest_distance);
@@ -63,7 +64,7 @@ void bind_mending(nb::module_& module) {
       [](In<std::int64_t> offsets, In<std::int32_t> corners, std::size_t vertex_count) {
         sphshell::EdgeTable table;
         {
-          nb::gil_scoped_release released;
+          const sphshell::ReleaseGil released;
           table = sphshell::edge_table(view(offsets, corners), vertex_count);
         }
         return nb::make_tuple(give(std::move(table.slot_edge)), give(std::move(table.ends), 2),
@@ -78,7 +79,7 @@ void bind_mending(nb::module_& module) {
          In<std::int32_t> users) {
         sphshell::Duplicates result;
         {
-          nb::gil_scoped_release released;
+          const sphshell::ReleaseGil released;
           result = sphshell::duplicate_polygons(view(offsets, corners), slot_edge.data(),
                                                 users.data(), users.shape(0));
         }
@@ -109,7 +110,7 @@ void bind_mending(nb::module_& module) {
          std::size_t components, In<double> centre) {
         sphshell::ComponentSums sums;
         {
-          nb::gil_scoped_release released;
+          const sphshell::ReleaseGil released;
           sums = sphshell::component_sums(points.data(), triangles.data(),
                                           polygon ? polygon->data() : nullptr, triangles.shape(0),
                                           component.data(), flip.data(), components, centre.data());
@@ -127,7 +128,7 @@ void bind_mending(nb::module_& module) {
          double tolerance) {
         sphshell::EarClips result;
         {
-          nb::gil_scoped_release released;
+          const sphshell::ReleaseGil released;
           result = sphshell::clip_ears(view(offsets, corners), points.data(), tolerance);
         }
         return nb::make_tuple(give(std::move(result.triangle_slots), 3),
@@ -144,7 +145,7 @@ void bind_mending(nb::module_& module) {
          double tolerance) {
         sphshell::Insertions result;
         {
-          nb::gil_scoped_release released;
+          const sphshell::ReleaseGil released;
           result =
               sphshell::find_t_junctions(view(offsets, corners), points.data(), copy(open_slots),
                                          copy(open_polygons), copy(candidates), tolerance);
@@ -162,7 +163,7 @@ void bind_mending(nb::module_& module) {
          In<std::int32_t> users) {
         sphshell::Orientation result;
         {
-          nb::gil_scoped_release released;
+          const sphshell::ReleaseGil released;
           result = sphshell::flood_fill(view(offsets, corners), slot_edge.data(), users.data(),
                                         users.shape(0));
         }
@@ -185,7 +186,7 @@ void bind_mending(nb::module_& module) {
          In<std::int32_t> triangle_component, InRows<double, 3> queries, In<std::uint8_t> closed) {
         std::vector<std::int32_t> depth;
         {
-          nb::gil_scoped_release released;
+          const sphshell::ReleaseGil released;
           depth = sphshell::nesting_depth(points.data(), triangles.data(),
                                           triangle_component.data(), triangles.shape(0),
                                           queries.data(), closed.data(), closed.shape(0));

@@ -2,6 +2,8 @@
 
 #include <memory>
 
+#include "bindings/gil.hpp"
+#include "bindings/own_errors.hpp"
 #include "bindings/records.hpp"
 #include "dynamics/rollout.hpp"
 
@@ -61,15 +63,30 @@ void bind_rollout(nanobind::module_& m) {
           [](Rollout& self, const std::vector<const Pair*>& pairs,
              std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
              const RunSettings& settings) {
+            check_count("q0", q0.size(), self.model().nq);
+            check_count("v0", v0.size(), self.model().nv);
             self.add(
                 {copies(pairs), settings, std::move(controller), std::move(q0), std::move(v0)});
           },
           nb::arg("pairs"), nb::arg("controller").none(), nb::arg("q0"), nb::arg("v0"),
           nb::arg("settings"))
       // Threads may want the interpreter for a user's routine.
-      .def("wait", &Rollout::wait, nb::arg("left"), nb::arg("seconds"),
-           nb::call_guard<nb::gil_scoped_release>())
-      .def("stop", &Rollout::stop, nb::call_guard<nb::gil_scoped_release>())
+      .def(
+          "wait",
+          [](Rollout& self, std::size_t left, double seconds) {
+            self.give_back();
+            const ReleaseGil released;
+            return self.wait(left, seconds);
+          },
+          nb::arg("left"), nb::arg("seconds"))
+      .def("stop",
+           [](Rollout& self) {
+             {
+               const ReleaseGil released;
+               self.stop();
+             }
+             self.give_back();
+           })
       .def("__len__", [](const Rollout& self) { return self.outcomes().size(); })
       .def("outcome", [](const Rollout& self,
                          std::size_t number) { return to_dict(self.outcomes().at(number)); })

@@ -3,6 +3,8 @@
 #include <optional>
 
 #include "bindings/arrays.hpp"
+#include "bindings/gil.hpp"
+#include "bindings/own_errors.hpp"
 #include "contact/query.hpp"
 #include "shell/curved.hpp"
 #include "shell/in_parallel.hpp"
@@ -37,7 +39,7 @@ std::shared_ptr<Shell> make_shell(const Points& vertices, const IntTriples& tria
     cad.face.assign(face->data(), face->data() + face->shape(0));
     cad.normals = rows(*normals);
   }
-  nb::gil_scoped_release release;
+  const ReleaseGil released;
   return std::make_shared<Shell>(std::move(points), std::move(corners), std::move(owner),
                                  crease_angle, static_cast<Side>(side), cad);
 }
@@ -62,13 +64,21 @@ nb::tuple columns(const std::vector<Contact>& contacts, bool dn_dc) {
                         to_array(std::move(slope), {dn_dc ? k : 0, 3, 3}));
 }
 
+// The Python face has made the curved elements before it asks for them.
+Method checked_method(const Shell& shell, int number) {
+  const auto method = static_cast<Method>(number);
+  if (number < 0 || number > 2 || (method == Method::Smooth && !shell.curved()))
+    raise_own("InvalidParameter", "method", number, "must be 0, 1, or after curve() 2");
+  return method;
+}
+
 // The contacts as shown, and those that are summed, where these are more.
 nb::tuple contacts(const Shell& shell, const Vec3& centre, double radius, int method, bool dn_dc) {
+  const Method how = checked_method(shell, method);
   Query query;
   if (dn_dc) query.want_dn_dc();
   std::vector<Contact> shown;
-  merge_places(query.find(shell, centre, radius, static_cast<Method>(method)), centre, radius,
-               shown);
+  merge_places(query.find(shell, centre, radius, how), centre, radius, shown);
   const bool same = shown.size() == query.contacts.size();
   return nb::make_tuple(columns(shown, dn_dc),
                         same ? nb::object(nb::none()) : columns(query.contacts, dn_dc));
@@ -79,17 +89,18 @@ constexpr std::size_t kGrain = 64;  // fewer queries are not worth a thread
 auto contacts_batch(const Shell& shell, const Points& centres, const Doubles& radii, int method,
                     int threads) {
   const std::size_t n = centres.shape(0);
+  check_count("radii", radii.shape(0), n);
+  const Method how = checked_method(shell, method);
   std::vector<double> depth(n, 0.0);
   std::vector<int> count(n, 0);
   {
-    nb::gil_scoped_release release;
+    const ReleaseGil released;
     in_parallel(n, threads, kGrain, [&](std::size_t begin, std::size_t end) {
       Query query;
       std::vector<Contact> shown;
       for (std::size_t i = begin; i < end; ++i) {
         const Vec3 centre = row(centres, i);
-        merge_places(query.find(shell, centre, radii(i), static_cast<Method>(method)), centre,
-                     radii(i), shown);
+        merge_places(query.find(shell, centre, radii(i), how), centre, radii(i), shown);
         for (const Contact& c : shown)
           depth[i] = std::max(depth[i], c.depth), count[i] += c.weight > 0;
       }
@@ -115,10 +126,11 @@ SurfacePoint on_curved(const Shell& shell, const Vec3& point, SurfacePoint at, Q
 
 auto closest_points(const Shell& shell, const Points& points, bool smooth, int threads) {
   const std::size_t n = points.shape(0);
+  if (smooth) checked_method(shell, static_cast<int>(Method::Smooth));
   std::vector<double> point(3 * n), normal(3 * n), distance(n);
   std::vector<int> element(n);
   {
-    nb::gil_scoped_release release;
+    const ReleaseGil released;
     in_parallel(n, threads, kGrain, [&](std::size_t begin, std::size_t end) {
       Query query;
       for (std::size_t i = begin; i < end; ++i) {

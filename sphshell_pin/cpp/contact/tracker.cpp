@@ -11,6 +11,9 @@ namespace {
 // moves it by a quarter of the radius at most.
 constexpr double kDeep = 0.5;
 
+// Longer lists, which only a contact source gives, go on by their order: all pairs would be too many.
+constexpr std::size_t kLongest = 1000;
+
 }  // namespace
 
 ContactTracker::ContactTracker() {
@@ -32,8 +35,13 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
   // On a concave surface a contact moves farther than the centre.
   const double moved = 4 * (centre - centre_).norm();
   links_.clear();
+  const bool by_order = radius == 0 && std::max(places_.size(), contacts.size()) > kLongest;
   for (std::size_t i = 0; i < places_.size(); ++i) {
     places_[i].taken = false;
+    if (by_order) {
+      if (i < contacts.size()) links_.push_back({0, static_cast<int>(i), static_cast<int>(i)});
+      continue;
+    }
     for (std::size_t j = 0; j < contacts.size(); ++j) {
       const Contact& c = contacts[j];
       if (places_[i].saddle != (c.weight < 0)) continue;

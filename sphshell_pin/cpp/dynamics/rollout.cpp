@@ -56,6 +56,11 @@ std::size_t Rollout::wait(std::size_t left, double seconds) {
   return done_;
 }
 
+std::vector<Lent> Rollout::give_back() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(lent_, {});
+}
+
 void Rollout::stop() {
   {
     const std::lock_guard lock(mutex_);
@@ -78,9 +83,11 @@ void Rollout::work() {
       task = std::move(waiting_.front().second);
       waiting_.pop_front();
     }
-    Outcome outcome = run(std::move(task));
+    Lent lent;
+    Outcome outcome = run(std::move(task), lent);
     {
       const std::lock_guard lock(mutex_);
+      lent_.push_back(std::move(lent));
       outcomes_[number] = std::move(outcome);
       ++done_;
     }
@@ -88,7 +95,7 @@ void Rollout::work() {
   }
 }
 
-Outcome Rollout::run(Task task) const {
+Outcome Rollout::run(Task task, Lent& lent) const {
   Outcome out;
   try {
     Simulation run(model_, std::move(task.pairs), task.settings, std::move(task.controller),
@@ -112,6 +119,7 @@ Outcome Rollout::run(Task task) const {
     out.q = run.q();
     out.v = run.v();
     out.summaries = run.summaries();
+    lent = run.give_back();
   } catch (const std::exception& error) {
     // An exception that left a thread would end the process: of a short memory, say.
     out.fault = error.what();

@@ -49,19 +49,23 @@ class Rollout {
   std::size_t wait(std::size_t left, double seconds);
   // Ends the runs under way where they stand, and begins no more. Waits for the threads.
   void stop();
+  // Hands over what the runs used that are finished. Users' routines and other objects of theirs
+  // are not let go of in the threads, where that might need a lock of theirs.
+  std::vector<Lent> give_back();
   // Of runs that are finished, once the threads stand still.
   const std::deque<Outcome>& outcomes() const { return outcomes_; }
   const pinocchio::Model& model() const { return model_; }
 
  private:
   void work();
-  Outcome run(Task task) const;
+  Outcome run(Task task, Lent& lent) const;
 
   pinocchio::Model model_;
   std::mutex mutex_;
   std::condition_variable added_, finished_;
   std::deque<std::pair<std::size_t, Task>> waiting_;
   std::deque<Outcome> outcomes_;  // by number; a deque: the others stay where they are
+  std::vector<Lent> lent_;        // of finished runs
   std::size_t done_ = 0;
   std::atomic<bool> stopped_{false};
   std::vector<std::thread> threads_;

@@ -252,8 +252,10 @@ void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& row
     const Vec3 point = state.world_from_j.act(whole.point);
     const Vec3 normal = state.world_from_j.rotation() * whole.normal;
     Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
-    for (std::size_t k = 0; k < contacts.size(); ++k) {
-      if (k != i - begin && (whole.place < 0 || contacts[k].place != whole.place)) continue;
+    // One that is of no place stands alone.
+    const std::size_t first = i - begin, last = whole.place < 0 ? first + 1 : contacts.size();
+    for (std::size_t k = first; k < last; ++k) {
+      if (k != first && contacts[k].place != whole.place) continue;
       const ActiveContact& other = active_[begin + k];
       push += other.contact.weight * other.force.normal * other.meeting.normal;
       friction += other.contact.weight * other.force.friction;

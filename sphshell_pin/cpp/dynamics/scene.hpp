@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "contact/friction.hpp"
@@ -90,6 +91,8 @@ class Scene {
 
   // The same pairs with other laws, friction of the same kind, radii and relaxation.
   void change(std::vector<Pair> pairs);
+  // Hands the pairs over; nothing can be evaluated any more.
+  std::vector<Pair> give_back() { return std::move(pairs_); }
 
   // Contact forces at (q, v), with the bristles z (3 per slot, in the shells' frames). `numbered`:
   // contacts are told apart even where no force asks for it.

@@ -57,6 +57,12 @@ struct Record {
   std::vector<Event> events;
 };
 
+// What a run uses and others may share, such as a user's routine.
+struct Lent {
+  std::vector<Pair> pairs;
+  std::shared_ptr<Controller> controller;
+};
+
 class Simulation : private Torques {
  public:
   enum class Status : int { Running = 0, Finished = 1, Diverged = 2, Stuck = 3 };
@@ -81,6 +87,9 @@ class Simulation : private Torques {
   // work counts as the controller's.
   void push(int joint, const Vec3& point, const Vec3& force_world);
 
+  // Hands over what a caller may share; the run is at its end.
+  Lent give_back() { return {scene_.give_back(), std::move(controller_)}; }
+
   double progress() const {
     return settings_.duration > 0 ? (state_.t - settings_.start_time) / settings_.duration : 1.0;
   }
@@ -94,6 +103,8 @@ class Simulation : private Torques {
   double wall_time() const { return wall_time_; }  // spent in advance() [s]
   const std::vector<PairSummary>& summaries() const { return summaries_; }
   const pinocchio::Model& model() const { return scene_.body().model(); }
+  const std::vector<Pair>& pairs() const { return scene_.pairs(); }
+  const Controller* controller() const { return controller_.get(); }
 
  private:
   const VectorX& torque(double t, const VectorX& q, const VectorX& v) override;

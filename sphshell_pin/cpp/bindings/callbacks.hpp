@@ -1,0 +1,54 @@
+// Users' routines as the core calls them, and how the garbage collector sees them.
+//
+// Types that hold a routine say so by tp_traverse. None needs tp_clear: the core's objects do not
+// refer to each other in a circle, so every cycle passes through a Python object that is cleared.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <vector>
+
+#include "bindings/gil.hpp"
+#include "dynamics/controllers.hpp"
+
+namespace sphshell {
+
+// A contact source. The callable returns points, normals and depths, checked and converted by its
+// Python wrapper. Each copy has a reference of its own, as the garbage collector wants to count.
+class PythonSource {
+ public:
+  explicit PythonSource(nb::object find) : find_(std::move(find)) {}
+  PythonSource(const PythonSource&) = default;
+  PythonSource(PythonSource&&) = default;
+  ~PythonSource();
+  void operator()(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& out) const;
+  nb::handle find() const { return find_; }
+
+ private:
+  nb::object find_;
+};
+
+// A callable tau(t, q, v, contacts): contacts as rows, its Python wrapper gives them names.
+class PythonController : public Controller {
+ public:
+  explicit PythonController(nb::object callable) : callable_(std::move(callable)) {}
+  ~PythonController() override;
+  bool follows_time() const override { return true; }
+  void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override;
+  nb::handle callable() const { return callable_; }
+
+ private:
+  nb::object callable_;
+};
+
+int visit_sources(const std::vector<Pair>& pairs, visitproc visit, void* arg);
+
+// tp_traverse of a bound T: its type, and what visit_parts(T, visit, arg) visits.
+template <class T, int (*visit_parts)(const T&, visitproc, void*)>
+int traverse(PyObject* self, visitproc visit, void* arg) {
+  Py_VISIT(Py_TYPE(self));
+  if (!nb::inst_ready(self)) return 0;
+  return visit_parts(*nb::inst_ptr<T>(self), visit, arg);
+}
+
+}  // namespace sphshell

@@ -1,0 +1,99 @@
+"""A scene is compiled with its model: a changed one is noticed, whatever was changed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter
+from tests.models import LAW, arm, ball, free_q, on_plate
+
+Q = free_q([0.0, 0.0, 0.049])
+
+
+def add_joint(model: pin.Model) -> None:
+    model.addJoint(1, pin.JointModelRX(), pin.SE3.Identity(), "new")
+
+
+def wrong_parent(model: pin.Model) -> None:
+    model.parents[1] = 7
+
+
+def no_gravity(model: pin.Model) -> None:
+    model.gravity.linear = np.zeros(3)
+
+
+def heavier(model: pin.Model) -> None:
+    model.inertias[1].mass *= 2
+
+
+def mass_nan(model: pin.Model) -> None:
+    model.inertias[1].mass = np.nan
+
+
+def negative_mass(model: pin.Model) -> None:
+    model.inertias[1].mass = -1.0
+
+
+def placement_nan(model: pin.Model) -> None:
+    model.jointPlacements[1] = pin.SE3(np.full((3, 3), np.nan), np.zeros(3))
+
+
+def add_frame(model: pin.Model) -> None:
+    model.addFrame(pin.Frame("new", 1, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+
+
+CHANGES = [add_joint, wrong_parent, no_gravity, heavier, mass_nan, placement_nan, add_frame]
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_changed_model_is_noticed(change, compiled: bool) -> None:
+    scene = on_plate(ball(), LAW)
+    simulation = sp.Simulation(scene)
+    if compiled:
+        scene.contacts(Q)
+    varied = scene.with_pairs(scene.pairs)
+    change(scene.model)
+    for use in (
+        lambda: scene.model,
+        lambda: scene.external_forces(Q),
+        lambda: scene.contacts(np.r_[Q, 0.3]),
+        lambda: scene.contact_derivatives(Q),
+        lambda: scene.explain(Q),
+        lambda: simulation.run(Q, None, 0.01),
+        lambda: simulation.rollout([Q] * 2, None, 0.01),
+        lambda: varied.contacts(Q),
+    ):
+        with pytest.raises(InvalidParameter, match=r"scene\.model was changed"):
+            use()
+
+
+def test_an_untouched_model_is_one_object_and_equal_to_the_given_one() -> None:
+    model = arm()
+    scene = sp.Scene(model)
+    assert scene.model is scene.model
+    assert scene.model is not model
+    assert scene.model == model
+    add_joint(model)
+    assert len(scene.external_forces(pin.neutral(scene.model))) == scene.model.njoints
+
+
+def test_a_limit_that_is_not_a_number_says_nothing_of_a_change() -> None:
+    model = ball()
+    limits = np.array(model.velocityLimit)
+    limits[0] = np.nan
+    model.velocityLimit = limits
+    scene = on_plate(model, LAW)
+    assert scene.model.nq == 7
+    assert len(scene.contacts(Q)) == len(on_plate(ball(), LAW).contacts(Q))
+
+
+@pytest.mark.parametrize("change", [wrong_parent, mass_nan, negative_mass, placement_nan])
+def test_a_model_that_pinocchio_would_not_survive_makes_no_scene(change) -> None:
+    model = ball()
+    change(model)
+    with pytest.raises(InvalidParameter, match="joint"):
+        sp.Scene(model)
