@@ -45,7 +45,9 @@ def checked_source(
             points, normals, depths = answer
             count = len(depths)
             if count > most:
-                must = f"but must return {most} at most{' with BristleFriction' if bristles else ''}"
+                must = (
+                    f"but must return {most} at most{' with BristleFriction' if bristles else ''}"
+                )
                 raise InvalidParameter(where, count, must, f"returns {count} contacts,")
             point, normal, depth = _rows(points), _rows(normals), as_floats(depths)
         except (TypeError, ValueError):
