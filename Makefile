@@ -22,7 +22,7 @@ help:
 # make report measure speed against error, a page in results/report
 # make robots check every robot and write docs/robots.md
 # make sweep-survival  500 runs five ways, workers killed and the sweep resumed: the same bytes
-# make kills           kill runs at every system call and at random times, fill disks (30 min)
+# make kills           kill runs at every system call and at random times, fill disks (15 min)
 # make rollouts        print the speed-up of 10 000 runs over threads
 # make real-surfaces FOLDER=...  jumps and energies over the surfaces of a folder
 # make fuzz SECONDS=600 SEED=1  damaged files for every reader, until one breaks it

@@ -22,6 +22,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
+from sphshell_pin.atomic import AtomicFolder
+
 RUN = [
     sys.executable, "-c", "from sphshell_pin.cli import main; main()", "run", "sphere_on_shell",
     "--duration", "0.03", "--set",
@@ -130,7 +132,8 @@ def kill_at_random(place: Path, times: int) -> list[str]:
     rng = random.Random(1)
     writing = place / ".out.writing"
     start, drawn = time.monotonic(), 0.0
-    with subprocess.Popen(command(place, STIFFNESS[1]), stdout=subprocess.DEVNULL) as process:
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command(place, STIFFNESS[1]), **silent) as process:
         while process.poll() is None:
             drawn = drawn or (time.monotonic() if writing.exists() else 0.0)
             time.sleep(0.001)
@@ -140,12 +143,10 @@ def kill_at_random(place: Path, times: int) -> list[str]:
     for n in range(times):
         before = state(place)
         wanted = STIFFNESS[before == STIFFNESS[0]]
-        for path in place.glob(".out.*"):  # by the next run otherwise; here to see it appear
-            if n % 2 and path.is_dir() and not (path / "ready.json").exists():
-                shutil.rmtree(path)
-        with subprocess.Popen(
-            command(place, wanted), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        ) as process:
+        if n % 2:  # what is left is cleared away now, to see the new files appear
+            with AtomicFolder(place / "out", last="summary.json", inner=["stopped"]):
+                pass
+        with subprocess.Popen(command(place, wanted), **silent) as process:
             wait = rng.uniform(0.0, whole)
             if n % 2:
                 while not writing.exists() and process.poll() is None:
