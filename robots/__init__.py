@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -121,11 +122,11 @@ def load_urdf(
         The file or one of its meshes is missing or cannot be read.
     """
     file = Path(path)
-    if not file.is_file():
+    if not os.path.isfile(file):
         raise RobotError(f"{file}: no such URDF file")
     dirs = [str(one) for one in package_dirs] + [str(file.parent)]
     for folder in dirs:
-        if not Path(folder).is_dir():
+        if not os.path.isdir(folder):
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
     root = [pin.JointModelFreeFlyer()] if free_flyer else []
     try:
