@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -123,11 +124,11 @@ def load_urdf(
         chain of more than 1000 links, or more degrees of freedom than 2 GB of memory hold (315).
     """
     file = Path(path)
-    if not file.is_file():
+    if not os.path.isfile(file):
         raise RobotError(f"{file}: no such URDF file")
     dirs = [str(one) for one in package_dirs] + [str(file.parent)]
     for folder in dirs:
-        if not Path(folder).is_dir():
+        if not os.path.isdir(folder):
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
     try:
         model = read_model(file, free_flyer=free_flyer)

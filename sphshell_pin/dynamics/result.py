@@ -327,4 +327,4 @@ def _found(told: dict[str, Any] | None, home: Path) -> Origin | None:
     if "path" not in told:
         return Origin(told["scenario"], told["settings"])
     near = Path(os.path.normpath(home.absolute() / told["scenario"]))
-    return Origin(str(near if near.exists() else told["path"]), told["settings"])
+    return Origin(str(near if os.path.exists(near) else told["path"]), told["settings"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -230,7 +231,7 @@ def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell
     with blamed_on(path, key):
         if section.file is not None:
             file = path.parent / section.file
-            if not file.is_file():
+            if not os.path.isfile(file):
                 raise SphshellError(f"no such surface file: {file}")
             shell = sp.Shell.from_file(
                 file,

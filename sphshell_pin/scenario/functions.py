@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ def load_function(where: str, path: Path, key: str) -> Callable[..., Any]:
     if not colon or not file_name.endswith(".py") or not function:
         raise ScenarioError(path, key, 'must be "file.py:function"', where)
     file = path.parent / file_name
-    if not file.is_file():
+    if not os.path.isfile(file):
         raise ScenarioError(path, key, f"no such file: {file}", where)
     spec = importlib.util.spec_from_file_location(f"sphshell_pin_scenario_{file.stem}", file)
     if spec is None or spec.loader is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import os
 import re
 import tomllib
 import types
@@ -40,15 +41,15 @@ def find_scenario(name: str | PathLike[str]) -> Path:
         Neither a file nor a shipped scenario.
     """
     path = Path(name)
-    if path.is_file():
+    if os.path.isfile(path):
         return path
     shipped = shipped_scenarios()
     if str(name) in shipped:
         return shipped[str(name)]
     beside = path.with_name(f"{path.name}.toml") if path.name else path
-    if beside.is_file():
+    if os.path.isfile(beside):
         raise ScenarioError(path, "", f"no such file; did you mean {beside}?")
-    if path.is_dir():
+    if os.path.isdir(path):
         raise ScenarioError(path, "", "is a folder: give the .toml file of a scenario")
     if path.suffix == ".toml" or len(path.parts) > 1:
         raise ScenarioError(path, "", "no such file")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
@@ -240,7 +241,7 @@ def _build_again(
     try:
         return build_scenario(Scenario.model_validate(settings), path, function=function)
     except SphshellError as fault:
-        gone = "" if path.exists() else f"{path} is no longer there, and "
+        gone = "" if os.path.exists(path) else f"{path} is no longer there, and "
         why = f"{gone}its scenario cannot be built again ({fault}): {HOW}"
         raise ResultError(name, why) from fault
     except ValueError as fault:

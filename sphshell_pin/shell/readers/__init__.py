@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
@@ -44,14 +45,14 @@ def reader_for(path: str | os.PathLike[str]) -> tuple[Path, str]:
         raise InvalidParameter(
             "path", str(path), f"must end in one of: {', '.join(SUFFIXES)}, not '{path.suffix}'"
         )
-    if not path.exists():
-        raise ShellFileError(path, "there is no such file")
-    if not path.is_file():
-        raise ShellFileError(path, "is not a file")
     try:
-        size = path.stat().st_size
+        found = path.stat()
+    except (FileNotFoundError, NotADirectoryError, ValueError):  # a name with a null character
+        raise ShellFileError(path, "there is no such file") from None
     except OSError as error:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
-    if size == 0:
+    if not stat.S_ISREG(found.st_mode):
+        raise ShellFileError(path, "is not a file")
+    if found.st_size == 0:
         raise ShellFileError(path, "is empty")
     return path, suffix

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -37,7 +38,7 @@ def all_names() -> list[str]:
 
 def is_path(robot: str) -> bool:
     """Whether `robot` is meant as a file, not as a name."""
-    return Path(robot).suffix.lower() in _SUFFIXES or "/" in robot or Path(robot).is_file()
+    return Path(robot).suffix.lower() in _SUFFIXES or "/" in robot or os.path.isfile(robot)
 
 
 def check_known(robots: Iterable[str]) -> None:
@@ -45,8 +46,8 @@ def check_known(robots: Iterable[str]) -> None:
     known = all_names()
     for robot in robots:
         if is_path(robot):
-            if not Path(robot).is_file():
-                what = "is a folder, not a URDF file" if Path(robot).is_dir() else "no such file"
+            if not os.path.isfile(robot):
+                what = "is a folder, not a URDF file" if os.path.isdir(robot) else "no such file"
                 raise SphshellError(f"{robot}: {what}")
         elif robot not in known:
             raise NameNotFound("robot", robot, "sphshell_pin.robots", known, "sphshell-pin list")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,7 +83,7 @@ def digest_files(folder: Path, names: Iterable[str]) -> dict[str, str]:
     found = {}
     for name in sorted(names):
         path = folder / name
-        if not path.is_file():
+        if not os.path.isfile(path):
             found[name] = "absent"
             continue
         with open(path, "rb") as file:
