@@ -286,6 +286,7 @@ def mend_t_junctions(
     polygon: _Ints,
     candidates: _Ints,
     tolerance: float,
+    most: int,
 ) -> tuple[_Longs, _Ints, _Doubles]: ...
 def mend_flood_fill(
     offsets: _Longs, corners: _Ints, slot_edge: _Ints, users: _Ints

@@ -31,6 +31,9 @@ PLANAR_TOLERANCE = 1e-10
 MOST_PASSES = 20
 """Two passes settle what files hold; elements tangled within the tolerance might go on for ever."""
 
+MOST_INSERTED = 1_000_000
+"""T-junctions that any surface may have; one of more corners may have four for each of them."""
+
 SMALL_HOLE_EDGES = 4
 SMALL_HOLE_AREA = 0.3
 """A boundary loop of so few edges that spans less than this share of its component is a hole."""
@@ -188,12 +191,15 @@ def _mend(
     for name in ("t_junctions", "warped_quads", "concave_quads", "tangled_polygons"):
         found[name] = 0
     found["largest_warp"] = 0.0
+    most = max(MOST_INSERTED, 4 * len(polygons.corners))
     given = np.ones(len(polygons), np.bool_)  # input elements of which something is left
     for _ in range(MOST_PASSES):
         before = len(polygons)
         polygons = _drop_flat(polygons, vertices, given, found)
         polygons = _drop_duplicates(polygons, given, found)
-        polygons, table, inserted = _split_t_junctions(polygons, vertices, table, tolerance)
+        polygons, table, inserted = _split_t_junctions(
+            polygons, vertices, table, tolerance, most - found["t_junctions"]
+        )
         found["t_junctions"] += inserted
         polygons = _triangulate(polygons, vertices, tolerance, size, found)
         if len(polygons) == before and inserted == 0:
@@ -240,9 +246,13 @@ def _drop_duplicates(polygons: Polygons, given: Mask, found: dict[str, Any]) -> 
 
 
 def _split_t_junctions(
-    polygons: Polygons, vertices: Floats, table: Floats | None, tolerance: float
+    polygons: Polygons, vertices: Floats, table: Floats | None, tolerance: float, most: int
 ) -> tuple[Polygons, Floats | None, int]:
-    """With the vertices that lie on open edges made corners there; and how many."""
+    """With the vertices that lie on open edges made corners there; and how many.
+
+    Raises InvalidShell where they are more than `most`: elements that lie on one another in one
+    line may have as many as the square of their number.
+    """
     open_edge = polygons.edges.users == 1
     if not open_edge.any():
         return polygons, table, 0
@@ -257,7 +267,13 @@ def _split_t_junctions(
         np.ascontiguousarray(polygons.polygon_of_slot[slots]),
         candidates,
         tolerance,
+        most,
     )
+    if len(at) > most:
+        raise InvalidShell(
+            f"vertices lie on open edges of other elements (within {tolerance:.3g} m) at more than "
+            f"{most} places: the elements lie on one another; check the vertices and their indices"
+        )
     if len(at) == 0:
         return polygons, table, 0
     rows = None

@@ -9,7 +9,7 @@ import pytest
 import trimesh  # noqa: F401  its import would be measured otherwise
 
 from sphshell_pin import Shell, _core
-from sphshell_pin.errors import ShellFileError
+from sphshell_pin.errors import InvalidShell, ShellFileError
 from sphshell_pin.shell import clean
 
 from ..oracle.ear_clipping import clip_ears
@@ -93,6 +93,18 @@ def test_a_polygon_costs_little_more_than_its_corners(shape):
 
     # Six times as many: a square would take 36 times as long, n log n eight times.
     assert cost(12_000) < 18 * cost(2_000)
+
+
+def test_elements_that_lie_on_one_another_are_refused():
+    # Each edge on the line holds ends of a third of the others: together 1.5 million.
+    rng = np.random.default_rng(0)
+    ends = np.sort(rng.random((1500, 2)), axis=1)
+    first, last = np.zeros((2, 1500, 3))
+    first[:, 0], last[:, 0] = ends.T
+    tips = np.column_stack([ends.mean(axis=1), rng.uniform(0.1, 1.0, 1500), rng.random(1500)])
+    points = np.stack([first, last, tips], axis=1).reshape(-1, 3)
+    with pytest.raises(InvalidShell, match="at more than 1000000 places"):
+        clean(points, np.arange(4500).reshape(-1, 3))
 
 
 PLY = "ply\nformat {}\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"

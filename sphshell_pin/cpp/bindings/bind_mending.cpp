@@ -142,20 +142,21 @@ void bind_mending(nb::module_& module) {
       "mend_t_junctions",
       [](In<std::int64_t> offsets, In<std::int32_t> corners, InRows<double, 3> points,
          In<std::int64_t> open_slots, In<std::int32_t> open_polygons, In<std::int32_t> candidates,
-         double tolerance) {
+         double tolerance, std::size_t most) {
         sphshell::Insertions result;
         {
           const sphshell::ReleaseGil released;
           result =
               sphshell::find_t_junctions(view(offsets, corners), points.data(), copy(open_slots),
-                                         copy(open_polygons), copy(candidates), tolerance);
+                                         copy(open_polygons), copy(candidates), tolerance, most);
         }
         return nb::make_tuple(give(std::move(result.slot)), give(std::move(result.vertex)),
                               give(std::move(result.parameter)));
       },
       "offsets"_a, "corners"_a, "points"_a, "open_slots"_a, "open_polygons"_a, "candidates"_a,
-      "tolerance"_a,
-      "(slot, vertex, parameter) of vertices inside open edges, in order along them.");
+      "tolerance"_a, "most"_a,
+      "(slot, vertex, parameter) of vertices inside open edges, in order along them; one more than "
+      "`most` where there are more.");
 
   module.def(
       "mend_flood_fill",

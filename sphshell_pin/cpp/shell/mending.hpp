@@ -88,11 +88,13 @@ struct Insertions {
 };
 
 // Vertices among `candidates` within `tolerance` of the interior of an open edge (given by its
-// slot and polygon) of a polygon that does not have them as corners.
+// slot and polygon) of a polygon that does not have them as corners; `candidates` ascend. Stops
+// with the first insertion beyond `most`.
 Insertions find_t_junctions(const PolygonView& polygons, const double* points,
                             const std::vector<std::int64_t>& open_slots,
                             const std::vector<std::int32_t>& open_polygons,
-                            const std::vector<std::int32_t>& candidates, double tolerance);
+                            const std::vector<std::int32_t>& candidates, double tolerance,
+                            std::size_t most);
 
 struct Orientation {
   std::vector<std::int32_t> component;  // per polygon, numbered in order of first polygon

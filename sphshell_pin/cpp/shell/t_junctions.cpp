@@ -35,7 +35,8 @@ bool meets(const Tree::Box& box, const double* a, const double* b, double tolera
 Insertions find_t_junctions(const PolygonView& polygons, const double* points,
                             const std::vector<std::int64_t>& open_slots,
                             const std::vector<std::int32_t>& open_polygons,
-                            const std::vector<std::int32_t>& candidates, double tolerance) {
+                            const std::vector<std::int32_t>& candidates, double tolerance,
+                            std::size_t most) {
   Insertions out;
   const Tree tree(points, candidates);
   struct Hit {
@@ -43,14 +44,17 @@ Insertions find_t_junctions(const PolygonView& polygons, const double* points,
     std::int32_t vertex;
   };
   std::vector<Hit> hits;
-  std::vector<std::int32_t> own;  // the polygon's corners, sorted
-  for (std::size_t k = 0; k < open_slots.size(); ++k) {
+  // Per vertex the last polygon that has it as a corner.
+  std::vector<std::int32_t> owner(candidates.empty() ? 0 : candidates.back() + 1, -1);
+  for (std::size_t k = 0; k < open_slots.size() && out.slot.size() <= most; ++k) {
     const auto polygon = static_cast<std::size_t>(open_polygons[k]);
     const std::int64_t from = polygons.offsets[polygon], to = polygons.offsets[polygon + 1];
     const std::int64_t slot = open_slots[k];
     if (k == 0 || open_polygons[k] != open_polygons[k - 1]) {
-      own.assign(polygons.corners + from, polygons.corners + to);
-      std::sort(own.begin(), own.end());
+      for (std::int64_t s = from; s < to; ++s) {
+        const auto corner = static_cast<std::size_t>(polygons.corners[s]);
+        if (corner < owner.size()) owner[corner] = open_polygons[k];
+      }
     }
     const double* a = points + 3 * static_cast<std::size_t>(polygons.corners[slot]);
     const double* b =
@@ -60,15 +64,15 @@ Insertions find_t_junctions(const PolygonView& polygons, const double* points,
     hits.clear();
     const auto near = [&](const Tree::Box& box) { return meets(box, a, b, tolerance); };
     tree.search(near, [&](std::int32_t vertex) {
+      if (owner[static_cast<std::size_t>(vertex)] == open_polygons[k]) return false;
       const double* p = points + 3 * static_cast<std::size_t>(vertex);
       const std::array<double, 3> e{p[0] - a[0], p[1] - a[1], p[2] - a[2]};
       const double t = (e[0] * d[0] + e[1] * d[1] + e[2] * d[2]) / squared;
       if (t > 0.0 && t < 1.0 &&
-          std::hypot(e[0] - t * d[0], e[1] - t * d[1], e[2] - t * d[2]) <= tolerance &&
-          !std::binary_search(own.begin(), own.end(), vertex)) {
+          std::hypot(e[0] - t * d[0], e[1] - t * d[1], e[2] - t * d[2]) <= tolerance) {
         hits.push_back({t, vertex});
       }
-      return false;
+      return out.slot.size() + hits.size() > most;
     });
     std::sort(hits.begin(), hits.end(), [](const Hit& x, const Hit& y) {
       return x.parameter != y.parameter ? x.parameter < y.parameter : x.vertex < y.vertex;
