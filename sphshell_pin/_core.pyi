@@ -147,7 +147,9 @@ class JointPd(Controller):
     ) -> None: ...
 
 class PythonController(Controller):
-    def __init__(self, callable: Callable[[float, _Doubles, _Doubles, _Doubles], Any]) -> None: ...
+    def __init__(
+        self, callable: Callable[[float, bytearray, bytearray, bytearray], Any]
+    ) -> None: ...
 
 class CartesianImpedance(Controller):
     def __init__(

@@ -75,7 +75,7 @@ def check_each_positive(name: str, value: Any, count: int, unit: str = "") -> Ar
     """Return `value`, one number or (count,), as an array (count,); raise unless all are > 0."""
     try:
         array = np.array(np.broadcast_to(as_floats(value), (count,)))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidParameter(
             name, np.shape(value), f"must be one number or have shape ({count},)"
         ) from None

@@ -229,9 +229,10 @@ class CartesianImpedance(Controller):
 def wrap_callable(callback: Callback, model: pin.Model) -> _core.Controller:
     """Wrap tau(t, q, v, contacts) -> (nv,) for the core; its answers are checked."""
 
-    def torque(t: float, q: Array, v: Array, rows: Array) -> Array:
+    def torque(t: float, q: bytearray, v: bytearray, rows: bytearray) -> Array:
+        contacts = SceneContacts.from_rows(np.frombuffer(rows).reshape(-1, 18))
         try:
-            tau = callback(t, q, v, SceneContacts.from_rows(rows))
+            tau = callback(t, np.frombuffer(q), np.frombuffer(v), contacts)
         except Exception as error:
             add_origin(error, f"the controller at t = {t:.6g} s")
             raise

@@ -44,13 +44,14 @@ def checked_source(
         try:
             points, normals, depths = answer
             count = len(depths)
-            if count > most:
-                must = (
-                    f"but must return {most} at most{' with BristleFriction' if bristles else ''}"
-                )
-                raise InvalidParameter(where, count, must, f"returns {count} contacts,")
-            point, normal, depth = _rows(points), _rows(normals), as_floats(depths)
         except (TypeError, ValueError):
+            raise InvalidParameter(where, answer, _SHAPES) from None
+        if count > most:
+            must = f"but must return {most} at most{' with BristleFriction' if bristles else ''}"
+            raise InvalidParameter(where, count, must, f"returns {count} contacts,")
+        try:
+            point, normal, depth = _rows(points), _rows(normals), as_floats(depths)
+        except (TypeError, ValueError, OverflowError):
             raise InvalidParameter(where, answer, _SHAPES) from None
         shapes = point.shape, normal.shape, depth.shape
         if shapes != ((len(depth), 3), (len(depth), 3), (len(depth),)):

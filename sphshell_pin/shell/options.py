@@ -24,7 +24,7 @@ def check_options(crease_angle: float, side: str) -> None:
         raise InvalidParameter("side", side, f"must be one of: {', '.join(SIDES)}")
     try:
         fits = 0.0 <= float(crease_angle) <= math.pi
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         fits = False
     if not fits:
         raise InvalidParameter("crease_angle", crease_angle, "must lie between 0 and pi [rad]")

@@ -93,7 +93,7 @@ def check_indices(offsets: Longs, corners: Ints, num_vertices: int) -> None:
 def _vertices(vertices: object) -> Floats:
     try:
         points = as_floats(vertices)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidShell(f"vertices must be an (n, 3) array of numbers [m]: {error}") from error
     if points.ndim != 2 or points.shape[1] != 3:
         raise InvalidShell(
@@ -175,7 +175,7 @@ def _corner_normals(
         return None
     try:
         given = as_floats(normals)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidShell(f"normals must be an array of numbers: {error}") from error
     if given.shape == points.shape:
         return np.asarray(given[corners], np.float64)

@@ -2,14 +2,43 @@
 
 #include "bindings/callbacks.hpp"
 
-#include <nanobind/eigen/dense.h>
-
-#include "bindings/records.hpp"
+#include <cstring>
 
 namespace sphshell {
 namespace {
 
-using RowPoints = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+// Numbers go to and fro as plain memory: NumPy gives the interpreter's lock away when it copies,
+// and might not get it back (see gil.hpp).
+PyObject* bytes_of(const double* first, std::size_t count) {
+  return PyByteArray_FromStringAndSize(reinterpret_cast<const char*>(first),
+                                       static_cast<Py_ssize_t>(count * sizeof(double)));
+}
+
+PyObject* pack(std::initializer_list<PyObject*> items) {
+  PyObject* out = PyTuple_New(static_cast<Py_ssize_t>(items.size()));
+  bool complete = out != nullptr;
+  Py_ssize_t i = 0;
+  for (PyObject* item : items) {
+    complete = complete && item != nullptr;
+    if (out)
+      PyTuple_SET_ITEM(out, i++, item);
+    else
+      Py_XDECREF(item);
+  }
+  if (complete) return out;
+  Py_XDECREF(out);
+  return nullptr;
+}
+
+// The doubles of an array, which its Python wrapper has made contiguous.
+std::vector<double> doubles_of(nb::handle array) {
+  Py_buffer view;
+  if (PyObject_GetBuffer(array.ptr(), &view, PyBUF_SIMPLE) != 0) throw nb::python_error();
+  std::vector<double> out(static_cast<std::size_t>(view.len) / sizeof(double));
+  if (!out.empty()) std::memcpy(out.data(), view.buf, out.size() * sizeof(double));
+  PyBuffer_Release(&view);
+  return out;
+}
 
 }  // namespace
 
@@ -22,14 +51,15 @@ PythonSource::~PythonSource() {
 void PythonSource::operator()(const SE3& pose_i, const SE3& pose_j,
                               std::vector<Contact>& out) const {
   const AcquireGil gil;
-  const nb::object answer = gil.call(find_, to_python(pose_i), to_python(pose_j));
-  const auto points = nb::cast<RowPoints>(answer[0]);
-  const auto normals = nb::cast<RowPoints>(answer[1]);
-  const auto depths = nb::cast<VectorX>(answer[2]);
-  for (Eigen::Index i = 0; i < depths.size(); ++i)
+  const nb::object answer = gil.call(find_, [&] {
+    return pack({to_python(pose_i).release().ptr(), to_python(pose_j).release().ptr()});
+  });
+  const std::vector<double> points = doubles_of(answer[0]), normals = doubles_of(answer[1]),
+                            depths = doubles_of(answer[2]);
+  for (std::size_t i = 0; i < depths.size(); ++i)
     if (depths[i] > 0)
-      out.push_back({points.row(i).transpose(), normals.row(i).transpose(), depths[i],
-                     static_cast<int>(i), Feature::Face});
+      out.push_back({Vec3(&points[3 * i]), Vec3(&normals[3 * i]), depths[i], static_cast<int>(i),
+                     Feature::Face});
 }
 
 PythonController::~PythonController() {
@@ -42,7 +72,13 @@ void PythonController::torque(Scene& scene, double t, const VectorX& q, const Ve
   std::vector<ContactRow> rows;
   scene.log(q, v, rows);
   const AcquireGil gil;
-  tau = nb::cast<VectorX>(gil.call(callable_, t, q, v, rows_to_array(std::move(rows))));
+  const nb::object answer = gil.call(callable_, [&] {
+    return pack(
+        {PyFloat_FromDouble(t), bytes_of(q.data(), q.size()), bytes_of(v.data(), v.size()),
+         bytes_of(rows.empty() ? nullptr : &rows[0].pair, rows.size() * ContactRow::kColumns)});
+  });
+  const std::vector<double> torque = doubles_of(answer);
+  tau = Eigen::Map<const VectorX>(torque.data(), static_cast<Eigen::Index>(torque.size()));
 }
 
 int visit_sources(const std::vector<Pair>& pairs, visitproc visit, void* arg) {

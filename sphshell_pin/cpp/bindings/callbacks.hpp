@@ -13,8 +13,9 @@
 
 namespace sphshell {
 
-// A contact source. The callable returns points, normals and depths, checked and converted by its
-// Python wrapper. Each copy has a reference of its own, as the garbage collector wants to count.
+// A contact source. The callable returns points, normals and depths as arrays of float64, checked
+// and made contiguous by its Python wrapper. Each copy has a reference of its own, as the garbage
+// collector wants to count.
 class PythonSource {
  public:
   explicit PythonSource(nb::object find) : find_(std::move(find)) {}
@@ -28,7 +29,8 @@ class PythonSource {
   nb::object find_;
 };
 
-// A callable tau(t, q, v, contacts): contacts as rows, its Python wrapper gives them names.
+// A callable tau(t, q, v, contacts): vectors and rows of contacts come as memory, of which its
+// Python wrapper makes arrays; it returns an array of float64 (nv).
 class PythonController : public Controller {
  public:
   explicit PythonController(nb::object callable) : callable_(std::move(callable)) {}

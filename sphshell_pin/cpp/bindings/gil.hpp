@@ -62,13 +62,18 @@ class AcquireGil {
   AcquireGil(const AcquireGil&) = delete;
   AcquireGil& operator=(const AcquireGil&) = delete;
 
-  // Calls a user's routine. In a thread of the core's own what it raises becomes a
-  // std::runtime_error with its text, as no Python object may leave the lock's scope there.
-  template <class... Args>
-  nb::object call(nb::handle routine, const Args&... args) const {
-    const nb::tuple arguments = nb::make_tuple(args...);
-    PyObject* answer =
-        or_sleep([&] { return PyObject_Call(routine.ptr(), arguments.ptr(), nullptr); });
+  // Calls a user's routine with the tuple (a new reference) that make_arguments() returns. In a
+  // thread of the core's own what it raises becomes a std::runtime_error with its text, as no
+  // Python object may leave the lock's scope there.
+  template <class MakeArguments>
+  nb::object call(nb::handle routine, MakeArguments&& make_arguments) const {
+    PyObject* answer = or_sleep([&]() -> PyObject* {
+      PyObject* arguments = make_arguments();
+      if (!arguments) return nullptr;
+      PyObject* out = PyObject_Call(routine.ptr(), arguments, nullptr);
+      Py_DECREF(arguments);
+      return out;
+    });
     if (answer) return nb::steal(answer);
     const nb::python_error error;
     if (is_foreign_) throw std::runtime_error(error.what());
