@@ -19,7 +19,7 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell.cad.messages import ALIVE, pack, unpack
 from sphshell_pin.shell.cad.options import require_kernel
 
-IDLE = 30.0
+IDLE = 90.0
 """A child without a job ends after this time [s]."""
 
 GRACE = 10.0

@@ -1,7 +1,7 @@
 """OpenCASCADE in a process of its own: a file that makes it crash, hang or swell ends only that.
 
 A child is started with the first CAD file; it imports OpenCASCADE, which takes a second, so it is
-kept for a few seconds, for the next file. One that has met a damaged file is not used again.
+kept for a minute, for the next file. One that has met a damaged file is not used again.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TIME_LIMIT = 600.0
 MEMORY_LIMIT = 8e9
 """Of a CAD file, unless stated [bytes]."""
 
-KEPT = 20.0
+KEPT = 60.0
 """How long a child is kept for the next file [s]; it ends by itself some seconds later."""
 
 ENDING = 2.0
