@@ -1,9 +1,9 @@
 """A folder of files that belong together, replaced whole or not at all.
 
 The new files are written to a folder beside the old one, and the two exchange their names in one
-system call. Files of others are linked into the new folder before. A folder that cannot be
-exchanged (see `AtomicFolder.replace`) gets the new files one by one, from a list on disk that the
-next process completes should this one be killed.
+system call. Files that are not ours are hard-linked into the new folder before. In a folder that
+cannot be exchanged (see `AtomicFolder.replace`) the files are replaced one by one; a list on disk,
+as in a redo log, lets the next process complete what a killed one began.
 """
 
 from __future__ import annotations
@@ -34,23 +34,23 @@ class Busy(OSError):
 
 
 class AtomicFolder:
-    """The folder at `path`, in the hands of this process alone while the `with` block lasts.
+    """The folder at `path`, locked by this process while the `with` block lasts.
 
-    It is made if it is not there, and removed if the block fails before `replace`. What a killed
-    process left behind is cleared away at the beginning, see `replace`.
+    It is made if it does not exist, and removed again if the block leaves it empty. At the
+    beginning, what a killed process left is removed or completed, see `replace`.
 
     Parameters
     ----------
     path : of the folder; of a symbolic link its target is meant.
-    last : the file that says that the others are there. Where files are exchanged one by one, it
-        is the first to go and the last to come.
-    inner : names of folders in it that go with it into an exchange. A folder that holds any others
-        is not exchanged: they may be working directories, or large.
+    last : name of the file that says that the others are complete. Where files are replaced one by
+        one, it is removed first and written last.
+    inner : names of subfolders whose files are linked, too. A folder with any other subfolder is
+        not exchanged: it may be large, or a working directory.
 
     Raises
     ------
     Busy
-        Another process has it.
+        Another process has locked it.
     OSError
         It cannot be made or written.
     """
@@ -61,7 +61,7 @@ class AtomicFolder:
         self._inner = frozenset(inner)
         self._made: list[Path] = []
         self._lock: tuple[Path, int] | None = None
-        # Those of another process are left alone where no lock says that it has ended.
+        # Without a lock nobody knows whether another process has ended: its files are left alone.
         self._suffix = ""
 
     def __enter__(self) -> Self:
@@ -73,8 +73,12 @@ class AtomicFolder:
                 pass
             self._take()
             self._clear()
+            for name in self._inner:
+                if any(folder.glob(f".{name}.*")):  # what a process left that was writing there
+                    with AtomicFolder(folder / name, last=self._last):
+                        pass
         except BaseException:
-            self._end(failed=True)
+            self._end()
             raise
         return self
 
@@ -89,7 +93,7 @@ class AtomicFolder:
             with contextlib.suppress(OSError):
                 self._clear()
         finally:
-            self._end(failed=kind is not None)
+            self._end()
 
     def desk(self) -> Path:
         """Make the empty folder for the new files, and return it."""
@@ -107,13 +111,13 @@ class AtomicFolder:
         return desk
 
     def replace(self, desk: Path, old: Iterable[str]) -> None:
-        """Put all files of the `desk` in the place of those called `old`; others stay.
+        """Replace the files called `old` by all files of the `desk`; other files stay.
 
-        Whoever looks sees the old files or the new ones, and every file of others, unless the
-        folder must stay where it is: a mount point, the working directory, one in a folder that
-        cannot be written, one with folders of others, or on a file system without the exchange of
-        names or without hard links. Then `last` is missing while files are moved; should the
-        process be killed meanwhile, the next `AtomicFolder` moves the rest.
+        A reader sees all old files or all new ones at any time, and every other file, unless the
+        folder cannot be exchanged: a mount point, the working directory, a folder whose parent
+        cannot be written, one with subfolders, or one on a file system without the exchange of
+        names or without hard links. There the files are replaced one by one, and `last` is missing
+        meanwhile; if the process is killed then, the next `AtomicFolder` completes the change.
 
         Raises
         ------
@@ -148,7 +152,7 @@ class AtomicFolder:
         self._move_in(inside)
 
     def _take(self) -> None:
-        """Lock the folder, by a file beside it, or in it where that cannot be."""
+        """Lock the folder by a file beside it; in it if the parent cannot be written."""
         beside, inside = self._folder.parent / f".{self._folder.name}.lock", self._folder / ".lock"
         for path in (beside, inside):
             try:
@@ -164,8 +168,8 @@ class AtomicFolder:
             sign(descriptor)
             return
 
-    def _end(self, *, failed: bool) -> None:
-        """Let go of the folder; remove it if it was made in vain."""
+    def _end(self) -> None:
+        """Unlock the folder; remove it if it was made in vain."""
         if self._lock is not None:
             path, descriptor = self._lock
             self._lock = None
@@ -174,10 +178,9 @@ class AtomicFolder:
                     os.unlink(path)
             finally:
                 os.close(descriptor)
-        if failed:
-            with contextlib.suppress(OSError):
-                for one in self._made:
-                    one.rmdir()
+        with contextlib.suppress(OSError):
+            for one in self._made:
+                one.rmdir()  # fails where something is in it
 
     def _places(self) -> tuple[Path, Path]:
         """Return the folders in which the new files may be made: beside, and inside."""
@@ -185,7 +188,7 @@ class AtomicFolder:
         return self._folder.parent / f".{self._folder.name}.{name}", self._folder / f".{name}"
 
     def _may_leave(self) -> bool:
-        """Whether the folder may become another one of the same name."""
+        """Whether the folder may be exchanged, as far as can be told beforehand."""
         parent = self._folder.parent
         if os.path.ismount(self._folder) or os.stat(parent).st_dev != os.stat(self._folder).st_dev:
             return False
@@ -194,7 +197,7 @@ class AtomicFolder:
         return True
 
     def _clear(self) -> None:
-        """Complete or undo what this process, or a killed one, has begun."""
+        """Complete or undo what this process or a killed one has begun."""
         beside, inside = self._places()
         if _is_left(beside):
             ours = _read_list(beside)

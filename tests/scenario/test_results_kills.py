@@ -17,7 +17,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.atomic import AtomicFolder
-from sphshell_pin.errors import ResultError, ScenarioError, ShellFileError
+from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, new, run, run_built
 from sphshell_pin.shell.converting import convert
@@ -189,6 +189,27 @@ def test_where_names_cannot_be_exchanged_the_next_run_goes_on(
         assert os.listdir(place) == ["out"], n
 
 
+def test_killed_while_it_writes_what_stopped_early_it_leaves_nothing_behind(
+    two_runs, results, runs, place, monkeypatch
+):
+    keep, before, _ = two_runs
+    built, (computed, _) = runs["new"]
+
+    def stop():
+        monkeypatch.setattr(run, "simulate", lambda *_: (computed, Interrupted(0.01, computed)))
+        run_built(built, place / "out", recording=False)
+
+    for n in ends(place, keep, stop):
+        left = visible(place)
+        assert {name: left[name] for name in before if "stopped" not in name} == {
+            name: data for name, data in before.items() if "stopped" not in name
+        }
+        with AtomicFolder(place / "out", last="summary.json", inner=["stopped"]):
+            pass
+        assert contents(place) == visible(place), n
+        assert not list(place.rglob(".*")), n
+
+
 def test_killed_in_its_first_run_a_folder_is_empty_or_whole(results, place, tmp_path):
     keep = tmp_path / "keep"
     keep.mkdir()
@@ -254,12 +275,3 @@ def test_other_files_are_old_or_new(writer, act, place, tmp_path):
         write_new(place)
         assert contents(place) == after, n
     assert False in seen
-
-
-def test_a_second_run_is_told_who_has_the_folder(runs, place, monkeypatch):
-    out = place / "out"
-    with AtomicFolder(out, last="summary.json"):
-        monkeypatch.setattr(run, "simulate", lambda *_: pytest.fail("it ran"))
-        with pytest.raises(ResultError, match=rf"process {os.getpid()}, since 20.* --out"):
-            run_built(runs["new"][0], out)
-    assert os.listdir(place) == ["out"]
