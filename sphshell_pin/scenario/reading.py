@@ -84,8 +84,10 @@ def parse_scenario(text: str, path: str | PathLike[str]) -> Scenario:
         raise ScenarioError(path, "", f"is not valid TOML: line {line} has a key of 100 parts")
     try:
         data = tomllib.loads(text)
-    except ValueError as error:  # also a number of thousands of digits
+    except tomllib.TOMLDecodeError as error:
         raise ScenarioError(path, "", f"is not valid TOML: {error}") from None
+    except ValueError:  # of int(), whose texts are limited
+        raise ScenarioError(path, "", "is not valid TOML: a number has too many digits") from None
     except RecursionError:
         raise ScenarioError(path, "", TOO_DEEP) from None
     return _validated(data, path)

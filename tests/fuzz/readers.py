@@ -70,12 +70,19 @@ def _read_journal(path: Path) -> None:
 
 
 def _read_robot(path: Path) -> None:
+    fault = None
     for load in (load_subject, robots.load_urdf):
-        loaded = load(str(path))
+        try:
+            loaded = load(str(path))
+        except SphshellError as error:
+            fault = error  # the other one has to refuse it, or read it, as well
+            continue
         robot = getattr(loaded, "robot", loaded)
         scene = sp.Scene(robot.model)
         pin.forwardKinematics(scene.model, scene.model.createData(), robot.q0)
         robots.end_spheres(robot)
+    if fault is not None:
+        raise fault
 
 
 _READERS = {

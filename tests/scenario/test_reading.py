@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from sphshell_pin.errors import NameNotFound, ScenarioError
+import sphshell_pin as sp
+from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.scenario.reading import find_scenario, read_scenario, shipped_scenarios
+from sphshell_pin.view.live.opening import player_of
 from tests.scenario.files import DROP, write
 
 FAULTS = {
@@ -172,3 +174,13 @@ def test_shipped_scenarios_are_valid_and_expect_something(name):
     assert scenario.expect
     assert len(scenario.title) > 20
     assert len(scenario.description) > 100
+
+
+@pytest.mark.parametrize("name", ["x" * 3000, "a\0b", f"{'x' * 300}/y.toml"])
+def test_a_name_that_the_system_refuses_is_no_such_file(name, tmp_path):
+    with pytest.raises(SphshellError):
+        find_scenario(tmp_path / name)
+    with pytest.raises(SphshellError):
+        player_of(tmp_path / f"{name}.toml")
+    with pytest.raises(SphshellError, match=r"no such file|cannot be read"):
+        sp.Shell.from_file(tmp_path / f"{name}.stl", "mm")

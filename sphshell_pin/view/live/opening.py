@@ -146,9 +146,9 @@ def result_file(what: str | PathLike[str]) -> Path | None:
     path = Path(what)
     if path.suffix == ".npz":
         return path
-    if (path / RESULT).is_file():
+    if os.path.isfile(path / RESULT):
         return path / RESULT
-    if path.is_dir() and str(what) not in shipped_scenarios():
+    if os.path.isdir(path) and str(what) not in shipped_scenarios():
         raise ResultError(path, f"has no {RESULT}: the folder of a finished run would")
     return None
 
