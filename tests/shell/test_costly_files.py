@@ -107,6 +107,47 @@ def test_elements_that_lie_on_one_another_are_refused():
         clean(points, np.arange(4500).reshape(-1, 3))
 
 
+SOLID = (
+    "solid x\nfacet normal 0 0 1\nouter loop\nvertex {0} 0 0\nvertex {0} 1 0\nvertex {0} 0 1\n"
+    "endloop\nendfacet\nendsolid x\n"
+)
+
+LONG = {  # a file of n repeated pieces
+    "digits.shl": lambda n: "1" * n + "x\n3 1 1.0\n0 0 0\n1 0 0\n0 1 0\n3 1 2 3\n",
+    "blanks.shl": lambda n: f"version{' ' * n}x\n3 1 1.0\n0 0 0\n1 0 0\n0 1 0\n3 1 2 3\n",
+}
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_a_long_file_costs_little_more_than_its_length(tmp_path, name):
+    path = tmp_path / name
+
+    def cost(count):
+        path.write_text(LONG[name](count))
+        start = time.thread_time()
+        Shell.from_file(path, None)
+        return time.thread_time() - start
+
+    assert cost(80_000) < 18 * cost(10_000) + 1.0
+
+
+@pytest.mark.parametrize("ends", ["\n", "\r\n"])
+def test_many_solids_cost_little_more_than_one(tmp_path, ends):
+    path = tmp_path / "solids.stl"
+
+    def cost(text):
+        path.write_text(text, newline=ends)
+        start = time.thread_time()
+        shell = Shell.from_file(path, "m")
+        assert (len(shell.elements), shell.health.components) == (3000, 3000)
+        assert sorted(shell.vertices[:, 0].tolist()) == sorted([*range(3000)] * 3)
+        return time.thread_time() - start
+
+    many = "".join(SOLID.format(k) for k in range(3000))
+    one = many.replace("endsolid x\nsolid x\n", "")
+    assert cost(many) < 10 * cost(one)
+
+
 PLY = "ply\nformat {}\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
 FACES = "element face {}\nproperty list uchar int vertex_indices\nend_header\n"
 POINTS = "0 0 0\n1 0 0\n0 1 0\n"

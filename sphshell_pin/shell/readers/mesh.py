@@ -7,6 +7,7 @@ corners, and it loses the quads of off files altogether; here elements must stay
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ def read_stl(path: Path) -> RawSurface:
 
     try:
         # From memory: a file that cannot be opened is then told from one that cannot be parsed.
-        data = io.BytesIO(path.read_bytes())
+        data = io.BytesIO(_few_solids(path.read_bytes()))
     except OSError as error:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
     try:
@@ -40,6 +41,18 @@ def read_stl(path: Path) -> RawSurface:
     triangles = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
     offsets, corners = pack_polygons(np.full(len(triangles), 3), triangles.ravel())
     return finish(path, np.asarray(mesh.vertices, np.float64), offsets, corners)
+
+
+_BETWEEN_SOLIDS = re.compile(rb"(?im)^[ \t]*endsolid\b[^\r\n]*[\r\n]\s*solid\b[^\r\n]*")
+_MANY_SOLIDS = 1000
+
+
+def _few_solids(data: bytes) -> bytes:
+    """Join the solids of a text file of very many: trimesh takes the square of their number."""
+    binary = len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
+    if binary or len(_BETWEEN_SOLIDS.findall(data)) < _MANY_SOLIDS:
+        return data
+    return _BETWEEN_SOLIDS.sub(b"", data)
 
 
 def read_obj(path: Path) -> RawSurface:

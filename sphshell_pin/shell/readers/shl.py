@@ -18,10 +18,11 @@ from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface
 from sphshell_pin.shell.readers.text import finish, pack_polygons, read_text
 
-_VERSION = re.compile(r"\s*version\s*[:=]?\s*([\d.]+)\s*$", re.IGNORECASE)
+# No two neighbours in a pattern match the same text: a long line would cost its length squared.
+_VERSION = re.compile(r"\s*version\s*(?:[:=]\s*)?([\d.]+)\s*$", re.IGNORECASE)
 _FORTRAN_EXPONENT = str.maketrans("dD", "eE")
 # What a line of numbers may be made of; the words a real may be spelled with are not among it.
-_NUMBERS = re.compile(r"[-+0-9.eEdD\s]*[0-9][-+0-9.eEdD\s]*$")
+_NUMBERS = re.compile(r"(?=[^0-9]*[0-9])[-+0-9.eEdD\s]*$")
 _NOT_FINITE = re.compile(r"(?i)(?<![a-z])[-+]?(nan|inf|infinity)(?![a-z])")
 
 
