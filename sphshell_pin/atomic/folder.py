@@ -29,7 +29,7 @@ from sphshell_pin.atomic.lock import holder, lock_file, sign
 _FILES, _READY = "files", "ready.json"
 
 
-class Busy(OSError):
+class FolderInUse(OSError):
     """Another process is writing the folder; the text says which and since when."""
 
 
@@ -49,7 +49,7 @@ class AtomicFolder:
 
     Raises
     ------
-    Busy
+    FolderInUse
         Another process has locked it.
     OSError
         It cannot be made or written.
@@ -158,7 +158,7 @@ class AtomicFolder:
             try:
                 descriptor, locked = lock_file(path, wait=False)
             except BlockingIOError:
-                raise Busy(f"{holder(path)} is writing it") from None
+                raise FolderInUse(f"{holder(path)} is writing it") from None
             except OSError:
                 if path == inside:
                     raise

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from sphshell_pin.atomic import AtomicFolder, Busy
+from sphshell_pin.atomic import AtomicFolder, FolderInUse
 from sphshell_pin.dynamics.result import Origin
 from sphshell_pin.errors import (
     Interrupted,
@@ -187,7 +187,7 @@ def _results_folder(folder: Path) -> Iterator[AtomicFolder]:
     with contextlib.ExitStack() as held:
         try:
             place = held.enter_context(AtomicFolder(folder, last=SUMMARY, inner=[STOPPED]))
-        except Busy as busy:
+        except FolderInUse as busy:
             raise ResultError(
                 folder, f"{busy}: wait until it ends, or give another folder with --out"
             ) from None

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from sphshell_pin.atomic import AtomicFolder, Busy
+from sphshell_pin.atomic import AtomicFolder, FolderInUse
 from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
 from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.study.report import forces, hard_cases, integrators, peers, queries, steps
@@ -102,7 +102,7 @@ def _report_folder(out: Path) -> Iterator[AtomicFolder]:
     with contextlib.ExitStack() as held:
         try:
             place = held.enter_context(AtomicFolder(out, last=DATA))
-        except Busy as busy:
+        except FolderInUse as busy:
             raise ResultError(out, f"{busy}: wait until it ends, or give another --out") from None
         except OSError as error:
             raise ResultError(out, f"cannot hold a report: {error.strerror}") from None
