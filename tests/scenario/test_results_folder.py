@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from sphshell_pin.atomic import AtomicFolder, Busy, atomic_file
+from sphshell_pin.atomic import AtomicFolder, FolderInUse, atomic_file
 from sphshell_pin.atomic.exchange import exchange
 from sphshell_pin.errors import ResultError
 from sphshell_pin.scenario import build, run, run_built
@@ -225,7 +225,7 @@ def test_a_folder_made_in_vain_is_removed(tmp_path):
 
     def refuse():
         with AtomicFolder(out, last=LAST):
-            with pytest.raises(Busy), AtomicFolder(out, last=LAST):
+            with pytest.raises(FolderInUse), AtomicFolder(out, last=LAST):
                 pass
             assert out.is_dir()
             raise ZeroDivisionError
