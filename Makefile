@@ -77,6 +77,7 @@ real-surfaces: $(VENV)/.test
 
 fuzz: $(VENV)/.test
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
+	$(BIN)/python -m tests.fuzz.cad --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 
 work-precision: $(VENV)/.test
 	$(BIN)/python -m benchmarks.work_precision --write

@@ -72,7 +72,7 @@ def _check_size(path: str | PathLike[str]) -> None:
     try:
         with Path(path).open("rb") as file:
             parser.ParseFile(file)
-    except expat.ExpatError as error:
+    except (expat.ExpatError, LookupError) as error:  # LookupError: an unknown encoding
         raise ValueError(f"it is not well-formed XML: {error}") from None
     if links > MOST_LINKS:
         raise ValueError(f"it has {links} links; at most {MOST_LINKS} can be read")
