@@ -61,7 +61,7 @@ def failing_import(folder: Path, core: str | None) -> str:
     """Import a copy of the package in `folder` whose core is the module `core`: the last line."""
     package = folder / "sphshell_pin"
     package.mkdir()
-    for name in ("__init__", "_versions", "errors"):
+    for name in ("__init__", "_interrupts", "_versions", "errors"):
         shutil.copy(PACKAGE / f"{name}.py", package)
     if core is not None:
         (package / "_core.py").write_text(core, encoding="utf-8")

@@ -104,6 +104,8 @@ def test_the_child_ends_with_its_parent(number, box, tmp_path):
     """A script without a guard, while the child holds the interpreter's lock for ever."""
     job = f"open({str(tmp_path / 'pid')!r}, 'w').write(f'{{os.getpid()}} '); {JOBS['hang']}"
     code = f"""
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background ignore it
 from sphshell_pin import Shell
 from sphshell_pin.shell.cad import process
 process._START = {start_with(job)!r}

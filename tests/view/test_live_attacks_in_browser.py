@@ -70,6 +70,10 @@ def test_another_site_can_neither_frame_nor_drive_nor_read_it(live, tab, other_s
     # Even one that knows the address.
     other_site.body = f'<iframe src="{live.url}"></iframe>'
     tab.goto(f"http://{name}:{other_site.port}/")
+    for _ in range(200):
+        if tab.frames[1].url:
+            break
+        tab.wait_for_timeout(50)
     assert tab.frames[1].url.startswith("chrome-error:")
     address = inside(live.url, "socket")
     seen = tab.evaluate(ATTACK, [address, address.partition("?")[0], live.url])
