@@ -174,6 +174,11 @@ void bind_shell(nanobind::module_& m) {
       .def(nb::new_(&make_shell), nb::arg("vertices"), nb::arg("triangles"),
            nb::arg("triangle_element"), nb::arg("crease_angle"), nb::arg("side"),
            nb::arg("face").none() = nb::none(), nb::arg("normals").none() = nb::none())
+      .def("__reduce_ex__",
+           [](const Shell&, int) -> nb::object {
+             raise_own("NotPicklable",
+                       "a compiled core cannot be pickled or copied: send its Shell instead");
+           })
       .def(
           "curve",
           [](Shell& shell, std::optional<Points> normals, bool exact,
