@@ -31,7 +31,7 @@ def lock_file(path: Path, *, wait: bool = True) -> tuple[int, bool]:
         descriptor = os.open(path, flags, 0o666)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-            # Whoever had the lock may have removed or renamed the file: then others lock a new one.
+            # The holder before may have removed or renamed the file: then others lock a new one.
             if _is_at(descriptor, path):
                 return descriptor, True
         except OSError as fault:
