@@ -204,7 +204,7 @@ class CellSearch {
   Eigenvalues whole_{0, 0, 0};      // bounds on the second derivative of |x|^2 / 2
   double radius_, least_;           // least: square of the distance of out_
   double steepest_, bend_, twist_;  // bounds on the derivatives of x, over the facet
-  double whole2_;  // least2_of the whole cell
+  double whole2_;                   // least2_of the whole cell
   bool level_;                      // all of it is as near as its nearest corner
   Nearest& out_;
 };

@@ -11,7 +11,8 @@ namespace {
 // moves it by a quarter of the radius at most.
 constexpr double kDeep = 0.5;
 
-// Longer lists, which only a contact source gives, go on by their order: all pairs would be too many.
+// Longer lists, which only a contact source gives, go on by their order: all pairs would be too
+// many.
 constexpr std::size_t kLongest = 1000;
 
 }  // namespace
