@@ -50,7 +50,7 @@ def roll_out(
     progress: Callable[[float], object] | None,
     t0: float,
 ) -> Rollout:
-    """Make the runs of Simulation.rollout, which see."""
+    """Make the runs of Simulation.rollout; its docstring says what the arguments are."""
     began = time.perf_counter()
     workers = _worker_count(threads)
     duration = check_not_negative("duration", duration, "s")

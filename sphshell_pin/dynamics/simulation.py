@@ -182,7 +182,7 @@ class Simulation:
         t0: float = 0.0,
         warn: bool = True,
     ) -> _core.Simulation:
-        """Check what `run` takes, which see, and return the compiled run, not yet started.
+        """Check the arguments of `run` and return the compiled run, not yet started.
 
         With `warn`, a law that cannot stop its sphere earns a WeakLawWarning.
         """

@@ -77,12 +77,6 @@ class CadSurface:
         )
 
 
-def read_cad(path: Path, unit: str | None, options: CadOptions) -> tuple[RawSurface, CadSurface]:
-    """Read and tessellate a CAD file: its polygons in metres; see `load_cad` for the errors."""
-    surface = load_cad(path, unit, options)
-    return surface.polygons().noting(*surface.notes()), surface
-
-
 def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
     """Read, sew and tessellate a CAD file.
 

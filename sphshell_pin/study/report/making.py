@@ -79,7 +79,7 @@ def make_report(
 ) -> Report:
     """Measure everything, then write the page and its tables to the folder `out`.
 
-    An error of one section is told in that section. Nothing is written before all is measured, so
+    An error of one section is stated in that section. Nothing is written before all is measured, so
     that an interrupted run leaves what was there. `tell` hears how far it is.
 
     Raises

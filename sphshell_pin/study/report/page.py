@@ -1,4 +1,4 @@
-"""The page: one HTML file that asks nobody for anything, in light and dark, and for paper."""
+"""The page: one HTML file that makes no external requests, in light and dark, and for paper."""
 
 from __future__ import annotations
 
