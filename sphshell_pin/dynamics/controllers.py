@@ -230,7 +230,7 @@ def wrap_callable(callback: Callback, model: pin.Model) -> _core.Controller:
     """Wrap tau(t, q, v, contacts) -> (nv,) for the core; its answers are checked."""
 
     def torque(t: float, q: bytearray, v: bytearray, rows: bytearray) -> Array:
-        contacts = SceneContacts.from_rows(np.frombuffer(rows).reshape(-1, 18))
+        contacts = SceneContacts.from_rows(rows)
         try:
             tau = callback(t, np.frombuffer(q), np.frombuffer(v), contacts)
         except Exception as error:

@@ -94,8 +94,8 @@ def _names_of(scene: Scene) -> dict[str, tuple[int, _Change, tuple[int, ...] | N
         if pair.sphere is None:
             continue
         out[f"{pair.name}.sphere.radius"] = k, _set_radius, ()
-        out[f"{pair.name}.sphere.offset"] = k, _offset(scene), (3,)
-        out[f"{pair.name}.placement"] = k, _placement(scene), None
+        out[f"{pair.name}.sphere.offset"] = k, _set_offset, (3,)
+        out[f"{pair.name}.placement"] = k, _set_placement, None
     return out
 
 
@@ -148,20 +148,11 @@ def _set_radius(pair: ContactPair, radius: float) -> ContactPair:
     return replace(pair, sphere=replace(pair.sphere, radius=radius))
 
 
-def _offset(scene: Scene) -> _Change:
-    def change(pair: ContactPair, offset: Any) -> ContactPair:
-        assert pair.sphere is not None
-        sphere = replace(pair.sphere, offset=tuple(offset))
-        return replace(pair, sphere=sphere, sphere_placement=scene.place(sphere))
-
-    return change
+def _set_offset(pair: ContactPair, offset: Any) -> ContactPair:
+    assert pair.sphere is not None
+    return replace(pair, sphere=replace(pair.sphere, offset=tuple(offset)))
 
 
-def _placement(scene: Scene) -> _Change:
-    def change(pair: ContactPair, placement: Any) -> ContactPair:
-        check_type("placement", placement, pin.SE3, "must be a pinocchio.SE3")
-        placement = check_placement("placement", placement)
-        in_joint = scene.frame_in_joint(pair.frame)[1] * placement
-        return replace(pair, placement=placement, shell_placement=in_joint)
-
-    return change
+def _set_placement(pair: ContactPair, placement: Any) -> ContactPair:
+    check_type("placement", placement, pin.SE3, "must be a pinocchio.SE3")
+    return replace(pair, placement=check_placement("placement", placement))

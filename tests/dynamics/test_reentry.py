@@ -122,7 +122,7 @@ def holder_of_a_pair() -> object:
     class Pair:
         def __init__(self) -> None:
             scene = sp.Scene(ball())
-            self.core = scene.add_contact_source(self.find, "ball", "universe").to_core()
+            self.core = scene.add_contact_source(self.find, "ball", "universe", LAW).to_core()
 
         def find(self, pose_i, pose_j):
             return some_contacts(0)
