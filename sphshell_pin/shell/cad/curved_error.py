@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from OCP.gp import gp_Pnt, gp_Vec
 
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.cad.face_mesh import ALONG, CURVED, FaceMesh
-from sphshell_pin.shell.cad.face_surface import stationary_parameter
 from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.surface import CadSurface
 from sphshell_pin.shell.cleaned import CleanedSurface
@@ -30,9 +30,9 @@ MOST_ROUNDS = 6
 SAME_PLACE = 1e-6
 """A corner this near to a node, as a share of the size, is it: cleaning welds within less."""
 
-CURVE_SEEDS, SETTLED = 9, 0.01
-"""Places along an edge from the nearest of which Newton's method goes on; the share of the chord
-error below which a step no longer changes the distance notably."""
+CURVE_SEEDS, CURVE_STEPS, SETTLED = 9, 4, 0.01
+"""Places along an edge from the nearest of which Newton's method goes on; its steps; the share of
+the chord error below which a step no longer changes the distance notably."""
 
 
 @dataclass(frozen=True)
@@ -227,17 +227,29 @@ def _note(found: Errors, stated: float, factor: float, count: int, bent: float) 
 
 
 def _from_curve(curve: Occ, points: Floats, start: float, end: float, settled: float) -> float:
-    """Largest distance of points (k, 3) along a side from the curve between two parameters."""
+    """Largest distance of points (k, 3) along a side from the curve between two parameters.
+
+    Gauss-Newton steps shorter than `settled` are the last.
+    """
+    place, tangent = gp_Pnt(), gp_Vec()
     # Its speed may be anything: the middle of the side need not be near that of the parameters.
     seeds = np.linspace(start, end, CURVE_SEEDS)
     along = np.array([curve.Value(at).Coord() for at in seeds.tolist()])
-    ends = curve.FirstParameter(), curve.LastParameter()
+    low, high = curve.FirstParameter(), curve.LastParameter()
     largest = 0.0
     for point in points:
         away = np.linalg.norm(along - point, axis=1)
-        at = stationary_parameter(curve, point, float(seeds[np.argmin(away)]), ends, settled)
-        nearest = float(away.min())
-        if at is not None:
-            nearest = min(nearest, float(np.linalg.norm(point - curve.Value(at).Coord())))
+        nearest, at = float(away.min()), float(seeds[np.argmin(away)])
+        for _ in range(CURVE_STEPS):
+            curve.D1(at, place, tangent)
+            offset, derivative = point - place.Coord(), np.array(tangent.Coord())
+            nearest = min(nearest, float(np.linalg.norm(offset)))
+            square = float(derivative @ derivative)
+            if square == 0.0:
+                break
+            along_curve = float(offset @ derivative)
+            at = min(max(at + along_curve / square, low), high)
+            if along_curve**2 <= settled**2 * square:
+                break
         largest = max(largest, nearest)
     return largest
