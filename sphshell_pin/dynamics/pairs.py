@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
-from sphshell_pin.contact import BristleFriction, Friction, Method, NormalLaw, Sphere
+from sphshell_pin.contact import Friction, Method, NormalLaw, Sphere
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.sources import Find, checked_source
 from sphshell_pin.shell import Shell
@@ -77,4 +77,5 @@ class ContactPair:
         )
 
     def _source(self, find: Find) -> Find:
-        return checked_source(find, self.name, isinstance(self.friction, BristleFriction))
+        has_state = self.friction is not None and self.friction.has_state
+        return checked_source(find, self.name, has_state)

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative
-from sphshell_pin.contact import BristleFriction
 from sphshell_pin.dynamics.explain import explain_pairs, relaxation_time
 from sphshell_pin.errors import InvalidParameter, NotPicklable
 
@@ -41,7 +40,7 @@ class SceneState:
         self._scene = scene
         self._pairs = scene.pairs
         cores = [pair.to_core() for pair in scene.pairs]
-        if any(isinstance(pair.friction, BristleFriction) for pair in scene.pairs):
+        if any(pair.friction and pair.friction.has_state for pair in scene.pairs):
             figures = explain_pairs(scene, *scene.check_state(scene.neutral if q is None else q, v))
             for pair, core, figure in zip(scene.pairs, cores, figures, strict=True):
                 core.relaxation = relaxation_time(pair, figure)

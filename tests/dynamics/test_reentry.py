@@ -186,7 +186,7 @@ def test_many_contacts_of_a_source_cost_in_proportion() -> None:
     contacts = scene.contacts(Q)
     assert len(contacts) == 30_000
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(Q, None, 3e-4)
-    assert np.array_equal(result.contacts.number[-30_000:], np.arange(30_000))
+    assert np.array_equal(result.contacts.contact_id[-30_000:], np.arange(30_000))
 
 
 def test_the_core_refuses_arrays_of_other_lengths() -> None:

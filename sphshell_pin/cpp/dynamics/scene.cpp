@@ -102,7 +102,7 @@ void Scene::accept(VectorX& z) {
     }
     const std::vector<int>& at = tracker.match(contacts, center, pair.radius);
     if (pair.friction.has_state())
-      bristles_.assign(k, contacts, at, tracker, z, pair.friction.torsional, pair.has_dn_dc());
+      bristles_.assign(k, contacts, at, tracker, z, pair.friction.torsional(), pair.has_dn_dc());
     else
       bristles_.assign_none(k);
     tracker.accept(contacts, center, pair.radius);
@@ -180,7 +180,7 @@ void Scene::compute_kinematics(ActiveContact& active, const VectorX& z) {
   m.normal = world_from_j.rotation() * active.contact.normal;
   m.relative.setZero();
   if (pair.needs_velocity()) m.relative = relative_velocity(pair, active.point);
-  if (pair.friction.torsional)
+  if (pair.friction.torsional())
     m.spin =
         m.normal.dot(body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
   if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
@@ -231,7 +231,7 @@ void Scene::add_force(const ActiveContact& active) {
   powers_.friction += weight * friction_power(f, m);
   powers_.elastic += share * pair.law.energy(m.depth);
   if (active.slot >= 0)
-    powers_.bristles += 0.5 * share * pair.friction.stiffness * f.bristle.squaredNorm();
+    powers_.bristles += 0.5 * share * pair.friction.bristle()->stiffness * f.bristle.squaredNorm();
 }
 
 void Scene::apply(int joint, const Vec3& point_world, const Vec3& force_world,
