@@ -1,7 +1,8 @@
 """A sweep of many runs whose workers, and which itself, are killed.
 
-`python -m tests.study.sweep_survival [RUNS]` prints, for each way to make the runs, whether every run is
-in the table once, and whether the file is bit for bit that of runs made in turn in one process.
+`python -m tests.study.sweep_survival [RUNS]` prints, for each way to make the runs, whether every
+run is in the table once, and whether the file is bit for bit that of runs made in turn in one
+process.
 """
 
 from __future__ import annotations
