@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +13,7 @@ import pinocchio as pin
 
 from sphshell_pin.checks import off_unit_length
 from sphshell_pin.errors import MissingExtra, NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.robots import LoadedRobot, load, load_urdf
 from sphshell_pin.scenario.reading import item_key
 from sphshell_pin.scenario.schema import Placement, RobotSection, Scenario
 
@@ -25,18 +24,17 @@ Array = npt.NDArray[np.float64]
 class Assembly:
     """All robots as one model, before any joint is locked."""
 
-    model: Any
-    """pinocchio.Model; names carry `label/` as soon as there are several robots."""
-    visual_model: Any
-    """pinocchio.GeometryModel to look at."""
+    model: pin.Model
+    """Names carry `label/` as soon as there are several robots."""
+    visual_model: pin.GeometryModel
     q0: Array
     """Start configuration (nq,)."""
     v0: Array
     """Start velocity (nv,)."""
     lock: tuple[str, ...]
     """Joints to lock at their place in q0."""
-    loaded: tuple[Any, ...] = ()
-    """The robots as they were loaded, one LoadedRobot for each table."""
+    loaded: tuple[LoadedRobot, ...] = ()
+    """The robots as they were loaded, one for each table."""
 
 
 @contextmanager
@@ -56,13 +54,13 @@ def blamed_on(path: Path, key: str) -> Iterator[None]:
         raise ScenarioError(path, key, why) from error
 
 
-def to_se3(placement: Placement) -> Any:
-    """Return the pinocchio.SE3 of a placement table."""
+def to_se3(placement: Placement) -> pin.SE3:
+    """Return the SE3 of a placement table."""
     return pin.SE3(pin.rpy.rpyToMatrix(*np.deg2rad(placement.rpy_deg)), np.array(placement.xyz))
 
 
 def assemble(
-    scenario: Scenario, path: Path, loaded: Mapping[tuple[object, ...], Any] | None = None
+    scenario: Scenario, path: Path, loaded: Mapping[tuple[object, ...], LoadedRobot] | None = None
 ) -> Assembly:
     """Load all robots of `scenario` and append them into one model under its gravity.
 
@@ -76,7 +74,6 @@ def assemble(
         A robot comes from a package that is not installed.
     """
     # The folder stands at the top of the repository and is installed inside the package.
-    robots = importlib.import_module("sphshell_pin.robots")
 
     several = len(scenario.robot) > 1
     base, visual = pin.Model(), pin.GeometryModel()
@@ -87,7 +84,7 @@ def assemble(
     for i, section in enumerate(scenario.robot):
         key = item_key("robot", scenario.robot, i)
         with blamed_on(path, key):
-            robot = (loaded or {}).get(origin(section)) or _load(robots, section, path)
+            robot = (loaded or {}).get(origin(section)) or _load(section, path)
         taken.append(robot)
         model, geometry = robot.model.copy(), robot.visual_model.copy()
         q, v = _start(model, robot.q0, section, path, key)
@@ -126,7 +123,7 @@ def origin(section: RobotSection) -> tuple[object, ...]:
     return section.name, section.urdf, tuple(section.package_dirs), section.free_flyer
 
 
-def reduce_visual(assembly: Assembly) -> Any:
+def reduce_visual(assembly: Assembly) -> pin.GeometryModel:
     """Return the visual geometry for the model with `assembly.lock` locked."""
     if not assembly.lock:
         return assembly.visual_model
@@ -135,7 +132,7 @@ def reduce_visual(assembly: Assembly) -> Any:
     return geometry
 
 
-def restrict(model: Any, reduced: Any, q: Array, v: Array) -> tuple[Array, Array]:
+def restrict(model: pin.Model, reduced: pin.Model, q: Array, v: Array) -> tuple[Array, Array]:
     """Return the state (q, v) of `model` for the joints that `reduced` still has."""
     q_reduced, v_reduced = pin.neutral(reduced), np.zeros(reduced.nv)
     for j, name in enumerate(reduced.names):
@@ -146,7 +143,7 @@ def restrict(model: Any, reduced: Any, q: Array, v: Array) -> tuple[Array, Array
     return q_reduced, v_reduced
 
 
-def set_joint(model: Any, q: Array, name: str, value: float | list[float]) -> None:
+def set_joint(model: pin.Model, q: Array, name: str, value: float | list[float]) -> None:
     """Write the position of one joint into `q` [m, rad; a free-flyer's x y z and quaternion].
 
     Raises
@@ -172,11 +169,11 @@ def set_joint(model: Any, q: Array, name: str, value: float | list[float]) -> No
     q[span] = value
 
 
-def _load(robots: Any, section: RobotSection, path: Path) -> Any:
+def _load(section: RobotSection, path: Path) -> LoadedRobot:
     if section.name is not None:
-        return robots.load(section.name)
+        return load(section.name)
     folder = path.parent
-    return robots.load_urdf(
+    return load_urdf(
         folder / (section.urdf or ""),
         [folder / one for one in section.package_dirs],
         free_flyer=section.free_flyer,
@@ -185,7 +182,7 @@ def _load(robots: Any, section: RobotSection, path: Path) -> Any:
 
 
 def _start(
-    model: Any, q_default: Array, section: RobotSection, path: Path, key: str
+    model: pin.Model, q_default: Array, section: RobotSection, path: Path, key: str
 ) -> tuple[Array, Array]:
     q, v = np.array(q_default, dtype=float), np.zeros(model.nv)
     if section.q is not None:
@@ -216,12 +213,12 @@ def _start(
     return unit, v
 
 
-def _refuse_joint(model: Any, name: str, path: Path, key: str) -> None:
+def _refuse_joint(model: pin.Model, name: str, path: Path, key: str) -> None:
     with blamed_on(path, key):
         raise NameNotFound("joint", name, "the robot", list(model.names)[1:])
 
 
-def _rename(model: Any, geometry: Any, prefix: str) -> None:
+def _rename(model: pin.Model, geometry: pin.GeometryModel, prefix: str) -> None:
     for j in range(1, model.njoints):
         model.names[j] = prefix + model.names[j]
     for f in range(1, model.nframes):
@@ -230,15 +227,17 @@ def _rename(model: Any, geometry: Any, prefix: str) -> None:
         one.name = prefix + one.name
 
 
-def _span_q(model: Any, joint: int) -> slice:
+def _span_q(model: pin.Model, joint: int) -> slice:
     return slice(model.joints[joint].idx_q, model.joints[joint].idx_q + model.joints[joint].nq)
 
 
-def _span_v(model: Any, joint: int) -> slice:
+def _span_v(model: pin.Model, joint: int) -> slice:
     return slice(model.joints[joint].idx_v, model.joints[joint].idx_v + model.joints[joint].nv)
 
 
-def by_joint(model: Any, values: Mapping[str, float], size: str, start: Array | float) -> Array:
+def by_joint(
+    model: pin.Model, values: Mapping[str, float], size: str, start: Array | float
+) -> Array:
     """Return a vector of length nq (`size` "q") or nv ("v") with `values` put in by joint name.
 
     Raises
