@@ -73,14 +73,12 @@ def assemble(
     MissingExtra
         A robot comes from a package that is not installed.
     """
-    # The folder stands at the top of the repository and is installed inside the package.
-
     several = len(scenario.robot) > 1
     base, visual = pin.Model(), pin.GeometryModel()
     starts: list[tuple[str, Array, Array]] = []
     lock: list[str] = []
     labels: set[str] = set()
-    taken: list[Any] = []
+    taken: list[LoadedRobot] = []
     for i, section in enumerate(scenario.robot):
         key = item_key("robot", scenario.robot, i)
         with blamed_on(path, key):
@@ -89,8 +87,8 @@ def assemble(
         model, geometry = robot.model.copy(), robot.visual_model.copy()
         q, v = _start(model, robot.q0, section, path, key)
         for j, joint in enumerate(section.lock):
-            if joint not in list(model.names)[1:]:
-                _refuse_joint(model, joint, path, f"{key}.lock[{j}]")
+            with blamed_on(path, f"{key}.lock[{j}]"):
+                joint_spans(model, joint, "the robot")
         prefix = ""
         if several:
             label = section.label or robot.name
@@ -100,11 +98,9 @@ def assemble(
             prefix = f"{label}/"
             _rename(model, geometry, prefix)
         lock += [prefix + joint for joint in section.lock]
-        starts += [
-            (name, q[_span_q(model, j)], v[_span_v(model, j)])
-            for j, name in enumerate(model.names)
-            if j > 0
-        ]
+        for name in list(model.names)[1:]:
+            in_q, in_v = joint_spans(model, name)
+            starts.append((name, q[in_q], v[in_v]))
         stand = to_se3(section.placement)
         if not several and stand.isIdentity():
             base, visual = model, geometry
@@ -113,8 +109,8 @@ def assemble(
     base.gravity.linear = np.array(scenario.gravity)
     q0, v0 = pin.neutral(base), np.zeros(base.nv)
     for name, q_joint, v_joint in starts:
-        j = base.getJointId(name)
-        q0[_span_q(base, j)], v0[_span_v(base, j)] = q_joint, v_joint
+        in_q, in_v = joint_spans(base, name)
+        q0[in_q], v0[in_v] = q_joint, v_joint
     return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken))
 
 
@@ -135,12 +131,26 @@ def reduce_visual(assembly: Assembly) -> pin.GeometryModel:
 def restrict(model: pin.Model, reduced: pin.Model, q: Array, v: Array) -> tuple[Array, Array]:
     """Return the state (q, v) of `model` for the joints that `reduced` still has."""
     q_reduced, v_reduced = pin.neutral(reduced), np.zeros(reduced.nv)
-    for j, name in enumerate(reduced.names):
-        if j > 0:
-            k = model.getJointId(name)
-            q_reduced[_span_q(reduced, j)] = q[_span_q(model, k)]
-            v_reduced[_span_v(reduced, j)] = v[_span_v(model, k)]
+    for name in list(reduced.names)[1:]:
+        to_q, to_v = joint_spans(reduced, name)
+        from_q, from_v = joint_spans(model, name)
+        q_reduced[to_q], v_reduced[to_v] = q[from_q], v[from_v]
     return q_reduced, v_reduced
+
+
+def joint_spans(model: pin.Model, name: str, owner: str = "the model") -> tuple[slice, slice]:
+    """Return the places of a joint's numbers in q and in v.
+
+    Raises
+    ------
+    NameNotFound
+        The model has no such joint; `owner` is what the message calls the model.
+    """
+    names = list(model.names)[1:]
+    if name not in names:
+        raise NameNotFound("joint", name, owner, names)
+    joint = model.joints[model.getJointId(name)]
+    return slice(joint.idx_q, joint.idx_q + joint.nq), slice(joint.idx_v, joint.idx_v + joint.nv)
 
 
 def set_joint(model: pin.Model, q: Array, name: str, value: float | list[float]) -> None:
@@ -153,20 +163,17 @@ def set_joint(model: pin.Model, q: Array, name: str, value: float | list[float])
     SphshellError
         `value` has not as many numbers as the joint.
     """
-    names = list(model.names)[1:]
-    if name not in names:
-        raise NameNotFound("joint", name, "the model", names)
-    joint = model.joints[model.getJointId(name)]
-    span = slice(joint.idx_q, joint.idx_q + joint.nq)
-    if not isinstance(value, list):
-        if joint.nv != 1:
-            raise SphshellError(f"joint '{name}' takes a list of {joint.nq} numbers")
+    span, rates = joint_spans(model, name)
+    count = span.stop - span.start
+    if isinstance(value, list):
+        if len(value) != count:
+            raise SphshellError(f"joint '{name}' takes {count} numbers, not {len(value)}")
+        q[span] = value
+    elif rates.stop - rates.start != 1:
+        raise SphshellError(f"joint '{name}' takes a list of {count} numbers")
+    else:
         # A continuous joint is stored as the cosine and the sine of its angle.
-        q[span] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
-        return
-    if len(value) != joint.nq:
-        raise SphshellError(f"joint '{name}' takes {joint.nq} numbers, not {len(value)}")
-    q[span] = value
+        q[span] = [value] if count == 1 else [np.cos(value), np.sin(value)]
 
 
 def _load(section: RobotSection, path: Path) -> LoadedRobot:
@@ -195,15 +202,13 @@ def _start(
         with blamed_on(path, f'{key}.start."{name}"'):
             set_joint(model, q, name, value)
     for name, value in section.speed.items():
-        if name not in list(model.names)[1:]:
-            _refuse_joint(model, name, path, f'{key}.speed."{name}"')
-        span = _span_v(model, model.getJointId(name))
+        where = f'{key}.speed."{name}"'
+        with blamed_on(path, where):
+            _, span = joint_spans(model, name, "the robot")
         values = np.atleast_1d(np.array(value, dtype=float))
-        if len(values) != span.stop - span.start:
-            n = span.stop - span.start
-            raise ScenarioError(
-                path, f'{key}.speed."{name}"', f"the joint takes {n} numbers", value
-            )
+        count = span.stop - span.start
+        if len(values) != count:
+            raise ScenarioError(path, where, f"the joint takes {count} numbers", value)
         v[span] = values
     unit = pin.normalize(model, q)
     # Rounded quaternions and cosines are set right; a wrong one (not of unit length) is a mistake.
@@ -213,11 +218,6 @@ def _start(
     return unit, v
 
 
-def _refuse_joint(model: pin.Model, name: str, path: Path, key: str) -> None:
-    with blamed_on(path, key):
-        raise NameNotFound("joint", name, "the robot", list(model.names)[1:])
-
-
 def _rename(model: pin.Model, geometry: pin.GeometryModel, prefix: str) -> None:
     for j in range(1, model.njoints):
         model.names[j] = prefix + model.names[j]
@@ -225,14 +225,6 @@ def _rename(model: pin.Model, geometry: pin.GeometryModel, prefix: str) -> None:
         model.frames[f].name = prefix + model.frames[f].name
     for one in geometry.geometryObjects:
         one.name = prefix + one.name
-
-
-def _span_q(model: pin.Model, joint: int) -> slice:
-    return slice(model.joints[joint].idx_q, model.joints[joint].idx_q + model.joints[joint].nq)
-
-
-def _span_v(model: pin.Model, joint: int) -> slice:
-    return slice(model.joints[joint].idx_v, model.joints[joint].idx_v + model.joints[joint].nv)
 
 
 def by_joint(
@@ -250,8 +242,5 @@ def by_joint(
         if size == "q":
             set_joint(model, vector, name, value)
             continue
-        names = list(model.names)[1:]
-        if name not in names:
-            raise NameNotFound("joint", name, "the model", names)
-        vector[_span_v(model, model.getJointId(name))] = value
+        vector[joint_spans(model, name)[1]] = value
     return vector
