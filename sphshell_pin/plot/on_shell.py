@@ -215,7 +215,7 @@ def _fewer(corners: FloatArray, bare: NDArray[np.bool_]) -> tuple[NDArray[np.int
 
     Of very many `bare` ones (m,) some are left out, and the others enlarged to take their place.
     """
-    share = max(1, -(-np.count_nonzero(bare) // MOST_PAINTED))
+    share = max(1, -(-int(np.count_nonzero(bare)) // MOST_PAINTED))
     kept = np.sort(np.concatenate((np.flatnonzero(bare)[::share], np.flatnonzero(~bare))))
     middle = corners[kept].mean(axis=1, keepdims=True)
     scale = 1.5 * np.sqrt(share) if share > 1 else 1.0

@@ -130,7 +130,6 @@ def _draw_maps(
     drawn = np.concatenate([part[figure].to_numpy(float) for _, part in groups])
     finite = drawn[np.isfinite(drawn)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
-    mesh = None
     for axis, (name, part) in zip(axes, groups, strict=False):
         grid = part.pivot(index=y_key, columns=x_key, values=figure)
         x, y = grid.columns.to_numpy(float), grid.index.to_numpy(float)
@@ -149,7 +148,7 @@ def _draw_maps(
             axis.set_yscale("log")
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
-    canvas.colorbar(mesh, ax=axes.tolist(), label=_label(figure))
+    canvas.colorbar(mesh, ax=list(axes), label=_label(figure))
     canvas.suptitle(figure, fontsize=12)
 
 

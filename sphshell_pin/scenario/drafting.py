@@ -244,7 +244,9 @@ def _fill(template: str, **values: object) -> str:
         text = ""
         for literal, name, _, conversion in formatter.parse(code):
             value = None if name is None else formatter.get_field(name, (), values)[0]
-            if conversion == "o" and not np.any(value):
+            if conversion == "o" and (
+                not value or (isinstance(value, list | tuple) and not any(value))
+            ):
                 break
             text += literal if name is None else literal + _toml(value)
         else:
@@ -262,7 +264,7 @@ def _fill(template: str, **values: object) -> str:
 
 
 def _rounded(values: ArrayLike, digits: int) -> list[float]:
-    rounded: list[float] = (np.round(values, digits) + 0.0).tolist()  # + 0.0: no -0.0
+    rounded: list[float] = (np.round(np.asarray(values), digits) + 0.0).tolist()  # no -0.0
     return rounded
 
 

@@ -39,6 +39,7 @@ from sphshell_pin.scenario.schema import (
     Box,
     Cylinder,
     HalfSpace,
+    Primitive,
     RobotSection,
     RunSection,
     Scenario,
@@ -303,7 +304,7 @@ def _shell_section(
     spread = float(np.linalg.norm(np.ptp(centres, axis=0)))
     size = _round_up(max(_SIZE * max(tip.radius for tip in tips), spread))
     ball = SphereSurface(type="sphere", radius=size)
-    primitives = {
+    primitives: dict[str, Primitive] = {
         "plane": HalfSpace(type="half-space", extent=2 * size),
         "box": Box(type="box", size=[2 * size, 2 * size, 0.4 * size]),
         "sphere": ball,

@@ -176,8 +176,8 @@ def origin_of(built: Built) -> Origin:
     """Return what a Result says of the scenario that it came from."""
     shipped = shipped_scenarios().get(built.name)
     scenario = built.name if shipped == built.path else str(built.path.absolute())
-    settings = _plain(built.scenario.model_dump(mode="json"))
-    return Origin(scenario, settings)
+    settings = built.scenario.model_dump(mode="json")
+    return Origin(scenario, {key: _plain(value) for key, value in settings.items()})
 
 
 @contextlib.contextmanager
@@ -289,7 +289,7 @@ def _write_summary(
             "numpy": np.__version__,
         },
         "files": {name: _digest(desk / name) for name in RESULTS if (desk / name).exists()},
-        "settings": result.origin.settings,
+        "settings": origin_of(built).settings,
     }
     text = json.dumps(_plain(summary), indent=2, allow_nan=False)
     (desk / SUMMARY).write_text(text + "\n", encoding="utf-8")

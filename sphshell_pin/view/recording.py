@@ -25,7 +25,7 @@ from sphshell_pin.view.bodies import SPHERE_COLOR
 from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, spaced
 from sphshell_pin.view.display import TRAIL_COLOR, Display, choose_view
 from sphshell_pin.view.distance import RAMP, Coloring, check_coloring
-from sphshell_pin.view.nodes import FloatArray, require_meshcat
+from sphshell_pin.view.nodes import FloatArray, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
 
 if TYPE_CHECKING:
@@ -95,7 +95,6 @@ def render_recording(
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
     positive, another `color`, or a geometry model that does not fit.
     """
-    meshcat = require_meshcat()
     check_coloring(color)
     for name, value in (("fps", fps), ("speed", speed)):
         if not (np.isfinite(value) and value > 0.0):
@@ -125,7 +124,7 @@ def render_recording(
     display = Display(
         scene,
         visual_model,
-        meshcat.Visualizer(window=window),
+        new_visualizer(window),
         view=view,
         arrows=arrows,
         arrow_scale=scale,

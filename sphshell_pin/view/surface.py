@@ -54,7 +54,8 @@ class SurfaceMesh:
         """Build from `shell`; with `curved` from its elements as the method "smooth" has them."""
         if not is_curved(shell, curved):
             points, triangles = np.asarray(shell.vertices), np.asarray(shell.triangles)
-            owner, same = np.arange(len(triangles)), np.arange(len(points))
+            owner = np.arange(len(triangles), dtype=np.int32)
+            same = np.arange(len(points))
             segments = outlined_edges(shell)
         else:
             from sphshell_pin.shell.curved import curved_mesh
