@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.checks import off_unit_length
+from sphshell_pin.dynamics.models import set_joint
 from sphshell_pin.errors import MissingExtra, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import LoadedRobot, load, load_urdf
 from sphshell_pin.scenario.reading import item_key
@@ -153,29 +154,6 @@ def joint_spans(model: pin.Model, name: str, owner: str = "the model") -> tuple[
     return slice(joint.idx_q, joint.idx_q + joint.nq), slice(joint.idx_v, joint.idx_v + joint.nv)
 
 
-def set_joint(model: pin.Model, q: Array, name: str, value: float | list[float]) -> None:
-    """Write the position of one joint into `q` [m, rad; a free-flyer's x y z and quaternion].
-
-    Raises
-    ------
-    NameNotFound
-        The model has no such joint.
-    SphshellError
-        `value` has not as many numbers as the joint.
-    """
-    span, rates = joint_spans(model, name)
-    count = span.stop - span.start
-    if isinstance(value, list):
-        if len(value) != count:
-            raise SphshellError(f"joint '{name}' takes {count} numbers, not {len(value)}")
-        q[span] = value
-    elif rates.stop - rates.start != 1:
-        raise SphshellError(f"joint '{name}' takes a list of {count} numbers")
-    else:
-        # A continuous joint is stored as the cosine and the sine of its angle.
-        q[span] = [value] if count == 1 else [np.cos(value), np.sin(value)]
-
-
 def _load(section: RobotSection, path: Path) -> LoadedRobot:
     if section.name is not None:
         return load(section.name)
@@ -225,22 +203,3 @@ def _rename(model: pin.Model, geometry: pin.GeometryModel, prefix: str) -> None:
         model.frames[f].name = prefix + model.frames[f].name
     for one in geometry.geometryObjects:
         one.name = prefix + one.name
-
-
-def by_joint(
-    model: pin.Model, values: Mapping[str, float], size: str, start: Array | float
-) -> Array:
-    """Return a vector of length nq (`size` "q") or nv ("v") with `values` put in by joint name.
-
-    Raises
-    ------
-    NameNotFound
-        The model has no such joint.
-    """
-    vector = np.array(start, dtype=float) * np.ones(model.nq if size == "q" else model.nv)
-    for name, value in values.items():
-        if size == "q":
-            set_joint(model, vector, name, value)
-            continue
-        vector[joint_spans(model, name)[1]] = value
-    return vector
