@@ -14,6 +14,8 @@ from sphshell_pin.scenario import build, run_built
 from tests.scenario.files import DROP, write
 from tests.view.test_recording_in_browser import browser  # noqa: F401
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):

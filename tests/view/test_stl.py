@@ -72,6 +72,7 @@ def test_a_file_of_several_links_is_stored_once():
     assert files["/other"] is other
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_the_page_restores_the_file(browser):  # noqa: F811
     source = Path(page_module.__file__).with_name("recording.html").read_text(encoding="utf-8")
