@@ -18,7 +18,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
-from sphshell_pin.contact.contact_set import ContactSet, Method
+from sphshell_pin.shell.contact_set import ContactSet, Method
 from sphshell_pin.errors import SphshellError
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.surfaces import mean_edge
