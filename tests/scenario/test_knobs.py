@@ -96,6 +96,7 @@ def test_a_value_set_from_outside_widens_the_range(tmp_path):
     assert (found.low, found.value, found.high) == (9e5, 5e6, 5e6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_shipped_knobs_hold_over_their_range(name):
     built = build(name)
