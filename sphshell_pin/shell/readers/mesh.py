@@ -25,7 +25,7 @@ def read_stl(path: Path) -> RawSurface:
         import trimesh
 
     try:
-        # From memory: a file that cannot be opened is then reported apart from one that cannot be parsed.
+        # From memory: so a file that cannot be opened is not reported as damaged.
         data = io.BytesIO(_few_solids(path.read_bytes()))
     except OSError as error:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
