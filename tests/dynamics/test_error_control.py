@@ -250,7 +250,7 @@ def scenario(run_keys: str, friction: str = "") -> str:
     [
         ('integrator = "adaptive"\ndt = 1e-4\n', "adaptive takes rtol and atol, not dt"),
         ('integrator = "implicit"\ndt = 1e-4\n', "implicit takes rtol and atol, not dt"),
-        ("rtol = 1e-4\n", "semi-implicit-euler takes dt, not rtol and atol"),
+        ("dt = 1e-4\nrtol = 1e-4\n", "semi-implicit-euler takes dt, not rtol and atol"),
         ('integrator = "adaptive"\nrtol = 1\n', "rtol"),
         ('integrator = "adaptive"\nrtol = -1e-3\n', "rtol"),
         ('integrator = "adaptiv"\n', "adaptive"),
