@@ -13,7 +13,7 @@ from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.controllers import Controller
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient, parameter, parameters_of, table
+from sphshell_pin.parameters import Ingredient, parameter, parameters_of, table, table_row
 
 FAMILIES = {"law": NormalLaw, "friction": Friction, "controller": Controller, "run": Integrator}
 KINDS = [kind for family in FAMILIES.values() for kind in family.kinds.values()]
@@ -100,3 +100,10 @@ def test_the_documents_have_the_tables_of_the_descriptions(family):
             assert table(kind) in page, f"docs/laws.md: the table of {kind.__name__} is now\n" + (
                 table(kind)
             )
+
+
+@pytest.mark.parametrize("family", ["law", "friction", "controller"])
+def test_the_reference_of_scenario_files_has_the_keys_of_the_descriptions(family):
+    page = (DOCS / "scenarios.md").read_text(encoding="utf-8")
+    for kind in FAMILIES[family].kinds.values():
+        assert table_row(kind) in page, f"docs/scenarios.md: a row is now\n{table_row(kind)}"
