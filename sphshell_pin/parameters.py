@@ -153,6 +153,11 @@ class Ingredient:
         """Return the parameters in their order, as the compiled core takes them."""
         return [float(getattr(self, name)) for name in parameters_of(self)]
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Files that this names, as it names them: relative to the scenario."""
+        return ()
+
     def made(self, folder: Path = Path()) -> Any:
         """Return what this states; `folder` is where its files are. By default itself."""
         return self

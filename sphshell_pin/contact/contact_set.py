@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.contact.laws import NormalLaw
+from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 
 Array = NDArray[np.float64]

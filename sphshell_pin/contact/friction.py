@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative, check_type
-from sphshell_pin.contact.laws import DECAYS_PER_PERIOD
+from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient, parameter
 

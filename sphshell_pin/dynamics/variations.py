@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from sphshell_pin.checks import as_floats, check_placement, check_type
 from sphshell_pin.contact.friction import check_friction
-from sphshell_pin.contact.laws import check_law
+from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.scene import ContactPair, Scene
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.parameters import parameters_of

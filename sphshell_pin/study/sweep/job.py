@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sphshell_pin.dynamics.controllers import PythonFunction
 from sphshell_pin.scenario.schema import Scenario
 
 DONE, FAILED = "done", "failed"
@@ -70,11 +69,12 @@ def digest(data: Any) -> str:
 
 
 def files_of(scenario: Scenario) -> set[str]:
-    """Return the files that `scenario` names: surfaces, URDFs, Python routines."""
+    """Return the files that `scenario` names: surfaces, URDFs, Python routines, tables of laws."""
     routines = [one.find for one in scenario.source] + list(scenario.figures.values())
-    if isinstance(scenario.controller, PythonFunction):
-        routines.append(scenario.controller.function)
     named = [one.file for one in scenario.shell] + [one.urdf for one in scenario.robot]
+    pairs = [*scenario.contact, *scenario.source]
+    stated = [scenario.controller, *(part for one in pairs for part in (one.law, one.friction))]
+    named += [file for one in stated for file in one.files]
     named += [routine.rpartition(":")[0] for routine in routines]
     return {name for name in named if name}
 
