@@ -90,9 +90,9 @@ class NormalLaw(Ingredient):
         return min(times)
 
 
-def check_law(law: object) -> None:
-    """Raise InvalidParameter unless `law` is a normal law."""
-    check_type("law", law, NormalLaw, "must be a law, for instance ImpactLaw(stiffness)")
+def check_law(law: object) -> NormalLaw:
+    """Return `law`; raise InvalidParameter unless it is a normal law."""
+    return check_type("law", law, NormalLaw, "must be a law, for instance ImpactLaw(stiffness)")
 
 
 def inverse(function: Callable[[float], float], value: float) -> float:

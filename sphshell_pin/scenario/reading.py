@@ -274,7 +274,7 @@ def _keys_of(table: str) -> Iterable[str]:
     return section.model_fields  # type: ignore[no-any-return]
 
 
-def _item_name(item: Mapping[str, Any]) -> str:
+def _item_name(item: Mapping[str, object]) -> str:
     return str(item.get("label") or item.get("name") or item.get("urdf") or "")
 
 

@@ -272,13 +272,16 @@ class SourceSection(Section):
 Controller = Annotated[Ingredient, OneOf(controllers.Controller)]
 
 
+def _bounds(about: Parameter) -> object:
+    return Field(gt=about.above, ge=about.at_least, le=about.at_most)
+
+
 # The parameters of all integrators, by name.
 STEPPING = {
     name: about for kind in Integrator.kinds.values() for name, about in parameters_of(kind).items()
 }
 _keys: dict[str, Any] = {
-    name: (Annotated[float | None, Field(**about.bounds), about], None)
-    for name, about in STEPPING.items()
+    name: (Annotated[float | None, _bounds(about), about], None) for name, about in STEPPING.items()
 }
 _Stepping: Any = create_model("_Stepping", __base__=Section, **_keys)
 

@@ -72,8 +72,11 @@ def files_of(scenario: Scenario) -> set[str]:
     """Return the files that `scenario` names: surfaces, URDFs, Python routines, tables of laws."""
     routines = [one.find for one in scenario.source] + list(scenario.figures.values())
     named = [one.file for one in scenario.shell] + [one.urdf for one in scenario.robot]
-    pairs = [*scenario.contact, *scenario.source]
-    stated = [scenario.controller, *(part for one in pairs for part in (one.law, one.friction))]
+    stated = [scenario.controller]
+    for one in scenario.contact:
+        stated += one.law, one.friction
+    for other in scenario.source:
+        stated += other.law, other.friction
     named += [file for one in stated for file in one.files]
     named += [routine.rpartition(":")[0] for routine in routines]
     return {name for name in named if name}
