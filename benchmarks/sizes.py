@@ -23,6 +23,7 @@ import numpy as np
 from sphshell_pin.benchmarks.query import (
     DEPTH,
     RADIUS,
+    coal_contestant,
     fcpw_contestant,
     libigl_contestant,
     query_contestant,
@@ -87,25 +88,6 @@ def available() -> float:
     return float("inf")
 
 
-def coal_contestant(vertices: Array, triangles: Any, centres: Array) -> Callable[[], float]:
-    """Time compiled collisions; the tree is built anew for each round, and not counted."""
-    from sphshell_pin import _core
-
-    return lambda: float(_core.coal_collide_all(vertices, triangles, centres, RADIUS)[0])
-
-
-def coal_tree(vertices: Array, triangles: Any) -> Any:
-    """Return Coal's tree."""
-    import coal
-
-    tree = coal.BVHModelOBBRSS()
-    tree.beginModel(len(triangles), len(vertices))
-    tree.addVertices(vertices)
-    tree.addTriangles(triangles.astype(np.uint32))
-    tree.endModel()
-    return tree
-
-
 def trimesh_contestant(vertices: Array, triangles: Any, centres: Array) -> Callable[[], float]:
     import trimesh
 
@@ -142,15 +124,10 @@ def serve(name: str, cells: int) -> None:
     centres = touching_centres(QUERIES.get(name, 20_000), size, RADIUS, DEPTH)
     contestant(name, *wavy_sheet(4, 4 * SIDE), centres[:1])()  # imports what it needs
     before, start = resident(), time.perf_counter()
-    if name == COAL:
-        tree = coal_tree(vertices, triangles)
-        told = {"build": time.perf_counter() - start, "memory": resident() - before}
-        del tree
-        run = contestant(name, vertices, triangles, centres)
-    else:
-        run = contestant(name, vertices, triangles, centres)
+    run = contestant(name, vertices, triangles, centres)
+    if name != COAL:
         run()  # some build at the first query
-        told = {"build": time.perf_counter() - start, "memory": resident() - before}
+    told = {"build": time.perf_counter() - start, "memory": resident() - before}
     print(json.dumps(told), flush=True)
     for _ in sys.stdin:
         print(json.dumps(run()), flush=True)
