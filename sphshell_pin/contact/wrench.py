@@ -10,7 +10,7 @@ import pinocchio as pin
 from sphshell_pin import _core
 from sphshell_pin.checks import check_finite, check_type, check_vector
 from sphshell_pin.contact.friction import CoulombFriction
-from sphshell_pin.contact.laws import NormalLaw, check_law
+from sphshell_pin.contact.normal_law import NormalLaw, check_law
 from sphshell_pin.errors import InvalidParameter
 
 

@@ -25,7 +25,7 @@ from sphshell_pin.checks import (
 )
 from sphshell_pin.contact import Friction, Method, NormalLaw, Sphere
 from sphshell_pin.contact.friction import check_friction
-from sphshell_pin.contact.laws import check_law
+from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.models import (
     check_model,
     check_no_mimic,
