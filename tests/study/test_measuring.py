@@ -75,7 +75,7 @@ def test_who_cannot_answer_is_left_out_with_a_reason(monkeypatch):
     names, notes = ["nobody", sizes.OURS_FLAT], []
     rows = sizes.measure_one(names, 22, 1, notes)
     assert [row.name for row in rows] == names == [sizes.OURS_FLAT]
-    assert notes[0].startswith("nobody is left out from 968 triangles on: nobody ended with 1")
+    assert notes[0].startswith("nobody is left out from 968 triangles on: KeyError: 'nobody'.")
 
 
 def test_sheets_that_do_not_fit_the_memory_are_left_out(monkeypatch):
