@@ -95,8 +95,8 @@ def _names_of(scene: Scene) -> dict[str, tuple[int, _Change, tuple[int, ...] | N
         if pair.sphere is None:
             continue
         out[f"{pair.name}.sphere.radius"] = k, _set_radius, ()
-        out[f"{pair.name}.sphere.offset"] = k, _offset(scene), (3,)
-        out[f"{pair.name}.placement"] = k, _placement(scene), None
+        out[f"{pair.name}.sphere.offset"] = k, _set_offset, (3,)
+        out[f"{pair.name}.placement"] = k, _set_placement, None
     return out
 
 
@@ -149,21 +149,12 @@ def _set_radius(pair: ContactPair, radius: object) -> ContactPair:
     return replace(pair, sphere=replace(pair.sphere, radius=check_finite("radius", radius)))
 
 
-def _offset(scene: Scene) -> _Change:
-    def change(pair: ContactPair, offset: object) -> ContactPair:
-        assert pair.sphere is not None
-        x, y, z = check_vector("offset", offset, 3).tolist()
-        sphere = replace(pair.sphere, offset=(x, y, z))
-        return replace(pair, sphere=sphere, sphere_placement=scene.place(sphere))
-
-    return change
+def _set_offset(pair: ContactPair, offset: object) -> ContactPair:
+    assert pair.sphere is not None
+    x, y, z = check_vector("offset", offset, 3).tolist()
+    return replace(pair, sphere=replace(pair.sphere, offset=(x, y, z)))
 
 
-def _placement(scene: Scene) -> _Change:
-    def change(pair: ContactPair, placement: object) -> ContactPair:
-        check_type("placement", placement, pin.SE3, "must be a pinocchio.SE3")
-        placement = check_placement("placement", placement)
-        in_joint = scene.frame_in_joint(pair.frame)[1] * placement
-        return replace(pair, placement=placement, shell_placement=in_joint)
-
-    return change
+def _set_placement(pair: ContactPair, placement: object) -> ContactPair:
+    check_type("placement", placement, pin.SE3, "must be a pinocchio.SE3")
+    return replace(pair, placement=check_placement("placement", placement))
