@@ -15,7 +15,7 @@ from sphshell_pin.checks import (
     check_vector,
 )
 from sphshell_pin.contact.friction import BristleFriction, Friction, check_friction
-from sphshell_pin.contact.laws import NormalLaw, check_law
+from sphshell_pin.contact.normal_law import NormalLaw, check_law
 from sphshell_pin.errors import InvalidParameter
 
 Array = NDArray[np.float64]

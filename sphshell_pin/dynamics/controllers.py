@@ -122,6 +122,11 @@ class PythonFunction(Ingredient, kind="python", of=Controller):
 
     function: str = parameter(help='"file.py:function"')
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """File of the function."""
+        return (self.function.rpartition(":")[0],)
+
 
 @dataclass(frozen=True)
 class GravityCompensation(Controller, kind="gravity-compensation"):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pinocchio as pin
     from matplotlib.figure import Figure
 
-    from sphshell_pin.view.notebook import RecordingView
+    from sphshell_pin.view.recording import RecordingView
 
 Array = NDArray[np.float64]
 
@@ -282,8 +282,13 @@ class Result:
         """
         from sphshell_pin.plot import plot_result
 
-        figure: Figure = plot_result(self, kind, scene)
-        return figure
+        return plot_result(self, kind, scene)
+
+    def save_figures(self, folder: str | PathLike[str], scene: Scene | None = None) -> list[Path]:
+        """Write the figures as .png files into `folder`; see `sphshell_pin.plot.save_figures`."""
+        from sphshell_pin.plot import save_figures
+
+        return save_figures(self, folder, scene=scene)
 
     def view(
         self,
@@ -292,16 +297,17 @@ class Result:
         *,
         speed: float | None = None,
         height: int = 480,
+        title: str | None = None,
     ) -> RecordingView:
         """Return the recording of this result, which a notebook shows `height` [pixels] high.
 
         It is drawn in `scene` (default: the one that ran, or that of the scenario the result came
         from) with `visual_model` (a pinocchio.GeometryModel, default: the scenario's; without one
         the joints are drawn). `speed` seconds of simulated time pass in one second (default: as the
-        scenario has it, or 1). `.save(path)` writes the page.
+        scenario has it, or 1), `title` is its heading. `.save(path)` writes the page.
 
         Raises ResultError without a scene, MissingExtra without meshcat.
         """
-        from sphshell_pin.view.notebook import view_result
+        from sphshell_pin.view.recording import view_result
 
-        return view_result(self, scene, visual_model, speed=speed, height=height)
+        return view_result(self, scene, visual_model, speed=speed, height=height, title=title)

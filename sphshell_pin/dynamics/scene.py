@@ -24,7 +24,7 @@ from sphshell_pin.checks import (
 )
 from sphshell_pin.contact import Friction, ImpactLaw, Method, NormalLaw, Sphere
 from sphshell_pin.contact.friction import check_friction
-from sphshell_pin.contact.laws import check_law
+from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.explain import Explanation, explain_scene
 from sphshell_pin.dynamics.from_geometry import add_pairs
 from sphshell_pin.dynamics.models import (

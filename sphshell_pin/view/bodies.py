@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pinocchio as pin
 
@@ -20,6 +20,8 @@ from sphshell_pin.view.nodes import (
 from sphshell_pin.view.surface import draw_patches, draw_shell, great_circles
 
 if TYPE_CHECKING:
+    from meshcat import Visualizer
+
     from sphshell_pin.dynamics.scene import ContactPair
 
 SPHERE_COLOR = 0x2F6FDE
@@ -46,7 +48,7 @@ def sphere_key(pair: ContactPair) -> SphereKey:
 class DrawnShell:
     """The shell of `pair`, drawn below `visualizer`; `index` numbers the shells of the scene."""
 
-    def __init__(self, visualizer: Any, pair: ContactPair, index: int) -> None:
+    def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
         shell = pair.shell
         if shell is None:
             raise ValueError("a pair without a shell")
@@ -90,7 +92,7 @@ class DrawnShell:
 class DrawnSphere:
     """The sphere of `pair`, drawn below `visualizer`; `index` numbers the spheres of the scene."""
 
-    def __init__(self, visualizer: Any, pair: ContactPair, index: int) -> None:
+    def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
         _, _, radius = sphere_key(pair)
         self.joint = pair.joint_i
         self._offset = pair.placement_i

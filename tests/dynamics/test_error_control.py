@@ -144,6 +144,7 @@ rows = sp.Simulation(scene, sp.{integrator}).run(models.ARM_Q, None, 0.6, impeda
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["Adaptive()", "Implicit()"])
 @pytest.mark.parametrize("body", [HELD, KINK], ids=["held torques, t0 = 1e6", "kink at t0 = 0.09"])
 def test_round_off_of_time_does_not_hang_the_run(body: str, integrator: str) -> None:

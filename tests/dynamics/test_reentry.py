@@ -141,6 +141,7 @@ def holder_of_a_controller() -> object:
     return Controlled()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make", [holder_of_a_run, holder_of_a_scene, holder_of_a_pair, holder_of_a_controller]
 )
