@@ -27,14 +27,14 @@ class SemiImplicitEuler(_FixedStep):
     round gains energy in proportion to spin^2 dt, so take another for fast tumbling.
     """
 
-    code: ClassVar[int] = 0
+    kind: ClassVar[str] = "semi-implicit-euler"
 
 
 @dataclass(frozen=True)
 class RungeKutta4(_FixedStep):
     """The classical method of order 4 in steps of `dt` [s], on the Lie group (Munthe-Kaas 1998)."""
 
-    code: ClassVar[int] = 1
+    kind: ClassVar[str] = "runge-kutta-4"
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class LinearlyImplicitEuler(_FixedStep):
     """
 
     dt: float = 1e-3
-    code: ClassVar[int] = 2
+    kind: ClassVar[str] = "linearly-implicit-euler"
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Adaptive(_ErrorControlled):
     motion; where contact is stiff and lasts, take Implicit.
     """
 
-    code: ClassVar[int] = 3
+    kind: ClassVar[str] = "adaptive"
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Implicit(_ErrorControlled):
     """
 
     rtol: float = 1e-5
-    code: ClassVar[int] = 4
+    kind: ClassVar[str] = "implicit"
 
 
 Integrator = SemiImplicitEuler | RungeKutta4 | LinearlyImplicitEuler | Adaptive | Implicit

@@ -12,6 +12,9 @@ namespace sphshell {
 
 Array<double> rows_to_array(std::vector<ContactRow> rows);
 nb::dict to_dict(Record record, int nq, int nv);
+nb::dict to_dict(const Counts& counts);
+// (pair, depth [m]), or None.
+nb::object to_python(const std::optional<DeepStart>& start);
 nb::list to_list(const std::vector<PairSummary>& summaries);
 std::vector<Pair> copies(const std::vector<const Pair*>& pairs);
 
