@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sphshell_pin import Shell, _core
 from sphshell_pin.benchmarks.surfaces import icosphere
 from sphshell_pin.benchmarks.timing import Spread, machine, one_core
-from sphshell_pin.contact.contact_set import Method
+from sphshell_pin.shell.contact_set import Method
 
 Array = NDArray[np.float64]
 LEVEL = 4  # of the icosphere of radius 1: 5120 triangles

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin import Adaptive, ImpactLaw, JointPD, Scene, Shell, Simulation, Sphere
 from sphshell_pin.benchmarks.timing import machine, one_core
-from sphshell_pin.contact.contact_set import ContactSet
+from sphshell_pin.shell.contact_set import ContactSet
 from sphshell_pin.dynamics import Result
 from sphshell_pin.errors import Interrupted, SphshellError
 

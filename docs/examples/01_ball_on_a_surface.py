@@ -30,7 +30,7 @@ print(f"energy residual {np.abs(result.energy.residual).max():.1e} J")
 
 # %% [markdown]
 # Forces, depth and energy over time; then where on the bowl it bounced and rolled: each element is
-# coloured by the normal impulse that it took. A notebook shows figures by itself, a script saves
+# colored by the normal impulse that it took. A notebook shows figures by itself, a script saves
 # them.
 
 # %%

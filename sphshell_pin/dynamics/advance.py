@@ -20,7 +20,6 @@ from sphshell_pin.checks import (
     check_not_negative,
     check_positive,
 )
-from sphshell_pin.contact import BristleFriction
 from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callable
 from sphshell_pin.dynamics.explain import DEFAULT_SPEED, explain_pairs, relaxation_time, weakness
 from sphshell_pin.dynamics.integrators import Integrator
@@ -139,7 +138,8 @@ def core_pairs(scene: Scene, q0: Array, v0: Array, *, warn: bool) -> list[_core.
     """Build the C++ pairs for a run from q0 (nq,), v0 (nv,); `warn` as of `start_run`."""
     pairs = [pair.to_core() for pair in scene.pairs]
     # Only bristles need to know how fast an impact is.
-    if not warn and not any(isinstance(pair.friction, BristleFriction) for pair in scene.pairs):
+    has_state = any(pair.friction is not None and pair.friction.has_state for pair in scene.pairs)
+    if not warn and not has_state:
         return pairs
     figures = explain_pairs(scene, q0, v0) if pairs else ()
     for pair, core, figure in zip(scene.pairs, pairs, figures, strict=True):

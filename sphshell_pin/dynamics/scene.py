@@ -23,7 +23,7 @@ from sphshell_pin.checks import (
     check_vector,
     read_only,
 )
-from sphshell_pin.contact import BristleFriction, Friction, Method, NormalLaw, Sphere
+from sphshell_pin.contact import Friction, Method, NormalLaw, Sphere
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.laws import check_law
 from sphshell_pin.dynamics.models import (
@@ -86,7 +86,8 @@ class ContactPair:
         )
 
     def _source(self, find: Find) -> Find:
-        return checked_source(find, self.name, isinstance(self.friction, BristleFriction))
+        stretches = self.friction is not None and self.friction.has_state
+        return checked_source(find, self.name, stretches)
 
 
 @dataclass(frozen=True)

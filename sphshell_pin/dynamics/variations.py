@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import pinocchio as pin
@@ -13,6 +13,7 @@ from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.laws import check_law
 from sphshell_pin.dynamics.scene import ContactPair, Scene
 from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.parameters import parameters_of
 
 # Changes a pair to one value.
 _Change = Callable[[ContactPair, Any], ContactPair]
@@ -88,9 +89,9 @@ def _names_of(scene: Scene) -> dict[str, tuple[int, _Change, tuple[int, ...] | N
         out[f"{pair.name}.friction"] = k, _set_friction, None
         for part in ("law", "friction"):
             whole = getattr(pair, part)
-            for field in fields(whole) if is_dataclass(whole) else ():
-                if field.type in ("float", float):
-                    out[f"{pair.name}.{part}.{field.name}"] = k, _field(part, field.name), ()
+            for name in parameters_of(whole):
+                if isinstance(getattr(whole, name), float):
+                    out[f"{pair.name}.{part}.{name}"] = k, _field(part, name), ()
         if pair.sphere is None:
             continue
         out[f"{pair.name}.sphere.radius"] = k, _set_radius, ()

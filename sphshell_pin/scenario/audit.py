@@ -180,7 +180,7 @@ def _audit_shell(
 def _feet(
     section: ShellSection, path: Path, centers: Array, points: Array
 ) -> tuple[Array, Array, npt.NDArray[np.int32]]:
-    """Return the places of the exact faces next to contacts, see `cad.jobs.feet`."""
+    """Return the places of the exact faces next to contacts, see `cad.jobs.stationary_points`."""
     from sphshell_pin.shell.cad.process import run_in_child
 
     file = path.parent / str(section.file)
@@ -195,7 +195,9 @@ def _feet(
     arguments = (file, section.unit, options, (scale, section.magnify), centers, points)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # told when the shell was made
-        points, normals, kinds = run_in_child("feet", arguments, file, "--audit-cad", options)
+        points, normals, kinds = run_in_child(
+            "stationary_points", arguments, file, "--audit-cad", options
+        )
     return points, normals, kinds
 
 

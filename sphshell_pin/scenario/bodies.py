@@ -14,6 +14,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.checks import off_unit_length
+from sphshell_pin.dynamics.models import set_joint
 from sphshell_pin.errors import MissingExtra, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.scenario.reading import item_key
 from sphshell_pin.scenario.schema import Placement, RobotSection, Scenario
@@ -146,32 +147,6 @@ def restrict(model: Any, reduced: Any, q: Array, v: Array) -> tuple[Array, Array
     return q_reduced, v_reduced
 
 
-def set_joint(model: Any, q: Array, name: str, value: float | list[float]) -> None:
-    """Write the position of one joint into `q` [m, rad; a free-flyer's x y z and quaternion].
-
-    Raises
-    ------
-    NameNotFound
-        The model has no such joint.
-    SphshellError
-        `value` has not as many numbers as the joint.
-    """
-    names = list(model.names)[1:]
-    if name not in names:
-        raise NameNotFound("joint", name, "the model", names)
-    joint = model.joints[model.getJointId(name)]
-    span = slice(joint.idx_q, joint.idx_q + joint.nq)
-    if not isinstance(value, list):
-        if joint.nv != 1:
-            raise SphshellError(f"joint '{name}' takes a list of {joint.nq} numbers")
-        # A continuous joint is stored as the cosine and the sine of its angle.
-        q[span] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
-        return
-    if len(value) != joint.nq:
-        raise SphshellError(f"joint '{name}' takes {joint.nq} numbers, not {len(value)}")
-    q[span] = value
-
-
 def _load(robots: Any, section: RobotSection, path: Path) -> Any:
     if section.name is not None:
         return robots.load(section.name)
@@ -236,23 +211,3 @@ def _span_q(model: Any, joint: int) -> slice:
 
 def _span_v(model: Any, joint: int) -> slice:
     return slice(model.joints[joint].idx_v, model.joints[joint].idx_v + model.joints[joint].nv)
-
-
-def by_joint(model: Any, values: Mapping[str, float], size: str, start: Array | float) -> Array:
-    """Return a vector of length nq (`size` "q") or nv ("v") with `values` put in by joint name.
-
-    Raises
-    ------
-    NameNotFound
-        The model has no such joint.
-    """
-    vector = np.array(start, dtype=float) * np.ones(model.nq if size == "q" else model.nv)
-    for name, value in values.items():
-        if size == "q":
-            set_joint(model, vector, name, value)
-            continue
-        names = list(model.names)[1:]
-        if name not in names:
-            raise NameNotFound("joint", name, "the model", names)
-        vector[_span_v(model, model.getJointId(name))] = value
-    return vector

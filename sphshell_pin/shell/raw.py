@@ -57,6 +57,11 @@ class RawSurface:
         return replace(self, notes=(*self.notes, *sentences))
 
 
+def area_vectors(corners: Floats) -> Floats:
+    """Twice the area times the unit normal (t, 3) of triangles (t, 3, 3)."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def raw_surface(vertices: object, elements: object, normals: object = None) -> RawSurface:
     """Check arrays and copy them into a `RawSurface`.
 

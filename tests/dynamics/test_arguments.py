@@ -221,7 +221,7 @@ def test_an_impedance_without_a_shell_takes_no_place_of_one() -> None:
         with pytest.raises(InvalidParameter, match="give the shell"):
             CartesianImpedance("ball", [[0, 0, 0]], 1.0, 1.0, **place)
     with pytest.raises(InvalidParameter, match="shell"):
-        CartesianImpedance("ball", [[0, 0, 0]], 1.0, 1.0, shell="x")
+        CartesianImpedance("ball", [[0, 0, 0]], 1.0, 1.0, shell=5)
 
 
 @pytest.mark.parametrize("wrong", [True, "1e-3", 1j, None])

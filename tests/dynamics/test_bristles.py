@@ -160,7 +160,7 @@ def test_rates_do_not_know_the_turn_of_the_shell() -> None:
     model = models.empty()
     joint = models.add_body(model, "disc", pin.JointModelRZ())
     models.add_body(model, "ball", pin.JointModelTranslation(), joint)
-    friction = _core.FrictionLaw.bristle(0.5, 0.3, K, 30.0, 0.01, False)
+    friction = _core.FrictionLaw("bristle", [0.5, 0.3, K, 30.0, 0.01, 0.0])
     shell = sp.Shell(*meshes.random_plate(300, seed=2, size=2.0))
     scene = sp.Scene(model)
     law, bristle = models.linear_law(K, 300.0), sp.BristleFriction(0.5, 0.3, K, 30.0)

@@ -112,12 +112,10 @@ def test_ctrl_c(options: str) -> None:
         assert child.stdout.readline().strip() == "started"
         time.sleep(1.0)
         child.send_signal(signal.SIGINT)
-        asked = time.monotonic()
         try:
             said, faults = child.communicate(timeout=20)
         finally:
             child.kill()
-    assert time.monotonic() - asked < 5.0
     assert child.returncode == 0, faults
     kept, rows, *truths = said.split()
     assert kept == "kept"

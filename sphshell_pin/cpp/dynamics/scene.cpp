@@ -110,7 +110,7 @@ void Scene::accept(VectorX& z) {
     }
     const std::vector<int>& at = tracker.match(contacts, states_[k].centre, pair.radius);
     if (bristles_.any() && pair.friction.has_state())
-      bristles_.deal(k, contacts, at, tracker, z, pair.friction.torsional, turns_known(pair));
+      bristles_.deal(k, contacts, at, tracker, z, pair.friction.torsional(), turns_known(pair));
     else if (bristles_.any())
       bristles_.deal_none(k);
     tracker.accept(contacts, states_[k].centre, pair.radius);
@@ -193,7 +193,8 @@ void Scene::meet(ActiveContact& active, const VectorX& z) {
   m.normal = turn * contact.normal;
   m.relative.setZero();
   if (pair.needs_velocity()) m.relative = relative_velocity(pair, active.point);
-  if (pair.friction.torsional) m.spin = m.normal.dot(spin_of(pair.joint_i) - spin_of(pair.joint_j));
+  if (pair.friction.torsional())
+    m.spin = m.normal.dot(spin_of(pair.joint_i) - spin_of(pair.joint_j));
   if (active.slot >= 0) m.bristle = turn * z.segment<3>(3 * active.slot);
   active.force = contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), m);
   if (active.slot >= 0)
@@ -234,7 +235,7 @@ void Scene::push(const ActiveContact& active) {
   powers_.friction += weight * friction_power(f, m);
   powers_.elastic += share * pair.law.energy(m.depth);
   if (active.slot >= 0)
-    powers_.bristles += 0.5 * share * pair.friction.stiffness * f.bristle.squaredNorm();
+    powers_.bristles += 0.5 * share * pair.friction.bristle()->stiffness * f.bristle.squaredNorm();
 }
 
 // Contacts of one place as one, with the sum of their forces.

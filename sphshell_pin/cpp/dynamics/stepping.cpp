@@ -173,7 +173,7 @@ double Stepping::error_norm() const {
   const double atol = replaced ? 1e-2 * kFineTolerance : settings_.atol;
   for (const ActiveContact& active : scene_.active()) {
     if (active.slot < 0) continue;
-    const FrictionLaw& friction = scene_.pairs()[active.pair].friction;
+    const BristleFriction& friction = *scene_.pairs()[active.pair].friction.bristle();
     const Vec3 z = y.segment<3>(2 * nv + 3 * active.slot);
     const double limit = friction.mu_static * active.force.normal / friction.stiffness;
     const double e = error.segment<3>(2 * nv + 3 * active.slot).norm();

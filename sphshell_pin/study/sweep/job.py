@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sphshell_pin.scenario.schema import PythonSection, Scenario
+from sphshell_pin.dynamics.controllers import PythonFunction
+from sphshell_pin.scenario.schema import Scenario
 
 DONE, FAILED = "done", "failed"
 
@@ -71,7 +72,7 @@ def digest(data: Any) -> str:
 def files_of(scenario: Scenario) -> set[str]:
     """Return the files that `scenario` names: surfaces, URDFs, Python routines."""
     routines = [one.find for one in scenario.source] + list(scenario.figures.values())
-    if isinstance(scenario.controller, PythonSection):
+    if isinstance(scenario.controller, PythonFunction):
         routines.append(scenario.controller.function)
     named = [one.file for one in scenario.shell] + [one.urdf for one in scenario.robot]
     named += [routine.rpartition(":")[0] for routine in routines]

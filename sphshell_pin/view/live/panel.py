@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 1_500  # of the strip; the page shows the last seconds
 MOST_LISTED = 40  # contacts
-# A bristle that is held lets its contact move by less than this share of the Stribeck speed.
-HELD = 0.01
 
 
 class Panel:
@@ -149,13 +147,7 @@ def sticks(pair: ContactPair, slip: float) -> bool | None:
     Two-velocity friction holds below v_static, where it creeps; a bristle where almost nothing
     moves.
     """
-    law = pair.friction
-    if law is None:
-        return None
-    limit = getattr(law, "v_static", None)
-    if limit is None:
-        limit = HELD * getattr(law, "v_stribeck", 0.0)
-    return slip < limit
+    return None if pair.friction is None else slip < pair.friction.sticking_speed
 
 
 def dump(value: Any) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
-from sphshell_pin.contact.contact_set import Feature
+from sphshell_pin.shell.contact_set import Feature
 from tests.contact.helpers import force_sum
 from tests.contact.smooth.surfaces import SIDES, SURFACES, can, shell_of, side_of
 

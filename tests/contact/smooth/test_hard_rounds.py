@@ -148,9 +148,9 @@ def test_cost_of_a_concentric_sphere() -> None:
     for aside in (0.0, 0.01):
         times = []
         for _ in range(2):
-            start = time.perf_counter()
+            start = time.thread_time()
             shell.contacts([aside, 0.0, 0.0], 1.1, method="smooth")
-            times.append(time.perf_counter() - start)
+            times.append(time.thread_time() - start)
         costs.append(min(times))
     assert costs[0] <= 60 * costs[1]
 
