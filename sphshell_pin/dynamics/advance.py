@@ -6,7 +6,7 @@ import math
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from types import FrameType
 from typing import TypeAlias
 
@@ -24,6 +24,7 @@ from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callabl
 from sphshell_pin.dynamics.explain import DEFAULT_SPEED, explain_pairs, relaxation_time, weakness
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.run_stats import PairFigures, RunStats
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.errors import DeepStart, InvalidParameter, WeakLawWarning
 
@@ -177,12 +178,6 @@ def advance(
             return status
 
 
-def figures_of(summary: Mapping[str, float]) -> dict[str, float]:
-    """Return the figures of a pair over a run."""
-    time = summary["contact_time"]
-    return {**summary, "mean_force": summary["impulse"] / time if time else 0.0}
-
-
 def result_of(
     scene: Scene, integrator: Integrator, core: Ended, record: dict[str, NDArray[np.generic]]
 ) -> Result:
@@ -190,15 +185,16 @@ def result_of(
     names = tuple(pair.name for pair in scene.pairs)
     counts, wall_time = core.counts, core.wall_time
     simulated = core.time - float(record["t"][0] if len(record["t"]) else core.time)
-    stats = {
+    figures = map(PairFigures.from_core, core.summaries)
+    stats = RunStats(
         **counts,
-        "wall_time": wall_time,
-        "real_time_factor": simulated / wall_time if wall_time > 0 else math.inf,
-        "duration": simulated,
-        "dt": step_of(integrator) or (simulated / counts["steps"] if counts["steps"] else 0.0),
-        "integrator": type(integrator).__name__,
-        "pairs": dict(zip(names, map(figures_of, core.summaries), strict=True)),
-    }
+        wall_time=wall_time,
+        real_time_factor=simulated / wall_time if wall_time > 0 else math.inf,
+        duration=simulated,
+        dt=step_of(integrator) or (simulated / counts["steps"] if counts["steps"] else 0.0),
+        integrator=type(integrator).__name__,
+        pairs=dict(zip(names, figures, strict=True)),
+    )
     return Result.from_blocks([record], names, stats, scene)
 
 

@@ -21,6 +21,7 @@ from sphshell_pin.dynamics.advance import (
 )
 from sphshell_pin.dynamics.busy import one_at_a_time
 from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.run_stats import RunStats
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
 from sphshell_pin.dynamics.simulation import Simulation
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NotPicklable
@@ -172,7 +173,7 @@ class OpenRun:
         # The core counts rows from the start of the run, a result from its own first one.
         record["contact_row"] = record["contact_row"] - first
         names = tuple(pair.name for pair in self.scene.pairs)
-        return Result.from_blocks([record], names, {}, self.scene)
+        return Result.from_blocks([record], names, RunStats(), self.scene)
 
 
 def contacts_of(row: Result) -> SceneContacts:
@@ -196,8 +197,8 @@ def _same_place(a: ContactPair, b: ContactPair) -> bool:
         and a.shell is b.shell
         and a.find is b.find
         and type(a.friction) is type(b.friction)
-        and _equal(a.sphere_placement, b.sphere_placement)
-        and _equal(a.shell_placement, b.shell_placement)
+        and _equal(a.placement_i, b.placement_i)
+        and _equal(a.placement_j, b.placement_j)
     )
 
 

@@ -6,7 +6,7 @@ import math
 import re
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, NoReturn, overload
 
 import numpy as np
@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.checks import read_only
-from sphshell_pin.dynamics.advance import deep_start, figures_of, result_of, why_ended
+from sphshell_pin.dynamics.advance import deep_start, result_of, why_ended
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.run_stats import PairFigures
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.dynamics.variations import Variations
 from sphshell_pin.errors import (
@@ -105,7 +106,7 @@ class Rollout(Sequence[Result]):
             self.q[run], self.v[run] = outcome.q, outcome.v
             self.residual[run] = outcome.residual
             for pair, summary in zip(scene.pairs, outcome.summaries, strict=True):
-                for name, value in figures_of(summary).items():
+                for name, value in asdict(PairFigures.from_core(summary)).items():
                     column = self.figures.setdefault(
                         f"{pair.name}.{name}", np.full(count, math.nan)
                     )

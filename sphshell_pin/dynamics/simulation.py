@@ -14,7 +14,7 @@ from sphshell_pin.dynamics.advance import (
     start_run,
     why_ended,
 )
-from sphshell_pin.dynamics.integrators import Integrator, SemiImplicitEuler
+from sphshell_pin.dynamics.integrators import Adaptive, Integrator
 from sphshell_pin.dynamics.many_runs import roll_out
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.rollout import Rollout
@@ -23,12 +23,12 @@ from sphshell_pin.errors import Interrupted, InvalidParameter, SimulationDiverge
 
 
 class Simulation:
-    """Moves `scene` in time with `integrator`."""
+    """Moves `scene` in time with `integrator`, Adaptive() unless given."""
 
     def __init__(self, scene: Scene, integrator: Integrator | None = None) -> None:
         if not isinstance(scene, Scene):
             raise InvalidParameter("scene", type(scene).__name__, "must be a sphshell_pin.Scene")
-        integrator = SemiImplicitEuler() if integrator is None else integrator
+        integrator = Adaptive() if integrator is None else integrator
         if not isinstance(integrator, Integrator):
             raise InvalidParameter(
                 "integrator",

@@ -41,10 +41,10 @@ def test_a_bounce_costs_few_evaluations(kind, rtol: float, law: str) -> None:
     count = len(touches(result))
     assert count >= 8
     stats = result.stats
-    beyond = stats["evaluations"] - STEP[kind] * stats["steps"]
+    beyond = stats.evaluations - STEP[kind] * stats.steps
     assert beyond / count <= 60
     # No dynamics in these: contacts alone, on the dense output.
-    assert stats["event_queries"] / count <= 120
+    assert stats.event_queries / count <= 120
 
 
 @both

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 
 COUNTER = r"""
@@ -45,8 +46,8 @@ for duration in (0.02, 0.1, 1.1):
     before = heap()
     result = sim.run(ARM_Q, np.zeros(3), duration, controller, record_dt=duration)
     counts.append(heap() - before)
-    steps.append(result.stats["steps"])
-print(*counts, steps[2] - steps[1], result.stats["pairs"]["ball-plate"]["contact_time"])
+    steps.append(result.stats.steps)
+print(*counts, steps[2] - steps[1], result.stats.pairs["ball-plate"].contact_time)
 """
 
 CONTROLLERS = {
