@@ -44,7 +44,8 @@ class RunStats(FormerDict):
     """Cost and figures of a run; zeros for the rows of a run that goes on.
 
     `steps` accepted, `rejected` for their error, `evaluations` of the forces, each with one forward
-    dynamics; `duration` [s] simulated in `wall_time` [s], their ratio `real_time_factor`; `dt` [s]
+    dynamics; of these `event_steps` steps to locate events, whose trials ask for `event_queries`
+    distances; `duration` [s] simulated in `wall_time` [s], their ratio `real_time_factor`; `dt` [s]
     the fixed or the mean step; `integrator` the name of its class; `pairs` the figures by the
     pairs' names.
     """
@@ -57,6 +58,8 @@ class RunStats(FormerDict):
     duration: float = 0.0
     rejected: int = 0
     evaluations: int = 0
+    event_steps: int = 0
+    event_queries: int = 0
     dt: float = 0.0
     integrator: str = ""
     pairs: dict[str, PairFigures] = field(default_factory=dict)
