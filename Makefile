@@ -35,12 +35,12 @@ $(BIN)/python:
 
 # One stamp per set of extras; a change of the C++ sources or of the packaging builds anew.
 $(VENV)/.demo: $(BIN)/python $(SOURCES)
-	@echo "Building sphshell_pin into $(VENV): about two minutes"
+	@echo "Building sphshell_pin into $(VENV): about 80 seconds"
 	$(BIN)/python -m pip install -q -e '.[view,robots]'
 	@touch $@
 
 $(VENV)/.test: $(BIN)/python $(SOURCES)
-	@echo "Building sphshell_pin into $(VENV): about two minutes"
+	@echo "Building sphshell_pin into $(VENV): about 80 seconds"
 	$(BIN)/python -m pip install -q -e '.[test]'
 	@touch $@ $(VENV)/.demo
 
