@@ -170,10 +170,7 @@ void bind_dynamics(nanobind::module_& m) {
             new (self) Evaluations(model_of(model), copies(pairs));
           },
           nb::arg("model"), nb::arg("pairs"))
-      .def_prop_ro("bristle_size",
-                   [](Evaluations& self) {
-                     return self.with_scene([](Scene& scene) { return scene.bristle_size(); });
-                   })
+      .def_prop_ro("bristle_size", &Evaluations::bristle_size)
       .def("rates",
            [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
               const VectorX& tau) {
