@@ -79,7 +79,7 @@ class UnitWarning(UserWarning):
 
 
 class WeakLawWarning(UserWarning):
-    """A law is so weak that the sphere's centre is expected to be pushed through the shell."""
+    """A law is so weak that the sphere's center is expected to be pushed through the shell."""
 
 
 class InvalidShell(SphshellError, ValueError):

@@ -180,15 +180,15 @@ def _write(path: Path, unit: str, source: _Surface, options: CadOptions) -> None
     if path.suffix.lower() not in CAD_SUFFIXES:
         path.write_bytes(encoded(path, source.shell(), unit))
         return
-    from sphshell_pin.shell.cad.units import MILLIMETRE
+    from sphshell_pin.shell.cad.units import MILLIMETER
     from sphshell_pin.shell.cad.writing import faceted, parts_of, write_cad
 
     if isinstance(source, _Faces):
         model = source.model
-        write_cad(path, parts_of(model, options.faces is None), model.metres, unit)
+        write_cad(path, parts_of(model, options.faces is None), model.meters, unit)
     else:
         shell = source.shell()
-        write_cad(path, [(shell.name, faceted(shell))], MILLIMETRE, unit)
+        write_cad(path, [(shell.name, faceted(shell))], MILLIMETER, unit)
 
 
 class _Mesh:
@@ -223,7 +223,7 @@ class _Faces:
         from sphshell_pin.shell.cad.surface import load_cad
 
         cad = load_cad(path, unit, options)
-        self._faces, self._metres, self._raw = TrimmedFaces(cad), cad.model.metres, cad.polygons()
+        self._faces, self._meters, self._raw = TrimmedFaces(cad), cad.model.meters, cad.polygons()
         self.model, self.notes = cad.whole, cad.notes()
         size, area = self._faces.extent
         self.held = Held(
@@ -231,8 +231,8 @@ class _Faces:
             cad.unit,
             len(self.model.faces),
             "CAD faces",
-            size * self._metres,
-            area * self._metres**2,
+            size * self._meters,
+            area * self._meters**2,
         )
 
     def shell(self) -> Shell:
@@ -242,7 +242,7 @@ class _Faces:
         return Shell(self._raw.vertices, elements, normals, name=self.held.path.stem)
 
     def distances(self, points: Floats) -> Floats:
-        return self._faces.distances(points / self._metres) * self._metres
+        return self._faces.distances(points / self._meters) * self._meters
 
     def samples(self, count: int, rng: np.random.Generator) -> Floats:
-        return self._faces.samples(count, rng) * self._metres
+        return self._faces.samples(count, rng) * self._meters

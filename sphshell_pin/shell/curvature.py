@@ -11,18 +11,15 @@ import numpy as np
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.curved import points_on
 from sphshell_pin.shell.health import LARGE_OF_HEIGHT, CurvatureReport, Place
-from sphshell_pin.shell.raw import Bytes, Floats, Longs
+from sphshell_pin.shell.raw import Bytes, Floats, Longs, area_vectors
 
-CURVED = 0
-FLAT_BECAUSE = (
-    "curved",
-    "no side of them bends: nothing around them turns",
-    "straightened: their neighbours do not bear witness to a bend",
-    "kept straight: curved ones would leave the exact CAD face",
-)
-"""What the codes of `_core.Shell.bending` mean, and one more."""
-
-OFF_FACE = 3
+CURVED, OFF_FACE = 0, 3
+FLAT_BECAUSE = {
+    1: "no side of them bends: nothing around them turns",
+    2: "straightened: their neighbors do not bend",
+    OFF_FACE: "kept straight: curved ones would leave the exact CAD face",
+}
+"""What the codes of `_core.Shell.bending` mean where they are not CURVED, and one more."""
 
 LARGE_OF_LENGTH = 0.05
 """It must also be that share of its longest side off: along a bend, a needle rightly stands off by
@@ -36,28 +33,36 @@ AT_ONCE = 5_000
 
 
 def curvature_report(shell: ShellBase) -> CurvatureReport:
-    """Measure the curved elements of `shell`; it makes them if nothing has touched them yet."""
+    """Measure the curved elements of `shell`; it makes them if no query has yet."""
+    core = shell.core_for("smooth")
     # A point is a mean of the control points: none is farther off than the farthest of them.
-    bound = np.linalg.norm(shell.core_for("smooth").lifts, axis=2).max(axis=1)
+    bound = np.linalg.norm(core.lifts, axis=2).max(axis=1)
+    corners = shell.vertices[shell.triangles]
+    sides = np.roll(corners, -1, axis=1) - corners
+    longest = np.linalg.norm(sides, axis=2).max(axis=1)
+    height = np.linalg.norm(area_vectors(corners), axis=1) / longest
     worst, largest, at = _largest_distance(shell, bound)
-    height, longest = _heights(shell)
+    limit = np.maximum(LARGE_OF_HEIGHT * height, LARGE_OF_LENGTH * longest)
+    rows = np.flatnonzero(bound > limit)
+    large = rows[_distances(shell, rows, COARSE).max(axis=1, initial=0.0) > limit[rows]]
     code = _bending(shell)
-    curved = int((code == CURVED).sum())
-    reasons = [
-        (FLAT_BECAUSE[one], int((code == one).sum())) for one in np.unique(code) if one != CURVED
-    ]
-    aside, aside_at = _set_aside(shell)
+    aside = np.flatnonzero(core.normals_set_aside) if shell.normals is not None else ()
+    first = None
+    if len(aside):
+        first = _place(shell.vertices[shell.triangles.ravel()[aside[0]]])
     return CurvatureReport(
         elements=shell.num_elements,
-        curved=curved,
-        flat_because=tuple(reasons),
+        curved=int((code == CURVED).sum()),
+        flat_because=tuple(
+            (why, int((code == k).sum())) for k, why in FLAT_BECAUSE.items() if (code == k).any()
+        ),
         largest=largest,
         at=None if largest == 0.0 else _place(at),
         of_size=largest / shell.size,
         of_height=largest / float(height[worst]),
-        large=_count_large(shell, bound, height, longest),
-        normals_set_aside=aside,
-        set_aside_at=aside_at,
+        large=len(np.unique(shell.triangle_element[large])),
+        normals_set_aside=len(aside),
+        set_aside_at=first,
     )
 
 
@@ -66,12 +71,13 @@ def distances_at(shell: ShellBase, divisions: int) -> Floats:
 
     The points are those of `curved_mesh` with as many divisions.
     """
-    chosen = np.arange(len(shell.triangles))
-    parts = [
-        _off_flat(shell, rows, divisions)[0]
-        for rows in np.split(chosen, range(AT_ONCE, len(chosen), AT_ONCE))
-    ]
-    return np.concatenate(parts)
+    return _distances(shell, np.arange(len(shell.triangles)), divisions)
+
+
+def _distances(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
+    """Distances (n, k) [m] of points of the curved triangles `rows` from the flat ones."""
+    parts = np.split(rows, range(AT_ONCE, len(rows), AT_ONCE))
+    return np.concatenate([_off_flat(shell, some, divisions)[0] for some in parts])
 
 
 def _largest_distance(shell: ShellBase, bound: Floats) -> tuple[int, float, Floats]:
@@ -81,29 +87,15 @@ def _largest_distance(shell: ShellBase, bound: Floats) -> tuple[int, float, Floa
     """
     order = np.argsort(-bound, kind="stable")
     largest, worst = 0.0, 0
-    for start in range(0, len(order), AT_ONCE):
-        rows = order[start : start + AT_ONCE]
+    for rows in np.split(order, range(AT_ONCE, len(order), AT_ONCE)):
         if bound[rows[0]] <= largest:
             break
         found = _off_flat(shell, rows, COARSE)[0].max(axis=1)
         if found.max() > largest:
             largest, worst = float(found.max()), int(rows[np.argmax(found)])
-    if largest == 0.0:
-        return worst, 0.0, shell.vertices[shell.triangles[worst, 0]]
     found, points = _off_flat(shell, np.array([worst]), FINE)
     highest = int(np.argmax(found[0]))
-    return worst, float(found[0, highest]), points[0, highest]
-
-
-def _count_large(shell: ShellBase, bound: Floats, height: Floats, longest: Floats) -> int:
-    """Count elements with a triangle that is far off for its own size."""
-    limit = np.maximum(LARGE_OF_HEIGHT * height, LARGE_OF_LENGTH * longest)
-    rows = np.flatnonzero(bound > limit)
-    large = [
-        some[_off_flat(shell, some, COARSE)[0].max(axis=1) > limit[some]]
-        for some in np.split(rows, range(AT_ONCE, len(rows), AT_ONCE))
-    ]
-    return len(np.unique(shell.triangle_element[np.concatenate(large)]))
+    return worst, float(found[0, highest]) if largest else 0.0, points[0, highest]
 
 
 def _off_flat(shell: ShellBase, rows: Longs, divisions: int) -> tuple[Floats, Floats]:
@@ -115,7 +107,7 @@ def _off_flat(shell: ShellBase, rows: Longs, divisions: int) -> tuple[Floats, Fl
 
 def _to_triangles(points: Floats, corners: Floats) -> Floats:
     """Distances (n, k) of points (n, k, 3) from triangles (n, 3, 3)."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal /= np.where(length > 0.0, length, 1.0)
     nearest = np.full(points.shape[:2], np.inf)
@@ -132,14 +124,6 @@ def _to_triangles(points: Floats, corners: Floats) -> Floats:
     return np.asarray(np.where(inside, np.minimum(upright, nearest), nearest))
 
 
-def _heights(shell: ShellBase) -> tuple[Floats, Floats]:
-    """Smallest height (t,) and longest side (t,) of each triangle [m]."""
-    corners = shell.vertices[shell.triangles]
-    sides = np.roll(corners, -1, axis=1) - corners
-    longest = np.linalg.norm(sides, axis=2).max(axis=1)
-    return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / longest, longest
-
-
 def _bending(shell: ShellBase) -> Bytes:
     """Return for each element (m,) whether it is curved, or why it is flat, as FLAT_BECAUSE."""
     core = shell.core_for("smooth")
@@ -152,14 +136,6 @@ def _bending(shell: ShellBase) -> Bytes:
     np.minimum.at(lowest, shell.triangle_element, codes)
     np.maximum.at(highest, shell.triangle_element, codes)
     return np.where(lowest == CURVED, lowest, highest)
-
-
-def _set_aside(shell: ShellBase) -> tuple[int, Place | None]:
-    """How many given normals the elements contradict, and where one of them is."""
-    corners = np.flatnonzero(shell.core_for("smooth").normals_set_aside)
-    if shell.normals is None or not len(corners):
-        return 0, None
-    return len(corners), _place(shell.vertices[shell.triangles.ravel()[corners[0]]])
 
 
 def _place(point: Floats) -> Place:

@@ -12,7 +12,7 @@ def points_on(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
     """Points (n, k, 3) [m] of n triangles of `shell`, curved as the method "smooth" has them.
 
     The k points of each are those of a grid that cuts each side into `divisions` pieces: corner 0
-    first, then by steps towards corner 2, by steps towards corner 1.
+    first, then by steps toward corner 2, by steps toward corner 1.
     """
     u, v = (np.array(_grid(divisions)) / divisions).T
     return points_at(shell, rows, np.stack([1 - u - v, u, v], axis=1))

@@ -46,7 +46,7 @@ _REPAIRS = (
     ),
     (
         "cavities",
-        "{cavities:closed component} inside another taken as a cavity and wound towards its inside",
+        "{cavities:closed component} inside another taken as a cavity and wound toward its inside",
     ),
     (
         "missing_normals",
@@ -186,7 +186,7 @@ class ShellHealth:
     Attributes
     ----------
     name, source, unit, scale : of the surface; the file it came from, the unit its numbers were
-        taken in, the factor from the numbers of the file to metres
+        taken in, the factor from the numbers of the file to meters
     cleaned : False if the surface was taken as it came (`clean=False`)
     input_vertices, input_elements : as given
     vertices, elements, triangles, quads : what is left; a planar quad is one element

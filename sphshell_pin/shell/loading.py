@@ -1,4 +1,4 @@
-"""A surface file in metres: its reader, its unit, and the SCALE of .shl files."""
+"""A surface file in meters: its reader, its unit, and the SCALE of .shl files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def load_surface(
     With a crease angle above 0 the sides that curvature would take off the faces of a CAD file are
     marked as straight.
 
-    Returns the surface in metres, the unit taken, and metres per file unit.
+    Returns the surface in meters, the unit taken, and meters per file unit.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def _load_shl(
     if scale is None:
         scale = "apply" if unit is None else "ignore"
     length = metres_per_unit(unit) if unit is not None else 1.0
-    said = f"unit '{unit}'" if unit is not None else "metres"
+    said = f"unit '{unit}'" if unit is not None else "meters"
     if scale == "apply":
         factor = length * written
         note = f"SCALE {written:.9g} of the file applied to its numbers, as {said} per file unit"

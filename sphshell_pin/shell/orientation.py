@@ -62,7 +62,7 @@ class Oriented:
 def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> Oriented:
     """Wind polygons of three and four corners alike within each component.
 
-    A closed component is wound outward; inside another closed one it is a cavity, wound towards
+    A closed component is wound outward; inside another closed one it is a cavity, wound toward
     its inside, and so on by turns. An open one keeps the winding most of its area has. With
     `keep_winding` nothing is turned, and a component counts as closed only if it need not be.
     """

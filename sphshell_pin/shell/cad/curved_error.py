@@ -66,7 +66,7 @@ def hold_curvature(
     A curved side, or the sides of a curved middle, farther off than the share CURVED of the stated
     chord error are kept straight, unless straight ones are no nearer.
 
-    factor : metres per unit of the model; crease_angle : of the shell [rad]
+    factor : meters per unit of the model; crease_angle : of the shell [rad]
     """
     places = _Places(surface, cad, factor)
     limit = CURVED * cad.stated
@@ -84,7 +84,7 @@ def hold_curvature(
             break
         straight |= bad
     count = _count_sides(surface, straight)
-    note = _note(found, cad.stated, cad.model.metres, count, bent)
+    note = _note(found, cad.stated, cad.model.meters, count, bent)
     health = surface.health.labelled(notes=(*surface.health.notes, note))
     return replace(surface, straight=straight if count else None, health=health)
 

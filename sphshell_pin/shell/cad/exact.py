@@ -70,7 +70,7 @@ class TrimmedFaces:
     def __init__(self, cad: CadSurface) -> None:
         self._cad = cad
         raw = cad.polygons()
-        points, triangles = raw.vertices / cad.model.metres, raw.corners.reshape(-1, 3)
+        points, triangles = raw.vertices / cad.model.meters, raw.corners.reshape(-1, 3)
         self._corners = points[triangles]
         self._shell = Shell(points, triangles, crease_angle=0.0)
         self._inside = cache(lambda face: IntTools_FClass2d(cad.sewn.faces[face], TRIMMING))

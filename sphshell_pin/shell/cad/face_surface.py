@@ -14,7 +14,7 @@ MOST_STEPS = 8
 """Of Newton's method to a closest point; it starts next to it."""
 
 MOST_STATIONARY_STEPS = 40
-"""Of Newton's method towards a stationary point of the distance."""
+"""Of Newton's method toward a stationary point of the distance."""
 
 SINGULAR = 1e-10
 """Where |du x dv| is below this share of the largest |du| |dv|, a surface has no normal."""

@@ -37,7 +37,7 @@ def read(
 ) -> tuple[CleanedSurface, str, float]:
     """Read, tessellate and clean a CAD file.
 
-    Returns the surface [m], the unit taken, and metres per unit of the file, `scale` included.
+    Returns the surface [m], the unit taken, and meters per unit of the file, `scale` included.
     """
     cad = load_cad(path, unit, options)
     raw = cad.polygons().noting(*cad.notes()).scaled(scale).noting(*notes)
@@ -46,7 +46,7 @@ def read(
     except InvalidShell as error:
         raise InvalidShell(f"{path}: {error}") from error
     if crease_angle > 0.0:
-        surface = hold_curvature(surface, cad, scale * cad.model.metres, crease_angle)
+        surface = hold_curvature(surface, cad, scale * cad.model.meters, crease_angle)
     return surface, cad.unit, cad.factor * scale
 
 
@@ -68,19 +68,19 @@ def stationary_points(
     there is none, 1 for a point of an edge or a vertex, which has no normal, 2 for one of a face.
     """
     cad = load_cad(path, unit, options)
-    metres = cad.model.metres
+    meters = cad.model.meters
     for scale in scales:
-        metres *= scale
+        meters *= scale
     faces = TrimmedFaces(cad)
     points, normals = np.zeros(centers.shape), np.zeros(centers.shape)
     kinds = np.zeros(len(centers), np.int32)
     for k, (center, contact) in enumerate(zip(centers, contacts, strict=True)):
         if k % BETWEEN == 0:
             alive()
-        found = faces.stationary_point(center / metres, contact / metres)
+        found = faces.stationary_point(center / meters, contact / meters)
         if found is None:
             continue
-        points[k], kinds[k] = metres * found.point, 1
+        points[k], kinds[k] = meters * found.point, 1
         if found.normal is not None:
             normals[k], kinds[k] = found.normal, 2
     return points, normals, kinds

@@ -44,7 +44,7 @@ def without_kinks(model: CadModel) -> tuple[CadModel, int]:
         divide.SetSurfaceCriterion(GeomAbs_C1)
         divide.SetBoundaryCriterion(GeomAbs_C0)
         divide.SetPCurveCriterion(GeomAbs_C0)
-        divide.Perform(False)  # in the same context: neighbours get the same new vertices
+        divide.Perform(False)  # in the same context: neighbors get the same new vertices
     faces: list[CadFace] = []
     for face in model.faces:
         pieces = faces_of(context.Apply(face.shape))

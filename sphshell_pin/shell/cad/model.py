@@ -61,9 +61,9 @@ class CadModel:
     notes: tuple[str, ...] = ()
 
     @property
-    def metres(self) -> float:
+    def meters(self) -> float:
         """Metres per unit of `shape`."""
-        return self.unit.shape_metres
+        return self.unit.shape_meters
 
     @property
     def shape(self) -> Occ:
