@@ -13,7 +13,7 @@ import numpy as np
 from OCP.gp import gp_Pnt, gp_Vec
 
 from sphshell_pin.shell.base import ShellBase
-from sphshell_pin.shell.cad.face_mesh import ALONG, CURVED, FaceMesh
+from sphshell_pin.shell.cad.face_mesh import ALONG, FaceMesh
 from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.surface import CadSurface
 from sphshell_pin.shell.cleaned import CleanedSurface
@@ -23,6 +23,9 @@ from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask
 _ON_SIDES = [np.roll([1 - share, share, 0.0], side) for side in range(3) for share in ALONG]
 WEIGHTS = np.array([*_ON_SIDES, [1 / 3, 1 / 3, 1 / 3]])
 """Where triangles are measured (k, 3): along the sides 0, 1 and 2, and in the middle."""
+
+CURVED = 0.25
+"""Curved sides must be nearer than this share of the chord error."""
 
 MOST_ROUNDS = 6
 """Times sides are straightened and measured again: a straight side changes middles beside it."""

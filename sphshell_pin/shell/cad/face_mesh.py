@@ -25,15 +25,6 @@ from sphshell_pin.shell.raw import Floats, Longs, Mask
 ALONG = (0.25, 0.5, 0.75)
 """Where along a side the distance is measured."""
 
-CURVED = 0.25
-"""Curved sides inside a face must be nearer than this share of the chord error."""
-
-MOST_TURN = 0.7
-"""The surface may turn by this along a side inside a face [rad]; curved elements need it small."""
-
-TURN_ROUNDS = 3
-"""Times sides are halved for that: along a kink the turn never falls."""
-
 LIMIT_STEP = 1e-4
 """Part of the way to the middle of the triangle at which the limit of a normal is taken."""
 
@@ -121,9 +112,8 @@ class FaceMesh:
     def refined(self, tolerance: float, rounds: int) -> tuple[FaceMesh, float]:
         """Halve sides inside the face until all points measured are within `tolerance`.
 
-        Also where the surface turns by more than MOST_TURN along a side, a few times. Returns the
-        mesh and the largest distance measured. Sides on the border stay: the face across them has
-        the same.
+        Returns the mesh and the largest distance measured. Sides on the border stay: the face
+        across them has the same.
         """
         if self.surface.flat:
             return self, float(np.linalg.norm(self.points - self.exact, axis=1).max(initial=0.0))
@@ -132,13 +122,8 @@ class FaceMesh:
             sides, of_triangle = mesh.sides()
             at_sides, middles = mesh._errors(sides, of_triangle, known, tolerance)
             inner = np.bincount(of_triangle.ravel(), minlength=len(sides)) == 2
-            marked = np.zeros(len(sides), np.bool_)
+            marked: Mask = (at_sides > tolerance) & (turn < rounds)
             if turn < rounds:
-                fresh = np.unique(of_triangle[known:])
-                curved = CURVED * tolerance
-                far = at_sides > tolerance
-                far[fresh] |= mesh._bulges(sides[fresh], curved - at_sides[fresh], curved) > curved
-                marked = mesh._too_long(sides, far, turn)
                 # A triangle too far in its middle alone: its longest side inside the face.
                 length = np.linalg.norm(mesh.points[sides[:, 0]] - mesh.points[sides[:, 1]], axis=1)
                 longest = np.argmax(np.where(inner, length, -1.0)[of_triangle], axis=1)
@@ -197,40 +182,6 @@ class FaceMesh:
         points, uv = self.points[new].mean(axis=1), self.parameters(new).mean(axis=1)
         middles[known:] = self.surface.distances(points, uv, tolerance)
         return at_sides, middles
-
-    def _too_long(self, sides: Longs, far: Mask, turn: int) -> Mask:
-        """Sides that are `far` from the surface, or along which it turns too much."""
-        if turn >= TURN_ROUNDS:
-            return far
-        first, second = self.normals[sides[:, 0]], self.normals[sides[:, 1]]
-        defined = first.any(axis=1) & second.any(axis=1)
-        turned: Mask = defined & (dot(first, second) < np.cos(MOST_TURN))
-        return far | turned
-
-    def _bulges(self, sides: Longs, spare: Floats, tolerance: float) -> Floats:
-        """Distances of sides (s,) from the surface, where each lies highest when it is curved.
-
-        A side whose ends stand for little of it, such as one that ends in a narrow bend, may be
-        near while it is straight, but not once it is curved to meet the normals. `spare` (s,) is
-        what it may bulge without being measured: there the distance is 0.
-        """
-        ends, upright = self.points[sides], self.normals[sides]
-        way = ends[:, 1] - ends[:, 0]
-        # What the tangents at the ends are off the side; they lie in the tangent planes there.
-        first, last = (-dot(upright[:, k], way)[:, None] * upright[:, k] for k in (0, 1))
-        shares = np.array(ALONG)[:, None, None]
-        lifts = shares * (1 - shares) * ((1 - shares) * first - shares * last)
-        highest = np.argmax(np.linalg.norm(lifts, axis=2), axis=0)
-        lift = lifts[highest, np.arange(len(sides))]
-        chosen = np.flatnonzero(np.linalg.norm(lift, axis=1) > spare)
-        share = np.array(ALONG)[highest[chosen], None]
-        between = self.parameters(sides[chosen])
-        uv = (1 - share) * between[:, 0] + share * between[:, 1]
-        found = np.zeros(len(sides))
-        found[chosen] = self.surface.distances(
-            ends[chosen, 0] + share * way[chosen] + lift[chosen], uv, tolerance
-        )
-        return found
 
     def _split(self, sides: Longs, of_triangle: Longs, marked: Mask) -> FaceMesh:
         """Halve the sides where `marked` (s,) holds, with new nodes on the surface."""
