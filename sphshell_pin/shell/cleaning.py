@@ -1,6 +1,6 @@
-"""From raw polygons to a surface fit for contact: nothing valid lost, nothing repaired in silence.
+"""From raw polygons to a surface for contact: all valid elements are kept, all repairs reported.
 
-The order of the steps matters: welding makes edges meet, dropping what has no area or stands twice
+The order of the steps matters: welding makes edges shared, dropping what has no area or is double
 opens the edges that T-junctions lie on, splitting those makes polygons, and only triangles and
 planar quads can be wound alike. Dropping the slivers a triangulation may leave opens cracks again,
 so these steps run until none changes anything.
@@ -30,7 +30,7 @@ PLANAR_TOLERANCE = 1e-10
 """A quad whose corners leave their mean plane by at most this share of the diagonal is planar."""
 
 MOST_PASSES = 20
-"""Two passes settle what files hold; elements tangled within the tolerance might go on for ever."""
+"""Two passes settle what files hold; elements tangled within the tolerance might never end."""
 
 MOST_INSERTED = 1_000_000
 """T-junctions that any surface may have; one of more corners may have four for each of them."""
@@ -116,7 +116,7 @@ def _given(raw: RawSurface) -> Found:
 
 
 def box_diagonal(points: Floats) -> float:
-    """Diagonal of the box round points (n, 3) [m]."""
+    """Diagonal of the box around points (n, 3) [m]."""
     return float(np.linalg.norm([np.ptp(np.ascontiguousarray(points[:, k])) for k in range(3)]))
 
 
@@ -341,7 +341,7 @@ def _with_faces(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
     return replace(surface, normals=normals, element_face=faces, face_names=raw.face_names)
 
 
-def _holes(borders: Borders, component_area: Floats) -> dict[str, object]:
+def _holes(borders: Borders, component_area: Floats) -> Found:
     """Boundary loops that look like a lost element rather than the rim of a sheet."""
     share = borders.loop_area / component_area[borders.loop_component]
     few = borders.loop_edges <= SMALL_HOLE_EDGES

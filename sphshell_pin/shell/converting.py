@@ -6,7 +6,6 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -154,29 +153,13 @@ def exchange(
     )
 
 
-class _Surface(Protocol):
-    """What a file holds, and its distance from points."""
-
-    held: Held
-    notes: tuple[str, ...]
-
-    def shell(self) -> Shell:
-        """Return it as elements."""
-
-    def distances(self, points: Floats) -> Floats:
-        """Distances (n,) of points (n, 3) [m]."""
-
-    def samples(self, count: int, rng: np.random.Generator) -> Floats:
-        """Random points (n <= count, 3), spread by area [m]."""
-
-
-def _surface(path: Path, unit: str | None, options: CadOptions) -> _Surface:
+def _surface(path: Path, unit: str | None, options: CadOptions) -> _Mesh | _Faces:
     if path.suffix.lower() in CAD_SUFFIXES:
         return _Faces(path, unit, options)
     return _Mesh(path, unit)
 
 
-def _write(path: Path, unit: str, source: _Surface, options: CadOptions) -> None:
+def _write(path: Path, unit: str, source: _Mesh | _Faces, options: CadOptions) -> None:
     if path.suffix.lower() not in CAD_SUFFIXES:
         path.write_bytes(encoded(path, source.shell(), unit))
         return
@@ -202,12 +185,15 @@ class _Mesh:
         self.notes = shell.health.notes
 
     def shell(self) -> Shell:
+        """Return the elements as they are."""
         return self._shell
 
     def distances(self, points: Floats) -> Floats:
+        """Distances (n,) of points (n, 3) [m]."""
         return np.abs(self._shell.closest_points(points, method="facets").distances)
 
     def samples(self, count: int, rng: np.random.Generator) -> Floats:
+        """Random points (count, 3), spread by area [m]."""
         corners = self._shell.vertices[self._shell.triangles]
         area = np.linalg.norm(area_vectors(corners), axis=1)
         chosen = rng.choice(len(area), count, p=area / area.sum())

@@ -14,7 +14,7 @@ Found = dict[str, Any]
 """Findings about a surface, under the names of ShellHealth's fields."""
 
 UNIT_TOLERANCE = 1e-3
-"""Normals off unit length by less than this were rounded when written; more is worth a word."""
+"""Normals off unit length by less than this were rounded when written; more is reported."""
 
 
 def unit_normals(raw: RawSurface, found: Found) -> Floats | None:

@@ -1,7 +1,7 @@
 """How far the curved elements of the method "smooth" stand off the flat ones, and which are flat.
 
-A curved element takes its shape from normals alone. Where these say more than the elements round it
-bear out, as averaged normals on a box do, it leaves the surface that was meant.
+The shape of a curved element follows from normals alone. Where these contradict the elements around
+it, as averaged normals on a box do, it leaves the surface that was meant.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ FLAT_BECAUSE = {
 """What the codes of `_core.Shell.bending` mean where they are not CURVED, and one more."""
 
 LARGE_OF_LENGTH = 0.05
-"""It must also be that share of its longest side off: along a bend, a needle rightly stands off by
+"""It must also be that share of its longest side off: along a bend, a needle is correctly off by
 more than its own height."""
 
 COARSE, FINE = 6, 30
@@ -46,7 +46,9 @@ def curvature_report(shell: ShellBase) -> CurvatureReport:
     rows = np.flatnonzero(bound > limit)
     large = rows[_distances(shell, rows, COARSE).max(axis=1, initial=0.0) > limit[rows]]
     code = _bending(shell)
-    aside = np.flatnonzero(core.normals_set_aside) if shell.normals is not None else ()
+    aside = (
+        np.flatnonzero(core.normals_set_aside) if shell.normals is not None else np.zeros(0, int)
+    )
     first = None
     if len(aside):
         first = _place(shell.vertices[shell.triangles.ravel()[aside[0]]])
@@ -113,15 +115,15 @@ def _to_triangles(points: Floats, corners: Floats) -> Floats:
     nearest = np.full(points.shape[:2], np.inf)
     inside = np.broadcast_to(length > 0.0, points.shape[:2]).copy()
     for k in range(3):
-        start, way = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
+        start, span = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
         offset = points - start[:, None]
-        square = np.maximum(np.einsum("nx,nx->n", way, way), np.finfo(float).tiny)
-        along = np.clip(np.einsum("nkx,nx->nk", offset, way) / square[:, None], 0.0, 1.0)
-        away = np.linalg.norm(offset - along[:, :, None] * way[:, None], axis=2)
+        square = np.maximum(np.einsum("nx,nx->n", span, span), np.finfo(float).tiny)
+        along = np.clip(np.einsum("nkx,nx->nk", offset, span) / square[:, None], 0.0, 1.0)
+        away = np.linalg.norm(offset - along[:, :, None] * span[:, None], axis=2)
         nearest = np.minimum(nearest, away)
-        inside &= np.einsum("nkx,nx->nk", offset, np.cross(normal, way)) >= 0.0
-    upright = np.abs(np.einsum("nkx,nx->nk", points - corners[:, :1], normal))
-    return np.asarray(np.where(inside, np.minimum(upright, nearest), nearest))
+        inside &= np.einsum("nkx,nx->nk", offset, np.cross(normal, span)) >= 0.0
+    height = np.abs(np.einsum("nkx,nx->nk", points - corners[:, :1], normal))
+    return np.asarray(np.where(inside, np.minimum(height, nearest), nearest))
 
 
 def _bending(shell: ShellBase) -> Bytes:

@@ -21,7 +21,7 @@ def points_on(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
 def points_at(shell: ShellBase, rows: Longs, weights: Floats) -> Floats:
     """Points (n, k, 3) [m] of n curved triangles at barycentric weights (k, 3)."""
     w, u, v = weights.T
-    # Bernstein's polynomials of the control points that are lifted off the flat triangle.
+    # Bernstein's polynomials of the control points, with their offsets from the flat triangle.
     sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
     inner = np.stack([*sides, 6 * u * v * w])
     corners, lifts = shell.vertices[shell.triangles[rows]], shell.core_for("smooth").lifts[rows]

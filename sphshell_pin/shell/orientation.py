@@ -1,4 +1,4 @@
-"""Which way elements are wound: consistent in a component, outward where it is closed."""
+"""The winding of elements: consistent in a component, outward where it is closed."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Oriented:
     ----------
     polygons : wound consistently
     component : (m,) of each polygon, connected across edges of exactly two polygons
-    closed : (components,) each edge is run through as often one way as the other
+    closed : (components,) its directed edges cancel
     one_sided : (components,) no consistent winding exists (a Moebius strip)
     flipped : (m,) wound the other way than in the input
     reversed_components : components turned as a whole

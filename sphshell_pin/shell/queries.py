@@ -28,8 +28,8 @@ class ClosestPoints:
     Attributes
     ----------
     points : (n, 3) on the surface [m]
-    normals : (n, 3) unit, along the way from there to the point, or with flat elements that of the
-        element, or the mean one of the edge or vertex; on the side the winding makes the outer one
+    normals : (n, 3) unit, toward the point, or with flat elements that of the element, or the mean
+        one of the edge or vertex; on the outer side by the winding
     distances : (n,) [m], negative behind the surface
     elements : (n,) row of shell.elements
     """
@@ -48,7 +48,7 @@ Columns = tuple[Floats, Floats, Floats, Ints, Bytes, Floats, Floats]
 
 
 class Queries(ShellBase):
-    """What a sphere or a point can ask a shell."""
+    """The contact and closest-point queries of a shell."""
 
     def contacts(
         self,

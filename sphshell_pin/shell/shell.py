@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class Shell(Queries):
     """A surface of three- and four-sided elements, open or closed, in its own frame [m].
 
-    The surface is cleaned when it is made; `health` says what was found and repaired. All arrays
+    The surface is cleaned when it is made; `health` lists what was found and repaired. All arrays
     are read-only.
 
     Parameters
@@ -178,7 +178,7 @@ class Shell(Queries):
         geometry : the geometry
         chord_error : largest distance between the elements and a round solid [m], 1e-3 of its
             diameter unless given
-        segments : elements round a full circle, instead of chord_error
+        segments : elements around a full circle, instead of chord_error
         extent : side of the square that stands for a half-space [m], 10 m unless given
         side, crease_angle, name : as of Shell; the name is the object's unless given
 

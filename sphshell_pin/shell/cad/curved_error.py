@@ -1,7 +1,7 @@
-"""How far curved elements are from the exact faces, and keeping those straight that are too far.
+"""The error of curved elements from the exact faces; sides whose error is too large stay straight.
 
 The tessellation is measured flat. Contact uses the elements curved to meet the normals at their
-corners, and where these do not stand for the whole side, as beside a joint that is nearly tangent,
+corners, and where these do not represent the whole side, as beside a joint that is nearly tangent,
 a curved side may leave a face that the straight one is on.
 """
 

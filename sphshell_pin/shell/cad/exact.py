@@ -65,7 +65,7 @@ class _Edge:
 
 
 class TrimmedFaces:
-    """The trimmed faces that a tessellation stands for [units of the model]."""
+    """The trimmed faces that a tessellation approximates [units of the model]."""
 
     def __init__(self, cad: CadSurface) -> None:
         self._cad = cad

@@ -26,7 +26,7 @@ ALONG = (0.25, 0.5, 0.75)
 """Where along a side the distance is measured."""
 
 LIMIT_STEP = 1e-4
-"""Part of the way to the middle of the triangle at which the limit of a normal is taken."""
+"""Share of the distance to the middle of the triangle at which the limit of a normal is taken."""
 
 
 @dataclass(frozen=True)
@@ -46,19 +46,19 @@ class Border:
         if self.curve.GetType() == GeomAbs_Line:
             ends = np.array([self.curve.Value(t).Coord() for t in (self.at[0], self.at[-1])])
             return float(np.linalg.norm(corners[[0, -1]] - ends, axis=1).max())
-        start, way = corners[:-1], np.diff(corners, axis=0)
+        start, span = corners[:-1], np.diff(corners, axis=0)
         shares = np.array((0.0, *ALONG))[:, None]
         places = ((1.0 - shares) * self.at[:-1] + shares * self.at[1:]).ravel()
         exact = np.array([self.curve.Value(t).Coord() for t in places.tolist()]).reshape(-1, 3)
         own = np.tile(np.arange(len(start)), len(shares))
-        away = _to_segments(exact, start[own], way[own])
+        away = _to_segments(exact, start[own], span[own])
         # Where curve and polyline run at different speeds, another side is the nearest. The
         # farthest first: it seldom takes more than a few to know the largest distance.
         largest = 0.0
         for k in np.argsort(-away):
             if away[k] <= largest:
                 break
-            largest = max(largest, float(_to_segments(exact[k], start, way).min()))
+            largest = max(largest, float(_to_segments(exact[k], start, span).min()))
         return largest
 
 
@@ -142,7 +142,7 @@ class FaceMesh:
         """Exact unit normals (t, 3, 3) at the corners, on the face's outer side.
 
         Where the surface has none, as at the pole of a sphere or the tip of a cone, or several, as
-        along a kink, it is the limit on the way from the middle of the triangle.
+        along a kink, it is the limit from the middle of the triangle.
         """
         corners = self.normals[self.triangles]
         limits: Mask = np.asarray(~corners.any(axis=2) | self.surface.kinked, np.bool_)
@@ -153,7 +153,7 @@ class FaceMesh:
     def parameters(self, nodes: Longs) -> Floats:
         """Parameters (k, c, 2) of the c nodes of k sides or triangles.
 
-        A pole takes those of the other nodes, so that what lies between them is on the way.
+        A pole takes those of the other nodes: the parameters between them belong to points between.
         """
         uv, free = self.uv[nodes], self.free[nodes]
         if not free.any():
@@ -219,9 +219,9 @@ class FaceMesh:
     def _limits(self, chosen: Mask) -> Floats:
         uv = self.parameters(self.triangles)
         start = uv[chosen]
-        way = np.broadcast_to(uv.mean(axis=1)[:, None], uv.shape)[chosen] - start
-        near, far = (self.surface.nodes(start + k * LIMIT_STEP * way)[1] for k in (1.0, 2.0))
-        # Carried on from two places on the way, the limit is exact to second order.
+        toward = np.broadcast_to(uv.mean(axis=1)[:, None], uv.shape)[chosen] - start
+        near, far = (self.surface.nodes(start + k * LIMIT_STEP * toward)[1] for k in (1.0, 2.0))
+        # Extrapolated from two places, the limit is exact to second order.
         limit = 2.0 * near - far
         length = np.linalg.norm(limit, axis=1, keepdims=True)
         return np.asarray(limit / np.where(length > 0.0, length, 1.0))
@@ -267,8 +267,8 @@ def _borders(face: Occ, found: Occ, location: Occ) -> Iterator[Border]:
         )
 
 
-def _to_segments(point: Floats, start: Floats, way: Floats) -> Floats:
+def _to_segments(point: Floats, start: Floats, span: Floats) -> Floats:
     """Distances of points (3,) or (n, 3) from segments (n, 3)."""
-    square = np.maximum(dot(way, way), np.finfo(float).tiny)
-    along = np.clip(dot(point - start, way) / square, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(point - start - along[:, None] * way, axis=1))
+    square = np.maximum(dot(span, span), np.finfo(float).tiny)
+    along = np.clip(dot(point - start, span) / square, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(point - start - along[:, None] * span, axis=1))

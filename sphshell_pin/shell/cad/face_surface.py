@@ -66,8 +66,8 @@ class FaceSurface:
         """
         if self.flat and len(points):
             place, by_u, by_v = (row[0] for row in self.derivatives(uv[:1]))
-            upright = np.cross(by_u, by_v)
-            return np.asarray(np.abs((points - place) @ (upright / np.linalg.norm(upright))))
+            normal = np.cross(by_u, by_v)
+            return np.asarray(np.abs((points - place) @ (normal / np.linalg.norm(normal))))
         distance = np.full(len(points), np.inf)
         at, left = uv.copy(), np.arange(len(points))
         for _ in range(MOST_STEPS):

@@ -1,6 +1,7 @@
 """What a CAD child does: all that the package needs of OpenCASCADE.
 
-These run in the child's process, where a crash or a hang harms nobody; `run_in_child` calls them.
+`run_in_child` has them run in the child's process, where a crash or a hang does not affect the
+caller.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from sphshell_pin.shell.raw import Floats, Ints
 Alive = Callable[[], None]
 
 BETWEEN = 100
-"""Contacts after which the audit says that it goes on."""
+"""Contacts after which the audit reports that it continues."""
 
 
 def read(

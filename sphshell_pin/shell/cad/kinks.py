@@ -67,7 +67,7 @@ def _has_kink(face: Occ) -> bool:
         fill(found, GeomAbs_C1)
         reach = ACROSS * (surface.high - surface.low)[column]
         for knot in (found.Value(k) for k in range(2, number + 1)):
-            before, after = (_normals(surface, column, knot + way * reach) for way in (-1, 1))
+            before, after = (_normals(surface, column, knot + sign * reach) for sign in (-1, 1))
             defined = before.any(axis=1) & after.any(axis=1)
             along = np.einsum("ij,ij->i", before, after)
             if (defined & (along < np.cos(TANGENT_ANGLE))).any():

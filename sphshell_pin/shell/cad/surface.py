@@ -19,7 +19,7 @@ from sphshell_pin.shell.cad.units import take_unit
 from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface, area_vectors
 
 CHORD_ERROR = 1e-3
-"""Share of the box diagonal that the elements may be off the exact surface, unless said."""
+"""Share of the box diagonal that the elements may be off the exact surface, unless stated."""
 
 
 @dataclass(frozen=True)
@@ -132,8 +132,8 @@ def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
     """
     model = read_model(path).selected(options.bodies, options.faces)
     size = box_size(model.shape)
-    held, taken, told = take_unit(path, model.unit, unit, size)
-    notes = (*model.notes, told) if told else model.notes
+    held, taken, note = take_unit(path, model.unit, unit, size)
+    notes = (*model.notes, note) if note else model.notes
     whole = model = replace(model, unit=held, notes=notes)
     model, kinked = without_kinks(model)
     if kinked:

@@ -1,4 +1,4 @@
-"""From trimmed faces to triangles within a stated distance, which is measured."""
+"""Tessellation of trimmed faces within a stated chord error, which is measured."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def sew(model: CadModel, size: float, tolerance: float | None) -> Sewn:
         if joined.IsNull():
             continue
         after = count_open_edges(joined)
-        # As they stand in the sewn shape: that may have turned them.
+        # The faces of the sewn shape, which may have reversed them.
         found = ShapeMap()
         TopExp.MapShapes_s(joined, TopAbs_FACE, found)
         rows = [found.FindIndex(sewing.ModifiedSubShape(face)) for face in faces]
@@ -117,7 +117,7 @@ def sew(model: CadModel, size: float, tolerance: float | None) -> Sewn:
 def tessellate(
     shape: Occ, faces: tuple[Occ, ...], size: float, chord_error: float, meters: float
 ) -> Tessellation:
-    """Lay triangles on all faces; refine until they are as near as asked, or no nearer.
+    """Tessellate all faces; refine until they are as near as asked, or no nearer.
 
     shape : what holds the faces; size : its diagonal; chord_error : largest distance [its units];
     meters : per unit
@@ -228,7 +228,7 @@ def _check_count(
 def _expected(mesh: FaceMesh, chord_error: float) -> float:
     """Triangles into which those of a coarse mesh would have to be cut.
 
-    A side of length l along which the normal turns by an angle a stands off by l a / 8. One that
+    A side of length l along which the normal turns by an angle a is off by l a / 8. One that
     bends in a single direction, as on a cylinder, is cut across that alone.
     """
     ends = mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]]

@@ -88,7 +88,7 @@ def iges_unit(path: Path, header: Occ) -> HeaderUnit:
 def take_unit(
     path: Path, header: HeaderUnit, unit: str | None, size: float
 ) -> tuple[HeaderUnit, str, str]:
-    """Return the unit that holds, its name, and a sentence about it.
+    """Return the unit that is valid, its name, and a sentence about it.
 
     unit : as stated, it wins over that of the header; size : of the shape [its units]
 

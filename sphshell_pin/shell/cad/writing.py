@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from sphshell_pin.shell.shell import Shell
 
 MOST_FACETS = 20_000
-"""A face takes about 1 kB in a STEP file, and CAD programs choke on more of them."""
+"""A face takes about 1 kB in a STEP file, and CAD programs fail on more of them."""
 
 STEP_UNITS = {"mm": "MM", "m": "M", "cm": "CM", "in": "INCH", "ft": "FT", "km": "KM", "um": "UM"}
 IGES_UNITS = {"mm": "MM", "m": "M", "cm": "CM", "in": "IN", "ft": "FT", "km": "KM", "um": "UM"}

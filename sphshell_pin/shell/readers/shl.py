@@ -22,7 +22,7 @@ from sphshell_pin.shell.readers.text import finish, pack_polygons, read_text
 # No two neighbors in a pattern match the same text: a long line would cost its length squared.
 _VERSION = re.compile(r"\s*version\s*(?:[:=]\s*)?([\d.]+)\s*$", re.IGNORECASE)
 _FORTRAN_EXPONENT = str.maketrans("dD", "eE")
-# What a line of numbers may be made of; the words a real may be spelled with are not among it.
+# The characters of a line of numbers; nan and inf are not among them.
 _NUMBERS = re.compile(r"(?=[^0-9]*[0-9])[-+0-9.eEdD\s]*$")
 _NOT_FINITE = re.compile(r"(?i)(?<![a-z])[-+]?(nan|inf|infinity)(?![a-z])")
 
@@ -37,7 +37,7 @@ class ShlSurface:
 
 
 class _Lines:
-    """Lines of a file that hold numbers only; `number` is where they stand in it (from 1)."""
+    """Lines of a file that hold numbers only; `number` is their line in it (from 1)."""
 
     def __init__(self, path: Path, rows: list[str], start: int) -> None:
         self._path = path
