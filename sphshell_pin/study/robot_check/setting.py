@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
-from sphshell_pin.dynamics.models import check_no_mimic
+from sphshell_pin.dynamics.models import check_no_mimic, find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell import Shell
 from sphshell_pin.study.robot_check.models import Subject, listed
@@ -128,7 +128,7 @@ def free_touch(setting: Setting, rng: np.random.Generator, gap: float, speed: fl
 
     The patch is as heavy as the robot is in the contact, and turns a little.
     """
-    model = _floating(setting.model)
+    model = _floating(setting.model, setting.sphere)
     q, v, way = _motion(model, setting.sphere, rng, speed)
     contact = _Contact.facing(way, rng, gap, setting)
     data = placed_data(model, q)
@@ -252,30 +252,53 @@ def _law(mass: float, speed: float, radius: float) -> tuple[NormalLaw, CoulombFr
     return law, CoulombFriction(0.3, 0.2, 0.2 * speed, speed)
 
 
-def _floating(model: pin.Model) -> pin.Model:
+def _floating(model: pin.Model, sphere: Sphere) -> pin.Model:
     """Return the robot with a free root, and a free plate, without gravity.
 
-    The links that are fixed to the world are not in a model: a body as heavy as the rest stands for
-    them, unless all joints at the root are free-flyers.
+    Of its frames only that of the sphere is kept. The links that are fixed to the world are not in
+    a model: a body as heavy as the rest stands for them. pinocchio.appendModel refuses models with
+    two frames of one name, or with limits that exclude everything.
     """
     whole = pin.Model()
-    _add_free(whole, PLATE, pin.Inertia.FromSphere(1.0, 1.0))
-    roots = [j for j in range(1, model.njoints) if model.parents[j] == 0]
-    mount = 0
-    if any(model.joints[j].shortname() != "JointModelFreeFlyer" for j in roots):
-        mass = max(sum(float(inertia.mass) for inertia in list(model.inertias)[1:]), 1e-3)
-        _add_free(whole, BASE, pin.Inertia.FromSphere(mass, 0.2))
-        mount = whole.getFrameId(BASE)
-    whole = pin.appendModel(whole, model, mount, pin.SE3.Identity())
     whole.gravity.vector = np.zeros(6)
+    joints = range(1, model.njoints)
+    anew = {0: 0}
+    if any(model.parents[j] == 0 and not _flies(model.joints[j]) for j in joints):
+        mass = max(float(sum(model.inertias[j].mass for j in joints)), 1e-3)
+        anew[0] = _add_free(whole, BASE, pin.Inertia.FromSphere(mass, 0.2))
+    for j in joints:
+        parent = anew[int(model.parents[j])] if not _flies(model.joints[j]) else 0
+        placed = model.jointPlacements[j], model.names[j]
+        anew[j] = int(whole.addJoint(parent, model.joints[j], *placed))
+        whole.appendBodyToJoint(anew[j], model.inertias[j], pin.SE3.Identity())
+    frame = model.frames[find_frame(model, sphere.frame)]
+    whole.addFrame(
+        pin.Frame(sphere.frame, anew[frame.parentJoint], 0, frame.placement, pin.FrameType.OP_FRAME)
+    )
+    _add_free(whole, PLATE, pin.Inertia.FromSphere(1.0, 1.0))
+    for name in ("lowerPositionLimit", "upperPositionLimit", "armature"):
+        values = np.array(getattr(whole, name))
+        of = np.asarray(getattr(model, name))
+        for j in joints:
+            old, new = model.joints[j], whole.joints[anew[j]]
+            at, to, n = old.idx_q, new.idx_q, old.nq
+            if len(of) == model.nv and name == "armature":
+                at, to, n = old.idx_v, new.idx_v, old.nv
+            values[to : to + n] = of[at : at + n]
+        setattr(whole, name, values)
     return whole
 
 
-def _add_free(model: pin.Model, name: str, inertia: pin.Inertia) -> None:
-    """Add a free body called `name`, with a frame."""
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name)
+def _flies(joint: pin.JointModel) -> bool:
+    return bool(joint.shortname() == "JointModelFreeFlyer")
+
+
+def _add_free(model: pin.Model, name: str, inertia: pin.Inertia) -> int:
+    """Add a free body called `name`, with a frame; return its joint."""
+    joint = int(model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name))
     model.addJointFrame(joint)
     model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    return joint
 
 
 def _wave(x: Array, y: Array, radius: float) -> tuple[Array, Array]:
