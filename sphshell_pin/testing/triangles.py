@@ -18,7 +18,7 @@ def distances(points: Array, corners: Array) -> Array:
 def closest(point: Array, corners: Array) -> Array:
     """Return the point (t, 3) of each triangle (t, 3, 3) that is closest to `point` (3,)."""
     same = np.broadcast_to(point, (len(corners), 3))
-    return np.asarray(trimesh.triangles.closest_point(corners, same))
+    return np.asarray(trimesh.triangles.closest_point(corners, same))  # type: ignore[no-untyped-call]
 
 
 def closest_inside(point: Array, corners: Array) -> tuple[Ints, Array]:
