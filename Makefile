@@ -1,6 +1,6 @@
 # make demo   build into .venv and run the main job
 # make test   build into .venv and run all tests, on all cores
-# make quick  the tests that are not marked slow: about a minute
+# make quick  the tests that are neither marked slow nor need a browser: a minute
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -72,7 +72,7 @@ test: $(VENV)/.test
 	$(PYTEST)
 
 quick: $(VENV)/.test
-	$(PYTEST) -m "not slow" --durations=10
+	$(PYTEST) -m "not slow and not browser" --durations=10
 
 $(VENV)/.bench: $(VENV)/.test
 	$(BIN)/python -m pip install -q -e '.[bench]'

@@ -57,7 +57,7 @@ def runner(scene: sp.Scene, controller: Any = None) -> Callable[[], float]:
 
     def run() -> float:
         result = simulation.run(q, None, STEPS * DT, controller, record_dt=STEPS * DT)
-        return float(result.stats["wall_time"]) / STEPS
+        return float(result.stats.wall_time) / STEPS
 
     return run
 

@@ -110,9 +110,9 @@ def measure(
                     setting=setting_of(integrator),
                     error=judge.error(integrator, result),
                     cpu=math.nan,
-                    evaluations=stats["evaluations"] / case.duration,
-                    steps=stats["steps"],
-                    rejected=stats["rejected"],
+                    evaluations=stats.evaluations / case.duration,
+                    steps=stats.steps,
+                    rejected=stats.rejected,
                 )
     return [
         replace(row, cpu=max(float(np.median(times[i])) - setup, 0.0) / case.duration)

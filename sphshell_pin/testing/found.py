@@ -135,7 +135,7 @@ def _places(model: pin.Model, pair: ContactPair) -> Callable[[pin.Data], tuple[p
     The pose is that in the world, the center is in the shell's frame.
     """
     offset = np.zeros(3) if pair.sphere is None else np.array(pair.sphere.offset)
-    frame_i, frame_j = find_frame(model, pair.frame_i), find_frame(model, pair.frame)
+    frame_i, frame_j = find_frame(model, pair.frame_i), find_frame(model, pair.frame_j)
 
     def at(data: pin.Data) -> tuple[pin.SE3, Array]:
         shell = data.oMf[frame_j] * pair.placement

@@ -11,6 +11,8 @@ from scipy.integrate import solve_ivp
 from sphshell_pin.benchmarks import analytic_cases, sizes, step, timing
 from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
 
+pytestmark = pytest.mark.slow
+
 
 def integrated(slope, start, t, method="DOP853"):
     """Return rows of a solution by SciPy."""

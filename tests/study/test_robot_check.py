@@ -72,6 +72,7 @@ def passes(report: RobotReport) -> bool:
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.robots
 def test_a_quarter_of_the_robots_pass() -> None:
     """`make robots` checks all of them; docs/robots.md has the verdicts."""

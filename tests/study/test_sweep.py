@@ -72,6 +72,7 @@ def test_two_workers_leave_the_same_bytes(folder, serial):
     assert table.read_bytes() == serial.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_killed_worker_costs_nothing(folder, serial):
     table = folder / "killed.parquet"
 
@@ -85,6 +86,7 @@ def test_a_killed_worker_costs_nothing(folder, serial):
     assert table.read_bytes() == serial.read_bytes()
 
 
+@pytest.mark.slow
 def test_values_are_read_back_exactly_from_either_kind_of_file(folder, serial):
     h5py = pytest.importorskip("h5py")
     table = folder / "same.h5"
@@ -122,6 +124,7 @@ def test_a_figure_that_breaks_leaves_the_others(tmp_path):
     assert table["figures.depth"].notna().all()
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_its_workers_is_given_up_and_the_others_go_on(tmp_path):
     path = write(tmp_path, "deadly")
     out = tmp_path / "table.parquet"

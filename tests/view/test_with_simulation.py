@@ -10,6 +10,8 @@ from sphshell_pin.view import write_recording
 from tests.view.stand_ins import CUBE_ELEMENTS, CUBE_VERTICES, ball_configuration, ball_model
 from tests.view.test_page import unpacked
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def run():

@@ -11,7 +11,6 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from sphshell_pin.dynamics.controllers import PythonFunction
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario.schema import Scenario
 
@@ -87,11 +86,15 @@ def digest(data: object) -> str:
 
 
 def files_of(scenario: Scenario) -> set[str]:
-    """Return the files that `scenario` names: surfaces, URDFs, Python routines."""
+    """Return the files that `scenario` names: surfaces, URDFs, Python routines, tables of laws."""
     routines = [one.find for one in scenario.source] + list(scenario.figures.values())
-    if isinstance(scenario.controller, PythonFunction):
-        routines.append(scenario.controller.function)
     named = [one.file for one in scenario.shell] + [one.urdf for one in scenario.robot]
+    stated = [scenario.controller]
+    for one in scenario.contact:
+        stated += one.law, one.friction
+    for other in scenario.source:
+        stated += other.law, other.friction
+    named += [file for one in stated for file in one.files]
     named += [routine.rpartition(":")[0] for routine in routines]
     return {name for name in named if name}
 
