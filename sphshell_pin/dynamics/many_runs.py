@@ -263,8 +263,8 @@ def _deep_starts(
         pairs = variations.pairs(run)
         for k in spheres:
             pair = pairs[k]
-            centre = data.oMi[pair.joint_i].act(pair.sphere_placement.translation)
-            centres[k][run] = (data.oMi[pair.joint_j] * pair.shell_placement).actInv(centre)
+            centre = data.oMi[pair.joint_i].act(pair.placement_i.translation)
+            centres[k][run] = (data.oMi[pair.joint_j] * pair.placement_j).actInv(centre)
             radii[k][run] = pair.sphere.radius if pair.sphere is not None else math.nan
     out: dict[int, SphshellError] = {}
     for k in spheres:

@@ -25,6 +25,7 @@ from pydantic import (
     PlainSerializer,
     SerializationInfo,
     Tag,
+    create_model,
     model_validator,
 )
 from pydantic_core import CoreSchema
@@ -271,8 +272,18 @@ class SourceSection(Section):
 Controller = Annotated[Ingredient, OneOf(controllers.Controller)]
 
 
-_DT = parameters_of(SemiImplicitEuler)["dt"]
-_RTOL, _ATOL = parameters_of(Adaptive).values()
+def _bounds(about: Parameter) -> object:
+    return Field(gt=about.above, ge=about.at_least, le=about.at_most)
+
+
+# The parameters of all integrators, by name.
+STEPPING = {
+    name: about for kind in Integrator.kinds.values() for name, about in parameters_of(kind).items()
+}
+_keys: dict[str, Any] = {
+    name: (Annotated[float | None, _bounds(about), about], None) for name, about in STEPPING.items()
+}
+_Stepping: Any = create_model("_Stepping", __base__=Section, **_keys)
 
 
 def _check_integrator(kind: str) -> str:
@@ -282,16 +293,13 @@ def _check_integrator(kind: str) -> str:
     return kind
 
 
-class RunSection(Section):
+class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integrators have
     """How long and how finely to simulate [s]; `recording_speed` 0.1 films in slow motion.
 
-    The integrator is adaptive unless `dt` is given; `dt`, `rtol` and `atol` are its parameters.
+    The parameters of the integrator stand in this table; it is adaptive unless `dt` is given.
     """
 
     duration: Annotated[Positive, Parameter("s")]
-    dt: Annotated[float | None, Field(**_DT.bounds), _DT] = None
-    rtol: Annotated[float | None, Field(**_RTOL.bounds), _RTOL] = None
-    atol: Annotated[float | None, Field(**_ATOL.bounds), _ATOL] = None
     integrator: Annotated[str, AfterValidator(_check_integrator)] = ""
     control_dt: Annotated[Positive | None, Parameter("s", "control period")] = None
     record_dt: Annotated[Positive | None, Parameter("s", "time between rows")] = None
@@ -305,19 +313,20 @@ class RunSection(Section):
             # Not as something that was set: it follows a change of dt.
             self.__dict__["integrator"] = kind.kind
         taken = parameters_of(Integrator.kinds[self.integrator])
-        if self.dt is not None and "dt" not in taken:
+        foreign = [name for name in STEPPING if name not in taken]
+        wrong = [name for name in foreign if getattr(self, name) is not None]
+        if wrong:
+            others = [k for k, one in Integrator.kinds.items() if wrong[0] in parameters_of(one)]
             raise ValueError(
-                f"{self.integrator} takes rtol and atol, not dt: for fixed steps set "
-                "run.integrator to semi-implicit-euler, and leave rtol and atol out"
+                f"{self.integrator} takes {' and '.join(taken)}, not {' and '.join(foreign)}: "
+                f"leave {' and '.join(wrong)} out, or set run.integrator to {others[0]}"
             )
-        if (self.rtol is not None or self.atol is not None) and "rtol" not in taken:
-            raise ValueError(f"{self.integrator} takes dt, not rtol and atol: leave them out")
         return self
 
     def made(self) -> Integrator:
         """Return the integrator."""
-        values = {name: getattr(self, name) for name in ("dt", "rtol", "atol")}
         kind = Integrator.kinds[self.integrator]
+        values = {name: getattr(self, name) for name in parameters_of(kind)}
         made: Integrator = kind(**{k: v for k, v in values.items() if v is not None}).made()
         return made
 

@@ -29,7 +29,7 @@ def momentum(result: Result) -> Finding:
     scene = _scene_of(result)
     _check_closed(scene, result)
     model, data = scene.model, scene.model.createData()
-    impulse = sum(float(one["impulse"]) for one in result.stats["pairs"].values())
+    impulse = sum(one.impulse for one in result.stats.pairs.values())
     if not len(result.contacts) or impulse <= 0.0:
         raise InvalidParameter("result", "a run", "must have contacts: nothing touched in it")
     middle = result.contacts.point_world.mean(axis=0)

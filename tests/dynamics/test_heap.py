@@ -48,7 +48,7 @@ for steps in (200, 1000, 11000):
     before = heap()
     result = sim.run(ARM_Q, np.zeros(3), duration, controller, record_dt=duration)
     counts.append(heap() - before)
-print(*counts, result.stats["pairs"]["ball-plate"]["contact_time"])
+print(*counts, result.stats.pairs["ball-plate"].contact_time)
 """
 
 CONTROLLERS = {

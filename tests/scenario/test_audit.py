@@ -105,8 +105,8 @@ def test_flat_elements_are_off_by_their_chord_error(tmp_path):
 )
 def test_trimmed_faces_edges_and_corners_are_found(center, contact, foot, tmp_path):
     require_kernel("this test")
-    from sphshell_pin.shell.cad.surface import load_cad
     from sphshell_pin.shell.cad.exact import TrimmedFaces
+    from sphshell_pin.shell.cad.surface import load_cad
 
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
     faces = TrimmedFaces(load_cad(path, "mm", CadOptions()))
@@ -118,8 +118,8 @@ def test_trimmed_faces_edges_and_corners_are_found(center, contact, foot, tmp_pa
 def test_border_of_a_hole_is_a_curve(tmp_path):
     """A ball on the rim of a hole touches its circle, where neither face has a closest point."""
     require_kernel("this test")
-    from sphshell_pin.shell.cad.surface import load_cad
     from sphshell_pin.shell.cad.exact import TrimmedFaces
+    from sphshell_pin.shell.cad.surface import load_cad
 
     path = shapes.write_brep(tmp_path / "plate.brep", shapes.drilled_plate())
     faces = TrimmedFaces(load_cad(path, "mm", CadOptions()))

@@ -97,7 +97,7 @@ def test_what_becomes_of_the_child_is_told_in_a_sentence(job, told, box, monkeyp
 @pytest.mark.slow
 def test_files_on_which_opencascade_crashed_or_hung():
     with ThreadPoolExecutor(2) as pool:
-        found = pool.map(lambda path: outcome(path, time_limit=3.0), DAMAGED)
+        found = pool.map(lambda path: outcome(path, time_limit=1.5), DAMAGED)
         assert set(found) <= set(KINDS.values())
 
 

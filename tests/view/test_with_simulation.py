@@ -61,8 +61,8 @@ def test_a_loaded_result_has_figures_too(run, tmp_path):
 
 def test_the_drawn_edges_are_those_of_the_file():
     """A quad's diagonal is no edge of its shell, and is not drawn as one."""
-    from sphshell_pin.view.surface import outlined_edges, split_at_creases
+    from sphshell_pin.view.surface import SurfaceMesh, outlined_edges
 
     cube = sp.Shell(CUBE_VERTICES, CUBE_ELEMENTS)
     assert len(outlined_edges(cube)) == 12
-    assert len(split_at_creases(cube)[0]) == 24
+    assert len(SurfaceMesh.of(cube).vertices) == 24
