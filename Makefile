@@ -1,5 +1,6 @@
 # make demo   build into .venv and run the main job
-# make test   build into .venv and run all tests
+# make test   build into .venv and run all tests, on all cores
+# make quick  the tests that are neither marked slow nor need a browser: a minute
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -8,7 +9,7 @@ CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 OUT ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench hard-cases work-precision lint format report robots sweep-survival kills rollouts real-surfaces wheel docs fuzz sanitize clean
+.PHONY: help demo test quick bench hard-cases work-precision lint format report robots sweep-survival kills rollouts real-surfaces wheel docs fuzz sanitize clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -29,26 +30,49 @@ help:
 # make sanitize        run tests with checks of memory, undefined behaviour and data races
 # make clean  remove everything that was built
 
+# uv downloads in parallel and links what it has unpacked once; pip installs whatever uv cannot.
+FETCH = -$(BIN)/uv pip install -q --python $(BIN)/python
+PIP = $(BIN)/python -m pip install -q
+BUILD = $(shell $(PYTHON) -c 'import tomllib; \
+	print(*map(repr, tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"]))')
+
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q --upgrade pip
+	-$(PIP) uv
 
-# One stamp per set of extras; a change of the C++ sources or of the packaging builds anew.
-$(VENV)/.demo: $(BIN)/python $(SOURCES)
-	@echo "Building sphshell_pin into $(VENV): about 80 seconds"
-	$(BIN)/python -m pip install -q -e '.[view,robots]'
+# What the build needs stays in the environment: after a change only what it concerns is compiled.
+$(VENV)/.build: $(BIN)/python pyproject.toml
+	$(FETCH) cmake ninja $(BUILD)
+	$(PIP) cmake ninja $(BUILD)
 	@touch $@
 
-$(VENV)/.test: $(BIN)/python $(SOURCES)
+# $(call install,EXTRAS)
+comma := ,
+define install
+	$(FETCH) -r pyproject.toml $(addprefix --extra ,$(1))
 	@echo "Building sphshell_pin into $(VENV): about 80 seconds"
-	$(BIN)/python -m pip install -q -e '.[test]'
+	$(PIP) --no-build-isolation -e '.[$(subst $() ,$(comma),$(1))]'
 	@touch $@ $(VENV)/.demo
+endef
+
+# One stamp per set of extras; a change of the C++ sources or of the packaging builds anew.
+$(VENV)/.demo: $(VENV)/.build $(SOURCES)
+	$(call install,view robots)
+
+$(VENV)/.test: $(VENV)/.build $(SOURCES)
+	$(call install,test)
 
 demo: $(VENV)/.demo
 	$(BIN)/sphshell-pin run fingertip_on_blade --out $(OUT)/fingertip_on_blade
 
+# ARGS="-k blade": more arguments; whoever ends early takes over tests of another process.
+PYTEST = $(BIN)/python -m pytest -n auto --dist worksteal $(ARGS)
+
 test: $(VENV)/.test
-	$(BIN)/python -m pytest
+	$(PYTEST)
+
+quick: $(VENV)/.test
+	$(PYTEST) -m "not slow and not browser" --durations=10
 
 $(VENV)/.bench: $(VENV)/.test
 	$(BIN)/python -m pip install -q -e '.[bench]'

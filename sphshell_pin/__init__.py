@@ -16,6 +16,7 @@ with interrupts_delayed():
 
 if TYPE_CHECKING:
     from sphshell_pin.contact import BristleFriction as BristleFriction
+    from sphshell_pin.contact import BristleState as BristleState
     from sphshell_pin.contact import ContactSet as ContactSet
     from sphshell_pin.contact import CoulombFriction as CoulombFriction
     from sphshell_pin.contact import Feature as Feature
@@ -42,6 +43,7 @@ __version__ = "0.1.0"
 _HOME = {
     "Adaptive": "dynamics",
     "BristleFriction": "contact",
+    "BristleState": "contact",
     "CartesianImpedance": "dynamics",
     "ContactSet": "contact",
     "CoulombFriction": "contact",

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.errors import InvalidParameter
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 
-def check_positive(name: str, value: float, unit: str = "") -> float:
+def check_positive(name: str, value: object, unit: str = "") -> float:
     """Return `value` as a float; raise InvalidParameter unless it is finite and > 0."""
     number = check_finite(name, value)
     if number <= 0:
@@ -22,7 +23,7 @@ def check_positive(name: str, value: float, unit: str = "") -> float:
     return number
 
 
-def check_not_negative(name: str, value: float, unit: str = "") -> float:
+def check_not_negative(name: str, value: object, unit: str = "") -> float:
     """Return `value` as a float; raise InvalidParameter unless it is finite and >= 0."""
     number = check_finite(name, value)
     if number < 0:
@@ -30,7 +31,7 @@ def check_not_negative(name: str, value: float, unit: str = "") -> float:
     return number
 
 
-def check_finite(name: str, value: float) -> float:
+def check_finite(name: str, value: object) -> float:
     """Return `value` as a float; raise InvalidParameter unless it is one finite number."""
     try:
         array = as_floats(value)
@@ -44,7 +45,7 @@ def check_finite(name: str, value: float) -> float:
     return number
 
 
-def check_vector(name: str, value: Any, size: int, what: str = "") -> Array:
+def check_vector(name: str, value: object, size: int, what: str = "") -> Array:
     """Return a copy of `value` as an array (size,); raise InvalidParameter otherwise."""
     try:
         array = as_floats(value)
@@ -57,7 +58,7 @@ def check_vector(name: str, value: Any, size: int, what: str = "") -> Array:
     return array
 
 
-def check_points(name: str, value: Any) -> Array:
+def check_points(name: str, value: object) -> Array:
     """Return a copy of `value` as an array (n, 3); raise InvalidParameter otherwise."""
     try:
         array = as_floats(value)
@@ -71,7 +72,7 @@ def check_points(name: str, value: Any) -> Array:
     return array
 
 
-def check_each_positive(name: str, value: Any, count: int, unit: str = "") -> Array:
+def check_each_positive(name: str, value: ArrayLike, count: int, unit: str = "") -> Array:
     """Return `value`, one number or (count,), as an array (count,); raise unless all are > 0."""
     try:
         array = np.array(np.broadcast_to(as_floats(value), (count,)))
@@ -86,7 +87,7 @@ def check_each_positive(name: str, value: Any, count: int, unit: str = "") -> Ar
     return array
 
 
-def as_floats(value: Any) -> Array:
+def as_floats(value: object) -> Array:
     """Return a copy of `value` as an array of float64.
 
     TypeError for truth values, texts and complex numbers, which numpy would take.
@@ -98,16 +99,16 @@ def as_floats(value: Any) -> Array:
     return np.array(given, dtype=np.float64, order="C")
 
 
-def check_type(name: str, value: Any, kind: type | tuple[type, ...], must: str) -> None:
-    """Raise InvalidParameter unless `value` is an instance of `kind`; `must` says what it is."""
+def check_type(name: str, value: object, kind: type[T] | tuple[type[T], ...], must: str) -> T:
+    """Return `value`; raise InvalidParameter unless it is an instance of `kind`, as `must` says."""
     if isinstance(value, kind):
-        return
+        return value
     if isinstance(value, type) and issubclass(value, kind):
         raise InvalidParameter(name, value, f"{must}, not its class: did you forget ()?")
     raise InvalidParameter(name, value, must)
 
 
-def check_flag(name: str, value: Any) -> bool:
+def check_flag(name: str, value: object) -> bool:
     """Return the truth of `value`; InvalidParameter where it has none, as of an array."""
     try:
         return bool(value)
@@ -115,17 +116,17 @@ def check_flag(name: str, value: Any) -> bool:
         raise InvalidParameter(name, value, "must be True or False") from None
 
 
-def check_name(name: str, value: Any) -> None:
+def check_name(name: str, value: object) -> None:
     """Raise InvalidParameter unless `value` is a text."""
     check_type(name, value, str, "must be a name (str)")
 
 
-def check_names(name: str, value: Any) -> tuple[str, ...]:
+def check_names(name: str, value: object) -> tuple[str, ...]:
     """Return `value` as a tuple of texts; raise InvalidParameter for others and for repeats."""
     if isinstance(value, str):
         raise InvalidParameter(name, value, f"must be a list of names: write [{value!r}]")
     try:
-        names = tuple(value)
+        names: tuple[str, ...] = tuple(value)  # type: ignore[arg-type]  # it refuses others
     except TypeError:
         raise InvalidParameter(name, value, "must be a list of names") from None
     for k, one in enumerate(names):
@@ -135,7 +136,7 @@ def check_names(name: str, value: Any) -> tuple[str, ...]:
     return names
 
 
-def check_placement(name: str, value: Any) -> pin.SE3:
+def check_placement(name: str, value: object) -> pin.SE3:
     """Return a copy of `value` (None: the identity).
 
     InvalidParameter unless it is a pinocchio.SE3 of finite numbers with a rotation: orthonormal to
@@ -145,18 +146,18 @@ def check_placement(name: str, value: Any) -> pin.SE3:
         return pin.SE3.Identity()
     is_matrix = getattr(value, "shape", None) == (4, 4)
     how = "; of a 4x4 array: pinocchio.SE3(array)" if is_matrix else ""
-    check_type(name, value, pin.SE3, f"must be a pinocchio.SE3{how}")
-    if not np.isfinite(value.homogeneous).all():
-        raise InvalidParameter(name, value.homogeneous.tolist(), "must be finite")
-    rotation = np.array(value.rotation)
+    pose = check_type(name, value, pin.SE3, f"must be a pinocchio.SE3{how}")
+    if not np.isfinite(pose.homogeneous).all():
+        raise InvalidParameter(name, pose.homogeneous.tolist(), "must be finite")
+    rotation = np.array(pose.rotation)
     if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
         raise InvalidParameter(
             f"{name}.rotation", rotation.tolist(), "must be a rotation: orthonormal, determinant +1"
         )
-    return pin.SE3(value)
+    return pin.SE3(pose)
 
 
-def check_configuration(name: str, model: pin.Model, value: Any, what: str = "") -> Array:
+def check_configuration(name: str, model: pin.Model, value: object, what: str = "") -> Array:
     """Return a copy of `value` as a configuration (nq,) of `model`.
 
     InvalidParameter for another size, no numbers, or a joint whose quaternion or (cos, sin) pair is
@@ -211,7 +212,7 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
-def _objects(array: NDArray[Any]) -> list[Any]:
+def _objects(array: NDArray[np.generic]) -> list[object]:
     return array.ravel().tolist() if array.dtype == object else []
 
 

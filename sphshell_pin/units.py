@@ -83,28 +83,32 @@ def adams_stiffness_to_si(stiffness: float, exponent: float, units: str = "mm-N-
     K converts by (1 / metres per unit)^exponent, which is 1000^2.2 = 3.98e6 for ADAMS's default
     exponent in millimetres, not by 1000.
     """
-    length, force = _adams_units(units)
+    length, force = adams_units(units)
     return float(stiffness * force / length**exponent)
 
 
 def adams_stiffness_from_si(stiffness: float, exponent: float, units: str = "mm-N-s") -> float:
     """Stiffness [N/m^exponent] as ADAMS writes it; the inverse of `adams_stiffness_to_si`."""
-    length, force = _adams_units(units)
+    length, force = adams_units(units)
     return float(stiffness * length**exponent / force)
 
 
 def adams_damping_to_si(damping: float, units: str = "mm-N-s") -> float:
     """ADAMS damping [force s/length] in [N s/m]."""
-    length, force = _adams_units(units)
+    length, force = adams_units(units)
     return damping * force / length
 
 
 def adams_length_to_si(value: float, units: str = "mm-N-s") -> float:
     """ADAMS length or speed [length or length/s] in [m] or [m/s]."""
-    return value * _adams_units(units)[0]
+    return value * adams_units(units)[0]
 
 
-def _adams_units(units: str) -> tuple[float, float]:
+def adams_units(units: str) -> tuple[float, float]:
+    """Return metres per length unit and newtons per force unit of an ADAMS unit system.
+
+    InvalidParameter for an unknown one lists the valid ones.
+    """
     try:
         return ADAMS_UNITS[units]
     except (KeyError, TypeError):

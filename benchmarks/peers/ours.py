@@ -158,7 +158,7 @@ def read(scene: BallScene, result: sp.Result, cpu: float) -> Trajectory:
         angular_velocity=spin,
         cpu=cpu,
         simulated=scene.duration,
-        steps=int(result.stats["steps"]),
+        steps=int(result.stats.steps),
         force=force,
         contact_forces=log.at_row(len(result.t) - 1).force_world,
     )
@@ -195,6 +195,6 @@ def run_press(scene: PressScene, simulation: sp.Simulation) -> Trajectory:
         angular_velocity=motion.angular[None].copy(),
         cpu=cpu,
         simulated=scene.duration,
-        steps=int(result.stats["steps"]),
+        steps=int(result.stats.steps),
         force=result.contacts.at_row(len(result.t) - 1).force_world.sum(axis=0)[None],
     )

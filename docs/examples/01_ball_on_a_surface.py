@@ -24,13 +24,13 @@ result = sp.Simulation(scene, sp.Adaptive()).run(q0, duration=1.5, record_dt=2e-
 # What happened, in numbers.
 
 # %%
-figures = result.stats["pairs"]["ball-bowl"]
+figures = result.stats.pairs["ball-bowl"]
 print(f"{figures['touches']} touches, hardest {figures['peak_force']:.0f} N")
 print(f"energy residual {np.abs(result.energy.residual).max():.1e} J")
 
 # %% [markdown]
 # Forces, depth and energy over time; then where on the bowl it bounced and rolled: each element is
-# coloured by the normal impulse that it took. A notebook shows figures by itself, a script saves
+# colored by the normal impulse that it took. A notebook shows figures by itself, a script saves
 # them.
 
 # %%

@@ -2,7 +2,7 @@
 """A fingertip on a wall, in a loop of one's own.
 
 The package finds the contacts and their wrenches; the controller, the dynamics and the time
-stepping are plain Pinocchio. This is the way into an existing simulator, estimator or optimiser.
+stepping are plain Pinocchio. This is the way into an existing simulator, estimator or optimizer.
 """
 
 # %%

@@ -80,7 +80,7 @@ def drop(stiffness: float) -> dict[str, float]:
     q0 = np.array([0, 0, RADIUS + 1e-6, 0, 0, 0, 1])
     v0 = np.array([0, 0, -SPEED, 0, 0, 0])
     result = sp.Simulation(scene, sp.Adaptive()).run(q0, v0, duration=0.02)
-    figures: dict[str, float] = result.stats["pairs"]["ball-plane"]
+    figures: dict[str, float] = result.stats.pairs["ball-plane"]
     return figures
 
 

@@ -2,37 +2,89 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from pathlib import Path
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_not_negative, check_positive, check_type
+from sphshell_pin.checks import check_not_negative, check_type
+from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.parameters import Ingredient, parameter
+
+__all__ = ["BristleFriction", "CoulombFriction", "Friction"]
+
+# Bristles stick below this part of Stribeck's speed: almost nothing moves.
+STICKING_SHARE = 0.01
 
 
-class Friction(ABC):
-    """What every friction law offers: `core`, the C++ twin, decides the numbers."""
+class Friction(Ingredient):
+    """Base of the friction laws: `core`, the C++ binding, computes the forces."""
+
+    @cached_property
+    def core(self) -> _core.FrictionLaw:
+        """The C++ binding of this law."""
+        return _core.FrictionLaw(self.kind, self.numbers())
 
     @property
-    @abstractmethod
-    def core(self) -> _core.FrictionLaw:
-        """The C++ twin of this law."""
+    def text(self) -> str:
+        """Parameters in one line."""
+        raise NotImplementedError
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the C++ twin, which is made again: what pickle and copy take."""
-        return {k: v for k, v in self.__dict__.items() if k != "core"}
+    @property
+    def has_state(self) -> bool:
+        """Whether a contact has a stretch, which depends on what happened before."""
+        return self.core.has_state
+
+    @property
+    def sticking_speed(self) -> float:
+        """Slip speed [m/s] below which a contact sticks."""
+        raise NotImplementedError
+
+    def slip_time(self, mass: float, load: float) -> float:
+        """Return the time scale [s] of slow slip of `mass` [kg] along the surface under `load` [N].
+
+        20 times its decay where friction acts like a damper; half a period where like a spring.
+        """
+        raise NotImplementedError
 
     def coefficient(self, slip_speed: float) -> float:
         """Return mu of steady sliding at `slip_speed` [m/s] >= 0."""
-        value: float = self.core.coefficient(check_not_negative("slip_speed", slip_speed, "m/s"))
-        return value
+        return self.core.coefficient(check_not_negative("slip_speed", slip_speed, "m/s"))
 
 
 @dataclass(frozen=True)
-class CoulombFriction(Friction):
-    """Coulomb friction regularised over two slip speeds, as ADAMS has it.
+class _Coefficients(Friction):
+    mu_static: float = parameter(
+        at_least=0, label="static friction", help="coefficient at rest or nearly so"
+    )
+    mu_dynamic: float = parameter(
+        at_least=0,
+        label="dynamic friction",
+        help="coefficient of fast sliding; not above `mu_static`",
+    )
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for a value outside its bounds."""
+        super().__post_init__()
+        if self.mu_dynamic > self.mu_static:
+            raise InvalidParameter(
+                "mu_dynamic", self.mu_dynamic, f"must not exceed mu_static = {self.mu_static!r}"
+            )
+
+
+@dataclass(frozen=True)
+class NoFriction(Ingredient, kind="none", of=Friction):
+    """A frictionless contact."""
+
+    def made(self, folder: Path = Path()) -> None:
+        """Return None."""
+
+
+@dataclass(frozen=True)
+class CoulombFriction(_Coefficients, kind="coulomb"):
+    """Coulomb friction regularized over two slip speeds, as ADAMS has it; its defaults are ADAMS's.
 
     The force opposes the slip velocity with mu(s) N: mu rises from 0 at rest to `mu_static` at
     slip speed `v_static` [m/s], falls to `mu_dynamic` at `v_dynamic` [m/s] and stays there; both
@@ -40,16 +92,34 @@ class CoulombFriction(Friction):
     Source: ADAMS/View help, contact friction force.
     """
 
-    mu_static: float
-    mu_dynamic: float
-    v_static: float
-    v_dynamic: float
+    mu_static: float = parameter(
+        0.3, at_least=0, label="static friction", help="coefficient at the slip speed `v_static`"
+    )
+    mu_dynamic: float = parameter(
+        0.1,
+        at_least=0,
+        label="dynamic friction",
+        help="coefficient from `v_dynamic` on; not above `mu_static`",
+    )
+    v_static: float = parameter(
+        0.1,
+        above=0,
+        unit="m/s",
+        label="static friction speed",
+        help="the slip you can bear where it should stick: small enough for the creep, large "
+        "enough for dt (below)",
+    )
+    v_dynamic: float = parameter(
+        1.0,
+        above=0,
+        unit="m/s",
+        label="dynamic friction speed",
+        help="more than `v_static`; ADAMS takes 10 times as much",
+    )
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter unless mu_dynamic <= mu_static and v_static < v_dynamic."""
-        _check_coefficients(self.mu_static, self.mu_dynamic)
-        check_positive("v_static", self.v_static, "m/s")
-        check_positive("v_dynamic", self.v_dynamic, "m/s")
+        super().__post_init__()
         if self.v_dynamic <= self.v_static:
             raise InvalidParameter(
                 "v_dynamic", self.v_dynamic, f"must exceed v_static = {self.v_static!r} m/s"
@@ -62,16 +132,28 @@ class CoulombFriction(Friction):
         """Build from ADAMS's coefficients and its speeds in mm/s."""
         return cls(mu_static, mu_dynamic, v_static / 1000, v_dynamic / 1000)
 
-    @cached_property
-    def core(self) -> _core.FrictionLaw:
-        """The C++ twin of this object."""
-        return _core.FrictionLaw.two_velocity(
-            self.mu_static, self.mu_dynamic, self.v_static, self.v_dynamic
+    @property
+    def text(self) -> str:
+        """Parameters in one line."""
+        return (
+            f"coefficient {self.mu_static:g} at {self.v_static:g} m/s, "
+            f"{self.mu_dynamic:g} from {self.v_dynamic:g} m/s; creeps under load"
         )
+
+    @property
+    def sticking_speed(self) -> float:
+        """Slip speed [m/s] below which a contact creeps."""
+        return self.v_static
+
+    def slip_time(self, mass: float, load: float) -> float:
+        """Return 20 times the decay of a slip below `v_static` [s]."""
+        if not self.mu_static or not load > 0:
+            return math.inf
+        return DECAYS_PER_PERIOD * mass * self.v_static / (1.5 * self.mu_static * load)
 
 
 @dataclass(frozen=True)
-class BristleFriction(Friction):
+class BristleFriction(_Coefficients, kind="bristle"):
     """Friction that sticks: an elastic, perfectly plastic spring between sphere and shell.
 
     Below the limit mu N the tangential force is that of a spring of `stiffness` [N/m] with
@@ -87,46 +169,57 @@ class BristleFriction(Friction):
     Howe and Cutkosky, Int. J. Robotics Research 15 (1996) 557; Johnson, Contact Mechanics, 1985.
     """
 
-    mu_static: float
-    mu_dynamic: float
-    stiffness: float
-    damping: float = 0.0
-    v_stribeck: float = 0.01
-    torsional: bool = False
+    stiffness: float = parameter(
+        above=0,
+        unit="N/m",
+        label="bristle stiffness",
+        help="k of the spring: at the limit it has given way by mu_static N / k",
+    )
+    damping: float = parameter(
+        0.0,
+        at_least=0,
+        unit="N s/m",
+        label="bristle damping",
+        help="c beside the spring: about `sqrt(k m)`, with the mass m along the surface",
+    )
+    v_stribeck: float = parameter(
+        0.01,
+        above=0,
+        unit="m/s",
+        label="Stribeck speed",
+        help="slip speed at which mu has come down from `mu_static` by 63 % of the way to "
+        "`mu_dynamic`",
+    )
+    torsional: bool = parameter(
+        False, help="True: also against spin about the normal, as a soft finger"
+    )
 
-    def __post_init__(self) -> None:
-        """Raise InvalidParameter for a value outside its range."""
-        _check_coefficients(self.mu_static, self.mu_dynamic)
-        check_positive("stiffness", self.stiffness, "N/m")
-        check_not_negative("damping", self.damping, "N s/m")
-        check_positive("v_stribeck", self.v_stribeck, "m/s")
-        check_type("torsional", self.torsional, bool, "must be True or False")
-
-    @cached_property
-    def core(self) -> _core.FrictionLaw:
-        """The C++ twin of this object."""
-        return _core.FrictionLaw.bristle(
-            self.mu_static,
-            self.mu_dynamic,
-            self.stiffness,
-            self.damping,
-            self.v_stribeck,
-            self.torsional,
+    @property
+    def text(self) -> str:
+        """Parameters in one line."""
+        spin = ", and against spin" if self.torsional else ""
+        return (
+            f"coefficient {self.mu_static:g} at rest, {self.mu_dynamic:g} beyond "
+            f"{self.v_stribeck:g} m/s; sticks with {self.stiffness:.4g} N/m, damping "
+            f"{self.damping:.4g} N s/m{spin}; the stretch is a state of the contact"
         )
 
+    @property
+    def sticking_speed(self) -> float:
+        """Slip speed [m/s] below which almost nothing moves."""
+        return STICKING_SHARE * self.v_stribeck
 
-def _check_coefficients(mu_static: float, mu_dynamic: float) -> None:
-    check_not_negative("mu_static", mu_static)
-    check_not_negative("mu_dynamic", mu_dynamic)
-    if mu_dynamic > mu_static:
-        raise InvalidParameter(
-            "mu_dynamic", mu_dynamic, f"must not exceed mu_static = {mu_static!r}"
-        )
+    def slip_time(self, mass: float, load: float) -> float:
+        """Return half a period of the spring, or 20 times its decay if that is shorter [s]."""
+        times = [math.pi * math.sqrt(mass / self.stiffness)]
+        if self.damping:
+            times.append(DECAYS_PER_PERIOD * mass / self.damping)
+        return min(times)
 
 
-def check_friction(friction: Any) -> None:
-    """Raise InvalidParameter unless `friction` is a friction law, or None."""
-    if friction is not None:
-        check_type(
-            "friction", friction, Friction, "must be a CoulombFriction, a BristleFriction or None"
-        )
+def check_friction(friction: object) -> Friction | None:
+    """Return `friction`; raise InvalidParameter unless it is a friction law, or None."""
+    if friction is None:
+        return None
+    kinds = "a CoulombFriction, a BristleFriction or None"
+    return check_type("friction", friction, Friction, f"must be {kinds}")

@@ -1,79 +1,84 @@
-"""Normal force of one contact, from depth and gap rate."""
+"""The normal laws: one class a law, and one a way to state it."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from pathlib import Path
 
-from sphshell_pin import _core
-from sphshell_pin.checks import check_finite, check_not_negative, check_positive, check_type
+from sphshell_pin.contact.normal_law import NormalLaw, bisect
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.units import (
+    adams_damping_to_si,
+    adams_length_to_si,
+    adams_stiffness_to_si,
+    adams_units,
+)
+
+__all__ = ["HuntCrossleyLaw", "ImpactLaw"]
 
 
-class NormalLaw(ABC):
-    """What every normal law offers: `core`, the C++ twin, decides the numbers."""
+@dataclass(frozen=True)
+class _PowerLaw(NormalLaw):
+    """A law whose elastic part is stiffness depth^exponent."""
 
-    stiffness: float
-    exponent: float
-
-    @property
-    @abstractmethod
-    def core(self) -> _core.NormalLaw:
-        """The C++ twin of this law."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the C++ twin, which is made again: what pickle and copy take."""
-        return {k: v for k, v in self.__dict__.items() if k != "core"}
-
-    def normal_force(self, depth: float, gap_rate: float = 0.0) -> float:
-        """Return the push [N] at `depth` [m] (0 where not positive) and `gap_rate` [m/s].
-
-        gap_rate = normal . relative velocity: negative while the bodies close.
-        """
-        value: float = self.core.force(
-            check_finite("depth", depth), check_finite("gap_rate", gap_rate)
-        )
-        return value
-
-    def normal_stiffness(self, depth: float) -> float:
-        """Return the slope of the elastic force at `depth` [m], in N/m (0 where not positive)."""
-        depth = check_finite("depth", depth)
-        if depth <= 0:
-            return 0.0
-        return float(self.exponent * self.stiffness * depth ** (self.exponent - 1))
-
-    def energy(self, depth: float) -> float:
-        """Return the elastic energy [J] stored at `depth` [m]."""
-        value: float = self.core.energy(check_finite("depth", depth))
-        return value
+    stiffness: float = parameter(
+        above=0,
+        unit="N/m^{0.exponent:g}",
+        help="k, from a load F and the depth you accept under it: `k = F / depth^exponent`; a few "
+        "percent of the radius is much",
+    )
+    exponent: float = parameter(
+        1.5,
+        above=0,
+        help="e: 1.5 for a ball on an elastic surface (Hertz), 1 for a linear spring; ADAMS's "
+        "default is 2.2 (`from_adams`)",
+    )
 
     def depth_at(self, force: float) -> float:
         """Return the depth [m] at which the elastic part alone carries `force` [N]."""
         return float((max(force, 0.0) / self.stiffness) ** (1 / self.exponent))
 
+    def depth_of(self, energy: float) -> float:
+        """Return the depth [m] at which the elastic part has stored `energy` [J]."""
+        power = self.exponent + 1
+        return float((power * energy / self.stiffness) ** (1 / power))
+
+    def contact_time(self, depth: float, speed: float) -> float:
+        """Return the duration [s] of an undamped impact at `speed` [m/s] down to `depth` [m]."""
+        power = self.exponent + 1
+        # Integral of du / sqrt(1 - u^power) from 0 to 1.
+        half = math.sqrt(math.pi) * math.gamma(1 + 1 / power) / math.gamma(0.5 + 1 / power)
+        return 2 * depth / speed * half
+
+    @property
+    def _stiffness_text(self) -> str:
+        return f"stiffness {self.stiffness:.4g} {self.unit_of('stiffness')}"
+
 
 @dataclass(frozen=True)
-class ImpactLaw(NormalLaw):
+class ImpactLaw(_PowerLaw, kind="impact"):
     """ADAMS's IMPACT: max(0, k depth^e - STEP(depth, 0, 0, d, c) gap_rate).
 
     `stiffness` k > 0 [N/m^e], `exponent` e > 0, `damping` c >= 0 [N s/m], which is reached at
     `full_damping_depth` d > 0 [m]. Source: ADAMS/Solver help, IMPACT.
     """
 
-    stiffness: float
-    exponent: float = 1.5
-    damping: float = 0.0
-    full_damping_depth: float = 1e-4
-
-    def __post_init__(self) -> None:
-        """Raise InvalidParameter for a value outside its range."""
-        check_positive("stiffness", self.stiffness, "N/m^e")
-        check_positive("exponent", self.exponent)
-        check_not_negative("damping", self.damping, "N s/m")
-        check_positive("full_damping_depth", self.full_damping_depth, "m")
+    damping: float = parameter(
+        0.0,
+        at_least=0,
+        unit="N s/m",
+        help="c: 0 gives back all energy. Restitution depends on speed and mass: find c by a drop "
+        "test",
+    )
+    full_damping_depth: float = parameter(
+        1e-4,
+        above=0,
+        unit="m",
+        help="d: about the depth under load; damping comes on gradually up to it, so that the "
+        "force starts from zero",
+    )
 
     @classmethod
     def from_adams(
@@ -88,18 +93,7 @@ class ImpactLaw(NormalLaw):
 
         The stiffness is per length^e, so it converts by (metres per length)^-e: 1000^e from mm.
         """
-        from sphshell_pin.units import (
-            adams_damping_to_si,
-            adams_length_to_si,
-            adams_stiffness_to_si,
-        )
-
-        return cls(
-            adams_stiffness_to_si(k, e, units),
-            e,
-            adams_damping_to_si(c, units),
-            adams_length_to_si(d, units),
-        )
+        return AdamsImpact(k, e, c, d, units).made()
 
     @staticmethod
     def hertz(
@@ -118,68 +112,154 @@ class ImpactLaw(NormalLaw):
         `speed` [m/s] it is a HuntCrossleyLaw: there restitution does not depend on the mass, in
         IMPACT it does.
         """
-        radius = check_positive("radius", radius, "m")
-        moduli = 0.0
-        for i, (young, poisson) in enumerate(((young_1, poisson_1), (young_2, poisson_2)), 1):
-            check_positive(f"young_{i}", young, "Pa")
-            if not -1 < check_finite(f"poisson_{i}", poisson) <= 0.5:
-                raise InvalidParameter(f"poisson_{i}", poisson, "must lie in (-1, 0.5]")
-            moduli += (1 - poisson**2) / young
-        stiffness = 4 / 3 / moduli * math.sqrt(radius)
-        if (restitution is None) != (speed is None):
-            raise InvalidParameter(
-                "restitution, speed", (restitution, speed), "must be given together, or neither"
-            )
-        if restitution is None or speed is None:
-            return ImpactLaw(stiffness, 1.5)
-        return HuntCrossleyLaw(stiffness, 1.5, dissipation_for(restitution, speed))
+        return Hertz(radius, young_1, poisson_1, young_2, poisson_2, restitution, speed).made()
 
-    @cached_property
-    def core(self) -> _core.NormalLaw:
-        """The C++ twin of this law."""
-        return _core.NormalLaw(
-            0, self.stiffness, self.exponent, self.damping, self.full_damping_depth
+    @property
+    def text(self) -> str:
+        """Name and parameters in one line."""
+        if not self.damping:
+            return f"IMPACT, {self._stiffness_text}, undamped"
+        return (
+            f"IMPACT, {self._stiffness_text}, damping {self.damping:.4g} N s/m from "
+            f"{self.full_damping_depth * 1e3:.4g} mm"
         )
+
+    def decay_time(self, mass: float, depth: float) -> float:
+        """Return the time [s] in which damping at `depth` [m] slows `mass` [kg] down by e."""
+        share = min(depth / self.full_damping_depth, 1.0)
+        damping = self.damping * share * share * (3 - 2 * share)
+        return mass / damping if damping else math.inf
 
 
 @dataclass(frozen=True)
-class HuntCrossleyLaw(NormalLaw):
+class HuntCrossleyLaw(_PowerLaw, kind="hunt-crossley"):
     """Hunt and Crossley's law: max(0, k depth^e (1 - b gap_rate)).
 
     `stiffness` k > 0 [N/m^e], `exponent` e > 0, `dissipation` b >= 0 [s/m]. The restitution at
     impact speed v depends on b v alone. Source: Hunt and Crossley, J. Appl. Mech. 42 (1975) 440.
     """
 
-    stiffness: float
-    exponent: float = 1.5
-    dissipation: float = 0.0
+    dissipation: float = parameter(
+        0.0,
+        at_least=0,
+        unit="s/m",
+        help="b, from the restitution wanted at an impact speed: "
+        "`ImpactLaw.hertz(..., restitution=, speed=)` computes it",
+    )
+
+    @property
+    def text(self) -> str:
+        """Name and parameters in one line."""
+        return f"Hunt-Crossley, {self._stiffness_text}, dissipation {self.dissipation:.4g} s/m"
+
+    def decay_time(self, mass: float, depth: float) -> float:
+        """Return the time [s] in which damping at `depth` [m] slows `mass` [kg] down by e."""
+        damping = self.stiffness * depth**self.exponent * self.dissipation
+        return mass / damping if damping else math.inf
+
+
+@dataclass(frozen=True)
+class AdamsImpact(Ingredient, kind="adams", of=NormalLaw):
+    """IMPACT as an ADAMS model states it; the defaults are ADAMS's own."""
+
+    k: float = parameter(
+        1e5, above=0, unit="{0.force}/{0.length}^{0.e:g}", label="stiffness", help="stiffness"
+    )
+    e: float = parameter(2.2, above=0, label="exponent", help="exponent")
+    c: float = parameter(
+        10.0, at_least=0, unit="{0.force} {0.time}/{0.length}", label="damping", help="damping"
+    )
+    d: float = parameter(
+        0.1,
+        above=0,
+        unit="{0.length}",
+        label="full damping depth",
+        help="penetration for full damping",
+    )
+    units: str = parameter("mm-N-s", help="ADAMS's unit system: length, force, time")
 
     def __post_init__(self) -> None:
-        """Raise InvalidParameter for a value outside its range."""
-        check_positive("stiffness", self.stiffness, "N/m^e")
-        check_positive("exponent", self.exponent)
-        check_not_negative("dissipation", self.dissipation, "s/m")
+        """Raise InvalidParameter for a value outside its bounds or an unknown unit system."""
+        super().__post_init__()
+        adams_units(self.units)
 
-    @cached_property
-    def core(self) -> _core.NormalLaw:
-        """The C++ twin of this law."""
-        return _core.NormalLaw(1, self.stiffness, self.exponent, self.dissipation)
+    @property
+    def length(self) -> str:
+        """Unit of length."""
+        return self.units.split("-")[0]
+
+    @property
+    def force(self) -> str:
+        """Unit of force."""
+        return self.units.split("-")[1]
+
+    @property
+    def time(self) -> str:
+        """Unit of time."""
+        return self.units.split("-")[2]
+
+    def made(self, folder: Path = Path()) -> ImpactLaw:
+        """Return the law in SI."""
+        return ImpactLaw(
+            adams_stiffness_to_si(self.k, self.e, self.units),
+            self.e,
+            adams_damping_to_si(self.c, self.units),
+            adams_length_to_si(self.d, self.units),
+        )
 
 
-def check_law(law: Any) -> None:
-    """Raise InvalidParameter unless `law` is a normal law."""
-    check_type("law", law, NormalLaw, "must be a law, for instance ImpactLaw(stiffness)")
+@dataclass(frozen=True)
+class Hertz(Ingredient, kind="hertz", of=NormalLaw):
+    """A ball on an elastic half-space, see ImpactLaw.hertz."""
+
+    radius: float = parameter(
+        above=0, unit="m", label="Hertz radius", help="radius of the ball, or the effective one"
+    )
+    young_1: float = parameter(
+        above=0, unit="Pa", label="Young's modulus 1", help="Young's modulus of the ball"
+    )
+    poisson_1: float = parameter(
+        above=-1, at_most=0.5, label="Poisson's ratio 1", help="Poisson's ratio of the ball"
+    )
+    young_2: float = parameter(
+        above=0, unit="Pa", label="Young's modulus 2", help="Young's modulus of the half-space"
+    )
+    poisson_2: float = parameter(
+        above=-1, at_most=0.5, label="Poisson's ratio 2", help="Poisson's ratio of the half-space"
+    )
+    restitution: float | None = parameter(
+        None, above=0, at_most=1, help="speed of rebound over `speed`; without it no damping"
+    )
+    speed: float | None = parameter(
+        None,
+        above=0,
+        unit="m/s",
+        label="speed of the restitution",
+        help="impact speed at which the restitution holds",
+    )
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for a value outside its bounds, and for one of a pair."""
+        super().__post_init__()
+        pair = self.restitution, self.speed
+        if (pair[0] is None) != (pair[1] is None):
+            raise InvalidParameter("restitution, speed", pair, "must be given together, or neither")
+
+    def made(self, folder: Path = Path()) -> ImpactLaw | HuntCrossleyLaw:
+        """Return the law of this stiffness, of Hunt and Crossley where a restitution is given."""
+        softness = (1 - self.poisson_1**2) / self.young_1 + (1 - self.poisson_2**2) / self.young_2
+        stiffness = 4 / 3 / softness * math.sqrt(self.radius)
+        if self.restitution is None or self.speed is None:
+            return ImpactLaw(stiffness, 1.5)
+        return HuntCrossleyLaw(stiffness, 1.5, _dissipation_for(self.restitution, self.speed))
 
 
-def dissipation_for(restitution: float, speed: float) -> float:
+def _dissipation_for(restitution: float, speed: float) -> float:
     """Return the dissipation b [s/m] of Hunt-Crossley that rebounds at restitution * `speed`.
 
     Energy of approach and of rebound are equal where the depth is largest, which gives
     x - ln(1 + x) = -y - ln(1 - y) with x = b v, y = b v restitution; solved by bisection.
     """
-    check_positive("speed", speed, "m/s")
-    if not 0 < check_finite("restitution", restitution) <= 1:
-        raise InvalidParameter("restitution", restitution, "must lie in (0, 1]")
 
     def excess(x: float) -> float:
         y = restitution * x
@@ -187,11 +267,6 @@ def dissipation_for(restitution: float, speed: float) -> float:
 
     if restitution == 1:
         return 0.0
-    low, high = 0.0, 1 / restitution  # y < 1: the rebound never exceeds 1 / b
-    for _ in range(200):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        # Below the root the series x^2 (restitution^2 - 1) / 2 makes the difference negative.
-        low, high = (middle, high) if excess(middle) < 0 else (low, middle)
-    return 0.5 * (low + high) / speed
+    # y < 1: the rebound never exceeds 1 / b. Below the root the series
+    # x^2 (restitution^2 - 1) / 2 makes the difference negative.
+    return bisect(excess, 0.0, 1 / restitution) / speed

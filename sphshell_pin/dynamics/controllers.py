@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.checks import (
@@ -20,21 +20,28 @@ from sphshell_pin.checks import (
     check_not_negative,
     check_placement,
     check_points,
-    check_positive,
     check_type,
     check_vector,
 )
-from sphshell_pin.dynamics.models import find_frame
+from sphshell_pin.dynamics.models import find_frame, find_joint, set_joint
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
-from sphshell_pin.errors import InvalidParameter, NameNotFound, add_origin
+from sphshell_pin.errors import InvalidParameter, SphshellError, add_origin
+from sphshell_pin.parameters import Ingredient, parameter
 from sphshell_pin.shell import Shell
 
 Array = NDArray[np.float64]
-Callback = Callable[[float, Array, Array, SceneContacts], Any]
 
 
-class Controller(ABC):
-    """A recipe for joint torques, bound to a scene when a run begins.
+# One number for all driven joints, one each (nv,), or by joint, 0 for the others.
+Gain = float | Sequence[float] | Array | Mapping[str, float]
+# Coordinates (nq,), or those of some joints, the others as at the start.
+Posture = Sequence[float] | Array | Mapping[str, float | Sequence[float]]
+Callback = Callable[[float, Array, Array, SceneContacts], ArrayLike]
+ShellPlace = tuple[Shell, str, pin.SE3]
+
+
+class Controller(Ingredient):
+    """Base of the controllers: joint torques, bound to a scene when a run begins.
 
     `joints` names the driven joints; by default all but free-flyers (a floating base or object has
     no motor).
@@ -44,35 +51,85 @@ class Controller(ABC):
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter unless `joints` is None or a list of names."""
+        super().__post_init__()
         if self.joints is not None:
             object.__setattr__(self, "joints", check_names("joints", self.joints))
 
-    @abstractmethod
     def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller for `scene`, started at q0 (nq,)."""
+        raise NotImplementedError
 
     def actuated(self, model: pin.Model) -> Array:
         """Return (nv,): 1 where a velocity is driven, else 0."""
-        names = list(model.names)
-        if self.joints is None:
-            chosen = [
-                n
-                for n in names[1:]
-                if model.joints[model.getJointId(n)].shortname() != "JointModelFreeFlyer"
-            ]
-        else:
-            chosen = list(self.joints)
         mask = np.zeros(model.nv)
-        for name in chosen:
-            if name not in names[1:]:
-                raise NameNotFound("joint", name, "the model", names[1:])
-            joint = model.joints[model.getJointId(name)]
+        free = "JointModelFreeFlyer"
+        names = self.joints
+        if names is None:
+            names = [n for n in model.names[1:] if find_joint(model, n).shortname() != free]
+        for name in names:
+            joint = find_joint(model, name)
             mask[joint.idx_v : joint.idx_v + joint.nv] = 1
         return mask
 
+    def gain(self, name: str, model: pin.Model) -> Array:
+        """Return the gain called `name` as (nv,); InvalidParameter where it is no gain."""
+        given: Gain = getattr(self, name)
+        if isinstance(given, Mapping):
+            gains = np.zeros(model.nv)
+            for joint_name, value in given.items():
+                number = check_not_negative(f"{name}.{joint_name}", value)
+                with _joint_of(name, joint_name):
+                    joint = find_joint(model, joint_name)
+                gains[joint.idx_v : joint.idx_v + joint.nv] = number
+            return gains
+        if np.ndim(given) == 0:
+            return np.full(model.nv, check_not_negative(name, given))
+        gains = check_vector(name, given, model.nv, f": nv = {model.nv}")
+        if (gains < 0).any():
+            k = int(np.argmin(gains))
+            raise InvalidParameter(f"{name}[{k}]", float(gains[k]), "must not be negative")
+        return gains
+
+    def posture(self, model: pin.Model, start: Array) -> Array:
+        """Return `q_ref` as a configuration (nq,); what it leaves out is as at the start."""
+        given: Posture | None = getattr(self, "q_ref", None)
+        q = start.copy()
+        if given is None:
+            return q
+        if not isinstance(given, Mapping):
+            return check_configuration("q_ref", model, given, f": nq = {model.nq}")
+        for name, value in given.items():
+            with _joint_of("q_ref", name):
+                set_joint(model, q, name, value)
+        return check_configuration("q_ref", model, q)
+
+    def in_scenario(self, find_shell: Callable[[str], ShellPlace]) -> Controller:
+        """Return this controller with the shells that it names."""
+        return self
+
 
 @dataclass(frozen=True)
-class GravityCompensation(Controller):
+class NoController(Ingredient, kind="none", of=Controller):
+    """No joint torques."""
+
+    def made(self, folder: Path = Path()) -> None:
+        """Return None."""
+
+
+@dataclass(frozen=True)
+class PythonFunction(Ingredient, kind="python", of=Controller):
+    """The user's own tau(t, q, v, contacts)."""
+
+    function: str = parameter(help='"file.py:function"')
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """File of the function."""
+        return (self.function.rpartition(":")[0],)
+
+
+@dataclass(frozen=True)
+class GravityCompensation(Controller, kind="gravity-compensation"):
     """Torques that hold the robot against gravity."""
 
     joints: Iterable[str] | None = None
@@ -83,62 +140,81 @@ class GravityCompensation(Controller):
 
 
 @dataclass(frozen=True)
-class JointPD(Controller):
+class JointPD(Controller, kind="joint-pd"):
     """Torques kp (q_ref - q) - kd v, plus gravity unless `gravity_compensation` is False.
 
-    `kp` [N m/rad or N/m] and `kd` [N m s/rad or N s/m] are one number or (nv,); `q_ref` (nq,) is
-    the start of the run where it is None; the difference is pinocchio.difference's.
+    `kp` [N m/rad or N/m] and `kd` [N m s/rad or N s/m] are one number, (nv,), or a mapping from
+    joints; `q_ref`, (nq,) or a mapping from joints, is the start of the run where it is None or
+    leaves a joint out; the difference is pinocchio.difference's.
     """
 
-    kp: Any
-    kd: Any
-    q_ref: Any = None
-    gravity_compensation: bool = True
+    kp: Gain = parameter(unit="N m/rad", label="joint stiffness", help="stiffness of the joints")
+    kd: Gain = parameter(unit="N m s/rad", label="joint damping", help="damping of the joints")
+    q_ref: Posture | None = parameter(None, help="posture; by default that of the start")
+    gravity_compensation: bool = parameter(True, help="add the torques that carry the weight")
     joints: Iterable[str] | None = None
 
     def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller."""
         model = scene.model
-        q_ref = q0 if self.q_ref is None else check_configuration("q_ref", model, self.q_ref)
         return _core.JointPd(
-            _gains("kp", self.kp, model.nv),
-            _gains("kd", self.kd, model.nv),
-            q_ref,
+            self.gain("kp", model),
+            self.gain("kd", model),
+            self.posture(model, q0),
             bool(self.gravity_compensation),
             self.actuated(model),
         )
 
 
 @dataclass(frozen=True)
-class CartesianImpedance(Controller):
+class CartesianImpedance(Controller, kind="cartesian-impedance"):
     """Follow a path with a frame's origin and press on the surface: J^T F plus the bias torques.
 
     F = stiffness (x_d - x) + damping (x_d' - x') [N/m], [N s/m] (Hogan 1985). `path` (k, 3) [m] are
-    the corners of the way: with `shell` (at `placement` in `shell_frame`, by default the universe)
-    in the shell's frame and projected on it, else in the world. With `normal_force` [N] (needs a
-    shell) the spring acts in the tangent plane only, and the frame is pushed against the shell's
-    normal, on the side where the frame is at the start. The target waits `lead_in` [s] at the first
-    point, then moves at `speed` [m/s], then waits at the last. `rotational_stiffness` [N m/rad] and
-    `rotational_damping` [N m s/rad] hold the orientation of the start. `posture_stiffness`
-    [N m/rad] draws the joints to `q_ref` (default: the start) and `joint_damping` [N m s/rad]
-    calms the motion that the frame does not show; both are one number or (nv,).
+    its corners: with `shell` in the shell's frame and projected on it, else in the world. With
+    `normal_force` [N] (needs a shell) the spring acts in the tangent plane only, and the frame is
+    pushed against the shell's normal, on the side where the frame is at the start. The target waits
+    `lead_in` [s] at the first point, then moves at `speed` [m/s], then waits at the last.
+    `rotational_stiffness` [N m/rad] and `rotational_damping` [N m s/rad] hold the orientation of
+    the start. `posture_stiffness` [N m/rad] draws the joints to `q_ref` (default: the start) and
+    `joint_damping` [N m s/rad] damps the motion of the joints; gains and `q_ref` as in JointPD.
+
+    The shell is at `placement` in `shell_frame`; if neither is given, where the contacts of the
+    scene have it, and if none has it, in the universe. If they have it in several places,
+    InvalidParameter asks for `shell_frame`.
     """
 
-    frame: str
-    path: Any
-    stiffness: float
-    damping: float
-    normal_force: float = 0.0
-    shell: Shell | None = None
+    frame: str = parameter(help="the frame that is moved")
+    path: Sequence[tuple[float, float, float]] | Array = parameter(
+        unit="m", help="corners of the path (k, 3)", min_length=1
+    )
+    stiffness: float = parameter(
+        at_least=0, unit="N/m", label="tip stiffness", help="pull towards the target"
+    )
+    damping: float = parameter(
+        at_least=0, unit="N s/m", label="tip damping", help="damping relative to the target"
+    )
+    normal_force: float = parameter(
+        0.0, at_least=0, unit="N", help="push against the normal of the shell"
+    )
+    shell: Shell | str | None = parameter(None, help="the surface to press on")
     shell_frame: str | None = None
     placement: pin.SE3 | None = None
-    speed: float = 0.05
-    lead_in: float = 0.0
-    rotational_stiffness: float = 0.0
-    rotational_damping: float = 0.0
-    posture_stiffness: Any = 0.0
-    joint_damping: Any = 0.0
-    q_ref: Any = None
+    speed: float = parameter(
+        0.05, above=0, unit="m/s", label="path speed", help="speed of the target"
+    )
+    lead_in: float = parameter(
+        0.0, at_least=0, unit="s", label="lead-in", help="time before the target moves"
+    )
+    rotational_stiffness: float = parameter(
+        0.0, at_least=0, unit="N m/rad", help="holds the orientation of the start"
+    )
+    rotational_damping: float = parameter(
+        0.0, at_least=0, unit="N m s/rad", help="damps the rotation of the frame"
+    )
+    posture_stiffness: Gain = parameter(0.0, unit="N m/rad", help="pull towards `q_ref`")
+    joint_damping: Gain = parameter(0.0, unit="N m s/rad", help="damping of the joints")
+    q_ref: Posture | None = parameter(None, help="posture; by default that of the start")
     joints: Iterable[str] | None = None
 
     def __post_init__(self) -> None:
@@ -146,7 +222,7 @@ class CartesianImpedance(Controller):
         super().__post_init__()
         check_name("frame", self.frame)
         if self.shell is not None:
-            check_type("shell", self.shell, Shell, "must be a Shell or None")
+            check_type("shell", self.shell, (Shell, str), "must be a Shell or None")
         for name, value in (("shell_frame", self.shell_frame), ("placement", self.placement)):
             if value is not None and self.shell is None:
                 raise InvalidParameter(name, value, "says where the shell is: give the shell too")
@@ -154,17 +230,26 @@ class CartesianImpedance(Controller):
             check_name("shell_frame", self.shell_frame)
         check_placement("placement", self.placement)
 
+    def in_scenario(self, find_shell: Callable[[str], ShellPlace]) -> CartesianImpedance:
+        """Return this controller with the shell that it names."""
+        if not isinstance(self.shell, str):
+            return self
+        shell, frame, placement = find_shell(self.shell)
+        return replace(self, shell=shell, shell_frame=frame, placement=placement)
+
     def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller: resample the path, project it, find the frames."""
         model = scene.model
         frame_index = find_frame(model, self.frame)
-        carrier_index = find_frame(model, self.shell_frame or "universe", "shell_frame")
-        frame, carrier = model.frames[frame_index], model.frames[carrier_index]
-        placement = check_placement("placement", self.placement)
-        normal_force = check_not_negative("normal_force", self.normal_force, "N")
-        if normal_force and self.shell is None:
-            raise InvalidParameter("normal_force", normal_force, "needs a shell to press on")
-        points, normals = self._way()
+        if isinstance(self.shell, str):
+            raise InvalidParameter("shell", self.shell, "must be a Shell: names are for files")
+        if self.normal_force and self.shell is None:
+            raise InvalidParameter("normal_force", self.normal_force, "needs a shell to press on")
+        frame = model.frames[frame_index]
+        carrier_name, placement = self._shell_place(scene)
+        carrier_index = find_frame(model, carrier_name, "shell_frame")
+        carrier = model.frames[carrier_index]
+        points, normals = self._projected_path()
         if self.shell is not None:
             data = model.createData()
             pin.framesForwardKinematics(model, data, q0)
@@ -172,65 +257,76 @@ class CartesianImpedance(Controller):
             at = shell_pose.actInv(data.oMf[frame_index].translation)
             above = float((at - points[0]) @ normals[0])
             normals = normals if above >= 0 else -normals
-        times = self._times(points)
         return _core.CartesianImpedance(
             num_joints=model.njoints,
             joint=int(frame.parentJoint),
             frame=frame.placement.homogeneous,
-            path_joint=int(carrier.parentJoint) if self.shell is not None else 0,
-            path_placement=(
-                (carrier.placement * placement).homogeneous if self.shell is not None else np.eye(4)
-            ),
-            times=times.tolist(),
+            path_joint=int(carrier.parentJoint),
+            path_placement=(carrier.placement * placement).homogeneous,
+            times=self._times(points).tolist(),
             points=points,
             normals=normals,
-            stiffness=check_not_negative("stiffness", self.stiffness, "N/m"),
-            damping=check_not_negative("damping", self.damping, "N s/m"),
-            normal_force=normal_force,
-            rotational_stiffness=check_not_negative(
-                "rotational_stiffness", self.rotational_stiffness, "N m/rad"
-            ),
-            rotational_damping=check_not_negative(
-                "rotational_damping", self.rotational_damping, "N m s/rad"
-            ),
-            posture_stiffness=_gains("posture_stiffness", self.posture_stiffness, model.nv),
-            joint_damping=_gains("joint_damping", self.joint_damping, model.nv),
-            q_ref=q0 if self.q_ref is None else check_configuration("q_ref", model, self.q_ref),
+            stiffness=self.stiffness,
+            damping=self.damping,
+            normal_force=self.normal_force,
+            rotational_stiffness=self.rotational_stiffness,
+            rotational_damping=self.rotational_damping,
+            posture_stiffness=self.gain("posture_stiffness", model),
+            joint_damping=self.gain("joint_damping", model),
+            q_ref=self.posture(model, q0),
             actuated=self.actuated(model),
         )
 
-    def _way(self) -> tuple[Array, Array]:
+    def _shell_place(self, scene: Scene) -> tuple[str, pin.SE3]:
+        """Return the frame that carries the path, and where the path's own frame is in it."""
+        placement = check_placement("placement", self.placement)
+        if self.shell_frame is not None or self.placement is not None:
+            return self.shell_frame or "universe", placement
+        places: list[tuple[str, pin.SE3]] = []
+        for pair in scene.pairs if self.shell is not None else ():
+            place = pair.frame_j, pair.placement
+            if pair.shell is self.shell and place not in places:
+                places.append(place)
+        if len(places) > 1:
+            frames = ", ".join(f"'{frame}'" for frame, _ in places)
+            raise InvalidParameter(
+                "shell",
+                self.shell,
+                f"is in several places of the scene ({frames}): give shell_frame and placement",
+            )
+        return places[0] if places else ("universe", placement)
+
+    def _projected_path(self) -> tuple[Array, Array]:
         """Return points (n, 3) and normals (n, 3) (zero without a shell) along the path."""
         corners = check_points("path", self.path)
         if len(corners) == 0:
             raise InvalidParameter("path", [], "must have at least one point")
-        if self.shell is None:
+        shell = self.shell
+        if not isinstance(shell, Shell):
             return corners, np.zeros_like(corners)
         # Straight pieces between corners leave a curved surface: project a fine division of them.
-        spacing = self.shell.size / 500
+        spacing = shell.size / 500
         pieces = [corners[:1]]
         for a, b in itertools.pairwise(corners):
             n = max(1, int(np.ceil(np.linalg.norm(b - a) / spacing)))
             pieces.append(a + (b - a) * (np.arange(1, n + 1) / n)[:, None])
-        at = self.shell.closest_points(np.concatenate(pieces))
+        at = shell.closest_points(np.concatenate(pieces))
         return at.points, at.normals
 
     def _times(self, points: Array) -> Array:
-        speed = check_positive("speed", self.speed, "m/s")
-        lead_in = check_not_negative("lead_in", self.lead_in, "s")
         lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        return lead_in + np.concatenate([[0.0], np.cumsum(lengths)]) / speed
+        return self.lead_in + np.concatenate([[0.0], np.cumsum(lengths)]) / self.speed
 
     def duration(self) -> float:
         """Return the time [s] at which the target reaches the last point."""
-        return float(self._times(self._way()[0])[-1])
+        return float(self._times(self._projected_path()[0])[-1])
 
 
 def wrap_callable(callback: Callback, model: pin.Model) -> _core.Controller:
     """Wrap tau(t, q, v, contacts) -> (nv,) for the core; its answers are checked."""
 
     def torque(t: float, q: bytearray, v: bytearray, rows: bytearray) -> Array:
-        contacts = SceneContacts.from_rows(np.frombuffer(rows).reshape(-1, 18))
+        contacts = SceneContacts.from_rows(rows)
         try:
             tau = callback(t, np.frombuffer(q), np.frombuffer(v), contacts)
         except Exception as error:
@@ -241,11 +337,10 @@ def wrap_callable(callback: Callback, model: pin.Model) -> _core.Controller:
     return _core.PythonController(torque)
 
 
-def _gains(name: str, value: Any, nv: int) -> Array:
-    if np.ndim(value) == 0:
-        return np.full(nv, check_not_negative(name, value))
-    gains = check_vector(name, value, nv)
-    if (gains < 0).any():
-        k = int(np.argmin(gains))
-        raise InvalidParameter(f"{name}[{k}]", float(gains[k]), "must not be negative")
-    return gains
+@contextmanager
+def _joint_of(called: str, joint: str) -> Iterator[None]:
+    """Name the parameter in an error about one of its joints."""
+    try:
+        yield
+    except SphshellError as error:
+        raise InvalidParameter(called, joint, f"is wrong: {error}", f"of joint '{joint}'") from None

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_moved_mass
-from sphshell_pin.contact import (
-    BristleFriction,
-    CoulombFriction,
-    Friction,
-    HuntCrossleyLaw,
-    ImpactLaw,
-    NormalLaw,
-)
 from sphshell_pin.dynamics.models import unit_warning
-from sphshell_pin.dynamics.scene import ContactPair, Scene
 from sphshell_pin.dynamics.sources import checked_source
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.pairs import ContactPair
+    from sphshell_pin.dynamics.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -140,7 +136,7 @@ def relaxation_time(pair: ContactPair, figures: PairExplanation) -> float:
     limit = figures.depth_limit_speed
     if pair.sphere is None or not math.isfinite(limit):
         return LONGEST_RELAXATION
-    shortest = 2 * pair.sphere.radius / limit * _duration_integral(pair.law.exponent)
+    shortest = pair.law.contact_time(pair.sphere.radius, limit)
     return min(0.02 * shortest, LONGEST_RELAXATION)
 
 
@@ -174,8 +170,8 @@ class _Touch:
 
 
 def _touch_of(pair: ContactPair, data: pin.Data) -> _Touch | None:
-    pose_i = data.oMi[pair.joint_i] * pair.sphere_placement
-    pose_j = data.oMi[pair.joint_j] * pair.shell_placement
+    pose_i = data.oMi[pair.joint_i] * pair.placement_i
+    pose_j = data.oMi[pair.joint_j] * pair.placement_j
     if pair.find is not None:
         points, normals, depths = checked_source(pair.find, pair.name)(pose_i, pose_j)
         if not len(depths):
@@ -212,70 +208,35 @@ def _explain_pair(
         fall = math.sqrt(2 * gravity * max(gap, 0.0))
         speed = max(abs(float(touch.normal @ jacobian @ v)), fall) or DEFAULT_SPEED
     law = pair.law
-    k, e = law.stiffness, law.exponent
     weight = mass * gravity
-    depth = (0.5 * (e + 1) * mass * speed**2 / k) ** (1 / (e + 1))
-    radius = pair.sphere.radius if pair.sphere is not None else math.nan
-    load = max(weight, law.normal_force(-gap)) if math.isfinite(weight) else math.nan
+    load = depth = contact_time = resting_depth = limit = math.nan
+    times = []
+    if math.isfinite(mass):
+        load = max(weight, law.normal_force(-gap))
+        depth = law.depth_of(0.5 * mass * speed**2)
+        contact_time = law.contact_time(depth, speed)
+        resting_depth = law.depth_at(weight)
+        times.append(law.shortest_time(mass, speed, load))
+        if pair.sphere is not None:
+            limit = math.sqrt(2 * law.energy(pair.sphere.radius) / mass)
+    if pair.friction is not None and math.isfinite(slip_mass):
+        times.append(pair.friction.slip_time(slip_mass, load))
     return PairExplanation(
         name=pair.name,
         modelled=_ingredients(pair),
         gap=gap,
         effective_mass=mass,
         approach_speed=speed,
-        contact_time=2 * depth / speed * _duration_integral(e),
+        contact_time=contact_time,
         impact_depth=depth,
-        resting_depth=law.depth_at(weight) if math.isfinite(weight) else math.nan,
-        depth_limit_speed=math.sqrt(2 * k * radius ** (e + 1) / ((e + 1) * mass)),
-        shortest_time=min(
-            _impact_times(law, mass, speed, depth, load), _slip_time(pair.friction, slip_mass, load)
-        ),
+        resting_depth=resting_depth,
+        depth_limit_speed=limit,
+        shortest_time=min(times, default=math.inf),
     )
 
 
 def _mass(mobility: float) -> float:
     return 1 / mobility if mobility > 1e-12 else math.nan
-
-
-def _duration_integral(e: float) -> float:
-    """Integral of du / sqrt(1 - u^(e+1)) from 0 to 1: half the contact time in depth / speed."""
-    return math.sqrt(math.pi) * math.gamma(1 + 1 / (e + 1)) / math.gamma(0.5 + 1 / (e + 1))
-
-
-def _impact_times(law: NormalLaw, mass: float, speed: float, depth: float, load: float) -> float:
-    """Return the shortest of: contact time, oscillation under the load, decay by damping [s]."""
-    if not math.isfinite(mass):
-        return math.inf
-    k, e = law.stiffness, law.exponent
-    times = [2 * depth / speed * _duration_integral(e)]
-    if load > 0:
-        # The stiffness under the load, k e depth^(e-1), is e load/depth.
-        times.append(math.pi * math.sqrt(mass * law.depth_at(load) / (e * load)))
-    # A decay needs fewer steps than an oscillation: 20 decay times count like one period.
-    if isinstance(law, ImpactLaw) and law.damping:
-        share = min(depth / law.full_damping_depth, 1.0)
-        times.append(20 * mass / (law.damping * share * share * (3 - 2 * share)))
-    if isinstance(law, HuntCrossleyLaw) and law.dissipation:
-        times.append(20 * mass / (k * depth**e * law.dissipation))
-    return min(times)
-
-
-def _slip_time(friction: Friction | None, slip_mass: float, load: float) -> float:
-    """Return the time scale [s] of slow slip.
-
-    20 times its decay where friction acts like a damper; half a period of a bristle's oscillation,
-    or 20 times its decay.
-    """
-    if not math.isfinite(slip_mass):
-        return math.inf
-    if isinstance(friction, BristleFriction):
-        times = [math.pi * math.sqrt(slip_mass / friction.stiffness)]
-        if friction.damping:
-            times.append(20 * slip_mass / friction.damping)
-        return min(times)
-    if not isinstance(friction, CoulombFriction) or not friction.mu_static or not load > 0:
-        return math.inf
-    return 20 * slip_mass * friction.v_static / (1.5 * friction.mu_static * load)
 
 
 def _point_jacobian(scene: Scene, data: pin.Data, joint: int, point: Array) -> Array:
@@ -293,7 +254,7 @@ def _ingredients(pair: ContactPair) -> tuple[str, ...]:
         shell = pair.shell
         lines.append(
             f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}' against "
-            f"shell '{shell.name}' on frame '{pair.frame}'"
+            f"shell '{shell.name}' on frame '{pair.frame_j}'"
         )
         moving = "moves with its frame" if pair.joint_j else "stands still: no wrench on its side"
         lines.append(
@@ -303,41 +264,15 @@ def _ingredients(pair: ContactPair) -> tuple[str, ...]:
     else:
         lines.append(
             f"contact points of the user's own routine between frames '{pair.frame_i}' and "
-            f"'{pair.frame}'"
+            f"'{pair.frame_j}'"
         )
-    lines.append(f"normal force: {_law_text(pair.law)}")
-    lines.append(_friction_text(pair.friction))
+    lines.append(f"normal force: {pair.law.text}")
+    lines.append(
+        "no friction: no tangential force is computed"
+        if pair.friction is None
+        else f"friction: {pair.friction.text}"
+    )
     return tuple(lines)
-
-
-def _friction_text(friction: Friction | None) -> str:
-    if isinstance(friction, CoulombFriction):
-        return (
-            f"friction: coefficient {friction.mu_static:g} at {friction.v_static:g} m/s, "
-            f"{friction.mu_dynamic:g} from {friction.v_dynamic:g} m/s; creeps under load"
-        )
-    if isinstance(friction, BristleFriction):
-        spin = ", and against spin" if friction.torsional else ""
-        return (
-            f"friction: coefficient {friction.mu_static:g} at rest, {friction.mu_dynamic:g} beyond "
-            f"{friction.v_stribeck:g} m/s; sticks with {friction.stiffness:.4g} N/m, damping "
-            f"{friction.damping:.4g} N s/m{spin}; the stretch is a state of the contact"
-        )
-    return "no friction: no tangential force is computed"
-
-
-def _law_text(law: NormalLaw) -> str:
-    k = f"{law.stiffness:.4g} N/m^{law.exponent:g}"
-    if isinstance(law, ImpactLaw):
-        if not law.damping:
-            return f"IMPACT, stiffness {k}, undamped"
-        return (
-            f"IMPACT, stiffness {k}, damping {law.damping:.4g} N s/m from "
-            f"{law.full_damping_depth * 1e3:.4g} mm"
-        )
-    if isinstance(law, HuntCrossleyLaw):
-        return f"Hunt-Crossley, stiffness {k}, dissipation {law.dissipation:.4g} s/m"
-    return f"{type(law).__name__}, stiffness {k}"
 
 
 def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> list[str]:

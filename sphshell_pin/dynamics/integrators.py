@@ -5,21 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from sphshell_pin.checks import check_positive
-from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.parameters import Ingredient, parameter
+
+
+class Integrator(Ingredient):
+    """Base of the integrators: `kind` is their name in files and in the compiled core."""
+
+    code: ClassVar[int]
+
+    @property
+    def limited_dt(self) -> float | None:
+        """Step [s] that has to resolve the shortest time scale; None where it need not."""
+        return None
 
 
 @dataclass(frozen=True)
-class _FixedStep:
-    dt: float = 1e-4
-
-    def __post_init__(self) -> None:
-        """Raise InvalidParameter unless dt is positive."""
-        object.__setattr__(self, "dt", check_positive("dt", self.dt, "s"))
+class _FixedStep(Integrator):
+    dt: float = parameter(1e-4, above=0, unit="s", label="time step", help="step")
 
 
 @dataclass(frozen=True)
-class SemiImplicitEuler(_FixedStep):
+class SemiImplicitEuler(_FixedStep, kind="semi-implicit-euler"):
     """Velocity first, then position with the new velocity, in steps of `dt` [s]; order 1.
 
     Cheap, and forgiving with stiff contact: where the mass matrix is constant it is symplectic, and
@@ -29,47 +35,60 @@ class SemiImplicitEuler(_FixedStep):
 
     code: ClassVar[int] = 0
 
+    @property
+    def limited_dt(self) -> float:
+        """The step: the recommended one is that of a method of order 1."""
+        return self.dt
+
 
 @dataclass(frozen=True)
-class RungeKutta4(_FixedStep):
+class RungeKutta4(_FixedStep, kind="runge-kutta-4"):
     """The classical method of order 4 in steps of `dt` [s], on the Lie group (Munthe-Kaas 1998)."""
 
     code: ClassVar[int] = 1
 
 
 @dataclass(frozen=True)
-class LinearlyImplicitEuler(_FixedStep):
+class LinearlyImplicitEuler(_FixedStep, kind="linearly-implicit-euler"):
     """One linear solve a step of `dt` [s]; order 1, stable at any stiffness and damping.
 
     For interactive use: it loses energy where a step does not resolve a contact, and gains none
     (with laws whose exponent is 1 or more).
     """
 
-    dt: float = 1e-3
+    dt: float = parameter(1e-3, above=0, unit="s", label="time step", help="step")
     code: ClassVar[int] = 2
 
 
 @dataclass(frozen=True)
-class _ErrorControlled:
-    rtol: float = 1e-6
-    atol: float | None = None
+class _ErrorControlled(Integrator):
+    rtol: float = parameter(
+        1e-6,
+        at_least=1e-13,
+        at_most=0.1,
+        label="relative tolerance",
+        help="error of a step over the size of the state",
+    )
+    atol: float | None = parameter(
+        None,
+        above=0,
+        label="absolute tolerance",
+        help="error of a step (m, rad, m/s, rad/s); by default `rtol` / 100",
+    )
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a tolerance that is not positive or out of reach."""
-        rtol = check_positive("rtol", self.rtol)
-        if not 1e-13 <= rtol <= 0.1:
-            raise InvalidParameter("rtol", rtol, "must lie between 1e-13 and 0.1")
-        atol = 0.01 * rtol if self.atol is None else self.atol
-        object.__setattr__(self, "rtol", rtol)
-        object.__setattr__(self, "atol", check_positive("atol", atol))
+        super().__post_init__()
+        if self.atol is None:
+            object.__setattr__(self, "atol", 0.01 * self.rtol)
 
 
 @dataclass(frozen=True)
-class Adaptive(_ErrorControlled):
+class Adaptive(_ErrorControlled, kind="adaptive"):
     """Steps as long as the error allows: Dormand and Prince's explicit pair of order 5(4).
 
     The error of a step stays below atol + rtol times the size of each part of the state (m, rad,
-    m/s, rad/s; positions from the origin, angles of joints from zero, turns of free bodies by
+    m/s, rad/s; positions from the origin, angles of joints from zero, rotations of free bodies by
     1 rad); `atol` is rtol / 100 unless given. Touch and lift-off are found to round-off and the
     step ends there, so that the order holds through them. The first choice for impacts and smooth
     motion; where contact is stiff and lasts, take Implicit.
@@ -79,15 +98,18 @@ class Adaptive(_ErrorControlled):
 
 
 @dataclass(frozen=True)
-class Implicit(_ErrorControlled):
+class Implicit(_ErrorControlled, kind="implicit"):
     """Steps as long as the error allows, however stiff: Rodas, an L-stable method of order 4(3).
 
     Tolerances and events are those of Adaptive. Each step solves linear systems with the analytic
     Jacobian of dynamics and contact: for stiff contact that lasts, and for friction that sticks.
     """
 
-    rtol: float = 1e-5
+    rtol: float = parameter(
+        1e-5,
+        at_least=1e-13,
+        at_most=0.1,
+        label="relative tolerance",
+        help="error of a step over the size of the state",
+    )
     code: ClassVar[int] = 4
-
-
-Integrator = SemiImplicitEuler | RungeKutta4 | LinearlyImplicitEuler | Adaptive | Implicit

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.checks import as_floats, check_not_negative
-from sphshell_pin.contact import BristleFriction
 from sphshell_pin.dynamics.controllers import Callback, Controller
 from sphshell_pin.dynamics.rollout import Plan, Rollout
 from sphshell_pin.dynamics.scene import ContactPair
@@ -239,7 +238,7 @@ def _states(
 
 
 def _has_state(pairs: Sequence[ContactPair]) -> bool:
-    return any(isinstance(pair.friction, BristleFriction) for pair in pairs)
+    return any(pair.friction is not None and pair.friction.has_state for pair in pairs)
 
 
 def _core_pairs(simulation: Simulation, q0: Array, v0: Array) -> list[_core.Pair]:
@@ -264,8 +263,8 @@ def _deep_starts(
         pairs = variations.pairs(run)
         for k in spheres:
             pair = pairs[k]
-            centre = data.oMi[pair.joint_i].act(pair.sphere_placement.translation)
-            centres[k][run] = (data.oMi[pair.joint_j] * pair.shell_placement).actInv(centre)
+            centre = data.oMi[pair.joint_i].act(pair.placement_i.translation)
+            centres[k][run] = (data.oMi[pair.joint_j] * pair.placement_j).actInv(centre)
             radii[k][run] = pair.sphere.radius if pair.sphere is not None else math.nan
     out: dict[int, SphshellError] = {}
     for k in spheres:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_name
-from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
+from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.units import size_warning
 
 Array = NDArray[np.float64]
@@ -151,3 +153,34 @@ def _reach(model: pin.Model) -> float:
         step = float(np.linalg.norm(model.jointPlacements[j].translation))
         reach[j] = reach[model.parents[j]] + step
     return float(reach.max())
+
+
+def find_joint(model: pin.Model, name: str) -> pin.JointModel:
+    """Return the joint called `name`; NameNotFound lists the joints."""
+    names = list(model.names)[1:]
+    if name not in names:
+        raise NameNotFound("joint", name, "the model", names)
+    return model.joints[model.getJointId(name)]
+
+
+def set_joint(model: pin.Model, q: Array, name: str, value: float | Sequence[float]) -> None:
+    """Write the position of one joint into `q` [m, rad; a free-flyer's x y z and quaternion].
+
+    Raises
+    ------
+    NameNotFound
+        The model has no such joint.
+    SphshellError
+        `value` has not as many numbers as the joint.
+    """
+    joint = find_joint(model, name)
+    span = slice(joint.idx_q, joint.idx_q + joint.nq)
+    if not isinstance(value, Sequence):
+        if joint.nv != 1:
+            raise SphshellError(f"joint '{name}' takes a list of {joint.nq} numbers")
+        # A continuous joint is stored as the cosine and the sine of its angle.
+        q[span] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+        return
+    if len(value) != joint.nq:
+        raise SphshellError(f"joint '{name}' takes {joint.nq} numbers, not {len(value)}")
+    q[span] = value

@@ -14,6 +14,7 @@ from sphshell_pin.checks import check_not_negative, check_vector
 from sphshell_pin.dynamics.busy import one_at_a_time
 from sphshell_pin.dynamics.controllers import Callback, Controller
 from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.run_stats import RunStats
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
 from sphshell_pin.dynamics.simulation import Simulation, why_ended
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NotPicklable
@@ -162,7 +163,7 @@ class OpenRun:
         for block in blocks:
             block["contact_row"] = block["contact_row"] - first
         names = tuple(pair.name for pair in self.scene.pairs)
-        return Result.from_blocks(blocks, names, {}, self.scene)
+        return Result.from_blocks(blocks, names, RunStats(), self.scene)
 
 
 def contacts_of(row: Result) -> SceneContacts:
@@ -186,8 +187,8 @@ def _same_place(a: ContactPair, b: ContactPair) -> bool:
         and a.shell is b.shell
         and a.find is b.find
         and type(a.friction) is type(b.friction)
-        and _equal(a.sphere_placement, b.sphere_placement)
-        and _equal(a.shell_placement, b.shell_placement)
+        and _equal(a.placement_i, b.placement_i)
+        and _equal(a.placement_j, b.placement_j)
     )
 
 

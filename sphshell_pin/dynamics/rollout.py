@@ -6,7 +6,7 @@ import math
 import re
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NoReturn, overload
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sphshell_pin import _core
 from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.run_stats import PairFigures
 from sphshell_pin.dynamics.simulation import Simulation, why_ended
 from sphshell_pin.dynamics.variations import Variations
 from sphshell_pin.errors import (
@@ -103,9 +104,7 @@ class Rollout(Sequence[Result]):
             self.q[run], self.v[run] = left["q"], left["v"]
             self.residual[run] = left["residual"]
             for pair, summary in zip(simulation.scene.pairs, left["summaries"], strict=True):
-                duration = summary["contact_time"]
-                mean = summary["impulse"] / duration if duration else 0.0
-                for name, value in {**summary, "mean_force": mean}.items():
+                for name, value in asdict(PairFigures.from_core(summary)).items():
                     column = f"{pair.name}.{name}"
                     if column not in self.figures:
                         self.figures[column] = np.full(count, math.nan)

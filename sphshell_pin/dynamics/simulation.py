@@ -21,8 +21,9 @@ from sphshell_pin.checks import (
     check_positive,
 )
 from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callable
-from sphshell_pin.dynamics.integrators import Integrator, SemiImplicitEuler
+from sphshell_pin.dynamics.integrators import Adaptive, Integrator
 from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.run_stats import PairFigures, RunStats
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.errors import (
     DeepStart,
@@ -46,12 +47,12 @@ _FARTHEST = 1e12
 
 
 class Simulation:
-    """Moves `scene` in time with `integrator`."""
+    """Moves `scene` in time with `integrator`, Adaptive() unless given."""
 
     def __init__(self, scene: Scene, integrator: Integrator | None = None) -> None:
         if not isinstance(scene, Scene):
             raise InvalidParameter("scene", type(scene).__name__, "must be a sphshell_pin.Scene")
-        integrator = SemiImplicitEuler() if integrator is None else integrator
+        integrator = Adaptive() if integrator is None else integrator
         if not isinstance(integrator, Integrator):
             raise InvalidParameter(
                 "integrator",
@@ -294,31 +295,28 @@ class Simulation:
             return -math.inf
         data = self.scene.model.createData()
         pin.forwardKinematics(self.scene.model, data, q0)
-        centre = (data.oMi[pair.joint_i] * pair.sphere_placement).translation
-        local = (data.oMi[pair.joint_j] * pair.shell_placement).actInv(centre)
+        centre = (data.oMi[pair.joint_i] * pair.placement_i).translation
+        local = (data.oMi[pair.joint_j] * pair.placement_j).actInv(centre)
         distance = float(pair.shell.closest_points(local[None], method=pair.method).distances[0])
         return pair.sphere.radius - (distance if pair.shell.side == "outside" else -distance)
 
     def gather(self, core: Any, blocks: list[dict[str, NDArray[Any]]]) -> Result:
         """Make the result of a compiled run `core`, or of what is left of one, and its blocks."""
         names = tuple(pair.name for pair in self.scene.pairs)
-        figures = {}
-        for name, summary in zip(names, core.summaries, strict=True):
-            time = summary["contact_time"]
-            figures[name] = {**summary, "mean_force": summary["impulse"] / time if time else 0.0}
+        figures = map(PairFigures.from_core, core.summaries)
         first = blocks[0]["t"][0] if len(blocks[0]["t"]) else core.time
         simulated = core.time - float(first)
-        stats = {
-            "steps": core.steps,
-            "wall_time": core.wall_time,
-            "real_time_factor": simulated / core.wall_time if core.wall_time > 0 else math.inf,
-            "duration": simulated,
-            "rejected": core.rejected,
-            "evaluations": core.evaluations,
-            "dt": self._dt or (simulated / core.steps if core.steps else 0.0),
-            "integrator": type(self.integrator).__name__,
-            "pairs": figures,
-        }
+        stats = RunStats(
+            steps=core.steps,
+            wall_time=core.wall_time,
+            real_time_factor=simulated / core.wall_time if core.wall_time > 0 else math.inf,
+            duration=simulated,
+            rejected=core.rejected,
+            evaluations=core.evaluations,
+            dt=self._dt or (simulated / core.steps if core.steps else 0.0),
+            integrator=type(self.integrator).__name__,
+            pairs=dict(zip(names, figures, strict=True)),
+        )
         return Result.from_blocks(blocks, names, stats, self.scene)
 
 

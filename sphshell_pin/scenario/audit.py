@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -64,7 +64,7 @@ class CadAudit:
             "cad_normal_error [rad]": self.normal_error,
         }
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> dict[str, dict[str, object]]:
         """Return the figures by pair, for summary.json."""
         return {
             pair.name: {
@@ -156,7 +156,7 @@ def _audit_shell(
         if log.row[i] != shown:
             shown = int(log.row[i])
             pin.forwardKinematics(model, data, np.asarray(result.q[shown], dtype=float))
-        shell = data.oMi[pair.joint_j] * pair.shell_placement
+        shell = data.oMi[pair.joint_j] * pair.placement_j
         normals[place] = shell.rotation.T @ log.normal_world[i]
         points[place] = shell.actInv(log.point_world[i])
         radii[place] = pair.sphere.radius
@@ -180,7 +180,7 @@ def _audit_shell(
 def _feet(
     section: ShellSection, path: Path, centers: Array, points: Array
 ) -> tuple[Array, Array, npt.NDArray[np.int32]]:
-    """Return the places of the exact faces next to contacts, see `cad.jobs.feet`."""
+    """Return the places of the exact faces next to contacts, see `cad.jobs.stationary_points`."""
     from sphshell_pin.shell.cad.process import run_in_child
 
     file = path.parent / str(section.file)
@@ -195,7 +195,9 @@ def _feet(
     arguments = (file, section.unit, options, (scale, section.magnify), centers, points)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # told when the shell was made
-        points, normals, kinds = run_in_child("feet", arguments, file, "--audit-cad", options)
+        points, normals, kinds = run_in_child(
+            "stationary_points", arguments, file, "--audit-cad", options
+        )
     return points, normals, kinds
 
 

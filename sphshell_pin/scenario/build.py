@@ -15,14 +15,20 @@ import numpy as np
 import numpy.typing as npt
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.controllers import Controller
-from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError, UnitWarning
+from sphshell_pin.dynamics.controllers import Controller, PythonFunction, ShellPlace
+from sphshell_pin.errors import (
+    InvalidParameter,
+    NameNotFound,
+    ScenarioError,
+    SphshellError,
+    UnitWarning,
+)
+from sphshell_pin.parameters import Ingredient, parameters_of
 from sphshell_pin.scenario import schema
 from sphshell_pin.scenario.bodies import (
     Assembly,
     assemble,
     blamed_on,
-    by_joint,
     origin,
     reduce_visual,
     restrict,
@@ -153,19 +159,14 @@ def build_scenario(
                 find,
                 source.frame_i,
                 source.frame_j,
-                _build_law(source.law),
-                _build_friction(source.friction),
+                source.law.made(path.parent),
+                source.friction.made(path.parent),
                 name=source.name,
             )
     q0, v0 = restrict(assembly.model, scene.model, assembly.q0, assembly.v0)
     controller = _build_controller(scenario.controller, scene, q0, shells, path, load)
-    if isinstance(controller, Controller):
-        with blamed_on(path, "controller"):
-            # A wrong frame or joint is told now, not when the run starts.
-            controller.to_core(scene, q0)
-    run = scenario.run
     with blamed_on(path, "run"):
-        simulation = sp.Simulation(scene, integrator=_build_integrator(run))
+        simulation = sp.Simulation(scene, integrator=scenario.run.made())
     figures = {
         figure: load(where, f"figures.{figure}") for figure, where in scenario.figures.items()
     }
@@ -216,10 +217,7 @@ def _kept_shell(section: schema.ShellSection, reuse: Built | None) -> sp.Shell |
 
 def explain_built(built: Built) -> Any:
     """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
-    stepper = built.simulation.integrator
-    # The recommended step is the first-order stepper's: no other is judged by it.
-    dt = stepper.dt if isinstance(stepper, sp.SemiImplicitEuler) else None
-    return built.scene.explain(built.q0, built.v0, dt)
+    return built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
 
 
 def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
@@ -293,139 +291,42 @@ def _add_contact(
             shell=shell,
             frame=section.frame,
             placement=to_se3(section.placement),
-            law=_build_law(contact.law),
-            friction=_build_friction(contact.friction),
+            law=contact.law.made(path.parent),
+            friction=contact.friction.made(path.parent),
             method=contact.method,
             name=contact.name,
         )
 
 
-def _build_law(law: schema.Law) -> Any:
-    values = law.model_dump(exclude={"type"})
-    match law:
-        case schema.Impact():
-            return sp.ImpactLaw(**values)
-        case schema.Adams():
-            return sp.ImpactLaw.from_adams(**values)
-        case schema.Hertz():
-            return sp.ImpactLaw.hertz(**values)
-        case _:
-            return sp.HuntCrossleyLaw(**values)
-
-
-def _build_friction(friction: schema.Friction) -> Any:
-    values = friction.model_dump(exclude={"type"})
-    match friction:
-        case schema.Coulomb():
-            return sp.CoulombFriction(**values)
-        case schema.Bristle():
-            return sp.BristleFriction(**values)
-        case _:
-            return None
-
-
-_INTEGRATORS = {
-    "semi-implicit-euler": sp.SemiImplicitEuler,
-    "runge-kutta-4": sp.RungeKutta4,
-    "linearly-implicit-euler": sp.LinearlyImplicitEuler,
-    "adaptive": sp.Adaptive,
-    "implicit": sp.Implicit,
-}
-
-
-def _build_integrator(run: schema.RunSection) -> Any:
-    given = {k: getattr(run, k) for k in ("dt", "rtol", "atol")}
-    chosen: Any = _INTEGRATORS[run.integrator]
-    return chosen(**{k: v for k, v in given.items() if v is not None})
-
-
 def _build_controller(
-    section: schema.Controller,
+    stated: Ingredient,
     scene: sp.Scene,
     q0: Array,
     shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
     path: Path,
     load: Callable[[str, str], Callable[..., Any]],
-) -> Any:
-    with blamed_on(path, "controller"):
-        match section:
-            case schema.GravityCompensationSection():
-                return sp.GravityCompensation()
-            case schema.PythonSection():
-                return load(section.function, "controller.function")
-            case schema.JointPDSection():
-                return sp.JointPD(
-                    _gain(scene.model, section.kp, path, "controller.kp"),
-                    _gain(scene.model, section.kd, path, "controller.kd"),
-                    _reference(scene.model, section.q_ref, q0, path),
-                    gravity_compensation=section.gravity_compensation,
-                )
-            case schema.CartesianImpedanceSection():
-                return _build_impedance(section, scene, q0, shells, path)
-            case _:
-                return None
-
-
-def _build_impedance(
-    section: schema.CartesianImpedanceSection,
-    scene: sp.Scene,
-    q0: Array,
-    shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
-    path: Path,
-) -> Any:
-    options: dict[str, Any] = {}
-    if section.shell is not None:
+) -> Controller | Callable[..., Any] | None:
+    def find_shell(name: str) -> ShellPlace:
         with blamed_on(path, "controller.shell"):
-            if section.shell not in shells:
-                raise NameNotFound("shell", section.shell, "the scenario", shells)
-        shell, stands = shells[section.shell]
-        options = {
-            "shell": shell,
-            "shell_frame": stands.frame,
-            "placement": to_se3(stands.placement),
-        }
-    return sp.CartesianImpedance(
-        section.frame,
-        np.array(section.path),
-        section.stiffness,
-        section.damping,
-        section.normal_force,
-        speed=section.speed,
-        lead_in=section.lead_in,
-        rotational_stiffness=section.rotational_stiffness,
-        rotational_damping=section.rotational_damping,
-        posture_stiffness=_gain(
-            scene.model, section.posture_stiffness, path, "controller.posture_stiffness"
-        ),
-        joint_damping=_gain(scene.model, section.joint_damping, path, "controller.joint_damping"),
-        q_ref=_reference(scene.model, section.q_ref, q0, path),
-        **options,
-    )
+            if name not in shells:
+                raise NameNotFound("shell", name, "the scenario", shells)
+        shell, section = shells[name]
+        return shell, section.frame, to_se3(section.placement)
 
-
-def _gain(model: Any, gain: schema.Gain, path: Path, key: str) -> Array:
-    """Return a gain per velocity coordinate (nv,); free-flying bodies have no motor."""
-    if isinstance(gain, dict):
-        with blamed_on(path, key):
-            return by_joint(model, gain, "v", 0.0)
-    if isinstance(gain, list):
-        if len(gain) != model.nv:
-            raise ScenarioError(path, key, f"takes {model.nv} numbers (nv), not {len(gain)}")
-        return np.array(gain)
-    motors = {name: gain for j, name in enumerate(model.names) if j and model.joints[j].nv < 6}
-    return by_joint(model, motors, "v", 0.0)
-
-
-def _reference(
-    model: Any, given: list[float] | dict[str, float] | None, q0: Array, path: Path
-) -> Array:
-    if given is None:
-        return q0.copy()
-    if isinstance(given, list):
-        if len(given) != model.nq:
+    with blamed_on(path, "controller"):
+        if isinstance(stated, PythonFunction):
+            return load(stated.function, "controller.function")
+        controller: Controller | None = stated.made(path.parent)
+        if controller is None:
+            return None
+        controller = controller.in_scenario(find_shell)
+        try:
+            # A wrong frame, joint or size is reported now, not when the run starts.
+            controller.to_core(scene, q0)
+        except InvalidParameter as error:
+            name = error.name.partition(".")[0].partition("[")[0]
+            known = name in parameters_of(stated)
             raise ScenarioError(
-                path, "controller.q_ref", f"takes {model.nq} numbers (nq), not {len(given)}"
-            )
-        return np.array(given)
-    with blamed_on(path, "controller.q_ref"):
-        return by_joint(model, given, "q", q0)
+                path, f"controller.{name}" if known else "controller", str(error)
+            ) from None
+        return controller

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pydantic import BaseModel
 
 from sphshell_pin.errors import ScenarioError
-from sphshell_pin.scenario.reading import look_up
+from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
+from sphshell_pin.scenario.reading import Found, look_up
 from sphshell_pin.scenario.schema import KnobSection, Scenario
 
 if TYPE_CHECKING:
@@ -16,54 +19,6 @@ if TYPE_CHECKING:
 
 # A knob without a range goes from a tenth of its value to ten times as much.
 DECADE = 10.0
-
-# What the last word of a key means: label, unit. The table's own words come first.
-_LAW = {
-    "exponent": ("exponent", ""),
-    "damping": ("damping", "N s/m"),
-    "full_damping_depth": ("full damping depth", "m"),
-    "dissipation": ("dissipation", "s/m"),
-    "radius": ("Hertz radius", "m"),
-    "young_1": ("Young's modulus 1", "Pa"),
-    "young_2": ("Young's modulus 2", "Pa"),
-    "poisson_1": ("Poisson's ratio 1", ""),
-    "poisson_2": ("Poisson's ratio 2", ""),
-    "restitution": ("restitution", ""),
-    "speed": ("speed of the restitution", "m/s"),
-}
-_FRICTION = {
-    "mu_static": ("static friction", ""),
-    "mu_dynamic": ("dynamic friction", ""),
-    "v_static": ("static friction speed", "m/s"),
-    "v_dynamic": ("dynamic friction speed", "m/s"),
-    "stiffness": ("bristle stiffness", "N/m"),
-    "damping": ("bristle damping", "N s/m"),
-    "v_stribeck": ("Stribeck speed", "m/s"),
-}
-_SPHERE = {"radius": ("sphere radius", "m")}
-_CONTROLLER = {
-    "normal_force": ("normal force", "N"),
-    "speed": ("path speed", "m/s"),
-    "lead_in": ("lead-in", "s"),
-    "stiffness": ("tip stiffness", "N/m"),
-    "damping": ("tip damping", "N s/m"),
-    "rotational_stiffness": ("rotational stiffness", "N m/rad"),
-    "rotational_damping": ("rotational damping", "N m s/rad"),
-    "posture_stiffness": ("posture stiffness", "N m/rad"),
-    "joint_damping": ("joint damping", "N m s/rad"),
-    "kp": ("joint stiffness", "N m/rad"),
-    "kd": ("joint damping", "N m s/rad"),
-}
-_RUN = {
-    "duration": ("duration", "s"),
-    "dt": ("time step", "s"),
-    "rtol": ("relative tolerance", ""),
-    "atol": ("absolute tolerance", ""),
-    "control_dt": ("control period", "s"),
-    "record_dt": ("time between rows", "s"),
-    "recording_speed": ("speed of the recording", ""),
-}
-_AXES = ("x", "y", "z")
 
 # Keys whose new value holds from the start only: a run under way keeps its state and its clock.
 _FROM_THE_START = ("robot", "shell", "run")
@@ -107,11 +62,12 @@ def check_knobs(scenario: Scenario, path: Path, *, ranges: bool) -> None:
     seen: set[str] = set()
     for i, section in enumerate(scenario.knob):
         where = f"knob[{i}]"
-        value, key = _value(section, scenario, path)
+        found = _found(section, scenario, path)
+        value, key = float(found.value), found.key
         if key in seen:
             raise ScenarioError(path, f"{where}.key", "is a knob already", section.key)
         seen.add(key)
-        low, high, log = _range(section, value)
+        low, high, log = _range(section, value, meaning(scenario, found))
         if low is None or high is None:
             if not ranges:
                 continue  # its author saw a range, which this value has left
@@ -131,20 +87,23 @@ def check_knobs(scenario: Scenario, path: Path, *, ranges: bool) -> None:
             )
 
 
-def _value(section: KnobSection, scenario: Scenario, path: Path) -> tuple[float, str]:
-    value, key = look_up(scenario, section.key, path)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        shown = None if isinstance(value, dict | list) else value
+def _found(section: KnobSection, scenario: Scenario, path: Path) -> Found:
+    found = look_up(scenario, section.key, path)
+    if isinstance(found.value, bool) or not isinstance(found.value, int | float):
+        shown = None if isinstance(found.value, dict | list) else found.value
         raise ScenarioError(path, section.key, "is not a number, so it cannot be a knob", shown)
-    return float(value), key
+    return found
 
 
-def _range(section: KnobSection, value: float) -> tuple[float | None, float | None, bool]:
+def _range(
+    section: KnobSection, value: float, about: Parameter
+) -> tuple[float | None, float | None, bool]:
     low, high = section.min, section.max
     if value > 0:
         low = value / DECADE if low is None else low
-        high = value * DECADE if high is None else high
-    log = section.log
+        if high is None:
+            high = value * DECADE if about.at_most is None else min(value * DECADE, about.at_most)
+    log = section.log if section.log is not None else about.log
     if log is None:
         # A range that was given spans what one wants to see, in plain steps unless it is wide.
         log = low is not None and high is not None and low > 0 and high >= DECADE * low
@@ -152,81 +111,76 @@ def _range(section: KnobSection, value: float) -> tuple[float | None, float | No
 
 
 def _knob(section: KnobSection, scenario: Scenario, path: Path) -> Knob:
-    value, key = _value(section, scenario, path)
-    low, high, log = _range(section, value)
+    found = _found(section, scenario, path)
+    value, about = float(found.value), meaning(scenario, found)
+    low, high, log = _range(section, value, about)
     # A missing end, and a value that is not positive any more.
     if low is None:
         low = DECADE * value
     if high is None:
         high = value / DECADE if value < 0.0 else 1.0
     low, high = min(low, value), max(high, value)
-    label, unit = _meaning(key, scenario)
     return Knob(
         key=section.key,
-        label=label if section.label is None else section.label,
-        unit=unit if section.unit is None else section.unit,
+        label=about.label if section.label is None else section.label,
+        unit=about.unit if section.unit is None else section.unit,
         low=low,
         high=high,
         log=log and low > 0,
         value=value,
-        restart=key.partition(".")[0] in _FROM_THE_START,
+        restart=found.parts[0] in _FROM_THE_START,
     )
 
 
-def _meaning(key: str, scenario: Scenario) -> tuple[str, str]:
-    """Return label and unit of a key whose names are spelt out."""
-    table, *middle, last = key.split(".")
-    plain = (last.replace("_", " "), "")
-    if table == "gravity":
-        return f"gravity {_axis(last)}", "m/s^2"
-    if table == "run":
-        return _RUN.get(last, plain)
-    if table == "controller":
-        known: Mapping[str, tuple[str, str]] = _CONTROLLER
-        for word in reversed([*middle, last]):
-            if word in known:
-                label, unit = known[word]
-                return (label if word == last else f"{label} of {last}"), unit
-        return plain
-    if table in ("contact", "source"):
-        return _meaning_in_contact(table, middle, last, scenario)
-    if "placement" in middle:
-        name = ".".join(middle[: middle.index("placement")])
-        turned = middle[-1] == "rpy_deg"
-        axis = ("roll", "pitch", "yaw")[int(last)] if turned else _axis(last)
-        return f"{name} {axis}".strip(), "deg" if turned else "m"
-    return (f"{'.'.join(middle)} {plain[0]}".strip(), plain[1])
+def meaning(scenario: Scenario, found: Found) -> Parameter:
+    """Return what the description of its table says of a number of `scenario`.
+
+    The label says whose it is, the unit is that of the table's other values.
+    """
+    owner: object = scenario
+    prefix: list[str] = []
+    for i, part in enumerate(found.parts):
+        about = _description(owner, part)
+        if about is not None:
+            inner = found.parts[i + 1 :]
+            label = about.label or part.replace("_", " ")
+            unit = owner.unit_of(part) if isinstance(owner, Ingredient) else about.unit
+            return replace(about, label=_named(prefix, _inside(label, inner), scenario), unit=unit)
+        prefix.append(part)
+        owner = _child(owner, part)
+    *tables, last = found.parts
+    return Parameter(label=f"{'.'.join(tables[1:])} {last.replace('_', ' ')}".strip())
 
 
-def _meaning_in_contact(
-    table: str, middle: list[str], last: str, scenario: Scenario
-) -> tuple[str, str]:
-    items: Any = getattr(scenario, table)
-    part = next((p for p in reversed(middle) if p in ("law", "friction", "sphere")), "")
-    name = ".".join(middle[: len(middle) - middle[::-1].index(part) - 1]) if part else ""
-    of = f"{name}: " if len(scenario.contact) + len(scenario.source) > 1 else ""
-    if part == "sphere" and middle[-1] == "offset":
-        return f"{of}sphere offset {_axis(last)}", "m"
-    if part == "law" and last in ("stiffness", "k", "c", "d", "e"):
-        item = next((one for one in items if one.name == name), None)
-        return _meaning_in_law(of, last, (item or items[int(name)]).law)
-    known = {"law": _LAW, "friction": _FRICTION, "sphere": _SPHERE}.get(part, {})
-    label, unit = known.get(last, (last.replace("_", " "), ""))
-    return f"{of}{label}", unit
+def _description(owner: object, name: str) -> Parameter | None:
+    if isinstance(owner, BaseModel):
+        info = type(owner).model_fields.get(name)
+        return next((m for m in info.metadata if isinstance(m, Parameter)), None) if info else None
+    return parameters_of(owner).get(name)
 
 
-def _meaning_in_law(of: str, last: str, law: Any) -> tuple[str, str]:
-    if last == "stiffness":
-        return f"{of}stiffness", f"N/m^{law.exponent:g}"
-    # ADAMS's own system of units, "mm-N-s": length, force, time.
-    length, force, time = law.units.split("-")
-    return {
-        "k": (f"{of}stiffness", f"{force}/{length}^{law.e:g}"),
-        "e": (f"{of}exponent", ""),
-        "c": (f"{of}damping", f"{force} {time}/{length}"),
-        "d": (f"{of}full damping depth", length),
-    }[last]
+def _child(owner: object, part: str) -> object:
+    if isinstance(owner, list):
+        names = [getattr(one, "label", None) or getattr(one, "name", None) for one in owner]
+        at = names.index(part) if part in names else int(part) if part.isdecimal() else None
+        return None if at is None else owner[at]
+    return owner.get(part) if isinstance(owner, Mapping) else getattr(owner, part, None)
 
 
-def _axis(index: str) -> str:
-    return _AXES[int(index)] if index in ("0", "1", "2") else index
+def _inside(label: str, inner: list[str]) -> str:
+    """Return the label of a part of a vector or table."""
+    if not inner:
+        return label
+    (part,) = inner
+    if label == "rpy deg":
+        return ("roll", "pitch", "yaw")[int(part)]
+    axis = "xyz"[int(part)] if part in ("0", "1", "2") else f"of {part}"
+    return axis if label == "xyz" else f"{label} {axis}"
+
+
+def _named(tables: list[str], label: str, scenario: Scenario) -> str:
+    """Return `label` with the name of the item that it belongs to."""
+    if tables and tables[0] in ("contact", "source"):
+        several = len(scenario.contact) + len(scenario.source) > 1
+        return f"{tables[1]}: {label}" if several else label
+    return f"{tables[1]} {label}" if len(tables) > 1 else label

@@ -12,14 +12,18 @@ import typing
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.errors import NameNotFound, ScenarioError
-from sphshell_pin.scenario.schema import ERROR_CONTROLLED, LISTS, RunSection, Scenario
+from sphshell_pin.parameters import Ingredient, parameters_of
+from sphshell_pin.scenario.schema import LISTS, STEPPING, OneOf, RunSection, Scenario
 
+# Pydantic's names of this fault in a model and in a dataclass.
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 TOO_DEEP = "is not valid TOML: its tables or lists are nested too deeply"
 # A key of a hundred parts: the time and memory of tomllib grow with their square.
 _LONG_KEY = re.compile(r"""(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""")
@@ -111,8 +115,8 @@ def change_scenario(
         _change(data, key, _parse_value(text), path, scenario)
     if "run.integrator" in changes:
         # Another kind of integrator has no use for the step or the tolerances of the file's.
-        by_error = changes["run.integrator"].strip("\"'") in ERROR_CONTROLLED
-        for key in ("dt",) if by_error else ("rtol", "atol"):
+        kind = Integrator.kinds.get(changes["run.integrator"].strip("\"'"))
+        for key in set(STEPPING) - set(parameters_of(kind)):
             if f"run.{key}" not in changes:
                 data["run"].pop(key, None)
     return _validated(data, path)
@@ -130,8 +134,18 @@ def _with_table(key: str, data: Mapping[str, Any]) -> str:
     return key
 
 
-def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> tuple[Any, str]:
-    """Return the value at a dotted key of `scenario`, and the key with all names spelt out.
+class Found(NamedTuple):
+    """What is at a dotted key of a scenario."""
+
+    value: Any
+    key: str
+    """The key with all names spelled out."""
+    parts: list[str]
+    """The names of `key`, which may hold dots."""
+
+
+def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> Found:
+    """Return what is at a dotted key of `scenario`.
 
     Raises
     ------
@@ -149,7 +163,8 @@ def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> tuple[An
         raise ScenarioError(
             path, key, f"the scenario has no '{last}' there; {hint}there are: {_listed(known)}"
         )
-    return node[int(last)] if isinstance(node, list) else node[last], ".".join([*trail, last])
+    value = node[int(last)] if isinstance(node, list) else node[last]
+    return Found(value, ".".join([*trail, last]), [*trail, last])
 
 
 def _validated(data: dict[str, Any], path: str | PathLike[str]) -> Scenario:
@@ -194,7 +209,7 @@ def _change(
     whole, _, index = key.rpartition(".")
     if index.isdecimal() and not isinstance(node, list):
         # One number of a list that stands at its default.
-        default, _ = look_up(scenario, whole, path)
+        default = look_up(scenario, whole, path).value
         if isinstance(default, list):
             _change(data, whole, list(default), path, scenario)
             _change(data, key, value, path, scenario)
@@ -259,7 +274,7 @@ def _keys_of(table: str) -> Iterable[str]:
     return section.model_fields  # type: ignore[no-any-return]
 
 
-def _item_name(item: Mapping[str, Any]) -> str:
+def _item_name(item: Mapping[str, object]) -> str:
     return str(item.get("label") or item.get("name") or item.get("urdf") or "")
 
 
@@ -268,7 +283,7 @@ def _explain(
 ) -> ScenarioError:
     """Turn the first of pydantic's complaints into one sentence with the valid choices."""
     # An unknown key often hides a missing one ("stifness" for "stiffness"): it is told first.
-    details = sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+    details = sorted(error.errors(), key=lambda one: one["type"] not in UNKNOWN_KEY)
     first = details[0]
     key, section = _locate(first["loc"], data)
     reason, value = _reason(first, section)
@@ -279,8 +294,8 @@ def _explain(
 
 def _reason(detail: ErrorDetails, section: type[BaseModel] | None) -> tuple[str, object]:
     kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
-    if kind == "extra_forbidden" and section is not None:
-        valid = list(section.model_fields)
+    if kind in UNKNOWN_KEY and section is not None:
+        valid = list(_types_of(section))
         near = difflib.get_close_matches(str(detail["loc"][-1]), valid, n=1)
         hint = f"did you mean '{near[0]}'? " if near else ""
         return f"unknown key; {hint}valid keys: {_listed(valid)}", value
@@ -290,7 +305,7 @@ def _reason(detail: ErrorDetails, section: type[BaseModel] | None) -> tuple[str,
         return f"type is missing; valid types: {_listed(_tags(detail['loc']))}", None
     if kind == "missing":
         return "is missing", None
-    if kind == "model_type":
+    if kind in ("model_type", "dataclass_type"):
         return "must be a table { key = value, ... }", value
     message = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
     plain = value if isinstance(value, str | int | float | bool) else None
@@ -317,9 +332,8 @@ def _locate(
         models = [one for one in _members(here) if _is_section(one)]
         if models:
             section = models[0]
-            field = section.model_fields.get(part)
             key += f".{part}" if key else part
-            here = None if field is None else field.rebuild_annotation()
+            here = _types_of(section).get(part)
             continue
         members = [one for one in _members(here) if one is not type(None)]
         if len(members) > 1:
@@ -345,29 +359,41 @@ def _tags(loc: Iterable[int | str]) -> list[str]:
             here = _by_tag(here)[str(part)]
         else:
             section = next((one for one in _members(here) if _is_section(one)), None)
-            field = None if section is None else section.model_fields.get(str(part))
-            here = None if field is None else field.rebuild_annotation()
+            here = None if section is None else _types_of(section).get(str(part))
     return list(_by_tag(here))
 
 
-def _by_tag(annotation: Any) -> dict[str, type[BaseModel]]:
-    found: dict[str, type[BaseModel]] = {}
+def _by_tag(annotation: object) -> dict[str, type]:
+    """Return what a table may be, by its key `type`."""
+    found: dict[str, type] = {}
     for one in _members(annotation):
-        if _is_section(one) and "type" in one.model_fields:
+        if _is_section(one) and issubclass(one, Ingredient):
+            found[one.kind] = one
+        elif _is_section(one) and "type" in one.model_fields:
             for tag in typing.get_args(one.model_fields["type"].annotation):
                 found[str(tag)] = one
     return found
 
 
-def _is_section(annotation: Any) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+def _is_section(annotation: object) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel | Ingredient)
+
+
+def _types_of(section: type) -> dict[str, object]:
+    """Return the types of the keys of a table."""
+    if issubclass(section, BaseModel):
+        return {k: field.rebuild_annotation() for k, field in section.model_fields.items()}
+    types = typing.get_type_hints(section)
+    return {name: types[name] for name in parameters_of(section)}
 
 
 def _members(annotation: Any) -> list[Any]:
     """Return what a union may be, whatever it is wrapped in."""
     origin = typing.get_origin(annotation)
     if origin is typing.Annotated:
-        return _members(typing.get_args(annotation)[0])
+        whole, *notes = typing.get_args(annotation)
+        families = [note.family for note in notes if isinstance(note, OneOf)]
+        return list(families[0].kinds.values()) if families else _members(whole)
     if origin in (typing.Union, types.UnionType):
         return [inner for one in typing.get_args(annotation) for inner in _members(one)]
     return [annotation]

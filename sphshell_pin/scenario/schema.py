@@ -7,9 +7,36 @@ them when it stands alone, `robot/name` as soon as there are several robots.
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    PlainSerializer,
+    SerializationInfo,
+    Tag,
+    create_model,
+    model_validator,
+)
+from pydantic_core import CoreSchema
+
+from sphshell_pin.contact import Friction as FrictionLaw
+from sphshell_pin.contact import NormalLaw
+from sphshell_pin.contact.friction import NoFriction
+from sphshell_pin.dynamics import controllers
+from sphshell_pin.dynamics.controllers import NoController
+from sphshell_pin.dynamics.integrators import Adaptive, Integrator, SemiImplicitEuler
+from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
 
 Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -27,11 +54,67 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+@dataclass(frozen=True)
+class OneOf:
+    """Annotation of a table that states one of a `family`; its key `type` says which."""
+
+    family: type[Ingredient]
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Build what reads and writes such tables."""
+        members = [
+            Annotated[kind, BeforeValidator(_without_type(kind)), Tag(name)]
+            for name, kind in self.family.kinds.items()
+        ]
+        either = functools.reduce(operator.or_, members)
+        return handler.generate_schema(
+            Annotated[either, Discriminator(_kind_of), PlainSerializer(_to_table)]
+        )
+
+
+def _kind_of(value: object) -> str | None:
+    kind = value.get("type") if isinstance(value, Mapping) else getattr(value, "kind", None)
+    return kind if isinstance(kind, str) else None
+
+
+def _without_type(kind: type[Ingredient]) -> Callable[[object], object]:
+    """Return what takes the key `type` off a table, and refuses fields that no file may state."""
+
+    def check(value: object) -> object:
+        if not isinstance(value, Mapping):
+            return value
+        known = parameters_of(kind)
+        for key in value:
+            if key in kind.__dataclass_fields__ and key not in known:
+                raise ValueError(f"unknown key '{key}'; valid keys: {', '.join(known)}")
+        return {k: v for k, v in value.items() if k != "type"}
+
+    return check
+
+
+def _to_table(value: Ingredient, info: SerializationInfo) -> dict[str, object]:
+    """Return the table that states `value`, without defaults where these may be left out."""
+    table: dict[str, object] = {"type": value.kind}
+    for one in dataclasses.fields(value):
+        given = getattr(value, one.name)
+        if one.name in parameters_of(value) and not (info.exclude_unset and given == one.default):
+            table[one.name] = _plain(given)
+    return table
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return dict(value) if isinstance(value, Mapping) else value
+
+
 class Placement(Section):
     """Where something stands in its reference frame: first rolled, pitched, yawed, then moved."""
 
-    xyz: Vector3 = [0.0, 0.0, 0.0]
-    rpy_deg: Vector3 = [0.0, 0.0, 0.0]
+    xyz: Annotated[Vector3, Parameter("m")] = [0.0, 0.0, 0.0]
+    rpy_deg: Annotated[Vector3, Parameter("deg")] = [0.0, 0.0, 0.0]
 
 
 class RobotSection(Section):
@@ -152,89 +235,16 @@ class ShellSection(Section):
         return self
 
 
-class Impact(Section):
-    """ADAMS's IMPACT with SI parameters [N/m^exponent, -, N s/m, m]."""
-
-    type: Literal["impact"]
-    stiffness: Positive
-    exponent: Positive = 1.5
-    damping: NotNegative = 0.0
-    full_damping_depth: Positive = 1e-4
-
-
-class Adams(Section):
-    """IMPACT as an ADAMS model states it; the defaults are ADAMS's own."""
-
-    type: Literal["adams"]
-    k: Positive = 1e5
-    e: Positive = 2.2
-    c: NotNegative = 10.0
-    d: Positive = 0.1
-    units: str = "mm-N-s"
-
-
-class Hertz(Section):
-    """A ball of `radius` [m] on an elastic half-space; moduli [Pa], `speed` [m/s]."""
-
-    type: Literal["hertz"]
-    radius: Positive
-    young_1: Positive
-    poisson_1: Annotated[float, Field(gt=-1, le=0.5)]
-    young_2: Positive
-    poisson_2: Annotated[float, Field(gt=-1, le=0.5)]
-    restitution: Annotated[float, Field(gt=0, le=1)] | None = None
-    speed: Positive | None = None
-
-
-class HuntCrossley(Section):
-    """Hunt and Crossley's law [N/m^exponent, -, s/m]."""
-
-    type: Literal["hunt-crossley"]
-    stiffness: Positive
-    exponent: Positive = 1.5
-    dissipation: NotNegative = 0.0
-
-
-Law = Annotated[Impact | Adams | Hertz | HuntCrossley, Field(discriminator="type")]
-
-
-class NoFriction(Section):
-    """A frictionless contact."""
-
-    type: Literal["none"]
-
-
-class Coulomb(Section):
-    """ADAMS's two-velocity Coulomb friction [-, -, m/s, m/s]; the defaults are ADAMS's own."""
-
-    type: Literal["coulomb"]
-    mu_static: NotNegative = 0.3
-    mu_dynamic: NotNegative = 0.1
-    v_static: Positive = 0.1
-    v_dynamic: Positive = 1.0
-
-
-class Bristle(Section):
-    """Friction that sticks: spring [N/m], damper [N s/m], Stribeck's speed [m/s]."""
-
-    type: Literal["bristle"]
-    mu_static: NotNegative
-    mu_dynamic: NotNegative
-    stiffness: Positive
-    damping: NotNegative = 0.0
-    v_stribeck: Positive = 0.01
-    torsional: bool = False
-
-
-Friction = Annotated[NoFriction | Coulomb | Bristle, Field(discriminator="type")]
+Law = Annotated[Ingredient, OneOf(NormalLaw)]
+Friction = Annotated[Ingredient, OneOf(FrictionLaw)]
 
 
 class SphereSection(Section):
     """The sphere of a contact: `radius` [m], centre `offset` [m] in the robot's `frame`."""
 
     frame: str
-    radius: Positive
-    offset: Vector3 = [0.0, 0.0, 0.0]
+    radius: Annotated[Positive, Parameter("m", "sphere radius")]
+    offset: Annotated[Vector3, Parameter("m", "sphere offset")] = [0.0, 0.0, 0.0]
 
 
 class ContactSection(Section):
@@ -245,7 +255,7 @@ class ContactSection(Section):
     shell: str
     method: Literal["facets", "smooth", "elements"] | None = None
     law: Law
-    friction: Friction = NoFriction(type="none")
+    friction: Friction = NoFriction()
 
 
 class SourceSection(Section):
@@ -256,106 +266,69 @@ class SourceSection(Section):
     frame_i: str
     frame_j: str = "universe"
     law: Law
-    friction: Friction = NoFriction(type="none")
+    friction: Friction = NoFriction()
 
 
-class NoController(Section):
-    """No joint torques."""
-
-    type: Literal["none"] = "none"
+Controller = Annotated[Ingredient, OneOf(controllers.Controller)]
 
 
-class GravityCompensationSection(Section):
-    """Joint torques that carry the robot's weight, no more."""
-
-    type: Literal["gravity-compensation"]
+def _bounds(about: Parameter) -> object:
+    return Field(gt=about.above, ge=about.at_least, le=about.at_most)
 
 
-Gain = float | list[float] | dict[str, float]
+# The parameters of all integrators, by name.
+STEPPING = {
+    name: about for kind in Integrator.kinds.values() for name, about in parameters_of(kind).items()
+}
+_keys: dict[str, Any] = {
+    name: (Annotated[float | None, _bounds(about), about], None) for name, about in STEPPING.items()
+}
+_Stepping: Any = create_model("_Stepping", __base__=Section, **_keys)
 
 
-class JointPDSection(Section):
-    """A spring and a damper at every joint [N m/rad, N m s/rad], towards `q_ref`.
-
-    A gain is one number for all motorised joints (not the free-flying bodies), a list of nv, or a
-    table by joint; `q_ref` a list of nq or a table of joints that differ from the start.
-    """
-
-    type: Literal["joint-pd"]
-    kp: Gain
-    kd: Gain
-    q_ref: list[float] | dict[str, float] | None = None
-    gravity_compensation: bool = True
+def _check_integrator(kind: str) -> str:
+    if kind and kind not in Integrator.kinds:
+        valid = [f"'{one}'" for one in Integrator.kinds]
+        raise ValueError(f"should be {', '.join(valid[:-1])} or {valid[-1]}")
+    return kind
 
 
-class CartesianImpedanceSection(Section):
-    """A frame that follows `path` and presses on a shell with `normal_force` [N]."""
-
-    type: Literal["cartesian-impedance"]
-    frame: str
-    path: Annotated[list[Vector3], Field(min_length=1)]
-    stiffness: NotNegative
-    damping: NotNegative
-    normal_force: NotNegative = 0.0
-    shell: str | None = None
-    speed: Positive = 0.05
-    lead_in: NotNegative = 0.0
-    rotational_stiffness: NotNegative = 0.0
-    rotational_damping: NotNegative = 0.0
-    posture_stiffness: Gain = 0.0
-    joint_damping: Gain = 0.0
-    q_ref: list[float] | dict[str, float] | None = None
-
-
-class PythonSection(Section):
-    """The user's own tau(t, q, v, contacts), "file.py:function"."""
-
-    type: Literal["python"]
-    function: str
-
-
-Controller = Annotated[
-    NoController
-    | GravityCompensationSection
-    | JointPDSection
-    | CartesianImpedanceSection
-    | PythonSection,
-    Field(discriminator="type"),
-]
-
-
-ERROR_CONTROLLED = ("adaptive", "implicit")
-
-
-class RunSection(Section):
+class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integrators have
     """How long and how finely to simulate [s]; `recording_speed` 0.1 films in slow motion.
 
-    `dt` belongs to integrators with fixed steps, `rtol` and `atol` to the others.
+    The parameters of the integrator stand in this table; it is adaptive unless `dt` is given.
     """
 
-    duration: Positive
-    dt: Positive | None = None
-    rtol: Positive | None = None
-    atol: Positive | None = None
-    integrator: Literal[
-        "semi-implicit-euler", "runge-kutta-4", "linearly-implicit-euler", "adaptive", "implicit"
-    ] = "semi-implicit-euler"
-    control_dt: Positive | None = None
-    record_dt: Positive | None = None
-    recording_speed: Positive = 1.0
+    duration: Annotated[Positive, Parameter("s")]
+    integrator: Annotated[str, AfterValidator(_check_integrator)] = ""
+    control_dt: Annotated[Positive | None, Parameter("s", "control period")] = None
+    record_dt: Annotated[Positive | None, Parameter("s", "time between rows")] = None
+    recording_speed: Annotated[Positive, Parameter(label="speed of the recording")] = 1.0
 
     @model_validator(mode="after")
     def check_steps(self) -> RunSection:
-        """Refuse a step where the error decides, and a tolerance where it does not."""
-        if self.integrator in ERROR_CONTROLLED:
-            if self.dt is not None:
-                raise ValueError(
-                    f"{self.integrator} takes rtol and atol, not dt: for fixed steps set "
-                    "run.integrator to semi-implicit-euler, and leave rtol and atol out"
-                )
-        elif self.rtol is not None or self.atol is not None:
-            raise ValueError(f"{self.integrator} takes dt, not rtol and atol: leave them out")
+        """Choose the integrator if none is given, and refuse what it does not take."""
+        if not self.integrator:
+            kind = Adaptive if self.dt is None else SemiImplicitEuler
+            # Not as something that was set: it follows a change of dt.
+            self.__dict__["integrator"] = kind.kind
+        taken = parameters_of(Integrator.kinds[self.integrator])
+        foreign = [name for name in STEPPING if name not in taken]
+        wrong = [name for name in foreign if getattr(self, name) is not None]
+        if wrong:
+            others = [k for k, one in Integrator.kinds.items() if wrong[0] in parameters_of(one)]
+            raise ValueError(
+                f"{self.integrator} takes {' and '.join(taken)}, not {' and '.join(foreign)}: "
+                f"leave {' and '.join(wrong)} out, or set run.integrator to {others[0]}"
+            )
         return self
+
+    def made(self) -> Integrator:
+        """Return the integrator."""
+        kind = Integrator.kinds[self.integrator]
+        values = {name: getattr(self, name) for name in parameters_of(kind)}
+        made: Integrator = kind(**{k: v for k, v in values.items() if v is not None}).made()
+        return made
 
 
 class KnobSection(Section):
@@ -411,7 +384,7 @@ class Scenario(Section):
 
     title: str
     description: str = ""
-    gravity: Vector3 = [0.0, 0.0, -9.81]
+    gravity: Annotated[Vector3, Parameter("m/s^2", "gravity")] = [0.0, 0.0, -9.81]
     robot: Annotated[list[RobotSection], Field(min_length=1)]
     shell: list[ShellSection] = []
     contact: list[ContactSection] = []

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.closest_points import ClosestPoints
+from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.shell import Shell
 
 if TYPE_CHECKING:
-    from sphshell_pin.shell.cleaning import CleanedSurface, clean
-    from sphshell_pin.shell.health import ShellHealth
+    from sphshell_pin.shell.cleaning import clean
 
 __all__ = ["CleanedSurface", "ClosestPoints", "Shell", "ShellHealth", "clean"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Load the cleaning when it is asked for: it is not needed to import the package."""
-    if name in ("CleanedSurface", "ShellHealth", "clean"):
+    if name == "clean":
         from sphshell_pin.shell import cleaning
 
-        return getattr(cleaning, name)
+        return cleaning.clean
     raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -8,13 +8,14 @@ so these steps run until none changes anything.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.errors import InvalidShell
+from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.corner_normals import settle_normals, unit_normals
 from sphshell_pin.shell.health import Place, ShellHealth
 from sphshell_pin.shell.joints import settle_joints
@@ -40,45 +41,6 @@ SMALL_HOLE_AREA = 0.3
 
 TINY_HOLE_AREA = 0.02
 """A boundary loop of any number of edges is a hole if it spans less than this share."""
-
-
-@dataclass(frozen=True)
-class CleanedSurface:
-    """A surface of planar elements with three or four corners.
-
-    Attributes
-    ----------
-    vertices : (n, 3) [m]
-    elements : (m, 4) vertex indices; triangles end in -1
-    triangles : (t, 3) vertex indices; those of one element side by side
-    triangle_element : (t,) element of each triangle, not decreasing
-    normals : (t, 3, 3) unit normal per triangle corner, or None
-    source_element : (m,) index of the input element each came from
-    health : what was found and done
-    element_face : (m,) row in `face_names` of the CAD face each element lies on, or None
-    face_names : of the CAD faces
-    straight : (t, 3) sides that stay straight whatever the normals say, or None
-    """
-
-    vertices: Floats
-    elements: Ints
-    triangles: Ints
-    triangle_element: Ints
-    normals: Floats | None
-    source_element: Ints
-    health: ShellHealth
-    element_face: Ints | None = None
-    face_names: tuple[str, ...] = ()
-    straight: Mask | None = None
-
-    def moved(self, scale: float, rotation: Floats, translation: Floats) -> CleanedSurface:
-        """Return the surface made larger, then turned by (3, 3), then moved by (3,) [m]."""
-        return replace(
-            self,
-            vertices=(self.vertices * scale) @ rotation.T + translation,
-            normals=None if self.normals is None else self.normals @ rotation.T,
-            health=self.health.moved(scale, rotation, translation),
-        )
 
 
 def clean(vertices: object, polygons: object, normals: object = None) -> CleanedSurface:

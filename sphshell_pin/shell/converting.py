@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from sphshell_pin.atomic import atomic_path
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES
-from sphshell_pin.shell.raw import Floats
+from sphshell_pin.shell.cad.process import run_in_child
+from sphshell_pin.shell.raw import Floats, area_vectors
 from sphshell_pin.shell.readers import SUFFIXES, reader_for
 from sphshell_pin.shell.shell import Shell
 from sphshell_pin.shell.writers import encoded
@@ -49,7 +50,7 @@ class Conversion:
     source, target : what was read, and what was written and read back
     forth : distances (n,) of points of the source from the surface of the target [m]
     back : distances (n,) of points of the target from the surface of the source [m]
-    notes : what the reader of the source had to say
+    notes : of the reader of the source
     """
 
     source: Held
@@ -86,7 +87,7 @@ def convert(
     Meshes (.stl, .obj, .ply, .off, .shl) hold elements, CAD files (.step, .iges, .brep) exact
     surfaces: CAD becomes a mesh within `chord_error`, CAD to CAD keeps the exact surfaces, and a
     mesh becomes planar CAD faces, one for each element. The new file is read back and compared
-    before it takes the place of one that was there.
+    before it replaces one that was there.
 
     Parameters
     ----------
@@ -113,106 +114,135 @@ def convert(
     if unit_out is not None:
         metres_per_unit(unit_out)
     options = CadOptions(chord_error, bodies, faces)
-    suffixes = {suffix, goal.suffix.lower()}
+    limits = CadOptions(time_limit=time_limit, memory_limit=memory_limit)
+    with_cad = bool({suffix, goal.suffix.lower()} & set(CAD_SUFFIXES))
     if suffix not in CAD_SUFFIXES:
         options.check_unused(suffix)
-    limits = CadOptions(time_limit=time_limit, memory_limit=memory_limit)
-    if not suffixes & set(CAD_SUFFIXES):
+    if not with_cad:
         limits.check_unused(suffix)
     try:
         with atomic_path(goal, goal.suffix) as written:
             arguments = (file, written, unit_in, unit_out, options)
-            if suffixes & set(CAD_SUFFIXES):
-                from sphshell_pin.shell.cad.process import run_in_child
-
+            if with_cad:
                 purpose = f"converting {suffix} to {goal.suffix.lower()} files"
-                first, second, *found = run_in_child("convert", arguments, file, purpose, limits)
+                done: Conversion = run_in_child("convert", arguments, file, purpose, limits)
             else:
-                first, second, *found = exchange(*arguments)
-            return Conversion(Held(file, *first), Held(goal, *second), *found)
+                done = exchange(*arguments)
+            return replace(done, target=replace(done.target, path=goal))
     except OSError as error:
         raise ShellFileError(goal, f"cannot be written ({error.strerror})") from error
 
 
 def exchange(
     source: Path, target: Path, unit_in: str | None, unit_out: str | None, options: CadOptions
-) -> tuple[tuple[Any, ...], tuple[Any, ...], Floats, Floats, tuple[str, ...]]:
-    """Write the surface of one file to another, read that back and compare.
-
-    Returns what a `Conversion` has, of either file without its path.
-    """
+) -> Conversion:
+    """Write the surface of one file to another, read that back and compare."""
     first = _surface(source, unit_in, options)
-    unit = unit_out or (first.unit if first.unit in METRES_PER_UNIT else "mm")
+    unit = unit_out or (first.held.unit if first.held.unit in METRES_PER_UNIT else "mm")
     _write(target, unit, first, options)
     suffix = target.suffix.lower()
     carried = suffix == ".shl" or suffix in CAD_SUFFIXES
     stated = unit if suffix in BREP_SUFFIXES or not carried else None
     second = _surface(target, stated, CadOptions())
     rng = np.random.default_rng(0)
-    return (
-        (first.unit, *first.count, *first.extent),
-        (unit, *second.count, *second.extent),
+    return Conversion(
+        first.held,
+        replace(second.held, unit=unit),
         second.distances(first.samples(SAMPLES, rng)),
         first.distances(second.samples(SAMPLES, rng)),
         first.notes,
     )
 
 
-def _surface(path: Path, unit: str | None, options: CadOptions) -> Any:
-    """Return what a file holds: an ExactSurface of CAD, else its flat elements."""
-    if path.suffix.lower() not in CAD_SUFFIXES:
-        return _Mesh(Shell.from_file(path, unit, crease_angle=0.0))
-    from sphshell_pin.shell.cad.reference import ExactSurface
+class _Surface(Protocol):
+    """What a file holds, and its distance from points."""
 
-    return ExactSurface(path, unit, options)
+    held: Held
+    notes: tuple[str, ...]
+
+    def shell(self) -> Shell:
+        """Return it as elements."""
+
+    def distances(self, points: Floats) -> Floats:
+        """Distances (n,) of points (n, 3) [m]."""
+
+    def samples(self, count: int, rng: np.random.Generator) -> Floats:
+        """Random points (n <= count, 3), spread by area [m]."""
 
 
-def _write(path: Path, unit: str, source: Any, options: CadOptions) -> None:
+def _surface(path: Path, unit: str | None, options: CadOptions) -> _Surface:
+    if path.suffix.lower() in CAD_SUFFIXES:
+        return _Faces(path, unit, options)
+    return _Mesh(path, unit)
+
+
+def _write(path: Path, unit: str, source: _Surface, options: CadOptions) -> None:
     if path.suffix.lower() not in CAD_SUFFIXES:
         path.write_bytes(encoded(path, source.shell(), unit))
         return
     from sphshell_pin.shell.cad.units import MILLIMETRE
     from sphshell_pin.shell.cad.writing import faceted, parts_of, write_cad
 
-    if isinstance(source, _Mesh):
-        shell = source.shell()
-        write_cad(path, [(shell.name, faceted(shell))], MILLIMETRE, unit)
-    else:
+    if isinstance(source, _Faces):
         model = source.model
         write_cad(path, parts_of(model, options.faces is None), model.metres, unit)
+    else:
+        shell = source.shell()
+        write_cad(path, [(shell.name, faceted(shell))], MILLIMETRE, unit)
 
 
 class _Mesh:
-    """The flat elements of a shell."""
+    """The flat elements of a file."""
 
-    def __init__(self, shell: Shell) -> None:
-        self._shell = shell
-        self.unit = shell.unit or "m"
+    def __init__(self, path: Path, unit: str | None) -> None:
+        self._shell = shell = Shell.from_file(path, unit, crease_angle=0.0)
+        self.held = Held(
+            path, shell.unit or "m", shell.num_elements, "elements", shell.size, shell.health.area
+        )
         self.notes = shell.health.notes
 
     def shell(self) -> Shell:
-        """Return the shell."""
         return self._shell
 
-    @property
-    def count(self) -> tuple[int, str]:
-        """How many elements there are."""
-        return self._shell.num_elements, "elements"
-
-    @property
-    def extent(self) -> tuple[float, float]:
-        """Box diagonal [m] and area [m^2]."""
-        return self._shell.size, self._shell.health.area
-
     def distances(self, points: Floats) -> Floats:
-        """Distances (n,) of points (n, 3) [m]."""
         return np.abs(self._shell.closest_points(points, method="facets").distances)
 
     def samples(self, count: int, rng: np.random.Generator) -> Floats:
-        """Random points (count, 3), spread by area [m]."""
         corners = self._shell.vertices[self._shell.triangles]
-        spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = np.linalg.norm(spans, axis=1)
+        area = np.linalg.norm(area_vectors(corners), axis=1)
         chosen = rng.choice(len(area), count, p=area / area.sum())
         weights = rng.dirichlet((1.0, 1.0, 1.0), count)
         return np.asarray(np.einsum("nk,nkx->nx", weights, corners[chosen]))
+
+
+class _Faces:
+    """The exact faces of a CAD file."""
+
+    def __init__(self, path: Path, unit: str | None, options: CadOptions) -> None:
+        from sphshell_pin.shell.cad.exact import TrimmedFaces
+        from sphshell_pin.shell.cad.surface import load_cad
+
+        cad = load_cad(path, unit, options)
+        self._faces, self._metres, self._raw = TrimmedFaces(cad), cad.model.metres, cad.polygons()
+        self.model, self.notes = cad.whole, cad.notes()
+        size, area = self._faces.extent
+        self.held = Held(
+            path,
+            cad.unit,
+            len(self.model.faces),
+            "CAD faces",
+            size * self._metres,
+            area * self._metres**2,
+        )
+
+    def shell(self) -> Shell:
+        """Return the tessellation, with exact normals, cleaned."""
+        elements = self._raw.corners.reshape(-1, 3)
+        normals = None if self._raw.normals is None else self._raw.normals.reshape(-1, 3, 3)
+        return Shell(self._raw.vertices, elements, normals, name=self.held.path.stem)
+
+    def distances(self, points: Floats) -> Floats:
+        return self._faces.distances(points / self._metres) * self._metres
+
+    def samples(self, count: int, rng: np.random.Generator) -> Floats:
+        return self._faces.samples(count, rng) * self._metres

@@ -6,17 +6,12 @@ bear out, as averaged normals on a box do, it leaves the surface that was meant.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.curved import points_on
-from sphshell_pin.shell.health import Place, place_text
-
-if TYPE_CHECKING:
-    from sphshell_pin.shell.raw import Bytes, Floats, Longs
-    from sphshell_pin.shell.shell import Shell
+from sphshell_pin.shell.health import LARGE_OF_HEIGHT, CurvatureReport, Place
+from sphshell_pin.shell.raw import Bytes, Floats, Longs
 
 CURVED = 0
 FLAT_BECAUSE = (
@@ -29,10 +24,6 @@ FLAT_BECAUSE = (
 
 OFF_FACE = 3
 
-LARGE_OF_HEIGHT = 0.2
-"""A curved element this far off, as a share of its smallest height, is one to look at. Sides that
-turn by 30 degrees, the most within a patch, stand off by 0.07 of their length."""
-
 LARGE_OF_LENGTH = 0.05
 """It must also be that share of its longest side off: along a bend, a needle rightly stands off by
 more than its own height."""
@@ -44,77 +35,7 @@ AT_ONCE = 5_000
 """Triangles measured at a time: it bounds the memory."""
 
 
-@dataclass(frozen=True)
-class CurvatureReport:
-    """How the curved elements of the method "smooth" differ from the flat ones.
-
-    Attributes
-    ----------
-    elements, curved : how many there are; how many bend
-    flat_because : how many stayed flat for each reason
-    largest : largest distance between a point of a curved element and its flat one [m]
-    at : that point [m]; None if all elements are flat
-    of_size, of_height : the same as a share of the box diagonal, and of the smallest height of the
-        triangle it is in
-    large : elements whose distance is large for their own height: what they stand for is doubtful
-    normals_set_aside : corners whose given normal was not used, as the elements contradict it
-    set_aside_at : one of them [m], or None
-    """
-
-    elements: int
-    curved: int
-    flat_because: tuple[tuple[str, int], ...]
-    largest: float
-    at: Place | None
-    of_size: float
-    of_height: float
-    large: int
-    normals_set_aside: int
-    set_aside_at: Place | None
-
-    @property
-    def flat(self) -> int:
-        """Elements that are flat."""
-        return self.elements - self.curved
-
-    @property
-    def problems(self) -> tuple[str, ...]:
-        """One sentence, if curved elements stand off so far that their normals are doubtful."""
-        if not self.large:
-            return ()
-        are = "element bends" if self.large == 1 else "elements bend"
-        return (
-            f"{self.large} curved {are} by more than {LARGE_OF_HEIGHT:g} of their height, up to "
-            f"{self._distance()}: unless the surface is meant to be that round, its normals are "
-            "wrong (averaged over sharp edges, or noisy); crease_angle=0 or method "
-            '"facets" keep it flat',
-        )
-
-    def rows(self) -> tuple[tuple[str, str], ...]:
-        """Labels and texts for a table."""
-        text = f"{self.curved} of {self.elements} elements"
-        if self.curved:
-            text += f", off the flat ones by up to {self._distance()}"
-        rows = [("curved", text)]
-        rows += [("flat", f"{count} {_elements(count)}: {why}") for why, count in self.flat_because]
-        if self.normals_set_aside:
-            rows.append(
-                (
-                    "set aside",
-                    f"{self.normals_set_aside} given normals that the elements contradict, one at "
-                    f"{place_text(self.set_aside_at)}",
-                )
-            )
-        return tuple(rows)
-
-    def _distance(self) -> str:
-        return (
-            f"{self.largest:.3g} m ({self.of_size:.2g} of the size, {self.of_height:.2g} of the "
-            f"element's height) at {place_text(self.at)}"
-        )
-
-
-def curvature_report(shell: Shell) -> CurvatureReport:
+def curvature_report(shell: ShellBase) -> CurvatureReport:
     """Measure the curved elements of `shell`; it makes them if nothing has touched them yet."""
     # A point is a mean of the control points: none is farther off than the farthest of them.
     bound = np.linalg.norm(shell.core_for("smooth").lifts, axis=2).max(axis=1)
@@ -140,7 +61,7 @@ def curvature_report(shell: Shell) -> CurvatureReport:
     )
 
 
-def distances_at(shell: Shell, divisions: int) -> Floats:
+def distances_at(shell: ShellBase, divisions: int) -> Floats:
     """Distances (t, k) [m] of points of the curved elements from the flat ones.
 
     The points are those of `curved_mesh` with as many divisions.
@@ -153,7 +74,7 @@ def distances_at(shell: Shell, divisions: int) -> Floats:
     return np.concatenate(parts)
 
 
-def _largest_distance(shell: Shell, bound: Floats) -> tuple[int, float, Floats]:
+def _largest_distance(shell: ShellBase, bound: Floats) -> tuple[int, float, Floats]:
     """Return the triangle with the largest distance, that distance [m], and its place (3,).
 
     bound : (t,) no triangle is farther off than that [m]
@@ -174,7 +95,7 @@ def _largest_distance(shell: Shell, bound: Floats) -> tuple[int, float, Floats]:
     return worst, float(found[0, highest]), points[0, highest]
 
 
-def _count_large(shell: Shell, bound: Floats, height: Floats, longest: Floats) -> int:
+def _count_large(shell: ShellBase, bound: Floats, height: Floats, longest: Floats) -> int:
     """Count elements with a triangle that is far off for its own size."""
     limit = np.maximum(LARGE_OF_HEIGHT * height, LARGE_OF_LENGTH * longest)
     rows = np.flatnonzero(bound > limit)
@@ -185,7 +106,7 @@ def _count_large(shell: Shell, bound: Floats, height: Floats, longest: Floats) -
     return len(np.unique(shell.triangle_element[np.concatenate(large)]))
 
 
-def _off_flat(shell: Shell, rows: Longs, divisions: int) -> tuple[Floats, Floats]:
+def _off_flat(shell: ShellBase, rows: Longs, divisions: int) -> tuple[Floats, Floats]:
     """Distances (n, k) of k points of curved triangles `rows` from the flat ones; the points."""
     points = points_on(shell, rows, divisions)
     corners = shell.vertices[shell.triangles[rows]]
@@ -211,7 +132,7 @@ def _to_triangles(points: Floats, corners: Floats) -> Floats:
     return np.asarray(np.where(inside, np.minimum(upright, nearest), nearest))
 
 
-def _heights(shell: Shell) -> tuple[Floats, Floats]:
+def _heights(shell: ShellBase) -> tuple[Floats, Floats]:
     """Smallest height (t,) and longest side (t,) of each triangle [m]."""
     corners = shell.vertices[shell.triangles]
     sides = np.roll(corners, -1, axis=1) - corners
@@ -219,7 +140,7 @@ def _heights(shell: Shell) -> tuple[Floats, Floats]:
     return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / longest, longest
 
 
-def _bending(shell: Shell) -> Bytes:
+def _bending(shell: ShellBase) -> Bytes:
     """Return for each element (m,) whether it is curved, or why it is flat, as FLAT_BECAUSE."""
     core = shell.core_for("smooth")
     codes = core.bending
@@ -233,7 +154,7 @@ def _bending(shell: Shell) -> Bytes:
     return np.where(lowest == CURVED, lowest, highest)
 
 
-def _set_aside(shell: Shell) -> tuple[int, Place | None]:
+def _set_aside(shell: ShellBase) -> tuple[int, Place | None]:
     """How many given normals the elements contradict, and where one of them is."""
     corners = np.flatnonzero(shell.core_for("smooth").normals_set_aside)
     if shell.normals is None or not len(corners):
@@ -244,7 +165,3 @@ def _set_aside(shell: Shell) -> tuple[int, Place | None]:
 def _place(point: Floats) -> Place:
     x, y, z = point.tolist()
     return x, y, z
-
-
-def _elements(count: int) -> str:
-    return "element" if count == 1 else "elements"

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from sphshell_pin.shell.raw import Floats, Ints, Longs
-    from sphshell_pin.shell.shell import Shell
+from sphshell_pin.shell.base import ShellBase
+from sphshell_pin.shell.raw import Floats, Ints, Longs
 
 
-def points_on(shell: Shell, rows: Longs, divisions: int) -> Floats:
+def points_on(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
     """Points (n, k, 3) [m] of n triangles of `shell`, curved as the method "smooth" has them.
 
     The k points of each are those of a grid that cuts each side into `divisions` pieces: corner 0
@@ -21,7 +18,7 @@ def points_on(shell: Shell, rows: Longs, divisions: int) -> Floats:
     return points_at(shell, rows, np.stack([1 - u - v, u, v], axis=1))
 
 
-def points_at(shell: Shell, rows: Longs, weights: Floats) -> Floats:
+def points_at(shell: ShellBase, rows: Longs, weights: Floats) -> Floats:
     """Points (n, k, 3) [m] of n curved triangles at barycentric weights (k, 3)."""
     w, u, v = weights.T
     # Bernstein's polynomials of the control points that are lifted off the flat triangle.
@@ -32,7 +29,7 @@ def points_at(shell: Shell, rows: Longs, weights: Floats) -> Floats:
     return np.asarray(points)
 
 
-def curved_mesh(shell: Shell, divisions: int = 4) -> tuple[Floats, Ints, Ints]:
+def curved_mesh(shell: ShellBase, divisions: int = 4) -> tuple[Floats, Ints, Ints]:
     """Divide every triangle of `shell`, curved as the method "smooth" has it.
 
     Each side is cut into `divisions` pieces. Returns points (t * k, 3) [m], triangles

@@ -2,17 +2,177 @@
 
 from __future__ import annotations
 
+import string
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sphshell_pin.shell.raw import Floats
 
-if TYPE_CHECKING:
-    from sphshell_pin.shell.curvature import CurvatureReport
-
 Place = tuple[float, float, float]
+
+LARGE_OF_HEIGHT = 0.2
+"""A curved element this far off, as a share of its smallest height, is one to look at. Sides that
+turn by 30 degrees, the most within a patch, stand off by 0.07 of their length."""
+
+_REPAIRS = (
+    (
+        "welded_vertices",
+        "{welded_vertices:vertex} merged with another within {weld_tolerance:.3g} m (farthest "
+        "{weld_distance:.3g} m)",
+    ),
+    ("unused_vertices", "{unused_vertices:vertex is} used by no element and dropped"),
+    ("degenerate_elements", "{degenerate_elements:element} without area dropped"),
+    (
+        "duplicate_elements",
+        "{duplicate_elements:duplicate element} dropped ({opposite_duplicates} of opposite "
+        "winding)",
+    ),
+    ("t_junctions", "{t_junctions:vertex} put into open edges on which they lie (T-junctions)"),
+    (
+        "split_quads",
+        "{split_quads:quad} split into triangles ({warped_quads} not planar, {concave_quads} not "
+        "convex)",
+    ),
+    ("polygons", "{polygons:polygon} of up to {largest_polygon} corners triangulated"),
+    (
+        "largest_warp",
+        "the largest warp of a split element is {largest_warp:.3g} m (its farthest corner from its "
+        "mean plane)",
+    ),
+    (
+        "flipped_elements",
+        "{flipped_elements:element} turned over, among them {reversed_components:whole component}",
+    ),
+    (
+        "cavities",
+        "{cavities:closed component} inside another taken as a cavity and wound towards its inside",
+    ),
+    (
+        "missing_normals",
+        "{missing_normals:normal} zero or not finite, replaced by the element's own",
+    ),
+    ("rescaled_normals", "{rescaled_normals:normal} not of unit length, made so"),
+    ("turned_normals", "{turned_normals:normal} turned to the side of their element"),
+)
+"""A count, and the sentence about it where it is not zero."""
+
+_PROBLEMS = (
+    (
+        "holes",
+        "{holes:hole} in the surface, the largest of {hole_edges} open edges and "
+        "{largest_hole_area:.3g} m^2 near {hole_at:place}: unless it is meant, an element is "
+        "missing or has a wrong number of corners",
+    ),
+    (
+        "non_manifold_edges",
+        "{non_manifold_edges:edge} of three or more elements (non-manifold), one near "
+        "{non_manifold_at:place}: inside and outside are not defined there",
+    ),
+    (
+        "one_sided_components",
+        "{one_sided_components:component} one-sided (like a Moebius strip): only "
+        'side="both" makes sense',
+    ),
+    (
+        "tangled_polygons",
+        "{tangled_polygons:polygon} whose outline crosses itself: triangulated as well as possible",
+    ),
+    (
+        "opposing_normals",
+        "{opposing_normals:normal} more than 90 degrees off the element (the worst by "
+        "{largest_normal_angle:degrees} degrees)",
+    ),
+)
+
+
+class _Sentences(string.Formatter):
+    """Fills in sentences: `{count:noun}` counts, `{at:place}` and `{angle:degrees}` convert."""
+
+    def format_field(self, value: object, spec: str) -> str:
+        if spec == "degrees" and isinstance(value, float):
+            return f"{np.degrees(value):.3g}"
+        if spec == "place":
+            if not isinstance(value, tuple):
+                return "an unknown place"
+            return "({:.4g}, {:.4g}, {:.4g}) m".format(*value)
+        if isinstance(value, int) and spec:
+            plural = {"vertex": "vertices", "vertex is": "vertices are"}.get(spec, spec + "s")
+            return f"{value} {spec if value == 1 else plural}"
+        return format(value, spec)
+
+
+_fill = _Sentences().format
+
+
+@dataclass(frozen=True)
+class CurvatureReport:
+    """How the curved elements of the method "smooth" differ from the flat ones.
+
+    Attributes
+    ----------
+    elements, curved : how many there are; how many bend
+    flat_because : how many stayed flat for each reason
+    largest : largest distance between a point of a curved element and its flat one [m]
+    at : that point [m]; None if all elements are flat
+    of_size, of_height : the same as a share of the box diagonal, and of the smallest height of the
+        triangle it is in
+    large : elements whose distance is large for their own height: what they stand for is doubtful
+    normals_set_aside : corners whose given normal was not used, as the elements contradict it
+    set_aside_at : one of them [m], or None
+    """
+
+    elements: int
+    curved: int
+    flat_because: tuple[tuple[str, int], ...]
+    largest: float
+    at: Place | None
+    of_size: float
+    of_height: float
+    large: int
+    normals_set_aside: int
+    set_aside_at: Place | None
+
+    @property
+    def flat(self) -> int:
+        """Elements that are flat."""
+        return self.elements - self.curved
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """One sentence, if curved elements stand off so far that their normals are doubtful."""
+        if not self.large:
+            return ()
+        are = "element bends" if self.large == 1 else "elements bend"
+        return (
+            f"{self.large} curved {are} by more than {LARGE_OF_HEIGHT:g} of their height, up to "
+            f"{self._distance()}: unless the surface is meant to be that round, its normals are "
+            "wrong (averaged over sharp edges, or noisy); crease_angle=0 or method "
+            '"facets" keep it flat',
+        )
+
+    def rows(self) -> tuple[tuple[str, str], ...]:
+        """Labels and texts for a table."""
+        text = f"{self.curved} of {self.elements} elements"
+        if self.curved:
+            text += f", off the flat ones by up to {self._distance()}"
+        rows = [("curved", text)]
+        rows += [("flat", _fill("{:element}: {}", count, why)) for why, count in self.flat_because]
+        if self.normals_set_aside:
+            rows.append(
+                (
+                    "set aside",
+                    f"{self.normals_set_aside} given normals that the elements contradict, one at "
+                    f"{_fill('{:place}', self.set_aside_at)}",
+                )
+            )
+        return tuple(rows)
+
+    def _distance(self) -> str:
+        return (
+            f"{self.largest:.3g} m ({self.of_size:.2g} of the size, {self.of_height:.2g} of the "
+            f"element's height) at {_fill('{:place}', self.at)}"
+        )
 
 
 @dataclass(frozen=True)
@@ -125,103 +285,17 @@ class ShellHealth:
     @property
     def repairs(self) -> tuple[str, ...]:
         """One sentence for each kind of repair."""
-        unused = _are(self.unused_vertices, "vertex", "vertices")
-        said = [
-            (
-                self.welded_vertices,
-                f"{_many(self.welded_vertices, 'vertex', 'vertices')} merged with another within "
-                f"{self.weld_tolerance:.3g} m (farthest {self.weld_distance:.3g} m)",
-            ),
-            (self.unused_vertices, f"{unused} used by no element and dropped"),
-            (
-                self.degenerate_elements,
-                f"{_many(self.degenerate_elements, 'element')} without area dropped",
-            ),
-            (
-                self.duplicate_elements,
-                f"{_many(self.duplicate_elements, 'duplicate element')} dropped "
-                f"({self.opposite_duplicates} of opposite winding)",
-            ),
-            (
-                self.t_junctions,
-                f"{_many(self.t_junctions, 'vertex', 'vertices')} put into open edges on which "
-                "they lie (T-junctions)",
-            ),
-            (
-                self.warped_quads + self.concave_quads,
-                f"{_many(self.warped_quads + self.concave_quads, 'quad')} split into triangles "
-                f"({self.warped_quads} not planar, {self.concave_quads} not convex)",
-            ),
-            (
-                self.polygons,
-                f"{_many(self.polygons, 'polygon')} of up to {self.largest_polygon} corners "
-                "triangulated",
-            ),
-            (
-                self.largest_warp > 0.0,
-                f"the largest warp of a split element is {self.largest_warp:.3g} m (its farthest "
-                "corner from its mean plane)",
-            ),
-            (
-                self.flipped_elements,
-                f"{_many(self.flipped_elements, 'element')} turned over, among them "
-                f"{_many(self.reversed_components, 'whole component')}",
-            ),
-            (
-                self.cavities,
-                f"{_many(self.cavities, 'closed component')} inside another taken as a cavity and "
-                "wound towards its inside",
-            ),
-            (
-                self.missing_normals,
-                f"{_many(self.missing_normals, 'normal')} zero or not finite, replaced by the "
-                "element's own",
-            ),
-            (
-                self.rescaled_normals,
-                f"{_many(self.rescaled_normals, 'normal')} not of unit length, made so",
-            ),
-            (
-                self.turned_normals,
-                f"{_many(self.turned_normals, 'normal')} turned to the side of their element",
-            ),
-        ]
-        return tuple(sentence for count, sentence in said if count)
+        return self._said(_REPAIRS)
 
     @property
     def problems(self) -> tuple[str, ...]:
         """One sentence for each thing no repair can settle."""
-        said = [
-            (
-                self.holes,
-                f"{_many(self.holes, 'hole')} in the surface, the largest of {self.hole_edges} "
-                f"open edges and {self.largest_hole_area:.3g} m^2 near {place_text(self.hole_at)}: "
-                "unless it is meant, an element is missing or has a wrong number of corners",
-            ),
-            (
-                self.non_manifold_edges,
-                f"{_many(self.non_manifold_edges, 'edge')} of three or more elements "
-                f"(non-manifold), one near {place_text(self.non_manifold_at)}: inside and outside "
-                "are not defined there",
-            ),
-            (
-                self.one_sided_components,
-                f"{_many(self.one_sided_components, 'component')} one-sided (like a Moebius "
-                'strip): only side="both" makes sense',
-            ),
-            (
-                self.tangled_polygons,
-                f"{_many(self.tangled_polygons, 'polygon')} whose outline crosses itself: "
-                "triangulated as well as possible",
-            ),
-            (
-                self.opposing_normals,
-                f"{_many(self.opposing_normals, 'normal')} more than 90 degrees off the element "
-                f"(the worst by {_degrees(self.largest_normal_angle):.3g} degrees)",
-            ),
-        ]
-        found = tuple(sentence for count, sentence in said if count)
-        return found if self.curvature is None else (*found, *self.curvature.problems)
+        curved = () if self.curvature is None else self.curvature.problems
+        return (*self._said(_PROBLEMS), *curved)
+
+    def _said(self, sentences: tuple[tuple[str, str], ...]) -> tuple[str, ...]:
+        found = {**vars(self), "split_quads": self.warped_quads + self.concave_quads}
+        return tuple(_fill(text, **found) for name, text in sentences if found[name])
 
     def summary(self) -> str:
         """One line: what the surface is."""
@@ -258,7 +332,7 @@ class ShellHealth:
             (
                 "edges",
                 f"{self.edges}: {self.boundary_edges} open in "
-                f"{_many(self.boundary_loops, 'loop')}, {self.non_manifold_edges} non-manifold",
+                f"{_fill('{:loop}', self.boundary_loops)}, {self.non_manifold_edges} non-manifold",
             ),
             ("worst shape", f"{self.worst_shape:.3g} (2 area / longest edge^2)"),
             ("normals", self._normals()),
@@ -268,7 +342,7 @@ class ShellHealth:
             *(("look at", sentence) for sentence in self.problems),
             (
                 "verdict",
-                "ok" if self.ok else f"ok, with {_many(len(self.problems), 'thing')} to look at",
+                "ok" if self.ok else _fill("ok, with {:thing} to look at", len(self.problems)),
             ),
         ]
         shown = [(label, value) for label, value in rows if value]
@@ -276,12 +350,12 @@ class ShellHealth:
         return "\n".join(f"{label:<{width}}  {value}" for label, value in shown)
 
     def _kinds(self) -> str:
-        return f"{_many(self.triangles_alone, 'triangle')}, {_many(self.quads, 'quad')}"
+        return _fill("{:triangle}, {:quad}", self.triangles_alone, self.quads)
 
     def _normals(self) -> str:
         if not self.has_normals:
             return "none given" + ("" if self.cleaned else "; taken as it came, not cleaned")
-        return f"given, up to {_degrees(self.largest_normal_angle):.3g} degrees off their element"
+        return _fill("given, up to {:degrees} degrees off their element", self.largest_normal_angle)
 
     def moved(self, scale: float, rotation: Floats, translation: Floats) -> ShellHealth:
         """Return the findings about the surface made `scale` times larger, turned and moved."""
@@ -307,27 +381,10 @@ class ShellHealth:
             non_manifold_at=place(self.non_manifold_at),
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """All fields by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
-    def labelled(self, **changes: Any) -> ShellHealth:
+    def labelled(self, **changes: object) -> ShellHealth:
         """Return the same findings under another name, source or unit."""
-        return replace(self, **changes)
-
-
-def _many(count: int, one: str, several: str | None = None) -> str:
-    return f"{count} {one if count == 1 else several or one + 's'}"
-
-
-def _are(count: int, one: str, several: str) -> str:
-    return f"{_many(count, one, several)} {'is' if count == 1 else 'are'}"
-
-
-def _degrees(angle: float) -> float:
-    return angle * 57.29577951308232
-
-
-def place_text(place: Place | None) -> str:
-    """Return a place [m] as text."""
-    return "an unknown place" if place is None else "({:.4g}, {:.4g}, {:.4g}) m".format(*place)
+        return replace(self, **changes)  # type: ignore[arg-type]

@@ -8,7 +8,10 @@ from pathlib import Path
 
 from sphshell_pin.errors import InvalidParameter, InvalidShell, UnitMissing
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
-from sphshell_pin.shell.cleaning import CleanedSurface, box_diagonal, clean_surface
+from sphshell_pin.shell.cad.framing import check_frame
+from sphshell_pin.shell.cad.process import run_in_child
+from sphshell_pin.shell.cleaned import CleanedSurface
+from sphshell_pin.shell.cleaning import box_diagonal, clean_surface
 from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers import READERS, read_shl, reader_for
 from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
@@ -64,9 +67,6 @@ def load_surface(
 def _load_cad(
     file: Path, unit: str | None, number: float, cad: CadOptions, crease_angle: float
 ) -> tuple[CleanedSurface, str, float]:
-    from sphshell_pin.shell.cad.framing import check_frame
-    from sphshell_pin.shell.cad.process import run_in_child
-
     check_frame(file)
     arguments = (file, unit, cad, number, crease_angle, _scaled(number))
     purpose = f"reading {file.suffix.lower()} files"

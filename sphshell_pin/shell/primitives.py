@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import coal
 import numpy as np
@@ -31,7 +30,7 @@ MOST_OF_BALL, MOST_OF_ROD = 1000, 100_000
 
 
 def geometry_surface(
-    geometry: Any,
+    geometry: object,
     chord_error: float | None = None,
     segments: int | None = None,
     extent: float | None = None,
@@ -79,10 +78,10 @@ def geometry_surface(
     raise InvalidParameter("geometry", type(shape).__name__, f"must be one of: {', '.join(known)}")
 
 
-Arrays = tuple[Floats, list[list[int]], Floats]
+Arrays = tuple[Floats, npt.ArrayLike, Floats]
 
 
-def _mesh(mesh: Any) -> RawSurface:
+def _mesh(mesh: coal.BVHModelBase) -> RawSurface:
     if mesh.getModelType() != coal.BVH_MODEL_TRIANGLES or mesh.num_tris == 0:
         raise InvalidParameter("geometry", mesh, "must be a mesh of triangles, not a point cloud")
     triangles = [mesh.tri_indices(k) for k in range(mesh.num_tris)]
@@ -130,7 +129,7 @@ def _ball(radius: float) -> Callable[[int], float]:
     return lambda n: 2.0 * _sagitta(radius)(n)
 
 
-def _box(shape: Any, _: float | None, __: int | None) -> Arrays:
+def _box(shape: coal.Box, _: float | None, __: int | None) -> Arrays:
     half = np.array(shape.halfSide, np.float64)
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     elements = [
@@ -145,56 +144,44 @@ def _box(shape: Any, _: float | None, __: int | None) -> Arrays:
     return signs * half, elements, np.repeat(faces[:, None, :], 4, axis=1)
 
 
-def _unit_sphere(segments: int) -> Arrays:
-    body = Revolution(segments)
-    profile = arc(-0.5 * math.pi, 0.5 * math.pi, max(2, math.ceil(segments / 2)))
+def _ball_shape(
+    shape: coal.Sphere | coal.Ellipsoid, chord_error: float | None, segments: int | None
+) -> Arrays:
+    """Build a coal.Sphere or coal.Ellipsoid: a unit sphere that is stretched."""
+    radii = np.array(
+        shape.radii if isinstance(shape, coal.Ellipsoid) else 3 * [shape.radius], np.float64
+    )
+    longest = float(radii.max())
+    body = Revolution(_round(longest, _ball(longest), chord_error, segments, MOST_OF_BALL))
+    profile = arc(-0.5 * math.pi, 0.5 * math.pi, max(2, math.ceil(body.segments / 2)))
     rings = [body.ring(c, s) for c, s in profile]
     for k in range(len(profile) - 1):
         body.strip(rings[k], rings[k + 1], profile[k], profile[k + 1])
-    return body.arrays()
-
-
-def _sphere(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
-    r = float(shape.radius)
-    points, elements, normals = _unit_sphere(
-        _round(r, _ball(r), chord_error, segments, MOST_OF_BALL)
-    )
-    return r * points, elements, normals
-
-
-def _ellipsoid(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
-    radii = np.array(shape.radii, np.float64)
-    longest = float(radii.max())
-    n = _round(longest, _ball(longest), chord_error, segments, MOST_OF_BALL)
-    points, elements, normals = _unit_sphere(n)
+    points, elements, normals = body.arrays()
     # Normals go with the inverse transpose of the stretching; unused fourth corners stay zero.
     stretched = normals / radii
     length = np.linalg.norm(stretched, axis=2, keepdims=True)
     return radii * points, elements, stretched / np.where(length > 0.0, length, 1.0)
 
 
-def _cylinder(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
+def _rod(
+    shape: coal.Cylinder | coal.Cone, chord_error: float | None, segments: int | None
+) -> Arrays:
+    """Build a coal.Cylinder or coal.Cone."""
     r, h = float(shape.radius), float(shape.halfLength)
+    top_radius = 0.0 if isinstance(shape, coal.Cone) else r
     body = Revolution(_round(r, _sagitta(r), chord_error, segments, MOST_OF_ROD))
-    bottom, top = body.ring(r, -h), body.ring(r, h)
-    body.strip(bottom, top, (1.0, 0.0), (1.0, 0.0))
+    bottom, top = body.ring(r, -h), body.ring(top_radius, h)
+    slant = math.hypot(r - top_radius, 2.0 * h)
+    normal = (2.0 * h / slant, (r - top_radius) / slant)
+    body.strip(bottom, top, normal, normal)
     body.disc(bottom, up=False)
-    body.disc(top, up=True)
+    if top_radius > 0.0:
+        body.disc(top, up=True)
     return body.arrays()
 
 
-def _cone(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
-    r, h = float(shape.radius), float(shape.halfLength)
-    body = Revolution(_round(r, _sagitta(r), chord_error, segments, MOST_OF_ROD))
-    bottom, tip = body.ring(r, -h), body.ring(0.0, h)
-    slant = math.hypot(r, 2.0 * h)
-    normal = (2.0 * h / slant, r / slant)
-    body.strip(bottom, tip, normal, normal)
-    body.disc(bottom, up=False)
-    return body.arrays()
-
-
-def _capsule(shape: Any, chord_error: float | None, segments: int | None) -> Arrays:
+def _capsule(shape: coal.Capsule, chord_error: float | None, segments: int | None) -> Arrays:
     r, h = float(shape.radius), float(shape.halfLength)
     body = Revolution(_round(r, _ball(r), chord_error, segments, MOST_OF_BALL))
     steps = max(1, math.ceil(body.segments / 4))
@@ -209,7 +196,7 @@ def _capsule(shape: Any, chord_error: float | None, segments: int | None) -> Arr
     return body.arrays()
 
 
-def _triangle(shape: Any, _: float | None, __: int | None) -> Arrays:
+def _triangle(shape: coal.TriangleP, _: float | None, __: int | None) -> Arrays:
     points = np.array([shape.a, shape.b, shape.c], np.float64)
     normal = np.cross(points[1] - points[0], points[2] - points[0])
     length = float(np.linalg.norm(normal))
@@ -217,7 +204,7 @@ def _triangle(shape: Any, _: float | None, __: int | None) -> Arrays:
     return points, [[0, 1, 2]], normals
 
 
-def _square(shape: Any, extent: float) -> RawSurface:
+def _square(shape: coal.Halfspace | coal.Plane, extent: float) -> RawSurface:
     """Return a square round the point nearest to the origin, wound along the shape's normal."""
     normal = np.array(shape.n, np.float64)
     least = np.zeros(3)
@@ -232,12 +219,12 @@ def _square(shape: Any, extent: float) -> RawSurface:
     return raw.noting(f"a square of {extent:.6g} m stands for the endless {type(shape).__name__}")
 
 
-_BUILDERS: dict[type, Callable[[Any, float | None, int | None], Arrays]] = {
+_BUILDERS: dict[type, Callable[..., Arrays]] = {
     coal.Box: _box,
-    coal.Sphere: _sphere,
-    coal.Cylinder: _cylinder,
+    coal.Sphere: _ball_shape,
+    coal.Cylinder: _rod,
     coal.Capsule: _capsule,
-    coal.Cone: _cone,
-    coal.Ellipsoid: _ellipsoid,
+    coal.Cone: _rod,
+    coal.Ellipsoid: _ball_shape,
     coal.TriangleP: _triangle,
 }

@@ -3,101 +3,84 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from sphshell_pin.shell.raw import Floats
+from sphshell_pin.shell.raw import Floats, Longs
+
+Slope = tuple[float, float]
+"""A unit normal as (radial, axial)."""
 
 
-@dataclass
 class Revolution:
-    """Collects rings round the z axis, strips between them and discs inside them.
+    """Collects rings around the z axis, strips between them and discs inside them.
 
     Strips are added with their bottom first, so that the winding is outward. Rings of radius 0 are
     single points, which makes triangles of the elements beside them: none is without area.
     """
 
-    segments: int
-    vertices: list[tuple[float, float, float]] = field(default_factory=list)
-    elements: list[list[int]] = field(default_factory=list)
-    normals: list[list[tuple[float, float, float]]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        turns = 2.0 * math.pi * np.arange(2 * self.segments) / (2 * self.segments)
-        circle = np.column_stack([np.cos(turns), np.sin(turns)])
+    def __init__(self, segments: int) -> None:
+        self.segments = segments
+        turns = math.pi * np.arange(2 * segments) / segments
+        # At whole and half steps around the circle.
+        self._circle = np.column_stack([np.cos(turns), np.sin(turns)])
         # Quarter turns are exact: a point meant to lie on an axis does.
-        circle[np.abs(circle) < 1e-15] = 0.0
-        self._direction = circle.tolist()
+        self._circle[np.abs(self._circle) < 1e-15] = 0.0
+        self._vertices: list[Floats] = []
+        self._elements: list[Longs] = []
+        self._normals: list[Floats] = []
 
-    def ring(self, radius: float, height: float) -> list[int]:
-        """Add a ring of vertices (radius, height) [m], or a single one on the axis."""
-        first = len(self.vertices)
-        if radius == 0.0:
-            self.vertices.append((0.0, 0.0, height))
-            return [first] * self.segments
-        for k in range(self.segments):
-            x, y = self._direction[2 * k]
-            self.vertices.append((radius * x, radius * y, height))
-        return list(range(first, first + self.segments))
+    def ring(self, radius: float, height: float) -> Longs:
+        """Add a ring of vertices (radius, height) [m], or a single one on the axis.
 
-    def strip(
-        self,
-        lower: list[int],
-        upper: list[int],
-        lower_normal: tuple[float, float],
-        upper_normal: tuple[float, float],
-    ) -> None:
-        """Add the elements between two rings; unit normals as (radial, axial) at each of them."""
-        n = self.segments
-        for k in range(n):
-            after = (k + 1) % n
-            corners = [lower[k], lower[after], upper[after], upper[k]]
-            halves = [2 * k, 2 * k + 2, 2 * k + 2, 2 * k]
-            slopes = [lower_normal, lower_normal, upper_normal, upper_normal]
-            if lower[k] == lower[after]:
-                # The tip of a cone has no normal: that of the middle of the element.
-                corners, slopes = corners[1:], slopes[1:]
-                halves = [2 * k + 1, 2 * k + 2, 2 * k]
-            elif upper[k] == upper[after]:
-                corners, slopes = corners[:3], slopes[:3]
-                halves = [2 * k, 2 * k + 2, 2 * k + 1]
-            self.elements.append(corners)
-            self.normals.append(
-                [self._turned(half, slope) for half, slope in zip(halves, slopes, strict=True)]
-            )
+        Returns their indices (segments,).
+        """
+        first = sum(map(len, self._vertices))
+        count = self.segments if radius else 1
+        points = np.column_stack([radius * self._circle[::2][:count], np.full(count, height)])
+        self._vertices.append(points if radius else points * [0.0, 0.0, 1.0])
+        return np.resize(np.arange(first, first + count), self.segments)
 
-    def disc(self, ring: list[int], up: bool) -> None:
+    def strip(self, lower: Longs, upper: Longs, lower_normal: Slope, upper_normal: Slope) -> None:
+        """Add the elements between two rings, with the normals at each of them."""
+        corners = np.stack([lower, np.roll(lower, -1), np.roll(upper, -1), upper], axis=1)
+        steps, slopes = [0, 2, 2, 0], [lower_normal, lower_normal, upper_normal, upper_normal]
+        # The tip of a cone has no normal: it gets that of the middle of the element.
+        if lower[0] == lower[-1]:
+            corners = np.column_stack([corners[:, 1:], np.full(self.segments, -1)])
+            steps, slopes = [1, 2, 0, 0], [lower_normal, upper_normal, upper_normal, (0.0, 0.0)]
+        elif upper[0] == upper[-1]:
+            corners[:, 3] = -1
+            steps, slopes = [0, 2, 1, 0], [lower_normal, lower_normal, upper_normal, (0.0, 0.0)]
+        places = (2 * np.arange(self.segments)[:, None] + steps) % (2 * self.segments)
+        radial, axial = np.array(slopes).T
+        normals = np.empty((self.segments, 4, 3))
+        normals[:, :, :2] = radial[:, None] * self._circle[places]
+        normals[:, :, 2] = axial
+        self._elements.append(corners)
+        self._normals.append(normals)
+
+    def disc(self, ring: Longs, up: bool) -> None:
         """Close a ring with a flat disc of quads from rim to rim (no needles in its middle)."""
-        n = self.segments
-        normal = (0.0, 0.0, 1.0 if up else -1.0)
-        for k in range(n // 2 + 1):
-            cycle = [k, k + 1, n - k - 1, (n - k) % n]
-            if k + 1 > n - k - 1:
-                break
-            corners = [ring[i] for i in dict.fromkeys(cycle)]
-            if len(corners) < 3:
-                break
-            self.elements.append(corners if up else corners[::-1])
-            self.normals.append([normal] * len(corners))
+        rows = []
+        for k in range(self.segments // 2):
+            cycle = [k, k + 1, self.segments - k - 1, (self.segments - k) % self.segments]
+            corners = list(dict.fromkeys(cycle))
+            corners = corners if up else corners[::-1]
+            rows.append([*(ring[i] for i in corners), -1][:4])
+        self._elements.append(np.array(rows))
+        self._normals.append(np.tile([0.0, 0.0, 1.0 if up else -1.0], (len(rows), 4, 1)))
 
-    def arrays(self) -> tuple[Floats, list[list[int]], Floats]:
-        """Vertices (n, 3), elements, and normals (m, 4, 3) of their corners."""
-        normals = np.zeros((len(self.elements), 4, 3))
-        for k, corners in enumerate(self.normals):
-            normals[k, : len(corners)] = corners
-        return np.array(self.vertices), self.elements, normals
-
-    def _turned(self, half: int, slope: tuple[float, float]) -> tuple[float, float, float]:
-        x, y = self._direction[half % (2 * self.segments)]
-        return (slope[0] * x, slope[0] * y, slope[1])
+    def arrays(self) -> tuple[Floats, Longs, Floats]:
+        """Vertices (n, 3), elements (m, 4), and normals (m, 4, 3) of their corners."""
+        parts = self._vertices, self._normals
+        vertices, normals = (np.concatenate(one) for one in parts)
+        return vertices, np.concatenate(self._elements), normals
 
 
 def arc(start: float, stop: float, steps: int) -> list[tuple[float, float]]:
     """Cosine and sine at `steps` + 1 latitudes [rad], exact at the poles and the equator."""
-    out = []
-    for k in range(steps + 1):
-        angle = start + (stop - start) * k / steps
-        c, s = math.cos(angle), math.sin(angle)
-        out.append((0.0 if abs(c) < 1e-15 else c, 0.0 if abs(s) < 1e-15 else s))
-    return out
+    angles = start + (stop - start) * np.arange(steps + 1) / steps
+    table = np.column_stack([np.cos(angles), np.sin(angles)])
+    table[np.abs(table) < 1e-15] = 0.0
+    return [(c, s) for c, s in table.tolist()]

@@ -29,7 +29,7 @@ def momentum(result: Result) -> Finding:
     scene = _scene_of(result)
     _check_closed(scene, result)
     model, data = scene.model, scene.model.createData()
-    impulse = sum(float(one["impulse"]) for one in result.stats["pairs"].values())
+    impulse = sum(one.impulse for one in result.stats.pairs.values())
     if not len(result.contacts) or impulse <= 0.0:
         raise InvalidParameter("result", "a run", "must have contacts: nothing touched in it")
     middle = result.contacts.point_world.mean(axis=0)
@@ -75,9 +75,9 @@ def energy(result: Result) -> Finding:
 
 
 def elastic_energy(result: Result) -> Finding:
-    """Measure energy that appeared from nowhere in a run without any loss, from closed forms.
+    """Measure energy that appeared from nowhere in a run without any loss.
 
-    The contacts store k depth^(e + 1) / (e + 1) at the depths that were recorded; kinetic and
+    The contacts store law.energy(depth) at the depths that were recorded; kinetic and
     potential energy are Pinocchio's. Nothing of `result.energy` is used.
 
     Raises InvalidParameter if a contact has damping or friction, or if there was a controller.
@@ -86,13 +86,12 @@ def elastic_energy(result: Result) -> Finding:
     stored = np.zeros(len(result.t))
     for k, pair in enumerate(scene.pairs):
         law = pair.law
-        lossy = any(getattr(law, name, 0.0) > 0.0 for name in ("damping", "dissipation"))
-        if lossy or pair.friction is not None or result.energy.control_work.any():
+        if law.has_damping or pair.friction is not None or result.energy.control_work.any():
             raise InvalidParameter(
                 "result", pair.name, "must be a contact without damping, friction and controller"
             )
         log = result.contacts.of_pair(k)
-        each = law.stiffness * log.depth ** (law.exponent + 1.0) / (law.exponent + 1.0)
+        each = np.array([law.energy(depth) for depth in log.depth])
         np.add.at(stored, log.row, np.where(log.normal_force < 0.0, -each, each))
     return _residual(result, np.array([*_energies(scene, result), stored]))
 

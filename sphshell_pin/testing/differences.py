@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.contact import BristleFriction
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.testing.finding import Finding, worst
 from sphshell_pin.testing.forces import joint_jacobian, joint_names
@@ -62,7 +61,7 @@ def derivatives(scene: Scene, q: Any, v: Any = None, tau: Any = None) -> Finding
         return np.array(pin.aba(model, data, q, v, tau, scene.external_forces(q, v)))
 
     compared: list[_Compared] = [("contact forces", force, scene.contact_derivatives(q, v))]
-    if not any(isinstance(pair.friction, BristleFriction) for pair in scene.pairs):
+    if not any(pair.friction and pair.friction.has_state for pair in scene.pairs):
         whole = scene.core.rate_jacobian(q, v, np.zeros(0), tau)
         both = whole[:, : model.nv], whole[:, model.nv : 2 * model.nv]
         compared.append(("accelerations", acceleration, both))

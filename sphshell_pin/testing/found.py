@@ -157,7 +157,7 @@ class _Places:
     @classmethod
     def of(cls, model: Any, pair: ContactPair) -> _Places:
         offset = np.zeros(3) if pair.sphere is None else np.array(pair.sphere.offset)
-        frames = find_frame(model, pair.frame_i), find_frame(model, pair.frame)
+        frames = find_frame(model, pair.frame_i), find_frame(model, pair.frame_j)
         return cls(*frames, offset, pair.placement)
 
     def at(self, data: Any) -> tuple[Any, Array]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
-from sphshell_pin.contact.contact_set import Feature
+from sphshell_pin.shell.contact_set import Feature
 from tests import meshes
 from tests.contact.helpers import force_sum, heights, shell_of
 
@@ -35,6 +35,7 @@ def errors(contacts, normal):
     return abs(along - 1.0), float(np.linalg.norm(force - along * normal))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("kind", ["slivers", "delaunay"])
 def test_one_exact_contact(kind: str, count: int) -> None:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 
 COUNTER = r"""
@@ -46,7 +48,7 @@ for steps in (200, 1000, 11000):
     before = heap()
     result = sim.run(ARM_Q, np.zeros(3), duration, controller, record_dt=duration)
     counts.append(heap() - before)
-print(*counts, result.stats["pairs"]["ball-plate"]["contact_time"])
+print(*counts, result.stats.pairs["ball-plate"].contact_time)
 """
 
 CONTROLLERS = {

@@ -22,6 +22,7 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_OUT, TopAbs_REVERSED
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
+from scipy.optimize import minimize_scalar
 from scipy.spatial import cKDTree
 
 from sphshell_pin import Shell
@@ -181,29 +182,18 @@ class ExactShape:
         return np.array(surface.Value(*at.tolist()).Coord()), at
 
     def _foot_on_edge(self, edge: int, seed: float, point: Array) -> Array:
-        """Nearest point of an edge near a seed, by bisecting golden sections."""
+        """Nearest point of an edge near a seed."""
         curve = self._curves[edge]
         low, high = curve.FirstParameter(), curve.LastParameter()
         reach = (high - low) / (EDGE_POINTS - 1)
-        low, high = max(low, seed - reach), min(high, seed + reach)
+        bounds = max(low, seed - reach), min(high, seed + reach)
 
         def away(t: float) -> float:
             offset = np.array(curve.Value(t).Coord()) - point
             return float(offset @ offset)
 
-        share = (5**0.5 - 1) / 2
-        a, b = high - share * (high - low), low + share * (high - low)
-        at_a, at_b = away(a), away(b)
-        for _ in range(45):
-            if at_a < at_b:
-                high, b, at_b = b, a, at_a
-                a = high - share * (high - low)
-                at_a = away(a)
-            else:
-                low, a, at_a = a, b, at_b
-                b = low + share * (high - low)
-                at_b = away(b)
-        return np.array(curve.Value((low + high) / 2).Coord())
+        found = minimize_scalar(away, bounds=bounds, options={"xatol": 1e-12 * (high - low)})
+        return np.array(curve.Value(float(found.x)).Coord())
 
 
 @dataclass(frozen=True)

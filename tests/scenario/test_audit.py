@@ -60,6 +60,7 @@ def exact(name, log):
     return RADIUS - (length - reach), way / length[:, None]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MADE)
 def test_audit_agrees_with_formulas(name, tmp_path):
     make, start, more = MADE[name]
@@ -104,21 +105,21 @@ def test_flat_elements_are_off_by_their_chord_error(tmp_path):
 )
 def test_trimmed_faces_edges_and_corners_are_found(center, contact, foot, tmp_path):
     require_kernel("this test")
+    from sphshell_pin.shell.cad.exact import TrimmedFaces
     from sphshell_pin.shell.cad.surface import load_cad
-    from sphshell_pin.shell.cad.trimmed import TrimmedFaces
 
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
     faces = TrimmedFaces(load_cad(path, "mm", CadOptions()))
-    found = faces.foot(np.array(center), np.array(contact))
+    found = faces.stationary_point(np.array(center), np.array(contact))
     assert found.point == pytest.approx(foot, abs=1e-12)
-    assert faces.foot(np.array(center), np.array([50.0, 50.0, 50.0])) is None
+    assert faces.stationary_point(np.array(center), np.array([50.0, 50.0, 50.0])) is None
 
 
 def test_border_of_a_hole_is_a_curve(tmp_path):
     """A ball on the rim of a hole touches its circle, where neither face has a closest point."""
     require_kernel("this test")
+    from sphshell_pin.shell.cad.exact import TrimmedFaces
     from sphshell_pin.shell.cad.surface import load_cad
-    from sphshell_pin.shell.cad.trimmed import TrimmedFaces
 
     path = shapes.write_brep(tmp_path / "plate.brep", shapes.drilled_plate())
     faces = TrimmedFaces(load_cad(path, "mm", CadOptions()))
@@ -127,7 +128,7 @@ def test_border_of_a_hole_is_a_curve(tmp_path):
         out = np.array([np.cos(angle), np.sin(angle), 0.0])
         rim = np.array([20.0, 20.0, 5.0]) + 10.0 * out
         center = rim - 3.0 * out + [0.0, 0.0, 2.0]
-        found = faces.foot(center, rim + rng.normal(scale=0.01, size=3))
+        found = faces.stationary_point(center, rim + rng.normal(scale=0.01, size=3))
         assert found.point == pytest.approx(rim, abs=1e-11)
         assert found.normal is None
 

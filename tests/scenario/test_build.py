@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sphshell_pin import ImpactLaw
+from sphshell_pin import Adaptive, ImpactLaw, RungeKutta4, SemiImplicitEuler
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build
 from tests.scenario.files import DROP, write
@@ -112,10 +112,12 @@ q_ref = { "three_link_finger/knuckle" = 0.5 }
 [run]
 duration = 1
 """
-    controller = build(write(tmp_path, text)).controller
-    np.testing.assert_allclose(controller.kp, [2, 2, 2, 0, 0, 0, 0, 0, 0])
-    np.testing.assert_allclose(controller.kd, [0.1, 0, 0, 0, 0, 0, 0, 0, 0])
-    np.testing.assert_allclose(controller.q_ref[:4], [0.5, 0, 0, 0])
+    built = build(write(tmp_path, text))
+    model, controller = built.scene.model, built.controller
+    driven = controller.actuated(model)
+    np.testing.assert_allclose(driven * controller.gain("kp", model), [2, 2, 2, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(controller.gain("kd", model), [0.1, 0, 0, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(controller.posture(model, built.q0)[:4], [0.5, 0, 0, 0])
 
 
 PD = '[controller]\ntype = "joint-pd"\nkp = {}\nkd = 1\nq_ref = {}\n[run]'
@@ -135,8 +137,8 @@ FAULTS = {
         "shell.plate.primitive.size[2]",
         "greater",
     ),
-    "kp's length": ("[run]", PD.format("[1, 2]", "{}"), "controller.kp", "6 numbers"),
-    "q_ref's length": ("[run]", PD.format("1", "[1]"), "controller.q_ref", "7 numbers"),
+    "kp's length": ("[run]", PD.format("[1, 2]", "{}"), "controller.kp", "(6,)"),
+    "q_ref's length": ("[run]", PD.format("1", "[1]"), "controller.q_ref", "(7,)"),
     "controller's frame": (
         "[run]",
         '[controller]\ntype = "cartesian-impedance"\nframe = "x"\npath = [[0, 0, 0]]\n'
@@ -193,3 +195,26 @@ def test_an_unknown_method_is_answered_with_the_valid_ones(tmp_path):
     text = DROP.replace(LAW_LINE, f'method = "smoth"\n{LAW_LINE}')
     with pytest.raises(ScenarioError, match=r"'facets', 'smooth' or 'elements'"):
         build(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("keys", "integrator"),
+    [
+        ("", Adaptive()),
+        ("rtol = 1e-4\n", Adaptive(1e-4)),
+        ("dt = 2e-5\n", SemiImplicitEuler(2e-5)),
+        ('integrator = "runge-kutta-4"\n', RungeKutta4()),
+    ],
+)
+def test_the_integrator_is_adaptive_unless_dt_is_given(keys, integrator, tmp_path):
+    path = write(tmp_path, DROP.replace("dt = 1e-4\n", keys))
+    assert build(path).simulation.integrator == integrator
+    if not keys:
+        fixed = build(path, {"run.dt": "1e-3"}).simulation.integrator
+        assert fixed == SemiImplicitEuler(1e-3)
+
+
+def test_a_key_that_only_python_has_is_refused(tmp_path):
+    table = '[controller]\ntype = "gravity-compensation"\njoints = ["x"]\n[run]'
+    with pytest.raises(ScenarioError, match="unknown key 'joints'"):
+        build(write(tmp_path, DROP.replace("[run]", table)))

@@ -89,7 +89,7 @@ def test_the_example_is_valid(tmp_path):
     scenario = read_scenario(write(tmp_path))
     assert scenario.robot[0].name == "ball"
     assert scenario.gravity == [0.0, 0.0, -9.81]
-    assert scenario.contact[0].friction.type == "none"
+    assert scenario.contact[0].friction.kind == "none"
 
 
 def test_not_toml_and_not_there(tmp_path):
@@ -121,7 +121,7 @@ def test_changes_by_dotted_key(tmp_path):
     assert scenario.contact[0].sphere.radius == 0.01
     assert scenario.robot[0].name == "turntable"
     assert scenario.shell[0].side == "outside"
-    assert scenario.controller.type == "gravity-compensation"
+    assert scenario.controller.kind == "gravity-compensation"
 
 
 @pytest.mark.parametrize("table", ["[robot]", "[[robot]]"])

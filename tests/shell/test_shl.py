@@ -89,7 +89,7 @@ def test_text_lines_are_skipped_and_said(write):
     lines[3:3] = ["! points of the cube", "x y z"]
     shell = Shell.from_file(write(["made by hand", *lines, "END"]))
     assert shell.is_closed
-    assert any("4 lines of text skipped" in note for note in shell.health.notes)
+    assert any("4 lines of text were skipped" in note for note in shell.health.notes)
     assert "made by hand" in str(shell.health)
 
 

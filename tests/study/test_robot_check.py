@@ -72,6 +72,7 @@ def passes(report: RobotReport) -> bool:
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.robots
 def test_every_robot_passes() -> None:
     pytest.importorskip("example_robot_data")

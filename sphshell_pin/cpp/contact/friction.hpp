@@ -7,52 +7,6 @@
 
 namespace sphshell {
 
-// Two laws. TwoVelocity is ADAMS's regularised Coulomb friction: it creeps. Bristle is an elastic,
-// perfectly plastic spring between sphere and shell (Dupont et al. 2002; Stribeck's curve), whose
-// stretch is a state z of the contact, in the shell's frame:
-//
-//   force = -P(stiffness z + damping w),   z' = w - (z - P(stiffness z) / stiffness) / relaxation,
-//
-// with w the slip and P the projection on the ball of radius mu N: below that load nothing creeps.
-// Beyond it z relaxes in a time that is short against the motion, but not zero: the rates stay
-// bounded where the normal force is small. For a soft finger the component of z along the normal is
-// the twist of the disc of contact, on the arm rho = 3 pi / 16 a of Hertz's pressure: the moment's
-// limit is mu N rho, and P couples it with the force as in Howe and Cutkosky's limit surface
-// (1996).
-struct FrictionLaw {
-  enum class Kind : int { None = 0, TwoVelocity = 1, Bristle = 2 };
-  Kind kind = Kind::None;
-  double mu_static = 0, mu_dynamic = 0;
-  double v_static = 1, v_dynamic = 2;  // [m/s]; of the bristle v_static is Stribeck's speed
-  double stiffness = 0, damping = 0;   // of the bristle [N/m], [N s/m]
-  bool torsional = false;
-
-  bool active() const { return kind != Kind::None; }
-  bool has_state() const { return kind == Kind::Bristle; }
-
-  // coefficient / slip speed [s/m] of TwoVelocity: finite at rest, so that no direction is
-  // divided by zero.
-  template <class S>
-  S over_speed(const S& speed2) const {
-    using std::sqrt;
-    if (speed2 < v_static * v_static)
-      return mu_static * (3 - speed2 / (v_static * v_static)) / (2 * v_static);
-    const S speed = sqrt(speed2);
-    return step(speed, v_static, mu_static, v_dynamic, mu_dynamic) / speed;
-  }
-
-  // coefficient of Bristle.
-  template <class S>
-  S stribeck(const S& speed2) const {
-    using std::exp;
-    return mu_dynamic + (mu_static - mu_dynamic) * exp(-speed2 / (v_static * v_static));
-  }
-
-  double coefficient(double speed) const {
-    return kind == Kind::Bristle ? stribeck(speed * speed) : speed * over_speed(speed * speed);
-  }
-};
-
 // What acts on the sphere at a contact.
 template <class S>
 struct ContactForce {
@@ -85,37 +39,127 @@ struct Meeting {
   Vector3<S> bristle = Vector3<S>::Zero();  // [m]
 };
 
+// The friction laws. Each has its name, its parameters, and:
+//   add  writes friction, torsion and the bristle's rates to the force at a contact; `radius` [m]
+//   is
+//        the sphere's, `relaxation` [s] that of the bristles;
+//   coefficient  of steady sliding at a slip speed [m/s].
+
+struct NoFriction {
+  static constexpr const char* kind = "none";
+  explicit NoFriction(const Numbers&) {}
+
+  double coefficient(double) const { return 0; }
+
+  template <class S>
+  void add(ContactForce<S>&, const Meeting<S>&, double, double) const {}
+};
+
+// ADAMS's Coulomb friction, regularized over two slip speeds: it creeps.
+struct CoulombFriction {
+  static constexpr const char* kind = "coulomb";
+  double mu_static, mu_dynamic, v_static, v_dynamic;  // 1, 1, [m/s], [m/s]
+
+  explicit CoulombFriction(const Numbers& p)
+      : mu_static(p.at(0)), mu_dynamic(p.at(1)), v_static(p.at(2)), v_dynamic(p.at(3)) {}
+
+  // coefficient / slip speed [s/m]: finite at rest, so that no direction is divided by zero.
+  template <class S>
+  S over_speed(const S& speed2) const {
+    using std::sqrt;
+    if (speed2 < v_static * v_static)
+      return mu_static * (3 - speed2 / (v_static * v_static)) / (2 * v_static);
+    const S speed = sqrt(speed2);
+    return step(speed, v_static, mu_static, v_dynamic, mu_dynamic) / speed;
+  }
+
+  double coefficient(double speed) const { return speed * over_speed(speed * speed); }
+
+  template <class S>
+  void add(ContactForce<S>& out, const Meeting<S>&, double, double) const {
+    out.friction = -out.normal * over_speed(S(out.slip.squaredNorm())) * out.slip;
+  }
+};
+
+// An elastic, perfectly plastic spring between sphere and shell (Dupont et al. 2002; Stribeck's
+// curve), whose stretch is a state z of the contact, in the shell's frame:
+//
+//   force = -P(stiffness z + damping w),   z' = w - (z - P(stiffness z) / stiffness) / relaxation,
+//
+// with w the slip and P the projection on the ball of radius mu N: below that load nothing creeps.
+// Beyond it z relaxes in a time that is short against the motion, but not zero: the rates stay
+// bounded where the normal force is small. For a soft finger the component of z along the normal is
+// the twist of the disc of contact, on the arm rho = 3 pi / 16 a of Hertz's pressure: the moment's
+// limit is mu N rho, and P couples it with the force as in Howe and Cutkosky's limit surface
+// (1996).
+struct BristleFriction {
+  static constexpr const char* kind = "bristle";
+  double mu_static, mu_dynamic, stiffness, damping, v_stribeck;  // 1, 1, [N/m], [N s/m], [m/s]
+  bool torsional;
+
+  explicit BristleFriction(const Numbers& p)
+      : mu_static(p.at(0)),
+        mu_dynamic(p.at(1)),
+        stiffness(p.at(2)),
+        damping(p.at(3)),
+        v_stribeck(p.at(4)),
+        torsional(p.at(5) != 0) {}
+
+  template <class S>
+  S stribeck(const S& speed2) const {
+    using std::exp;
+    return mu_dynamic + (mu_static - mu_dynamic) * exp(-speed2 / (v_stribeck * v_stribeck));
+  }
+
+  double coefficient(double speed) const { return stribeck(speed * speed); }
+
+  template <class S>
+  void add(ContactForce<S>& out, const Meeting<S>& m, double radius, double relaxation) const {
+    using std::sqrt;
+    Vector3<S> w = out.slip;
+    S arm(0);
+    if (torsional) {
+      arm = 3 * M_PI / 16 * sqrt(radius * m.depth);
+      w += arm * m.spin * m.normal;
+    }
+    const S limit = stribeck(S(w.squaredNorm())) * out.normal;
+    Vector3<S> z = m.bristle;
+    if (!torsional) z -= z.dot(m.normal) * m.normal;
+    const Vector3<S> stretched = stiffness * z;
+    out.bristle = in_ball(stretched, limit) / stiffness;
+    out.bristle_rate = w - (z - out.bristle) / relaxation;
+    const Vector3<S> all = -in_ball(Vector3<S>(stretched + damping * w), limit);
+    const S along = all.dot(m.normal);
+    out.friction = all - along * m.normal;
+    out.torsion = arm * along;
+  }
+};
+
+// One of the friction laws.
+struct FrictionLaw {
+  std::variant<NoFriction, CoulombFriction, BristleFriction> law = NoFriction({});
+
+  bool active() const { return !std::holds_alternative<NoFriction>(law); }
+  // Of the contacts that have a stretch for a state, else null.
+  const BristleFriction* bristle() const { return std::get_if<BristleFriction>(&law); }
+  bool has_state() const { return bristle() != nullptr; }
+  bool torsional() const { return bristle() && bristle()->torsional; }
+
+  double coefficient(double speed) const {
+    return std::visit([&](const auto& one) { return one.coefficient(speed); }, law);
+  }
+};
+
 template <class S>
 ContactForce<S> contact_force(const NormalLaw& law, const FrictionLaw& friction, double radius,
                               double relaxation, const Meeting<S>& m) {
-  using std::sqrt;
   ContactForce<S> out;
   const S gap_rate = m.normal.dot(m.relative);
   const NormalForce<S> push = law.force(m.depth, gap_rate);
   out.normal = push.total;
   out.elastic = push.elastic;
   out.slip = m.relative - gap_rate * m.normal;
-  if (friction.kind == FrictionLaw::Kind::TwoVelocity) {
-    const S speed2 = out.slip.squaredNorm();
-    out.friction = -push.total * friction.over_speed(speed2) * out.slip;
-  } else if (friction.kind == FrictionLaw::Kind::Bristle) {
-    Vector3<S> w = out.slip;
-    S arm(0);
-    if (friction.torsional) {
-      arm = 3 * M_PI / 16 * sqrt(radius * m.depth);
-      w += arm * m.spin * m.normal;
-    }
-    const S limit = friction.stribeck(S(w.squaredNorm())) * push.total;
-    Vector3<S> z = m.bristle;
-    if (!friction.torsional) z -= z.dot(m.normal) * m.normal;
-    const Vector3<S> stretched = friction.stiffness * z;
-    out.bristle = in_ball(stretched, limit) / friction.stiffness;
-    out.bristle_rate = w - (z - out.bristle) / relaxation;
-    const Vector3<S> all = -in_ball(Vector3<S>(stretched + friction.damping * w), limit);
-    const S along = all.dot(m.normal);
-    out.friction = all - along * m.normal;
-    out.torsion = arm * along;
-  }
+  std::visit([&](const auto& one) { one.add(out, m, radius, relaxation); }, friction.law);
   return out;
 }
 

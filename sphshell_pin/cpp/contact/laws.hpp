@@ -3,8 +3,11 @@
 #pragma once
 
 #include <cmath>
+#include <variant>
 
 #include <Eigen/Core>
+
+#include "contact/kinds.hpp"
 
 namespace sphshell {
 
@@ -36,35 +39,75 @@ struct NormalForce {
   S elastic;  // its part that derives from the potential [N]
 };
 
-// IMPACT: max(0, k depth^e - STEP(depth, 0, 0, d, c) gap_rate);
-// Hunt-Crossley: max(0, k depth^e (1 - b gap_rate)).
-struct NormalLaw {
-  enum class Kind : int { Impact = 0, HuntCrossley = 1 };
-  Kind kind = Kind::Impact;
-  double stiffness = 0;           // k [N/m^e]
-  double exponent = 1;            // e
-  double damping = 0;             // c [N s/m], or b [s/m]
-  double full_damping_depth = 1;  // d [m], IMPACT only
+template <class S>
+NormalForce<S> push(const S& total, const S& elastic) {
+  return {total < 0 ? S(0) : total, elastic};
+}
+
+// The laws. Each has its name, its parameters, and:
+//   force   at depth > 0 [m] and gap_rate = n . v_rel [m/s], negative while closing;
+//   energy  potential of the elastic part [J];
+//   needs_rate  whether the force depends on gap_rate.
+
+// max(0, k depth^e - STEP(depth, 0, 0, d, c) gap_rate)
+struct ImpactLaw {
+  static constexpr const char* kind = "impact";
+  double stiffness, exponent, damping, full_damping_depth;  // [N/m^e], 1, [N s/m], [m]
+
+  explicit ImpactLaw(const Numbers& p)
+      : stiffness(p.at(0)), exponent(p.at(1)), damping(p.at(2)), full_damping_depth(p.at(3)) {}
 
   bool needs_rate() const { return damping > 0; }
 
-  // depth > 0 [m]; gap_rate = n . v_rel [m/s], negative while closing.
   template <class S>
   NormalForce<S> force(const S& depth, const S& gap_rate) const {
     const S elastic = stiffness * power(depth, exponent);
     if (!needs_rate()) return {elastic, elastic};
-    S total = elastic;
-    if (kind == Kind::Impact)
-      total -= step(depth, 0, 0, full_damping_depth, damping) * gap_rate;
-    else
-      total -= elastic * damping * gap_rate;
-    if (total < 0) total = S(0);
-    return {total, elastic};
+    return push(S(elastic - step(depth, 0, 0, full_damping_depth, damping) * gap_rate), elastic);
   }
 
-  // Potential of the elastic part [J].
   double energy(double depth) const {
     return stiffness * power(depth, exponent) * depth / (exponent + 1);
+  }
+};
+
+// max(0, k depth^e (1 - b gap_rate))
+struct HuntCrossleyLaw {
+  static constexpr const char* kind = "hunt-crossley";
+  double stiffness, exponent, dissipation;  // [N/m^e], 1, [s/m]
+
+  explicit HuntCrossleyLaw(const Numbers& p)
+      : stiffness(p.at(0)), exponent(p.at(1)), dissipation(p.at(2)) {}
+
+  bool needs_rate() const { return dissipation > 0; }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+    const S elastic = stiffness * power(depth, exponent);
+    if (!needs_rate()) return {elastic, elastic};
+    return push(S(elastic - elastic * dissipation * gap_rate), elastic);
+  }
+
+  double energy(double depth) const {
+    return stiffness * power(depth, exponent) * depth / (exponent + 1);
+  }
+};
+
+// One of the laws.
+struct NormalLaw {
+  std::variant<ImpactLaw, HuntCrossleyLaw> law = ImpactLaw({0, 1, 0, 1});
+
+  bool needs_rate() const {
+    return std::visit([](const auto& one) { return one.needs_rate(); }, law);
+  }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+    return std::visit([&](const auto& one) { return one.force(depth, gap_rate); }, law);
+  }
+
+  double energy(double depth) const {
+    return std::visit([&](const auto& one) { return one.energy(depth); }, law);
   }
 };
 

@@ -1,19 +1,21 @@
 #include "dynamics/linearization.hpp"
 
+#include <pinocchio/spatial.hpp>
+
 namespace sphshell {
 namespace {
 
 // The displacement of a place that goes with a displacement of its body.
-Matrix36 velocity_at(const Vec3& place) {
+Matrix36 displacement_at(const Vec3& place) {
   Matrix36 out;
-  out << Mat3::Identity(), -cross_matrix(place);
+  out << Mat3::Identity(), -pinocchio::skew(place);
   return out;
 }
 
 }  // namespace
 
 Linearization::Linearization(Scene& scene) : scene_(scene) {
-  scene.want_turns();
+  scene.want_dn_dc();
   scene.body().want_derivatives();
   const pinocchio::Model& model = scene.body().model();
   for (const Pair& pair : scene.pairs()) chains_.emplace_back(model, pair.joint_j, pair.joint_i);
@@ -79,7 +81,7 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
       const ContactSite site = site_of(active[next], chain.twist());
       contact_slopes(pair.law, pair.friction, scene_.relaxation(pair), site, slopes_);
       sum.wrench += slopes_.wrench;
-      sum.by_displacement += slopes_.by_place * velocity_at(site.place);
+      sum.by_displacement += slopes_.by_place * displacement_at(site.place);
       sum.by_twist += slopes_.by_twist;
       if (jacobian && active[next].slot >= 0) add_bristle(active[next], site, chain, *jacobian);
     }
@@ -102,7 +104,7 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
 void Linearization::add_bristle(const ActiveContact& active, const ContactSite& site,
                                 const Chain& chain, MatrixX& jacobian) {
   const Eigen::Index nv = force_.size(), z = 3 * active.slot;
-  const Matrix36 by_displacement = slopes_.rate_by_place * velocity_at(site.place);
+  const Matrix36 by_displacement = slopes_.rate_by_place * displacement_at(site.place);
   auto rate = jacobian.middleRows<3>(nv + z);
   for (int m = 0; m < chain.size(); ++m) {
     const int k = chain.velocity(m);

@@ -261,7 +261,7 @@ double Simulation::error_of(const Stepper& stepper) {
     worst = std::max(worst, std::abs(error[nv + i]) / (atol + rtol * sizes_[i]));
   for (const ActiveContact& active : scene_.active()) {
     if (active.slot < 0) continue;
-    const FrictionLaw& friction = scene_.pairs()[active.pair].friction;
+    const BristleFriction& friction = *scene_.pairs()[active.pair].friction.bristle();
     const Vec3 z = y.segment<3>(2 * nv + 3 * active.slot);
     const double limit = friction.mu_static * active.force.normal / friction.stiffness;
     const double e = error.segment<3>(2 * nv + 3 * active.slot).norm();

@@ -7,22 +7,18 @@ a curved side may leave a face that the straight one is on.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from OCP.gp import gp_Pnt, gp_Vec
 
+from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.cad.face_mesh import ALONG, CURVED, FaceMesh
-from sphshell_pin.shell.cad.reference import corner_weights
+from sphshell_pin.shell.cad.options import Occ
+from sphshell_pin.shell.cad.surface import CadSurface
+from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.curved import points_at
-
-if TYPE_CHECKING:
-    from sphshell_pin.shell.cad.surface import CadSurface
-    from sphshell_pin.shell.cleaning import CleanedSurface
-    from sphshell_pin.shell.raw import Floats, Longs, Mask
-    from sphshell_pin.shell.shell import Shell
+from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask
 
 _ON_SIDES = [np.roll([1 - share, share, 0.0], side) for side in range(3) for share in ALONG]
 WEIGHTS = np.array([*_ON_SIDES, [1 / 3, 1 / 3, 1 / 3]])
@@ -36,7 +32,7 @@ SAME_PLACE = 1e-6
 
 CURVE_SEEDS, CURVE_STEPS, SETTLED = 9, 4, 0.01
 """Places along an edge from the nearest of which Newton's method goes on; its steps; the share of
-the chord error below which a step changes the distance by nothing to speak of."""
+the chord error below which a step no longer changes the distance notably."""
 
 
 @dataclass(frozen=True)
@@ -63,28 +59,30 @@ class Errors:
 
 
 def hold_curvature(
-    surface: CleanedSurface, cad: CadSurface, factor: float, make: Callable[[CleanedSurface], Shell]
+    surface: CleanedSurface, cad: CadSurface, factor: float, crease_angle: float
 ) -> CleanedSurface:
     """Return a CAD surface whose curved elements are as near as its flat ones, with a note of it.
 
     A curved side, or the sides of a curved middle, farther off than the share CURVED of the stated
     chord error are kept straight, unless straight ones are no nearer.
 
-    factor : metres per unit of the model; make : makes a shell of the surface
+    factor : metres per unit of the model; crease_angle : of the shell [rad]
     """
     places = _Places(surface, cad, factor)
     limit = CURVED * cad.stated
     straight = np.zeros((len(surface.triangles), 3), np.bool_)
     bent = 0.0
-    for _ in range(MOST_ROUNDS):
-        found = places.errors(make(replace(surface, straight=straight)))
+    for turn in range(MOST_ROUNDS + 1):
+        found = places.errors(
+            ShellBase.from_surface(replace(surface, straight=straight), crease_angle)
+        )
+        if turn == MOST_ROUNDS:
+            break
         bad, farthest = _too_far(found, places, limit)
         bent = max(bent, farthest)
         if not (bad & ~straight).any():
             break
         straight |= bad
-    else:
-        found = places.errors(make(replace(surface, straight=straight)))
     count = _count_sides(surface, straight)
     note = _note(found, cad.stated, cad.model.metres, count, bent)
     health = surface.health.labelled(notes=(*surface.health.notes, note))
@@ -96,28 +94,19 @@ class _Places:
 
     def __init__(self, surface: CleanedSurface, cad: CadSurface, factor: float) -> None:
         self._factor, self._tolerance = factor, cad.stated
-        meshes = cad.found.meshes
-        counts = [0 if mesh is None else len(mesh.triangles) for mesh in meshes]
-        starts = np.cumsum([0, *counts])
         polygon = surface.source_element[surface.triangle_element]
-        face = np.searchsorted(starts, polygon, side="right") - 1
         self.corners = surface.vertices[surface.triangles] / factor
-        self._sides = _own_sides(surface.triangles, face)
+        self._sides = _own_sides(surface.triangles, cad.face_of(polygon))
         self._of_face: list[tuple[FaceMesh, Longs, Floats]] = []
-        self._curves: list[tuple[int, int, Any, float, float]] = []
-        on_border = self._sides.on_border
-        for row in np.unique(face).tolist():
-            mesh = meshes[row]
-            assert mesh is not None  # it has triangles
-            own = np.flatnonzero(face == row)
-            nodes = mesh.triangles[polygon[own] - starts[row]]
-            at = np.repeat(nodes, 3, axis=0)
-            weights = corner_weights(mesh.points[at], self.corners[own].reshape(-1, 3))
-            uv = np.einsum("nk,nkx->nx", weights, mesh.parameters(at)).reshape(-1, 3, 2)
-            self._of_face.append((mesh, own, uv))
-            self._find_curves(mesh, own, nodes, on_border[own], SAME_PLACE * cad.size)
+        self._curves: list[tuple[int, int, Occ, float, float]] = []
+        corner_rows = np.repeat(polygon, 3)
+        for face, mesh, rows, uv in cad.locate(corner_rows, self.corners.reshape(-1, 3)):
+            own = rows[::3] // 3
+            self._of_face.append((mesh, own, uv.reshape(-1, 3, 2)))
+            nodes = mesh.triangles[polygon[own] - cad.starts[face]]
+            self._find_curves(mesh, own, nodes, SAME_PLACE * cad.size)
 
-    def errors(self, shell: Shell) -> Errors:
+    def errors(self, shell: ShellBase) -> Errors:
         """Measure the curved elements of `shell`, whose triangles are those of the surface."""
         rows = np.arange(len(self.corners))
         points = points_at(shell, rows, WEIGHTS) / self._factor
@@ -153,9 +142,7 @@ class _Places:
                 borders[triangle, side] = _from_curve(curve, along, start, end, near)
         return Errors(self._sides.spread(sides), middles, borders)
 
-    def _find_curves(
-        self, mesh: FaceMesh, own: Longs, nodes: Longs, on_border: Mask, near: float
-    ) -> None:
+    def _find_curves(self, mesh: FaceMesh, own: Longs, nodes: Longs, near: float) -> None:
         """Find the exact curve of each side on the border of a face, and its parameters there."""
         known = {}
         for border in mesh.borders:
@@ -166,7 +153,7 @@ class _Places:
         away = np.linalg.norm(self.corners[own][:, :, None] - mesh.points[nodes][:, None], axis=3)
         node = np.take_along_axis(nodes, away.argmin(axis=2), axis=1)
         node[away.min(axis=2) > near] = -1  # a corner that cleaning has put into a side
-        for row, side in np.argwhere(on_border).tolist():
+        for row, side in np.argwhere(self._sides.on_border[own]).tolist():
             pair = int(node[row, side]), int(node[row, (side + 1) % 3])
             if pair in known:
                 self._curves.append((int(own[row]), side, *known[pair]))
@@ -191,7 +178,7 @@ class _Sides:
         return np.asarray(largest[self.number])
 
 
-def _own_sides(triangles: Any, face: Longs) -> _Sides:
+def _own_sides(triangles: Ints, face: Longs) -> _Sides:
     ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
     keys = np.column_stack([ends.reshape(-1, 2), np.repeat(face, 3)])
     _, index, number, count = np.unique(
@@ -239,10 +226,10 @@ def _note(found: Errors, stated: float, factor: float, count: int, bent: float) 
     return note
 
 
-def _from_curve(curve: Any, points: Floats, start: float, end: float, settled: float) -> float:
-    """Largest distance of points (3, 3) along a side from the curve between two parameters.
+def _from_curve(curve: Occ, points: Floats, start: float, end: float, settled: float) -> float:
+    """Largest distance of points (k, 3) along a side from the curve between two parameters.
 
-    Newton's steps shorter than `settled` are the last.
+    Gauss-Newton steps shorter than `settled` are the last.
     """
     place, tangent = gp_Pnt(), gp_Vec()
     # Its speed may be anything: the middle of the side need not be near that of the parameters.
@@ -255,12 +242,12 @@ def _from_curve(curve: Any, points: Floats, start: float, end: float, settled: f
         nearest, at = float(away.min()), float(seeds[np.argmin(away)])
         for _ in range(CURVE_STEPS):
             curve.D1(at, place, tangent)
-            offset, way = point - place.Coord(), np.array(tangent.Coord())
+            offset, derivative = point - place.Coord(), np.array(tangent.Coord())
             nearest = min(nearest, float(np.linalg.norm(offset)))
-            square = float(way @ way)
+            square = float(derivative @ derivative)
             if square == 0.0:
                 break
-            along_curve = float(offset @ way)
+            along_curve = float(offset @ derivative)
             at = min(max(at + along_curve / square, low), high)
             if along_curve**2 <= settled**2 * square:
                 break

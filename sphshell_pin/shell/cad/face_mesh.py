@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from OCP.BRep import BRep_Tool
@@ -19,9 +18,8 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
 from sphshell_pin.shell.cad.face_surface import SINGULAR, FaceSurface, dot
-from sphshell_pin.shell.cad.flipping import flipped
 from sphshell_pin.shell.cad.model import subshapes
-from sphshell_pin.shell.cad.thinning import thinned
+from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.raw import Floats, Longs, Mask
 
 ALONG = (0.25, 0.5, 0.75)
@@ -36,9 +34,6 @@ MOST_TURN = 0.7
 TURN_ROUNDS = 3
 """Times sides are halved for that: along a kink the turn never falls."""
 
-FLIP_ROUNDS = 3
-"""Times thin triangles are flipped after sides were halved: later ones would undo halvings."""
-
 LIMIT_STEP = 1e-4
 """Part of the way to the middle of the triangle at which the limit of a normal is taken."""
 
@@ -52,7 +47,7 @@ class Border:
 
     nodes: Longs
     at: Floats
-    curve: Any
+    curve: Occ
 
     def error(self, points: Floats) -> float:
         """Largest distance of the curve from the polyline through `points` of the nodes."""
@@ -132,8 +127,7 @@ class FaceMesh:
         """
         if self.surface.flat:
             return self, float(np.linalg.norm(self.points - self.exact, axis=1).max(initial=0.0))
-        mesh, _ = self._thinned()._flipped(0)
-        largest, known = 0.0, 0
+        mesh, largest, known = self, 0.0, 0
         for turn in range(rounds + 1):
             sides, of_triangle = mesh.sides()
             at_sides, middles = mesh._errors(sides, of_triangle, known, tolerance)
@@ -157,8 +151,6 @@ class FaceMesh:
             if not marked.any():
                 break
             mesh, known = mesh._split(sides, of_triangle, marked), int(whole.sum())
-            if turn < FLIP_ROUNDS:
-                mesh, known = mesh._flipped(known)
         return mesh, largest
 
     def corner_normals(self) -> Floats:
@@ -273,38 +265,6 @@ class FaceMesh:
             triangles=np.concatenate(pieces),
         )
 
-    def _thinned(self) -> FaceMesh:
-        """Return the mesh with fewer nodes where triangles are needles without need."""
-        fixed: Mask = np.asarray(~self.normals.any(axis=1), np.bool_)
-        fixed[self.border_nodes] = True
-        rows = thinned(self.points, self.normals, self.parameters, self.triangles, fixed)
-        used = np.zeros(len(self.points), np.bool_)
-        used[rows] = True
-        used[self.border_nodes] = True
-        row = np.cumsum(used) - 1
-        return replace(
-            self,
-            points=self.points[used],
-            exact=self.exact[used],
-            uv=self.uv[used],
-            free=self.free[used],
-            normals=self.normals[used],
-            triangles=row[rows],
-            borders=tuple(replace(one, nodes=row[one.nodes]) for one in self.borders),
-        )
-
-    def _flipped(self, known: int) -> tuple[FaceMesh, int]:
-        """Return the mesh with thin triangles flipped, and how many of the first are as before.
-
-        known : number of triangles, the first ones, that were measured before
-        """
-        rows, changed = flipped(
-            self.points, self.normals, self.parameters(self.triangles), self.triangles
-        )
-        kept = np.flatnonzero(~changed[:known])
-        fresh = np.concatenate([np.flatnonzero(changed[:known]), np.arange(known, len(rows))])
-        return replace(self, triangles=rows[np.concatenate([kept, fresh])]), len(kept)
-
     def _limits(self, chosen: Mask) -> Floats:
         uv = self.parameters(self.triangles)
         start = uv[chosen]
@@ -316,7 +276,7 @@ class FaceMesh:
         return np.asarray(limit / np.where(length > 0.0, length, 1.0))
 
 
-def take_mesh(face: Any) -> FaceMesh | None:
+def take_mesh(face: Occ) -> FaceMesh | None:
     """Return the triangles that OpenCASCADE has laid on a face, None if it could not."""
     location = TopLoc_Location()
     found = BRep_Tool.Triangulation_s(face, location)
@@ -342,7 +302,7 @@ def take_mesh(face: Any) -> FaceMesh | None:
     )
 
 
-def _borders(face: Any, found: Any, location: Any) -> Iterator[Border]:
+def _borders(face: Occ, found: Occ, location: Occ) -> Iterator[Border]:
     for part in subshapes(face, TopAbs_EDGE):
         edge = TopoDS.Edge(part)
         polygon = BRep_Tool.PolygonOnTriangulation_s(edge, found, location)

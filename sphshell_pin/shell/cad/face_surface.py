@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import GeomAbs_C0, GeomAbs_Plane
 from OCP.gp import gp_Pnt, gp_Vec
 
+from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.raw import Floats
 
 MOST_STEPS = 8
-"""Of Newton's method towards a foot point; it starts next to it."""
+"""Of Newton's method to a closest point; it starts next to it."""
 
-MOST_FOOT_STEPS = 40
+MOST_STATIONARY_STEPS = 40
 """Of Newton's method towards a stationary point of the distance."""
 
 SINGULAR = 1e-10
@@ -24,12 +23,12 @@ SINGULAR = 1e-10
 class FaceSurface:
     """The surface below a face: points and derivatives at many places at once."""
 
-    def __init__(self, face: Any) -> None:
+    def __init__(self, face: Occ) -> None:
         self._surface = BRepAdaptor_Surface(face)
         surface = self._surface
         self.low = np.array([surface.FirstUParameter(), surface.FirstVParameter()])
         self.high = np.array([surface.LastUParameter(), surface.LastVParameter()])
-        # Round a closed surface a way may lead across its seam.
+        # Around a closed surface a step may cross its seam.
         endless = np.array([surface.IsUPeriodic(), surface.IsVPeriodic()])
         self._lowest = np.where(endless, -np.inf, self.low)
         self._highest = np.where(endless, np.inf, self.high)
@@ -92,15 +91,15 @@ class FaceSurface:
                 break
         return distance
 
-    def foot(self, point: Floats, uv: Floats, settled: float) -> Floats | None:
-        """Parameters (2,) at which the way to `point` (3,) is upright, next to `uv` (2,), or None.
+    def stationary(self, point: Floats, uv: Floats, settled: float) -> Floats | None:
+        """Parameters (2,) of a stationary point of the distance to `point` (3,), next to `uv` (2,).
 
-        A closest point or a saddle of the distance, without the trimming. Newton's method ends with
-        a step shorter than `settled`: what is left is about its square.
+        A closest point or a saddle of the distance, without the trimming; None if there is none.
+        Newton's method ends with a step shorter than `settled`: the error left is about its square.
         """
         place, u, v, uu, vv, uv_ = gp_Pnt(), gp_Vec(), gp_Vec(), gp_Vec(), gp_Vec(), gp_Vec()
         at = np.array(uv, np.float64)
-        for _ in range(MOST_FOOT_STEPS):
+        for _ in range(MOST_STATIONARY_STEPS):
             self._surface.D2(*at.tolist(), place, u, v, uu, vv, uv_)
             offset, by_u, by_v = (np.array(one.Coord()) for one in (place, u, v))
             offset -= point
@@ -111,13 +110,39 @@ class FaceSurface:
                 return None
             slope = np.array([offset @ by_u, offset @ by_v])
             full = first + np.array([[bend_uu, bend_uv], [bend_uv, bend_vv]])
-            # At a centre of curvature all directions are alike: the tangent plane decides.
+            # At a center of curvature all directions are alike: the tangent plane decides.
             flat = abs(np.linalg.det(full)) <= 1e-6 * scale
             step = -np.linalg.solve(first if flat else full, slope)
             at = np.clip(at + step, self._lowest, self._highest)
             if np.linalg.norm(step[0] * by_u + step[1] * by_v) <= settled:
                 return at
         return None
+
+
+def stationary_parameter(
+    curve: Occ, point: Floats, seed: float, ends: tuple[float, float], settled: float
+) -> float | None:
+    """Parameter of a stationary point of the distance from `point` (3,) to a curve, or None.
+
+    Between the parameters `ends`, next to `seed`; Newton's method ends with a step shorter than
+    `settled`.
+    """
+    place, first, second = gp_Pnt(), gp_Vec(), gp_Vec()
+    at = seed
+    for _ in range(MOST_STATIONARY_STEPS):
+        curve.D2(at, place, first, second)
+        offset, tangent = np.array(place.Coord()) - point, np.array(first.Coord())
+        square = float(tangent @ tangent)
+        bend = square + float(offset @ np.array(second.Coord()))
+        # Near a center of curvature, or at a place where the derivative vanishes.
+        bend = bend if abs(bend) > 1e-3 * square else square
+        if bend == 0.0:
+            return None
+        moved = min(max(at - float(offset @ tangent) / bend, ends[0]), ends[1])
+        if abs(moved - at) * square**0.5 <= settled:
+            return moved if ends[0] < moved < ends[1] else None
+        at = moved
+    return None
 
 
 def dot(a: Floats, b: Floats) -> Floats:

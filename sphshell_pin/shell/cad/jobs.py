@@ -7,18 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.cad.curved_error import hold_curvature
+from sphshell_pin.shell.cad.exact import TrimmedFaces
 from sphshell_pin.shell.cad.options import CadOptions
 from sphshell_pin.shell.cad.surface import load_cad
-from sphshell_pin.shell.cad.trimmed import TrimmedFaces
-from sphshell_pin.shell.cleaning import CleanedSurface, clean_surface
+from sphshell_pin.shell.cleaned import CleanedSurface
+from sphshell_pin.shell.cleaning import clean_surface
+from sphshell_pin.shell.converting import Conversion, exchange
 from sphshell_pin.shell.raw import Floats, Ints
-from sphshell_pin.shell.shell import Shell
 
 Alive = Callable[[], None]
 
@@ -39,26 +39,18 @@ def read(
 
     Returns the surface [m], the unit taken, and metres per unit of the file, `scale` included.
     """
-    del alive
     cad = load_cad(path, unit, options)
     raw = cad.polygons().noting(*cad.notes()).scaled(scale).noting(*notes)
     try:
         surface = clean_surface(raw)
     except InvalidShell as error:
         raise InvalidShell(f"{path}: {error}") from error
-
-    def make(of: CleanedSurface) -> Shell:
-        shell = Shell.__new__(Shell)
-        shell._set(of, crease_angle, "both", path.stem, str(path), cad.unit)
-        return shell
-
-    factor = cad.factor * scale
     if crease_angle > 0.0:
-        surface = hold_curvature(surface, cad, factor / cad.factor * cad.model.metres, make)
-    return surface, cad.unit, factor
+        surface = hold_curvature(surface, cad, scale * cad.model.metres, crease_angle)
+    return surface, cad.unit, cad.factor * scale
 
 
-def feet(
+def stationary_points(
     alive: Alive,
     path: Path,
     unit: str | None,
@@ -85,28 +77,27 @@ def feet(
     for k, (center, contact) in enumerate(zip(centers, contacts, strict=True)):
         if k % BETWEEN == 0:
             alive()
-        foot = faces.foot(center / metres, contact / metres)
-        if foot is None:
+        found = faces.stationary_point(center / metres, contact / metres)
+        if found is None:
             continue
-        points[k], kinds[k] = metres * foot.point, 1
-        if foot.normal is not None:
-            normals[k], kinds[k] = foot.normal, 2
+        points[k], kinds[k] = metres * found.point, 1
+        if found.normal is not None:
+            normals[k], kinds[k] = found.normal, 2
     return points, normals, kinds
 
 
 def convert(
     alive: Alive,
     source: Path,
-    written: Path,
+    target: Path,
     unit_in: str | None,
     unit_out: str | None,
     options: CadOptions,
-) -> tuple[Any, ...]:
+) -> Conversion:
     """Write the surface of one file to another, and measure; see `converting.exchange`."""
-    from sphshell_pin.shell.converting import exchange
-
-    del alive
-    return exchange(source, written, unit_in, unit_out, options)
+    return exchange(source, target, unit_in, unit_out, options)
 
 
-JOBS: dict[str, Callable[..., Any]] = {"read": read, "feet": feet, "convert": convert}
+JOBS: dict[str, Callable[..., object]] = {
+    one.__name__: one for one in (read, stationary_points, convert)
+}

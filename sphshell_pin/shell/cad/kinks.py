@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
@@ -14,6 +13,7 @@ from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideContinuity
 
 from sphshell_pin.shell.cad.face_surface import FaceSurface
 from sphshell_pin.shell.cad.model import CadFace, CadModel, faces_of
+from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.joints import TANGENT_ANGLE
 from sphshell_pin.shell.raw import Floats
 
@@ -52,7 +52,7 @@ def without_kinks(model: CadModel) -> tuple[CadModel, int]:
     return replace(model, faces=tuple(faces)), len(kinked)
 
 
-def _has_kink(face: Any) -> bool:
+def _has_kink(face: Occ) -> bool:
     """Whether the normal of a face jumps along one of its knots."""
     adaptor = BRepAdaptor_Surface(face)
     if GeomAbs_C0 not in (adaptor.UContinuity(), adaptor.VContinuity()):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Builder, BRep_Tool
@@ -19,6 +18,7 @@ from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Compound
 
 from sphshell_pin.errors import NameNotFound
+from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.units import HeaderUnit
 
 LARGEST = 1
@@ -33,7 +33,7 @@ class CadFace:
     it belongs to.
     """
 
-    shape: Any
+    shape: Occ
     name: str
     number: int
     body: int
@@ -56,7 +56,7 @@ class CadModel:
     path: Path
     faces: tuple[CadFace, ...]
     bodies: tuple[str, ...]
-    solids: tuple[Any, ...]
+    solids: tuple[Occ, ...]
     unit: HeaderUnit
     notes: tuple[str, ...] = ()
 
@@ -66,7 +66,7 @@ class CadModel:
         return self.unit.shape_metres
 
     @property
-    def shape(self) -> Any:
+    def shape(self) -> Occ:
         """All faces as one TopoDS_Compound; borders that faces share stay shared."""
         return compound([face.shape for face in self.faces])
 
@@ -99,7 +99,7 @@ class CadModel:
         return replace(self, faces=kept)
 
 
-def compound(shapes: Sequence[Any]) -> Any:
+def compound(shapes: Sequence[Occ]) -> Occ:
     """Return one TopoDS_Compound of several shapes."""
     builder, whole = BRep_Builder(), TopoDS_Compound()
     builder.MakeCompound(whole)
@@ -108,7 +108,7 @@ def compound(shapes: Sequence[Any]) -> Any:
     return whole
 
 
-def subshapes(shape: Any, kind: Any, avoid: Any = None) -> Iterator[Any]:
+def subshapes(shape: Occ, kind: Occ, avoid: Occ = None) -> Iterator[Occ]:
     """Walk the parts of `shape` of one kind, oriented and placed as they stand in it.
 
     With `avoid`, without those inside a part of that kind.
@@ -121,12 +121,12 @@ def subshapes(shape: Any, kind: Any, avoid: Any = None) -> Iterator[Any]:
         explorer.Next()
 
 
-def faces_of(shape: Any) -> list[Any]:
+def faces_of(shape: Occ) -> list[Occ]:
     """All faces of a shape, as TopoDS_Face."""
     return [TopoDS.Face(face) for face in subshapes(shape, TopAbs_FACE)]
 
 
-def count_open_edges(shape: Any) -> int:
+def count_open_edges(shape: Occ) -> int:
     """How many edges bound only one face, and that once."""
     owners = AncestorMap()
     TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, owners)
@@ -137,7 +137,7 @@ def count_open_edges(shape: Any) -> int:
     )
 
 
-def box_size(shape: Any) -> float:
+def box_size(shape: Occ) -> float:
     """Diagonal of the box round a shape [its units]; 0 if it is empty."""
     box = Bnd_Box()
     # The quick box may be far too large: it holds the poles of the splines.

@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 from sphshell_pin.checks import check_positive
 from sphshell_pin.errors import InvalidParameter, MissingExtra, UnusableExtra
+
+Occ: TypeAlias = Any
+"""An object of OpenCASCADE, whose binding has no types."""
 
 STEP_SUFFIXES = (".step", ".stp")
 IGES_SUFFIXES = (".iges", ".igs")

@@ -1,15 +1,16 @@
-"""OpenCASCADE in a process of its own: a file that makes it crash, hang or swell ends only that.
+"""OpenCASCADE in a process of its own: a file on which it crashes or hangs ends only that process.
 
 A child is started with the first CAD file; it imports OpenCASCADE, which takes a second, so it is
-kept for a minute, for the next file. One that has met a damaged file is not used again.
+kept for a minute, for the next file. One that has read a damaged file is not used again. The
+standard library's pools of processes run the caller's main module again, which a script without a
+guard does not survive, and leave a worker behind that hangs.
 """
 
 from __future__ import annotations
 
 import atexit
-import builtins
-import fcntl
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -21,9 +22,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from sphshell_pin import errors
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError, SphshellError
-from sphshell_pin.shell.cad.messages import ALIVE, pack, unpack
+from sphshell_pin.shell.cad.messages import ALIVE, unpack
 from sphshell_pin.shell.cad.options import CadOptions
 
 TIME_LIMIT = 600.0
@@ -36,10 +36,10 @@ KEPT = 60.0
 """How long a child is kept for the next file [s]; it ends by itself some seconds later."""
 
 ENDING = 2.0
-"""How long a child that answers no more is waited for [s]."""
+"""How long a child that no longer answers is waited for [s]."""
 
 LONGEST = 1e6
-"""Larger limits of time are taken for this one, which the system's timers can hold [s]."""
+"""Larger time limits are replaced by this one, which the system's timers can hold [s]."""
 
 LARGEST = 1 << 32
 """Of an answer [bytes]; two million triangles take a tenth."""
@@ -48,24 +48,24 @@ MOST_JOBS = 50
 """Of one child: OpenCASCADE does not give all memory back."""
 
 _ADVICE = (
-    "the file is damaged, or meets a defect of OpenCASCADE: check it in its CAD program, or export "
-    "it anew"
+    "the file is damaged, or triggers a defect of OpenCASCADE: check it in its CAD program, or "
+    "export it anew"
 )
 _NO_ANSWER = f"gets no valid answer from OpenCASCADE: {_ADVICE}"
 
 _START = """
 import signal
-signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's: it ends the child
+signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C: it ends the child
 import sys
-sys.path[:] = sys.argv[2:]
+sys.path[:] = sys.argv[1:]
 from sphshell_pin.shell.cad.child import serve
-serve(int(sys.argv[1]))
+serve()
 """
 
 
 def run_in_child(
-    job: str, arguments: tuple[Any, ...], path: Path, purpose: str, options: CadOptions
-) -> Any:
+    job: str, arguments: tuple[object, ...], path: Path, purpose: str, options: CadOptions
+) -> Any:  # what the job returns
     """Do a job of `jobs.JOBS` in a child, and return its result.
 
     path : of the file that is read, for messages; purpose : what needs OpenCASCADE
@@ -75,42 +75,44 @@ def run_in_child(
     SphshellError
         As the job raises it.
     ShellFileError
-        If OpenCASCADE crashes, or goes beyond the limits of time or memory of `options`.
+        If OpenCASCADE crashes, or exceeds the time or memory limit of `options`.
     """
     time_limit = TIME_LIMIT if options.time_limit is None else min(options.time_limit, LONGEST)
     memory_limit = MEMORY_LIMIT if options.memory_limit is None else options.memory_limit
-    request = pack((job, arguments, purpose, _folder(), time_limit, memory_limit))
+    try:
+        folder = os.getcwd()
+    except OSError:  # it was removed
+        folder = ""
+    request = pickle.dumps((job, arguments, purpose, folder, time_limit, memory_limit))
     child = _take()
     fine = False
     try:
-        answer = child.ask(request, time_limit)
+        try:
+            answer: Any = child.ask(request, time_limit)
+        except EOFError:
+            raise ShellFileError(path, child.why_ended(memory_limit)) from None
+        except ValueError:
+            raise ShellFileError(path, _NO_ANSWER) from None
         if answer is None:
             raise ShellFileError(
                 path,
                 f"takes OpenCASCADE more than the time limit of {time_limit:g} s: raise "
                 "time_limit, take a larger chord_error or fewer faces, or mend the file",
             )
-        try:
-            kind, *content, told = unpack(answer)
-        except ValueError:
-            raise ShellFileError(path, _NO_ANSWER) from None
-        for category, text in told:
-            _warn(category, text)
-        if kind == "done":
-            fine = True
-            return content[0]
-        if kind == "fault":
-            fault = _fault(*content)
-            fine = isinstance(fault, (InvalidParameter, NameNotFound))
-            raise fault
+        kind, content, caught = answer
+        for warning in caught:
+            _warn(warning)
+        if kind == "error":
+            fine = isinstance(content, (InvalidParameter, NameNotFound))
+            raise content
         if kind == "memory":
             raise ShellFileError(path, _short_of_memory(memory_limit))
-        reason, trace = content
-        cause = RuntimeError(f"in the CAD child:\n{trace}")
-        raise ShellFileError(path, f"makes OpenCASCADE fail ({reason}): {_ADVICE}") from cause
-    except EOFError:
-        why = child.why_ended(memory_limit)
-        raise ShellFileError(path, why) from None
+        if kind == "failed":
+            reason, trace = content
+            cause = RuntimeError(f"in the CAD child:\n{trace}")
+            raise ShellFileError(path, f"makes OpenCASCADE fail ({reason}): {_ADVICE}") from cause
+        fine = True
+        return content
     finally:
         if fine:
             child.keep()
@@ -125,26 +127,14 @@ class _Child:
         self.paths = [str(one) for one in sys.path]
         self.owner = os.getpid()
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the child)
-        # The child ends when the other end of this pipe closes, be it by SIGKILL.
-        ends = os.pipe()
-        # Not 0 to 2, which are free where this process has closed them: those are the child's own.
-        life, self._life = (fcntl.fcntl(one, fcntl.F_DUPFD_CLOEXEC, 3) for one in ends)
-        for one in ends:
-            os.close(one)
-        program = os.fsdecode(spawn.get_executable() or sys.executable)
-        try:
-            self._process = subprocess.Popen(
-                [program, "-P", "-c", _START, str(life), *self.paths],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=self._errors,
-                pass_fds=[life],
-            )
-        except OSError:
-            os.close(self._life)
-            raise
-        finally:
-            os.close(life)
+        # The child ends when its standard input closes, even if this process is killed.
+        self._process = subprocess.Popen(
+            [os.fsdecode(spawn.get_executable() or sys.executable), "-P", "-c", _START]
+            + self.paths,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+        )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._requests = Connection(os.dup(self._process.stdin.fileno()), readable=False)
@@ -153,10 +143,10 @@ class _Child:
         self._process.stdout.close()
         self._jobs, self._since = 0, 0.0
 
-    def ask(self, request: bytes, limit: float) -> bytes | None:
+    def ask(self, request: bytes, limit: float) -> object:
         """Return the answer, None if it takes more than `limit` [s].
 
-        Raises EOFError if the child ends before.
+        Raises EOFError if the child ends before, ValueError if the answer is damaged.
         """
         self._jobs += 1
         try:
@@ -164,13 +154,13 @@ class _Child:
             while self._answers.poll(limit):
                 answer = self._answers.recv_bytes(LARGEST)
                 if answer != ALIVE:
-                    return answer
+                    return unpack(answer)
         except OSError as error:
             raise EOFError from error
         return None
 
     def why_ended(self, memory_limit: float) -> str:
-        """Say why the child has ended, or answers no more."""
+        """Return why the child has ended, or no longer answers."""
         try:
             code = self._process.wait(ENDING)
         except subprocess.TimeoutExpired:
@@ -192,7 +182,7 @@ class _Child:
         )
 
     def usable(self) -> bool:
-        """Whether it is this process's own, runs, and may take another file."""
+        """Whether this process started it, and it runs and may read another file."""
         return (
             self.owner == os.getpid()
             and self.paths == [str(one) for one in sys.path]
@@ -210,11 +200,10 @@ class _Child:
             _idle.append(self)
 
     def end(self) -> None:
-        """End the process at once, unless it belongs to the process that this one was forked of."""
+        """End the process at once, unless this process is a fork of the one that started it."""
         self._requests.close()
         self._answers.close()
         self._errors.close()
-        os.close(self._life)
         if self.owner == os.getpid():
             self._process.kill()
             self._process.wait()
@@ -245,14 +234,6 @@ def _end_idle() -> None:
         _idle.pop().end()
 
 
-def _folder() -> str:
-    """Return the folder that relative paths start from, "" if it is gone."""
-    try:
-        return os.getcwd()
-    except OSError:
-        return ""
-
-
 def _short_of_memory(limit: float) -> str:
     return (
         f"takes OpenCASCADE more than the memory limit of {limit / 1e9:g} GB: raise memory_limit, "
@@ -260,20 +241,9 @@ def _short_of_memory(limit: float) -> str:
     )
 
 
-def _fault(name: str, text: str, named: tuple[tuple[str, Any], ...]) -> SphshellError:
-    """Return an error of the package as it was in the child."""
-    kind = getattr(errors, name, SphshellError)
-    error: SphshellError = kind.__new__(kind, text)
-    vars(error).update(named)
-    return error
-
-
-def _warn(name: str, text: str) -> None:
+def _warn(warning: Warning) -> None:
     """Give a warning of the child to the line that called the package."""
-    kind = getattr(errors, name, None) or getattr(builtins, name, None)
-    if not (isinstance(kind, type) and issubclass(kind, Warning)):
-        kind = UserWarning
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and frame.f_globals["__name__"].startswith("sphshell_pin."):
         level, frame = level + 1, frame.f_back
-    warnings.warn(text, kind, stacklevel=level)
+    warnings.warn(warning, stacklevel=level)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from OCP.BRep import BRep_Builder
 from OCP.BRepTools import BRepTools
@@ -27,6 +26,7 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.cad.framing import check_frame
 from sphshell_pin.shell.cad.model import CadFace, CadModel, compound, subshapes
+from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.units import NO_UNIT, iges_unit, step_unit
 
 IGES_FACES = (143, 144, 510)
@@ -40,8 +40,8 @@ _STEP_NAMES = re.compile(
 )
 """Names of faces and bodies: to find the entity of a shape takes long, so not without need."""
 
-Part = tuple[str, Any]
-Namer = Callable[[Any], str]
+Part = tuple[str, Occ]
+Namer = Callable[[Occ], str]
 
 
 def read_model(path: Path) -> CadModel:
@@ -89,7 +89,7 @@ def _read_step(path: Path, data: bytes) -> CadModel:
         _walk(label, TopLoc_Location(), parts)
     transfer = reader.ChangeReader().WS().TransferReader()
 
-    def name_of(shape: Any) -> str:
+    def name_of(shape: Occ) -> str:
         entity = transfer.EntityFromShapeResult(shape.Located(TopLoc_Location()), 1)
         text = entity.Name() if entity is not None and hasattr(entity, "Name") else None
         return "" if text is None else _name(text.ToCString())
@@ -100,7 +100,7 @@ def _read_step(path: Path, data: bytes) -> CadModel:
     return CadModel(path, faces, bodies, solids, unit, notes)
 
 
-def _walk(label: Any, location: Any, parts: list[Part]) -> None:
+def _walk(label: Occ, location: Occ, parts: list[Part]) -> None:
     """Gather the parts of an assembly, each where it stands."""
     if XCAFDoc_ShapeTool.IsReference_s(label):
         location = location.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label))
@@ -134,7 +134,7 @@ def _read_iges(path: Path, data: bytes) -> CadModel:
     shape = reader.OneShape()
     transfer = reader.WS().TransferReader()
 
-    def name_of(shape: Any) -> str:
+    def name_of(shape: Occ) -> str:
         entity = transfer.EntityFromShapeResult(shape, 1)
         text = entity.NameValue() if entity is not None and entity.HasName() else None
         return "" if text is None else _name(text.ToCString())
@@ -156,7 +156,7 @@ def _read_brep(path: Path, data: bytes) -> CadModel:
     return CadModel(path, faces, bodies, solids, NO_UNIT)
 
 
-def _no_name(_: Any) -> str:
+def _no_name(_: Occ) -> str:
     return ""
 
 
@@ -176,7 +176,7 @@ def _lost(held: int, faces: tuple[CadFace, ...]) -> tuple[str, ...]:
 
 def _sort(
     parts: list[Part], name_of: Namer
-) -> tuple[tuple[CadFace, ...], tuple[str, ...], tuple[Any, ...]]:
+) -> tuple[tuple[CadFace, ...], tuple[str, ...], tuple[Occ, ...]]:
     """Sort faces into bodies: each solid, each shell outside of solids, all loose faces of a part.
 
     Returns faces, names of the bodies and their shapes. Names of bodies are made unique; those of
@@ -184,7 +184,7 @@ def _sort(
     """
     faces: list[CadFace] = []
     bodies: list[str] = []
-    found: list[Any] = []
+    found: list[Occ] = []
     for part, shape in parts:
         solids = list(subshapes(shape, TopAbs_SOLID))
         shells = list(subshapes(shape, TopAbs_SHELL, TopAbs_SOLID))

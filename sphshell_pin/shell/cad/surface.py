@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin.shell.cad.face_mesh import FaceMesh
 from sphshell_pin.shell.cad.kinks import without_kinks
 from sphshell_pin.shell.cad.model import CadModel, box_size
 from sphshell_pin.shell.cad.options import CadOptions
 from sphshell_pin.shell.cad.reading import read_model
 from sphshell_pin.shell.cad.tessellation import Sewn, Tessellation, sew, tessellate
 from sphshell_pin.shell.cad.units import take_unit
-from sphshell_pin.shell.raw import RawSurface
+from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface, area_vectors
 
 CHORD_ERROR = 1e-3
 """Share of the box diagonal that the elements may be off the exact surface, unless said."""
@@ -48,7 +51,7 @@ class CadSurface:
 
     def notes(self) -> tuple[str, ...]:
         """Sentences about what was read and how near it was met."""
-        return (*self.model.notes, *_told(self))
+        return (*self.model.notes, *_notes(self))
 
     def polygons(self) -> RawSurface:
         """Triangles of all faces side by side [m], outer sides out; each face has its own points.
@@ -75,6 +78,44 @@ class CadSurface:
             faces=np.concatenate(faces),
             face_names=tuple(face.name for face in self.model.faces),
         )
+
+    @cached_property
+    def starts(self) -> Longs:
+        """(f + 1,) polygon with which each face begins."""
+        counts = [0 if mesh is None else len(mesh.triangles) for mesh in self.found.meshes]
+        return np.cumsum([0, *counts])
+
+    def face_of(self, polygons: Ints | Longs) -> Longs:
+        """(n,) face of each of the `polygons` (n,)."""
+        return np.searchsorted(self.starts, polygons, side="right") - 1
+
+    def locate(
+        self, polygons: Ints | Longs, points: Floats
+    ) -> Iterator[tuple[int, FaceMesh, Longs, Floats]]:
+        """Find the parameters of points (n, 3) near `polygons` (n,) [units of the model].
+
+        Yields, face by face: the face, its mesh, the rows (k,) of the points on it, and the
+        parameters (k, 2) at which these rows are.
+        """
+        face = self.face_of(polygons)
+        for one in np.unique(face).tolist():
+            mesh = self.found.meshes[one]
+            assert mesh is not None  # it has triangles
+            own = np.flatnonzero(face == one)
+            nodes = mesh.triangles[polygons[own] - self.starts[one]]
+            weights = corner_weights(mesh.points[nodes], points[own])
+            yield one, mesh, own, np.einsum("nk,nkx->nx", weights, mesh.parameters(nodes))
+
+
+def corner_weights(corners: Floats, points: Floats) -> Floats:
+    """Barycentric weights (n, 3) of points in the planes of their triangles (n, 3, 3)."""
+    spans = area_vectors(corners)
+    square = np.maximum(np.einsum("nx,nx->n", spans, spans), np.finfo(float).tiny)
+    offset, one, two = (place - corners[:, 0] for place in (points, corners[:, 1], corners[:, 2]))
+    second = np.einsum("nx,nx->n", np.cross(offset, two), spans) / square
+    third = np.einsum("nx,nx->n", np.cross(one, offset), spans) / square
+    weights = np.clip(np.stack([1.0 - second - third, second, third], axis=1), 0.0, 1.0)
+    return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12))
 
 
 def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
@@ -105,7 +146,7 @@ def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
     return CadSurface(whole, model, size, taken, sewn, found, stated)
 
 
-def _told(surface: CadSurface) -> list[str]:
+def _notes(surface: CadSurface) -> list[str]:
     """Say what was found about sewing and chord error."""
     model, sewn, found, stated = surface.model, surface.sewn, surface.found, surface.stated
     metres = model.metres

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
@@ -20,6 +19,7 @@ from OCP.TopoDS import TopoDS
 from sphshell_pin.errors import InvalidParameter, InvalidShell
 from sphshell_pin.shell.cad.face_mesh import FaceMesh, take_mesh
 from sphshell_pin.shell.cad.model import CadModel, count_open_edges
+from sphshell_pin.shell.cad.options import Occ
 
 ANGLE = 0.35
 """Neighbouring elements on a face turn by about this at most [rad]: less than the crease angle."""
@@ -74,8 +74,8 @@ class Sewn:
     model], open edges of the faces `before` and `after`.
     """
 
-    shape: Any
-    faces: tuple[Any, ...]
+    shape: Occ
+    faces: tuple[Occ, ...]
     tolerance: float
     before: int
     after: int
@@ -115,7 +115,7 @@ def sew(model: CadModel, size: float, tolerance: float | None) -> Sewn:
 
 
 def tessellate(
-    shape: Any, faces: tuple[Any, ...], size: float, chord_error: float, metres: float
+    shape: Occ, faces: tuple[Occ, ...], size: float, chord_error: float, metres: float
 ) -> Tessellation:
     """Lay triangles on all faces; refine until they are as near as asked, or no nearer.
 
@@ -148,7 +148,7 @@ def tessellate(
     return best
 
 
-def _lay(shape: Any, deflection: float) -> None:
+def _lay(shape: Occ, deflection: float) -> None:
     parameters = IMeshTools_Parameters()
     parameters.Deflection = parameters.DeflectionInterior = deflection
     parameters.Angle = parameters.AngleInterior = ANGLE
@@ -158,7 +158,7 @@ def _lay(shape: Any, deflection: float) -> None:
     BRepMesh_IncrementalMesh(shape, parameters)
 
 
-def _mesh(shape: Any, faces: tuple[Any, ...], deflection: float, target: float) -> Tessellation:
+def _mesh(shape: Occ, faces: tuple[Occ, ...], deflection: float, target: float) -> Tessellation:
     _lay(shape, deflection)
     meshes = _meet([take_mesh(face) for face in faces])
     interior = border = 0.0
@@ -203,7 +203,7 @@ def _meet(meshes: list[FaceMesh | None]) -> list[FaceMesh | None]:
 
 
 def _check_count(
-    shape: Any, faces: tuple[Any, ...], size: float, chord_error: float, metres: float
+    shape: Occ, faces: tuple[Occ, ...], size: float, chord_error: float, metres: float
 ) -> None:
     """Refuse what would take too many triangles, judged by how a coarse mesh bends."""
     coarse = 2e-3 * size

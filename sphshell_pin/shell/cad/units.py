@@ -6,12 +6,12 @@ import math
 import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from OCP.STEPConstruct import STEPConstruct_UnitContext
 from OCP.StepRepr import StepRepr_GlobalUnitAssignedContext
 
 from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, UnitWarning
+from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
 
 MILLIMETRE = 1e-3
@@ -43,7 +43,7 @@ class HeaderUnit:
 NO_UNIT = HeaderUnit((), 1.0, 1.0)
 
 
-def step_unit(model: Any) -> HeaderUnit:
+def step_unit(model: Occ) -> HeaderUnit:
     """Return the unit in which a STEP file (StepData_StepModel) gives its lengths.
 
     OpenCASCADE has brought the lengths to millimetres, each by the unit of its own context; where
@@ -67,7 +67,7 @@ def step_unit(model: Any) -> HeaderUnit:
     return HeaderUnit(tuple(map(_called, found)), metres, MILLIMETRE)
 
 
-def iges_unit(path: Path, header: Any) -> HeaderUnit:
+def iges_unit(path: Path, header: Occ) -> HeaderUnit:
     """Return the unit an IGES header (IGESData_GlobalSection) states.
 
     Raises

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from OCP.BRep import BRep_Builder
@@ -32,7 +32,7 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad.model import CadModel, compound
-from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES
+from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES, Occ
 from sphshell_pin.shell.cad.units import MILLIMETRE
 from sphshell_pin.units import metres_per_unit
 
@@ -49,7 +49,7 @@ IGES_UNITS = {"mm": "MM", "m": "M", "cm": "CM", "in": "IN", "ft": "FT", "km": "K
 BREP_OF_SOLIDS = 1
 """IGES entities of solids and shells, whose faces share their borders, not of loose faces."""
 
-Part = tuple[str, Any]
+Part = tuple[str, Occ]
 
 
 def parts_of(model: CadModel, whole: bool) -> list[Part]:
@@ -89,7 +89,7 @@ def write_cad(path: Path, parts: Sequence[Part], metres: float, unit: str) -> No
         raise ShellFileError(path, "cannot be written: is there such a folder, and room in it?")
 
 
-def faceted(shell: Shell) -> Any:
+def faceted(shell: Shell) -> Occ:
     """Return a shell as a solid, or an open shell, of planar faces [mm].
 
     Raises
@@ -108,7 +108,7 @@ def faceted(shell: Shell) -> Any:
     builder.MakeShell(whole)
     points = [gp_Pnt(*point) for point in (shell.vertices / MILLIMETRE).tolist()]
     vertices = [BRepBuilderAPI_MakeVertex(point).Vertex() for point in points]
-    edges: dict[tuple[int, int], Any] = {}
+    edges: dict[tuple[int, int], Occ] = {}
     first = np.searchsorted(shell.triangle_element, np.arange(shell.num_elements))
     normals = shell.triangle_normals[first]
     for row, normal in zip(shell.elements.tolist(), normals.tolist(), strict=True):
@@ -126,7 +126,7 @@ def faceted(shell: Shell) -> Any:
     return BRepBuilderAPI_MakeSolid(whole).Solid() if single else whole
 
 
-def _scaled(shape: Any, factor: float) -> Any:
+def _scaled(shape: Occ, factor: float) -> Occ:
     if abs(factor - 1.0) < 1e-12:
         return shape
     larger = gp_Trsf()

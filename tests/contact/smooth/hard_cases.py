@@ -28,7 +28,7 @@ DEPTH = 0.04
 
 def fails(why: str):
     """Mark of a test that the present code fails."""
-    return pytest.mark.xfail(strict=True, reason=why)
+    return pytest.mark.xfail(strict=True, raises=AssertionError, reason=why)
 
 
 def find(shell: Shell, center, radius: float = 1.0):

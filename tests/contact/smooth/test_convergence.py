@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
-from sphshell_pin.contact.contact_set import Feature
+from sphshell_pin.shell.contact_set import Feature
 from tests.contact.helpers import force_sum
 from tests.contact.smooth.surfaces import SIDES, SURFACES, can, shell_of, side_of
 
@@ -41,6 +41,7 @@ def order(name: str, depth: float, exact: bool) -> float:
     return float(np.polyfit(np.log(sides[used]), np.log(rms[used]), 1)[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", DEPTHS)
 @pytest.mark.parametrize("name", SURFACES)
 def test_order_with_exact_normals(name: str, depth: float) -> None:

@@ -148,9 +148,9 @@ def test_cost_of_a_concentric_sphere() -> None:
     for aside in (0.0, 0.01):
         times = []
         for _ in range(2):
-            start = time.perf_counter()
+            start = time.thread_time()
             shell.contacts([aside, 0.0, 0.0], 1.1, method="smooth")
-            times.append(time.perf_counter() - start)
+            times.append(time.thread_time() - start)
         costs.append(min(times))
     assert costs[0] <= 60 * costs[1]
 
@@ -192,6 +192,7 @@ def seat(columns: int, rows: int) -> Shell:
     return Shell(vertices, meshes._split(elements, np.zeros(len(elements), bool)), normals=normals)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("columns", "error"), [(32, 0.15), (64, 0.02), (128, 0.003)])
 def test_ball_in_a_countersink(columns: int, error: float) -> None:
     """Ball in a conical seat of 32, 64, 128 columns, touched round; of one to 15, 2, 0.3 %."""

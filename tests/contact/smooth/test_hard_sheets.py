@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
-from sphshell_pin.contact.contact_set import Feature
+from sphshell_pin.shell.contact_set import Feature
 from tests import meshes
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.hard_cases import (

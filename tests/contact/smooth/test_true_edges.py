@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
-from sphshell_pin.contact.contact_set import Feature
+from sphshell_pin.shell.contact_set import Feature
 from tests import meshes
 from tests.contact.helpers import energy, force_sum, positions, shell_of
 from tests.oracle.pieces import potential_and_force
@@ -191,6 +191,7 @@ POLYHEDRA = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [0.1, 0.4])
 @pytest.mark.parametrize("name", POLYHEDRA)
 def test_pieces_of_polyhedra(name: str, radius: float) -> None:

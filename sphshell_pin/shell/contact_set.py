@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.contact.laws import NormalLaw
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 
 Array = NDArray[np.float64]
@@ -38,17 +38,30 @@ class Method(IntEnum):
         raise NameNotFound("method", str(name), "the contact query", [m.name.lower() for m in cls])
 
 
+class ElasticLaw(Protocol):
+    """What a normal law tells of its elastic part, see `sphshell_pin.contact.NormalLaw`."""
+
+    def normal_force(self, depth: float) -> float:
+        """Force [N] at a depth [m]."""
+
+    def normal_stiffness(self, depth: float) -> float:
+        """Its derivative [N/m]."""
+
+    def energy(self, depth: float) -> float:
+        """Energy [J] at a depth [m]."""
+
+
 @dataclass(frozen=True)
 class ContactSet:
-    """Places of touch, deepest first, in the shell's frame.
+    """Contacts, deepest first, in the shell's frame.
 
     With k contacts: `point` (k, 3) on the shell [m]; `normal` (k, 3) unit, from the shell to the
-    sphere's centre; `depth` (k,) > 0 [m]; `element` (k,) row of shell.elements (of an edge or a
+    sphere's center; `depth` (k,) > 0 [m]; `element` (k,) row of shell.elements (of an edge or a
     vertex, one of those that share it); `patch` (k,) smooth piece of the surface; `feature` (k,)
     values of Feature; `weight` (k,) by which a contact's force counts: 1, but -1 at a saddle,
     where two components of the surface inside the sphere merge (method "smooth" only, where the
     sphere reaches a concave crease between them); `turn` (k, 3, 3), if asked for: derivative of
-    weight * normal with respect to the centre [1/m].
+    weight * normal with respect to the center [1/m].
 
     Minima that are nearly one, as beside the joint of two curved elements, are shown as one
     contact. `terms` are the minima and saddles themselves: force and energy are their sums.
@@ -73,19 +86,19 @@ class ContactSet:
         """Return the number of contacts."""
         return len(self.depth)
 
-    def force(self, law: NormalLaw) -> Array:
-        """Return the elastic push (3,) on the sphere [N], in the shell's frame: no damping."""
+    def force(self, law: ElasticLaw) -> Array:
+        """Return the elastic force (3,) on the sphere [N], in the shell's frame: no damping."""
         terms = self.terms
-        push = np.array([law.normal_force(depth) for depth in terms.depth])
-        return np.asarray((terms.weight * push) @ terms.normal)
+        magnitude = np.array([law.normal_force(depth) for depth in terms.depth])
+        return np.asarray((terms.weight * magnitude) @ terms.normal)
 
-    def energy(self, law: NormalLaw) -> float:
+    def energy(self, law: ElasticLaw) -> float:
         """Return the elastic energy [J]: `force` is minus its gradient."""
         terms = self.terms
         return float(terms.weight @ np.array([law.energy(depth) for depth in terms.depth]))
 
-    def force_gradient(self, law: NormalLaw) -> Array:
-        """Return the derivative (3, 3) of `force` with respect to the sphere's centre [N/m].
+    def force_gradient(self, law: ElasticLaw) -> Array:
+        """Return the derivative (3, 3) of `force` with respect to the sphere's center [N/m].
 
         Of contacts that were found with gradient=True; it is symmetric. With n the normal, t the
         turn and F the law's elastic force: the sum over `terms` of F t - F' weight n n^T.
@@ -93,12 +106,11 @@ class ContactSet:
         terms = self.terms
         if terms.turn is None:
             raise InvalidParameter(
-                "contacts", self, "know no turn: ask for them with gradient=True"
+                "contacts", self, "have no derivative: ask for them with gradient=True"
             )
-        total = np.zeros((3, 3))
-        for depth, normal, weight, turn in zip(
-            terms.depth, terms.normal, terms.weight, terms.turn, strict=True
-        ):
-            total += law.normal_force(depth) * turn
-            total -= law.normal_stiffness(depth) * weight * np.outer(normal, normal)
-        return total
+        force = np.array([law.normal_force(depth) for depth in terms.depth])
+        stiffness = np.array([law.normal_stiffness(depth) for depth in terms.depth])
+        return np.asarray(
+            np.einsum("k,kxy->xy", force, terms.turn)
+            - np.einsum("k,kx,ky->xy", stiffness * terms.weight, terms.normal, terms.normal)
+        )

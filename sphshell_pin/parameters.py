@@ -1,0 +1,205 @@
+"""One description of every ingredient: the fields of its dataclass say everything about it.
+
+Laws, friction, integrators and controllers are frozen dataclasses whose fields are made by
+`parameter`. From these follow the checks, the tables of scenario files (pydantic reads the same
+dataclasses and bounds), the labels, units and ranges of parameters that are varied, and the tables
+of the documentation.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+from sphshell_pin.checks import check_finite, check_type
+from sphshell_pin.errors import InvalidParameter
+
+_KEY = "parameter"
+# A field of the object in a unit, as in "N/m^{0.exponent:g}".
+_IN_UNIT = re.compile(r"\{0\.(\w+)[^}]*\}")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What is known of a parameter but its name, type and default."""
+
+    unit: str = ""
+    """Unit; "" for a pure number. `{0.exponent:g}` stands for a field of the object."""
+    label: str = ""
+    """A few words, as on a slider; by default its name."""
+    help: str = ""
+    """Meaning, in one line."""
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    log: bool | None = None
+    """Whether a slider multiplies (else it adds); None: it follows from the range."""
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        """Bounds as pydantic names them."""
+        all_ = {"gt": self.above, "ge": self.at_least, "le": self.at_most}
+        return {name: value for name, value in all_.items() if value is not None}
+
+    @property
+    def general_unit(self) -> str:
+        """Unit with the names of the fields that it depends on: "N/m^exponent"."""
+        return _IN_UNIT.sub(r"\1", self.unit)
+
+    def check(self, name: str, value: object) -> float:
+        """Return `value` as a float; raise InvalidParameter unless it lies within the bounds."""
+        number = check_finite(name, value)
+        low = self.above if self.above is not None else self.at_least
+        inside = (
+            (self.above is None or number > self.above)
+            and (self.at_least is None or number >= self.at_least)
+            and (self.at_most is None or number <= self.at_most)
+        )
+        if inside:
+            return number
+        unit = f" [{self.general_unit}]" if self.unit else ""
+        if self.at_most is not None:
+            bracket = "[" if self.above is None else "("
+            raise InvalidParameter(
+                name, value, f"must lie in {bracket}{low:g}, {self.at_most:g}]{unit}"
+            )
+        if low:
+            word = "be more than" if self.above is not None else "be at least"
+            raise InvalidParameter(name, value, f"must {word} {low:g}{unit}")
+        must = "must be positive" if self.above is not None else "must not be negative"
+        raise InvalidParameter(name, value, must + unit)
+
+
+def parameter(
+    default: Any = MISSING,
+    *,
+    unit: str = "",
+    help: str,
+    label: str = "",
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    log: bool | None = None,
+    **more: Any,
+) -> Any:
+    """Return the field of a dataclass that is a parameter.
+
+    The bounds hold for numbers; `more` is what pydantic takes for the field in a file
+    (`min_length`). A field that is not made by this function cannot be stated in a file.
+    """
+    about = Parameter(unit, label, help, above, at_least, at_most, log)
+    # Pydantic reads the bounds and the description in a field's metadata.
+    metadata = {_KEY: about, "description": help, **about.bounds, **more}
+    return field(default=default, metadata=metadata)
+
+
+def parameters_of(kind: object) -> dict[str, Parameter]:
+    """Return the parameters of a dataclass or of one of its objects, by name; {} of others."""
+    if not dataclasses.is_dataclass(kind):
+        return {}
+    return {f.name: f.metadata[_KEY] for f in dataclasses.fields(kind) if _KEY in f.metadata}
+
+
+@dataclass(frozen=True)
+class Ingredient:
+    """Base of what a scene, a run or a file is composed of.
+
+    A direct subclass is a family (`class NormalLaw(Ingredient)`). A class that belongs to it gives
+    its type name in files, `class ImpactLaw(NormalLaw, kind="impact")`. Another way to state one
+    names the family that it belongs to, `class Hertz(Ingredient, kind="hertz", of=NormalLaw)`, and
+    returns what it states by `made`; if its kind is taken, files state that kind in this way.
+    """
+
+    kind: ClassVar[str] = ""
+    """Type name in files and in the compiled core."""
+    kinds: ClassVar[dict[str, type[Ingredient]]] = {}
+    """What files may state of this family, by type name."""
+    # Pydantic's settings for these dataclasses.
+    __pydantic_config__: ClassVar[Mapping[str, Any]] = {
+        "extra": "forbid",
+        "allow_inf_nan": False,
+        "arbitrary_types_allowed": True,
+    }
+
+    def __init_subclass__(cls, *, kind: str = "", of: type[Ingredient] | None = None) -> None:
+        """Register the class under its type name."""
+        super().__init_subclass__()
+        if Ingredient in cls.__bases__ and of is None:
+            cls.kinds = {}
+        if kind:
+            cls.kind = kind
+            (cls if of is None else of).kinds[kind] = cls
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for a value that is no number or outside its bounds."""
+        for one in dataclasses.fields(self):
+            about, value = one.metadata.get(_KEY), getattr(self, one.name)
+            if about is None or (value is None and one.default is None):
+                continue
+            if one.type in ("float", "float | None"):
+                object.__setattr__(self, one.name, about.check(one.name, value))
+            elif one.type == "bool":
+                check_type(one.name, value, bool, "must be True or False")
+
+    def unit_of(self, name: str) -> str:
+        """Return the unit of the parameter called `name`; "" for a pure number."""
+        return parameters_of(self)[name].unit.format(self)
+
+    def numbers(self) -> list[float]:
+        """Return the parameters in their order, as the compiled core takes them."""
+        return [float(getattr(self, name)) for name in parameters_of(self)]
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Files that this names, as it names them: relative to the scenario."""
+        return ()
+
+    def made(self, folder: Path = Path()) -> Any:
+        """Return what this states; `folder` is where its files are. By default itself."""
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the C++ binding, which is made again: what pickle and copy take."""
+        return {k: v for k, v in self.__dict__.items() if k != "core"}
+
+
+def table(kind: type[Ingredient]) -> str:
+    """Return the parameters of a class as a table of the documentation (Markdown)."""
+    lines = [f"| parameter of `{kind.__name__}` | unit | default | meaning |", "|---|---|---|---|"]
+    about = parameters_of(kind)
+    for one in dataclasses.fields(kind):
+        if one.name in about:
+            default = _shown(one.default)
+            unit = about[one.name].general_unit or ("1" if one.type == "float" else "")
+            lines.append(f"| `{one.name}` | {unit} | {default} | {about[one.name].help} |")
+    return "\n".join(lines) + "\n"
+
+
+def table_row(kind: type[Ingredient]) -> str:
+    """Return what a file may state of a class, as a row of the documentation (Markdown).
+
+    Names of keys that must be given are bold.
+    """
+    keys = []
+    about = parameters_of(kind)
+    for one in dataclasses.fields(kind):
+        if one.name not in about:
+            continue
+        key = f"**`{one.name}`**" if one.default is MISSING else f"`{one.name}`"
+        default = _shown(one.default)
+        unit = about[one.name].general_unit
+        keys.append(key + (f" = {default}" if default else "") + (f" [{unit}]" if unit else ""))
+    return f"| `{kind.kind}` | {', '.join(keys)} |\n"
+
+
+def _shown(default: object) -> str:
+    """Return a default as a file states it; "" where there is none."""
+    if default is MISSING or default is None:
+        return ""
+    if isinstance(default, bool):
+        return str(default).lower()
+    return f"{default:g}" if isinstance(default, float) else f'"{default}"'

@@ -1,0 +1,175 @@
+"""The arrays of a shell and its compiled core."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from functools import cached_property
+from typing import Self, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from sphshell_pin import _core
+from sphshell_pin.checks import read_only
+from sphshell_pin.shell.cleaned import CleanedSurface
+from sphshell_pin.shell.health import ShellHealth
+from sphshell_pin.shell.options import SIDES, check_size
+from sphshell_pin.shell.raw import Bytes, Floats, Ints, Mask
+
+Scalar = TypeVar("Scalar", np.float64, np.int32, np.bool_)
+
+
+class ShellBase:
+    """A cleaned surface and the compiled one that queries run on; `Shell` has the attributes."""
+
+    name: str
+    side: str
+    crease_angle: float
+    source: str | None
+    unit: str | None
+    vertices: Floats
+    elements: Ints
+    triangles: Ints
+    triangle_element: Ints
+    normals: Floats | None
+    source_element: Ints
+    element_face: Ints | None
+    face_names: tuple[str, ...]
+    straight: Mask | None
+    box: Floats
+    size: float
+    health: ShellHealth
+    core: _core.Shell
+
+    @classmethod
+    def from_surface(
+        cls,
+        surface: CleanedSurface,
+        crease_angle: float,
+        side: str = "both",
+        name: str = "shell",
+        source: str | None = None,
+        unit: str | None = None,
+    ) -> Self:
+        """Build a shell of a surface that is clean; the options are not checked."""
+        shell = cls.__new__(cls)
+        shell._set(surface, crease_angle, side, name, source, unit)
+        return shell
+
+    def _set(
+        self,
+        surface: CleanedSurface,
+        crease_angle: float,
+        side: str,
+        name: str,
+        source: str | None = None,
+        unit: str | None = None,
+    ) -> None:
+        self.name, self.side, self.source, self.unit = str(name), side, source, unit
+        self.crease_angle = float(crease_angle)
+        vertices = np.ascontiguousarray(surface.vertices, np.float64)
+        triangles = np.ascontiguousarray(surface.triangles, np.int32)
+        triangle_element = np.ascontiguousarray(surface.triangle_element, np.int32)
+        self.elements = _owned(surface.elements, np.int32)
+        self.source_element = _owned(surface.source_element, np.int32)
+        self.normals = _owned_if(surface.normals, np.float64)
+        self.element_face = _owned_if(surface.element_face, np.int32)
+        self.face_names = tuple(surface.face_names)
+        self.straight = None if surface.straight is None else read_only(surface.straight.copy())
+        # Without cleaning there may be vertices no element uses.
+        in_use = np.zeros(len(vertices), np.bool_)
+        in_use[triangles] = True
+        corners = vertices if in_use.all() else vertices[in_use]
+        self.box = read_only(np.stack([corners.min(axis=0), corners.max(axis=0)]))
+        self.size = float(np.linalg.norm(self.box[1] - self.box[0]))
+        check_size(self.size)
+        self.health = surface.health.labelled(name=self.name, size=self.size)
+        # The CAD face of each triangle and the corner normals say what is smooth.
+        faces, normals = None, None
+        if self.element_face is not None and self.normals is not None and self.crease_angle > 0.0:
+            faces, normals = self.element_face[triangle_element], self.normals.reshape(-1, 3)
+        self.core = _core.Shell(
+            vertices,
+            triangles,
+            triangle_element,
+            self.crease_angle,
+            SIDES.index(side),
+            faces,
+            normals,
+        )
+        # The compiled surface has its own copies: these are views of them.
+        self.vertices = self.core.vertices
+        self.triangles = self.core.triangles
+        self.triangle_element = self.core.triangle_element
+
+    def surface(self) -> CleanedSurface:
+        """Return the arrays that the shell is made of."""
+        held = {one.name: getattr(self, one.name) for one in fields(CleanedSurface)}
+        return CleanedSurface(**held)
+
+    def core_for(self, method: str) -> _core.Shell:
+        """Return the compiled surface, with curved elements if `method` is "smooth"."""
+        if method == "smooth":
+            # With no smooth edges every element is flat, whatever normals came with it.
+            given = self.normals if self.crease_angle > 0 else None
+            exact = self.element_face is not None  # CAD's own
+            straight = None if self.straight is None else self.straight.ravel().view(np.uint8)
+            self.core.curve(None if given is None else given.reshape(-1, 3), exact, straight)
+        return self.core
+
+    @property
+    def num_elements(self) -> int:
+        """Number of elements."""
+        return int(self.core.num_elements)
+
+    @property
+    def num_patches(self) -> int:
+        """Number of patches: elements connected through smooth edges."""
+        return int(self.core.num_patches)
+
+    @property
+    def num_edges(self) -> int:
+        """Number of edges; the diagonal inside a quad is none."""
+        return int(self.core.num_edges)
+
+    @cached_property
+    def element_patch(self) -> Ints:
+        """(m,) patch of each element."""
+        return read_only(self.core.element_patch)
+
+    @cached_property
+    def edge_vertices(self) -> Ints:
+        """(E, 2) ends of each edge."""
+        return read_only(self.core.edge_vertices)
+
+    @cached_property
+    def edge_class(self) -> Bytes:
+        """(E,) 0 smooth, 1 crease, 2 boundary, 3 non-manifold."""
+        return read_only(self.core.edge_class)
+
+    @cached_property
+    def edge_angle(self) -> Floats:
+        """(E,) turn of each edge [rad], positive where convex."""
+        return read_only(self.core.edge_angle)
+
+    @cached_property
+    def triangle_normals(self) -> Floats:
+        """(t, 3) unit normals by winding."""
+        return read_only(self.core.triangle_normals)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Everything but the compiled surface, which is made again."""
+        options = ("crease_angle", "side", "name", "source", "unit")
+        return {"surface": self.surface(), **{one: getattr(self, one) for one in options}}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Rebuild from arrays that are clean already."""
+        self._set(**state)  # type: ignore[arg-type]
+
+
+def _owned(array: npt.NDArray[Scalar], kind: type[Scalar]) -> npt.NDArray[Scalar]:
+    return read_only(np.ascontiguousarray(array, kind))
+
+
+def _owned_if(array: npt.NDArray[Scalar] | None, kind: type[Scalar]) -> npt.NDArray[Scalar] | None:
+    return None if array is None else _owned(array, kind)

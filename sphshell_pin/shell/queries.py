@@ -1,0 +1,116 @@
+"""Queries of a shell: contacts with spheres, and closest points."""
+
+from __future__ import annotations
+
+import numpy.typing as npt
+
+from sphshell_pin.checks import (
+    check_each_positive,
+    check_flag,
+    check_points,
+    check_positive,
+    check_vector,
+    read_only,
+)
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.shell.base import ShellBase
+from sphshell_pin.shell.closest_points import ClosestPoints
+from sphshell_pin.shell.contact_set import ContactSet, Method
+from sphshell_pin.shell.options import thread_count
+from sphshell_pin.shell.raw import Bytes, Floats, Ints
+
+Columns = tuple[Floats, Floats, Floats, Ints, Bytes, Floats, Floats]
+
+
+class Queries(ShellBase):
+    """What a sphere or a point can ask a shell."""
+
+    def contacts(
+        self,
+        center: npt.ArrayLike,
+        radius: float,
+        method: str = "smooth",
+        gradient: bool = False,
+    ) -> ContactSet:
+        """Find every place where a sphere touches, deepest first.
+
+        Parameters
+        ----------
+        center : (3,) of the sphere, in the shell's frame [m]
+        radius : of the sphere [m]
+        method : "smooth" (elements curved to meet the vertex normals; a connected piece of surface
+            inside the sphere counts once), "facets" (each true feature of the polyhedron once) or
+            "elements" (every touched element by itself, as ADAMS's SPHSHL3 has it: counts shared
+            edges twice)
+        gradient : also find how the normals turn as the sphere moves, for
+            `ContactSet.force_gradient`; not with "elements"
+
+        Raises
+        ------
+        InvalidParameter, NameNotFound
+            If center or radius is out of range, or the method unknown.
+        """
+        place = check_vector("center", center, 3, " [m]")
+        radius = check_positive("radius", radius, "m")
+        number = Method.from_name(method)
+        gradient = check_flag("gradient", gradient)
+        if gradient and number is Method.ELEMENTS:
+            raise InvalidParameter("gradient", gradient, "is not known with method 'elements'")
+        shown, terms = self.core_for(method).contacts(place, radius, int(number), gradient)
+        summed = None if terms is None else self._contact_set(terms, gradient)
+        return self._contact_set(shown, gradient, summed)
+
+    def _contact_set(
+        self, columns: Columns, gradient: bool, summed: ContactSet | None = None
+    ) -> ContactSet:
+        point, normal, depth, element, feature, weight, turn = columns
+        for column in (*columns, patch := self.element_patch[element]):
+            read_only(column)
+        turned = turn if gradient else None
+        return ContactSet(point, normal, depth, element, patch, feature, weight, turned, summed)
+
+    def contacts_batch(
+        self,
+        centers: npt.ArrayLike,
+        radii: npt.ArrayLike | float,
+        method: str = "smooth",
+        threads: int | None = None,
+    ) -> tuple[Floats, Ints]:
+        """Find the contacts of many spheres at once.
+
+        Parameters
+        ----------
+        centers : (n, 3) in the shell's frame [m]
+        radii : (n,) or one number [m]
+        method : as of `contacts`
+        threads : how many to use; all processors unless given. The results do not depend on it
+
+        Returns
+        -------
+        depth (n,) : the largest of each sphere [m], 0 if it does not touch
+        count (n,) : how many contacts it has
+
+        Raises
+        ------
+        InvalidParameter, NameNotFound
+            If centers or radii are out of range, or the method unknown.
+        """
+        places = check_points("centers", centers)
+        sizes = check_each_positive("radii", radii, len(places), "m")
+        workers, number = thread_count(threads), Method.from_name(method)
+        depth, count = self.core_for(method).contacts_batch(places, sizes, int(number), workers)
+        return depth, count
+
+    def closest_points(
+        self, points: npt.ArrayLike, threads: int | None = 1, method: str = "smooth"
+    ) -> ClosestPoints:
+        """Project points (n, 3) [m] of the shell's frame on the surface.
+
+        On that of the method "smooth", or else on the flat elements. Raises InvalidParameter if
+        the points are out of range, NameNotFound if the method is unknown.
+        """
+        smooth = Method.from_name(method) is Method.SMOOTH
+        places = check_points("points", points)
+        core = self.core_for(method)
+        found = core.closest_points(places, smooth, thread_count(threads))
+        return ClosestPoints(*(read_only(column) for column in found))

@@ -1,0 +1,114 @@
+"""One description of each ingredient: checks, files, C++ and documents follow from it."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, dataclass, fields
+from pathlib import Path
+
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from sphshell_pin import _core
+from sphshell_pin.contact import Friction, NormalLaw
+from sphshell_pin.dynamics.controllers import Controller
+from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.parameters import Ingredient, parameter, parameters_of, table, table_row
+
+FAMILIES = {"law": NormalLaw, "friction": Friction, "controller": Controller, "run": Integrator}
+
+
+def concrete(family: type[Ingredient]) -> list[type[Ingredient]]:
+    """Return the classes of a family without the other ways to state them."""
+    own = [one for base in family.__subclasses__() for one in concrete(base)]
+    return own + [family] * ("kind" in vars(family))
+
+
+KINDS = [kind for family in FAMILIES.values() for kind in family.kinds.values()]
+DOCS = Path(__file__).parent.parent / "docs"
+
+
+@dataclass(frozen=True)
+class Spring(Ingredient):
+    """An ingredient of every kind of bounds."""
+
+    stiffness: float = parameter(above=0, unit="N/m^{0.exponent:g}", help="k")
+    exponent: float = parameter(1.5, above=1, help="e")
+    damping: float = parameter(0.0, at_least=0, unit="N s/m", help="c")
+    share: float | None = parameter(None, above=0, at_most=1, help="s")
+    twist: bool = parameter(False, help="t")
+    note: str | None = None
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"stiffness": 0}, r"stiffness = 0 must be positive \[N/m\^exponent\]"),
+        ({"stiffness": "1"}, "stiffness = '1' must be a number"),
+        ({"stiffness": float("nan")}, "must be finite"),
+        ({"exponent": 1.0}, "exponent = 1.0 must be more than 1"),
+        ({"damping": -1}, r"damping = -1 must not be negative \[N s/m\]"),
+        ({"share": 1.5}, r"share = 1.5 must lie in \(0, 1\]"),
+        ({"twist": 1}, "must be True or False"),
+    ],
+)
+def test_a_value_is_checked_against_its_description(values, said):
+    with pytest.raises(InvalidParameter, match=said) as caught:
+        Spring(**{"stiffness": 1.0, **values})
+    assert caught.value.name == next(iter(values))
+
+
+def test_units_may_depend_on_other_values():
+    spring = Spring(2)
+    assert spring.stiffness.hex() == (2.0).hex()
+    assert spring.unit_of("stiffness") == "N/m^1.5"
+    assert parameters_of(spring)["stiffness"].general_unit == "N/m^exponent"
+    assert Spring(2, share=1, twist=True).numbers() == [2.0, 1.5, 0.0, 1.0, 1.0]
+
+
+def test_pydantic_reads_the_same_description():
+    adapter = TypeAdapter(Spring)
+    assert adapter.validate_python({"stiffness": 1}) == Spring(1.0)
+    for wrong in ({"stiffness": -1}, {"stiffness": 1, "share": 2}, {"stiffness": 1, "k": 2}):
+        with pytest.raises(ValidationError):
+            adapter.validate_python(wrong)
+    schema = adapter.json_schema()["properties"]["stiffness"]
+    assert schema["exclusiveMinimum"] == 0
+    assert schema["description"] == "k"
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_every_parameter_is_described(kind):
+    for one in fields(kind):
+        about = parameters_of(kind).get(one.name)
+        if about is None:
+            assert one.default is not MISSING, "what no file can state has a default"
+            continue
+        assert about.help
+        assert "\n" not in about.help
+        if one.type == "float":
+            assert about.bounds, f"{one.name} has no bounds"
+
+
+@pytest.mark.parametrize(
+    ("family", "core"), [(NormalLaw, _core.NormalLaw), (Friction, _core.FrictionLaw)]
+)
+def test_the_compiled_core_has_the_same_kinds(family, core):
+    own = {one.kind for one in concrete(family)}
+    assert {kind for kind in core.kinds() if kind != "none"} == own
+    with pytest.raises(ValueError, match="unknown kind 'x'"):
+        core("x", [])
+
+
+@pytest.mark.parametrize("family", [NormalLaw, Friction], ids=lambda kind: kind.__name__)
+def test_the_documents_have_the_tables_of_the_descriptions(family):
+    page = (DOCS / "laws.md").read_text(encoding="utf-8")
+    for kind in concrete(family):
+        assert table(kind) in page, f"docs/laws.md: a table is now\n{table(kind)}"
+
+
+@pytest.mark.parametrize("family", ["law", "friction", "controller"])
+def test_the_reference_of_scenario_files_has_the_keys_of_the_descriptions(family):
+    page = (DOCS / "scenarios.md").read_text(encoding="utf-8")
+    for kind in FAMILIES[family].kinds.values():
+        assert table_row(kind) in page, f"docs/scenarios.md: a row is now\n{table_row(kind)}"
