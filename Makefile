@@ -7,6 +7,8 @@ BIN := $(VENV)/bin
 SOURCES := CMakeLists.txt pyproject.toml $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 OUT ?= results
+# Modules are compiled once, and not in every process of the tests.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick bench hard-cases work-precision lint format report robots sweep-survival kills rollouts real-surfaces wheel docs fuzz sanitize clean
