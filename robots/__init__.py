@@ -6,19 +6,18 @@ import os
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.errors import MissingExtra, NameNotFound, SphshellError
 from sphshell_pin.robots.description import read_model
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-    from sphshell_pin import Sphere
 
 URDF_FOLDER = Path(__file__).parent / "urdf"
 
@@ -58,12 +57,9 @@ class LoadedRobot:
     """A robot ready for a Scene: its model, its geometry, a posture to start from."""
 
     name: str
-    model: Any
-    """pinocchio.Model."""
-    collision_model: Any
-    """pinocchio.GeometryModel."""
-    visual_model: Any
-    """pinocchio.GeometryModel."""
+    model: pin.Model
+    collision_model: pin.GeometryModel
+    visual_model: pin.GeometryModel
     q0: npt.NDArray[np.float64]
     """A posture (nq,): the robot's reference posture where it has one, else neutral."""
 
@@ -154,8 +150,6 @@ def fingertips(name: str) -> list[Sphere]:
     They are the sphere collision geometries of links that carry no further joint, else those of a
     small table of well-known robots; an empty list where neither is known.
     """
-    from sphshell_pin import Sphere
-
     if name in TIPS:
         return [Sphere(radius, frame, np.array(offset)) for frame, radius, offset in TIPS[name]]
     return end_spheres(load(name))
@@ -163,8 +157,6 @@ def fingertips(name: str) -> list[Sphere]:
 
 def end_spheres(robot: LoadedRobot) -> list[Sphere]:
     """Return the sphere collision geometries of the links of `robot` without a further joint."""
-    from sphshell_pin import Sphere
-
     parents = {int(parent) for parent in robot.model.parents}
     tips = []
     for geometry in robot.collision_model.geometryObjects:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO
 
 from sphshell_pin.atomic.lock import lock_file
+from sphshell_pin.errors import ResultError
 
 
 @contextlib.contextmanager
@@ -40,6 +41,24 @@ def atomic_path(path: str | PathLike[str], suffix: str) -> Iterator[Path]:
     """
     with _aside(path, suffix) as (_, part):
         yield part
+
+
+def write_whole(path: str | PathLike[str], data: bytes) -> Path:
+    """Write `data` as the file at `path`, in folders that are made; return the path.
+
+    Raises
+    ------
+    ResultError
+        It cannot be written; the file that was there stays.
+    """
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_file(path) as file:
+            file.write(data)
+    except OSError as fault:
+        raise ResultError(path, f"cannot be written ({fault.strerror})") from fault
+    return path
 
 
 @contextlib.contextmanager

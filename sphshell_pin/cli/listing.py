@@ -14,17 +14,15 @@ def list_(context: typer.Context) -> None:
     Example: sphshell-pin list
     """
     with faults(context):
-        import importlib
-
+        from sphshell_pin.robots import OWN, names
         from sphshell_pin.scenario import read_scenario, shipped_scenarios
 
-        robots = importlib.import_module("sphshell_pin.robots")
         console = terminal()
         table = make_table("scenario")
         table.add_column("what it shows")
         for name, path in shipped_scenarios().items():
             table.add_row(name, plain(read_scenario(path).title))
         console.print(table)
-        console.print(f"[bold]robots[/bold]: {', '.join(robots.names())}", highlight=False)
-        if len(robots.names()) == len(robots.OWN):
+        console.print(f"[bold]robots[/bold]: {', '.join(names())}", highlight=False)
+        if len(names()) == len(OWN):
             console.print("More robots: pip install 'sphshell-pin\\[robots]'", highlight=False)

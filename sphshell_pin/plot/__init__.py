@@ -6,10 +6,11 @@ Figures are made without pyplot: no window, no global state, any thread.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.plot.contact_map import QUANTITIES, plot_contact_map
+from sphshell_pin.plot.contact_path import plot_contact_path
 from sphshell_pin.plot.figure import NO_CONTACT, write_figure
 from sphshell_pin.plot.over_time import (
     MOST_PAIRS,
@@ -17,12 +18,12 @@ from sphshell_pin.plot.over_time import (
     plot_force_and_depth,
     plot_overview,
 )
-from sphshell_pin.plot.paths import plot_contact_path
-from sphshell_pin.plot.scenes import scene_of
 from sphshell_pin.plot.series import MOST_POINTS, PairSeries
 
 if TYPE_CHECKING:
     from os import PathLike
+
+    from matplotlib.figure import Figure
 
     from sphshell_pin.dynamics.result import Result
     from sphshell_pin.dynamics.scene import Scene
@@ -46,7 +47,7 @@ __all__ = [
 KINDS = ("overview", "force", "energy", "path", "map")
 
 
-def plot_result(result: Result, kind: str = "overview", scene: Scene | None = None) -> Any:
+def plot_result(result: Result, kind: str = "overview", scene: Scene | None = None) -> Figure:
     """Return one matplotlib Figure of `result`.
 
     `kind` is one of KINDS: force, depth and energy over time ("overview"), force and depth of each
@@ -71,6 +72,19 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
     return over_time[kind](result)
 
 
+def scene_of(result: Result, scene: Scene | None = None) -> Scene | None:
+    """Return `scene`, or the one that ran, or that of the scenario that `result` came from.
+
+    None if there is none of them; ResultError if the scenario cannot be built again.
+    """
+    scene = result.scene if scene is None else scene
+    if scene is not None or result.origin is None:
+        return scene
+    from sphshell_pin.scenario.replay import Replay
+
+    return Replay(result).scene
+
+
 def save_figures(
     result: Result, folder: str | PathLike[str], scene: Scene | None = None
 ) -> list[Path]:
@@ -90,8 +104,4 @@ def save_figures(
     touched = {int(pair) for pair in result.contacts.pair}
     if scene is not None and any(scene.pairs[pair].shell is not None for pair in touched):
         figures["contact_map.png"] = plot_contact_map(result, scene)
-    paths = []
-    for name, figure in figures.items():
-        path = Path(folder) / name
-        paths.append(write_figure(path, figure))
-    return paths
+    return [write_figure(Path(folder) / name, figure) for name, figure in figures.items()]

@@ -1,55 +1,96 @@
-"""An empty figure, and what every picture shares."""
+"""An empty figure, what every picture shares, and the units of its axes."""
 
 from __future__ import annotations
 
+import functools
 import io
-from importlib import import_module
+import math
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
-from sphshell_pin.atomic import atomic_file
-from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.atomic import write_whole
+from sphshell_pin.errors import MissingExtra
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 NO_CONTACT = "No contact in this run."
 RESOLUTION = 130  # dots per inch of the files
+INK = "#101418"
+_PREFIXES = {3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 
 
 def new_figure(
     width: float, height: float, layout: Literal["constrained", "compressed"] = "constrained"
-) -> Any:
+) -> Figure:
     """Return an empty Figure of `width` by `height` inches, made without pyplot.
 
     Raises MissingExtra without matplotlib.
     """
     try:
-        import_module("matplotlib.figure")
+        from matplotlib.figure import Figure
     except ImportError as missing:
         raise MissingExtra("matplotlib", "view", "a figure") from missing
-    from sphshell_pin.plot.shown import ShownFigure
+    figure = Figure(figsize=(width, height), layout=layout)
+    # A notebook shows it where it is the value of a cell, whatever backend it has.
+    figure._repr_png_ = functools.partial(png, figure, 100)  # type: ignore[attr-defined]
+    return figure
 
-    return ShownFigure(figsize=(width, height), layout=layout)
+
+def png(figure: Figure, dpi: int = RESOLUTION) -> bytes:
+    """Return `figure` as a .png file."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=dpi)
+    return stream.getvalue()
 
 
-def write_figure(path: str | PathLike[str], figure: Any) -> Path:
+def write_figure(path: str | PathLike[str], figure: Figure) -> Path:
     """Write `figure` as a .png file, whole or not at all; ResultError if it cannot be written."""
-    path, picture = Path(path), io.BytesIO()
-    figure.savefig(picture, format="png", dpi=RESOLUTION)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_file(path) as file:
-            file.write(picture.getbuffer())
-    except OSError as fault:
-        raise ResultError(path, f"cannot be written ({fault.strerror})") from fault
-    return path
+    return write_whole(path, png(figure))
 
 
-def say(axis: Any, sentence: str) -> None:
+def reading_unit(largest: float, base: str) -> tuple[float, str]:
+    """Return factor and name of the unit in which `largest` [base: m, N, s, J] reads well."""
+    if not 0.0 < largest < math.inf:
+        return 1.0, base
+    exponent = max(-9, 3 * math.floor((math.log10(largest) + 1.0) / 3.0))
+    if base == "m" and 0.1 <= largest < 1.0:
+        exponent = -3  # 300 mm, but 0.3 N
+    if exponent > 0:
+        exponent = 3 if base in ("N", "J") and largest >= 1e4 else 0
+    return 10.0**-exponent, _PREFIXES[exponent] + base
+
+
+def label_axis(axis: Axes, quantity: str, base: str, largest: float) -> float:
+    """Label the y axis with `quantity` and the unit for `largest` [base]; return its factor."""
+    factor, unit = reading_unit(largest, base)
+    axis.set_ylabel(f"{quantity} [{unit}]")
+    return factor
+
+
+def finish_axis(axis: Axes, *, legend: bool = False) -> None:
+    """Draw the grid that all figures have, and a `legend`."""
+    axis.grid(True, alpha=0.3, linewidth=0.6)
+    if legend:
+        axis.legend(loc="best", fontsize=8, framealpha=0.85)
+
+
+def say(axis: Axes, sentence: str) -> None:
     """Write `sentence` in the middle of an empty `axis`."""
     axis.text(
         0.5, 0.5, sentence, transform=axis.transAxes, ha="center", va="center", color="#555555"
     )
     axis.set_yticks([])
+
+
+def only_say(title: str, sentence: str) -> Figure:
+    """Return a figure of nothing but a `sentence`."""
+    figure = new_figure(9.0, 5.0)
+    say(figure.subplots(), sentence)
+    figure.suptitle(title, fontsize=12)
+    return figure
 
 
 def count(number: int, one: str, many: str) -> str:

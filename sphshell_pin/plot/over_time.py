@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.plot.figure import NO_CONTACT, count, new_figure, say
+from sphshell_pin.plot.figure import (
+    NO_CONTACT,
+    count,
+    finish_axis,
+    label_axis,
+    new_figure,
+    say,
+)
 from sphshell_pin.plot.series import FloatArray, PairSeries, thinned
-from sphshell_pin.view.path_axes import reading_unit
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from sphshell_pin.dynamics.result import Result
 
-NORMAL_COLOR = "#d4202a"
-FRICTION_COLOR = "#f08a00"
+FORCE_COLORS = {"normal": "#d4202a", "friction": "#f08a00"}
 DEPTH_COLOR = "#2f6fde"
 COUNT_COLOR = "#6b7280"
 COUNT_SHARE = 4.0  # the number of contacts takes up a quarter of its axis
@@ -22,16 +30,20 @@ MOST_PAIRS = 8
 CONTROLLED = ("Adaptive", "Implicit")  # integrators that choose their steps
 
 
-def plot_overview(result: Result) -> Any:
+def plot_overview(result: Result) -> Figure:
     """Return one Figure of force, depth, energy and its residual over time.
 
     Raises MissingExtra without matplotlib.
     """
     figure = new_figure(12.5, 7.0)
     axes = figure.subplots(2, 2, sharex=True)
-    series = [PairSeries.of(result, index) for index in range(len(result.pairs))]
-    touched = [pair for pair in series if pair.touches]
-    _draw_overview_forces(axes[0, 0], result, touched)
+    touched = [pair for pair in _series(result) if pair.touches]
+    if len(touched) == 1:
+        _draw_forces(axes[0, 0], result, touched[0], touched[0].peak)
+        axes[0, 0].set_title(f"force of {touched[0].name}", fontsize=10)
+    else:
+        normal = {pair.name: pair.normal for pair in touched}
+        _draw_curves(axes[0, 0], result, normal, "normal force", "N")
     _draw_depths(axes[1, 0], result, touched)
     _draw_energies(axes[0, 1], result)
     _draw_residual(axes[1, 1], result)
@@ -41,38 +53,38 @@ def plot_overview(result: Result) -> Any:
     return figure
 
 
-def plot_force_and_depth(result: Result) -> Any:
+def plot_force_and_depth(result: Result) -> Figure:
     """Return a Figure of normal and friction force and of depth over time, one pair after another.
 
     Of more than eight pairs in touch, the eight with the largest peak force are drawn.
     """
-    series = [PairSeries.of(result, index) for index in range(len(result.pairs))]
-    touched = sorted((pair for pair in series if pair.touches), key=lambda pair: -pair.peak)
-    shown = [pair for pair in series if pair in touched[:MOST_PAIRS]]
+    touched = [pair for pair in _series(result) if pair.touches]
+    largest = sorted(touched, key=lambda pair: -pair.peak)[:MOST_PAIRS]
+    shown = [pair for pair in touched if pair in largest]
     if len(shown) <= 1:
         figure = new_figure(9.0, 6.5)
         axes = figure.subplots(2, 1, sharex=True).reshape(1, 2)
+        axes[0, 1].set_xlabel("time [s]")
     else:
         figure = new_figure(12.0, 1.2 + 2.1 * len(shown))
         axes = figure.subplots(len(shown), 2, sharex=True, squeeze=False)
+        for axis in axes[-1]:
+            axis.set_xlabel("time [s]")
     if not shown:
         for axis, quantity in zip(axes[0], ("force", "largest depth"), strict=True):
             say(axis, NO_CONTACT)
             axis.set_ylabel(quantity)
-    largest = max((pair.peak for pair in shown), default=0.0)
     for pair, (force, depth) in zip(shown, axes, strict=False):
-        _draw_forces(force, result, pair, largest)
+        _draw_forces(force, result, pair, largest[0].peak)
         _draw_depths(depth, result, [pair])
         force.set_title(_pair_title(result, pair), fontsize=10, loc="left")
-    for axis in axes[-1, -1:] if len(shown) <= 1 else axes[-1]:
-        axis.set_xlabel("time [s]")
     left_out = len(touched) - len(shown)
     note = f" ({count(left_out, 'pair', 'pairs')} with smaller forces left out)" if left_out else ""
     figure.suptitle(f"Contact force and depth{note}", fontsize=12)
     return figure
 
 
-def plot_energy(result: Result) -> Any:
+def plot_energy(result: Result) -> Figure:
     """Return a Figure of the energy audit and of its residual over time."""
     figure = new_figure(10.0, 6.5)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
@@ -83,65 +95,48 @@ def plot_energy(result: Result) -> Any:
     return figure
 
 
-def _line(axis: Any, t: FloatArray, values: FloatArray, **look: Any) -> None:
-    axis.plot(*thinned(t, values), **look)
-
-
-def _finish(axis: Any, legend: bool = True) -> None:
-    axis.grid(True, alpha=0.3, linewidth=0.6)
-    axis.margins(x=0.01)
-    if legend:
-        axis.legend(loc="best", fontsize=8, framealpha=0.85)
+def _series(result: Result) -> list[PairSeries]:
+    return [PairSeries.of(result, index) for index in range(len(result.pairs))]
 
 
 def _headline(result: Result) -> str:
     stats = result.stats
     parts = [f"{float(result.t[-1] - result.t[0]):g} s simulated"] if len(result.t) else []
-    if "dt" in stats and "integrator" in stats:
-        kind = str(stats["integrator"])
-        step = "mean dt" if kind in CONTROLLED else "dt"
-        parts.append(f"{kind}, {step} = {float(stats['dt']):.3g} s")
-    if "steps" in stats:
-        parts.append(f"{int(stats['steps'])} steps")
+    if stats.integrator:
+        step = "mean dt" if stats.integrator in CONTROLLED else "dt"
+        parts.append(f"{stats.integrator}, {step} = {stats.dt:.3g} s")
+        parts.append(f"{stats.steps} steps")
     return ", ".join(parts)
 
 
 def _pair_title(result: Result, pair: PairSeries) -> str:
-    stats = result.stats.get("pairs", {}).get(pair.name)
-    if not stats:
+    figures = result.stats.pairs.get(pair.name)
+    if figures is None:
         return pair.name
-    touches = count(int(stats["touches"]), "touch", "touches")
-    peak = float(stats["peak_force"])
+    touches = count(figures.touches, "touch", "touches")
+    peak = figures.peak_force
     # An impact may pass between two rows.
     unseen = " (between the recorded rows)" if peak > 1.2 * pair.peak else ""
     return (
-        f"{pair.name}: {float(stats['contact_time']):.3g} s in contact, {touches}, "
-        f"peak {peak:.4g} N{unseen}, mean {float(stats['mean_force']):.4g} N"
+        f"{pair.name}: {figures.contact_time:.3g} s in contact, {touches}, "
+        f"peak {peak:.4g} N{unseen}, mean {figures.mean_force:.4g} N"
     )
 
 
-def _draw_forces(axis: Any, result: Result, pair: PairSeries, largest: float) -> None:
-    factor, unit = reading_unit(largest, "N")
-    t = np.asarray(result.t)
-    _line(axis, t, pair.normal * factor, color=NORMAL_COLOR, linewidth=1.2, label="normal")
+def _draw_forces(axis: Axes, result: Result, pair: PairSeries, largest: float) -> None:
+    """Draw normal and friction force of `pair`, in the unit for forces up to `largest` [N]."""
+    curves = {"normal": pair.normal}
     if np.any(pair.friction > 0.0):
-        _line(
-            axis, t, pair.friction * factor, color=FRICTION_COLOR, linewidth=1.2, label="friction"
-        )
-    axis.set_ylabel(f"force [{unit}]")
-    _finish(axis)
+        curves["friction"] = pair.friction
+    factor = label_axis(axis, "force", "N", largest)
+    for name, values in curves.items():
+        t, force = thinned(np.asarray(result.t), values * factor)
+        axis.plot(t, force, color=FORCE_COLORS[name], linewidth=1.2, label=name)
+    axis.margins(x=0.01)
+    finish_axis(axis, legend=True)
 
 
-def _draw_overview_forces(axis: Any, result: Result, touched: list[PairSeries]) -> None:
-    if len(touched) == 1:
-        _draw_forces(axis, result, touched[0], touched[0].peak)
-        axis.set_title(f"force of {touched[0].name}", fontsize=10)
-        return
-    curves = {pair.name: pair.normal for pair in touched}
-    _draw_curves(axis, result, curves, "normal force", "N", NORMAL_COLOR)
-
-
-def _draw_depths(axis: Any, result: Result, touched: list[PairSeries]) -> None:
+def _draw_depths(axis: Axes, result: Result, touched: list[PairSeries]) -> None:
     curves = {pair.name: pair.depth for pair in touched}
     _draw_curves(axis, result, curves, "largest depth", "m", DEPTH_COLOR)
     if touched:
@@ -151,27 +146,28 @@ def _draw_depths(axis: Any, result: Result, touched: list[PairSeries]) -> None:
 
 
 def _draw_curves(
-    axis: Any,
+    axis: Axes,
     result: Result,
     curves: dict[str, FloatArray],
     quantity: str,
-    symbol: str,
-    color: str,
+    base: str,
+    color: str | None = None,
 ) -> None:
-    """Draw a quantity of every pair, by name; that of a single pair in `color`."""
+    """Draw a quantity [base] of every pair, by name; that of a single pair in `color`."""
     if not curves:
         say(axis, NO_CONTACT)
         axis.set_ylabel(quantity)
         return
-    factor, unit = reading_unit(max(float(values.max()) for values in curves.values()), symbol)
+    factor = label_axis(axis, quantity, base, max(float(one.max()) for one in curves.values()))
+    alone = len(curves) == 1
     for name, values in curves.items():
-        look = {"color": color} if len(curves) == 1 else {"label": name}
-        _line(axis, np.asarray(result.t), values * factor, linewidth=1.1, **look)
-    axis.set_ylabel(f"{quantity} [{unit}]")
-    _finish(axis, legend=len(curves) > 1)
+        t, shown = thinned(np.asarray(result.t), values * factor)
+        axis.plot(t, shown, linewidth=1.1, color=color if alone else None, label=name)
+    axis.margins(x=0.01)
+    finish_axis(axis, legend=not alone)
 
 
-def _draw_count(axis: Any, result: Result, pair: PairSeries) -> None:
+def _draw_count(axis: Axes, result: Result, pair: PairSeries) -> None:
     """Draw, at the foot of `axis`, how many contacts share the load."""
     beside = axis.twinx()
     t, count = thinned(np.asarray(result.t), pair.count)
@@ -189,16 +185,16 @@ def _draw_count(axis: Any, result: Result, pair: PairSeries) -> None:
     axis.patch.set_visible(False)
 
 
-def _draw_energies(axis: Any, result: Result) -> None:
+def _draw_energies(axis: Axes, result: Result) -> None:
     curves = _energy_curves(result)
     largest = max(float(np.abs(values).max(initial=0.0)) for values, _ in curves.values())
-    factor, unit = reading_unit(largest, "J")
+    factor = label_axis(axis, "energy", "J", largest)
     for label, (values, style) in curves.items():
         if np.any(values != 0.0):
-            t = np.asarray(result.t)
-            _line(axis, t, values * factor, linestyle=style, linewidth=1.2, label=label)
-    axis.set_ylabel(f"energy [{unit}]")
-    _finish(axis, legend=False)
+            t, energy = thinned(np.asarray(result.t), values * factor)
+            axis.plot(t, energy, linestyle=style, linewidth=1.2, label=label)
+    axis.margins(x=0.01)
+    finish_axis(axis)
     if axis.get_legend_handles_labels()[0]:
         # Beside the curves: these fill their axes, and cross wherever a legend might lie.
         axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8, borderaxespad=0.0)
@@ -219,21 +215,23 @@ def _energy_curves(result: Result) -> dict[str, tuple[FloatArray, str]]:
     }
     moved = max(float(np.abs(values).max(initial=0.0)) for values, _ in rest.values())
     moved = max(moved, float(np.ptp(kinetic)) if len(kinetic) else 0.0)
-    # A body that turns for ever would press all other curves flat.
+    # A body that keeps turning would press all other curves flat.
     if len(kinetic) and kinetic.min() > 3.0 * moved > 0.0:
         return {"kinetic (change)": (kinetic - kinetic[0], "-"), **rest}
     return {"kinetic": (kinetic, "-"), **rest}
 
 
-def _draw_residual(axis: Any, result: Result) -> None:
+def _draw_residual(axis: Axes, result: Result) -> None:
     residual = np.asarray(result.energy.residual, dtype=float)
-    factor, unit = reading_unit(float(np.abs(residual).max(initial=0.0)), "J")
-    _line(axis, np.asarray(result.t), residual * factor, color="#444444", linewidth=1.0)
-    axis.set_ylabel(f"residual [{unit}]")
+    largest = float(np.abs(residual).max(initial=0.0))
+    factor = label_axis(axis, "residual", "J", largest)
+    t, shown = thinned(np.asarray(result.t), residual * factor)
+    axis.plot(t, shown, color="#444444", linewidth=1.0)
     exchanged = float(result.energy.exchanged)
     if exchanged > 0.0 and len(residual):
-        share = float(np.abs(residual).max()) / exchanged
+        share = largest / exchanged
         axis.set_title(
             f"largest residual {share:.2g} of the {exchanged:.3g} J exchanged", fontsize=9
         )
-    _finish(axis, legend=False)
+    axis.margins(x=0.01)
+    finish_axis(axis)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.errors import InvalidParameter, NameNotFound
-from sphshell_pin.plot.figure import new_figure, say
+from sphshell_pin.plot.figure import finish_axis, new_figure, say
 from sphshell_pin.scenario.figures import PAIR_FIGURES, RUN_FIGURES
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
 
@@ -23,7 +25,7 @@ _EVEN = 1e-3
 _UNITS = {"impulse": "N s", "peak_force_time": "s"} | PAIR_FIGURES
 
 
-def plot_sweep(table: pd.DataFrame, figure: str) -> Any:
+def plot_sweep(table: pd.DataFrame, figure: str) -> Figure:
     """Return a matplotlib Figure of one column of a sweep's `table` over what was varied.
 
     One varied number gives curves, two give a heat map; of varied words (or truths, or lists) each
@@ -96,7 +98,7 @@ def _groups(table: pd.DataFrame, words: list[str]) -> list[tuple[str, pd.DataFra
     return found
 
 
-def _draw_curves(axis: Any, groups: list[tuple[str, pd.DataFrame]], key: str, figure: str) -> None:
+def _draw_curves(axis: Axes, groups: list[tuple[str, pd.DataFrame]], key: str, figure: str) -> None:
     for name, rows in groups:
         ordered = rows.sort_values(key)
         axis.plot(ordered[key], ordered[figure], "o-", markersize=4, label=name or None)
@@ -106,12 +108,10 @@ def _draw_curves(axis: Any, groups: list[tuple[str, pd.DataFrame]], key: str, fi
         axis.set_xscale("log")
     if not any(np.isfinite(rows[figure]).any() for _, rows in groups):
         say(axis, "No run has this figure.")
-    axis.grid(alpha=0.3)
-    if len(groups) > 1:
-        axis.legend()
+    finish_axis(axis, legend=len(groups) > 1)
 
 
-def _draw_bars(axis: Any, groups: list[tuple[str, pd.DataFrame]], figure: str) -> None:
+def _draw_bars(axis: Axes, groups: list[tuple[str, pd.DataFrame]], figure: str) -> None:
     heights = [float(rows[figure].iloc[0]) for _, rows in groups]
     axis.bar([name or "run 0" for name, _ in groups], heights)
     axis.set(ylabel=_label(figure), title=figure)
@@ -119,7 +119,7 @@ def _draw_bars(axis: Any, groups: list[tuple[str, pd.DataFrame]], figure: str) -
 
 
 def _draw_maps(
-    canvas: Any, groups: list[tuple[str, pd.DataFrame]], keys: list[str], figure: str
+    canvas: Figure, groups: list[tuple[str, pd.DataFrame]], keys: list[str], figure: str
 ) -> None:
     columns = min(len(groups), 3)
     rows = -(-len(groups) // columns)
@@ -130,7 +130,6 @@ def _draw_maps(
     drawn = np.concatenate([part[figure].to_numpy(float) for _, part in groups])
     finite = drawn[np.isfinite(drawn)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
-    mesh = None
     for axis, (name, part) in zip(axes, groups, strict=False):
         grid = part.pivot(index=y_key, columns=x_key, values=figure)
         x, y = grid.columns.to_numpy(float), grid.index.to_numpy(float)
@@ -149,7 +148,7 @@ def _draw_maps(
             axis.set_yscale("log")
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
-    canvas.colorbar(mesh, ax=axes.tolist(), label=_label(figure))
+    canvas.colorbar(mesh, ax=list(axes), label=_label(figure))
     canvas.suptitle(figure, fontsize=12)
 
 

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -64,7 +64,7 @@ class CadAudit:
             "cad_normal_error [rad]": self.normal_error,
         }
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> dict[str, dict[str, object]]:
         """Return the figures by pair, for summary.json."""
         return {
             pair.name: {
@@ -156,7 +156,7 @@ def _audit_shell(
         if log.row[i] != shown:
             shown = int(log.row[i])
             pin.forwardKinematics(model, data, np.asarray(result.q[shown], dtype=float))
-        shell = data.oMi[pair.joint_j] * pair.shell_placement
+        shell = data.oMi[pair.joint_j] * pair.placement_j
         normals[place] = shell.rotation.T @ log.normal_world[i]
         points[place] = shell.actInv(log.point_world[i])
         radii[place] = pair.sphere.radius

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +14,7 @@ import pinocchio as pin
 from sphshell_pin.checks import off_unit_length
 from sphshell_pin.dynamics.models import set_joint
 from sphshell_pin.errors import MissingExtra, NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.robots import LoadedRobot, load, load_urdf
 from sphshell_pin.scenario.reading import item_key
 from sphshell_pin.scenario.schema import Placement, RobotSection, Scenario
 
@@ -26,18 +25,17 @@ Array = npt.NDArray[np.float64]
 class Assembly:
     """All robots as one model, before any joint is locked."""
 
-    model: Any
-    """pinocchio.Model; names carry `label/` as soon as there are several robots."""
-    visual_model: Any
-    """pinocchio.GeometryModel to look at."""
+    model: pin.Model
+    """Names carry `label/` as soon as there are several robots."""
+    visual_model: pin.GeometryModel
     q0: Array
     """Start configuration (nq,)."""
     v0: Array
     """Start velocity (nv,)."""
     lock: tuple[str, ...]
     """Joints to lock at their place in q0."""
-    loaded: tuple[Any, ...] = ()
-    """The robots as they were loaded, one LoadedRobot for each table."""
+    loaded: tuple[LoadedRobot, ...] = ()
+    """The robots as they were loaded, one for each table."""
 
 
 @contextmanager
@@ -57,13 +55,13 @@ def blamed_on(path: Path, key: str) -> Iterator[None]:
         raise ScenarioError(path, key, why) from error
 
 
-def to_se3(placement: Placement) -> Any:
-    """Return the pinocchio.SE3 of a placement table."""
+def to_se3(placement: Placement) -> pin.SE3:
+    """Return the SE3 of a placement table."""
     return pin.SE3(pin.rpy.rpyToMatrix(*np.deg2rad(placement.rpy_deg)), np.array(placement.xyz))
 
 
 def assemble(
-    scenario: Scenario, path: Path, loaded: Mapping[tuple[object, ...], Any] | None = None
+    scenario: Scenario, path: Path, loaded: Mapping[tuple[object, ...], LoadedRobot] | None = None
 ) -> Assembly:
     """Load all robots of `scenario` and append them into one model under its gravity.
 
@@ -76,25 +74,22 @@ def assemble(
     MissingExtra
         A robot comes from a package that is not installed.
     """
-    # The folder stands at the top of the repository and is installed inside the package.
-    robots = importlib.import_module("sphshell_pin.robots")
-
     several = len(scenario.robot) > 1
     base, visual = pin.Model(), pin.GeometryModel()
     starts: list[tuple[str, Array, Array]] = []
     lock: list[str] = []
     labels: set[str] = set()
-    taken: list[Any] = []
+    taken: list[LoadedRobot] = []
     for i, section in enumerate(scenario.robot):
         key = item_key("robot", scenario.robot, i)
         with blamed_on(path, key):
-            robot = (loaded or {}).get(origin(section)) or _load(robots, section, path)
+            robot = (loaded or {}).get(origin(section)) or _load(section, path)
         taken.append(robot)
         model, geometry = robot.model.copy(), robot.visual_model.copy()
         q, v = _start(model, robot.q0, section, path, key)
         for j, joint in enumerate(section.lock):
-            if joint not in list(model.names)[1:]:
-                _refuse_joint(model, joint, path, f"{key}.lock[{j}]")
+            with blamed_on(path, f"{key}.lock[{j}]"):
+                joint_spans(model, joint, "the robot")
         prefix = ""
         if several:
             label = section.label or robot.name
@@ -104,11 +99,9 @@ def assemble(
             prefix = f"{label}/"
             _rename(model, geometry, prefix)
         lock += [prefix + joint for joint in section.lock]
-        starts += [
-            (name, q[_span_q(model, j)], v[_span_v(model, j)])
-            for j, name in enumerate(model.names)
-            if j > 0
-        ]
+        for name in list(model.names)[1:]:
+            in_q, in_v = joint_spans(model, name)
+            starts.append((name, q[in_q], v[in_v]))
         stand = to_se3(section.placement)
         if not several and stand.isIdentity():
             base, visual = model, geometry
@@ -117,8 +110,8 @@ def assemble(
     base.gravity.linear = np.array(scenario.gravity)
     q0, v0 = pin.neutral(base), np.zeros(base.nv)
     for name, q_joint, v_joint in starts:
-        j = base.getJointId(name)
-        q0[_span_q(base, j)], v0[_span_v(base, j)] = q_joint, v_joint
+        in_q, in_v = joint_spans(base, name)
+        q0[in_q], v0[in_v] = q_joint, v_joint
     return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken))
 
 
@@ -127,7 +120,7 @@ def origin(section: RobotSection) -> tuple[object, ...]:
     return section.name, section.urdf, tuple(section.package_dirs), section.free_flyer
 
 
-def reduce_visual(assembly: Assembly) -> Any:
+def reduce_visual(assembly: Assembly) -> pin.GeometryModel:
     """Return the visual geometry for the model with `assembly.lock` locked."""
     if not assembly.lock:
         return assembly.visual_model
@@ -136,22 +129,36 @@ def reduce_visual(assembly: Assembly) -> Any:
     return geometry
 
 
-def restrict(model: Any, reduced: Any, q: Array, v: Array) -> tuple[Array, Array]:
+def restrict(model: pin.Model, reduced: pin.Model, q: Array, v: Array) -> tuple[Array, Array]:
     """Return the state (q, v) of `model` for the joints that `reduced` still has."""
     q_reduced, v_reduced = pin.neutral(reduced), np.zeros(reduced.nv)
-    for j, name in enumerate(reduced.names):
-        if j > 0:
-            k = model.getJointId(name)
-            q_reduced[_span_q(reduced, j)] = q[_span_q(model, k)]
-            v_reduced[_span_v(reduced, j)] = v[_span_v(model, k)]
+    for name in list(reduced.names)[1:]:
+        to_q, to_v = joint_spans(reduced, name)
+        from_q, from_v = joint_spans(model, name)
+        q_reduced[to_q], v_reduced[to_v] = q[from_q], v[from_v]
     return q_reduced, v_reduced
 
 
-def _load(robots: Any, section: RobotSection, path: Path) -> Any:
+def joint_spans(model: pin.Model, name: str, owner: str = "the model") -> tuple[slice, slice]:
+    """Return the places of a joint's numbers in q and in v.
+
+    Raises
+    ------
+    NameNotFound
+        The model has no such joint; `owner` is what the message calls the model.
+    """
+    names = list(model.names)[1:]
+    if name not in names:
+        raise NameNotFound("joint", name, owner, names)
+    joint = model.joints[model.getJointId(name)]
+    return slice(joint.idx_q, joint.idx_q + joint.nq), slice(joint.idx_v, joint.idx_v + joint.nv)
+
+
+def _load(section: RobotSection, path: Path) -> LoadedRobot:
     if section.name is not None:
-        return robots.load(section.name)
+        return load(section.name)
     folder = path.parent
-    return robots.load_urdf(
+    return load_urdf(
         folder / (section.urdf or ""),
         [folder / one for one in section.package_dirs],
         free_flyer=section.free_flyer,
@@ -160,7 +167,7 @@ def _load(robots: Any, section: RobotSection, path: Path) -> Any:
 
 
 def _start(
-    model: Any, q_default: Array, section: RobotSection, path: Path, key: str
+    model: pin.Model, q_default: Array, section: RobotSection, path: Path, key: str
 ) -> tuple[Array, Array]:
     q, v = np.array(q_default, dtype=float), np.zeros(model.nv)
     if section.q is not None:
@@ -173,15 +180,13 @@ def _start(
         with blamed_on(path, f'{key}.start."{name}"'):
             set_joint(model, q, name, value)
     for name, value in section.speed.items():
-        if name not in list(model.names)[1:]:
-            _refuse_joint(model, name, path, f'{key}.speed."{name}"')
-        span = _span_v(model, model.getJointId(name))
+        where = f'{key}.speed."{name}"'
+        with blamed_on(path, where):
+            _, span = joint_spans(model, name, "the robot")
         values = np.atleast_1d(np.array(value, dtype=float))
-        if len(values) != span.stop - span.start:
-            n = span.stop - span.start
-            raise ScenarioError(
-                path, f'{key}.speed."{name}"', f"the joint takes {n} numbers", value
-            )
+        count = span.stop - span.start
+        if len(values) != count:
+            raise ScenarioError(path, where, f"the joint takes {count} numbers", value)
         v[span] = values
     unit = pin.normalize(model, q)
     # Rounded quaternions and cosines are set right; a wrong one (not of unit length) is a mistake.
@@ -191,23 +196,10 @@ def _start(
     return unit, v
 
 
-def _refuse_joint(model: Any, name: str, path: Path, key: str) -> None:
-    with blamed_on(path, key):
-        raise NameNotFound("joint", name, "the robot", list(model.names)[1:])
-
-
-def _rename(model: Any, geometry: Any, prefix: str) -> None:
+def _rename(model: pin.Model, geometry: pin.GeometryModel, prefix: str) -> None:
     for j in range(1, model.njoints):
         model.names[j] = prefix + model.names[j]
     for f in range(1, model.nframes):
         model.frames[f].name = prefix + model.frames[f].name
     for one in geometry.geometryObjects:
         one.name = prefix + one.name
-
-
-def _span_q(model: Any, joint: int) -> slice:
-    return slice(model.joints[joint].idx_q, model.joints[joint].idx_q + model.joints[joint].nq)
-
-
-def _span_v(model: Any, joint: int) -> slice:
-    return slice(model.joints[joint].idx_v, model.joints[joint].idx_v + model.joints[joint].nv)

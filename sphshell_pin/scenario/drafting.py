@@ -5,18 +5,145 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from string import Formatter
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
-from sphshell_pin.scenario.plan import Contact, Hold, Plan, Press
+from sphshell_pin.scenario.plan import Hold, Plan, Press
 from sphshell_pin.scenario.schema import RobotSection, RunSection, ShellSection
 from sphshell_pin.scenario.tips import Tip
 
 # Column of the comments beside values.
 _COLUMN = 34
+
+# A line whose value is marked !o (optional) and is nothing, or zero, is left out, with the comment
+# line above it.
+_ROBOT = """\
+# {title}.
+#
+#   sphshell-pin run {name}.toml
+#   sphshell-pin view {name}.toml
+#
+# Units are SI (m, kg, s, N, rad) unless a key says otherwise.
+
+title = {title}
+
+[robot]
+name = {robot.name!o}
+urdf = {robot.urdf!o}
+package_dirs = {robot.package_dirs!o}
+free_flyer = {robot.free_flyer!o} # the root link floats
+# They do not move the tip: locked, they cost nothing.
+lock = {robot.lock!o}
+"""
+_ROOT = """
+[robot.start]
+# x y z [m] and the quaternion x y z w: the sphere stands above the surface.
+root_joint = {root}
+"""
+_POSTURE = """
+[robot.start]
+# A posture in which the tip can move: joints [rad, m].
+"""
+_SHELL = """
+[[shell]]
+name = {shell.name}
+file = {shell.file!o} # relative to this file
+unit = {shell.unit!o} # length unit of the file's numbers
+bodies = {shell.bodies!o} # of the CAD file
+faces = {shell.faces!o} # of the CAD file
+primitive = {primitive!o}
+side = "both" # spheres may touch it from both sides
+frame = "universe" # fixed to the world; any frame of the robot may do
+"""
+_PLACEMENT = """\
+# Its middle stands {gap:.3g} mm before the sphere.
+[shell.placement]
+xyz = {xyz}
+rpy_deg = {rpy_deg!o}
+"""
+_CONTACT = """
+[[contact]]
+name = {pair}
+sphere = {sphere}
+shell = {shell.name}
+
+# Hertz: a {plan.contact.material.name} ball on {plan.contact.against.name}.
+[contact.law]
+type = "hertz"
+radius = {tip.radius} # of the ball; less where it lies in a hollow
+young_1 = {plan.contact.material.young} # [Pa] {plan.contact.material.name}, a typical value
+poisson_1 = {plan.contact.material.poisson}
+young_2 = {plan.contact.against.young} # [Pa] {plan.contact.against.name}, a typical value
+poisson_2 = {plan.contact.against.poisson}
+restitution = {plan.contact.restitution} # speed of rebound, as a part
+speed = {plan.contact.speed} # [m/s] at which it holds: the first touch
+
+"""
+_COULOMB = """\
+[contact.friction]
+type = "coulomb"
+mu_static = {contact.mu_static} # {materials}, dry: a typical value
+mu_dynamic = {contact.mu_dynamic}
+v_static = {contact.v_static} # [m/s] slip at which friction is full
+v_dynamic = {v_dynamic} # [m/s] slip of mu_dynamic
+"""
+_BRISTLE = """\
+# Friction that sticks.
+[contact.friction]
+type = "bristle"
+mu_static = {contact.mu_static} # {materials}, dry: a typical value
+mu_dynamic = {contact.mu_dynamic}
+stiffness = {contact.bristle[0]} # [N/m] as stiff as the law under the load
+damping = {contact.bristle[1]} # [N s/m] a tenth of critical
+"""
+_PRESS = """
+# The tip follows a path on the surface and presses on it.
+[controller]
+type = "cartesian-impedance"
+frame = {tip.frame}
+shell = {shell.name}
+# Points in the shell's own coordinates [m], projected on it.
+path = {path}
+normal_force = {press.force} # [N]
+speed = {press.speed} # [m/s] along the path: three radii a second
+lead_in = {press.lead_in} # [s] stand still while the force comes on
+stiffness = {press.stiffness} # [N/m] friction holds the tip a fifth of a radius behind at most
+damping = {press.damping} # [N s/m] 0.7 of critical
+rotational_stiffness = {press.rotational_stiffness!o} # [N m/rad] keeps the tip's orientation
+rotational_damping = {press.rotational_damping!o}
+# Null-space posture damping, in proportion to the joints' own inertia.
+posture_stiffness = {press.posture_stiffness!o}
+joint_damping = {press.joint_damping!o}
+"""
+_HOLD = """
+# Springs and dampers at the joints hold the posture of the start.
+[controller]
+type = "joint-pd"
+kp = {hold.kp} # [N m/rad] gives 0.05 rad under the weight
+kd = {hold.kd} # [N m s/rad] 0.7 of critical
+"""
+_RUN = """
+[run]
+duration = {run.duration}
+integrator = {run.integrator} # its steps follow the contact
+dt = {run.dt!o}
+rtol = {run.rtol!o}
+record_dt = {run.record_dt!o}
+recording_speed = {slow!o} # the recording in slow motion
+
+# The parameters that have a slider in sphshell-pin view.
+"""
+_EXPECT = """\
+# What the run is checked against.
+[expect]
+"pairs.{pair}.mean_force" = {mean_force!o}
+"pairs.{pair}.touches" = {{ min = 1 }}
+"energy.relative_residual" = {{ max = 1e-3 }}
+"""
 
 
 def draft_text(
@@ -30,29 +157,43 @@ def draft_text(
     """Return the text of the scenario called `name`."""
     pairs = pair_names(plan.tips, shell.name)
     digits = decimals(plan.gap)
-    parts = [
-        [
-            f"# {title}.",
-            "#",
-            f"#   sphshell-pin run {name}.toml",
-            f"#   sphshell-pin view {name}.toml",
-            "#",
-            "# Units are SI (m, kg, s, N, rad) unless a key says otherwise.",
-        ],
-        [f"title = {_string(title)}"],
-        _robot(robot, plan, digits),
-        _shell(shell, plan, digits),
-    ]
+    text = _fill(_ROBOT, name=name, title=title, robot=robot)
+    if plan.root is not None:
+        text += _fill(_ROOT, root=_rounded(plan.root, digits))
+    elif robot.start:
+        text += _POSTURE
+        text += "".join(f"{_key(joint)} = {_toml(q)}\n" for joint, q in robot.start.items())
+    primitive = None if shell.primitive is None else shell.primitive.model_dump()
+    text += _fill(_SHELL, shell=shell, primitive=primitive)
+    if plan.root is None:
+        angles = np.rad2deg(pin.rpy.matrixToRpy(plan.placement.rotation))
+        angles[np.abs(angles) < 1e-6] = 0.0
+        xyz, rpy = _rounded(plan.placement.translation, digits), _rounded(angles, digits)
+        text += _fill(_PLACEMENT, gap=1e3 * plan.gap, xyz=xyz, rpy_deg=rpy)
     for tip, pair in zip(plan.tips, pairs, strict=True):
-        parts.append(_contact(tip, pair, shell.name, plan, digits))
-    if isinstance(plan.control, Press):
-        parts.append(_press(plan.control, plan.tips[0], shell.name, digits))
-    if isinstance(plan.control, Hold):
-        parts.append(_hold(plan.control))
-    parts.append(_run(run))
-    parts += _knobs(plan, pairs)
-    parts.append(_expect(plan, pairs))
-    return "\n\n".join("\n".join(part) for part in parts) + "\n"
+        sphere: dict[str, object] = {"frame": tip.frame, "radius": tip.radius}
+        if tip.offset.any():
+            sphere["offset"] = _rounded(tip.offset, digits)
+        text += _fill(_CONTACT, pair=pair, sphere=sphere, shell=shell, tip=tip, plan=plan)
+        materials = f"{plan.contact.material.name} on {plan.contact.against.name}"
+        friction = {"materials": materials, "v_dynamic": 10 * plan.contact.v_static}
+        template = _COULOMB if plan.contact.bristle is None else _BRISTLE
+        text += _fill(template, contact=plan.contact, **friction)
+    control, mean_force = plan.control, None
+    if isinstance(control, Press):
+        path = _rounded(control.way, digits)
+        text += _fill(_PRESS, tip=plan.tips[0], shell=shell, path=path, press=control)
+        if control.even:
+            mean_force = {"value": control.force, "rtol": 0.15, "atol": 0.03}
+    elif isinstance(control, Hold):
+        text += _fill(_HOLD, hold=control)
+    slow = None if run.recording_speed == 1.0 else run.recording_speed
+    text += _fill(_RUN, run=run, slow=slow)
+    for key, limits in _parameters(plan, pairs).items():
+        text += f"[[knob]]\nkey = {_toml(key)}\n"
+        text += "".join(f"{bound} = {_toml(value)}\n" for bound, value in limits.items()) + "\n"
+    # Of several feet a rough surface may leave one in the air.
+    return text + _fill(_EXPECT, pair=pairs[0], mean_force=mean_force)
 
 
 def pair_names(tips: Sequence[Tip], shell: str) -> list[str]:
@@ -72,244 +213,76 @@ def decimals(gap: float) -> int:
     return max(4, math.ceil(-math.log10(gap / 200)))
 
 
-def _robot(robot: RobotSection, plan: Plan, digits: int) -> list[str]:
-    lines = ["[robot]"]
-    if robot.name is not None:
-        lines.append(f"name = {_string(robot.name)}")
-    if robot.urdf is not None:
-        lines.append(f"urdf = {_string(robot.urdf)}")
-    if robot.package_dirs:
-        lines.append(f"package_dirs = {_list(map(_string, robot.package_dirs))}")
-    if robot.free_flyer:
-        lines.append(_beside("free_flyer = true", "the root link floats"))
-    if robot.lock:
-        lines.append("# They do not move the tip: held, they cost nothing.")
-        lines += _wrapped("lock", map(_string, robot.lock))
-    if robot.start or plan.root is not None:
-        lines += ["", "[robot.start]"]
-    if plan.root is not None:
-        lines.append("# x y z [m] and the quaternion x y z w: the sphere stands above the surface.")
-        lines.append(f"root_joint = {_numbers(plan.root, digits)}")
-    elif robot.start:
-        lines.append("# A posture in which the tip can move: joints [rad, m].")
-    for joint, value in robot.start.items():
-        if plan.root is None:
-            lines.append(f"{_key(joint)} = {_value(value)}")
-    return lines
-
-
-def _shell(shell: ShellSection, plan: Plan, digits: int) -> list[str]:
-    lines = ["[[shell]]", f"name = {_string(shell.name)}"]
-    if shell.file is not None:
-        lines.append(_beside(f"file = {_string(shell.file)}", "relative to this file"))
-    if shell.unit is not None:
-        lines.append(_beside(f"unit = {_string(shell.unit)}", "length unit of the file's numbers"))
-    if shell.bodies is not None:
-        lines.append(_beside(f"bodies = {_list(map(_string, shell.bodies))}", "of the CAD file"))
-    if shell.faces is not None:
-        faces = (str(one) if isinstance(one, int) else _string(one) for one in shell.faces)
-        lines.append(_beside(f"faces = {_list(faces)}", "of the CAD file"))
-    if shell.primitive is not None:
-        table = ", ".join(f"{k} = {_value(v)}" for k, v in shell.primitive.model_dump().items())
-        lines.append(f"primitive = {{ {table} }}")
-    lines.append(_beside('side = "both"', "spheres may touch it from both sides"))
-    lines.append(_beside('frame = "universe"', "fixed to the world; any frame of the robot may do"))
-    if plan.root is None:
-        angles = np.rad2deg(pin.rpy.matrixToRpy(plan.placement.rotation))
-        lines.append(f"# Its middle stands {plan.gap * 1e3:.3g} mm before the sphere.")
-        lines.append("[shell.placement]")
-        lines.append(f"xyz = {_numbers(plan.placement.translation, digits)}")
-        if np.abs(angles).max() > 1e-6:
-            lines.append(f"rpy_deg = {_numbers(angles, digits)}")
-    return lines
-
-
-def _contact(tip: Tip, pair: str, shell: str, plan: Plan, digits: int) -> list[str]:
+def _parameters(plan: Plan, pairs: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return the keys of the parameters that get a slider, and its ends where they are stated."""
     contact = plan.contact
-    one, other = contact.material, contact.against
-    offset = "" if not tip.offset.any() else f", offset = {_numbers(tip.offset, digits)}"
-    sphere = f"sphere = {{ frame = {_string(tip.frame)}, radius = {_value(tip.radius)}{offset} }}"
-    return [
-        "[[contact]]",
-        f"name = {_string(pair)}",
-        sphere,
-        f"shell = {_string(shell)}",
-        "",
-        f"# Hertz: a {one.name} ball on {other.name}.",
-        "[contact.law]",
-        'type = "hertz"',
-        _beside(f"radius = {_value(tip.radius)}", "of the ball; less where it lies in a hollow"),
-        _beside(f"young_1 = {_value(one.young)}", f"[Pa] {one.name}, a typical value"),
-        _beside(f"poisson_1 = {_value(one.poisson)}", ""),
-        _beside(f"young_2 = {_value(other.young)}", f"[Pa] {other.name}, a typical value"),
-        _beside(f"poisson_2 = {_value(other.poisson)}", ""),
-        _beside(f"restitution = {_value(contact.restitution)}", "speed of rebound, as a part"),
-        _beside(f"speed = {_value(contact.speed)}", "[m/s] at which it holds: the first touch"),
-        "",
-        *_friction(contact),
-    ]
-
-
-def _friction(contact: Contact) -> list[str]:
-    static = _beside(
-        f"mu_static = {_value(contact.mu_static)}",
-        f"{contact.material.name} on {contact.against.name}, dry: a typical value",
-    )
-    dynamic = f"mu_dynamic = {_value(contact.mu_dynamic)}"
-    if contact.bristle is not None:
-        stiffness, damping = contact.bristle
-        return [
-            "# Friction that sticks.",
-            "[contact.friction]",
-            'type = "bristle"',
-            static,
-            dynamic,
-            _beside(f"stiffness = {_value(stiffness)}", "[N/m] as stiff as the law under the load"),
-            _beside(f"damping = {_value(damping)}", "[N s/m] a tenth of critical"),
-        ]
-    return [
-        "[contact.friction]",
-        'type = "coulomb"',
-        static,
-        dynamic,
-        _beside(f"v_static = {_value(contact.v_static)}", "[m/s] slip at which friction is full"),
-        _beside(f"v_dynamic = {_value(10 * contact.v_static)}", "[m/s] slip of mu_dynamic"),
-    ]
-
-
-def _press(press: Press, tip: Tip, shell: str, digits: int) -> list[str]:
-    lines = [
-        "# The tip follows a way across the surface and presses on it.",
-        "[controller]",
-        'type = "cartesian-impedance"',
-        f"frame = {_string(tip.frame)}",
-        f"shell = {_string(shell)}",
-        "# Points in the shell's own coordinates [m], projected on it.",
-        "path = [",
-        *(f"  {_numbers(point, digits)}," for point in press.way),
-        "]",
-        _beside(f"normal_force = {_value(press.force)}", "[N]"),
-        _beside(f"speed = {_value(press.speed)}", "[m/s] along the way: three radii a second"),
-        _beside(f"lead_in = {_value(press.lead_in)}", "[s] stand still while the force comes on"),
-        _beside(
-            f"stiffness = {_value(press.stiffness)}",
-            "[N/m] friction holds the tip a fifth of a radius behind at most",
-        ),
-        _beside(f"damping = {_value(press.damping)}", "[N s/m] 0.7 of critical"),
-    ]
-    if press.rotational_stiffness:
-        lines += [
-            _beside(
-                f"rotational_stiffness = {_value(press.rotational_stiffness)}",
-                "[N m/rad] keeps the tip's orientation",
-            ),
-            f"rotational_damping = {_value(press.rotational_damping)}",
-        ]
-    if any(press.posture_stiffness):
-        lines += [
-            "# What the tip does not show, the posture calms: by the joints' own inertia.",
-            f"posture_stiffness = {_list(map(_value, press.posture_stiffness))}",
-            f"joint_damping = {_list(map(_value, press.joint_damping))}",
-        ]
-    return lines
-
-
-def _hold(hold: Hold) -> list[str]:
-    return [
-        "# Springs and dampers at the joints hold the posture of the start.",
-        "[controller]",
-        'type = "joint-pd"',
-        _beside(f"kp = {_value(hold.kp)}", "[N m/rad] gives 0.05 rad under the weight"),
-        _beside(f"kd = {_value(hold.kd)}", "[N m s/rad] 0.7 of critical"),
-    ]
-
-
-def _run(run: RunSection) -> list[str]:
-    lines = ["[run]", f"duration = {_value(run.duration)}"]
-    lines.append(_beside(f"integrator = {_string(run.integrator)}", "its steps follow the contact"))
-    for key in ("dt", "rtol", "record_dt"):
-        value = getattr(run, key)
-        if value is not None:
-            lines.append(f"{key} = {_value(value)}")
-    if run.recording_speed != 1.0:
-        lines.append(
-            _beside(f"recording_speed = {_value(run.recording_speed)}", "the film in slow motion")
-        )
-    return lines
-
-
-def _knobs(plan: Plan, pairs: Sequence[str]) -> list[list[str]]:
-    contact = plan.contact
-    knobs: list[tuple[str, Mapping[str, float]]] = []
+    found: dict[str, dict[str, float]] = {}
     for pair in pairs:
         at = f"contact.{pair}"
-        knobs += [
-            (f"{at}.law.young_1", {}),
-            (f"{at}.law.restitution", {"min": 0.05, "max": 1.0}),
-            (f"{at}.friction.mu_static", {"min": contact.mu_dynamic, "max": 1.5}),
-            (f"{at}.friction.mu_dynamic", {"min": 0.0, "max": contact.mu_static}),
-        ]
-    if isinstance(plan.control, Press):
-        keys = ("normal_force", "speed", "stiffness", "damping")
-        knobs += [(f"controller.{key}", {}) for key in keys]
-    elif isinstance(plan.control, Hold):
-        knobs += [("controller.kp", {}), ("controller.kd", {})]
-    else:
-        knobs.append(("gravity.2", {"min": -20.0, "max": 0.0}))
-    parts = []
-    for i, (key, limits) in enumerate(knobs):
-        lines = ["# What one may turn while looking at it (sphshell-pin view)."] if i == 0 else []
-        lines += ["[[knob]]", f"key = {_string(key)}"]
-        parts.append([*lines, *(f"{name} = {_value(limit)}" for name, limit in limits.items())])
-    return parts
+        found |= {
+            f"{at}.law.young_1": {},
+            f"{at}.law.restitution": {"min": 0.05, "max": 1.0},
+            f"{at}.friction.mu_static": {"min": contact.mu_dynamic, "max": 1.5},
+            f"{at}.friction.mu_dynamic": {"min": 0.0, "max": contact.mu_static},
+        }
+    if plan.control is None:
+        return found | {"gravity.2": {"min": -20.0, "max": 0.0}}
+    press = isinstance(plan.control, Press)
+    keys = ("normal_force", "speed", "stiffness", "damping") if press else ("kp", "kd")
+    return found | {f"controller.{key}": {} for key in keys}
 
 
-def _expect(plan: Plan, pairs: Sequence[str]) -> list[str]:
-    # Of several feet a rough surface may leave one in the air.
-    lines = ["# What the run is checked against.", "[expect]"]
-    if isinstance(plan.control, Press) and plan.control.even:
-        force = f"{{ value = {_value(plan.control.force)}, rtol = 0.15, atol = 0.03 }}"
-        lines.append(f'"pairs.{pairs[0]}.mean_force" = {force}')
-    lines += [f'"pairs.{pair}.touches" = {{ min = 1 }}' for pair in pairs[:1]]
-    lines.append('"energy.relative_residual" = { max = 1e-3 }')
-    return lines
+def _fill(template: str, **values: object) -> str:
+    """Put `values` in place of the {names}: as TOML where a value stands, else as plain text."""
+    formatter, lines = Formatter(), list[str]()
+    for line in template.splitlines():
+        key, equals, rest = line.partition(" = ")
+        code, mark, comment = rest.partition(" # ")
+        if not equals or line.startswith("#"):
+            lines.append(formatter.format(line, **values))
+            continue
+        text = ""
+        for literal, name, _, conversion in formatter.parse(code):
+            value = None if name is None else formatter.get_field(name, (), values)[0]
+            if conversion == "o" and (
+                not value or (isinstance(value, list | tuple) and not any(value))
+            ):
+                break
+            text += literal if name is None else literal + _toml(value)
+        else:
+            start = formatter.format(key, **values)
+            text = f"{start} = {text}"
+            if isinstance(value, list) and (isinstance(value[0], list) or len(text) > 96):
+                text = f"{start} = [\n" + "".join(f"  {_toml(one)},\n" for one in value) + "]"
+            if mark:
+                text = f"{text.ljust(_COLUMN)} # {formatter.format(comment, **values)}"
+            lines.append(text)
+            continue
+        if lines and lines[-1].startswith("#"):
+            lines.pop()
+    return "\n".join(lines) + "\n"
 
 
-def _beside(code: str, comment: str) -> str:
-    return f"{code.ljust(_COLUMN)} # {comment}" if comment else code
+def _rounded(values: ArrayLike, digits: int) -> list[float]:
+    rounded: list[float] = (np.round(np.asarray(values), digits) + 0.0).tolist()  # no -0.0
+    return rounded
 
 
-def _wrapped(key: str, items: Iterable[str]) -> list[str]:
-    """Return a list on one line, or item by item where it is long."""
-    all_items = list(items)
-    line = f"{key} = {_list(all_items)}"
-    return [line] if len(line) <= 96 else [f"{key} = [", *(f"  {i}," for i in all_items), "]"]
-
-
-def _list(items: Iterable[str]) -> str:
-    return f"[{', '.join(items)}]"
-
-
-def _numbers(values: Iterable[float], digits: int) -> str:
-    # + 0.0 turns -0.0 into 0.0
-    return _list(repr(round(float(one), digits) + 0.0) for one in values)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, str):
-        return _string(value)
+def _toml(value: object) -> str:
+    """Return `value` as TOML writes it; very large and very small numbers in powers of ten."""
+    if isinstance(value, bool | str | int):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{_key(k)} = {_toml(one)}' for k, one in value.items())} }}"
     if isinstance(value, list | tuple):
-        return _list(map(_value, value))
-    number = float(value)
-    if number == 0 or 1e-3 <= abs(number) < 1e5:
-        return repr(number)
-    mantissa, exponent = f"{number:.15e}".split("e")
+        return f"[{', '.join(map(_toml, value))}]"
+    if not isinstance(value, float):
+        raise TypeError(f"no TOML for {value!r}")
+    if value == 0 or 1e-3 <= abs(value) < 1e5:
+        return repr(value)
+    mantissa, exponent = f"{value:.15e}".split("e")
     return f"{float(mantissa)!r}e{int(exponent)}"
 
 
 def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _string(name)
-
-
-def _string(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _toml(name)

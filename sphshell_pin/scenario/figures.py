@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
+from sphshell_pin.dynamics.result import Result
 from sphshell_pin.errors import ScenarioError, add_origin
+from sphshell_pin.scenario.bodies import joint_spans
 from sphshell_pin.scenario.build import Built
 
 PAIR_FIGURES = {
@@ -45,12 +47,11 @@ def figure_names(built: Built) -> list[str]:
     names += RUN_FIGURES
     names += [f"figures.{name}" for name in built.figures]
     model = built.scene.model
-    for j, joint in enumerate(model.names):
-        if j == 0:
-            continue
-        for kind, n in (("q", model.joints[j].nq), ("v", model.joints[j].nv)):
-            names += [f"final.{kind}.{joint}.{i}" for i in range(n)] if n > 1 else []
-            names += [f"final.{kind}.{joint}"] if n == 1 else []
+    for joint in list(model.names)[1:]:
+        for kind, span in zip("qv", joint_spans(model, joint), strict=True):
+            count = span.stop - span.start
+            name = f"final.{kind}.{joint}"
+            names += [f"{name}.{i}" for i in range(count)] if count > 1 else [name] * count
     return names
 
 
@@ -73,12 +74,12 @@ def check_expectations(built: Built) -> None:
             )
 
 
-def measure(built: Built, result: Any, name: str) -> float:
+def measure(built: Built, result: Result, name: str) -> float:
     """Return the figure `name` of `result` [SI units, see PAIR_FIGURES and RUN_FIGURES]."""
     kind, _, rest = name.partition(".")
     if kind == "pairs":
         pair, _, figure = rest.rpartition(".")
-        return float(result.stats["pairs"][pair][figure])
+        return float(getattr(result.stats.pairs[pair], figure))
     if kind == "figures":
         try:
             return float(built.figures[rest](result, built.scene))
@@ -89,10 +90,10 @@ def measure(built: Built, result: Any, name: str) -> float:
         return _final(built.scene.model, result, rest)
     if kind == "energy":
         return measure_energy(result)[rest]
-    return float(result.stats[rest])
+    return float(getattr(result.stats, rest))
 
 
-def measure_energy(result: Any) -> dict[str, float]:
+def measure_energy(result: Result) -> dict[str, float]:
     """Return the energy exchanged, the residual's largest size [J], and their ratio."""
     residual = float(np.max(np.abs(result.energy.residual), initial=0.0))
     exchanged = float(result.energy.exchanged)
@@ -100,7 +101,7 @@ def measure_energy(result: Any) -> dict[str, float]:
     return {"exchanged": exchanged, "residual": residual, "relative_residual": ratio}
 
 
-def judge(built: Built, result: Any) -> list[Verdict]:
+def judge(built: Built, result: Result) -> list[Verdict]:
     """Return the verdict on each of the scenario's expectations."""
     verdicts = []
     for name, expected in built.scenario.expect.items():
@@ -109,13 +110,12 @@ def judge(built: Built, result: Any) -> list[Verdict]:
     return verdicts
 
 
-def _final(model: Any, result: Any, rest: str) -> float:
+def _final(model: pin.Model, result: Result, rest: str) -> float:
+    """Return the last `rest`: q or v, a joint, and an index where it has several."""
     kind, _, joint = rest.partition(".")
     index = 0
     if joint not in list(model.names):
         joint, _, last = joint.rpartition(".")
         index = int(last)
-    entry = model.joints[model.getJointId(joint)]
-    if kind == "q":
-        return float(result.q[-1, entry.idx_q + index])
-    return float(result.v[-1, entry.idx_v + index])
+    in_q, in_v = joint_spans(model, joint)
+    return float(result.q[-1, in_q][index] if kind == "q" else result.v[-1, in_v][index])

@@ -10,13 +10,12 @@ import inspect
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.scenario.bodies import blamed_on
 
 
-def load_function(where: str, path: Path, key: str) -> Callable[..., Any]:
+def load_function(where: str, path: Path, key: str) -> Callable[..., object]:
     """Return the function that "file.py:function" names, the file relative to the scenario's.
 
     Raises
@@ -50,13 +49,13 @@ def load_function(where: str, path: Path, key: str) -> Callable[..., Any]:
     return found  # type: ignore[no-any-return]
 
 
-def unloaded(where: str, path: Path, key: str) -> Callable[..., Any]:
+def unloaded(where: str, path: Path, key: str) -> Callable[..., object]:
     """Return what stands for the function that "file.py:function" names; nothing is executed.
 
     Called, it raises SphshellError, which says how to have the function itself.
     """
 
-    def refuse(*arguments: Any, **keywords: Any) -> Any:
+    def refuse(*arguments: object, **keywords: object) -> object:
         raise SphshellError(
             f"{path}: {key}: '{where}' was not loaded, as no code is executed to show a finished "
             "run: if you trust it, say Replay(result, trust_code=True)"

@@ -1,10 +1,9 @@
-"""A scenario that keeps running while somebody turns its knobs and pushes its bodies."""
+"""A scenario that keeps running while its parameters are changed and its bodies pushed."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -66,8 +65,8 @@ class LiveRun:
         return self._run.scene
 
     @property
-    def visual_model(self) -> Any:
-        """pinocchio.GeometryModel of the scene's model."""
+    def visual_model(self) -> pin.GeometryModel:
+        """Of the scene's model."""
         return self.built.visual_model
 
     @property

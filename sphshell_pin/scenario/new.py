@@ -1,14 +1,13 @@
-"""A new scenario out of a robot and a surface: what can be found out is, the rest is chosen."""
+"""A new scenario from a robot and a surface, with values chosen for their sizes."""
 
 from __future__ import annotations
 
-import importlib
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +17,8 @@ from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.robots import WORKING
+from sphshell_pin.scenario.bodies import joint_spans
 from sphshell_pin.scenario.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.drafting import draft_text
 from sphshell_pin.scenario.knobs import check_knobs
@@ -36,15 +37,20 @@ from sphshell_pin.scenario.poses import take_stance
 from sphshell_pin.scenario.reading import parse_scenario
 from sphshell_pin.scenario.schema import (
     Box,
-    Cylinder,
     HalfSpace,
+    Primitive,
     RobotSection,
+    RoundSolid,
     RunSection,
     Scenario,
     ShellSection,
     SphereSurface,
 )
 from sphshell_pin.scenario.tips import Tip, find_tips, floats
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.explain import Explanation
+    from sphshell_pin.shell.shell import Shell
 
 Array = npt.NDArray[np.float64]
 
@@ -73,8 +79,8 @@ class NewScenario:
     path: Path
     text: str
     built: Built
-    explanation: Any
-    """Scene.explain's answer for the start."""
+    explanation: Explanation
+    """Of the start, see Scene.explain."""
     why: tuple[str, ...]
     """One sentence for each choice that was made for the user."""
 
@@ -151,18 +157,18 @@ def new_scenario(
     shell_section, word = _shell_section(surface, unit, (bodies, faces), path, bare, tips)
     with_shell = _build_bare(section, path, shell_section, reuse=bare)
     _check_size(with_shell.shells[shell_section.name], tips)
-    wish = _Wish(material, against, press, place, word)
-    section, plan = _plan(section, with_shell, tips, wish)
+    request = _Request(material, against, press, place, word)
+    section, plan = _plan(section, with_shell, tips, request)
     title = f"{loaded.name} {_DOES[type(plan.control)]} {shell_section.name}"
     text = draft_text(path.stem, title, section, shell_section, plan, _run(plan))
     # What is written is what was built.
     built = _build_text(text, path, with_shell)
     _write(path, text)
-    why = (*plan.why, _tell_materials(plan))
+    why = (*plan.why, _materials_note(plan))
     return NewScenario(path, text, built, explain_built(built), why)
 
 
-def _tell_materials(plan: Plan) -> str:
+def _materials_note(plan: Plan) -> str:
     one, other = plan.contact.material.name, plan.contact.against.name
     return f"law and friction of {one} on {other}, typical values: --law and --against name others"
 
@@ -174,7 +180,7 @@ def _build_text(text: str, path: Path, reuse: Built) -> Built:
 
 
 @dataclass(frozen=True)
-class _Wish:
+class _Request:
     """What the user said of the contact; `word` stood for the surface."""
 
     material: str | None
@@ -237,7 +243,7 @@ def _robot_section(
 
 
 def _relative(file: Path, path: Path) -> str:
-    """Return `file` as seen from the scenario at `path`; as it is where no way leads there."""
+    """Return `file` relative to the scenario at `path`; absolute where that cannot be."""
     try:
         return Path(os.path.relpath(file, path.parent)).as_posix()
     except ValueError:  # another drive
@@ -250,9 +256,9 @@ def _build_bare(
     shell: ShellSection | None = None,
     reuse: Built | None = None,
 ) -> Built:
-    """Build robot and surface without contacts; a fault is told as of the command, not of a file.
+    """Build robot and surface without contacts.
 
-    The scenario's file does not exist yet, so its name would only puzzle.
+    An error does not name the scenario's file, as that does not exist yet.
     """
     shells = [] if shell is None else [shell]
     scenario = Scenario(title="", robot=[section], shell=shells, run=RunSection(duration=1.0))
@@ -297,17 +303,18 @@ def _shell_section(
     centres = _centres(built, tips)
     spread = float(np.linalg.norm(np.ptp(centres, axis=0)))
     size = _round_up(max(_SIZE * max(tip.radius for tip in tips), spread))
-    primitive: Any = {
+    ball = SphereSurface(type="sphere", radius=size)
+    primitives: dict[str, Primitive] = {
         "plane": HalfSpace(type="half-space", extent=2 * size),
         "box": Box(type="box", size=[2 * size, 2 * size, 0.4 * size]),
-        "sphere": SphereSurface(type="sphere", radius=size),
-        "bowl": SphereSurface(type="sphere", radius=size),
-        "cylinder": Cylinder(type="cylinder", radius=size, length=2 * size),
-    }[word]
-    return ShellSection(name=word, primitive=primitive), word
+        "sphere": ball,
+        "bowl": ball,
+        "cylinder": RoundSolid(type="cylinder", radius=size, length=2 * size),
+    }
+    return ShellSection(name=word, primitive=primitives[word]), word
 
 
-def _check_size(shell: Any, tips: Sequence[Tip]) -> None:
+def _check_size(shell: Shell, tips: Sequence[Tip]) -> None:
     radius = min(tip.radius for tip in tips)
     if shell.size < radius:
         raise SphshellError(
@@ -334,10 +341,10 @@ def _plan(
     section: RobotSection,
     built: Built,
     tips: Sequence[Tip],
-    wish: _Wish,
+    request: _Request,
 ) -> tuple[RobotSection, Plan]:
     """Return the plan, and the robot's table with what the plan asks of it."""
-    press, place, inside = wish.press, wish.place, wish.word == "bowl"
+    press, place, inside = request.press, request.place, request.word == "bowl"
     model, q0 = built.assembly.model, built.assembly.q0
     (shell,) = built.shells.values()
     if floats(model):
@@ -349,7 +356,7 @@ def _plan(
         centres = _centres(built, tips)
         root = q0[:7]
         if model.njoints == 2:
-            pair = wish.materials(tips, 0.0)
+            pair = request.materials(tips, 0.0)
             return section, plan_fall(shell, tips[0], centres[0], root, pair, inside=inside)
         data = model.createData()
         inertia = np.diag(pin.crba(model, data, q0))[6:]
@@ -357,7 +364,7 @@ def _plan(
         leg = float(np.linalg.norm(root[:3] - centres, axis=1).max())
         if inside:
             raise SphshellError("a robot cannot stand in a bowl: take another --surface")
-        pair = wish.materials(tips, mass / len(tips))
+        pair = request.materials(tips, mass / len(tips))
         return section, plan_stand(shell, tuple(tips), centres, mass, inertia, leg, pair)
     tip = tips[0]
     if int(model.frames[find_frame(model, tip.frame)].parentJoint) == 0:
@@ -367,29 +374,27 @@ def _plan(
         )
     approach = None if place is None else np.array(PLACES[place])
     stance = take_stance(model, _working_posture(section, model, q0), tip, approach)
-    side = {"cylinder": (1.0, 0.0, 0.0), "bowl": (0.0, 0.0, 1.0)}.get(wish.word or "")
+    side = {"cylinder": (1.0, 0.0, 0.0), "bowl": (0.0, 0.0, 1.0)}.get(request.word or "")
     toward = None if side is None else np.array(side)
-    pair = wish.materials(tips, stance.mass)
+    pair = request.materials(tips, stance.mass)
     plan = plan_press(shell, tip, stance, pair, press, toward=toward, inside=inside)
     start = _changed_joints(model, q0, stance.q)
     return section.model_copy(update={"lock": list(stance.lock), "start": start}), plan
 
 
-def _working_posture(section: RobotSection, model: Any, q0: Array) -> Array:
+def _working_posture(section: RobotSection, model: pin.Model, q0: Array) -> Array:
     """Return the posture in which the robot is known to work, else its reference posture."""
-    robots = importlib.import_module("sphshell_pin.robots")
-    known = robots.WORKING.get(section.name, ())
+    known = WORKING.get(section.name or "", ())
     return np.array(known) if len(known) == model.nq else q0
 
 
-def _changed_joints(model: Any, q0: Array, q: Array) -> dict[str, float | list[float]]:
+def _changed_joints(model: pin.Model, q0: Array, q: Array) -> dict[str, float | list[float]]:
     start: dict[str, float | list[float]] = {}
-    for j in range(1, model.njoints):
-        joint = model.joints[j]
-        span = slice(joint.idx_q, joint.idx_q + joint.nq)
+    for name in list(model.names)[1:]:
+        span, _ = joint_spans(model, name)
         if not np.array_equal(q[span], q0[span]):
             values = [round(float(one), 9) for one in q[span]]
-            start[model.names[j]] = values[0] if joint.nq == 1 else values
+            start[name] = values[0] if len(values) == 1 else values
     return start
 
 

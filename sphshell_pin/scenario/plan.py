@@ -13,15 +13,15 @@ import pinocchio as pin
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.materials import Material, friction_between, restitution_between
 from sphshell_pin.scenario.poses import Stance
-from sphshell_pin.scenario.spots import (
-    Spot,
-    come_down,
-    find_spot,
-    spots_about,
-    touches_once,
-    way_across,
-)
 from sphshell_pin.scenario.tips import Tip
+from sphshell_pin.scenario.touch_points import (
+    TouchPoint,
+    come_down,
+    find_touch_point,
+    path_on_surface,
+    touch_points,
+    touches_once,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -206,7 +206,7 @@ def plan_fall(
     gap = FALL_GAP * tip.radius
     # Beside the middle: a ball in a bowl rolls then.
     beside = FALL_BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
-    spot = find_spot(shell, tip.radius, gap, toward=UP, inside=inside, beside=beside)
+    spot = find_touch_point(shell, tip.radius, gap, toward=UP, inside=inside, beside=beside)
     start = root.copy()
     start[:3] += spot.centre - centre
     speed = math.sqrt(2 * GRAVITY * gap)
@@ -285,19 +285,19 @@ def _suitable_force(stance: Stance, radius: float, materials: tuple[Material, Ma
 
 def _place_to_press(
     shell: Any, tip: Tip, stance: Stance, gap: float, toward: Array | None, *, inside: bool
-) -> tuple[Spot, Array, Array, bool]:
+) -> tuple[TouchPoint, Array, Array, bool]:
     """Return a spot, how the shell is turned to face the tip, a way (k, 3) across; if it is even.
 
     The first spot from the middle on where the sphere touches once all along the way; where there
     is none, the middle.
     """
-    first: tuple[Spot, Array, Array, bool] | None = None
-    for spot in spots_about(shell, tip.radius, gap, toward=toward, inside=inside):
+    first: tuple[TouchPoint, Array, Array, bool] | None = None
+    for spot in touch_points(shell, tip.radius, gap, toward=toward, inside=inside):
         turned = _turn(spot.normal, -stance.approach)
         points = spot.point[None]
         if stance.slide is not None and stance.inertia:
             length = min(WAY_RADII * tip.radius, 0.8 * stance.room)
-            points = way_across(shell, spot, turned.T @ stance.slide, length, 0.5 * tip.radius)
+            points = path_on_surface(shell, spot, turned.T @ stance.slide, length, 0.5 * tip.radius)
         first = first or (spot, turned, points, False)
         # Beside an edge a way may be short, but not on a whole surface.
         roomy = len(points) > 4 or len(first[2]) <= 4
@@ -314,7 +314,7 @@ def _under(shell: Any, centres: Array, radii: Array, gap: float) -> Any:
     Its middle stands under the middle of the spheres; where none of them would then come down on
     it, under the first one.
     """
-    spot = find_spot(shell, float(radii[0]), gap, toward=UP)
+    spot = find_touch_point(shell, float(radii[0]), gap, toward=UP)
     for anchor in (centres.mean(axis=0), centres[0]):
         aside = anchor - spot.point
         heights = []

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.dynamics.models import find_frame, reduced_model
+from sphshell_pin.scenario.bodies import restrict
 from sphshell_pin.scenario.tips import Tip
 
 Array = npt.NDArray[np.float64]
@@ -37,8 +37,8 @@ _MARGIN = 0.02
 class Stance:
     """A robot at the start, seen from its tip; vectors and points in the world."""
 
-    model: Any
-    """pinocchio.Model without the joints that do not move the tip."""
+    model: pin.Model
+    """Without the joints that do not move the tip."""
     q: Array
     """Configuration of the whole robot (nq,)."""
     coordinates: Array
@@ -71,7 +71,7 @@ class Stance:
     """Whether the posture had to be bent out of a singular one, or into its limits."""
 
 
-def take_stance(model: Any, q: Array, tip: Tip, approach: Array | None) -> Stance:
+def take_stance(model: pin.Model, q: Array, tip: Tip, approach: Array | None) -> Stance:
     """Return how the robot stands with its tip near the configuration q (nq,).
 
     `approach` (3,) is where the tip shall press; by default down if its limb points down, else as
@@ -87,7 +87,7 @@ def take_stance(model: Any, q: Array, tip: Tip, approach: Array | None) -> Stanc
 
 
 def _bend(
-    model: Any,
+    model: pin.Model,
     inside: Array,
     lock: tuple[str, ...],
     tip: Tip,
@@ -115,14 +115,14 @@ def _bend(
     return best, best_score
 
 
-def _joints_aside(model: Any, tip: Tip) -> tuple[str, ...]:
+def _joints_aside(model: pin.Model, tip: Tip) -> tuple[str, ...]:
     """Return the joints that do not move the tip; none are left aside of a robot that floats."""
     parent = int(model.frames[find_frame(model, tip.frame)].parentJoint)
     chain = set(model.supports[parent])
     return tuple(model.names[j] for j in range(1, model.njoints) if j not in chain)
 
 
-def _into_limits(model: Any, q: Array) -> Array:
+def _into_limits(model: pin.Model, q: Array) -> Array:
     """Return q with every joint of one coordinate inside its limits."""
     inside = np.array(q, dtype=float)
     for j in range(1, model.njoints):
@@ -139,7 +139,7 @@ def _into_limits(model: Any, q: Array) -> Array:
 
 
 def _stance(
-    model: Any,
+    model: pin.Model,
     q: Array,
     lock: tuple[str, ...],
     tip: Tip,
@@ -152,7 +152,7 @@ def _stance(
     Without an `approach` it is forward; with `best_way`, where the tip moves best if not forward.
     """
     reduced = reduced_model(model, lock, q) if lock else model
-    short = _coordinates(model, reduced, q)
+    short, _ = restrict(model, reduced, q, np.zeros(model.nv))
     data = reduced.createData()
     pin.computeJointJacobians(reduced, data, short)
     pin.updateFramePlacements(reduced, data)
@@ -207,7 +207,7 @@ def _stance(
     return stance, usable / top
 
 
-def _forward(data: Any, pose: Any, tip: Tip) -> Array:
+def _forward(data: pin.Data, pose: pin.SE3, tip: Tip) -> Array:
     """Return where there is nothing of the robot before the tip: down, or as its limb points.
 
     A sphere before its frame is pressed as the frame points, else the frame would be dragged beside
@@ -254,14 +254,6 @@ def _slide_room(stance: Stance, tip: Tip, direction: Array) -> float:
     return _SLIDE_STEPS * step
 
 
-def _coordinates(model: Any, reduced: Any, q: Array) -> Array:
-    short: Array = pin.neutral(reduced)
-    for j in range(1, reduced.njoints):
-        to, source = reduced.joints[j], model.joints[model.getJointId(reduced.names[j])]
-        short[to.idx_q : to.idx_q + to.nq] = q[source.idx_q : source.idx_q + source.nq]
-    return short
-
-
 def _upright(axis: Array, *, free: bool = True) -> Array:
     """Return `axis` along the nearest coordinate axis, where it nearly is one; `free`: in its +."""
     k = int(np.argmax(np.abs(axis)))
@@ -272,7 +264,7 @@ def _upright(axis: Array, *, free: bool = True) -> Array:
     return upright if free else sign * upright
 
 
-def _roomier(model: Any, q: Array, linear: Array, mass_matrix: Array, axis: Array) -> Array:
+def _roomier(model: pin.Model, q: Array, linear: Array, mass_matrix: Array, axis: Array) -> Array:
     """Return `axis` or its opposite: the way along which the joints are farther from limits."""
     rates = np.linalg.solve(mass_matrix, linear.T @ axis)
     rooms = []

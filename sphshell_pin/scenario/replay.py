@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from sphshell_pin.dynamics.result import Origin, Result
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
 from sphshell_pin.scenario.build import Built, build_scenario
 from sphshell_pin.scenario.functions import load_function, unloaded
+from sphshell_pin.scenario.knobs import Knob
 from sphshell_pin.scenario.player import Rows
 from sphshell_pin.scenario.reading import find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.schema import Scenario
@@ -60,7 +61,7 @@ class Replay:
         """Seconds of simulated time that a recording of it shows in one second."""
         if built is not None:
             self.scene: Scene = built.scene
-            self.visual_model: Any = built.visual_model
+            self.visual_model: pin.GeometryModel | None = built.visual_model
             self.title = built.scenario.title or built.name
             self.speed = built.scenario.run.recording_speed
         elif self.result.scene is not None:
@@ -78,9 +79,9 @@ class Replay:
         self._rows = self._all_rows()
         self._residual = self.result.energy.residual
         self._exchanged = self.result.energy.exchanged_until
-        self._time, self._row, self._told = self.start, 0, 0
+        self._time, self._row, self._given = self.start, 0, 0
 
-    knobs: tuple[Any, ...] = ()
+    knobs: tuple[Knob, ...] = ()
     bodies: tuple[str, ...] = ()
 
     @property
@@ -141,8 +142,8 @@ class Replay:
         Nothing is computed: `wall`, the time that a player may take, is not used up.
         """
         self._go_to(self._time + max(0.0, float(duration)))
-        passed = self._rows.select(slice(self._told, self._row + 1))
-        self._told = max(self._told, self._row + 1)
+        passed = self._rows.select(slice(self._given, self._row + 1))
+        self._given = max(self._given, self._row + 1)
         return passed
 
     def seek(self, t: float) -> None:
@@ -151,18 +152,18 @@ class Replay:
         if not np.isfinite(t):
             raise InvalidParameter("t", t, "must be a time [s]")
         self._go_to(t)
-        self._told = self._row
+        self._given = self._row
 
     def reset(self) -> None:
         """Go back to the first row."""
-        self._told = 0
+        self._given = 0
         self._go_to(self.start)
 
     def change(self, key: str, value: float) -> None:
-        """Refuse: a finished run has nothing to turn."""
+        """Refuse: a finished run has nothing to change."""
         raise InvalidParameter(key, value, "cannot be changed: this is a finished run")
 
-    def push(self, body: str, force_world: Any, seconds: float) -> None:
+    def push(self, body: str, force_world: npt.ArrayLike, seconds: float) -> None:
         """Refuse: a finished run cannot be pushed."""
         raise InvalidParameter("body", body, "cannot be pushed: this is a finished run")
 
@@ -228,7 +229,7 @@ def _shown(scenario: Scenario) -> Scenario:
 
 
 def _build_again(
-    origin: Origin, name: str, function: Callable[[str, Path, str], Callable[..., Any]]
+    origin: Origin, name: str, function: Callable[[str, Path, str], Callable[..., object]]
 ) -> Built:
     """Build the scenario of `origin` with its settings; `name` is the result's."""
     path = Path(origin.scenario)
@@ -237,7 +238,7 @@ def _build_again(
         if origin.scenario not in shipped:
             raise ResultError(name, f"its scenario '{origin.scenario}' is not shipped: {HOW}")
         path = shipped[origin.scenario]
-    settings: Mapping[str, Any] = {k: v for k, v in origin.settings.items() if k not in UNSHOWN}
+    settings = {k: v for k, v in origin.settings.items() if k not in UNSHOWN}
     try:
         return build_scenario(Scenario.model_validate(settings), path, function=function)
     except SphshellError as fault:

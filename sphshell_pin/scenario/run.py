@@ -8,15 +8,14 @@ import hashlib
 import json
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
-from sphshell_pin.dynamics.result import Origin
+from sphshell_pin.dynamics.result import Origin, Result
 from sphshell_pin.errors import (
     Interrupted,
     MissingExtra,
@@ -54,8 +53,8 @@ class RunReport:
     """What a run left behind."""
 
     built: Built
-    result: Any
-    """sphshell_pin.Result; what was computed until then when `stopped` is set."""
+    result: Result
+    """What was computed until then when `stopped` is set."""
     folder: Path
     files: tuple[Path, ...]
     notes: tuple[str, ...]
@@ -64,7 +63,7 @@ class RunReport:
     stopped: SphshellError | None
     """Why the run ended early: Interrupted or SimulationDiverged."""
     audit: CadAudit | None = None
-    """What the contacts are off those on the exact CAD faces, if that was asked for."""
+    """Differences of the contacts from those on the exact CAD faces, if that was asked for."""
 
 
 def run_scenario(
@@ -142,7 +141,7 @@ def run_built(
     return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit)
 
 
-def _judge(built: Built, result: Any) -> tuple[tuple[Verdict, ...], Exception | None]:
+def _judge(built: Built, result: Result) -> tuple[tuple[Verdict, ...], Exception | None]:
     """Return the verdicts; or the fault of a figure of the user's, told when all is written."""
     try:
         return tuple(judge(built, result)), None
@@ -152,7 +151,7 @@ def _judge(built: Built, result: Any) -> tuple[tuple[Verdict, ...], Exception | 
 
 def simulate(
     built: Built, progress: Callable[[float], object] | None = None
-) -> tuple[Any, SphshellError | None]:
+) -> tuple[Result, SphshellError | None]:
     """Run without writing; return the result, and why it ended early (None: it did not)."""
     run = built.scenario.run
     try:
@@ -177,8 +176,8 @@ def origin_of(built: Built) -> Origin:
     """Return what a Result says of the scenario that it came from."""
     shipped = shipped_scenarios().get(built.name)
     scenario = built.name if shipped == built.path else str(built.path.absolute())
-    settings = _plain(built.scenario.model_dump(mode="json"))
-    return Origin(scenario, settings)
+    settings = built.scenario.model_dump(mode="json")
+    return Origin(scenario, {key: _plain(value) for key, value in settings.items()})
 
 
 @contextlib.contextmanager
@@ -214,49 +213,42 @@ def _holds_complete(folder: Path) -> bool:
         return any((folder / name).exists() for name in RESULTS)
 
 
-def _draw(built: Built, result: Any, desk: Path, notes: list[str], *, recording: bool) -> bool:
-    """Write the pictures; note which of them cannot be made, for the numbers are worth more.
+def _draw(built: Built, result: Result, desk: Path, notes: list[str], *, recording: bool) -> bool:
+    """Write the pictures; note which of them cannot be made, as the numbers matter more.
 
     Returns whether Ctrl-C ended it. Raises ResultError for one that cannot be written.
     """
-    writers = {"figures": _write_figures, RECORDING: _write_recording}
-    for what in writers if recording else ["figures"]:
+    scenario = built.scenario
+
+    def write_recording() -> None:
+        speed, title = scenario.run.recording_speed, scenario.title
+        view = result.view(built.scene, built.visual_model, speed=speed, title=title)
+        view.save(desk / RECORDING)
+
+    writers: dict[str, Callable[[], object]] = {
+        "figures": lambda: result.save_figures(desk, built.scene),
+        RECORDING: write_recording,
+    }
+    for what, write in writers.items():
+        if what == RECORDING and not recording:
+            continue
         try:
-            writers[what](result, desk, built)
+            write()
         except KeyboardInterrupt:
             return True
         except MissingExtra as error:
             notes.append(str(error))
-        except ResultError as error:
-            if isinstance(error.__cause__, OSError):
-                raise
-            notes.append(f"{what} could not be made: {error}")
         except Exception as error:
-            reason = f"{type(error).__name__}: {error}".removesuffix(": ")
-            notes.append(f"{what} could not be made: {reason}")
+            if isinstance(error, ResultError) and isinstance(error.__cause__, OSError):
+                raise
+            named = "" if isinstance(error, ResultError) else f"{type(error).__name__}: "
+            notes.append(f"{what} could not be made: {named}{error}".removesuffix(": "))
     return False
 
 
-def _write_figures(result: Any, desk: Path, built: Built) -> None:
-    from sphshell_pin.plot import save_figures
-
-    save_figures(result, desk, scene=built.scene)
-
-
-def _write_recording(result: Any, desk: Path, built: Built) -> None:
-    from sphshell_pin.view.recording import write_recording
-
-    write_recording(
-        desk / RECORDING,
-        result,
-        built.scene,
-        visual_model=built.visual_model,
-        speed=built.scenario.run.recording_speed,
-        title=built.scenario.title,
-    )
-
-
-def write_contacts(path: str | PathLike[str], result: Any, audit: CadAudit | None = None) -> None:
+def write_contacts(
+    path: str | PathLike[str], result: Result, audit: CadAudit | None = None
+) -> None:
     """Write the contact log of `result` as comma-separated values, one row for each contact."""
     columns = result.contact_columns() | ({} if audit is None else audit.columns())
     with open(path, "w", newline="", encoding="utf-8") as file:
@@ -268,7 +260,7 @@ def write_contacts(path: str | PathLike[str], result: Any, audit: CadAudit | Non
 def _write_summary(
     desk: Path,
     built: Built,
-    result: Any,
+    result: Result,
     verdicts: Iterable[Verdict],
     stopped: SphshellError | None,
     audit: CadAudit | None,
@@ -283,7 +275,7 @@ def _write_summary(
         "title": built.scenario.title,
         "complete": stopped is None,
         "stopped": None if stopped is None else str(stopped),
-        "stats": result.stats,
+        "stats": asdict(result.stats),
         "energy": measure_energy(result),
         "expected": [
             {"figure": v.figure, "expected": v.expected, "measured": v.measured, "met": v.met}
@@ -297,7 +289,7 @@ def _write_summary(
             "numpy": np.__version__,
         },
         "files": {name: _digest(desk / name) for name in RESULTS if (desk / name).exists()},
-        "settings": result.origin.settings,
+        "settings": origin_of(built).settings,
     }
     text = json.dumps(_plain(summary), indent=2, allow_nan=False)
     (desk / SUMMARY).write_text(text + "\n", encoding="utf-8")
@@ -308,7 +300,7 @@ def _digest(path: Path) -> str:
         return f"sha256:{hashlib.file_digest(file, 'sha256').hexdigest()}"
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """Return `value` made of what JSON knows; it has no infinity: null stands for it."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips
 
 Array = npt.NDArray[np.float64]
 
@@ -29,9 +29,9 @@ class Tip:
 
 
 def find_tips(
-    robot: Any, *, shipped: str | None, frame: str | None, radius: float | None
+    robot: LoadedRobot, *, shipped: str | None, frame: str | None, radius: float | None
 ) -> list[Tip]:
-    """Return the spheres of `robot` (a LoadedRobot) to put on a surface.
+    """Return the spheres of `robot` to put on a surface.
 
     One for a robot with a fixed base, all feet of one that floats. `shipped` is the name of a
     shipped robot; `frame` and `radius` [m] are what the user gave.
@@ -54,17 +54,16 @@ def find_tips(
     return [_sized(Tip(one, 0.0, np.zeros(3), said), radius) for one, said in _ends(robot.model)]
 
 
-def floats(model: Any) -> bool:
+def floats(model: pin.Model) -> bool:
     """Whether the root of the robot is free to move in space."""
     return bool(model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer")
 
 
-def _known(robot: Any, shipped: str | None) -> list[Tip]:
-    robots = importlib.import_module("sphshell_pin.robots")
-    if shipped in robots.TIPS:
-        spheres, said = robots.fingertips(shipped), "a fingertip this package knows of"
+def _known(robot: LoadedRobot, shipped: str | None) -> list[Tip]:
+    if shipped in TIPS:
+        spheres, said = fingertips(shipped), "a fingertip this package knows of"
     else:
-        spheres, said = robots.end_spheres(robot), "the sphere of its collision geometry"
+        spheres, said = end_spheres(robot), "the sphere of its collision geometry"
     model = robot.model
     return [
         Tip(one.frame, one.radius, np.array(one.offset), said)
@@ -87,7 +86,7 @@ def _sized(tip: Tip, radius: float | None) -> Tip:
     return tip
 
 
-def _ends(model: Any) -> list[tuple[str, str]]:
+def _ends(model: pin.Model) -> list[tuple[str, str]]:
     """Return the frames at the ends of the limbs that may be meant, and why."""
     leaves = set(range(1, model.njoints)) - {int(one) for one in model.parents}
     carriers = {int(one.parentFrame) for one in model.frames}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from sphshell_pin.view.nodes import (
     show,
     sphere,
 )
+
+if TYPE_CHECKING:
+    from meshcat import Visualizer
 
 NORMAL_COLOR = 0xD4202A
 FRICTION_COLOR = 0xF08A00
@@ -112,7 +115,7 @@ class ArrowPool:
     """
 
     def __init__(
-        self, visualizer: Any, size: int, width: float, kind: ArrowKind = "components"
+        self, visualizer: Visualizer, size: int, width: float, kind: ArrowKind = "components"
     ) -> None:
         self.size = size
         self._width = width

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pinocchio as pin
 
@@ -20,6 +20,8 @@ from sphshell_pin.view.nodes import (
 from sphshell_pin.view.surface import draw_patches, draw_shell, great_circles
 
 if TYPE_CHECKING:
+    from meshcat import Visualizer
+
     from sphshell_pin.dynamics.scene import ContactPair
 
 SPHERE_COLOR = 0x2F6FDE
@@ -33,20 +35,20 @@ SphereKey = tuple[int, bytes, float]
 
 def shell_key(pair: ContactPair) -> ShellKey:
     """Return what tells the picture of one pair's shell from another's."""
-    place = pair.shell_placement.homogeneous.tobytes()
+    place = pair.placement_j.homogeneous.tobytes()
     return id(pair.shell), pair.joint_j, place, pair.method == "smooth"
 
 
 def sphere_key(pair: ContactPair) -> SphereKey:
     """Return what tells the picture of one pair's sphere from another's."""
     radius = 0.0 if pair.sphere is None else pair.sphere.radius
-    return pair.joint_i, pair.sphere_placement.homogeneous.tobytes(), radius
+    return pair.joint_i, pair.placement_i.homogeneous.tobytes(), radius
 
 
 class DrawnShell:
     """The shell of `pair`, drawn below `visualizer`; `index` numbers the shells of the scene."""
 
-    def __init__(self, visualizer: Any, pair: ContactPair, index: int) -> None:
+    def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
         shell = pair.shell
         if shell is None:
             raise ValueError("a pair without a shell")
@@ -54,7 +56,7 @@ class DrawnShell:
         self.joint = pair.joint_j
         self.node = visualizer[f"{index}_{node_name(shell.name)}"]
         self._curved = pair.method == "smooth"
-        self._offset = pair.shell_placement
+        self._offset = pair.placement_j
         self._colorings: dict[str, bool] = {}
         draw_shell(self.node, shell, index, curved=self._curved)
         self._move = mover(self.node)
@@ -90,10 +92,10 @@ class DrawnShell:
 class DrawnSphere:
     """The sphere of `pair`, drawn below `visualizer`; `index` numbers the spheres of the scene."""
 
-    def __init__(self, visualizer: Any, pair: ContactPair, index: int) -> None:
+    def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
         _, _, radius = sphere_key(pair)
         self.joint = pair.joint_i
-        self._offset = pair.sphere_placement
+        self._offset = pair.placement_i
         node = visualizer[f"{index}_{node_name(pair.name)}"]
         set_object(
             node["ball"],

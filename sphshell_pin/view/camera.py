@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.view.nodes import Command, FloatArray, set_camera
+
+if TYPE_CHECKING:
+    from meshcat import Visualizer
 
 FIELD_OF_VIEW = 40.0  # vertical [deg]
 ASPECT = 1.2  # of the part of the window that legend and controls leave free
@@ -94,7 +97,7 @@ def _direction(target: FloatArray, subject: FloatArray, normal: FloatArray) -> F
     return np.asarray(direction / np.linalg.norm(direction))
 
 
-def look(visualizer: Any, view: View) -> None:
+def look(visualizer: Visualizer, view: View) -> None:
     """Point the page's camera; the mouse then orbits about the target.
 
     meshcat 0.3.2's own live page does not know the target yet, and looks at the world's origin.
@@ -121,7 +124,7 @@ def _y_up(point: FloatArray) -> list[float]:
     return [x, z, -y]
 
 
-def set_surroundings(visualizer: Any) -> None:
+def set_surroundings(visualizer: Visualizer) -> None:
     """Give the page a light background; hide the axes at the world's origin and the ground grid.
 
     The grid lies at z = 0 and would cut through whatever stands there; the page's controls bring

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.result import ContactLog, Result
     from sphshell_pin.dynamics.scene import ContactPair, Scene
 
 FloatArray = NDArray[np.float64]
@@ -30,7 +30,7 @@ class ContactRows:
     friction_force_world: FloatArray
 
     @classmethod
-    def of(cls, log: Any) -> ContactRows:
+    def of(cls, log: ContactLog) -> ContactRows:
         """Take the columns of a Result's contact log, ordered by row.
 
         The end of a run that diverged may hold numbers no picture can show: they are left out.
@@ -55,7 +55,7 @@ class ContactRows:
             sound &= (np.abs(vector) < LARGEST).all(axis=1)
         return rows if sound.all() else rows.select(sound)
 
-    def select(self, chosen: Any) -> ContactRows:
+    def select(self, chosen: slice | IndexArray | NDArray[np.bool_]) -> ContactRows:
         """Return the entries that `chosen`, a slice, mask or indices, picks."""
         return ContactRows(
             self.row[chosen],
@@ -136,7 +136,7 @@ def _in_shell(
     for place, row in enumerate(contacts.row):
         if shell is None or pair.joint_j != 0:
             pin.forwardKinematics(model, data, np.asarray(result.q[row], dtype=float))
-            shell = data.oMi[pair.joint_j] * pair.shell_placement
+            shell = data.oMi[pair.joint_j] * pair.placement_j
         points[place] = shell.actInv(contacts.point_world[place])
         normals[place] = shell.rotation.T @ contacts.normal_world[place]
     return points, normals

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 import pinocchio as pin
@@ -23,8 +23,8 @@ from sphshell_pin.view.distance import range_text
 from sphshell_pin.view.nodes import (
     FloatArray,
     material,
+    new_visualizer,
     node_name,
-    require_meshcat,
     set_object,
     show,
     triangle_mesh,
@@ -33,6 +33,7 @@ from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot, check_geometry
 from sphshell_pin.view.surface import tube
 
 if TYPE_CHECKING:
+    from meshcat import Visualizer
     from numpy.typing import ArrayLike
 
     from sphshell_pin.dynamics.scene import Scene
@@ -62,18 +63,17 @@ class Display:
         self,
         scene: Scene,
         visual_model: pin.GeometryModel | None = None,
-        visualizer: Any = None,
+        visualizer: Visualizer | None = None,
         *,
         view: View | None = None,
         arrows: ArrowKind = "components",
         arrow_scale: ArrowScale | None = None,
         pool: int = 8,
     ) -> None:
-        meshcat = require_meshcat()
         if arrows not in ("components", "total"):
             raise InvalidParameter("arrows", arrows, 'must be "components" or "total"')
         self.scene = scene
-        self.visualizer = meshcat.Visualizer() if visualizer is None else visualizer
+        self.visualizer = new_visualizer() if visualizer is None else visualizer
         self._model = scene.model
         self._data = self._model.createData()
         neutral = pin.neutral(self._model)
@@ -135,7 +135,9 @@ class Display:
         """Radius of the lines that `draw_trail` draws [m]."""
         return 0.0014 * self.view.distance
 
-    def draw_trail(self, name: str, points: ArrayLike, pair: int | None = None) -> Any:
+    def draw_trail(
+        self, name: str, points: ArrayLike, pair: int | None = None
+    ) -> Visualizer | None:
         """Draw a line along `points` (k, 3) [m]; return its node, None if there is no length.
 
         With `pair`, the index of a contact pair, the points are in its shell's frame and move with
@@ -151,7 +153,7 @@ class Display:
         set_object(node, triangle_mesh(vertices, triangles), material("MeshBasic", TRAIL_COLOR))
         return node
 
-    def trail_node(self, pair: int | None = None) -> Any:
+    def trail_node(self, pair: int | None = None) -> Visualizer:
         """Return the parent node of trails: on the shell of a `pair`, or in the world."""
         if pair is None:
             return self.visualizer["trail"]
@@ -226,7 +228,7 @@ class Display:
         if visual_model is not None and len(visual_model.geometryObjects):
             return GeometryRobot(self.visualizer, self._model, visual_model)
         tips = [
-            (pair.joint_i, pair.sphere_placement.translation)
+            (pair.joint_i, pair.placement_i.translation)
             for pair in self.scene.pairs
             if pair.sphere is not None
         ]
@@ -251,7 +253,7 @@ def choose_view(
     """
     model, data = scene.model, scene.model.createData()
     boxes = [
-        (pair.joint_j, pair.shell_placement, *np.asarray(pair.shell.box))
+        (pair.joint_j, pair.placement_j, *np.asarray(pair.shell.box))
         for pair in scene.pairs
         if pair.shell is not None
     ]
@@ -268,7 +270,7 @@ def choose_view(
             around.append(np.array(data.oMi[joint].translation))
         for pair in scene.pairs:
             if pair.sphere is not None:
-                centres.append(data.oMi[pair.joint_i].act(pair.sphere_placement.translation))
+                centres.append(data.oMi[pair.joint_i].act(pair.placement_i.translation))
         if row == 0:
             for joint, placement, low, high in boxes:
                 where = data.oMi[joint] * placement

@@ -1,56 +1,52 @@
-"""A shell coloured by how far its curved elements stand off the flat ones."""
+"""A shell colored by how far its curved elements differ from the flat ones."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.view.nodes import FloatArray, material, set_object, triangle_mesh, typed_array
-from sphshell_pin.view.surface import MOST_CURVED, MOST_FINELY_CURVED
+from sphshell_pin.view.nodes import FloatArray
+from sphshell_pin.view.surface import divisions, draw_colored, is_curved
 
 if TYPE_CHECKING:
+    from meshcat import Visualizer
+
     from sphshell_pin.shell.shell import Shell
 
 RAMP = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")
-"""From no distance to the largest: five colours of matplotlib's viridis, evenly spaced."""
+"""From no distance to the largest: five colors of matplotlib's viridis, evenly spaced."""
 
 Coloring = Literal["surface", "patches", "distance"]
-"""What the colours of shells can show."""
+"""What the colors of shells can show."""
 
 FEW = 2
-"""Pieces of a side at which a shell of very many elements is measured; its elements have one colour
+"""Pieces of a side at which a shell of very many elements is measured; its elements have one color
 each."""
 
 
-def draw_distance(visualizer: Any, shell: Shell, largest: float) -> None:
-    """Draw the curved elements of `shell` below `visualizer`, as "distance".
+def draw_distance(node: Visualizer, shell: Shell, largest: float) -> None:
+    """Draw the curved elements of `shell` below `node`, as "distance".
 
-    Its colours go from the first of RAMP, where a curved element is on the flat one, to the last,
+    Its colors go from the first of RAMP, where a curved element is on the flat one, to the last,
     at the distance `largest` [m].
     """
     from sphshell_pin.shell.curvature import distances_at
     from sphshell_pin.shell.curved import curved_mesh
 
-    count = len(shell.triangles)
-    if count <= MOST_CURVED:
-        divisions = 6 if count <= MOST_FINELY_CURVED else 2
-        points, triangles, _ = curved_mesh(shell, divisions)
-        distance = distances_at(shell, divisions).ravel()
+    if is_curved(shell, curved=True):
+        points, triangles, _ = curved_mesh(shell, divisions(shell))
+        distance = distances_at(shell, divisions(shell)).ravel()
     else:
         points = np.asarray(shell.vertices)[shell.triangles].reshape(-1, 3)
-        triangles = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+        triangles = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
         distance = distances_at(shell, FEW).max(axis=1).repeat(3)
-    geometry = triangle_mesh(points, triangles)
-    geometry["data"]["attributes"]["color"] = typed_array(ramp_colors(distance, largest))
-    look = material("MeshPhong", 0xFFFFFF, vertexColors=True, shininess=10)
-    look |= {"polygonOffset": True, "polygonOffsetFactor": 1.0, "polygonOffsetUnits": 1.0}
-    set_object(visualizer["distance"], geometry, look)
+    draw_colored(node["distance"], points, triangles, ramp_colors(distance, largest))
 
 
 def ramp_colors(values: FloatArray, largest: float) -> FloatArray:
-    """Return colours (n, 3) from 0 to 1 for `values` (n,) between 0 and `largest`."""
+    """Return colors (n, 3) from 0 to 1 for `values` (n,) between 0 and `largest`."""
     stops = np.array([[int(name[k : k + 2], 16) for k in (1, 3, 5)] for name in RAMP]) / 255.0
     share = np.clip(values / largest, 0.0, 1.0) if largest > 0.0 else np.zeros(len(values))
     at = np.linspace(0.0, 1.0, len(RAMP))
@@ -64,5 +60,5 @@ def check_coloring(color: str) -> None:
 
 
 def range_text(largest: float) -> str:
-    """Return the range of the colours as text."""
+    """Return the range of the colors as text."""
     return f"distance of curved from flat: 0 to {largest * 1e3:.3g} mm"

@@ -5,9 +5,11 @@ Every object is a three.js JSON description, sent to any `meshcat.Visualizer` as
 
 from __future__ import annotations
 
+import importlib.util
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +17,30 @@ from numpy.typing import NDArray
 from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.errors import MissingExtra
 
+if TYPE_CHECKING:
+    from meshcat import Visualizer
+
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.integer[Any]]
+IntArray = NDArray[np.int32] | NDArray[np.int64]
 Json = dict[str, Any]
 Move = Callable[[FloatArray], object]
 
 # Never zero: a transform with a zero scale cannot be decomposed, and its node is lost for good.
 HIDDEN_SCALE = 1e-6
+
+
+class Sent(Protocol):
+    """What meshcat sends: its `lower` returns the dictionary that goes over the wire."""
+
+    def lower(self) -> Json:
+        """Return the dictionary."""
+
+
+class Window(Protocol):
+    """What meshcat draws in: a server, or one of our windows that keep the scene."""
+
+    def send(self, command: Sent) -> object:
+        """Take one command."""
 
 
 class Command:
@@ -35,14 +54,25 @@ class Command:
         return self._data
 
 
-def require_meshcat() -> Any:
-    """Return the `meshcat` package; raise MissingExtra where it is not installed."""
+def new_visualizer(window: Window | None = None) -> Visualizer:
+    """Return a meshcat.Visualizer that draws in `window`, by default in a server of its own.
+
+    Raises MissingExtra without meshcat.
+    """
     try:
         with interrupts_delayed():
             import meshcat
     except ImportError as missing:
         raise MissingExtra("meshcat", "view", "the picture of a scene") from missing
-    return meshcat
+    return meshcat.Visualizer(window=window)
+
+
+def viewer_script() -> Path:
+    """Return the file of meshcat's viewer for browsers; raise MissingExtra without meshcat."""
+    found = importlib.util.find_spec("meshcat")
+    if found is None or found.origin is None:
+        raise MissingExtra("meshcat", "view", "the picture of a scene")
+    return Path(found.origin).parent / "viewer" / "dist" / "main.min.js"
 
 
 def typed_array(values: FloatArray | IntArray) -> Json:
@@ -102,7 +132,7 @@ def rod(radius_start: float, radius_end: float) -> Json:
     }
 
 
-def material(kind: str, color: int, opacity: float = 1.0, **properties: Any) -> Json:
+def material(kind: str, color: int, opacity: float = 1.0, **properties: object) -> Json:
     """Material `kind` ("MeshPhong", "MeshBasic", "LineBasic"), two-sided unless told otherwise."""
     return {
         "type": f"{kind}Material",
@@ -122,7 +152,7 @@ def on_top(color: int, opacity: float = 1.0) -> Json:
 
 
 def set_object(
-    visualizer: Any, geometry: Json, look: Json, kind: str = "Mesh", order: int = 0
+    visualizer: Visualizer, geometry: Json, look: Json, kind: str = "Mesh", order: int = 0
 ) -> None:
     """Put one object at the visualizer's path; larger `order` is drawn later.
 
@@ -147,7 +177,7 @@ def set_object(
     visualizer.window.send(Command({"type": "set_object", "path": path, "object": data}))
 
 
-def mover(visualizer: Any) -> Move:
+def mover(visualizer: Visualizer) -> Move:
     """Return the routine that places the visualizer's node at a homogeneous matrix (4, 4).
 
     A window that knows a shorter way than one command per matrix offers it as `mover(path)`.
@@ -157,12 +187,12 @@ def mover(visualizer: Any) -> Move:
     return move
 
 
-def show(visualizer: Any, on: bool) -> None:
+def show(visualizer: Visualizer, on: bool) -> None:
     """Show or hide the visualizer's node and all below it."""
     visualizer.set_property("visible", bool(on))
 
 
-def set_camera(visualizer: Any, camera: Mapping[str, Any]) -> None:
+def set_camera(visualizer: Visualizer, camera: Json) -> None:
     """Replace the page's camera by the three.js `camera` description."""
     node = visualizer["/Cameras/default/rotated"]
     path = node.path.lower()
@@ -175,7 +205,9 @@ def node_name(name: str) -> str:
     return name.replace("/", "_") or "_"
 
 
-def pose(rotation: FloatArray, translation: FloatArray, scale: FloatArray | float = 1.0) -> Any:
+def pose(
+    rotation: FloatArray, translation: FloatArray, scale: FloatArray | float = 1.0
+) -> FloatArray:
     """Homogeneous (4, 4) of `rotation` (3, 3) times diag(`scale`), and `translation` (3,) [m]."""
     matrix = np.zeros((4, 4))
     np.multiply(rotation, scale, out=matrix[:3, :3])

@@ -9,14 +9,23 @@ import html
 import json
 import struct
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.view.collada import take_out_numbers
-from sphshell_pin.view.nodes import HIDDEN_SCALE, FloatArray, Json, require_meshcat, typed_array
-from sphshell_pin.view.stl import pack_facets
+from sphshell_pin.view.meshes import pack_facets, take_out_numbers
+from sphshell_pin.view.nodes import (
+    HIDDEN_SCALE,
+    FloatArray,
+    Json,
+    Sent,
+    typed_array,
+    viewer_script,
+)
+
+if TYPE_CHECKING:
+    from meshcat import Visualizer
 
 # A mesh file this long may well be used by several links: it is stored once.
 SHARED_TEXT = 20_000
@@ -36,7 +45,7 @@ class FilmWindow:
         self._frames: dict[str, dict[int, list[float]]] = {}
         self._switches: dict[str, tuple[FloatArray, list[bool]]] = {}
 
-    def send(self, command: Any) -> None:
+    def send(self, command: Sent) -> None:
         """Take one meshcat command."""
         data = command.lower()
         kind, path = data["type"], data["path"]
@@ -53,14 +62,14 @@ class FilmWindow:
         # An object that replaces another comes first again, before its properties.
         self._commands[kind, path, data.get("property", "")] = data
 
-    def switch(self, visualizer: Any, times: FloatArray, visible: list[bool]) -> None:
+    def switch(self, visualizer: Visualizer, times: FloatArray, visible: list[bool]) -> None:
         """Show or hide the visualizer's node from each of `times` (k,) [s of the page] on."""
         self._switches[visualizer.path.lower()] = (times, visible)
 
     def _share(self, data: Json) -> Json:
         from umsgpack import Ext
 
-        def shared(value: Any) -> Any:
+        def shared(value: object) -> object:
             if isinstance(value, dict):
                 return {key: shared(item) for key, item in value.items()}
             if isinstance(value, list):
@@ -80,8 +89,7 @@ class FilmWindow:
                 return {"$text": name} if name in self._texts else value
             return value
 
-        result: Json = shared(data)
-        return result
+        return {key: shared(item) for key, item in data.items()}
 
     def commands(self, times: FloatArray) -> list[Json]:
         """Return every command of the page; frame k is shown at `times[k]` [s of the page]."""
@@ -187,12 +195,11 @@ def render_page(
         f"{html.escape(text)}</div>"
         for color, text in legend
     )
-    viewer = Path(require_meshcat().__file__).parent / "viewer" / "dist" / "main.min.js"
     parts = {
         "title": html.escape(title),
         "legend": rows,
         "clock": json.dumps(clock),
-        "viewer": _compressed(viewer.read_bytes()),
+        "viewer": _compressed(viewer_script().read_bytes()),
         "scene": _compressed(bytes(packed)),
     }
     page = Path(__file__).with_name("recording.html").read_text(encoding="utf-8")

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import html
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.atomic import atomic_file
+from sphshell_pin.atomic import write_whole
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.view.arrows import (
     FRICTION_COLOR,
@@ -23,7 +25,7 @@ from sphshell_pin.view.bodies import SPHERE_COLOR
 from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, spaced
 from sphshell_pin.view.display import TRAIL_COLOR, Display, choose_view
 from sphshell_pin.view.distance import RAMP, Coloring, check_coloring
-from sphshell_pin.view.nodes import FloatArray, require_meshcat
+from sphshell_pin.view.nodes import FloatArray, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
 
 if TYPE_CHECKING:
@@ -66,7 +68,7 @@ def write_recording(
         arrows=arrows,
         color=color,
     )
-    return write_page(path, page)
+    return write_whole(path, page.encode())
 
 
 def render_recording(
@@ -93,7 +95,6 @@ def render_recording(
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
     positive, another `color`, or a geometry model that does not fit.
     """
-    meshcat = require_meshcat()
     check_coloring(color)
     for name, value in (("fps", fps), ("speed", speed)):
         if not (np.isfinite(value) and value > 0.0):
@@ -123,7 +124,7 @@ def render_recording(
     display = Display(
         scene,
         visual_model,
-        meshcat.Visualizer(window=window),
+        new_visualizer(window),
         view=view,
         arrows=arrows,
         arrow_scale=scale,
@@ -143,6 +144,56 @@ def render_recording(
         _legend(scene, scale, arrows, shown, trailed) + _color_keys(display),
         {"start": float(result.t[0]), "speed": float(speed), "digits": _digits(speed, fps)},
     )
+
+
+@dataclass(frozen=True)
+class RecordingView:
+    """A recording: `page`, a whole HTML page, to be shown `height` [pixels] high."""
+
+    page: str
+    height: int = 480
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the page at `path` and return it; ResultError if it cannot be written."""
+        return write_whole(path, self.page.encode())
+
+    def __repr__(self) -> str:
+        return f"RecordingView({len(self.page) / 1e6:.1f} MB; .save(path) writes the page)"
+
+    def _repr_html_(self) -> str:
+        """Return a frame with the page inside, which needs no server and no network."""
+        return (
+            f'<iframe srcdoc="{html.escape(self.page)}" width="100%" height="{self.height}" '
+            'style="border: 1px solid #c8d0d8; border-radius: 4px" allowfullscreen></iframe>'
+        )
+
+
+def view_result(
+    result: Result,
+    scene: Scene | None = None,
+    visual_model: pin.GeometryModel | None = None,
+    *,
+    speed: float | None = None,
+    height: int = 480,
+    title: str | None = None,
+) -> RecordingView:
+    """Return the recording of `result`: see `Result.view`."""
+    if isinstance(height, bool) or not isinstance(height, int) or height <= 0:
+        raise InvalidParameter("height", height, "must be a positive number of pixels")
+    if scene is None and result.origin is not None:
+        from sphshell_pin.scenario.replay import Replay
+
+        replay = Replay(result)
+        scene, title = replay.scene, title or replay.title
+        visual_model = replay.visual_model if visual_model is None else visual_model
+        speed = replay.speed if speed is None else speed
+    scene = result.scene if scene is None else scene
+    if scene is None:
+        raise ResultError("the result", "has no scene to be drawn in: give view(scene=...)")
+    page = render_recording(
+        result, scene, visual_model, speed=speed or 1.0, title=title or "A finished run"
+    )
+    return RecordingView(page, height)
 
 
 def choose_rows(
@@ -244,15 +295,3 @@ def _css(color: int) -> str:
 def _digits(speed: float, fps: float) -> int:
     """Return the decimals that tell two frames apart, two at least."""
     return max(2, int(np.ceil(-np.log10(speed / fps))))
-
-
-def write_page(path: str | PathLike[str], page: str) -> Path:
-    """Write `page` at `path`, whole or not at all; ResultError if it cannot be."""
-    path = Path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_file(path) as file:
-            file.write(page.encode())
-    except OSError as fault:
-        raise ResultError(path, f"the recording cannot be written ({fault.strerror})") from fault
-    return path

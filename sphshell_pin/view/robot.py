@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
-from typing import Any
+from typing import TYPE_CHECKING
 
 import coal
 import numpy as np
@@ -25,6 +25,9 @@ from sphshell_pin.view.nodes import (
     set_object,
     sphere,
 )
+
+if TYPE_CHECKING:
+    from meshcat import Visualizer
 
 LINK_COLOR = 0x8B95A1
 JOINT_COLOR = 0x4A5560
@@ -54,7 +57,7 @@ class GeometryRobot:
     """The geometry objects of a visual or collision model, drawn by Pinocchio's own loader."""
 
     def __init__(
-        self, visualizer: Any, model: pin.Model, geometry_model: pin.GeometryModel
+        self, visualizer: Visualizer, model: pin.Model, geometry_model: pin.GeometryModel
     ) -> None:
         with interrupts_delayed():
             from pinocchio.visualize import MeshcatVisualizer
@@ -99,7 +102,7 @@ class SkeletonRobot:
 
     def __init__(
         self,
-        visualizer: Any,
+        visualizer: Visualizer,
         model: pin.Model,
         size: float,
         tips: list[tuple[int, FloatArray]],

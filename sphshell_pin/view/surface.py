@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.view.nodes import (
     FloatArray,
     IntArray,
+    Json,
     line_segments,
     material,
     set_object,
@@ -17,10 +19,14 @@ from sphshell_pin.view.nodes import (
 )
 
 if TYPE_CHECKING:
+    from meshcat import Visualizer
+
     from sphshell_pin.shell.shell import Shell
 
 SURFACE_COLORS = (0x7FA8A0, 0xC4A878, 0x9A94C0, 0xB58C8C)
 EDGE_COLOR = 0x22302E
+# The surface is pushed back a little, so that lines on it are not drawn half inside it.
+PUSHED_BACK: Json = {"polygonOffset": True, "polygonOffsetFactor": 1.0, "polygonOffsetUnits": 1.0}
 MOST_OUTLINED_EDGES = 60_000
 # Curved elements are drawn finely up to the first number, and not curved beyond the second: there
 # the flat ones look the same.
@@ -28,19 +34,54 @@ MOST_FINELY_CURVED = 3_000
 MOST_CURVED = 20_000
 
 
-def split_at_creases(shell: Shell) -> tuple[FloatArray, IntArray]:
-    """Return vertices (n, 3) [m] and triangles (t, 3) that share vertices within a patch only.
+@dataclass(frozen=True)
+class SurfaceMesh:
+    """A shell as triangles that share vertices within a patch only, and the lines on it.
 
     The page averages normals over shared vertices: patches then look smooth and creases sharp.
+    `vertices` (n, 3) [m] of the patches `patch` (n,), `triangles` (t, 3); `segments` (s, 2) between
+    the points `outline` (p, 3) [m].
     """
-    triangles = np.asarray(shell.triangles, dtype=np.int64)
-    patch = np.asarray(shell.element_patch, dtype=np.int64)[
-        np.asarray(shell.triangle_element, dtype=np.int64)
-    ]
-    keys = patch[:, None] * len(shell.vertices) + triangles
-    unique, corners = np.unique(keys, return_inverse=True)
-    vertices = np.asarray(shell.vertices)[unique % len(shell.vertices)]
-    return vertices, corners.reshape(-1, 3)
+
+    vertices: FloatArray
+    patch: IntArray
+    triangles: IntArray
+    outline: FloatArray
+    segments: IntArray
+
+    @classmethod
+    def of(cls, shell: Shell, *, curved: bool = False) -> SurfaceMesh:
+        """Build from `shell`; with `curved` from its elements as the method "smooth" has them."""
+        if not is_curved(shell, curved):
+            points, triangles = np.asarray(shell.vertices), np.asarray(shell.triangles)
+            owner = np.arange(len(triangles), dtype=np.int32)
+            same = np.arange(len(points))
+            segments = outlined_edges(shell)
+        else:
+            from sphshell_pin.shell.curved import curved_mesh
+
+            points, triangles, owner = curved_mesh(shell, divisions(shell))
+            grid = np.round(points / (1e-7 * shell.size)).astype(np.int64)
+            same = np.unique(grid, axis=0, return_inverse=True)[1].reshape(-1)
+            # A border of an element is a chain of edges that no second small triangle of it has.
+            sides = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+            edges, count = np.unique(sides, axis=0, return_counts=True)
+            segments = edges[count == 1]
+        patch = np.asarray(shell.element_patch)[np.asarray(shell.triangle_element)][owner]
+        keys = patch[:, None].astype(np.int64) * len(points) + same[triangles]
+        unique, first, corners = np.unique(keys, return_index=True, return_inverse=True)
+        vertices = points[triangles.reshape(-1)[first]]
+        return cls(vertices, unique // len(points), corners.reshape(-1, 3), points, segments)
+
+
+def is_curved(shell: Shell, curved: bool) -> bool:
+    """Whether `shell`, if `curved`, has few enough elements to be drawn so."""
+    return curved and len(shell.triangles) <= MOST_CURVED
+
+
+def divisions(shell: Shell) -> int:
+    """Return into how many pieces a side of a curved element is divided."""
+    return 6 if len(shell.triangles) <= MOST_FINELY_CURVED else 2
 
 
 def outlined_edges(shell: Shell) -> IntArray:
@@ -52,87 +93,40 @@ def outlined_edges(shell: Shell) -> IntArray:
     return sharp
 
 
-def curved_surface(shell: Shell) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
-    """Return the curved elements of the method "smooth" as fine triangles, and their outlines.
-
-    Vertices (n, 3) [m], triangles (t, 3), points of the outlines (p, 3) [m], segments (s, 2).
-    """
-    from sphshell_pin.shell.curved import curved_mesh
-
-    divisions = 6 if len(shell.triangles) <= MOST_FINELY_CURVED else 2
-    points, triangles, owner = curved_mesh(shell, divisions)
-    # Points of one patch at one place become one, for the page to average their normals.
-    patch = np.asarray(shell.element_patch)[np.asarray(shell.triangle_element)][owner]
-    grid = np.round(points / (1e-7 * shell.size)).astype(np.int64)
-    of_point = np.zeros(len(points), np.int64)
-    of_point[triangles] = patch[:, None]
-    keys = np.column_stack((of_point, grid))
-    _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    vertices, corners = points[first], number.reshape(-1)[triangles]
-    # A border of an element is a chain of small edges that no second small triangle of it has.
-    small = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    edges, count = np.unique(small, axis=0, return_counts=True)
-    return vertices, corners, points, edges[count == 1]
-
-
-def draw_shell(visualizer: Any, shell: Shell, index: int, *, curved: bool = False) -> None:
-    """Draw `shell` in its own frame below `visualizer`; `index` chooses its colour.
-
-    With `curved` the elements are drawn as the method "smooth" touches them.
-    """
-    curved = curved and len(shell.triangles) <= MOST_CURVED
-    if curved:
-        vertices, triangles, outline, edges = curved_surface(shell)
-    else:
-        vertices, triangles = split_at_creases(shell)
-        outline, edges = np.asarray(shell.vertices), outlined_edges(shell)
-    # The surface is pushed back a little, so that lines on it are not drawn half inside it.
-    look = material(
-        "MeshPhong",
-        SURFACE_COLORS[index % len(SURFACE_COLORS)],
-        specular=0x222222,
-        shininess=20,
-        polygonOffset=True,
-        polygonOffsetFactor=1.0,
-        polygonOffsetUnits=1.0,
-    )
-    set_object(visualizer["surface"], triangle_mesh(vertices, triangles), look)
-    if len(edges):
+def draw_shell(node: Visualizer, shell: Shell, index: int, *, curved: bool = False) -> None:
+    """Draw `shell` in its own frame below `node`; `index` chooses its color."""
+    mesh = SurfaceMesh.of(shell, curved=curved)
+    color = SURFACE_COLORS[index % len(SURFACE_COLORS)]
+    look = material("MeshPhong", color, specular=0x222222, shininess=20, **PUSHED_BACK)
+    set_object(node["surface"], triangle_mesh(mesh.vertices, mesh.triangles), look)
+    if len(mesh.segments):
         # The finer the mesh, the lighter its lines, so that the surface stays visible.
         opacity = float(np.clip(5.0 / np.sqrt(len(shell.edge_vertices)), 0.10, 0.45))
-        lines = line_segments(outline, edges)
+        lines = line_segments(mesh.outline, mesh.segments)
         set_object(
-            visualizer["elements"],
-            lines,
-            material("LineBasic", EDGE_COLOR, opacity),
-            "LineSegments",
+            node["elements"], lines, material("LineBasic", EDGE_COLOR, opacity), "LineSegments"
         )
 
 
-def draw_patches(visualizer: Any, shell: Shell, *, curved: bool = False) -> None:
-    """Draw `shell` below `visualizer` with a colour for each patch, as "patches"."""
-    if curved and len(shell.triangles) <= MOST_CURVED:
-        from sphshell_pin.shell.curved import curved_mesh
+def draw_patches(node: Visualizer, shell: Shell, *, curved: bool = False) -> None:
+    """Draw `shell` below `node` with a color for each patch, as "patches"."""
+    mesh = SurfaceMesh.of(shell, curved=curved)
+    colors = patch_colors(int(mesh.patch.max(initial=0)) + 1)[mesh.patch]
+    draw_colored(node["patches"], mesh.vertices, mesh.triangles, colors)
 
-        divisions = 6 if len(shell.triangles) <= MOST_FINELY_CURVED else 2
-        points, triangles, owner = curved_mesh(shell, divisions)
-    else:
-        points, triangles = np.asarray(shell.vertices), np.asarray(shell.triangles)
-        owner = np.arange(len(triangles), dtype=np.int32)
-    patch = np.asarray(shell.element_patch)[np.asarray(shell.triangle_element)][owner]
-    # A point of each patch for every point: colours, and the page's normals, end at patches.
-    keys = patch[:, None].astype(np.int64) * len(points) + triangles
-    unique, corners = np.unique(keys, return_inverse=True)
-    geometry = triangle_mesh(points[unique % len(points)], corners.reshape(-1, 3))
-    colors = patch_colors(int(patch.max(initial=0)) + 1)[unique // len(points)]
+
+def draw_colored(
+    node: Visualizer, vertices: FloatArray, triangles: IntArray, colors: FloatArray
+) -> None:
+    """Draw a mesh at `node` with `colors` (n, 3) from 0 to 1 of its vertices."""
+    geometry = triangle_mesh(vertices, triangles)
     geometry["data"]["attributes"]["color"] = typed_array(colors)
-    look = material("MeshPhong", 0xFFFFFF, vertexColors=True, shininess=10)
-    look |= {"polygonOffset": True, "polygonOffsetFactor": 1.0, "polygonOffsetUnits": 1.0}
-    set_object(visualizer["patches"], geometry, look)
+    look = material("MeshPhong", 0xFFFFFF, vertexColors=True, shininess=10, **PUSHED_BACK)
+    set_object(node, geometry, look)
 
 
 def patch_colors(count: int) -> FloatArray:
-    """Return `count` colours (n, 3) from 0 to 1, calm ones, neighbours in number well apart."""
+    """Return `count` muted colors (n, 3) from 0 to 1, neighbors in number well apart."""
     # Hues by the golden ratio: no two of any few in a row are close.
     hue = (0.47 + 0.618033988749895 * np.arange(count)) % 1.0
     ramp = np.abs((hue[:, None] * 6.0 + np.array([0.0, 4.0, 2.0])) % 6.0 - 3.0) - 1.0

@@ -60,6 +60,7 @@ def exact(name, log):
     return RADIUS - (length - reach), way / length[:, None]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MADE)
 def test_audit_agrees_with_formulas(name, tmp_path):
     make, start, more = MADE[name]
@@ -104,8 +105,8 @@ def test_flat_elements_are_off_by_their_chord_error(tmp_path):
 )
 def test_trimmed_faces_edges_and_corners_are_found(center, contact, foot, tmp_path):
     require_kernel("this test")
-    from sphshell_pin.shell.cad.surface import load_cad
     from sphshell_pin.shell.cad.exact import TrimmedFaces
+    from sphshell_pin.shell.cad.surface import load_cad
 
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
     faces = TrimmedFaces(load_cad(path, "mm", CadOptions()))
@@ -117,8 +118,8 @@ def test_trimmed_faces_edges_and_corners_are_found(center, contact, foot, tmp_pa
 def test_border_of_a_hole_is_a_curve(tmp_path):
     """A ball on the rim of a hole touches its circle, where neither face has a closest point."""
     require_kernel("this test")
-    from sphshell_pin.shell.cad.surface import load_cad
     from sphshell_pin.shell.cad.exact import TrimmedFaces
+    from sphshell_pin.shell.cad.surface import load_cad
 
     path = shapes.write_brep(tmp_path / "plate.brep", shapes.drilled_plate())
     faces = TrimmedFaces(load_cad(path, "mm", CadOptions()))

@@ -82,6 +82,7 @@ CASES = [
 AT_HAND = ("arm", "ball", "three_link_finger")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("robot", "surface", "options"), CASES)
 def test_what_is_written_works(robot, surface, options, tmp_path):
     if robot not in AT_HAND:
@@ -100,6 +101,7 @@ def test_what_is_written_works(robot, surface, options, tmp_path):
     assert 0 < min(gaps) <= 2.01 * radius
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["ball", "arm"])
 def test_a_cad_file_works_without_a_unit(robot, tmp_path):
     pytest.importorskip("OCP")
@@ -114,6 +116,7 @@ def test_a_cad_file_works_without_a_unit(robot, tmp_path):
     assert sizes.max() == pytest.approx(5 * 0.0254, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_robot_that_stands_weighs_what_it_weighs(tmp_path):
     pytest.importorskip("example_robot_data")
     built = new_scenario("a1", out=tmp_path / "a1.toml").built
@@ -346,16 +349,16 @@ def test_feet_come_down_on_what_is_under_them():
 
 def test_a_spot_avoids_edges_and_grooves():
     """On a roof the ridge is in the middle: a tip is put beside it, on one side."""
-    from sphshell_pin.scenario.spots import find_spot, spots_about, touches_once
+    from sphshell_pin.scenario.touch_points import find_touch_point, touch_points, touches_once
 
     roof = [[x, y, 0.1 - abs(x)] for x in (-0.1, 0.0, 0.1) for y in (-0.2, 0.2)]
     shell = sp.Shell(roof, [[0, 2, 3, 1], [2, 4, 5, 3]])
     up = np.array([0.0, 0.0, 1.0])
-    middle = find_spot(shell, 0.01, 1e-3, toward=up)
+    middle = find_touch_point(shell, 0.01, 1e-3, toward=up)
     assert not touches_once(shell, middle, middle.point[None], 0.01, 1e-3)
     good = next(
         spot
-        for spot in spots_about(shell, 0.01, 1e-3, toward=up)
+        for spot in touch_points(shell, 0.01, 1e-3, toward=up)
         if touches_once(shell, spot, spot.point[None], 0.01, 1e-3)
     )
     assert abs(good.point[0]) > 0.002
@@ -380,9 +383,9 @@ def shell_of(geometry) -> sp.Shell:
 def test_a_surface_is_touched_in_the_middle_of_its_broad_side(
     geometry, toward, inside, point, normal
 ):
-    from sphshell_pin.scenario.spots import find_spot
+    from sphshell_pin.scenario.touch_points import find_touch_point
 
-    spot = find_spot(shell_of(geometry), 0.01, 1e-3, toward=toward, inside=inside)
+    spot = find_touch_point(shell_of(geometry), 0.01, 1e-3, toward=toward, inside=inside)
     np.testing.assert_allclose(spot.point, point, atol=1e-4)
     np.testing.assert_allclose(spot.normal, normal, atol=1e-3)
     np.testing.assert_allclose(spot.centre, spot.point + 0.011 * spot.normal, atol=2e-6)
@@ -390,13 +393,13 @@ def test_a_surface_is_touched_in_the_middle_of_its_broad_side(
 
 def test_a_sphere_has_room_in_a_groove():
     """A V of 60 degrees: the sphere rests on both sides, its centre at twice the distance."""
-    from sphshell_pin.scenario.spots import find_spot
+    from sphshell_pin.scenario.touch_points import find_touch_point
 
     slope = np.tan(np.deg2rad(60))
     vertices = [[-0.1, y, 0.1 * slope] for y in (-0.1, 0.1)]
     vertices += [[0.0, y, 0.0] for y in (-0.1, 0.1)] + [[0.1, y, 0.1 * slope] for y in (-0.1, 0.1)]
     shell = sp.Shell(vertices, [[0, 2, 3, 1], [2, 4, 5, 3]])
-    spot = find_spot(shell, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))
+    spot = find_touch_point(shell, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))
     distance = abs(shell.closest_points(spot.centre[None]).distances[0])
     assert distance == pytest.approx(0.011, rel=1e-3)
     # From the bottom of the groove the centre stands 1 / cos 60 degrees as high.
@@ -404,16 +407,16 @@ def test_a_sphere_has_room_in_a_groove():
 
 
 def test_a_way_across_stays_on_the_surface_and_ends_at_the_rim():
-    from sphshell_pin.scenario.spots import find_spot, way_across
+    from sphshell_pin.scenario.touch_points import find_touch_point, path_on_surface
 
     ball = shell_of(coal.Sphere(0.1))
-    spot = find_spot(ball, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))
-    way = way_across(ball, spot, np.array([1.0, 0.0, 0.0]), 0.1, 0.005)
+    spot = find_touch_point(ball, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))
+    way = path_on_surface(ball, spot, np.array([1.0, 0.0, 0.0]), 0.1, 0.005)
     assert len(way) == 21
     np.testing.assert_allclose(np.linalg.norm(way, axis=1), 0.1, atol=2e-4)
     assert way[-1, 0] > 0.05
     box = shell_of(coal.Box(0.2, 0.2, 0.04))
-    spot = find_spot(box, 0.01, 1e-3)
-    way = way_across(box, spot, np.array([1.0, 0.0, 0.0]), 1.0, 0.005)
+    spot = find_touch_point(box, 0.01, 1e-3)
+    way = path_on_surface(box, spot, np.array([1.0, 0.0, 0.0]), 1.0, 0.005)
     assert np.abs(way[:, :2]).max() <= 0.1 + 1e-9
     np.testing.assert_allclose(way[:, 2], 0.02, atol=1e-9)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.atomic import AtomicFolder
+from sphshell_pin.atomic import AtomicFolder, write_whole
 from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, new, run, run_built
@@ -24,10 +24,11 @@ from sphshell_pin.shell.converting import convert
 from sphshell_pin.study.report import making
 from sphshell_pin.study.report.contents import Column, Section, Table
 from sphshell_pin.study.sweep.table import write_table
-from sphshell_pin.view.recording import write_page
 from tests import meshes
 from tests.scenario.files import write
 from tests.scenario.operations import contents, counted, fill, interrupt, killed_at, visible
+
+pytestmark = pytest.mark.slow
 
 MESH = Path(__file__).parents[1] / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
 OTHERS = {"notes.txt": b"mine", "stopped/run.npz": b"stopped early"}
@@ -252,7 +253,8 @@ WRITERS = {
         lambda place, text=text: new._write(place / "new.toml", text) for text in ("old", "new")
     ),
     "recording": tuple(
-        lambda place, text=text: write_page(place / "page.html", text) for text in ("old", "new")
+        lambda place, text=text: write_whole(place / "page.html", text.encode())
+        for text in ("old", "new")
     ),
 }
 

@@ -148,6 +148,7 @@ def test_brep_files_need_a_unit(tmp_path):
         Shell.from_file(path)
 
 
+@pytest.mark.slow
 def test_a_wire_holds_no_surface(tmp_path):
     edge = BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, 0), gp_Pnt(1, 0, 0)).Edge()
     files = [
@@ -238,6 +239,7 @@ def test_a_library_of_the_system_that_is_absent_is_named(reason, told, tmp_path,
     assert caught.value.reason == reason
 
 
+@pytest.mark.slow
 def test_the_library_is_never_imported(tmp_path):
     """So does reading a CAD file: another process imports it."""
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())

@@ -83,6 +83,7 @@ UNITS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", UNITS)
 def test_step_units_are_taken_by_their_length_not_by_their_name(name, step, tmp_path):
     entities, meters, called = UNITS[name]

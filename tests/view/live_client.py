@@ -5,6 +5,7 @@ import contextlib
 import json
 import urllib.error
 import urllib.request
+from concurrent.futures import ThreadPoolExecutor
 from urllib.parse import urlsplit
 
 import umsgpack
@@ -12,6 +13,12 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
 PATIENCE = 20.0
+
+
+def run(visit):
+    """Return what a coroutine returns; in a thread, as a browser of playwright has a loop here."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, visit).result()
 
 
 def inside(url, name, scheme="http"):

@@ -110,7 +110,7 @@ def test_flat_shells_have_one_colour(shell, method):
 
 def test_many_elements_have_one_colour_each(monkeypatch):
     shell = ball(8)
-    monkeypatch.setattr("sphshell_pin.view.distance.MOST_CURVED", 10)
+    monkeypatch.setattr("sphshell_pin.view.surface.MOST_CURVED", 10)
     window = FilmWindow()
     draw_distance(meshcat.Visualizer(window=window), shell, shell.curvature_report().largest)
     (command,) = [c for c in window.commands(np.array([0.0, 1.0])) if c["type"] == "set_object"]

@@ -1,6 +1,5 @@
 """Who gets at the live page: nobody without the token, no foreign name, site or frame."""
 
-import asyncio
 import re
 import socket
 
@@ -9,7 +8,7 @@ from tornado.httpclient import HTTPClientError
 
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.live import Live, access, server
-from tests.view.live_client import Client, get, inside
+from tests.view.live_client import Client, get, inside, run
 from tests.view.live_player import BallPlayer
 
 
@@ -31,7 +30,7 @@ def connects(live, url, **headers):
         client.socket.close()
         return 101
 
-    return asyncio.run(visit())
+    return run(visit())
 
 
 def test_the_address_ends_with_a_token_that_everything_asks_for(live):

@@ -8,7 +8,6 @@ import pytest
 from sphshell_pin.view.live import Live
 from tests.view.live_client import inside
 from tests.view.live_player import BallPlayer
-from tests.view.test_recording_in_browser import browser  # noqa: F401
 
 pytestmark = pytest.mark.browser
 
@@ -22,7 +21,7 @@ def live():
 
 
 @pytest.fixture
-def tab(browser):  # noqa: F811
+def tab(browser):
     context = browser.new_context()
     yield context.new_page()
     context.close()

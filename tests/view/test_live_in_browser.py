@@ -10,7 +10,7 @@ from sphshell_pin.scenario.live import LiveRun
 from sphshell_pin.view.arrows import NORMAL_COLOR
 from sphshell_pin.view.live import Live
 from tests.view.live_player import ArmPlayer, BallPlayer, FilmPlayer
-from tests.view.test_recording_in_browser import browser, count, is_blue  # noqa: F401
+from tests.view.test_recording_in_browser import count, is_blue
 
 pytestmark = pytest.mark.browser
 
@@ -74,7 +74,7 @@ class Tab:
 
 
 @pytest.fixture
-def opened(browser):  # noqa: F811
+def opened(browser):
     lives, tabs = [], []
     context = browser.new_context(viewport=SIZE)
 

@@ -13,7 +13,7 @@ from tornado.websocket import WebSocketClosedError
 from sphshell_pin.errors import InvalidParameter, SphshellError
 from sphshell_pin.view.live import Live
 from sphshell_pin.view.live.events import LARGEST_MESSAGE
-from tests.view.live_client import Client, get, inside
+from tests.view.live_client import Client, get, inside, run
 from tests.view.live_player import BallPlayer
 from tests.view.test_live_events import BAD
 
@@ -55,7 +55,7 @@ def test_a_late_browser_gets_the_whole_scene(live):
                 await late.until(lambda c: c.scenes and c.state and c.rows)
                 return early, late
 
-    early, late = asyncio.run(visit())
+    early, late = run(visit())
     kinds = [command["type"] for command in late.scenes[0]]
     assert kinds.count("set_object") >= len(
         [c for c in early.scenes[0] if c["type"] == "set_object"]
@@ -79,7 +79,7 @@ def test_several_browsers_follow_each_other(live):
             await two.say("run", on=False)
             await one.until(lambda c: not c.state["running"])
 
-    asyncio.run(visit())
+    run(visit())
     assert live.player.knob_values["stiffness"] == 7000.0
 
 
@@ -92,7 +92,7 @@ def test_no_message_stops_the_run(live, message):
             await other.until(lambda c: len(c.scenes) > 3)
             return client, other
 
-    client, other = asyncio.run(visit())
+    client, other = run(visit())
     assert len(client.errors) == 1
     assert other.errors == []
     assert goes_on(live)
@@ -107,10 +107,11 @@ def test_a_message_beyond_all_measure_only_ends_its_own_connection(live):
             assert client.closed
             await other.until(lambda c: len(c.scenes) > 3)
 
-    asyncio.run(visit())
+    run(visit())
     assert goes_on(live)
 
 
+@pytest.mark.slow
 def test_a_flood_is_answered_and_survived(live):
     async def visit():
         async with Client(live.url) as client:
@@ -120,7 +121,7 @@ def test_a_flood_is_answered_and_survived(live):
             await client.say("reset")
             await client.until(lambda c: c.state["knobs"]["stiffness"] == 6999.0 or c.errors)
 
-    asyncio.run(visit())
+    run(visit())
     assert goes_on(live)
 
 
@@ -142,7 +143,7 @@ def test_wrong_names_and_values_are_told_to_the_one_who_asked(live):
             await other.until(lambda c: len(c.scenes) > 3)
             assert other.errors == []
 
-    asyncio.run(visit())
+    run(visit())
     assert live.player.knob_values["stiffness"] == 5e3
     assert goes_on(live)
 
@@ -159,6 +160,7 @@ def raw_socket(live):
     return connection
 
 
+@pytest.mark.slow
 def test_a_browser_that_never_reads_holds_up_nobody(live):
     deaf = raw_socket(live)
 
@@ -169,11 +171,12 @@ def test_a_browser_that_never_reads_holds_up_nobody(live):
 
     while not live.server.watched:
         time.sleep(0.01)
-    asyncio.run(visit())
+    run(visit())
     assert goes_on(live)
     deaf.close()
 
 
+@pytest.mark.slow
 def test_a_browser_that_answers_late_skips_frames_and_gets_the_newest(live):
     async def visit():
         async with Client(live.url, answers=False) as slow, Client(live.url) as fast:
@@ -185,7 +188,7 @@ def test_a_browser_that_answers_late_skips_frames_and_gets_the_newest(live):
                     break
             return slow, fast
 
-    slow, fast = asyncio.run(visit())
+    slow, fast = run(visit())
     assert 1 <= len(slow.scenes) < 0.5 * len(fast.scenes)
 
 
@@ -196,7 +199,7 @@ def test_a_tab_that_is_closed_lets_go_what_it_held(live):
             await client.say("hold", body="ball", direction=[1, 0, 0], newtons=2.0)
             await client.until(lambda _: live.player.force[0] == 2.0)
 
-    asyncio.run(hold())
+    run(hold())
     deadline = time.monotonic() + 10.0
     while live.player.time < live.player.push_end and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -211,7 +214,7 @@ def test_browsers_that_come_and_go_leave_nothing_behind(live):
             await client.read()
             client.socket.close()
 
-    asyncio.run(visit())
+    run(visit())
     deadline = time.monotonic() + 10.0
     while live.server.watched and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -229,7 +232,7 @@ def test_the_end_is_told():
             ending.join()
             return client
 
-    client = asyncio.run(visit())
+    client = run(visit())
     assert client.ends == 1
     assert client.closed
 
@@ -243,11 +246,11 @@ def test_a_server_that_comes_back_on_its_port_is_another_session():
             await client.until(lambda c: c.hello)
             return client.hello["session"]
 
-    before = asyncio.run(session(first.url))
+    before = run(session(first.url))
     first.stop()
     with Live(BallPlayer(), port=port) as second:
         assert second.url == first.url
-        assert asyncio.run(session(second.url)) != before
+        assert run(session(second.url)) != before
 
 
 def test_a_busy_port_is_one_sentence(live):
@@ -274,7 +277,7 @@ def test_answers_carry_json_that_browsers_read(live):
             await client.until(lambda c: c.state and c.state["residual"] is None)
             return json.dumps(client.state, allow_nan=False)
 
-    assert '"relative": null' in asyncio.run(visit())
+    assert '"relative": null' in run(visit())
 
 
 @pytest.mark.parametrize("host", ["no.such.host.invalid", "192.0.2.1", "a..b"])

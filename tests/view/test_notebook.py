@@ -12,7 +12,8 @@ import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.scenario import build, run_built
 from tests.scenario.files import DROP, write
-from tests.view.test_recording_in_browser import browser  # noqa: F401
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def test_a_loaded_result_is_mapped_on_the_shell_it_touched(result):
 
 
 @pytest.mark.browser
-def test_the_frame_plays_in_a_page(result, tmp_path, browser):  # noqa: F811
+def test_the_frame_plays_in_a_page(result, tmp_path, browser):
     page = tmp_path / "notebook.html"
     page.write_text(f"<!DOCTYPE html><body>{result.view()._repr_html_()}</body>")
     tab = browser.new_page()

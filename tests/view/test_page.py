@@ -10,6 +10,7 @@ import umsgpack
 
 from sphshell_pin.view.nodes import HIDDEN_SCALE, Command, pose
 from sphshell_pin.view.page import FilmWindow, render_page
+from tests.view.test_meshes import ball, stl
 
 
 def unpacked(page):
@@ -89,16 +90,22 @@ def test_a_node_appears_where_it_will_be():
     assert tracks[".scale"][1].min() > 0.0
 
 
-def test_a_long_text_is_stored_once():
+def test_a_long_text_or_file_is_stored_once():
     window = FilmWindow()
     text = "<COLLADA>" + "0.123 " * 10_000
-    for name in ("left", "right"):
-        command = {"type": "set_object", "path": f"/{name}", "object": {"object": {"data": text}}}
+    mesh = umsgpack.Ext(0x12, stl(ball(30)))
+    other = umsgpack.Ext(0x12, bytes(30_000))
+    files = {"text": text, "text again": text, "mesh": mesh, "mesh again": mesh, "other": other}
+    for name, file in files.items():
+        command = {"type": "set_object", "path": f"/{name}", "object": {"geometries": [file]}}
         window.send(Command(command))
     commands = window.commands(np.zeros(1))
-    assert [c["text"] for c in commands if c["type"] == "text"] == [text]
-    names = {c["object"]["object"]["data"]["$text"] for c in commands if c["type"] == "set_object"}
-    assert names == {commands[0]["name"]}
+    stored = [c for c in commands if c["type"] == "text"]
+    assert [c.get("text") for c in stored] == [text, None]
+    drawn = {c["path"]: c["object"]["geometries"][0] for c in commands if c["type"] == "set_object"}
+    assert drawn["/text"] == drawn["/text again"] == {"$text": stored[0]["name"]}
+    assert drawn["/mesh"] == drawn["/mesh again"] == {"$text": stored[1]["name"]}
+    assert drawn["/other"] is other
 
 
 def test_deleting_a_path_takes_what_is_below_and_no_more():

@@ -1,7 +1,6 @@
 """The recording in a real browser: pixels, clicks, no network."""
 
 import io
-import shutil
 
 import numpy as np
 import pinocchio as pin
@@ -14,28 +13,7 @@ from tests.view.stand_ins import a_result, a_scene, ball_on_plate, contact_pair,
 
 pytestmark = pytest.mark.browser
 
-# Software rendering, on machines that have no graphics card.
-FLAGS = [
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-    "--host-resolver-rules=MAP evil.example 127.0.0.1",  # a name that was made to lead here
-]
 SIZE = {"width": 800, "height": 500}
-
-
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api")
-    names = ("chromium", "chromium-browser", "google-chrome")
-    program = next(filter(None, map(shutil.which, names)), None)
-    if program is None:
-        pytest.skip("no Chromium on this machine")
-    with playwright.sync_playwright() as driver:
-        running = driver.chromium.launch(executable_path=program, args=FLAGS)
-        yield running
-        running.close()
 
 
 @pytest.fixture

@@ -1,19 +1,19 @@
 import numpy as np
 
-from sphshell_pin.view.surface import great_circles, outlined_edges, split_at_creases, tube
+from sphshell_pin.view.surface import SurfaceMesh, great_circles, outlined_edges, tube
 from tests.view.stand_ins import CUBE_ELEMENTS, CUBE_VERTICES, quad_shell
 
 
 def test_patches_share_no_vertices_and_keep_their_shape():
     cube = quad_shell(CUBE_VERTICES, CUBE_ELEMENTS)
-    vertices, triangles = split_at_creases(cube)
-    assert len(vertices) == 24
-    np.testing.assert_array_equal(vertices[triangles], cube.vertices[cube.triangles])
+    mesh = SurfaceMesh.of(cube)
+    assert len(mesh.vertices) == 24
+    np.testing.assert_array_equal(mesh.vertices[mesh.triangles], cube.vertices[cube.triangles])
 
 
 def test_within_a_patch_vertices_are_shared():
     cube = quad_shell(CUBE_VERTICES, CUBE_ELEMENTS, patches=np.zeros(6))
-    assert len(split_at_creases(cube)[0]) == 8
+    assert len(SurfaceMesh.of(cube).vertices) == 8
 
 
 def test_a_fine_shell_is_outlined_by_its_sharp_edges_only(monkeypatch):

@@ -10,6 +10,8 @@ from sphshell_pin.view import write_recording
 from tests.view.stand_ins import CUBE_ELEMENTS, CUBE_VERTICES, ball_configuration, ball_model
 from tests.view.test_page import unpacked
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def run():
@@ -59,8 +61,8 @@ def test_a_loaded_result_has_figures_too(run, tmp_path):
 
 def test_the_drawn_edges_are_those_of_the_file():
     """A quad's diagonal is no edge of its shell, and is not drawn as one."""
-    from sphshell_pin.view.surface import outlined_edges, split_at_creases
+    from sphshell_pin.view.surface import SurfaceMesh, outlined_edges
 
     cube = sp.Shell(CUBE_VERTICES, CUBE_ELEMENTS)
     assert len(outlined_edges(cube)) == 12
-    assert len(split_at_creases(cube)[0]) == 24
+    assert len(SurfaceMesh.of(cube).vertices) == 24

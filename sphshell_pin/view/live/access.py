@@ -8,9 +8,12 @@ import os
 import re
 import secrets
 import socket
-from typing import Any
+from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import InvalidParameter
+
+if TYPE_CHECKING:
+    from tornado.httputil import HTTPServerRequest
 
 TOKEN_VARIABLE = "SPHSHELL_PIN_TOKEN"  # as JUPYTER_TOKEN: the address of the next run is the same
 
@@ -59,7 +62,7 @@ class Access:
         site = re.match(r"https?://[\w.:\[\]-]+", framed or "")
         self._framed = site[0] if site else "'none'"
 
-    def check(self, request: Any) -> tuple[str, str]:
+    def check(self, request: HTTPServerRequest) -> tuple[str, str]:
         """Return the token that `request` has, and the file that it asks for.
 
         Raises PermissionError, whose text is one sentence for the person who asked.

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sphshell_pin.errors import SphshellError
+
+if TYPE_CHECKING:
+    from sphshell_pin.view.live.server import Client
 
 LARGEST_MESSAGE = 16_384  # bytes
 LONGEST_TEXT = 200
@@ -20,7 +23,7 @@ class BadMessage(SphshellError, ValueError):
     """A message that is no event; its text goes back to the browser that sent it."""
 
 
-def _number(value: Any) -> float:
+def _number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise BadMessage("must be a number")
     if not abs(value) <= LARGEST_NUMBER:
@@ -28,26 +31,26 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-def _not_negative(value: Any) -> float:
+def _not_negative(value: object) -> float:
     number = _number(value)
     if number < 0.0:
         raise BadMessage("must not be negative")
     return number
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     if not isinstance(value, str) or len(value) > LONGEST_TEXT:
         raise BadMessage(f"must be a text of at most {LONGEST_TEXT} characters")
     return value
 
 
-def _switch(value: Any) -> bool:
+def _switch(value: object) -> bool:
     if not isinstance(value, bool):
         raise BadMessage("must be true or false")
     return value
 
 
-def _direction(value: Any) -> list[float]:
+def _direction(value: object) -> list[float]:
     if not isinstance(value, list) or len(value) != 3:
         raise BadMessage("must be a list of three numbers")
     numbers = [_number(one) for one in value]
@@ -57,7 +60,7 @@ def _direction(value: Any) -> list[float]:
     return [one / length for one in numbers]
 
 
-_Fields = dict[str, Callable[[Any], Any]]
+_Fields = dict[str, Callable[[object], object]]
 FIELDS: dict[str, _Fields] = {
     "run": {"on": _switch},
     "step": {"seconds": _not_negative},
@@ -111,13 +114,13 @@ def read_event(message: str | bytes) -> Event:
     return event
 
 
-def newest(events: list[tuple[object, Event]]) -> list[tuple[object, Event]]:
+def newest(events: list[tuple[Client, Event]]) -> list[tuple[Client, Event]]:
     """Keep of a slider's many values only the last, where the last one came; join steps.
 
     Else a key held down, where physics is slow, would go on for long after it was let go.
     """
-    kept: list[tuple[object, Event]] = []
-    seen: set[tuple[Any, ...]] = set()
+    kept: list[tuple[Client, Event]] = []
+    seen: set[tuple[object, ...]] = set()
     for client, event in reversed(events):
         if event["type"] in ("knob", "speed", "arrows", "seek"):
             key = (event["type"], event.get("key"))

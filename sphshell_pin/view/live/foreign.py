@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.view.nodes import Sent, Window
 
 PERIOD = 1.0 / 30.0  # [s] between two frames
 
@@ -15,9 +14,9 @@ class ForeignWindow:
     Such a window answers every command, and the sender waits for the answer.
     """
 
-    def __init__(self, window: Any) -> None:
+    def __init__(self, window: Window) -> None:
         self._window = window
-        self._matrices: dict[str, Any] = {}
+        self._matrices: dict[str, list[float]] = {}
         self._due = 0.0
 
     @property
@@ -33,7 +32,7 @@ class ForeignWindow:
         self._due = now + PERIOD
         return True
 
-    def send(self, command: Any) -> None:
+    def send(self, command: Sent) -> None:
         """Hand on one meshcat command."""
         data = command.lower()
         path = data.get("path", "")
@@ -48,7 +47,7 @@ class ForeignWindow:
         self._window.send(command)
 
 
-def window_of(visualizer: Any) -> Any:
+def window_of(visualizer: object) -> Window:
     """Return the window of a meshcat.Visualizer or a pinocchio MeshcatVisualizer."""
     inner = getattr(visualizer, "viewer", visualizer)
     window = getattr(inner, "window", None)
@@ -58,4 +57,5 @@ def window_of(visualizer: Any) -> Any:
             type(visualizer).__name__,
             "must be a meshcat.Visualizer, or a pinocchio MeshcatVisualizer after initViewer",
         )
-    return window
+    found: Window = window
+    return found

@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +21,11 @@ from sphshell_pin.view.live.greeting import (
     check_speed,
     greeting,
 )
-from sphshell_pin.view.live.panel import Panel, Strip, list_contacts, rows_now
+from sphshell_pin.view.live.panel import Panel, Strip, StripRow, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown, frame_point
-from sphshell_pin.view.live.server import Server
+from sphshell_pin.view.live.server import Client, Server
 from sphshell_pin.view.live.window import LiveWindow
-from sphshell_pin.view.nodes import Json, require_meshcat
+from sphshell_pin.view.nodes import FloatArray, Json, new_visualizer
 
 if TYPE_CHECKING:
     from sphshell_pin.view.live.player import Player
@@ -57,7 +57,7 @@ class Live:
     def __init__(
         self,
         player: Player,
-        visualizer: Any = None,
+        visualizer: object = None,
         *,
         host: str = "127.0.0.1",
         port: int = 0,
@@ -65,7 +65,6 @@ class Live:
         running: bool = True,
         wait: bool = False,
     ) -> None:
-        meshcat = require_meshcat()
         self.player = player
         self.speed = check_speed(speed)
         self.running = running
@@ -78,12 +77,12 @@ class Live:
             self._foreign = ForeignWindow(window_of(visualizer))
         self._panel = Panel()
         self._strip = Strip()
-        self._strip_rows: list[Any] = []
+        self._strip_rows: list[StripRow] = []
         self._clear_strip = True
         self._factor = 1.0
         self._pace: deque[tuple[float, float]] = deque()
-        self._holds: dict[object, Event] = {}
-        self._pushed: tuple[str, Any, float] | None = None
+        self._holds: dict[Client, Event] = {}
+        self._pushed: tuple[str, FloatArray, float] | None = None
         self._changed = True
         self._knob_values = self._read_knobs()
         self._next_panel = 0.0
@@ -96,7 +95,7 @@ class Live:
         framed = None if self._foreign is None else self._foreign.url
         self.server = Server(self, host, port, framed)
         try:
-            canvas = meshcat.Visualizer(window=self._foreign or self._window)
+            canvas = new_visualizer(self._foreign or self._window)
             self.picture = Picture(player, canvas)
             self._panel.greet(greeting(player, framed))
             self.draw()
@@ -272,7 +271,7 @@ class Live:
 
     # Events
 
-    def _handle(self, client: object, event: Event) -> None:
+    def _handle(self, client: Client, event: Event) -> None:
         player = self.player
         match event["type"]:
             case "run":

@@ -12,7 +12,7 @@ import webbrowser
 from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
 from sphshell_pin.view.distance import Coloring, check_coloring
@@ -26,8 +26,8 @@ RESULT = "run.npz"
 
 
 def preview(
-    what: Any,
-    visualizer: Any = None,
+    what: object,
+    visualizer: object = None,
     *,
     changes: Mapping[str, str] | None = None,
     scenario: str | PathLike[str] | None = None,
@@ -103,7 +103,7 @@ def preview(
 
 
 def player_of(
-    what: Any,
+    what: object,
     *,
     changes: Mapping[str, str] | None = None,
     scenario: str | PathLike[str] | None = None,
@@ -129,8 +129,7 @@ def player_of(
     if isinstance(what, Result):
         return Replay(what, scenario)
     if callable(getattr(what, "advance", None)):
-        player: Player = what
-        return player
+        return what  # type: ignore[return-value]
     raise InvalidParameter(
         "what", type(what).__name__, "must be a scenario, a finished run, or a player"
     )

@@ -6,16 +6,19 @@ import json
 import math
 import threading
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.view.nodes import Json
+from sphshell_pin.view.nodes import FloatArray, Json
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene import ContactPair, SceneContacts
     from sphshell_pin.scenario.player import Rows
     from sphshell_pin.view.live.player import Player
+
+StripRow = tuple[float, FloatArray, FloatArray]
+"""Time [s], normal and friction forces (pairs,) [N]."""
 
 MOST_ROWS = 1_500  # of the strip; the page shows the last seconds
 MOST_LISTED = 40  # contacts
@@ -41,7 +44,7 @@ class Panel:
             self._number += 1
             self._hello = (self._number, dump({"type": "hello", **hello}))
 
-    def publish(self, state: Json, rows: list[Any], *, clear: bool = False) -> None:
+    def publish(self, state: Json, rows: list[StripRow], *, clear: bool = False) -> None:
         """Publish the `state` of now, and new `rows` of the strip; `clear` drops the old ones."""
         with self._lock:
             self._number += 1
@@ -75,15 +78,15 @@ class Strip:
 
     def __init__(self) -> None:
         self._spacing = 0.0
-        self._row: list[Any] | None = None
+        self._row: StripRow | None = None
         self.clear()
 
-    def add(self, rows: Rows, spacing: float) -> list[Any]:
+    def add(self, rows: Rows, spacing: float) -> list[StripRow]:
         """Take `rows`, and return [t, normal forces, friction forces] of each finished piece.
 
         A piece is `spacing` [s] of simulated time long.
         """
-        finished: list[Any] = []
+        finished: list[StripRow] = []
         if not len(rows.t):
             return finished
         if spacing != self._spacing:
@@ -99,7 +102,7 @@ class Strip:
                 self._piece, self._largest = piece[start], -math.inf
             if total[k] > self._largest:
                 self._largest = total[k]
-                self._row = [rows.t[k], rows.normal_force[k], rows.friction_force[k]]
+                self._row = (float(rows.t[k]), rows.normal_force[k], rows.friction_force[k])
         return finished
 
     def clear(self) -> None:
@@ -150,12 +153,12 @@ def sticks(pair: ContactPair, slip: float) -> bool | None:
     return None if pair.friction is None else slip < pair.friction.sticking_speed
 
 
-def dump(value: Any) -> str:
+def dump(value: object) -> str:
     """Return `value` as JSON; numbers keep nine digits, and null stands for what is no number."""
     return json.dumps(_plain(value), separators=(",", ":"), allow_nan=False)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, float):

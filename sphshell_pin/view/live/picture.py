@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 import pinocchio as pin
@@ -26,7 +26,9 @@ from sphshell_pin.view.nodes import (
 )
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.scene import Scene, SceneContacts
+    from meshcat import Visualizer
+
+    from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
     from sphshell_pin.view.live.player import Player
 
 POOL = 16
@@ -45,7 +47,7 @@ SHOWN_AT_FIRST = frozenset({"robot", "spheres", "arrows", "points", "wireframe",
 class Picture:
     """Draws the state of `player` below `visualizer` again and again."""
 
-    def __init__(self, player: Player, visualizer: Any) -> None:
+    def __init__(self, player: Player, visualizer: Visualizer) -> None:
         scene, q = player.scene, player.q
         touched = player.contacts
         view = choose_view(
@@ -149,7 +151,7 @@ class ConePool:
     friction that reaches the rim is at its limit.
     """
 
-    def __init__(self, visualizer: Any, size: int) -> None:
+    def __init__(self, visualizer: Visualizer, size: int) -> None:
         self._moves: list[Move] = []
         for index in range(size):
             node = visualizer[f"cone_{index}"]
@@ -158,7 +160,9 @@ class ConePool:
             self._moves.append(mover(node))
             self._moves[-1](pose(np.eye(3), np.zeros(3), HIDDEN_SCALE))
 
-    def update(self, contacts: SceneContacts, pairs: Any, scale: ArrowScale) -> None:
+    def update(
+        self, contacts: SceneContacts, pairs: tuple[ContactPair, ...], scale: ArrowScale
+    ) -> None:
         """Show the cones of `contacts`, the largest forces first; hide the others."""
         order = np.argsort(-contacts.normal_force, kind="stable")
         for slot, move in enumerate(self._moves):
@@ -236,7 +240,7 @@ class _Trails:
             pair = pairs[index]
             if pair.shell is None:
                 continue
-            where = self._display.data.oMi[pair.joint_j] * pair.shell_placement
+            where = self._display.data.oMi[pair.joint_j] * pair.placement_j
             self._extend(index, where.actInv(contacts.point_world[k]))
 
     def _extend(self, index: int, point: FloatArray) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from sphshell_pin.view.nodes import FloatArray
 
 if TYPE_CHECKING:
+    import pinocchio as pin
+
     from sphshell_pin.dynamics.scene import Scene, SceneContacts
     from sphshell_pin.scenario.knobs import Knob
     from sphshell_pin.scenario.player import Rows
@@ -23,8 +25,8 @@ class Player(Protocol):
         """One line on what there is to see."""
 
     @property
-    def visual_model(self) -> Any:
-        """A pinocchio.GeometryModel of scene.model, or None for a skeleton."""
+    def visual_model(self) -> pin.GeometryModel | None:
+        """Of scene.model, or None for a skeleton."""
 
     @property
     def scene(self) -> Scene:

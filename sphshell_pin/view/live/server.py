@@ -10,14 +10,19 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
 from sphshell_pin.view.live.access import Access
 from sphshell_pin.view.live.events import LARGEST_MESSAGE, BadMessage, Event, read_event
-from sphshell_pin.view.nodes import require_meshcat
+from sphshell_pin.view.nodes import viewer_script
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from tornado.iostream import IOStream
 
 PAGE = Path(__file__).with_name("page")
 MOST_EVENTS = 2_000  # waiting to be handled; more are refused
@@ -46,6 +51,18 @@ class Source(Protocol):
         """Return the last panel's number, and the texts that lead there from panel `since`."""
 
 
+class Client(Protocol):
+    """A browser."""
+
+    wake: asyncio.Event
+
+    def say(self, data: Mapping[str, object]) -> None:
+        """Send one text, without waiting."""
+
+    def close(self, code: int, reason: str) -> None:
+        """End the connection."""
+
+
 class Server:
     """Serves the page and one websocket per browser at `url`, until `stop`.
 
@@ -56,7 +73,7 @@ class Server:
     def __init__(
         self, source: Source, host: str = "127.0.0.1", port: int = 0, framed: str | None = None
     ) -> None:
-        viewer = Path(require_meshcat().__file__).parent / "viewer" / "dist" / "main.min.js"
+        viewer = viewer_script()
         try:
             import tornado.netutil
         except ImportError as missing:
@@ -64,10 +81,10 @@ class Server:
         if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
             raise InvalidParameter("port", port, "must be a port number from 0 (any free) to 65535")
         self.source = source
-        self.clients: set[Any] = set()
+        self.clients: set[Client] = set()
         self.arrived = threading.Event()
         """Set when there is something for the simulation to do."""
-        self._events: collections.deque[tuple[object, Event]] = collections.deque()
+        self._events: collections.deque[tuple[Client, Event]] = collections.deque()
         self._woken = False
         self._stopping = False
         try:
@@ -118,7 +135,7 @@ class Server:
         """Whether any browser is connected."""
         return bool(self.clients)
 
-    def events(self) -> list[tuple[object, Event]]:
+    def events(self) -> list[tuple[Client, Event]]:
         """Return the events since the last call, each with the browser it came from."""
         self.arrived.clear()
         return [self._events.popleft() for _ in range(len(self._events))]
@@ -129,7 +146,7 @@ class Server:
             self._woken = True
             self._call(self._wake)
 
-    def tell(self, client: Any, text: str) -> None:
+    def tell(self, client: Client, text: str) -> None:
         """Send one browser a sentence that it shows."""
         self._call(lambda: client.say({"type": "error", "text": text}))
 
@@ -142,20 +159,20 @@ class Server:
 
     # What follows runs in the server's thread.
 
-    def take(self, client: object, event: Event) -> None:
+    def take(self, client: Client, event: Event) -> None:
         """Keep an event for the simulation."""
         if len(self._events) >= MOST_EVENTS:
             raise BadMessage("too many messages wait to be handled; this one was dropped")
         self._events.append((client, event))
         self.arrived.set()
 
-    def leave(self, client: object) -> None:
+    def leave(self, client: Client) -> None:
         """Forget a browser that has gone; what it held, it lets go."""
         self.clients.discard(client)
         self._events.append((client, {"type": "release"}))
         self.arrived.set()
 
-    def _call(self, routine: Callable[[], Any]) -> None:
+    def _call(self, routine: Callable[[], object]) -> None:
         if not self._loop.is_closed():
             try:
                 self._loop.call_soon_threadsafe(routine)
@@ -178,12 +195,12 @@ class Server:
         await self._http.close_all_connections()
         self._loop.stop()
 
-    def _serve(self, sockets: list[Any], viewer: Path) -> None:
+    def _serve(self, sockets: list[socket.socket], viewer: Path) -> None:
         import tornado.httpserver
         import tornado.web
 
         class HTTPServer(tornado.httpserver.HTTPServer):
-            def handle_stream(self, stream: Any, address: Any) -> None:
+            def handle_stream(self, stream: IOStream, address: tuple[object, ...]) -> None:
                 if len(self._connections) >= MOST_CONNECTIONS:
                     stream.close()
                 else:
@@ -256,11 +273,16 @@ def _handlers() -> tuple[type, type]:
                 self.refused = str(refused)
                 raise tornado.web.HTTPError(403) from None
 
-        def write_error(self, status_code: int, **_: Any) -> None:
+        def write_error(self, status_code: int, **_: object) -> None:
             self.set_header("Content-Type", "text/plain")
             self.finish(f"{status_code}: {getattr(self, 'refused', 'there is nothing here')}\n")
 
-        def log_exception(self, kind: Any, value: Any, traceback: Any) -> None:
+        def log_exception(
+            self,
+            kind: type[BaseException] | None,
+            value: BaseException | None,
+            traceback: TracebackType | None,
+        ) -> None:
             if not isinstance(value, tornado.web.HTTPError):
                 super().log_exception(kind, value, traceback)
 
@@ -319,7 +341,7 @@ def _handlers() -> tuple[type, type]:
                 self._server.leave(self)
                 self._pump_task.cancel()
 
-        def say(self, data: dict[str, Any]) -> None:
+        def say(self, data: Mapping[str, object]) -> None:
             """Send one text, without waiting; nobody minds if the browser has gone."""
             if len(self._answers) < MOST_UNSAID:
                 answer = asyncio.ensure_future(self._say(json.dumps(data)))

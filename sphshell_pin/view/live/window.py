@@ -8,11 +8,10 @@ one skips frames, a late one starts at frame zero and gets the whole scene.
 from __future__ import annotations
 
 import threading
-from typing import Any
 
 import numpy as np
 
-from sphshell_pin.view.nodes import FloatArray, Json, Move
+from sphshell_pin.view.nodes import FloatArray, Json, Move, Sent
 
 _FIRST_ROWS = 64
 
@@ -40,7 +39,7 @@ class LiveWindow:
         """Number of the last committed frame; 0 before the first."""
         return self._frame
 
-    def send(self, command: Any) -> None:
+    def send(self, command: Sent) -> None:
         """Take one meshcat command; it belongs to the frame that `commit` closes."""
         import umsgpack
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sphshell_pin import ImpactLaw, Shell
-from sphshell_pin.shell.contact_set import Feature
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.shell.contact_set import Feature
 from tests import meshes
 from tests.contact.smooth.surfaces import SURFACES, can, shell_of
 

@@ -18,12 +18,14 @@ import pytest
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
-from sphshell_pin.shell.contact_set import ContactSet, Method
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.shell.contact_set import ContactSet, Method
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.surfaces import mean_edge
 from tests.shell.surfaces import DATA
 from tests.shell.test_corpus import FILES, load
+
+pytestmark = pytest.mark.slow
 
 Array = NDArray[np.float64]
 

@@ -1,31 +1,34 @@
-"""A place to touch on any surface: its broad side, away from holes, and a way across it."""
+"""A place to touch on any surface: its broad side, away from holes, and a path on it."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+if TYPE_CHECKING:
+    from sphshell_pin.shell.shell import Shell
+
 Array = npt.NDArray[np.float64]
 
-# A way across a surface ends before a turn this sharp from one of its points to the next.
+# A path on a surface ends before a turn this sharp from one of its points to the next.
 _SHARPEST = np.cos(np.deg2rad(35.0))
 # Of a contact's normal with the surface's, where a face is touched and not an edge.
 _ALIGNED = 0.98
-# How far from the middle other spots are looked for, as parts of half the box.
+# How far from the middle other places are looked for, as parts of half the box.
 _PARTS = (0.15, 0.35, 0.6)
-# Points at the end of a way that are left out, so that it ends before a rim and not on it.
+# Points at the end of a path that are left out, so that it ends before a rim and not on it.
 _SPARE = 2
-# Directions in which a way across is tried when the asked one is too short.
+# Directions in which a path is tried when the asked one is too short.
 _DIRECTIONS = 8
 
 
 @dataclass(frozen=True)
-class Spot:
+class TouchPoint:
     """Where a sphere may stand on a shell; all in the shell's frame."""
 
     point: Array
@@ -36,20 +39,20 @@ class Spot:
     """Of the sphere (3,) [m], whose gap to the surface is the one asked for."""
 
 
-def find_spot(
-    shell: Any,
+def find_touch_point(
+    shell: Shell,
     radius: float,
     gap: float,
     *,
     toward: Array | None = None,
     inside: bool = False,
     beside: Array | None = None,
-) -> Spot:
-    """Return a spot in the middle of `shell` where a sphere of `radius` [m] has the `gap` [m].
+) -> TouchPoint:
+    """Return a place in the middle of `shell` where a sphere of `radius` [m] has the `gap` [m].
 
     `toward` (3,) is the side to touch from; by default the broad side, and for a closed surface its
     upper one where sides are alike. A sheet is touched from its hollow side. With `inside` the
-    surface is touched from its middle. `beside` (3,) [m] moves the spot away from the middle.
+    surface is touched from its middle. `beside` (3,) [m] moves the place away from the middle.
     """
     middle = shell.box.mean(axis=0) + (0.0 if beside is None else beside)
     if toward is None and _is_sheet(shell):
@@ -62,35 +65,39 @@ def find_spot(
     return come_down(shell, start, -axis, radius, gap)
 
 
-def spots_about(
-    shell: Any, radius: float, gap: float, *, toward: Array | None = None, inside: bool = False
-) -> Iterator[Spot]:
-    """Yield spots as `find_spot` finds them: in the middle, then farther and farther from it."""
-    yield find_spot(shell, radius, gap, toward=toward, inside=inside)
+def touch_points(
+    shell: Shell, radius: float, gap: float, *, toward: Array | None = None, inside: bool = False
+) -> Iterator[TouchPoint]:
+    """Yield touch points: that of `find_touch_point`, then others farther and farther from it."""
+    yield find_touch_point(shell, radius, gap, toward=toward, inside=inside)
     half = 0.5 * (shell.box[1] - shell.box[0])
     for part in _PARTS:
         for signs in itertools.product((0, 1, -1), repeat=3):
             if any(signs):
                 aside = part * half * np.array(signs)
-                yield find_spot(shell, radius, gap, toward=toward, inside=inside, beside=aside)
+                yield find_touch_point(
+                    shell, radius, gap, toward=toward, inside=inside, beside=aside
+                )
 
 
-def touches_once(shell: Any, spot: Spot, points: Array, radius: float, depth: float) -> bool:
+def touches_once(
+    shell: Shell, place: TouchPoint, points: Array, radius: float, depth: float
+) -> bool:
     """Whether a sphere pressed in by `depth` [m] at `points` (k, 3) touches a face, and once.
 
     In a groove it rests on several sides, each with a force of its own; on an edge the force turns
-    with the smallest step aside. `points` lead away from `spot`.
+    with the smallest step aside. `points` lead away from `place`.
     """
-    first = np.cross(spot.normal, np.eye(3)[int(np.argmin(np.abs(spot.normal)))])
-    first /= np.linalg.norm(first)
-    second = np.cross(spot.normal, first)
+    first, second = _tangents(place.normal, np.zeros(3))
     for aside in (0.1 * radius, 0.5 * radius):
-        near = shell.closest_points(spot.point + aside * np.array([first, -first, second, -second]))
+        near = shell.closest_points(
+            place.point + aside * np.array([first, -first, second, -second])
+        )
         # Where it turns or ends, there is an edge or a hole.
-        turns = np.abs(near.normals @ spot.normal) < _SHARPEST
+        turns = np.abs(near.normals @ place.normal) < _SHARPEST
         if turns.any() or np.abs(near.distances).max() > 0.3 * aside:
             return False
-    normal = spot.normal
+    normal = place.normal
     at = shell.closest_points(points)
     for point, turned in zip(at.points, at.normals, strict=True):
         before, normal = normal, turned if turned @ normal >= 0 else -turned
@@ -102,38 +109,39 @@ def touches_once(shell: Any, spot: Spot, points: Array, radius: float, depth: fl
     return True
 
 
-def way_across(shell: Any, spot: Spot, direction: Array, length: float, spacing: float) -> Array:
-    """Return points (k, 3) on the surface from `spot` on, `spacing` apart, over `length` [m].
+def path_on_surface(
+    shell: Shell, place: TouchPoint, direction: Array, length: float, spacing: float
+) -> Array:
+    """Return points (k, 3) on the surface from `place` on, `spacing` apart, over `length` [m].
 
-    The way goes along `direction` (3,) as the surface allows and ends before a rim or a sharp edge;
+    It goes along `direction` (3,) as the surface allows and ends before a rim or a sharp edge;
     where it would be less than half of `length`, the longest of several directions is taken.
     """
-    normal = spot.normal
-    first = direction - normal * (normal @ direction)
-    if np.linalg.norm(first) < 1e-6:
-        first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    first /= np.linalg.norm(first)
-    second = np.cross(normal, first)
-    ways: list[Array] = []
+    first, second = _tangents(place.normal, direction)
+    steps = max(1, round(length / spacing))
+    best = np.zeros((0, 3))
     for k in range(_DIRECTIONS):
         # 0, +45, -45, +90, ... degrees: near the asked direction first.
         angle = np.pi / 4 * ((k + 1) // 2) * (1 if k % 2 else -1)
-        ways.append(
-            _walk(
-                shell,
-                spot,
-                np.cos(angle) * first + np.sin(angle) * second,
-                max(1, round(length / spacing)),
-                spacing,
-            )
-        )
-        if len(ways[-1]) - 1 >= 0.5 * length / spacing:
-            return ways[-1]
-    return max(ways, key=len)
+        ahead = np.cos(angle) * first + np.sin(angle) * second
+        path = _walk(shell, place, ahead, steps, spacing)
+        best = path if len(path) > len(best) else best
+        if len(best) - 1 >= 0.5 * length / spacing:
+            break
+    return best
 
 
-def _walk(shell: Any, spot: Spot, direction: Array, steps: int, spacing: float) -> Array:
-    points, normal = [spot.point], spot.normal
+def _tangents(normal: Array, direction: Array) -> tuple[Array, Array]:
+    """Return unit vectors (3,) across `normal` and each other, the first along `direction`."""
+    first = direction - normal * (normal @ direction)
+    if np.linalg.norm(first) < 1e-6:
+        first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    first = first / np.linalg.norm(first)
+    return first, np.cross(normal, first)
+
+
+def _walk(shell: Shell, place: TouchPoint, direction: Array, steps: int, spacing: float) -> Array:
+    points, normal = [place.point], place.normal
     for _ in range(steps + _SPARE):
         at = shell.closest_points((points[-1] + spacing * direction)[None])
         point, turned = at.points[0], at.normals[0]
@@ -148,7 +156,7 @@ def _walk(shell: Any, spot: Spot, direction: Array, steps: int, spacing: float) 
     return np.array(points[: max(1, len(points) - _SPARE)])
 
 
-def _is_sheet(shell: Any) -> bool:
+def _is_sheet(shell: Shell) -> bool:
     """Whether the surface is a sheet, and not a body, be it with holes: its normals agree."""
     if shell.is_closed:
         return False
@@ -166,27 +174,16 @@ def _broad_axis(box: Array) -> Array:
     return axis
 
 
-def _above(shell: Any, axis: Array, middle: Array) -> Array:
+def _above(shell: Shell, axis: Array, middle: Array) -> Array:
     """Return a place far out along `axis`, above the middle or, over a hole, beside it."""
-    corners = shell.vertices[shell.triangles]
-    a = corners[:, 0]
-    edge_1, edge_2 = corners[:, 1] - a, corners[:, 2] - a
-    # Moeller and Trumbore, Fast Minimum Storage Ray/Triangle Intersection, 1997.
-    p = np.cross(axis, edge_2)
-    volume = np.einsum("ij,ij->i", edge_1, p)
-    s = middle - a
-    with np.errstate(divide="ignore", invalid="ignore"):
-        u = np.einsum("ij,ij->i", s, p) / volume
-        v = (np.cross(s, edge_1) @ axis) / volume
-        met = bool(((u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)).any())
     far: Array = middle + 2 * shell.size * axis
-    if not met:
+    if not _advance(shell, far, -axis, 0.0, 1e-6 * shell.size)[2]:
         beside = shell.closest_points(far[None]).points[0]
         far = beside + axis * (axis @ (far - beside))
     return far
 
 
-def _hollow_side(shell: Any, middle: Array) -> tuple[Array, Array]:
+def _hollow_side(shell: Shell, middle: Array) -> tuple[Array, Array]:
     """Return the point of an open surface nearest to its `middle`, and the normal towards that."""
     at = shell.closest_points(middle[None])
     point, normal = at.points[0], at.normals[0]
@@ -197,19 +194,34 @@ def _hollow_side(shell: Any, middle: Array) -> tuple[Array, Array]:
     return point, normal if inward >= 0 else -normal
 
 
-def come_down(shell: Any, start: Array, way: Array, radius: float, gap: float) -> Spot:
-    """Return the spot that a sphere of `radius` [m] at `start` reaches along `way`, unit (3,).
+def come_down(
+    shell: Shell, start: Array, direction: Array, radius: float, gap: float
+) -> TouchPoint:
+    """Return where a sphere of `radius` [m] comes to that moves from `start` along `direction`.
 
-    No step is longer than what is free, so nothing is passed through.
+    It stops at the `gap` [m] to the surface; `direction` is a unit vector (3,).
     """
-    wanted, centre = radius + gap, start
+    centre, point, _ = _advance(shell, start, direction, radius + gap, 1e-3 * gap)
+    away = centre - point
+    return TouchPoint(point, away / np.linalg.norm(away), centre)
+
+
+def _advance(
+    shell: Shell, start: Array, direction: Array, distance: float, tolerance: float
+) -> tuple[Array, Array, bool]:
+    """Go from `start` along `direction` until the surface is at `distance` [m].
+
+    Return the place, the surface's point next to it, and whether the surface was there. No step is
+    longer than what is free, so nothing is passed through (sphere tracing, Hart 1996).
+    """
+    place = start
     farthest = 2 * float(np.linalg.norm(start - shell.box.mean(axis=0))) + 2 * shell.size
     for _ in range(500):
-        at = shell.closest_points(centre[None])
-        free = float(np.linalg.norm(centre - at.points[0])) - wanted
-        # Beside the surface it goes past.
-        if abs(free) <= 1e-3 * gap or float(way @ (centre - start)) > farthest:
+        point = shell.closest_points(place[None]).points[0]
+        free = float(np.linalg.norm(place - point)) - distance
+        if abs(free) <= tolerance:
+            return place, point, True
+        if float(direction @ (place - start)) > farthest:
             break
-        centre = centre + free * way
-    away = centre - at.points[0]
-    return Spot(at.points[0], away / np.linalg.norm(away), centre)
+        place = place + free * direction
+    return place, point, False

@@ -1,13 +1,13 @@
-"""Robot meshes in Collada files, made small: their numbers as quantised differences of bytes.
+"""Robot meshes made small for a recording: their numbers as quantized differences of bytes.
 
-Everything else of the file (materials, nodes, units) stays as it is, so that the page's own loader
-draws what it would have drawn.
+A recording of a robot is 2 to 5 times as large without it: 14 MB instead of 4 MB for a Go1. Of
+Collada files everything else (materials, nodes, units) stays as it is, so that the page's own
+loader draws what it would have drawn.
 """
 
 from __future__ import annotations
 
 import re
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ MARK = "$$"  # where a list was taken out; no Collada file has two dollars
 LEAST = 64  # shorter lists stay as they are
 LEVELS = 65_535  # steps between the least and the largest coordinate of a mesh
 LEVELS_OF_NORMALS = 1023
+STL_HEADER = 84  # bytes: a title of 80, then the number of facets
+STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def take_out_numbers(text: str) -> tuple[str, list[Json]]:
@@ -49,12 +51,38 @@ def take_out_numbers(text: str) -> tuple[str, list[Json]]:
     return _NUMBERS.sub(replace, text), lists
 
 
+def pack_facets(data: bytes) -> Json | None:
+    """Describe the facets of the binary STL file `data`, packed with `pack_numbers`.
+
+    `points` (p, 3), row by row, and `corners` (f, 3) that number them. Titles, colors and normals
+    are left out: the page shows none of the first two, and finds the last. None for what is no
+    binary STL file.
+    """
+    if len(data) <= STL_HEADER:
+        return None
+    count = int.from_bytes(data[80:STL_HEADER], "little")
+    if len(data) != STL_HEADER + STL_FACET.itemsize * count:
+        return None
+    soup = np.frombuffer(data, STL_FACET, count, STL_HEADER)["corners"].reshape(-1, 3)
+    if not np.isfinite(soup).all():
+        return None
+    points, first, number = np.unique(soup, axis=0, return_index=True, return_inverse=True)
+    # In the order of the file, where neighbors stand near each other.
+    order = np.argsort(first)
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    return {
+        "points": pack_numbers(points[order].astype(float).reshape(-1), exact=False),
+        "corners": pack_numbers(place[number.reshape(-1)].astype(float), exact=True),
+    }
+
+
 def pack_numbers(values: NDArray[np.float64], *, exact: bool) -> Json:
     """Describe `values` (n,) as `low` + `step` * integers, these as differences that compress well.
 
-    An integer is told by its difference to the one `stride` before it, the signs folded (0, -1, 1,
-    -2, ... are 0, 1, 2, 3, ...), component after component; `bytes` holds the lowest bytes of all
-    of them, then the next, `width` of them.
+    An integer is stored as its difference to the one `stride` before it, the signs folded (0, -1,
+    1, -2, ... are 0, 1, 2, 3, ...), component by component; `bytes` holds the lowest bytes of all,
+    then the next, `width` of them.
     """
     low, step = 0.0, 1.0
     if not exact:
@@ -85,7 +113,7 @@ def _fold(whole: NDArray[np.int64], stride: int) -> NDArray[np.int64]:
     return folded
 
 
-def _are_normals(values: NDArray[Any]) -> bool:
+def _are_normals(values: NDArray[np.float64]) -> bool:
     if len(values) % 3:
         return False
     return bool(np.all(np.abs(np.linalg.norm(values.reshape(-1, 3), axis=1) - 1.0) < 1e-2))

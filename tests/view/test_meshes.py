@@ -1,0 +1,173 @@
+"""Robot meshes, packed and restored: as good as they were, in less room."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import umsgpack
+
+import sphshell_pin.view.page as page_module
+from sphshell_pin.view.meshes import LEVELS, MARK, pack_facets, pack_numbers, take_out_numbers
+
+PAGE = Path(page_module.__file__).with_name("recording.html").read_text(encoding="utf-8")
+
+
+def restored(packed):
+    """What the page makes of a packed list, written down from its description, number by number."""
+    count, stride, rows = packed["count"], packed["stride"], packed["count"] // packed["stride"]
+    values = np.zeros(count)
+    for component in range(stride):
+        whole = 0
+        for row in range(rows):
+            place = component * rows + row
+            planes = [packed["bytes"][p * count + place] for p in range(packed["width"])]
+            (folded,) = struct.unpack("<Q", bytes(planes).ljust(8, b"\0"))
+            whole += -(folded + 1) // 2 if folded % 2 else folded // 2
+            values[row * stride + component] = packed["low"] + packed["step"] * whole
+    return values
+
+
+def sphere_points(count):
+    points = np.random.default_rng(1).normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1)[:, None]
+
+
+@pytest.mark.parametrize("count", [100, 99, 98, 97])
+def test_indices_are_exact(count):
+    indices = np.random.default_rng(count).integers(0, 2_000_000, count)
+    indices[:20] = np.arange(20)
+    packed = pack_numbers(indices.astype(float), exact=True)
+    np.testing.assert_array_equal(restored(packed), indices)
+
+
+def test_coordinates_keep_a_part_of_the_meshs_size_and_equal_ones_stay_equal():
+    points = 0.3 * sphere_points(300).reshape(-1) + 0.1
+    error = restored(pack_numbers(points, exact=False)) - points
+    assert np.abs(error).max() <= 0.5001 * np.ptp(points) / LEVELS
+    np.testing.assert_array_equal(restored(pack_numbers(np.full(90, 0.25), exact=False)), 0.25)
+
+
+def test_normals_keep_their_direction():
+    normals = sphere_points(300)
+    packed = pack_numbers(normals.reshape(-1), exact=False)
+    again = restored(packed).reshape(-1, 3)
+    again /= np.linalg.norm(again, axis=1)[:, None]
+    angle = np.linalg.norm(np.cross(again, normals), axis=1)
+    assert np.rad2deg(angle.max()) < 0.12
+    assert packed["width"] <= 2
+
+
+MESH = """<COLLADA><asset><unit meter="0.001"/></asset>
+<float_array id="p" count="{n}">{points}</float_array>
+<p>{indices}</p><p>0 1 2</p><float_array id="odd">{odd}</float_array></COLLADA>"""
+
+
+def a_mesh():
+    points = 100.0 * sphere_points(400)
+    indices = np.arange(1200) // 2
+    text = MESH.format(
+        n=1200,
+        points=" ".join(f"{x:.6f}" for x in points.reshape(-1)),
+        indices=" ".join(map(str, indices)),
+        odd="1.0 NaN " * 50,
+    )
+    return text, points.reshape(-1), indices
+
+
+def test_only_long_lists_of_numbers_are_taken_out():
+    text, points, indices = a_mesh()
+    rest, numbers = take_out_numbers(text)
+    assert len(numbers) == rest.count(MARK) == 2
+    assert "<p>0 1 2</p>" in rest
+    assert "NaN" in rest
+    assert '<unit meter="0.001"/>' in rest
+    np.testing.assert_allclose(restored(numbers[0]), points, atol=2e-3)
+    np.testing.assert_array_equal(restored(numbers[1]), indices)
+    small = len(gzip.compress(rest.encode() + umsgpack.packb(numbers)))
+    assert small < 0.5 * len(gzip.compress(text.encode()))
+    # A text with the mark is left alone.
+    marked = text.replace("NaN", MARK)
+    assert take_out_numbers(marked) == (marked, [])
+
+
+def ball(rings=24):
+    """Corners (f, 3, 3) of a ball of radius 0.2 about (1, 2, 3)."""
+    u, v = np.meshgrid(np.linspace(0, np.pi, rings), np.linspace(0, 2 * np.pi, rings))
+    points = np.stack((np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)), axis=-1)
+    points = (0.2 * points + [1.0, 2.0, 3.0]).astype(np.float32)
+    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    facets = [np.stack(one, axis=2).reshape(-1, 3, 3) for one in ((a, b, c), (a, c, d))]
+    return np.concatenate(facets)
+
+
+def stl(corners, title=b""):
+    """A binary STL file of these facets, written field by field."""
+    parts = [title.ljust(80, b" "), len(corners).to_bytes(4, "little")]
+    for facet in corners:
+        normal = np.cross(facet[1] - facet[0], facet[2] - facet[0])
+        normal /= np.linalg.norm(normal) or 1.0
+        parts += [np.vstack((normal, facet)).astype("<f4").tobytes(), b"\0\0"]
+    return b"".join(parts)
+
+
+@pytest.mark.parametrize("title", [b"", b"COLOR=abc"])
+def test_facets_keep_their_corners(title):
+    corners = ball()
+    data = stl(corners, title)
+    packed = pack_facets(data)
+    points = restored(packed["points"]).reshape(-1, 3)
+    again = points[restored(packed["corners"]).astype(int)].reshape(-1, 3, 3)
+    assert np.abs(again - corners).max() <= 0.51 * np.ptp(corners) / LEVELS + 1e-7
+    assert len(points) == len(np.unique(corners.reshape(-1, 3), axis=0))
+    assert len(gzip.compress(umsgpack.packb(packed))) < 0.5 * len(gzip.compress(data))
+
+
+def test_what_is_no_binary_stl_is_left_alone():
+    data = stl(ball(5))
+    for other in (b"", data[:-1], data + b"\0", b"solid ascii\nfacet normal 0 0 1\n" * 50):
+        assert pack_facets(other) is None
+    assert pack_facets(data.replace(data[96:100], np.float32(np.nan).tobytes(), 1)) is None
+
+
+@pytest.mark.browser
+def test_the_page_restores_collada_and_stl(browser):
+    functions = re.search(r"^function unfold.*?^function restore_facets.*?^}$", PAGE, re.S | re.M)[
+        0
+    ]
+    text, points, indices = a_mesh()
+    rest, numbers = take_out_numbers(text)
+    page = browser.new_page()
+
+    def call(name, *arguments):
+        script = f"given => {{ {functions}\nreturn Array.from({name}(...given)); }}"
+        return page.evaluate(script, plain(arguments))
+
+    again = "".join(call("restore", rest, numbers))
+    assert re.sub(r">[^<]{200,}<", "><", again) == re.sub(r">[^<]{200,}<", "><", text)
+    bodies = re.findall(r"<(?:float_array|p)\b[^>]*>([^<]*)<", again)
+    np.testing.assert_allclose(np.array(bodies[0].split(), float), points, atol=2e-3)
+    np.testing.assert_array_equal(np.array(bodies[1].split(), int), indices)
+    corners = ball(8)
+    given = stl(corners)
+    again = bytes(call("restore_facets", pack_facets(given)))
+    page.close()
+    row = np.dtype([("f", "<f4", (4, 3)), ("a", "<u2")])
+    facets, wanted = (np.frombuffer(file[84:], row)["f"] for file in (again, given))
+    np.testing.assert_allclose(facets[:, 1:], corners, atol=0.52 * np.ptp(corners) / LEVELS)
+    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    large = np.linalg.norm(doubled, axis=1) > 1e-4
+    np.testing.assert_allclose(facets[large, 0], wanted[large, 0], atol=0.02)
+
+
+def plain(value):
+    """Bytes as lists, which a browser takes."""
+    if isinstance(value, bytes):
+        return list(value)
+    if isinstance(value, dict):
+        return {key: plain(one) for key, one in value.items()}
+    return [plain(one) for one in value] if isinstance(value, list | tuple) else value
