@@ -62,9 +62,9 @@ def check_robot_(
 ) -> None:
     """Check contact on robots: forces, momentum, energy, derivatives, contacts missed.
 
-    A sphere is put on the robot, a curved shell under it, and what comes out is compared with
-    results that the compiled core has no part in. Exit code 1: a check failed; 2: a robot could
-    not be checked.
+    A sphere is put on the robot and a curved shell under it; the contact is compared with
+    computations independent of the compiled core. Exit code 1: a check failed; 2: a robot could not
+    be checked.
 
     Example: sphshell-pin check-robot panda my_robot.urdf
     """
@@ -93,8 +93,8 @@ def check_robot_(
         if json is not None:
             study.write(json, study.as_json(reports, seed, sizes))
         if write is not None:
-            told = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
-            study.write(write, study.as_markdown(reports, f"{told} --write {write}"))
+            command = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
+            study.write(write, study.as_markdown(reports, f"{command} --write {write}"))
         verdicts = [one.verdict for one in reports]
         # A robot that was asked for by name and cannot be checked is wrong input, and so is what
         # no robot there is can be checked with.
@@ -135,7 +135,7 @@ def _check(
         try:
             for name in names:
 
-                def tell(title: str, name: str = name) -> None:
+                def show(title: str, name: str = name) -> None:
                     bar.update(task, description=f"{Path(name).name}: {title}")
 
                 try:
@@ -146,7 +146,7 @@ def _check(
                         free_flyer=free_flyer,
                         seed=seed,
                         sizes=sizes,
-                        progress=tell,
+                        progress=show,
                     )
                 except FrameNotFound as error:
                     if len(names) == 1:
@@ -161,7 +161,7 @@ def _check(
 
 
 def _print(reports: Sequence[RobotReport]) -> None:
-    from sphshell_pin.study.robot_check import CHECKS, PASS, remarks, told
+    from sphshell_pin.study.robot_check import CHECKS, PASS, error_text, remarks
 
     console = terminal()
     titles = [check.title for check in CHECKS.values()]
@@ -182,12 +182,12 @@ def _print(reports: Sequence[RobotReport]) -> None:
     for one in reports:
         figures = []
         for key in CHECKS:
-            text = told(one.findings[key].error) if key in one.findings else ""
+            text = error_text(one.findings[key].error) if key in one.findings else ""
             figures.append(f"[red]{text}[/red]" if text and not one.met(key) else text)
-        colour = "green" if one.verdict == PASS else "red"
+        color = "green" if one.verdict == PASS else "red"
         size = f"{one.nq}/{one.nv}" if one.nv else ""
         what = [] if narrow else [plain(one.frame), size]
-        verdict = f"[{colour}]{one.verdict}[/{colour}]"
+        verdict = f"[{color}]{one.verdict}[/{color}]"
         table.add_row(plain(one.name), *what, *figures, verdict)
     console.print(table)
     for sentence in remarks(reports):

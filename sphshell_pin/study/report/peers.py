@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from sphshell_pin.benchmarks.peers import measuring, scenes
-from sphshell_pin.benchmarks.peers.engine import Knob
+from sphshell_pin.benchmarks.peers.engine import Params
 from sphshell_pin.benchmarks.peers.measuring import Ratio, Row
 from sphshell_pin.study.report.contents import (
     TIMES,
@@ -31,7 +31,7 @@ from sphshell_pin.study.report.drawing import (
 )
 
 KEY, TITLE = "peers", "Other engines"
-# Name on the page, colour, marker; of an engine that is not here, its own name in grey.
+# Name on the page, color, marker; of an engine that is not here, its own name in gray.
 LOOKS = {
     "ours": ("sphshell_pin", BLUE, "o"),
     "mujoco": ("MuJoCo", RED, "v"),
@@ -142,11 +142,11 @@ def _finding(key: str, what: str, ratio: Ratio, aim: float) -> Finding:
     )
 
 
-def knob_text(knob: Knob) -> str:
+def params_text(params: Params) -> str:
     """Return a setting in a few words."""
     return ", ".join(
         f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {value}"
-        for name, value in knob.items()
+        for name, value in params.items()
     )
 
 
@@ -174,7 +174,7 @@ def ratios_table(ratios: list[Ratio]) -> Table:
         [
             (r.what, name_of(r.peer.engine), r.median, r.low, r.high)
             + (errors_text(r.peer.errors), errors_text(r.ours.errors))
-            + (knob_text(r.peer.knob), knob_text(r.ours.knob))
+            + (params_text(r.peer.params), params_text(r.ours.params))
             for r in ratios
         ],
     )
@@ -198,7 +198,7 @@ def scene_table(rows: list[Row], scene: str, title: str) -> Table:
             Column("note", "note"),
         ),
         [
-            (name_of(row.engine), knob_text(row.knob))
+            (name_of(row.engine), params_text(row.params))
             + tuple(row.errors.get(name, math.nan) for name in names)
             + (row.cost, row.low, row.high, row.note)
             for row in found

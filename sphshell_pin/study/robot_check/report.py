@@ -52,7 +52,7 @@ class RobotReport:
         """Sentences on what failed, what was not checked, and what was done differently."""
         failed = [
             f"{CHECKS[key].title} failed: {self.findings[key].where} "
-            f"({told(self.findings[key].error)}, allowed {CHECKS[key].tolerance:g})"
+            f"({error_text(self.findings[key].error)}, allowed {CHECKS[key].tolerance:g})"
             for key in self.findings
             if not self.met(key)
         ]
@@ -65,7 +65,7 @@ class RobotReport:
         return self
 
 
-def told(error: float) -> str:
+def error_text(error: float) -> str:
     """Return an error as the tables show it."""
     return "0" if error == 0.0 else f"{error:.0e}" if math.isfinite(error) else "no figure"
 
@@ -77,8 +77,9 @@ def as_markdown(reports: Sequence[RobotReport], command: str) -> str:
         "# Every robot",
         "",
         f"{passed} of {len(reports)} robots pass; written by `{command}`. A sphere is attached to "
-        "the frame told, a curved shell of 800 elements is put under it at random legal postures, "
-        "and each check compares the result to a way apart from the compiled core "
+        "the frame listed, a curved shell of 800 elements is put under it at random legal "
+        "postures, "
+        "and each check compares the result with computations independent of the compiled core "
         "([testing](testing.md)). Figures are the worst over all postures.",
         "",
         "| check | what is compared | allowed |",
@@ -89,7 +90,9 @@ def as_markdown(reports: Sequence[RobotReport], command: str) -> str:
         f"|---|---|---{'|---' * len(CHECKS)}|---|",
     ]
     for one in reports:
-        figures = [told(one.findings[key].error) if key in one.findings else "" for key in CHECKS]
+        figures = [
+            error_text(one.findings[key].error) if key in one.findings else "" for key in CHECKS
+        ]
         size = f"{one.nq}/{one.nv}" if one.nv else ""
         frame = f"`{one.frame}`" if one.frame else ""
         lines.append(f"| {one.name} | {frame} | {size} | {' | '.join(figures)} | {one.verdict} |")
