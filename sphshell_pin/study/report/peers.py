@@ -9,12 +9,12 @@ from sphshell_pin.benchmarks.peers.engine import Params
 from sphshell_pin.benchmarks.peers.measuring import Ratio, Row
 from sphshell_pin.study.report.contents import (
     TIMES,
-    Column,
     Finding,
     Picture,
     Progress,
     Section,
     Table,
+    columns,
     number,
 )
 from sphshell_pin.study.report.drawing import (
@@ -160,16 +160,16 @@ def ratios_table(ratios: list[Ratio]) -> Table:
     return Table(
         "peers_ratios",
         "Cost of a peer over ours, in turns.",
-        (
-            Column("scene", "scene"),
-            Column("peer", "peer"),
-            Column("ratio", f"peer / ours [{TIMES}]"),
-            Column("low", "lower quartile"),
-            Column("high", "upper quartile"),
-            Column("peer_errors", "its errors"),
-            Column("our_errors", "ours"),
-            Column("peer_setting", "its setting"),
-            Column("our_setting", "ours"),
+        columns(
+            "scene",
+            "peer",
+            f"ratio: peer / ours [{TIMES}]",
+            "low: lower quartile",
+            "high: upper quartile",
+            "peer_errors: its errors",
+            "our_errors: ours",
+            "peer_setting: its setting",
+            "our_setting: ours",
         ),
         [
             (r.what, name_of(r.peer.engine), r.median, r.low, r.high)
@@ -188,14 +188,14 @@ def scene_table(rows: list[Row], scene: str, title: str) -> Table:
     return Table(
         f"peers_{scene.replace(' ', '_')}",
         f"{title}.",
-        (
-            Column("engine", "engine"),
-            Column("setting", "setting"),
-            *(Column(name.replace(" ", "_"), name) for name in names),
-            Column("cost", unit),
-            Column("low", "lower quartile"),
-            Column("high", "upper quartile"),
-            Column("note", "note"),
+        columns(
+            "engine",
+            "setting",
+            *(f"{name.replace(' ', '_')}: {name}" for name in names),
+            f"cost: {unit}",
+            "low: lower quartile",
+            "high: upper quartile",
+            "note",
         ),
         [
             (name_of(row.engine), params_text(row.params))
@@ -217,12 +217,7 @@ def settings_table(rows: list[Row]) -> Table:
     return Table(
         "peers_settings",
         "Settings, and where they are recommended.",
-        (
-            Column("engine", "engine"),
-            Column("scene", "scene"),
-            Column("setting", "setting"),
-            Column("text", "value and source"),
-        ),
+        columns("engine", "scene", "setting", "text: value and source"),
         list(settings),
         folded=True,
     )
