@@ -23,9 +23,8 @@ from sphshell_pin.study.robot_check.report import (
     RobotReport,
     as_json,
     as_markdown,
-    error_text,
+    as_table,
     remarks,
-    write,
 )
 from sphshell_pin.study.robot_check.setting import Touch, fixed_touch, free_touch, setting_of
 
@@ -42,12 +41,11 @@ __all__ = [
     "all_names",
     "as_json",
     "as_markdown",
+    "as_table",
     "check_known",
     "check_robot",
     "contact_scene",
-    "error_text",
     "remarks",
-    "write",
 ]
 
 
