@@ -32,6 +32,7 @@ def replay(folder):
     return Replay(folder / "out" / "run.npz")
 
 
+@pytest.mark.slow
 def test_it_stands_at_the_row_of_its_time(replay):
     result = replay.result
     assert replay.time == result.t[0]
@@ -94,6 +95,7 @@ def test_the_settings_are_those_of_the_run(replay, folder):
         (folder / "gone.toml").rename(folder / "drop.toml")
 
 
+@pytest.mark.slow
 def test_results_and_scenario_may_move_together(tmp_path):
     home = tmp_path / "here"
     home.mkdir()
@@ -230,6 +232,7 @@ def with_code(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_looking_at_results_executes_no_code(with_code):
     """Somebody else's run.npz may name any file beside it."""
     file = with_code / "out" / "run.npz"
@@ -249,6 +252,7 @@ def test_looking_at_results_executes_no_code(with_code):
     assert not (with_code / "executed").exists()
 
 
+@pytest.mark.slow
 def test_the_routine_is_loaded_where_it_is_trusted(with_code):
     file = with_code / "out" / "run.npz"
     replay = Replay(file)
