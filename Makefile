@@ -52,7 +52,7 @@ $(VENV)/.build: $(BIN)/python pyproject.toml
 comma := ,
 define install
 	$(FETCH) -r pyproject.toml $(addprefix --extra ,$(1))
-	@echo "Building sphshell_pin into $(VENV): about two minutes"
+	@echo "Building sphshell_pin into $(VENV): about 80 seconds"
 	$(PIP) --no-build-isolation -e '.[$(subst $() ,$(comma),$(1))]'
 	@touch $@ $(VENV)/.demo
 endef

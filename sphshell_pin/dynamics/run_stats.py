@@ -43,10 +43,11 @@ class PairFigures(FormerDict):
 class RunStats(FormerDict):
     """Cost and figures of a run; zeros for the rows of a run that goes on.
 
-    `steps` accepted, `rejected` for their error, `evaluations` of the forces, each with one forward
-    dynamics; `duration` [s] simulated in `wall_time` [s], their ratio `real_time_factor`; `dt` [s]
-    the fixed or the mean step; `integrator` the name of its class; `pairs` the figures by the
-    pairs' names.
+    `steps` accepted, `rejected` for their error or a sphere's motion, `event_steps` made to end at
+    an event and made again, as they missed it; `evaluations` of forces and forward dynamics in all
+    of these; `event_queries` of the contacts alone, to locate events within a step; `duration` [s]
+    simulated in `wall_time` [s], their ratio `real_time_factor`; `dt` [s] the fixed or the mean
+    step; `integrator` the name of its class; `pairs` the figures by the pairs' names.
     """
 
     __pydantic_config__: ClassVar[Mapping[str, bool]] = {"strict": True}
@@ -57,6 +58,8 @@ class RunStats(FormerDict):
     duration: float = 0.0
     rejected: int = 0
     evaluations: int = 0
+    event_steps: int = 0
+    event_queries: int = 0
     dt: float = 0.0
     integrator: str = ""
     pairs: dict[str, PairFigures] = field(default_factory=dict)

@@ -137,7 +137,7 @@ def test_scale(write, options, size, word):
     assert any(word in note and "0.0254" in note for note in shell.health.notes)
 
 
-@pytest.mark.parametrize("scale", ["metres", 0.0, -1.0, np.nan, True])
+@pytest.mark.parametrize("scale", ["meters", 0.0, -1.0, np.nan, True])
 def test_wrong_scale(write, scale):
     with pytest.raises(InvalidParameter, match="apply"):
         Shell.from_file(write(version_1()), scale=scale)

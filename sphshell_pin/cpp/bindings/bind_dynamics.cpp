@@ -170,10 +170,7 @@ void bind_dynamics(nanobind::module_& m) {
             new (self) Evaluations(model_of(model), copies(pairs));
           },
           nb::arg("model"), nb::arg("pairs"))
-      .def_prop_ro("bristle_size",
-                   [](Evaluations& self) {
-                     return self.with_scene([](Scene& scene) { return scene.bristle_size(); });
-                   })
+      .def_prop_ro("bristle_size", &Evaluations::bristle_size)
       .def("rates",
            [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
               const VectorX& tau) {
@@ -262,16 +259,10 @@ void bind_dynamics(nanobind::module_& m) {
   nb::class_<RunSettings>(m, "RunSettings")
       .def(
           "__init__",
-          [](RunSettings* self, int integrator, double dt, double rtol, double atol,
+          [](RunSettings* self, std::string integrator, double dt, double rtol, double atol,
              double duration, double start_time, double control_dt, double record_dt) {
-            new (self) RunSettings{static_cast<Integrator>(integrator),
-                                   dt,
-                                   rtol,
-                                   atol,
-                                   duration,
-                                   start_time,
-                                   control_dt,
-                                   record_dt};
+            new (self) RunSettings{
+                {std::move(integrator), dt, rtol, atol}, duration, start_time, control_dt, record_dt};
           },
           nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"), nb::arg("atol"),
           nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"));
@@ -306,6 +297,11 @@ void bind_dynamics(nanobind::module_& m) {
             return static_cast<int>(self.simulation.advance(wall_seconds, until));
           },
           nb::arg("wall_seconds"), nb::arg("until") = std::numeric_limits<double>::infinity())
+      .def("deep_start",
+           [](Run& self) {
+             const Use use(self.user, "start");
+             return to_python(self.simulation.deep_start());
+           })
       .def(
           "change",
           [](Run& self, const std::vector<const Pair*>& pairs,
@@ -337,10 +333,7 @@ void bind_dynamics(nanobind::module_& m) {
       .def_prop_ro("time", &alone<&Simulation::time>)
       .def_prop_ro("q", &alone<&Simulation::q>)
       .def_prop_ro("v", &alone<&Simulation::v>)
-      .def_prop_ro("steps", &alone<&Simulation::steps>)
-      .def_prop_ro("full", &alone<&Simulation::full>)
-      .def_prop_ro("rejected", &alone<&Simulation::rejected>)
-      .def_prop_ro("evaluations", &alone<&Simulation::evaluations>)
+      .def_prop_ro("counts", [](Run& self) { return to_dict(alone<&Simulation::counts>(self)); })
       .def_prop_ro("last_step", &alone<&Simulation::last_step>)
       .def_prop_ro("wall_time", &alone<&Simulation::wall_time>)
       .def_prop_ro("summaries",

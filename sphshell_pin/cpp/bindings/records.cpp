@@ -47,6 +47,21 @@ nb::dict to_dict(Record record, int nq, int nv) {
   return out;
 }
 
+nb::dict to_dict(const Counts& counts) {
+  nb::dict out;
+  out["steps"] = counts.steps;
+  out["rejected"] = counts.rejected;
+  out["evaluations"] = counts.evaluations;
+  out["event_steps"] = counts.event_steps;
+  out["event_queries"] = counts.event_queries;
+  return out;
+}
+
+nb::object to_python(const std::optional<DeepStart>& start) {
+  if (!start) return nb::none();
+  return nb::make_tuple(start->pair, start->depth);
+}
+
 nb::list to_list(const std::vector<PairSummary>& summaries) {
   nb::list out;
   for (const PairSummary& s : summaries) {

@@ -64,11 +64,11 @@ void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool 
     state.world_from_j = body_.world_from(pair.joint_j, pair.placement_j);
     std::vector<Contact>& contacts = find_contacts(k);
     Excursion& excursion = excursions_[k];
-    excursion.moved = std::max(excursion.moved, (state.centre - excursion.from).norm());
+    excursion.moved = std::max(excursion.moved, (state.center - excursion.from).norm());
     excursion.touched = excursion.touched || !contacts.empty();
     ContactTracker& tracker = trackers_[k];
     if (!contacts.empty() && (identify || tracker.deep() || pair.friction.has_state())) {
-      const std::vector<int>& at = tracker.match(contacts, state.centre, pair.radius);
+      const std::vector<int>& at = tracker.match(contacts, state.center, pair.radius);
       for (std::size_t i = 0; i < contacts.size(); ++i)
         add_contact(k, contacts[i], bristles_.slot(k, at[i]), tracker.places()[at[i]].number);
       state.pushed_through = tracker.pushed_through();
@@ -92,7 +92,7 @@ void Scene::accept(VectorX& z) {
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     std::vector<Contact>& contacts = queries_[k].contacts;
-    const Vec3& center = states_[k].centre;
+    const Vec3& center = states_[k].center;
     excursions_[k].from = center;
     ContactTracker& tracker = trackers_[k];
     if (contacts.empty() && tracker.places().empty()) {
@@ -132,18 +132,18 @@ std::vector<Contact>& Scene::find_contacts(std::size_t k) {
       contact.point = state.world_from_j.actInv(contact.point);
       contact.normal = state.world_from_j.rotation().transpose() * contact.normal;
     }
-    state.centre.setZero();
+    state.center.setZero();
     return query.contacts;
   }
   const Vec3& center = pair.placement_i.translation();
-  state.centre = state.world_from_j.actInv(
+  state.center = state.world_from_j.actInv(
       pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
-  query.find(*pair.shell, state.centre, pair.radius, pair.method);
+  query.find(*pair.shell, state.center, pair.radius, pair.method);
   // Friction belongs to a place, and its spring should not be split and merged at every border
   // between elements: contacts that are nearly one are one. The elastic energy is that of their
   // depths' sum, off by the square of the depths' difference, 1e-4 at most.
   if (pair.friction.active() && query.contacts.size() > 1) {
-    merge_places(query.contacts, state.centre, pair.radius, merged_);
+    merge_places(query.contacts, state.center, pair.radius, merged_);
     query.contacts.swap(merged_);
   }
   return query.contacts;
@@ -174,7 +174,7 @@ void Scene::compute_forces(const VectorX& z) {
 void Scene::compute_kinematics(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
   const SE3& world_from_j = states_[active.pair].world_from_j;
-  Meeting<double>& m = active.meeting;
+  ContactKinematics<double>& m = active.kinematics;
   active.point = world_from_j.act(active.contact.point);
   m.depth = active.contact.depth;
   m.normal = world_from_j.rotation() * active.contact.normal;
@@ -189,7 +189,7 @@ void Scene::compute_kinematics(ActiveContact& active, const VectorX& z) {
 void Scene::compute_force(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
   active.force =
-      contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), active.meeting);
+      contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), active.kinematics);
   if (active.slot < 0) return;
   const auto& rotation = states_[active.pair].world_from_j.rotation();
   const int at = 3 * active.slot;
@@ -203,7 +203,7 @@ Vec3 Scene::rate_of_turning(const ActiveContact& active, const Vec3& stretch) co
   if (!pair.has_dn_dc()) return Vec3::Zero();
   const PairState& state = states_[active.pair];
   const Vec3 center_rate = state.world_from_j.rotation().transpose() *
-                           relative_velocity(pair, state.world_from_j.act(state.centre));
+                           relative_velocity(pair, state.world_from_j.act(state.center));
   const Contact& contact = active.contact;
   const Vec3 normal_rate = contact.dn_dc * center_rate / contact.weight;
   return contact.normal.cross(normal_rate).cross(stretch);
@@ -213,7 +213,7 @@ Vec3 Scene::rate_of_turning(const ActiveContact& active, const Vec3& stretch) co
 void Scene::add_force(const ActiveContact& active) {
   const Pair& pair = pairs_[active.pair];
   const ContactForce<double>& f = active.force;
-  const Meeting<double>& m = active.meeting;
+  const ContactKinematics<double>& m = active.kinematics;
   const double weight = active.contact.weight;
   const Vec3 force = weight * (f.normal * m.normal + f.friction);
   const Vec3 moment = weight * f.torsion * m.normal;
@@ -261,7 +261,7 @@ void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& row
     if (!leads(contacts, i - begin)) continue;
     const Pair& pair = pairs_[active.pair];
     const PairState& state = states_[active.pair];
-    const Contact whole = whole_of(contacts, i - begin, state.centre, pair.radius);
+    const Contact whole = whole_of(contacts, i - begin, state.center, pair.radius);
     const Vec3 point = state.world_from_j.act(whole.point);
     const Vec3 normal = state.world_from_j.rotation() * whole.normal;
     Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
@@ -270,7 +270,7 @@ void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& row
     for (std::size_t k = first; k < last; ++k) {
       if (k != first && contacts[k].place != whole.place) continue;
       const ActiveContact& other = active_[begin + k];
-      push += other.contact.weight * other.force.normal * other.meeting.normal;
+      push += other.contact.weight * other.force.normal * other.kinematics.normal;
       friction += other.contact.weight * other.force.friction;
     }
     const Vec3 relative = relative_velocity(pair, point);

@@ -53,7 +53,7 @@ struct PairState {
   double normal_force = 0;  // sum [N]
   bool pushed_through = false;
   SE3 world_from_j = SE3::Identity();
-  Vec3 centre = Vec3::Zero();  // of the sphere, in the shell's frame [m]
+  Vec3 center = Vec3::Zero();  // of the sphere, in the shell's frame [m]
 
   void clear_sums() { count = pieces = clamped = 0, depth = normal_force = 0; }
 };
@@ -68,7 +68,7 @@ struct ActiveContact {
   int pair, slot, contact_id;  // slot: of its bristle in z, or -1
   Contact contact;             // in the frame of the shell, or of a source, that of body j
   Vec3 point;                  // in the world
-  Meeting<double> meeting;     // in the world
+  ContactKinematics<double> kinematics;  // in the world
   ContactForce<double> force;
 };
 

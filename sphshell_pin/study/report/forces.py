@@ -191,7 +191,7 @@ def picture(names: tuple[str, ...], rows: list[Row], *, against_time: bool) -> P
         return float(row.time.median * 1e6 if against_time else row.triangles)
 
     with drawing(7.8, 5.8) as figure:
-        figure.get_layout_engine().set(h_pad=0.09)
+        figure.set_layout_engine("constrained", h_pad=0.09)
         panels = figure.subplots(2, 2, sharex=True).ravel()
         for axis, name in zip(panels, names, strict=True):
             flat = name == "flat plate"

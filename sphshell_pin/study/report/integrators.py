@@ -186,7 +186,7 @@ def picture(cases: list[Case], rows: list[Row]) -> Picture:
     """Draw cost against error, one panel per case."""
     lines = -(-len(cases) // 2)
     with drawing(7.8, 2.75 * lines) as figure:
-        figure.get_layout_engine().set(h_pad=0.12)
+        figure.set_layout_engine("constrained", h_pad=0.12)
         panels = figure.subplots(lines, 2, sharey=True, squeeze=False).ravel()
         for axis, case in zip(panels, cases, strict=False):
             logarithmic(axis, every=(2, 1))
