@@ -17,6 +17,8 @@ from sphshell_pin.scenario.replay import Replay
 from sphshell_pin.view.live.opening import player_of
 from tests.scenario.files import DROP, write
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
@@ -32,7 +34,6 @@ def replay(folder):
     return Replay(folder / "out" / "run.npz")
 
 
-@pytest.mark.slow
 def test_it_stands_at_the_row_of_its_time(replay):
     result = replay.result
     assert replay.time == result.t[0]
@@ -95,7 +96,6 @@ def test_the_settings_are_those_of_the_run(replay, folder):
         (folder / "gone.toml").rename(folder / "drop.toml")
 
 
-@pytest.mark.slow
 def test_results_and_scenario_may_move_together(tmp_path):
     home = tmp_path / "here"
     home.mkdir()
@@ -232,7 +232,6 @@ def with_code(tmp_path):
     return tmp_path
 
 
-@pytest.mark.slow
 def test_looking_at_results_executes_no_code(with_code):
     """Somebody else's run.npz may name any file beside it."""
     file = with_code / "out" / "run.npz"
@@ -252,7 +251,6 @@ def test_looking_at_results_executes_no_code(with_code):
     assert not (with_code / "executed").exists()
 
 
-@pytest.mark.slow
 def test_the_routine_is_loaded_where_it_is_trusted(with_code):
     file = with_code / "out" / "run.npz"
     replay = Replay(file)
