@@ -1,12 +1,14 @@
 # make demo   build into .venv and run the main job
 # make test   build into .venv and run all tests, on all cores
-# make quick  the tests that are not marked slow: about a minute
+# make quick  the tests that are neither marked slow nor need a browser: a minute
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := CMakeLists.txt pyproject.toml $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
 OUT ?= results
+# Modules are compiled once, and not in every process of the tests.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick bench hard-cases work-precision lint format report robots sweep-survival kills rollouts real-surfaces wheel docs fuzz sanitize clean
@@ -50,7 +52,7 @@ $(VENV)/.build: $(BIN)/python pyproject.toml
 comma := ,
 define install
 	$(FETCH) -r pyproject.toml $(addprefix --extra ,$(1))
-	@echo "Building sphshell_pin into $(VENV): about two minutes"
+	@echo "Building sphshell_pin into $(VENV): about 80 seconds"
 	$(PIP) --no-build-isolation -e '.[$(subst $() ,$(comma),$(1))]'
 	@touch $@ $(VENV)/.demo
 endef
@@ -72,7 +74,7 @@ test: $(VENV)/.test
 	$(PYTEST)
 
 quick: $(VENV)/.test
-	$(PYTEST) -m "not slow" --durations=10
+	$(PYTEST) -m "not slow and not browser" --durations=10
 
 $(VENV)/.bench: $(VENV)/.test
 	$(BIN)/python -m pip install -q -e '.[bench]'

@@ -7,9 +7,6 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import json
-import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sphshell_pin.benchmarks.processes import OwnProcess
 from sphshell_pin.benchmarks.surfaces import height, touching_centres, wavy_sheet
 
 Array = NDArray[np.float64]
@@ -105,10 +103,11 @@ def measure_here(name: str, cells: int, size: float) -> Cost:
 
 def measure(name: str, cells: int, size: float) -> Cost:
     """Build once in a fresh process."""
-    command = [sys.executable, "-m", "sphshell_pin.benchmarks.building"]
-    case = json.dumps([name, cells, size])
-    run = subprocess.run([*command, "--case", case], check=True, capture_output=True, text=True)
-    return Cost(**json.loads(run.stdout))
+    process = OwnProcess()
+    try:
+        return process.call(None, measure_here, name, cells, size)
+    finally:
+        process.close()
 
 
 def building(rounds: int, sheets: tuple[tuple[int, float], ...] = SHEETS) -> None:
@@ -136,14 +135,10 @@ def building(rounds: int, sheets: tuple[tuple[int, float], ...] = SHEETS) -> Non
 
 
 def main() -> None:
-    """Print all sizes, or measure one case for the process that started this one."""
+    """Print all sizes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="200 k triangles only, once")
-    parser.add_argument("--case", help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.case is not None:
-        print(json.dumps(vars(measure_here(*json.loads(given.case)))))
-    elif given.quick:
+    if parser.parse_args().quick:
         building(1, SHEETS[:1])
     else:
         building(3)

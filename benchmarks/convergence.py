@@ -1,15 +1,13 @@
 """Error of the contact force against the size of the elements, and cost, of every contact method.
 
-python -m benchmarks.convergence [--out docs/pictures/convergence.png]
+python -m benchmarks.convergence    # prints tables, draws docs/pictures/convergence.png
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +49,7 @@ BALL = 4 * RADIUS
 RING, TUBE = 6 * RADIUS, 3 * RADIUS
 PLATE = 6 * RADIUS  # half the side of the flat plate
 TIMED_PLACES = 2000
+PICTURE = Path(__file__).parent.parent / "docs" / "pictures" / "convergence.png"
 
 
 @dataclass(frozen=True)
@@ -66,16 +65,6 @@ class Surface:
         points, outward = self.places(np.random.default_rng(seed), count)
         normals = -outward if self.inside else outward
         return points + (RADIUS - DEPTH) * normals, normals
-
-
-@dataclass(frozen=True)
-class Rule:
-    """A way to find contacts: a method, and whether the shell is given the exact normals."""
-
-    method: str
-    exact_normals: bool
-    color: str
-    marker: str
 
 
 @dataclass(frozen=True)
@@ -135,23 +124,19 @@ def plates() -> list[Mesh]:
 
 
 SURFACES = {
-    "bowl: inside a sphere, R = 4 r": Surface(balls, on_ball, inside=True),
-    "dome: outside a sphere, R = 4 r": Surface(balls, on_ball, inside=False),
-    "inside a torus, R = 6 r and 3 r": Surface(tori, torus_places, inside=True),
-    "on a wavy sheet": Surface(sheets, sheet_places, inside=False),
-}
-# Those of the report, under short names.
-REPORTED = {
-    "bowl": SURFACES["bowl: inside a sphere, R = 4 r"],
-    "dome": SURFACES["dome: outside a sphere, R = 4 r"],
-    "torus": SURFACES["inside a torus, R = 6 r and 3 r"],
+    "bowl": Surface(balls, on_ball, inside=True),
+    "dome": Surface(balls, on_ball, inside=False),
+    "torus": Surface(tori, torus_places, inside=True),
+    "wavy sheet": Surface(sheets, sheet_places, inside=False),
     "flat plate": Surface(plates, plate_places, inside=False),
 }
+REPORTED = ("bowl", "dome", "torus", "flat plate")
+# Method, and whether the shell is given the exact normals.
 RULES = {
-    "smooth, exact normals": Rule("smooth", True, "#2f6fde", "o"),
-    "smooth, estimated normals": Rule("smooth", False, "#1a9a5a", "s"),
-    "facets": Rule("facets", False, "#f08a00", "^"),
-    "elements": Rule("elements", False, "#d4202a", "v"),
+    "smooth, exact normals": ("smooth", True),
+    "smooth, estimated normals": ("smooth", False),
+    "facets": ("facets", False),
+    "elements": ("elements", False),
 }
 
 
@@ -175,12 +160,10 @@ def measure(
     for k, mesh in enumerate(meshes):
         estimated = Shell(mesh.vertices, mesh.triangles)
         exact = Shell(mesh.vertices, mesh.triangles, normals=mesh.normals)
-        for label, rule in RULES.items():
-            shell = exact if rule.exact_normals else estimated
-            rows.append(
-                row_of(name, label, mesh, relative_forces(shell, rule.method, centres), normals)
-            )
-            contestants[str(len(rows) - 1)] = query_contestant(shell, elsewhere, rule.method)
+        for label, (method, exact_normals) in RULES.items():
+            shell = exact if exact_normals else estimated
+            rows.append(row_of(name, label, mesh, relative_forces(shell, method, centres), normals))
+            contestants[str(len(rows) - 1)] = query_contestant(shell, elsewhere, method)
         progress(0.5 * (k + 1) / len(meshes))
     if rounds == 0:
         return rows
@@ -207,33 +190,6 @@ def row_of(name: str, label: str, mesh: Mesh, forces: Array, normals: Array) -> 
     )
 
 
-def print_table(rows: list[Row]) -> None:
-    """Print the errors, and the orders observed between one mesh and the next."""
-    for name in SURFACES:
-        print(f"{name}; depth / r = {DEPTH / RADIUS:g}, {PLACES} places; means [order]")
-        print(f"  {'':26s} triangles    h/r          force  largest      magnitude  direction, deg")
-        for label in RULES:
-            coarser = None
-            for row in (r for r in rows if (r.surface, r.rule) == (name, label)):
-                columns = [
-                    f"{getattr(row, key):8.1e} {order(coarser, row, key):6s}"
-                    for key in ("mean", "magnitude", "direction")
-                ]
-                print(
-                    f"  {label:25s} {row.triangles:10d}  {row.side:5.3f}  {columns[0]}  "
-                    f"{row.largest:6.0e}  {columns[1]} {columns[2]}".rstrip()
-                )
-                coarser = row
-
-
-def order(coarser: Row | None, finer: Row, key: str) -> str:
-    """Return the exponent of the element size that a mean error followed, in brackets."""
-    if coarser is None:
-        return ""
-    fall = getattr(coarser, key) / getattr(finer, key)
-    return f"[{np.log(fall) / np.log(coarser.side / finer.side):.1f}]"
-
-
 def measure_cost(rounds: int, progress: Progress = silent) -> dict[str, dict[str, Array]]:
     """Return the times of a query [s] of each method on 200 k triangles, wavy and flat."""
     depth = 0.0005
@@ -258,84 +214,19 @@ def print_cost(rounds: int) -> None:
             print(f"  {method:25s} {median_us(t)}   {ratio(t, times['facets'])} x")
 
 
-def print_equal_error(rows: list[Row], rounds: int) -> None:
-    """Print what an error of flat elements costs with curved ones: elements, and time."""
-    name, flat = "dome: outside a sphere, R = 4 r", "facets"
-    finest = [r for r in rows if (r.surface, r.rule) == (name, flat)][-1]
-    curved = [r for r in rows if (r.surface, r.rule) == (name, "smooth, exact normals")]
-    enough = next(r for r in curved if r.mean <= finest.mean)
-    points, normals = on_ball(np.random.default_rng(1))
-    centres = np.tile(points + (RADIUS - DEPTH) * normals, (20, 1))
-    contestants = {}
-    for row, method in ((finest, "facets"), (enough, "smooth")):
-        mesh = next(m for m in balls() if len(m.triangles) == row.triangles)
-        shell = Shell(mesh.vertices, mesh.triangles, normals=mesh.normals)
-        contestants[method] = query_contestant(shell, centres, method)
-    times = take_turns(contestants, rounds)
-    print(
-        f"Dome, mean error of the force at most {finest.mean:.1e}\n"
-        f"  facets {finest.triangles:8d} triangles   {median_us(times['facets'])}\n"
-        f"  smooth {enough.triangles:8d} triangles   {median_us(times['smooth'])}   "
-        f"error {enough.mean:.1e}\n"
-        f"  {finest.triangles / enough.triangles:.0f} times fewer, "
-        f"{ratio(times['facets'], times['smooth'])} x faster"
-    )
-
-
-def figure_of(rows: list[Row]) -> Any:
-    """Draw mean force errors as lines, up to the largest as bands, one panel per surface."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 8.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(2, 2, sharex=True, sharey=True)
-    for axis, name in zip(panels.ravel(), SURFACES, strict=True):
-        for label, rule in RULES.items():
-            found = [r for r in rows if (r.surface, r.rule) == (name, label)]
-            side, mean, largest = np.array([(r.side, r.mean, r.largest) for r in found]).T
-            # On a sphere estimated normals are exact, and one line hides the other.
-            look = "-" if rule.exact_normals or rule.method != "smooth" else "--"
-            fill = "none" if look == "--" else rule.color
-            axis.fill_between(side, mean, largest, color=rule.color, alpha=0.13, linewidth=0)
-            axis.loglog(
-                side, mean, look, color=rule.color, marker=rule.marker, label=label,
-                markersize=8 if look == "--" else 5, markerfacecolor=fill,
-            )  # fmt: skip
-        for exponent in (2, 4):
-            guide = np.array([0.35, 1.2])
-            fall = 1e-6 * (guide / guide[1]) ** exponent
-            axis.loglog(guide, fall, color="#6b7280", linestyle=":", linewidth=1)
-            axis.annotate(
-                f"order {exponent} ", (guide[0], fall[0]), color="#6b7280", fontsize=8,
-                ha="right", va="center",
-            )  # fmt: skip
-        axis.set_title(name, fontsize=10)
-        axis.grid(True, which="major", color="#e5e7eb")
-        axis.set_axisbelow(True)
-    figure.supxlabel("mean side of the elements / r", fontsize=10)
-    figure.supylabel("error of the force / force (line: mean, band: to the largest)", fontsize=10)
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(RULES), frameon=False)
-    return figure
-
-
 def main() -> None:
-    """Measure, print the tables, draw the figure."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.convergence", description=(__doc__ or "").partition("\n")[0]
-    )
-    default = Path(__file__).parent.parent / "docs" / "pictures" / "convergence.png"
-    parser.add_argument("--out", type=Path, default=default, help="the figure (.png)")
-    out = parser.parse_args().out
+    """Measure, print the tables, draw the picture: those of the report, with the wavy sheet."""
+    from sphshell_pin.study.report import forces
+
     one_core()
     print(machine())
-    rows = [row for name, surface in SURFACES.items() for row in measure(name, surface)]
-    print_table(rows)
-    print_equal_error(rows, rounds=15)
+    names = ("bowl", "dome", "torus", "wavy sheet")
+    rows = [row for name in names for row in measure(name, SURFACES[name], rounds=5)]
+    print(forces.orders_table(names, rows).markdown())
+    print(forces.errors_table(rows).markdown())
     print_cost(rounds=15)
-    figure_of(rows).savefig(out, dpi=110)
-    print(f"wrote {out}")
+    PICTURE.write_bytes(forces.picture(names, rows, against_time=False).png)
+    print(f"wrote {PICTURE}")
 
 
 if __name__ == "__main__":

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from sphshell_pin import Adaptive, ImpactLaw, JointPD, Scene, Shell, Simulation, Sphere
 from sphshell_pin.benchmarks.timing import machine, one_core
-from sphshell_pin.shell.contact_set import ContactSet
 from sphshell_pin.dynamics import Result
 from sphshell_pin.errors import Interrupted, SphshellError
+from sphshell_pin.shell.contact_set import ContactSet
 
 Array = NDArray[np.float64]
 Find = Callable[[Array], ContactSet]

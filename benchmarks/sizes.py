@@ -1,7 +1,7 @@
 """Query time, building time and memory against the number of triangles, ours and others'.
 
-Each contestant lives in a process of its own, so that its memory can be told; all of them on one
-core, asked in turn to time their queries. One that gets too slow or too big is left out of larger
+Each contestant runs in a process of its own, so that its memory can be measured; all on one core,
+asked in turn to time their queries. One that gets too slow or too big is left out of larger
 sheets. `python -m benchmarks.sizes` prints the table.
 """
 
@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import json
 import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,9 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from sphshell_pin.benchmarks.processes import OwnProcess
 from sphshell_pin.benchmarks.query import (
     DEPTH,
     RADIUS,
+    coal_contestant,
     fcpw_contestant,
     libigl_contestant,
     query_contestant,
@@ -87,25 +86,6 @@ def available() -> float:
     return float("inf")
 
 
-def coal_contestant(vertices: Array, triangles: Any, centres: Array) -> Callable[[], float]:
-    """Time compiled collisions; the tree is built anew for each round, and not counted."""
-    from sphshell_pin import _core
-
-    return lambda: float(_core.coal_collide_all(vertices, triangles, centres, RADIUS)[0])
-
-
-def coal_tree(vertices: Array, triangles: Any) -> Any:
-    """Return Coal's tree."""
-    import coal
-
-    tree = coal.BVHModelOBBRSS()
-    tree.beginModel(len(triangles), len(vertices))
-    tree.addVertices(vertices)
-    tree.addTriangles(triangles.astype(np.uint32))
-    tree.endModel()
-    return tree
-
-
 def trimesh_contestant(vertices: Array, triangles: Any, centres: Array) -> Callable[[], float]:
     import trimesh
 
@@ -135,63 +115,27 @@ def contestant(name: str, vertices: Array, triangles: Any, centres: Array) -> Ca
     return made
 
 
-def serve(name: str, cells: int) -> None:
-    """Build, tell the time and the memory of that, then time a round at each line of stdin."""
+_served: list[Callable[[], float]] = []
+
+
+def build(name: str, cells: int) -> tuple[float, float]:
+    """Build in this process, for `time_round`; return the time [s] and the memory [bytes]."""
     size = cells * SIDE
     vertices, triangles = wavy_sheet(cells, size)
     centres = touching_centres(QUERIES.get(name, 20_000), size, RADIUS, DEPTH)
     contestant(name, *wavy_sheet(4, 4 * SIDE), centres[:1])()  # imports what it needs
     before, start = resident(), time.perf_counter()
-    if name == COAL:
-        tree = coal_tree(vertices, triangles)
-        told = {"build": time.perf_counter() - start, "memory": resident() - before}
-        del tree
-        run = contestant(name, vertices, triangles, centres)
-    else:
-        run = contestant(name, vertices, triangles, centres)
+    run = contestant(name, vertices, triangles, centres)
+    if name != COAL:
         run()  # some build at the first query
-        told = {"build": time.perf_counter() - start, "memory": resident() - before}
-    print(json.dumps(told), flush=True)
-    for _ in sys.stdin:
-        print(json.dumps(run()), flush=True)
+    cost = time.perf_counter() - start, resident() - before
+    _served[:] = [run]
+    return cost
 
 
-class Served:
-    """A contestant in a process of its own."""
-
-    def __init__(self, name: str, cells: int) -> None:
-        self.name = name
-        command = [sys.executable, "-m", "sphshell_pin.benchmarks.sizes", "--serve", name]
-        self.process = subprocess.Popen(
-            [*command, str(cells)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-    def answer(self) -> Any:
-        """Read a line of its answers."""
-        assert self.process.stdout is not None
-        assert self.process.stderr is not None
-        line = self.process.stdout.readline()
-        if not line:
-            told = self.process.stderr.read().strip().splitlines()
-            code = self.process.wait()
-            raise RuntimeError(f"{self.name} ended with {code}: {told[-1] if told else 'no word'}")
-        return json.loads(line)
-
-    def time(self) -> float:
-        """Let it time one round; return seconds per query."""
-        assert self.process.stdin is not None
-        self.process.stdin.write("\n")
-        self.process.stdin.flush()
-        return float(self.answer())
-
-    def end(self) -> None:
-        """End the process."""
-        self.process.kill()
-        self.process.communicate()
+def time_round() -> float:
+    """Return seconds per query of what was built in this process."""
+    return _served[0]()
 
 
 def installed() -> tuple[list[str], list[str]]:
@@ -252,48 +196,45 @@ def measure(
 def measure_one(names: list[str], cells: int, rounds: int, notes: list[str]) -> list[Row]:
     """Return the rows of one sheet; who fails there leaves `names`, with a sentence in `notes`."""
     triangles, built = 2 * cells**2, {}
-    served: dict[str, Served] = {}
+    processes = {name: OwnProcess() for name in names}
+    times: dict[str, list[float]] = {name: [] for name in names}
     try:
         for name in list(names):
-            served[name] = Served(name, cells)
             try:
                 # One after the other, so that none is built while another is.
-                built[name] = served[name].answer()
-            except RuntimeError as error:
-                served.pop(name).end()
+                built[name] = processes[name].call(None, build, name, cells)
+            except Exception as error:
                 names.remove(name)
-                notes.append(f"{name} is left out from {triangles} triangles on: {error}.")
-        times: dict[str, list[float]] = {name: [] for name in served}
+                notes.append(
+                    f"{name} is left out from {triangles} triangles on: "
+                    f"{type(error).__name__}: {error}."
+                )
         for _ in range(rounds):
-            for name, one in served.items():
-                times[name].append(one.time())
+            for name in names:
+                times[name].append(processes[name].call(None, time_round))
     finally:
-        for one in served.values():
-            one.end()
+        for process in processes.values():
+            process.close()
     return [
         Row(
             name,
             QUESTIONS[name],
             triangles,
             Spread.of(np.array(times[name])),
-            built[name]["build"],
-            built[name]["memory"] if built[name]["memory"] > 0 else float("nan"),
+            built[name][0],
+            built[name][1] if built[name][1] > 0 else float("nan"),
         )
-        for name in served
+        for name in names
     ]
 
 
 def main() -> None:
-    """Measure and print the table, or serve a parent."""
+    """Measure and print the table."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.sizes", description=(__doc__ or "").partition("\n")[0]
     )
     parser.add_argument("--quick", action="store_true", help="up to 200 k triangles")
-    parser.add_argument("--serve", nargs=2, metavar=("NAME", "CELLS"), help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if options.serve:
-        serve(options.serve[0], int(options.serve[1]))
-        return
     one_core()
     print(machine())
     rows, notes = measure(QUICK_CELLS if options.quick else CELLS)

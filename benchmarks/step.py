@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from sphshell_pin import _core, robots
+from sphshell_pin import robots
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
 from sphshell_pin.benchmarks.timing import Progress, median_us, ratio, silent, take_turns
 
@@ -56,16 +57,31 @@ def runner(scene: sp.Scene, controller: Any = None) -> Callable[[], float]:
 
     def run() -> float:
         result = simulation.run(q, None, STEPS * DT, controller, record_dt=STEPS * DT)
-        return float(result.stats["wall_time"]) / STEPS
+        return float(result.stats.wall_time) / STEPS
 
     return run
 
 
 def bare(scene: sp.Scene) -> Callable[[], float]:
-    """Seconds per step of ABA and integrate alone."""
+    """Seconds per step of ABA and integrate alone, of many states at once in Pinocchio's loop.
+
+    All joints must be revolute or prismatic: then integrate is a sum.
+    """
     model = scene.model
+    pool = pin.ModelPool(model, 1)
     q = START if model.nq == len(START) else np.r_[START, 0.02, 0.02]
-    return lambda: float(_core.bare_dynamics(model, q, np.zeros(model.nv), DT, STEPS))
+    start = np.asfortranarray(np.tile(q[:, None], STEPS))
+    torque, acceleration = np.zeros((2, STEPS, model.nv))
+
+    def run() -> float:
+        states, velocities = start.copy(order="F"), np.zeros_like(start)
+        begin = time.perf_counter()
+        pin.abaInParallel(1, pool, states, velocities, torque.T, acceleration.T)
+        velocities += DT * acceleration.T
+        states += DT * velocities
+        return (time.perf_counter() - begin) / STEPS
+
+    return run
 
 
 BARE, FREE, FAR = "ABA + integrate alone, C++", "scene without contact", "far sphere"
@@ -101,43 +117,20 @@ def step_cost(rounds: int) -> None:
     print(f"  {'with control: touching / no contact':40s} {'':12s}   {share} x")
 
 
-PARTS = ("kinematics", "query", "law", "aba", "integrate")
+PARTS = ("aba", "stepping", "contact")
 
 
-def measure_parts(rounds: int, progress: Progress = silent) -> dict[str, dict[str, Array]]:
-    """Return the times [s] of the parts of a step and of the whole of it, by scene.
+def parts_of(times: dict[str, Array]) -> dict[str, dict[str, Array]]:
+    """Return the parts of a step [s] from the times of `measure_step`, by scene.
 
-    The parts are timed one by one at the first state, the whole in a run. Of ABA and integrate
-    alone there is the whole.
+    "aba": ABA and integrate; "stepping": what a scene without contact takes beyond them; "contact":
+    what a scene takes beyond one without contact (kinematics, query, law and wrench).
     """
-    shell = sp.Shell(*wavy_sheet(316, 1.0))
-    scenes = {FREE: panda(), FAR: with_sheet(panda(), shell, -1.0)}
-    scenes[TOUCHING] = with_sheet(panda(), shell, 5e-4)
-    runs = {name: runner(scene) for name, scene in scenes.items()}
-    alone = bare(panda())
-    found: dict[str, dict[str, list[float]]] = {
-        name: {what: [] for what in (*PARTS, "whole")} for name in scenes
+    stepping = times[FREE] - times[BARE]
+    return {
+        name: {"aba": times[BARE], "stepping": stepping, "contact": times[name] - times[FREE]}
+        for name in (FREE, FAR, TOUCHING)
     }
-    found[BARE] = {"whole": []}
-    for turn in range(rounds + 1):
-        times = {BARE: {"whole": alone()}}
-        for name, scene in scenes.items():
-            times[name] = {**parts_of(scene), "whole": runs[name]()}
-        if turn > 0:  # the first warms up
-            for name, parts in times.items():
-                for what, seconds in parts.items():
-                    found[name][what].append(seconds)
-        progress((turn + 1) / (rounds + 1))
-    return {name: {what: np.array(t) for what, t in times.items()} for name, times in found.items()}
-
-
-def parts_of(scene: sp.Scene) -> dict[str, float]:
-    """Return the times [s] of the parts of a step at the start."""
-    pairs = [pair.to_core() for pair in scene.pairs]
-    times: dict[str, float] = _core.step_parts(
-        scene.model, pairs, START, np.zeros(scene.model.nv), DT, STEPS
-    )
-    return times
 
 
 def with_moving_sheet(shell: sp.Shell) -> sp.Scene:

@@ -1,4 +1,4 @@
-"""CPU time against error of every integrator, on three cases.
+"""CPU time against error of every integrator.
 
 python -m benchmarks.work_precision [--quick] [--write]
 """
@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-import sphshell_pin as sp
 from sphshell_pin.benchmarks.analytic_cases import Exact
 from sphshell_pin.benchmarks.timing import Progress, machine, one_core, silent
 from sphshell_pin.benchmarks.work_precision_cases import (
@@ -34,13 +33,6 @@ PICTURE = Path(__file__).parent.parent / "docs" / "pictures" / "work_precision.p
 TARGET = 1e-4  # error at which costs are compared
 ROUNDS = 5
 LONG = 0.5  # [s]: runs that take longer are made once
-LOOKS = {
-    "SemiImplicitEuler": ("#f08a00", "^"),
-    "RungeKutta4": ("#1a9a5a", "s"),
-    "LinearlyImplicitEuler": ("#d4202a", "v"),
-    "Adaptive": ("#2f6fde", "o"),
-    "Implicit": ("#7a3fc4", "D"),
-}
 
 
 @dataclass(frozen=True)
@@ -118,9 +110,9 @@ def measure(
                     setting=setting_of(integrator),
                     error=judge.error(integrator, result),
                     cpu=math.nan,
-                    evaluations=stats["evaluations"] / case.duration,
-                    steps=stats["steps"],
-                    rejected=stats["rejected"],
+                    evaluations=stats.evaluations / case.duration,
+                    steps=stats.steps,
+                    rejected=stats.rejected,
                 )
     return [
         replace(row, cpu=max(float(np.median(times[i])) - setup, 0.0) / case.duration)
@@ -143,84 +135,6 @@ def cost_at(rows: list[Row], integrator: str, what: str = "cpu", error: float = 
     return math.nan
 
 
-def print_table(case: Case, judge: Judge, rows: list[Row]) -> None:
-    print(f"{case.name}, {case.duration:g} s; {case.judged}; references differ by "
-          f"{judge.disagreement():.0e}")  # fmt: skip
-    print(
-        f"  {'integrator':22s} {'setting':14s}   error   CPU s/s     steps  rejected  "
-        "evaluations / s"
-    )
-    for row in rows:
-        print(
-            f"  {row.integrator:22s} {row.setting:14s} {row.error:7.1e}  {row.cpu:8.4f}  "
-            f"{row.steps:8d}  {row.rejected:8d}  {row.evaluations:15.0f}"
-        )
-
-
-def print_ratios(rows: list[Row]) -> None:
-    """Print what every integrator costs at the error of the comparison, against Implicit."""
-    base = {what: cost_at(rows, "Implicit", what) for what in ("cpu", "evaluations")}
-    print(f"  at error {TARGET:g}, and over Implicit's:")
-    for name in LOOKS:
-        cpu, evaluations = (cost_at(rows, name, what) for what in ("cpu", "evaluations"))
-        if math.isfinite(cpu):
-            print(
-                f"    {name:22s} {cpu:8.4f} CPU s/s {cpu / base['cpu']:7.1f} x   "
-                f"{evaluations:9.0f} evaluations / s {evaluations / base['evaluations']:7.1f} x"
-            )
-
-
-def figure_of(cases: list[Case], rows: list[Row]) -> Any:
-    """Draw cost against error, one panel per case."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import LogLocator, NullLocator
-
-    figure = Figure(figsize=(10.0, 4.3), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(1, len(cases), sharey=True)
-    for axis, case in zip(panels, cases, strict=True):
-        for name, (color, marker) in LOOKS.items():
-            found = [r for r in rows if (r.case, r.integrator) == (case.name, name)]
-            axis.loglog(
-                [r.error for r in found], [r.cpu for r in found], color=color, marker=marker,
-                markersize=5, label=name,
-            )  # fmt: skip
-        axis.axhline(1.0, color="#6b7280", linestyle=":", linewidth=1)
-        axis.set_title(case.title, fontsize=11)
-        axis.set_xlabel(case.judged, fontsize=9.5)
-        axis.xaxis.set_major_locator(LogLocator(numticks=6))
-        axis.xaxis.set_minor_locator(NullLocator())
-        axis.grid(True, which="major", color="#e5e7eb")
-        axis.set_axisbelow(True)
-    panels[0].annotate(
-        "real time", (0.02, 1.0), xycoords=("axes fraction", "data"), color="#6b7280", fontsize=9,
-        va="bottom", xytext=(0, 2), textcoords="offset points",
-    )  # fmt: skip
-    mark_ratio(panels[1], [r for r in rows if r.case == cases[1].name])
-    figure.supylabel("CPU s / simulated s", fontsize=10)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside upper center", ncols=len(LOOKS), frameon=False, fontsize=10
-    )
-    return figure
-
-
-def mark_ratio(axis: Any, rows: list[Row]) -> None:
-    """Mark how far apart the semi-implicit and the implicit method are at the error compared."""
-    low, high = cost_at(rows, "Implicit"), cost_at(rows, "SemiImplicitEuler")
-    if not math.isfinite(low * high):
-        return
-    axis.annotate(
-        "", (TARGET, high), xytext=(TARGET, low),
-        arrowprops={"arrowstyle": "<->", "color": "#111827", "shrinkA": 0, "shrinkB": 0},
-    )  # fmt: skip
-    axis.annotate(
-        f"{high / low:.0f} x", (TARGET, 0.55 * math.sqrt(low * high)), fontsize=11, ha="right",
-        va="center", color="#111827", xytext=(-5, 0), textcoords="offset points",
-    )  # fmt: skip
-
-
 def thinned(case: Case) -> Case:
     """Return the case with the settings of --quick."""
     kept = [
@@ -232,7 +146,9 @@ def thinned(case: Case) -> Case:
 
 
 def main() -> None:
-    """Measure, print the tables, draw the figure."""
+    """Measure, print the tables, draw the picture: those of the report."""
+    from sphshell_pin.study.report import integrators
+
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.work_precision", description=(__doc__ or "").partition("\n")[0]
     )
@@ -241,23 +157,18 @@ def main() -> None:
     arguments = parser.parse_args()
     one_core()
     print(machine())
-    drawn = [bowl(), press(SLOW_CREEP), stick_slip()]
-    # How much of the advantage the friction's regularisation makes.
-    other = press(FAST_CREEP)
-    compared = (sp.SemiImplicitEuler, sp.Implicit)
-    other = replace(
-        other, integrators=tuple(i for i in other.integrators if isinstance(i, compared))
-    )
+    # Two presses: how much of the implicit methods' advantage the regularized friction makes.
+    cases = [bowl(), press(SLOW_CREEP), stick_slip(), press(FAST_CREEP)]
     rows = []
-    for case in [*drawn, other]:
-        chosen = thinned(case) if arguments.quick else case
+    for k, case in enumerate(cases):
+        cases[k] = chosen = thinned(case) if arguments.quick else case
         judge = Judge(chosen)
-        found = measure(chosen, judge, 1 if arguments.quick else ROUNDS)
-        print_table(chosen, judge, found)
-        print_ratios(found)
-        rows += found
+        print(f"{case.name}: references differ by {judge.disagreement():.0e}", flush=True)
+        rows += measure(chosen, judge, 1 if arguments.quick else ROUNDS)
+    print(integrators.rows_table(rows).markdown())
+    print(integrators.costs_table(cases, rows).markdown())
     if arguments.write:
-        figure_of(drawn, rows).savefig(PICTURE, dpi=110)
+        PICTURE.write_bytes(integrators.picture(cases, rows).png)
         print(f"wrote docs/pictures/{PICTURE.name}")
 
 

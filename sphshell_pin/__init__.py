@@ -16,12 +16,14 @@ with interrupts_delayed():
 
 if TYPE_CHECKING:
     from sphshell_pin.contact import BristleFriction as BristleFriction
+    from sphshell_pin.contact import BristleState as BristleState
     from sphshell_pin.contact import ContactSet as ContactSet
     from sphshell_pin.contact import CoulombFriction as CoulombFriction
     from sphshell_pin.contact import Feature as Feature
     from sphshell_pin.contact import HuntCrossleyLaw as HuntCrossleyLaw
     from sphshell_pin.contact import ImpactLaw as ImpactLaw
     from sphshell_pin.contact import Sphere as Sphere
+    from sphshell_pin.contact import TableLaw as TableLaw
     from sphshell_pin.contact import contact_wrench as contact_wrench
     from sphshell_pin.dynamics import Adaptive as Adaptive
     from sphshell_pin.dynamics import CartesianImpedance as CartesianImpedance
@@ -42,6 +44,7 @@ __version__ = "0.1.0"
 _HOME = {
     "Adaptive": "dynamics",
     "BristleFriction": "contact",
+    "BristleState": "contact",
     "CartesianImpedance": "dynamics",
     "ContactSet": "contact",
     "CoulombFriction": "contact",
@@ -60,6 +63,7 @@ _HOME = {
     "Simulation": "dynamics",
     "Sphere": "contact",
     "SphshellError": "errors",
+    "TableLaw": "contact",
     "contact_wrench": "contact",
 }
 _PARTS = ("contact", "dynamics", "errors", "robots", "scenario", "shell", "units", "view")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from sphshell_pin.errors import InvalidParameter
 
 Array = NDArray[np.float64]
-Scalar = TypeVar("Scalar", bound=np.generic)
+T = TypeVar("T")
 
 
 def check_positive(name: str, value: object, unit: str = "") -> float:
@@ -99,10 +99,10 @@ def as_floats(value: object) -> Array:
     return np.array(given, dtype=np.float64, order="C")
 
 
-def check_type(name: str, value: object, kind: type | tuple[type, ...], must: str) -> None:
-    """Raise InvalidParameter unless `value` is an instance of `kind`; `must` says what it is."""
+def check_type(name: str, value: object, kind: type[T] | tuple[type[T], ...], must: str) -> T:
+    """Return `value`; raise InvalidParameter unless it is an instance of `kind`, as `must` says."""
     if isinstance(value, kind):
-        return
+        return value
     if isinstance(value, type) and issubclass(value, kind):
         raise InvalidParameter(name, value, f"{must}, not its class: did you forget ()?")
     raise InvalidParameter(name, value, must)
@@ -146,16 +146,15 @@ def check_placement(name: str, value: object) -> pin.SE3:
         return pin.SE3.Identity()
     is_matrix = getattr(value, "shape", None) == (4, 4)
     how = "; of a 4x4 array: pinocchio.SE3(array)" if is_matrix else ""
-    check_type(name, value, pin.SE3, f"must be a pinocchio.SE3{how}")
-    assert isinstance(value, pin.SE3)  # as was checked
-    if not np.isfinite(value.homogeneous).all():
-        raise InvalidParameter(name, value.homogeneous.tolist(), "must be finite")
-    rotation = np.array(value.rotation)
+    pose = check_type(name, value, pin.SE3, f"must be a pinocchio.SE3{how}")
+    if not np.isfinite(pose.homogeneous).all():
+        raise InvalidParameter(name, pose.homogeneous.tolist(), "must be finite")
+    rotation = np.array(pose.rotation)
     if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
         raise InvalidParameter(
             f"{name}.rotation", rotation.tolist(), "must be a rotation: orthonormal, determinant +1"
         )
-    return pin.SE3(value)
+    return pin.SE3(pose)
 
 
 def check_configuration(name: str, model: pin.Model, value: object, what: str = "") -> Array:
@@ -207,7 +206,7 @@ def check_moved_mass(model: pin.Model) -> None:
         moved[model.parents[joint]] += moved[joint]
 
 
-def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
     """Return `array` with writing switched off."""
     array.setflags(write=False)
     return array

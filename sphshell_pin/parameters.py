@@ -153,6 +153,11 @@ class Ingredient:
         """Return the parameters in their order, as the compiled core takes them."""
         return [float(getattr(self, name)) for name in parameters_of(self)]
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Files that this names, as it names them: relative to the scenario."""
+        return ()
+
     def made(self, folder: Path = Path()) -> Any:
         """Return what this states; `folder` is where its files are. By default itself."""
         return self
@@ -168,7 +173,33 @@ def table(kind: type[Ingredient]) -> str:
     about = parameters_of(kind)
     for one in dataclasses.fields(kind):
         if one.name in about:
-            default = "" if one.default is MISSING else f"{one.default}"
+            default = _shown(one.default)
             unit = about[one.name].general_unit or ("1" if one.type == "float" else "")
             lines.append(f"| `{one.name}` | {unit} | {default} | {about[one.name].help} |")
     return "\n".join(lines) + "\n"
+
+
+def table_row(kind: type[Ingredient]) -> str:
+    """Return what a file may state of a class, as a row of the documentation (Markdown).
+
+    Names of keys that must be given are bold.
+    """
+    keys = []
+    about = parameters_of(kind)
+    for one in dataclasses.fields(kind):
+        if one.name not in about:
+            continue
+        key = f"**`{one.name}`**" if one.default is MISSING else f"`{one.name}`"
+        default = _shown(one.default)
+        unit = about[one.name].general_unit
+        keys.append(key + (f" = {default}" if default else "") + (f" [{unit}]" if unit else ""))
+    return f"| `{kind.kind}` | {', '.join(keys)} |\n"
+
+
+def _shown(default: object) -> str:
+    """Return a default as a file states it; "" where there is none."""
+    if default is MISSING or default is None:
+        return ""
+    if isinstance(default, bool):
+        return str(default).lower()
+    return f"{default:g}" if isinstance(default, float) else f'"{default}"'

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.dynamics.run_stats import PairFigures, RunStats
 from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.plot import plot_contact_map, plot_result
 from sphshell_pin.plot.contact_map import element_values
@@ -192,7 +193,8 @@ def test_what_cannot_be_drawn_is_reported():
 )
 def test_what_passed_between_the_rows_is_reported(figures, said):
     scene, result = ball_on_plate()
-    result.stats["pairs"] = {"ball": figures}
+    rest = dict.fromkeys(("impulse", "peak_force_time", "max_depth", "max_depth_time"), 0.0)
+    result.stats = RunStats(pairs={"ball": PairFigures(**figures, **rest, touches=1)})
     for quantity in ("impulse", "time"):
         title = plot_contact_map(result, scene, quantity)._suptitle.get_text()
         assert ("record more often" in title) == bool(said)

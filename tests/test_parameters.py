@@ -13,9 +13,17 @@ from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.controllers import Controller
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient, parameter, parameters_of, table
+from sphshell_pin.parameters import Ingredient, parameter, parameters_of, table, table_row
 
 FAMILIES = {"law": NormalLaw, "friction": Friction, "controller": Controller, "run": Integrator}
+
+
+def concrete(family: type[Ingredient]) -> list[type[Ingredient]]:
+    """Return the classes of a family without the other ways to state them."""
+    own = [one for base in family.__subclasses__() for one in concrete(base)]
+    return own + [family] * ("kind" in vars(family))
+
+
 KINDS = [kind for family in FAMILIES.values() for kind in family.kinds.values()]
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -86,8 +94,8 @@ def test_every_parameter_is_described(kind):
     ("family", "core"), [(NormalLaw, _core.NormalLaw), (Friction, _core.FrictionLaw)]
 )
 def test_the_compiled_core_has_the_same_kinds(family, core):
-    own = [one.kind for one in family.kinds.values() if issubclass(one, family)]
-    assert [kind for kind in core.kinds() if kind != "none"] == own
+    own = {one.kind for one in concrete(family)}
+    assert {kind for kind in core.kinds() if kind != "none"} == own
     with pytest.raises(ValueError, match="unknown kind 'x'"):
         core("x", [])
 
@@ -95,8 +103,12 @@ def test_the_compiled_core_has_the_same_kinds(family, core):
 @pytest.mark.parametrize("family", [NormalLaw, Friction], ids=lambda kind: kind.__name__)
 def test_the_documents_have_the_tables_of_the_descriptions(family):
     page = (DOCS / "laws.md").read_text(encoding="utf-8")
-    for kind in family.kinds.values():
-        if issubclass(kind, family):
-            assert table(kind) in page, f"docs/laws.md: the table of {kind.__name__} is now\n" + (
-                table(kind)
-            )
+    for kind in concrete(family):
+        assert table(kind) in page, f"docs/laws.md: a table is now\n{table(kind)}"
+
+
+@pytest.mark.parametrize("family", ["law", "friction", "controller"])
+def test_the_reference_of_scenario_files_has_the_keys_of_the_descriptions(family):
+    page = (DOCS / "scenarios.md").read_text(encoding="utf-8")
+    for kind in FAMILIES[family].kinds.values():
+        assert table_row(kind) in page, f"docs/scenarios.md: a row is now\n{table_row(kind)}"

@@ -194,6 +194,7 @@ def test_without_matplotlib_one_sentence_says_how_to_get_it(monkeypatch):
         plot_result(without_contact())
 
 
+@pytest.mark.slow
 def test_no_global_figure_is_made(tmp_path):
     script = (
         "import sys; from sphshell_pin.plot import save_figures;"

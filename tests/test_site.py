@@ -19,6 +19,8 @@ import sphshell_pin
 from sphshell_pin import errors
 from tests.view.test_recording_in_browser import browser  # noqa: F401
 
+pytestmark = pytest.mark.slow
+
 for package in ("mkdocs", "material", "mkdocstrings"):
     pytest.importorskip(package, reason="needs the extra docs: mkdocs-material, mkdocstrings")
 

@@ -8,18 +8,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from sphshell_pin.atomic import atomic_file
 from sphshell_pin.benchmarks.peers.measuring import measure
 from sphshell_pin.benchmarks.peers.scenes import SCENES
-from sphshell_pin.benchmarks.peers.tables import (
-    PAGE,
-    machine_line,
-    page,
-    replace,
-    text_tables,
-    write_files,
-)
+from sphshell_pin.benchmarks.peers.tables import PAGE, TITLES, machine_line, page
 from sphshell_pin.benchmarks.peers.workers import ENGINES
 from sphshell_pin.benchmarks.timing import one_core
+from sphshell_pin.study.report.peers import assemble
 
 
 def main() -> None:
@@ -30,7 +25,7 @@ def main() -> None:
     parser.add_argument("--engine", action="append", choices=ENGINES, help="only these, and ours")
     parser.add_argument("--scene", action="append", choices=SCENES, help="only these")
     parser.add_argument("--quick", action="store_true", help="fewer settings, swings and rounds")
-    parser.add_argument("--out", type=Path, help="folder for results.csv and results.json")
+    parser.add_argument("--out", type=Path, help="folder for the tables, as .csv")
     parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
     arguments = parser.parse_args()
     one_core()
@@ -41,12 +36,18 @@ def main() -> None:
         arguments.quick,
         say=lambda text: print(text, flush=True),
     )
-    print(text_tables(rows, ratios))
+    tables = assemble(rows, ratios, TITLES).tables
+    for table in tables:
+        print(f"{table.caption}\n\n{table.markdown()}")
     if arguments.out is not None:
-        write_files(arguments.out, rows, ratios)
-        print(f"wrote {arguments.out}/results.csv and results.json")
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        for table in tables:
+            with atomic_file(arguments.out / f"{table.name}.csv") as file:
+                file.write(table.csv().encode())
+        print(f"wrote {len(tables)} tables to {arguments.out}")
     if arguments.write:
-        replace(PAGE, page(rows, ratios, arguments.quick))
+        with atomic_file(PAGE) as file:
+            file.write(page(rows, ratios, arguments.quick).encode())
         print(f"wrote docs/{PAGE.name}")
 
 

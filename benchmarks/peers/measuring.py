@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from sphshell_pin.benchmarks.peers.engine import Knob
 from sphshell_pin.benchmarks.peers.scenes import SCENES
-from sphshell_pin.benchmarks.peers.workers import ENGINES, Worker, WorkerLost
+from sphshell_pin.benchmarks.peers.workers import ENGINES, NoAnswer, Ran, Worker
 
 OURS = "ours"
 SWINGS = ("bowl", "bowl fine")
@@ -41,10 +40,6 @@ class Row:
     high: float = math.nan
     steps: int = 0
     note: str = ""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fields as JSON takes them."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -77,11 +72,11 @@ QUICK = Budget(scene=2.0, swing=10.0, variants=2, rounds=3)
 FULL = Budget(scene=10.0, swing=60.0, variants=16, rounds=11)
 
 
-def cost_of(unit: str, found: dict[str, Any]) -> float:
+def cost_of(unit: str, found: Ran) -> float:
     """Return the cost of a run in `unit`."""
     if unit == "us / step":
-        return float(found["cpu"] / found["steps"] * 1e6)
-    return float(found["cpu"] / found["simulated"])
+        return found["cpu"] / found["steps"] * 1e6
+    return found["cpu"] / found["simulated"]
 
 
 class Field:
@@ -100,12 +95,9 @@ class Field:
         """Run an engine over a scene, its settings one after another while the time lasts."""
         worker, budget = self.workers[engine], self.budget.of(scene)
         try:
-            status, facts = worker.ask("facts", scene)
-        except WorkerLost as lost:
-            return [Row(scene, engine, note=str(lost))]
-        if status != "done":
-            told = {"cannot": "cannot: ", "absent": "not installed: "}.get(status, "")
-            return [Row(scene, engine, note=told + facts)]
+            facts = worker.facts(scene)
+        except NoAnswer as reason:
+            return [Row(scene, engine, note=str(reason))]
         start, rows = time.monotonic(), []
         self.say(f"  {SCENES[scene]().title}: {facts['version']}")
         base = Row(scene, engine, facts["version"], facts["settings"])
@@ -129,19 +121,15 @@ class Field:
         """Run one setting: all variants once, and again while that is short."""
         scene = SCENES[base.scene]()
         variants = range(min(len(scene.variants()), self.budget.variants))
+        timeout = 3 * self.budget.of(base.scene) + BUILDING
         errors, costs, steps = [], [], 0
         start = time.monotonic()
-        more = {name: getattr(base, name) for name in ("scene", "engine", "version", "settings")}
         for turn in range(5):
             for variant in variants:
                 try:
-                    status, found = self.workers[base.engine].ask(
-                        "run", base.scene, knob, variant, 3 * self.budget.of(base.scene) + BUILDING
-                    )
-                except WorkerLost as lost:
-                    return Row(**more, knob=knob, note=str(lost))
-                if status != "done":
-                    return Row(**more, knob=knob, note=found)
+                    found = self.workers[base.engine].run(base.scene, knob, variant, timeout)
+                except NoAnswer as reason:
+                    return replace(base, knob=knob, note=str(reason))
                 costs.append(cost_of(scene.unit, found))
                 if turn == 0:
                     errors.append(found["errors"])
@@ -150,8 +138,8 @@ class Field:
                 break
         low, median, high = np.percentile(costs, [25, 50, 75])
         joined = scene.joined(errors)
-        return Row(
-            **more,
+        return replace(
+            base,
             knob=knob,
             errors=joined,
             unit=scene.unit,
@@ -163,18 +151,14 @@ class Field:
         )
 
     def in_turns(self, what: str, peer: Row, ours: Row) -> Ratio:
-        """Run two settings in turns; return the ratio of their costs."""
+        """Run two settings in turns; return the ratio of their costs. Raises NoAnswer."""
         ratios = []
         unit = SCENES[peer.scene]().unit
         for turn in range(self.budget.rounds):
             costs = []
             for row in (peer, ours):
                 variant = turn % 2 if row.scene in SWINGS else 0
-                status, found = self.workers[row.engine].ask(
-                    "run", row.scene, row.knob, variant, LONGEST
-                )
-                if status != "done":
-                    raise WorkerLost(f"{row.engine} in {row.scene}: {found}")
+                found = self.workers[row.engine].run(row.scene, row.knob, variant, LONGEST)
                 costs.append(cost_of(unit, found))
             ratios.append(costs[0] / costs[1])
         low, median, high = np.percentile(ratios, [25, 50, 75])
@@ -201,8 +185,8 @@ def measure(
 
     Returns a row for every setting, and for every peer that can do it how many times more it costs
     than this package: a step of the Panda at the cheapest setting of each; the swing in the bowl
-    at the peer's best error. `say` is told every row as one line. A peer that is not installed,
-    cannot do a scene, crashes or takes too long has a row that says so.
+    at the peer's best error. `say` is called with every row as one line. A peer that is not
+    installed, cannot do a scene, crashes or takes too long has a row that says so.
     """
     scenes = list(scenes)
     names = [OURS, *(name for name in engines if name != OURS)]
@@ -217,8 +201,8 @@ def measure(
                     continue
                 try:
                     ratios.append(field_of.in_turns(SCENES[scene]().title, *pair))
-                except WorkerLost as lost:
-                    say(f"  {scene} {name}: not compared, {lost}")
+                except NoAnswer as reason:
+                    say(f"  {scene} {name}: not compared, {reason}")
     finally:
         field_of.close()
     return rows, ratios

@@ -15,6 +15,7 @@ from sphshell_pin.benchmarks.peers.engine import CpuClock, Knob, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
 from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Scene, Shot
 from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.dynamics.advance import advance, start_run
 
 Array = NDArray[np.float64]
 # Bristles are so much stiffer than the contact: what rolls should not slip.
@@ -86,10 +87,19 @@ def integrator_of(knob: Knob) -> Any:
 
 def timed(simulation: sp.Simulation, q0: Array, v0: Any, duration: float, control: Any) -> float:
     """Return the CPU time [s] of the compiled loop alone."""
-    core = simulation.to_core(q0, v0, duration, control, None, record_dt=duration)
+    core = start_run(
+        simulation.scene,
+        simulation.integrator,
+        q0,
+        v0,
+        duration,
+        control,
+        None,
+        record_dt=duration,
+        t0=0.0,
+    )
     with CpuClock() as clock:
-        while not core.advance(60.0):
-            core.take()
+        advance(core)
     return clock.spent
 
 
@@ -158,7 +168,7 @@ def read(scene: BallScene, result: sp.Result, cpu: float) -> Trajectory:
         angular_velocity=spin,
         cpu=cpu,
         simulated=scene.duration,
-        steps=int(result.stats["steps"]),
+        steps=int(result.stats.steps),
         force=force,
         contact_forces=log.at_row(len(result.t) - 1).force_world,
     )
@@ -195,6 +205,6 @@ def run_press(scene: PressScene, simulation: sp.Simulation) -> Trajectory:
         angular_velocity=motion.angular[None].copy(),
         cpu=cpu,
         simulated=scene.duration,
-        steps=int(result.stats["steps"]),
+        steps=int(result.stats.steps),
         force=result.contacts.at_row(len(result.t) - 1).force_world.sum(axis=0)[None],
     )

@@ -13,6 +13,8 @@ from sphshell_pin.benchmarks.peers.engine import CpuClock, Knob, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
 from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
+from sphshell_pin.benchmarks.query import coal_tree
+from sphshell_pin.benchmarks.step import bare
 
 Array = NDArray[np.float64]
 MOST = 1000  # contacts asked for
@@ -44,8 +46,8 @@ class PythonLoop:
             settings["friction"] = f"Coulomb, in proportion to the slip up to {CREEP:g} m/s"
         if isinstance(scene, PressScene):
             settings[PARTS] = (
-                "time of aba + integrate and of coal::collide where the Python loop ends, both in "
-                "compiled loops: less than a whole one takes, which has control and forces, too"
+                "time of aba + integrate in a compiled loop and of coal.collide where the Python "
+                "loop ends: less than a whole loop takes, which has control and forces, too"
             )
         return settings
 
@@ -68,15 +70,8 @@ class PythonLoop:
 
 @lru_cache(maxsize=2)
 def mesh_of(surface: Surface) -> Any:
-    """Return Coal's tree of a surface."""
-    import coal
-
-    mesh = coal.BVHModelOBBRSS()
-    mesh.beginModel(len(surface.triangles), len(surface.vertices))
-    mesh.addVertices(surface.vertices)
-    mesh.addTriangles(surface.triangles)
-    mesh.endModel()
-    return mesh
+    """Return Coal's tree of a surface, kept for the runs that follow."""
+    return coal_tree(surface.vertices, surface.triangles)
 
 
 class Finder:
@@ -91,13 +86,17 @@ class Finder:
         self.request = coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, MOST)
         self.result = coal.CollisionResult()
 
-    def contacts(self, centre: Array) -> list[tuple[float, Array]]:
-        """Return depth [m] and normal (3,), towards the sphere, of each place of touch."""
+    def collide(self, centre: Array) -> None:
+        """Let Coal find all contacts."""
         self.placement.setTranslation(centre)
         self.result.clear()
         self.coal.collide(
             self.mesh, self.mesh_placement, self.sphere, self.placement, self.request, self.result
         )
+
+    def contacts(self, centre: Array) -> list[tuple[float, Array]]:
+        """Return depth [m] and normal (3,), towards the sphere, of each place of touch."""
+        self.collide(centre)
         found = [(-c.penetration_depth, c.normal) for c in self.result.getContacts()]
         found.sort(key=lambda one: -one[0])
         kept: list[tuple[float, Array]] = []
@@ -240,17 +239,16 @@ def at_the_end(
 
 
 def compiled_parts(scene: PressScene) -> Trajectory:
-    """Return what the parts of the loop take in compiled loops, where the Python loop ends."""
+    """Return what the compiled parts of the loop take, where the Python loop ends."""
     import pinocchio as pin
 
-    from sphshell_pin import _core
+    import sphshell_pin as sp
 
     end = run_press(scene, scene.dt)
-    model = pin.buildModelFromXML(scene.urdf)
-    q, v = np.array(scene.q0), np.zeros(model.nv)
-    steps = scene.steps // 5
-    centres = np.repeat(end.position, steps, axis=0)
-    triangles = np.ascontiguousarray(scene.surface.triangles, dtype=np.int32)
-    seconds = _core.bare_dynamics(model, q, v, scene.dt, steps)
-    seconds += _core.coal_collide_all(scene.surface.vertices, triangles, centres, scene.radius)[0]
-    return replace(end, cpu=float(seconds) * steps, simulated=steps * scene.dt, steps=steps)
+    finder, steps = Finder(scene.surface, scene.radius), scene.steps // 5
+    dynamics = bare(sp.Scene(pin.buildModelFromXML(scene.urdf)))()
+    with CpuClock() as clock:
+        for _ in range(steps):
+            finder.collide(end.position[0])
+    cpu = dynamics * steps + clock.spent
+    return replace(end, cpu=cpu, simulated=steps * scene.dt, steps=steps)

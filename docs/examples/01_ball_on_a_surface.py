@@ -24,8 +24,8 @@ result = sp.Simulation(scene, sp.Adaptive()).run(q0, duration=1.5, record_dt=2e-
 # What happened, in numbers.
 
 # %%
-figures = result.stats["pairs"]["ball-bowl"]
-print(f"{figures['touches']} touches, hardest {figures['peak_force']:.0f} N")
+figures = result.stats.pairs["ball-bowl"]
+print(f"{figures.touches} touches, hardest {figures.peak_force:.0f} N")
 print(f"energy residual {np.abs(result.energy.residual).max():.1e} J")
 
 # %% [markdown]

@@ -125,22 +125,22 @@ def _print_report(report: RunReport) -> None:
     table = make_table(
         "contact", "duration", "touches", "peak force", "mean force", "largest depth"
     )
-    for name, pair in stats["pairs"].items():
+    for name, pair in stats.pairs.items():
         table.add_row(
             plain(name),
-            f"{pair['contact_time']:.4g} s",
-            f"{pair['touches']}",
-            f"{pair['peak_force']:.4g} N",
-            f"{pair['mean_force']:.4g} N",
-            f"{pair['max_depth'] * 1e3:.4g} mm",
+            f"{pair.contact_time:.4g} s",
+            f"{pair.touches}",
+            f"{pair.peak_force:.4g} N",
+            f"{pair.mean_force:.4g} N",
+            f"{pair.max_depth * 1e3:.4g} mm",
         )
     console.print(table)
     energy = measure_energy(report.result)
     console.print(
         f"energy residual   {energy['residual']:.3g} J, {energy['relative_residual']:.2g} of the "
         f"{energy['exchanged']:.3g} J exchanged\n"
-        f"real-time factor  {stats['real_time_factor']:.3g} ({stats['duration']:.4g} s simulated "
-        f"in {stats['wall_time']:.3g} s, {stats['steps']} steps of {stats['dt']:g} s)",
+        f"real-time factor  {stats.real_time_factor:.3g} ({stats.duration:.4g} s simulated "
+        f"in {stats.wall_time:.3g} s, {stats.steps} steps of {stats.dt:g} s)",
         highlight=False,
     )
     if energy["relative_residual"] > SUSPICIOUS_RESIDUAL:

@@ -3,10 +3,19 @@
 from sphshell_pin.contact import friction, laws
 from sphshell_pin.contact.friction import *  # noqa: F403
 from sphshell_pin.contact.laws import *  # noqa: F403
+from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.contact.sphere import Sphere
-from sphshell_pin.contact.wrench import contact_wrench
+from sphshell_pin.contact.wrench import BristleState, contact_wrench
 from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
 
-__all__ = ["ContactSet", "Feature", "Method", "Sphere", "contact_wrench"]
+__all__ = [
+    "BristleState",
+    "ContactSet",
+    "Feature",
+    "Method",
+    "NormalLaw",
+    "Sphere",
+    "contact_wrench",
+]
 __all__ += friction.__all__
 __all__ += laws.__all__

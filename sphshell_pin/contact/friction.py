@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative, check_type
-from sphshell_pin.contact.laws import DECAYS_PER_PERIOD
+from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient, parameter
 
@@ -217,9 +217,9 @@ class BristleFriction(_Coefficients, kind="bristle"):
         return min(times)
 
 
-def check_friction(friction: object) -> None:
-    """Raise InvalidParameter unless `friction` is a friction law, or None."""
-    if friction is not None:
-        check_type(
-            "friction", friction, Friction, "must be a CoulombFriction, a BristleFriction or None"
-        )
+def check_friction(friction: object) -> Friction | None:
+    """Return `friction`; raise InvalidParameter unless it is a friction law, or None."""
+    if friction is None:
+        return None
+    kinds = "a CoulombFriction, a BristleFriction or None"
+    return check_type("friction", friction, Friction, f"must be {kinds}")

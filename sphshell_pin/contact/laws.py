@@ -1,17 +1,16 @@
-"""Normal force of one contact, from depth and gap rate."""
+"""The normal laws: one class a law, and one a way to state it."""
 
 from __future__ import annotations
 
+import csv
+import itertools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from os import PathLike
 from pathlib import Path
 
-import numpy as np
-
-from sphshell_pin import _core
-from sphshell_pin.checks import check_finite, check_type
+from sphshell_pin.checks import check_vector
+from sphshell_pin.contact.normal_law import NormalLaw, bisect
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient, parameter
 from sphshell_pin.units import (
@@ -21,84 +20,7 @@ from sphshell_pin.units import (
     adams_units,
 )
 
-__all__ = ["HuntCrossleyLaw", "ImpactLaw", "NormalLaw"]
-
-# Decay times that need as many steps as one period of an oscillation.
-DECAYS_PER_PERIOD = 20
-
-
-class NormalLaw(Ingredient):
-    """Base of the normal laws: `core`, the C++ binding, computes the forces.
-
-    A law gives `kind`, its parameters, `text`, and `decay_time` if it has damping. What else is
-    asked of it follows from force and energy; a law overrides what has a closed form.
-    """
-
-    @cached_property
-    def core(self) -> _core.NormalLaw:
-        """The C++ binding of this law."""
-        return _core.NormalLaw(self.kind, self.numbers())
-
-    @property
-    def text(self) -> str:
-        """Name and parameters in one line."""
-        raise NotImplementedError
-
-    @property
-    def has_damping(self) -> bool:
-        """Whether the force depends on the gap rate."""
-        return self.core.needs_rate
-
-    def normal_force(self, depth: float, gap_rate: float = 0.0) -> float:
-        """Return the push [N] at `depth` [m] (0 where not positive) and `gap_rate` [m/s].
-
-        gap_rate = normal . relative velocity: negative while the bodies close.
-        """
-        return self.core.force(check_finite("depth", depth), check_finite("gap_rate", gap_rate))
-
-    def normal_stiffness(self, depth: float) -> float:
-        """Return the slope of the elastic force at `depth` [m], in N/m (0 where not positive)."""
-        return self.core.stiffness(check_finite("depth", depth))
-
-    def energy(self, depth: float) -> float:
-        """Return the elastic energy [J] stored at `depth` [m]."""
-        return self.core.energy(check_finite("depth", depth))
-
-    def depth_at(self, force: float) -> float:
-        """Return the depth [m] at which the elastic part alone carries `force` [N]."""
-        return _inverse(self.normal_force, force)
-
-    def depth_of(self, energy: float) -> float:
-        """Return the depth [m] at which the elastic part has stored `energy` [J]."""
-        return _inverse(self.energy, energy)
-
-    def contact_time(self, depth: float, speed: float) -> float:
-        """Return the duration [s] of an undamped impact at `speed` [m/s] down to `depth` [m].
-
-        It is 2 / speed times the integral of dx / sqrt(1 - energy(x) / energy(depth)) from 0 to
-        `depth`, here by Gauss's rule after x = depth (1 - s^2), which removes the singularity.
-        """
-        nodes, weights = np.polynomial.legendre.leggauss(40)
-        s = 0.5 * (1.0 + nodes)
-        stored = np.array([self.energy(depth * (1.0 - one * one)) for one in s])
-        integrand = s / np.sqrt(1.0 - stored / self.energy(depth))
-        return float(2.0 * depth / speed * (weights @ integrand))
-
-    def decay_time(self, mass: float, depth: float) -> float:
-        """Return the time [s] in which damping at `depth` [m] slows `mass` [kg] down by e."""
-        return math.inf
-
-    def shortest_time(self, mass: float, speed: float, load: float) -> float:
-        """Return the shortest time scale [s] of `mass` [kg].
-
-        It is the shortest of an impact at `speed` [m/s], half an oscillation under `load` [N], and
-        the decay by damping: a decay needs fewer steps than an oscillation.
-        """
-        depth = self.depth_of(0.5 * mass * speed**2)
-        times = [self.contact_time(depth, speed), DECAYS_PER_PERIOD * self.decay_time(mass, depth)]
-        if load > 0:
-            times.append(math.pi * math.sqrt(mass / self.normal_stiffness(self.depth_at(load))))
-        return min(times)
+__all__ = ["HuntCrossleyLaw", "ImpactLaw", "TableLaw"]
 
 
 @dataclass(frozen=True)
@@ -241,6 +163,98 @@ class HuntCrossleyLaw(_PowerLaw, kind="hunt-crossley"):
 
 
 @dataclass(frozen=True)
+class TableLaw(NormalLaw, kind="table"):
+    """Elastic force from a table, such as a measured one: no damping.
+
+    `depth` (k,) [m] and `force` (k,) [N] start at zero and increase. Between them the force is the
+    monotone cubic Hermite interpolant (Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238),
+    with a continuous slope; beyond the last row it is linear, with the last slope. The energy is
+    its exact integral.
+    """
+
+    depth: tuple[float, ...] = parameter(unit="m", help="depths, from 0, increasing")
+    force: tuple[float, ...] = parameter(unit="N", help="elastic force at each of them, from 0")
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter unless the columns start at zero and increase."""
+        for name in ("depth", "force"):
+            given = getattr(self, name)
+            rows = len(given) if hasattr(given, "__len__") else 0
+            column = check_vector(name, given, rows).tolist()
+            object.__setattr__(self, name, tuple(column))
+            if rows < 2:
+                raise InvalidParameter(name, given, "must have at least 2 rows")
+            if column[0] != 0:
+                raise InvalidParameter(f"{name}[0]", column[0], "must be 0: no depth, no force")
+            for k, (before, here) in enumerate(itertools.pairwise(column), 1):
+                if here <= before:
+                    must = f"must be more than the row before, {before!r}"
+                    raise InvalidParameter(f"{name}[{k}]", here, must)
+        if len(self.depth) != len(self.force):
+            raise InvalidParameter(
+                "force",
+                self.force,
+                f"must have as many rows as depth, {len(self.depth)}",
+                f"has {len(self.force)} rows,",
+            )
+
+    @classmethod
+    def from_file(cls, path: str | PathLike[str]) -> TableLaw:
+        """Read a csv file of two columns, depth [m] and force [N].
+
+        A header and lines that start with # are left out. InvalidParameter for a file that cannot
+        be read, and for its rows as for the arguments.
+        """
+        try:
+            lines = csv.reader(Path(path).read_text(encoding="utf-8").splitlines())
+            rows = [(k, row) for k, row in enumerate(lines, 1) if row and row[0].strip()[:1] != "#"]
+        except (OSError, UnicodeDecodeError, csv.Error) as error:
+            raise InvalidParameter("file", str(path), f"cannot be read: {error}") from None
+        table = []
+        for i, (k, row) in enumerate(rows):
+            try:
+                depth, force = map(float, row)
+            except ValueError:
+                if i == 0:
+                    continue  # the header
+                must = f"must hold two numbers in line {k}: depth [m], force [N]"
+                raise InvalidParameter("file", str(path), must) from None
+            table.append((depth, force))
+        try:
+            return cls(*zip(*table, strict=True)) if table else cls((), ())
+        except InvalidParameter as error:
+            raise InvalidParameter("file", str(path), f"is no table of a law: {error}") from None
+
+    def numbers(self) -> list[float]:
+        """Return all depths, then all forces, as the compiled core takes them."""
+        return [*self.depth, *self.force]
+
+    @property
+    def text(self) -> str:
+        """Extent in one line."""
+        return (
+            f"table of {len(self.depth)} rows down to {self.depth[-1] * 1e3:.4g} mm and "
+            f"{self.force[-1]:.4g} N, linear beyond, undamped"
+        )
+
+
+@dataclass(frozen=True)
+class TableFile(Ingredient, kind="table", of=NormalLaw):
+    """A table law as a scenario states it."""
+
+    file: str = parameter(help="csv file of depth [m] and force [N], relative to the scenario")
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The csv file."""
+        return (self.file,)
+
+    def made(self, folder: Path = Path()) -> TableLaw:
+        """Read the table."""
+        return TableLaw.from_file(folder / self.file)
+
+
+@dataclass(frozen=True)
 class AdamsImpact(Ingredient, kind="adams", of=NormalLaw):
     """IMPACT as an ADAMS model states it; the defaults are ADAMS's own."""
 
@@ -336,11 +350,6 @@ class Hertz(Ingredient, kind="hertz", of=NormalLaw):
         return HuntCrossleyLaw(stiffness, 1.5, _dissipation_for(self.restitution, self.speed))
 
 
-def check_law(law: object) -> None:
-    """Raise InvalidParameter unless `law` is a normal law."""
-    check_type("law", law, NormalLaw, "must be a law, for instance ImpactLaw(stiffness)")
-
-
 def _dissipation_for(restitution: float, speed: float) -> float:
     """Return the dissipation b [s/m] of Hunt-Crossley that rebounds at restitution * `speed`.
 
@@ -356,24 +365,4 @@ def _dissipation_for(restitution: float, speed: float) -> float:
         return 0.0
     # y < 1: the rebound never exceeds 1 / b. Below the root the series
     # x^2 (restitution^2 - 1) / 2 makes the difference negative.
-    return _bisect(excess, 0.0, 1 / restitution) / speed
-
-
-def _inverse(function: Callable[[float], float], value: float) -> float:
-    """Return where the increasing `function` with function(0) = 0 has `value`, 0 if that is < 0."""
-    if value <= 0:
-        return 0.0
-    high = 1e-6
-    while function(high) < value:
-        high *= 2
-    return _bisect(lambda x: function(x) - value, 0.0, high)
-
-
-def _bisect(function: Callable[[float], float], low: float, high: float) -> float:
-    """Return to the last bit where the increasing `function` changes its sign."""
-    for _ in range(200):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        low, high = (middle, high) if function(middle) < 0 else (low, middle)
-    return 0.5 * (low + high)
+    return bisect(excess, 0.0, 1 / restitution) / speed

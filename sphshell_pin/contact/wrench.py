@@ -1,52 +1,167 @@
-"""The force routine for anybody's own contact point (XXXXX1 of the ADAMS technique)."""
+"""The force routine for your own contact point (XXXXX1 of the ADAMS technique)."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_finite, check_type, check_vector
-from sphshell_pin.contact.friction import CoulombFriction
-from sphshell_pin.contact.laws import NormalLaw, check_law
+from sphshell_pin.checks import (
+    check_finite,
+    check_not_negative,
+    check_positive,
+    check_type,
+    check_vector,
+)
+from sphshell_pin.contact.friction import BristleFriction, Friction, check_friction
+from sphshell_pin.contact.normal_law import NormalLaw, check_law
 from sphshell_pin.errors import InvalidParameter
+
+Array = NDArray[np.float64]
+
+# Of force, moment and rate where nothing touches.
+_NOTHING = (0.0, np.zeros(3), 0.0, np.zeros(3))
+
+
+class BristleState:
+    """The memory of one contact with BristleFriction, for `contact_wrench`.
+
+    Evaluations do not change it; `advance` moves it on, once for each accepted step. `radius` [m]
+    of the sphere is needed by torsional friction; in `relaxation` [s] the bristle gives way beyond
+    its limit. It can be copied and pickled.
+    """
+
+    def __init__(self, radius: float = 0.0, relaxation: float = 2e-5) -> None:
+        self.radius = check_not_negative("radius", radius, "m")
+        self.relaxation = check_positive("relaxation", relaxation, "s")
+        self.stretch_world: Array = np.zeros(3)
+        """Of the bristle (3,) [m]; zero without contact."""
+        self._normal: Array | None = None
+
+    def advance(
+        self,
+        point: ArrayLike,
+        normal: ArrayLike,
+        depth: float,
+        motion_i: pin.Motion,
+        motion_j: pin.Motion,
+        law: NormalLaw,
+        friction: BristleFriction,
+        *,
+        dt: float,
+    ) -> None:
+        """Move on by a step of `dt` >= 0 [s], at whose end the bodies have these motions.
+
+        The other arguments are those of `contact_wrench`. The bristle turns with body j and with
+        the normal, and is stretched by the new velocity, as in SemiImplicitEuler (order 1). Where
+        `depth` is not positive, it forgets; at a new touch it begins unstretched.
+        """
+        dt = check_not_negative("dt", dt, "s")
+        contact = _Contact(point, normal, depth, motion_i, motion_j, law, friction)
+        if contact.depth <= 0 or self._normal is None:
+            self.stretch_world = np.zeros(3)
+        else:
+            turned = pin.exp3(dt * np.array(motion_j.angular))
+            relaxation = max(self.relaxation, dt)
+            stretch = _with_normal(turned @ self.stretch_world, turned @ self._normal, contact)
+            rate = contact.force(stretch, self.radius, relaxation)[3]
+            self.stretch_world = stretch + dt * rate
+        self._normal = contact.normal if contact.depth > 0 else None
+
+    def stretch_at(self, contact: _Contact) -> Array:
+        """Return the stretch (3,) [m], turned with the normal of `contact`."""
+        if self._normal is None:
+            return np.zeros(3)
+        return _with_normal(self.stretch_world, self._normal, contact)
+
+
+class _Contact:
+    """The checked arguments of `contact_wrench`."""
+
+    def __init__(
+        self,
+        point: ArrayLike,
+        normal: ArrayLike,
+        depth: float,
+        motion_i: pin.Motion,
+        motion_j: pin.Motion,
+        law: NormalLaw,
+        friction: Friction | None,
+    ) -> None:
+        self.point = check_vector("point", point, 3)
+        self.normal = check_vector("normal", normal, 3)
+        if abs(np.linalg.norm(self.normal) - 1) > 1e-6:
+            raise InvalidParameter("normal", self.normal.tolist(), "must be a unit vector")
+        for name, motion in (("motion_i", motion_i), ("motion_j", motion_j)):
+            check_type(name, motion, pin.Motion, "must be a pinocchio.Motion")
+        check_law(law)
+        check_friction(friction)
+        self.depth = check_finite("depth", depth)
+        self.motion = motion_i - motion_j
+        self.law, self.friction = law, friction
+
+    def force(
+        self, stretch: Array, radius: float, relaxation: float
+    ) -> tuple[float, Array, float, Array]:
+        """Return push [N], friction [N], moment about the normal [N m], bristle rate [m/s]."""
+        if self.depth <= 0:
+            return _NOTHING
+        return _core.contact_force(
+            self.law.core,
+            None if self.friction is None else self.friction.core,
+            self.depth,
+            self.normal,
+            self.motion.linear + np.cross(self.motion.angular, self.point),
+            float(self.normal @ self.motion.angular),
+            stretch,
+            radius,
+            relaxation,
+        )
 
 
 def contact_wrench(
-    point: Any,
-    normal: Any,
+    point: ArrayLike,
+    normal: ArrayLike,
     depth: float,
     motion_i: pin.Motion,
     motion_j: pin.Motion,
     law: NormalLaw,
-    friction: CoulombFriction | None = None,
+    friction: Friction | None = None,
+    state: BristleState | None = None,
 ) -> tuple[pin.Force, pin.Force]:
     """Return the wrenches on body i and body j that touch at `point`.
 
     `point` (3,) [m] and `normal` (3,) (unit, from j to i) in the world; `depth` [m], no force
     where it is not positive; `motion_i`, `motion_j`: spatial velocities of the bodies in the world
     frame, about the world origin (data.oMi[j].act(data.v[j])). Both wrenches are pinocchio.Force
-    in the world about the world origin, equal and opposite. A BristleFriction raises
-    InvalidParameter: its force depends on how the contact came about, which a scene remembers.
+    in the world about the world origin, equal and opposite.
+
+    A BristleFriction needs a `state`, which holds its stretch (else InvalidParameter); call
+    `state.advance` once a step.
     """
-    place = check_vector("point", point, 3)
-    direction = check_vector("normal", normal, 3)
-    if abs(np.linalg.norm(direction) - 1) > 1e-6:
-        raise InvalidParameter("normal", direction.tolist(), "must be a unit vector")
-    for name, motion in (("motion_i", motion_i), ("motion_j", motion_j)):
-        check_type(name, motion, pin.Motion, "must be a pinocchio.Motion")
-    check_law(law)
-    if friction is not None:
-        without = "must be a CoulombFriction or None: bristles need a scene, which remembers them"
-        check_type("friction", friction, CoulombFriction, without)
-    if check_finite("depth", depth) <= 0:
-        return pin.Force.Zero(), pin.Force.Zero()
-    relative = (motion_i - motion_j).linear + np.cross((motion_i - motion_j).angular, place)
-    push, drag, _ = _core.contact_force(
-        law.core, None if friction is None else friction.core, depth, direction, relative
-    )
-    force = push * direction + drag
-    wrench = pin.Force(force, np.cross(place, force))
+    contact = _Contact(point, normal, depth, motion_i, motion_j, law, friction)
+    if not isinstance(friction, BristleFriction):
+        push, drag, torsion, _ = contact.force(np.zeros(3), 0.0, 1.0)
+    else:
+        without = "must be a BristleState, which holds the stretch of BristleFriction"
+        if not isinstance(state, BristleState):
+            raise InvalidParameter("state", state, without)
+        if friction.torsional and not state.radius:
+            raise InvalidParameter(
+                "state.radius", 0.0, "must be the sphere's, of torsional friction"
+            )
+        stretch = state.stretch_at(contact)
+        push, drag, torsion, _ = contact.force(stretch, state.radius, state.relaxation)
+    force = push * contact.normal + drag
+    wrench = pin.Force(force, np.cross(contact.point, force) + torsion * contact.normal)
     return wrench, -wrench
+
+
+def _with_normal(stretch: Array, before: Array, contact: _Contact) -> Array:
+    """Turn a stretch by the smallest rotation from the normal `before` to that of `contact`."""
+    turn = pin.Quaternion.FromTwoVectors(before, contact.normal).matrix()
+    turned = np.asarray(turn @ stretch)
+    if isinstance(contact.friction, BristleFriction) and contact.friction.torsional:
+        return turned
+    return turned - (turned @ contact.normal) * contact.normal

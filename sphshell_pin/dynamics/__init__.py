@@ -10,7 +10,8 @@ from sphshell_pin.dynamics.integrators import (
 )
 from sphshell_pin.dynamics.result import ContactLog, EnergyAudit, Event, Result
 from sphshell_pin.dynamics.rollout import Rollout
-from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
+from sphshell_pin.dynamics.run_stats import PairFigures, RunStats
+from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts, SceneState
 from sphshell_pin.dynamics.simulation import Simulation
 
 __all__ = [
@@ -24,11 +25,14 @@ __all__ = [
     "Implicit",
     "JointPD",
     "LinearlyImplicitEuler",
+    "PairFigures",
     "Result",
     "Rollout",
+    "RunStats",
     "RungeKutta4",
     "Scene",
     "SceneContacts",
+    "SceneState",
     "SemiImplicitEuler",
     "Simulation",
 ]

@@ -122,6 +122,11 @@ class PythonFunction(Ingredient, kind="python", of=Controller):
 
     function: str = parameter(help='"file.py:function"')
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """File of the function."""
+        return (self.function.rpartition(":")[0],)
+
 
 @dataclass(frozen=True)
 class GravityCompensation(Controller, kind="gravity-compensation"):
@@ -279,7 +284,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
             return self.shell_frame or "universe", placement
         places: list[tuple[str, pin.SE3]] = []
         for pair in scene.pairs if self.shell is not None else ():
-            place = pair.frame, pair.placement
+            place = pair.frame_j, pair.placement
             if pair.shell is self.shell and place not in places:
                 places.append(place)
         if len(places) > 1:
@@ -321,7 +326,7 @@ def wrap_callable(callback: Callback, model: pin.Model) -> _core.Controller:
     """Wrap tau(t, q, v, contacts) -> (nv,) for the core; its answers are checked."""
 
     def torque(t: float, q: bytearray, v: bytearray, rows: bytearray) -> Array:
-        contacts = SceneContacts.from_rows(np.frombuffer(rows).reshape(-1, 18))
+        contacts = SceneContacts.from_rows(rows)
         try:
             tau = callback(t, np.frombuffer(q), np.frombuffer(v), contacts)
         except Exception as error:

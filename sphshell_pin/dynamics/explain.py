@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -11,8 +12,11 @@ from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_moved_mass
 from sphshell_pin.dynamics.models import unit_warning
-from sphshell_pin.dynamics.scene import ContactPair, Scene
 from sphshell_pin.dynamics.sources import checked_source
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.pairs import ContactPair
+    from sphshell_pin.dynamics.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -166,8 +170,8 @@ class _Touch:
 
 
 def _touch_of(pair: ContactPair, data: pin.Data) -> _Touch | None:
-    pose_i = data.oMi[pair.joint_i] * pair.sphere_placement
-    pose_j = data.oMi[pair.joint_j] * pair.shell_placement
+    pose_i = data.oMi[pair.joint_i] * pair.placement_i
+    pose_j = data.oMi[pair.joint_j] * pair.placement_j
     if pair.find is not None:
         points, normals, depths = checked_source(pair.find, pair.name)(pose_i, pose_j)
         if not len(depths):
@@ -250,7 +254,7 @@ def _ingredients(pair: ContactPair) -> tuple[str, ...]:
         shell = pair.shell
         lines.append(
             f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}' against "
-            f"shell '{shell.name}' on frame '{pair.frame}'"
+            f"shell '{shell.name}' on frame '{pair.frame_j}'"
         )
         moving = "moves with its frame" if pair.joint_j else "stands still: no wrench on its side"
         lines.append(
@@ -260,7 +264,7 @@ def _ingredients(pair: ContactPair) -> tuple[str, ...]:
     else:
         lines.append(
             f"contact points of the user's own routine between frames '{pair.frame_i}' and "
-            f"'{pair.frame}'"
+            f"'{pair.frame_j}'"
         )
     lines.append(f"normal force: {pair.law.text}")
     lines.append(

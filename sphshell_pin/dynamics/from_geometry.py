@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import coal
 import pinocchio as pin
 
 from sphshell_pin.checks import check_type
 from sphshell_pin.contact import Friction, NormalLaw, Sphere
 from sphshell_pin.dynamics.models import find_frame, frame_on_joint
-from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.scene import Scene
 
 
 def add_pairs(
@@ -56,7 +60,7 @@ def add_pairs(
 
 
 def _frame_of(model: pin.Model, joint: int) -> tuple[str, pin.SE3]:
-    """Return the name of a frame on `joint`, in which geometry is placed, and where it stands."""
+    """Return the name of a frame on `joint`, and its placement in the joint."""
     name = frame_on_joint(model, joint)
     if name is None:
         raise InvalidParameter(

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from sphshell_pin.parameters import Ingredient, parameter
 
 
 class Integrator(Ingredient):
     """Base of the integrators: `kind` is their name in files and in the compiled core."""
-
-    code: ClassVar[int]
 
     @property
     def limited_dt(self) -> float | None:
@@ -33,8 +30,6 @@ class SemiImplicitEuler(_FixedStep, kind="semi-implicit-euler"):
     round gains energy in proportion to spin^2 dt, so take another for fast tumbling.
     """
 
-    code: ClassVar[int] = 0
-
     @property
     def limited_dt(self) -> float:
         """The step: the recommended one is that of a method of order 1."""
@@ -44,8 +39,6 @@ class SemiImplicitEuler(_FixedStep, kind="semi-implicit-euler"):
 @dataclass(frozen=True)
 class RungeKutta4(_FixedStep, kind="runge-kutta-4"):
     """The classical method of order 4 in steps of `dt` [s], on the Lie group (Munthe-Kaas 1998)."""
-
-    code: ClassVar[int] = 1
 
 
 @dataclass(frozen=True)
@@ -57,7 +50,6 @@ class LinearlyImplicitEuler(_FixedStep, kind="linearly-implicit-euler"):
     """
 
     dt: float = parameter(1e-3, above=0, unit="s", label="time step", help="step")
-    code: ClassVar[int] = 2
 
 
 @dataclass(frozen=True)
@@ -94,8 +86,6 @@ class Adaptive(_ErrorControlled, kind="adaptive"):
     motion; where contact is stiff and lasts, take Implicit.
     """
 
-    code: ClassVar[int] = 3
-
 
 @dataclass(frozen=True)
 class Implicit(_ErrorControlled, kind="implicit"):
@@ -112,4 +102,3 @@ class Implicit(_ErrorControlled, kind="implicit"):
         label="relative tolerance",
         help="error of a step over the size of the state",
     )
-    code: ClassVar[int] = 4

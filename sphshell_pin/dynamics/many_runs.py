@@ -2,32 +2,31 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
-import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.checks import as_floats, check_not_negative
-from sphshell_pin.dynamics.controllers import Callback, Controller
-from sphshell_pin.dynamics.rollout import Plan, Rollout
-from sphshell_pin.dynamics.scene import ContactPair
-from sphshell_pin.dynamics.simulation import GLANCE, CtrlC, Simulation
-from sphshell_pin.dynamics.variations import Variations, check_names_of, has_length
-from sphshell_pin.errors import (
-    DeepStart,
-    InvalidParameter,
-    RolloutInterrupted,
-    SphshellError,
+from sphshell_pin.dynamics.advance import (
+    GLANCE,
+    AnyController,
+    CtrlC,
+    bind_controller,
+    core_pairs,
+    run_settings,
 )
+from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.dynamics.rollout import Plan, Rollout
+from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.dynamics.variations import Variations, check_names_of, has_length
+from sphshell_pin.errors import InvalidParameter, RolloutInterrupted, SphshellError
 from sphshell_pin.shell.options import thread_count
 
 Array = NDArray[np.float64]
-_OneController = Controller | Callback | None
+Start = tuple[Array, Array]
 
 # So many runs, for each thread, are made ready while others run.
 _AHEAD = 32
@@ -36,15 +35,16 @@ _MOST_THREADS = 1024
 
 
 def roll_out(
-    simulation: Simulation,
-    q0s: Any,
-    v0s: Any,
+    scene: Scene,
+    integrator: Integrator,
+    q0s: ArrayLike,
+    v0s: ArrayLike | None,
     duration: float,
     threads: int | None,
     *,
-    controller: Any,
+    controller: AnyController | Sequence[AnyController],
     control_dt: float | None,
-    vary: Mapping[str, Any] | None,
+    vary: Mapping[str, object] | None,
     record_dt: float | None,
     progress: Callable[[float], object] | None,
     t0: float,
@@ -54,39 +54,39 @@ def roll_out(
     workers = _worker_count(threads)
     duration = check_not_negative("duration", duration, "s")
     vary = check_names_of(vary)
-    starts = _states(simulation, q0s, v0s, vary, controller)
+    starts = _states(scene, q0s, v0s, vary, controller)
     # Start and end are rows whatever the time between rows.
     rows = record_dt if record_dt is not None else (duration or None)
-    settings = {0.0: simulation.core_settings(duration, 0.0, record_dt=rows, t0=t0)}
+    settings = {0.0: run_settings(scene, integrator, duration, 0.0, record_dt=rows, t0=t0)}
     controllers = _one_each(controller, len(starts))
-    _check_controllers(simulation, controllers, control_dt, starts)
-    variations = Variations(simulation.scene, vary, len(starts))
-    failures = _deep_starts(simulation, variations, starts)
-    plan = Plan(starts, [None] * len(starts), variations, failures, t0)
+    _check_controllers(scene, integrator, controllers, control_dt, starts)
+    variations = Variations(scene, vary, len(starts))
+    plan = Plan(starts, [None] * len(starts), variations, {}, t0)
 
-    def make_ready(run: int) -> tuple[Any, ...]:
+    def add(run: int) -> None:
         q0, v0 = starts[run]
-        varied = Simulation(variations.scene(run), simulation.integrator)
-        core_controller, hold = varied.bind(controllers[run], control_dt, q0)
+        varied = variations.scene(run)
+        bound, hold = bind_controller(varied, integrator, controllers[run], control_dt, q0)
         if hold not in settings:
-            settings[hold] = varied.core_settings(duration, hold, record_dt=rows, t0=t0)
-        return _core_pairs(varied, q0, v0), core_controller, q0, v0, settings[hold]
+            settings[hold] = run_settings(varied, integrator, duration, hold, record_dt=rows, t0=t0)
+        # The rollout warns of a weak law when a sphere has gone through.
+        core.add(core_pairs(varied, q0, v0, warn=False), bound, q0, v0, settings[hold])
+
+    def rollout() -> Rollout:
+        return Rollout(scene, integrator, core, plan, workers, time.perf_counter() - began)
 
     workers = max(min(workers, len(starts)), 1)
-    core = _core.Rollout(simulation.scene.model, workers)
-    tasks = _Tasks(core, workers, progress, len(starts), failures)
+    core = _core.Rollout(scene.model, workers)
+    tasks = _Tasks(core, workers, progress, len(starts), plan.failures)
     try:
         with CtrlC() as ctrl_c:
             for run in range(len(starts)):
-                if run in failures:
-                    continue
                 try:
-                    task = make_ready(run)
+                    add(run)
                 except Exception as fault:
                     # A contact source is asked about the start, and may raise.
-                    failures[run] = _not_begun(fault)
+                    plan.failures[run] = _not_begun(fault)
                     continue
-                core.add(*task)
                 plan.numbers[run] = tasks.added
                 tasks.make_room(ctrl_c)
             tasks.wait(0, ctrl_c)
@@ -94,15 +94,15 @@ def roll_out(
         core.stop()
         for run, number in enumerate(plan.numbers):
             # The threads had not come to it.
-            if number is not None and not len(core.outcome(number)["q"]):
+            if number is not None and not len(core.outcome(number).q):
                 plan.numbers[run] = None
-            if plan.numbers[run] is None and run not in failures:
-                failures[run] = SphshellError("the rollout was interrupted before this run began")
-        rollout = Rollout(simulation, core, plan, workers, time.perf_counter() - began)
-        raise RolloutInterrupted(tasks.done, rollout) from None
+            if plan.numbers[run] is None and run not in plan.failures:
+                why = "the rollout was interrupted before this run began"
+                plan.failures[run] = SphshellError(why)
+        raise RolloutInterrupted(tasks.done, rollout()) from None
     finally:
         core.stop()
-    return Rollout(simulation, core, plan, workers, time.perf_counter() - began)
+    return rollout()
 
 
 class _Tasks:
@@ -161,10 +161,11 @@ def _not_begun(fault: Exception) -> SphshellError:
 
 
 def _check_controllers(
-    simulation: Simulation,
-    controllers: Sequence[_OneController],
+    scene: Scene,
+    integrator: Integrator,
+    controllers: Sequence[AnyController],
     control_dt: float | None,
-    starts: list[tuple[Array, Array]],
+    starts: list[Start],
 ) -> None:
     """Refuse a controller that cannot be, each of them once, before anything runs."""
     seen = set[int]()
@@ -173,7 +174,7 @@ def _check_controllers(
             continue
         seen.add(id(controller))
         try:
-            simulation.bind(controller, control_dt, starts[run][0])
+            bind_controller(scene, integrator, controller, control_dt, starts[run][0])
         except InvalidParameter as error:
             if run == 0:
                 raise
@@ -182,7 +183,9 @@ def _check_controllers(
             ) from None
 
 
-def _one_each(controller: Any, count: int) -> Sequence[_OneController]:
+def _one_each(
+    controller: AnyController | Sequence[AnyController], count: int
+) -> Sequence[AnyController]:
     """Return the controller of each run."""
     if not isinstance(controller, list | tuple):
         return [controller] * count
@@ -197,10 +200,14 @@ def _one_each(controller: Any, count: int) -> Sequence[_OneController]:
 
 
 def _states(
-    simulation: Simulation, q0s: Any, v0s: Any, vary: Mapping[str, Any], controller: Any
-) -> list[tuple[Array, Array]]:
+    scene: Scene,
+    q0s: ArrayLike,
+    v0s: ArrayLike | None,
+    vary: Mapping[str, object],
+    controller: AnyController | Sequence[AnyController],
+) -> list[Start]:
     """Return the checked starts; what is given once holds for all runs."""
-    model = simulation.scene.model
+    model = scene.model
     tables = {}
     for name, given, size in (("q0s", q0s, model.nq), ("v0s", v0s, model.nv)):
         if given is None:
@@ -229,51 +236,9 @@ def _states(
     for run in range(count):
         row = {name: t if t.ndim == 1 else t[run] for name, t in tables.items()}
         try:
-            starts.append(simulation.scene.check_state(row["q0s"], row.get("v0s")))
+            starts.append(scene.check_state(row["q0s"], row.get("v0s")))
         except InvalidParameter as error:
             raise InvalidParameter(
                 f"the start of run {run}", error.value, str(error), given="cannot be taken:"
             ) from None
     return starts
-
-
-def _has_state(pairs: Sequence[ContactPair]) -> bool:
-    return any(pair.friction is not None and pair.friction.has_state for pair in pairs)
-
-
-def _core_pairs(simulation: Simulation, q0: Array, v0: Array) -> list[_core.Pair]:
-    """Build the C++ twins of the pairs; what bristles need to know of the start costs most."""
-    pairs = simulation.scene.pairs
-    if not _has_state(pairs):
-        return [pair.to_core() for pair in pairs]
-    return simulation.core_pairs(q0, v0, warn=False)  # told of what happens, when it has
-
-
-def _deep_starts(
-    simulation: Simulation, variations: Variations, starts: list[tuple[Array, Array]]
-) -> dict[int, SphshellError]:
-    """Return the runs that would start with a sphere deep inside, as Simulation.run sees it."""
-    scene = simulation.scene
-    data = scene.model.createData()
-    spheres = [k for k, pair in enumerate(scene.pairs) if pair.sphere is not None]
-    centres = {k: np.empty((len(starts), 3)) for k in spheres}
-    radii = {k: np.empty(len(starts)) for k in spheres}
-    for run, (q0, _) in enumerate(starts if spheres else []):
-        pin.forwardKinematics(scene.model, data, q0)
-        pairs = variations.pairs(run)
-        for k in spheres:
-            pair = pairs[k]
-            centre = data.oMi[pair.joint_i].act(pair.sphere_placement.translation)
-            centres[k][run] = (data.oMi[pair.joint_j] * pair.shell_placement).actInv(centre)
-            radii[k][run] = pair.sphere.radius if pair.sphere is not None else math.nan
-    out: dict[int, SphshellError] = {}
-    for k in spheres:
-        pair = scene.pairs[k]
-        assert pair.shell is not None
-        depth, _ = pair.shell.contacts_batch(centres[k], radii[k], method=pair.method)
-        if pair.shell.side != "both" and pair.shell.is_closed:
-            away = pair.shell.closest_points(centres[k], threads=None, method=pair.method).distances
-            depth = np.maximum(depth, radii[k] - (away if pair.shell.side == "outside" else -away))
-        for run in np.flatnonzero(depth > 0.5 * radii[k]).tolist():
-            out.setdefault(run, DeepStart(pair.name, float(depth[run]), float(radii[k][run])))
-    return out

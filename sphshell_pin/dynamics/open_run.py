@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative, check_vector
+from sphshell_pin.dynamics.advance import (
+    AnyController,
+    advance,
+    bind_controller,
+    core_pairs,
+    start_run,
+    why_ended,
+)
 from sphshell_pin.dynamics.busy import one_at_a_time
-from sphshell_pin.dynamics.controllers import Callback, Controller
 from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.run_stats import RunStats
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
-from sphshell_pin.dynamics.simulation import Simulation, why_ended
+from sphshell_pin.dynamics.simulation import Simulation
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NotPicklable
 
 Array = NDArray[np.float64]
@@ -43,9 +51,9 @@ class OpenRun:
     def __init__(
         self,
         simulation: Simulation,
-        q0: Any,
-        v0: Any = None,
-        controller: Controller | Callback | None = None,
+        q0: ArrayLike,
+        v0: ArrayLike | None = None,
+        controller: AnyController = None,
         control_dt: float | None = None,
         *,
         record_dt: float,
@@ -54,9 +62,18 @@ class OpenRun:
         self.simulation = simulation
         self.ended: str | None = None
         self._user = _core.OneUser("OpenRun")
-        # Of a weak law Scene.explain tells.
-        self._core = simulation.to_core(
-            q0, v0, _FOR_EVER, controller, control_dt, record_dt=record_dt, t0=t0, warn=False
+        # Scene.explain reports a weak law.
+        self._core = start_run(
+            simulation.scene,
+            simulation.integrator,
+            q0,
+            v0,
+            _FOR_EVER,
+            controller,
+            control_dt,
+            record_dt=record_dt,
+            t0=t0,
+            warn=False,
         )
         self._controller = controller
         self._rows = 0
@@ -90,22 +107,17 @@ class OpenRun:
         """
         until = self.time + check_not_negative("duration", duration, "s")
         left = wall if wall == math.inf else check_not_negative("wall", wall, "s")
-        blocks: list[dict[str, NDArray[Any]]] = []
-        before = self._core.wall_time
-        while self.ended is None:
-            status = self._core.advance(left - (self._core.wall_time - before), until)
+        if self.ended is None:
+            status = advance(self._core, until, left)
             self.ended = why_ended(status, self._core, self.scene)
-            blocks.append(self._core.take())
-            if self.time >= until or self._core.wall_time - before >= left:
-                break
-        rows = self._result(blocks or [self._core.take()], first=self._rows)
+        rows = self._result(self._core.take(), first=self._rows)
         self._rows += len(rows.t)
         return rows
 
     @one_at_a_time
     def snapshot(self) -> Result:
         """Return the state where the run stands, as a result of one row."""
-        return self._result([self._core.snapshot()])
+        return self._result(self._core.snapshot())
 
     @property
     def residual(self) -> float:
@@ -114,7 +126,7 @@ class OpenRun:
         return float(now.total[0] - start.total[0])
 
     @one_at_a_time
-    def change(self, scene: Scene, controller: Controller | Callback | None = None) -> bool:
+    def change(self, scene: Scene, controller: AnyController = None) -> bool:
         """Go on with the laws, friction and radii of `scene`, and with `controller` unless None.
 
         The scene must have the same model and the same pairs otherwise; what this adds to the
@@ -127,8 +139,8 @@ class OpenRun:
         q, v = np.array(self._core.q), np.array(self._core.v)
         core_controller = None
         if controller is not None and controller is not self._controller:
-            core_controller = simulation.core_controller(controller, q)
-        pairs = simulation.core_pairs(q, v, warn=False)
+            core_controller, _ = bind_controller(scene, simulation.integrator, controller, None, q)
+        pairs = core_pairs(scene, q, v, warn=False)
         self._core.change(pairs, core_controller)
         if core_controller is not None:
             self._controller = controller
@@ -136,7 +148,7 @@ class OpenRun:
         return True
 
     @one_at_a_time
-    def push(self, frame: str, force_world: Any) -> None:
+    def push(self, frame: str, force_world: ArrayLike) -> None:
         """Push at the origin of `frame` with a force (3,) [N] in the world, from now on.
 
         A push replaces the one before; zeros end it. Its work counts as the controller's.
@@ -157,12 +169,11 @@ class OpenRun:
         force = check_vector("force_world", force_world, 3, " [N]")
         self._core.push(where.parentJoint, where.placement.translation, force)
 
-    def _result(self, blocks: list[dict[str, NDArray[Any]]], first: int = 0) -> Result:
+    def _result(self, record: dict[str, NDArray[np.generic]], first: int = 0) -> Result:
         # The core counts rows from the start of the run, a result from its own first one.
-        for block in blocks:
-            block["contact_row"] = block["contact_row"] - first
+        record["contact_row"] = record["contact_row"] - first
         names = tuple(pair.name for pair in self.scene.pairs)
-        return Result.from_blocks(blocks, names, {}, self.scene)
+        return Result.from_blocks([record], names, RunStats(), self.scene)
 
 
 def contacts_of(row: Result) -> SceneContacts:
@@ -186,8 +197,8 @@ def _same_place(a: ContactPair, b: ContactPair) -> bool:
         and a.shell is b.shell
         and a.find is b.find
         and type(a.friction) is type(b.friction)
-        and _equal(a.sphere_placement, b.sphere_placement)
-        and _equal(a.shell_placement, b.shell_placement)
+        and _equal(a.placement_i, b.placement_i)
+        and _equal(a.placement_j, b.placement_j)
     )
 
 

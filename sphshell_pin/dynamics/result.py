@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
-import os
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import read_only
-from sphshell_pin.dynamics.scene import Scene, SceneContacts
-from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.dynamics.run_stats import RunStats
+from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.dynamics.scene_contacts import Columns, SceneContacts, columns
+from sphshell_pin.errors import MissingExtra
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,7 +123,7 @@ class Origin:
     """
 
     scenario: str
-    settings: dict[str, Any]
+    settings: dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -134,7 +132,7 @@ class Result:
 
     `t` (n,) [s], `q` (n, nq), `v` (n, nv) at the recorded rows; `pairs` the names of the contact
     pairs; `contacts` the contact log; `events` in order of time; `energy` the audit; `stats`
-    steps, wall time and figures of each pair over all steps, recorded or not; `scene` that ran
+    its cost, and figures of each pair over all steps; `scene` that ran
     (None after load); `origin` the scenario it came from (None without one).
     """
 
@@ -145,23 +143,22 @@ class Result:
     contacts: ContactLog
     events: tuple[Event, ...]
     energy: EnergyAudit
-    stats: dict[str, Any]
+    stats: RunStats
     scene: Scene | None = None
     origin: Origin | None = None
 
     @classmethod
     def from_blocks(
         cls,
-        blocks: list[dict[str, NDArray[Any]]],
+        blocks: list[Columns],
         pairs: tuple[str, ...],
-        stats: dict[str, Any],
+        stats: RunStats,
         scene: Scene,
     ) -> Result:
         """Join the core's blocks of recorded rows."""
         whole = {k: np.concatenate([b[k] for b in blocks]) for k in blocks[0]}
         row = whole["contact_row"].astype(np.int64)
-        columns = SceneContacts.columns_from_rows(whole["contacts"])
-        log = {**columns, "t": whole["t"][row], "row": row}
+        log = {**columns(whole["contacts"]), "t": whole["t"][row], "row": row}
         energy = {
             f.name: read_only(whole["energy"][:, i]) for i, f in enumerate(fields(EnergyAudit))
         }
@@ -186,27 +183,27 @@ class Result:
     def save(self, path: str | PathLike[str], *, home: str | PathLike[str] | None = None) -> Path:
         """Write everything but the scene to a compressed .npz file, whole or not at all.
 
-        A scenario's file is told relative to the folder `home`, where the results will stay
+        The path of a scenario is written relative to the folder `home`, where the results will stay
         (default: that of `path`).
         """
+        from sphshell_pin.dynamics.result_file import origin_in_file, write_result
+
         target = Path(path)
-        arrays: dict[str, NDArray[Any]] = {"t": self.t, "q": self.q, "v": self.v}
+        arrays: Columns = {"t": self.t, "q": self.q, "v": self.v}
         for part in ("contacts", "energy"):
             value = getattr(self, part)
             arrays |= {f"{part}.{f.name}": getattr(value, f.name) for f in fields(value)}
+        origin = None
+        if self.origin is not None:
+            home = Path(target.parent if home is None else home)
+            origin = origin_in_file(self.origin.scenario, self.origin.settings, home)
         header = {
-            "format": 1,
             "pairs": self.pairs,
-            "stats": self.stats,
+            "stats": asdict(self.stats),
             "events": [[e.t, e.pair, e.kind] for e in self.events],
-            "origin": _told(self.origin, Path(target.parent if home is None else home)),
+            "origin": origin,
         }
-        arrays["header"] = np.array(json.dumps(header))
-        try:
-            with atomic_file(target) as stream:
-                np.savez_compressed(stream, allow_pickle=False, **arrays)
-        except OSError as error:
-            raise ResultError(path, f"cannot write the results: {error.strerror}") from error
+        write_result(target, header, arrays)
         return target
 
     @classmethod
@@ -225,16 +222,19 @@ class Result:
         header, arrays = read_result(path, max_size)
         log = {f.name: arrays[f"contacts.{f.name}"] for f in fields(ContactLog)}
         energy = {f.name: arrays[f"energy.{f.name}"] for f in fields(EnergyAudit)}
+        origin = None
+        if header.origin is not None:
+            origin = Origin(header.origin.found_from(Path(path).parent), header.origin.settings)
         return cls(
             t=arrays["t"],
             q=arrays["q"],
             v=arrays["v"],
-            pairs=tuple(header["pairs"]),
+            pairs=tuple(header.pairs),
             contacts=ContactLog(**log),
-            events=tuple(Event(*e) for e in header["events"]),
+            events=tuple(Event(*e) for e in header.events),
             energy=EnergyAudit(**energy),
-            stats=header["stats"],
-            origin=_found(header.get("origin"), Path(path).parent),
+            stats=header.stats,
+            origin=origin,
         )
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -248,10 +248,10 @@ class Result:
             raise MissingExtra("pandas", "tables", "Result.to_dataframe") from None
         return pandas.DataFrame(self.contact_columns())
 
-    def contact_columns(self) -> dict[str, Any]:
+    def contact_columns(self) -> dict[str, ArrayLike]:
         """Return the contact log as named scalar columns, units in the names (for CSV, tables)."""
         log = self.contacts
-        columns: dict[str, Any] = {"t [s]": log.t, "pair": [self.pairs[i] for i in log.pair]}
+        columns: dict[str, ArrayLike] = {"t [s]": log.t, "pair": [self.pairs[i] for i in log.pair]}
         for label, unit, vectors in (
             ("point", "m", log.point_world),
             ("normal", "1", log.normal_world),
@@ -266,7 +266,7 @@ class Result:
         return columns | {
             "element": log.element,
             "feature": log.feature,
-            "number": log.number,
+            "number": log.contact_id,
         }
 
     def plot(self, kind: str = "overview", scene: Scene | None = None) -> Figure:
@@ -311,27 +311,3 @@ class Result:
         from sphshell_pin.view.recording import view_result
 
         return view_result(self, scene, visual_model, speed=speed, height=height, title=title)
-
-
-def _told(origin: Origin | None, home: Path) -> dict[str, Any] | None:
-    """Return what a file in the folder `home` says of `origin`."""
-    if origin is None:
-        return None
-    told: dict[str, Any] = {"scenario": origin.scenario, "settings": origin.settings}
-    if Path(origin.scenario).suffix == ".toml":
-        # Results and scenario may move together, or the results alone: both ways are told.
-        told["path"] = os.path.abspath(origin.scenario)
-        # Another drive has no relative path.
-        with contextlib.suppress(ValueError):
-            told["scenario"] = Path(os.path.relpath(told["path"], home.absolute())).as_posix()
-    return told
-
-
-def _found(told: dict[str, Any] | None, home: Path) -> Origin | None:
-    """Return the origin that a file in the folder `home` tells."""
-    if told is None:
-        return None
-    if "path" not in told:
-        return Origin(told["scenario"], told["settings"])
-    near = Path(os.path.normpath(home.absolute() / told["scenario"]))
-    return Origin(str(near if os.path.exists(near) else told["path"]), told["settings"])

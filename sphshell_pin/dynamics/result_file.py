@@ -6,24 +6,31 @@ anything: sizes are compared before memory is taken, nothing is ever unpickled.
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
+import os
 import warnings
 import zipfile
+from collections.abc import Mapping
 from os import PathLike
-from typing import Any, Literal
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
-from pydantic_core import from_json
 
+from sphshell_pin.atomic import atomic_file
+from sphshell_pin.dynamics.run_stats import RunStats
+from sphshell_pin.dynamics.scene_contacts import Columns
 from sphshell_pin.errors import ResultError
 
 LARGEST_HEADER = 1 << 26  # characters; a million events need less
 
 FLOAT, INT, LONG, BYTE = (np.dtype(one) for one in ("f8", "i4", "i8", "u1"))
 
-ARRAYS: dict[str, tuple[np.dtype[Any], tuple[str | int, ...]]] = {
+ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
     "t": (FLOAT, ("n",)),
     "q": (FLOAT, ("n", "nq")),
     "v": (FLOAT, ("n", "nv")),
@@ -36,7 +43,7 @@ ARRAYS: dict[str, tuple[np.dtype[Any], tuple[str | int, ...]]] = {
     "contacts.slip_velocity_world": (FLOAT, ("m", 3)),
     "contacts.element": (INT, ("m",)),
     "contacts.feature": (BYTE, ("m",)),
-    "contacts.number": (INT, ("m",)),
+    "contacts.contact_id": (INT, ("m",)),
     "contacts.t": (FLOAT, ("m",)),
     "contacts.row": (LONG, ("m",)),
     "energy.kinetic": (FLOAT, ("n",)),
@@ -48,39 +55,26 @@ ARRAYS: dict[str, tuple[np.dtype[Any], tuple[str | int, ...]]] = {
 }
 """By name: the numbers of an array and its shape; a size of the same name is the same in all."""
 
+_IN_FILE = {name: name for name in ARRAYS} | {"contacts.contact_id": "contacts.number"}
+
 
 class _Part(BaseModel):
-    """A table of the header; unknown keys are left alone, as a later version may write them."""
+    """A table of the header; unknown keys are ignored, as a later version may write them."""
 
-    model_config = ConfigDict(strict=True, extra="allow")
-
-
-class _Pair(_Part):
-    contact_time: float
-    impulse: float
-    peak_force: float
-    peak_force_time: float
-    max_depth: float
-    max_depth_time: float
-    touches: int
-    mean_force: float
-
-
-class _Stats(_Part):
-    # A run that goes on has none.
-    steps: int = 0
-    duration: float = 0.0
-    dt: float = 0.0
-    wall_time: float = 0.0
-    real_time_factor: float = 0.0
-    integrator: str = ""
-    pairs: dict[str, _Pair] = {}
+    model_config = ConfigDict(strict=True)
 
 
 class _Origin(_Part):
     scenario: str
-    settings: dict[str, Any]
+    settings: dict[str, object]
     path: str = ""
+
+    def found_from(self, home: Path) -> str:
+        """Return the scenario's name, or its path as seen from a file in the folder `home`."""
+        if not self.path:
+            return self.scenario
+        near = os.path.normpath(home.absolute() / self.scenario)
+        return near if os.path.exists(near) else self.path
 
 
 class Header(_Part):
@@ -88,14 +82,35 @@ class Header(_Part):
 
     format: Literal[1]
     pairs: list[str]
-    stats: _Stats
+    stats: RunStats
     events: list[tuple[float, str, Literal["touch", "lift_off", "deep", "through"]]]
     origin: _Origin | None = None
 
 
-def read_result(
-    path: str | PathLike[str], max_size: float
-) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+def origin_in_file(scenario: str, settings: dict[str, object], home: Path) -> dict[str, object]:
+    """Return what a file in the folder `home` holds of the scenario that ran."""
+    if Path(scenario).suffix != ".toml":
+        return {"scenario": scenario, "settings": settings}
+    # Results and scenario may move together, or the results alone: both paths are written.
+    path = os.path.abspath(scenario)
+    # Another drive has no relative path.
+    with contextlib.suppress(ValueError):
+        scenario = Path(os.path.relpath(path, home.absolute())).as_posix()
+    return {"scenario": scenario, "settings": settings, "path": path}
+
+
+def write_result(path: Path, header: Mapping[str, object], arrays: Columns) -> None:
+    """Write a compressed .npz file, whole or not at all; ResultError where that fails."""
+    named = {_IN_FILE[name]: array for name, array in arrays.items()}
+    named["header"] = np.array(json.dumps({"format": 1, **header}))
+    try:
+        with atomic_file(path) as stream:
+            np.savez_compressed(stream, allow_pickle=False, **named)
+    except OSError as error:
+        raise ResultError(path, f"cannot write the results: {error.strerror}") from error
+
+
+def read_result(path: str | PathLike[str], max_size: float) -> tuple[Header, Columns]:
     """Return the header and the ARRAYS of the results at `path`.
 
     Raises
@@ -118,35 +133,36 @@ def read_result(
 
 def _read(
     path: str | PathLike[str], archive: zipfile.ZipFile, max_size: float
-) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+) -> tuple[Header, Columns]:
     files = {one.filename: one for one in archive.infolist()}
     shapes: dict[str, tuple[int, ...]] = {}
-    for name in ("header", *ARRAYS):
-        if f"{name}.npy" not in files:
+    parts = {"header": "header.npy"} | {name: f"{_IN_FILE[name]}.npy" for name in ARRAYS}
+    for name, part in parts.items():
+        if part not in files:
             raise _refused(path, f"it has no array '{name}'")
-        kind, shapes[name] = _announced(path, archive, files[f"{name}.npy"], name)
+        kind, shapes[name] = _announced(path, archive, files[part], name)
         if name == "header":
             if kind.kind != "U" or shapes[name] != () or kind.itemsize > 4 * LARGEST_HEADER:
                 raise _refused(path, f"'header' is no text but {kind} {shapes[name]}")
         elif kind != ARRAYS[name][0]:
             raise _refused(path, f"'{name}' holds {kind}, not {ARRAYS[name][0]}")
     _check_shapes(path, shapes)
-    size = sum(files[f"{name}.npy"].file_size for name in shapes)
+    size = sum(files[part].file_size for part in parts.values())
     if size > max_size:
         raise ResultError(
             path,
             f"needs {size:.3g} bytes of memory, more than max_size = {max_size:.3g}: give a "
             "larger max_size to Result.load if you trust the file",
         )
-    arrays = {name: _array(archive, files[f"{name}.npy"]) for name in shapes}
+    arrays = {name: _array(archive, files[part]) for name, part in parts.items()}
     header = _header(path, str(arrays.pop("header")))
-    _check_values(path, arrays, len(header["pairs"]))
+    _check_values(path, arrays, len(header.pairs))
     return header, arrays
 
 
 def _announced(
     path: str | PathLike[str], archive: zipfile.ZipFile, file: zipfile.ZipInfo, name: str
-) -> tuple[np.dtype[Any], tuple[int, ...]]:
+) -> tuple[np.dtype[np.generic], tuple[int, ...]]:
     """Return type and shape that an array announces; its bytes must be as many."""
     with archive.open(file) as stream, warnings.catch_warnings():
         warnings.simplefilter("error")  # numpy warns of headers that it would repair
@@ -180,30 +196,29 @@ def _check_shapes(path: str | PathLike[str], shapes: dict[str, tuple[int, ...]])
                 raise _refused(path, f"'{name}' has the shape {shape}, not {called}{of}")
 
 
-def _array(archive: zipfile.ZipFile, file: zipfile.ZipInfo) -> NDArray[Any]:
+def _array(archive: zipfile.ZipFile, file: zipfile.ZipInfo) -> NDArray[np.generic]:
     with archive.open(file) as stream:
-        array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
+        array: NDArray[np.generic] = np.lib.format.read_array(stream, allow_pickle=False)
         stream.read(1)  # at its end, the sum of the bytes is checked
     array.setflags(write=False)
     return array
 
 
-def _header(path: str | PathLike[str], text: str) -> dict[str, Any]:
+def _header(path: str | PathLike[str], text: str) -> Header:
     try:
-        Header.model_validate_json(text)
+        header = Header.model_validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(["header", *map(str, first["loc"])])
         raise _refused(path, f"{where}: {first['msg']}") from None
-    header: dict[str, Any] = from_json(text)
-    known = set(header["pairs"])
-    strange = {pair for _, pair, _ in header["events"]} | set(header["stats"].get("pairs", {}))
-    if len(known) < len(header["pairs"]) or strange - known:
-        raise _refused(path, f"header.pairs does not list each pair once: {header['pairs']}")
+    known = set(header.pairs)
+    unknown = {pair for _, pair, _ in header.events} | set(header.stats.pairs)
+    if len(known) < len(header.pairs) or unknown - known:
+        raise _refused(path, f"header.pairs does not list each pair once: {header.pairs}")
     return header
 
 
-def _check_values(path: str | PathLike[str], arrays: dict[str, NDArray[Any]], pairs: int) -> None:
+def _check_values(path: str | PathLike[str], arrays: Columns, pairs: int) -> None:
     for name, least, most in (
         ("contacts.row", 0, len(arrays["t"]) - 1),
         ("contacts.pair", 0, pairs - 1),

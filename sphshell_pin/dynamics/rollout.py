@@ -6,17 +6,19 @@ import math
 import re
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NoReturn, overload
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, NoReturn, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.checks import read_only
+from sphshell_pin.dynamics.advance import deep_start, result_of, why_ended
+from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.dynamics.result import Result
-from sphshell_pin.dynamics.simulation import Simulation, why_ended
+from sphshell_pin.dynamics.run_stats import PairFigures
+from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.dynamics.variations import Variations
 from sphshell_pin.errors import (
     Interrupted,
@@ -72,20 +74,21 @@ class Rollout(Sequence[Result]):
 
     def __init__(
         self,
-        simulation: Simulation,
+        scene: Scene,
+        integrator: Integrator,
         core: _core.Rollout,
         plan: Plan,
         threads: int,
         wall_time: float,
     ) -> None:
-        self._simulation, self._core, self._plan = simulation, core, plan
+        self._integrator, self._core, self._plan = integrator, core, plan
         self.threads, self.wall_time = threads, wall_time
         self.varied = plan.variations.columns
         self.failures = dict(plan.failures)
-        count, model = len(plan.starts), simulation.scene.model
+        count = len(plan.starts)
         self.t = np.full(count, plan.t0)
-        self.q = np.array([q for q, _ in plan.starts]).reshape(count, model.nq)
-        self.v = np.array([v for _, v in plan.starts]).reshape(count, model.nv)
+        self.q = np.array([q for q, _ in plan.starts]).reshape(count, scene.model.nq)
+        self.v = np.array([v for _, v in plan.starts]).reshape(count, scene.model.nv)
         self.steps = np.zeros(count, dtype=np.int64)
         self.residual = np.full(count, math.nan)
         self.figures: dict[str, Array] = {}
@@ -93,25 +96,23 @@ class Rollout(Sequence[Result]):
         for run, number in enumerate(plan.numbers):
             if number is None:
                 continue
-            left = core.outcome(number)
-            if not len(left["q"]):  # what made it ready ran out of memory
+            outcome = core.outcome(number)
+            why_not = self._why_not_begun(run, outcome)
+            if why_not is not None:
                 plan.numbers[run] = None
-                plan.failures[run] = SphshellError(f"the run could not begin: {left['fault']}")
-                self.failures[run] = plan.failures[run]
+                plan.failures[run] = self.failures[run] = why_not
                 continue
-            self.t[run], self.steps[run] = left["time"], left["steps"]
-            self.q[run], self.v[run] = left["q"], left["v"]
-            self.residual[run] = left["residual"]
-            for pair, summary in zip(simulation.scene.pairs, left["summaries"], strict=True):
-                duration = summary["contact_time"]
-                mean = summary["impulse"] / duration if duration else 0.0
-                for name, value in {**summary, "mean_force": mean}.items():
-                    column = f"{pair.name}.{name}"
-                    if column not in self.figures:
-                        self.figures[column] = np.full(count, math.nan)
-                    self.figures[column][run] = value
-            through += [(run, simulation.scene.pairs[k].name) for k in left["through"]]
-            why = self._why_failed(run, left)
+            self.t[run], self.steps[run] = outcome.time, outcome.counts["steps"]
+            self.q[run], self.v[run] = outcome.q, outcome.v
+            self.residual[run] = outcome.residual
+            for pair, summary in zip(scene.pairs, outcome.summaries, strict=True):
+                for name, value in asdict(PairFigures.from_core(summary)).items():
+                    column = self.figures.setdefault(
+                        f"{pair.name}.{name}", np.full(count, math.nan)
+                    )
+                    column[run] = value
+            through += [(run, scene.pairs[k].name) for k in outcome.through]
+            why = self._why_failed(run, outcome)
             if why is not None:
                 self.failures[run] = why
         self.failures = dict(sorted(self.failures.items()))
@@ -143,7 +144,7 @@ class Rollout(Sequence[Result]):
         number = self._plan.numbers[run]
         if number is None:
             raise self._plan.failures[run].with_traceback(None)
-        return self._result(run, SimpleNamespace(**self._core.outcome(number)), number)
+        return self._result(run, self._core.outcome(number))
 
     def __iter__(self) -> Iterator[Result]:
         """Go through the results of all runs."""
@@ -165,7 +166,7 @@ class Rollout(Sequence[Result]):
             import pandas
         except ImportError:
             raise MissingExtra("pandas", "tables", "Rollout.to_dataframe") from None
-        columns: dict[str, Any] = {"run": np.arange(len(self))}
+        columns: dict[str, object] = {"run": np.arange(len(self))}
         for name, values in self.varied.items():
             array = np.asarray(values)
             if array.dtype.kind == "f" and array.ndim < 3:  # poses are matrices
@@ -176,20 +177,26 @@ class Rollout(Sequence[Result]):
         columns["failure"] = [str(self.failures.get(run, "")) for run in range(len(self))]
         return pandas.DataFrame(columns)
 
-    def _result(self, run: int, left: Any, number: int) -> Result:
-        simulation = Simulation(self._plan.variations.scene(run), self._simulation.integrator)
-        return simulation.gather(left, [self._core.record(number)])
-
-    def _why_failed(self, run: int, left: dict[str, Any]) -> SphshellError | None:
+    def _result(self, run: int, outcome: _core.Outcome) -> Result:
         number = self._plan.numbers[run]
         assert number is not None
-        view = SimpleNamespace(**left)
-        if view.fault:
-            why = " ".join(_TRACEBACK.sub("", view.fault, count=1).split()).rstrip(":")
-            return RunFailed(view.time, why, self._result(run, view, number))
-        reason = why_ended(view.status, view, self._simulation.scene)
+        scene = self._plan.variations.scene(run)
+        return result_of(scene, self._integrator, outcome, self._core.record(number))
+
+    def _why_not_begun(self, run: int, outcome: _core.Outcome) -> SphshellError | None:
+        if outcome.deep_start is not None:
+            return deep_start(self._plan.variations.scene(run), *outcome.deep_start)
+        if not len(outcome.q):  # memory was short before the start
+            return SphshellError(f"the run could not begin: {outcome.fault}")
+        return None
+
+    def _why_failed(self, run: int, outcome: _core.Outcome) -> SphshellError | None:
+        if outcome.fault:
+            why = " ".join(_TRACEBACK.sub("", outcome.fault, count=1).split()).rstrip(":")
+            return RunFailed(outcome.time, why, self._result(run, outcome))
+        reason = why_ended(outcome.status, outcome, self._plan.variations.scene(run))
         if reason is not None:
-            return SimulationDiverged(view.time, reason, self._result(run, view, number))
-        if view.status == _STOPPED:
-            return Interrupted(view.time, self._result(run, view, number))
+            return SimulationDiverged(outcome.time, reason, self._result(run, outcome))
+        if outcome.status == _STOPPED:
+            return Interrupted(outcome.time, self._result(run, outcome))
         return None

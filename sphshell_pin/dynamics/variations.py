@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TypeGuard
 
 import pinocchio as pin
 
-from sphshell_pin.checks import as_floats, check_placement, check_type
+from sphshell_pin.checks import as_floats, check_finite, check_placement, check_type, check_vector
 from sphshell_pin.contact.friction import check_friction
-from sphshell_pin.contact.laws import check_law
+from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.scene import ContactPair, Scene
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.parameters import parameters_of
 
 # Changes a pair to one value.
-_Change = Callable[[ContactPair, Any], ContactPair]
+_Change = Callable[[ContactPair, object], ContactPair]
 
 
-def check_names_of(vary: Any) -> Mapping[str, Any]:
+def check_names_of(vary: object) -> Mapping[str, object]:
     """Return `vary`, {} for None; raise InvalidParameter unless it maps names to values."""
     if vary is None:
         return {}
@@ -30,7 +30,7 @@ def check_names_of(vary: Any) -> Mapping[str, Any]:
     return vary
 
 
-def has_length(values: Any) -> bool:
+def has_length(values: object) -> TypeGuard[Sequence[object]]:
     """Whether `values` are several; an array without dimensions only looks as if."""
     return hasattr(values, "__len__") and getattr(values, "ndim", 1) > 0
 
@@ -42,9 +42,9 @@ class Variations:
     of values and for values out of range, which says in which run.
     """
 
-    def __init__(self, scene: Scene, vary: Mapping[str, Any], count: int) -> None:
+    def __init__(self, scene: Scene, vary: Mapping[str, object], count: int) -> None:
         self._scene = scene
-        self._parts: list[tuple[str, int, _Change, Sequence[Any]]] = []
+        self._parts: list[tuple[str, int, _Change, Sequence[object]]] = []
         valid = _names_of(scene)
         # A whole law comes before its fields.
         for name in sorted(vary, key=lambda name: name.count(".")):
@@ -57,7 +57,7 @@ class Variations:
             self.pairs(run)
 
     @property
-    def columns(self) -> dict[str, Any]:
+    def columns(self) -> dict[str, Sequence[object]]:
         """What varies, by name: the values of all runs."""
         return {name: values for name, _, _, values in self._parts}
 
@@ -95,12 +95,14 @@ def _names_of(scene: Scene) -> dict[str, tuple[int, _Change, tuple[int, ...] | N
         if pair.sphere is None:
             continue
         out[f"{pair.name}.sphere.radius"] = k, _set_radius, ()
-        out[f"{pair.name}.sphere.offset"] = k, _offset(scene), (3,)
-        out[f"{pair.name}.placement"] = k, _placement(scene), None
+        out[f"{pair.name}.sphere.offset"] = k, _set_offset, (3,)
+        out[f"{pair.name}.placement"] = k, _set_placement, None
     return out
 
 
-def _values(name: str, given: Any, count: int, shape: tuple[int, ...] | None) -> Sequence[Any]:
+def _values(
+    name: str, given: object, count: int, shape: tuple[int, ...] | None
+) -> Sequence[object]:
     """Return one value for each run."""
     called = f"vary['{name}']"
     if shape is None:
@@ -120,49 +122,39 @@ def _values(name: str, given: Any, count: int, shape: tuple[int, ...] | None) ->
         raise InvalidParameter(
             called, given, f"must have shape {wanted}", given=f"of shape {values.shape}"
         )
-    return values if shape else values.tolist()  # type: ignore[return-value]
+    return list(values) if shape else list(values.tolist())
 
 
-def _set_law(pair: ContactPair, law: Any) -> ContactPair:
-    check_law(law)
-    return replace(pair, law=law)
+def _set_law(pair: ContactPair, law: object) -> ContactPair:
+    return replace(pair, law=check_law(law))
 
 
-def _set_friction(pair: ContactPair, friction: Any) -> ContactPair:
-    check_friction(friction)
-    return replace(pair, friction=friction)
+def _set_friction(pair: ContactPair, friction: object) -> ContactPair:
+    return replace(pair, friction=check_friction(friction))
 
 
 def _field(part: str, name: str) -> _Change:
-    def change(pair: ContactPair, value: float) -> ContactPair:
+    def change(pair: ContactPair, value: object) -> ContactPair:
         whole = getattr(pair, part)
         if not hasattr(whole, name):
             raise InvalidParameter(f"{part}.{name}", value, f"is not a number of {whole!r}")
-        changed: dict[str, Any] = {part: replace(whole, **{name: value})}
-        return replace(pair, **changed)
+        changed = replace(whole, **{name: value})
+        return replace(pair, law=changed) if part == "law" else replace(pair, friction=changed)
 
     return change
 
 
-def _set_radius(pair: ContactPair, radius: float) -> ContactPair:
+def _set_radius(pair: ContactPair, radius: object) -> ContactPair:
     assert pair.sphere is not None
-    return replace(pair, sphere=replace(pair.sphere, radius=radius))
+    return replace(pair, sphere=replace(pair.sphere, radius=check_finite("radius", radius)))
 
 
-def _offset(scene: Scene) -> _Change:
-    def change(pair: ContactPair, offset: Any) -> ContactPair:
-        assert pair.sphere is not None
-        sphere = replace(pair.sphere, offset=tuple(offset))
-        return replace(pair, sphere=sphere, sphere_placement=scene.place(sphere))
-
-    return change
+def _set_offset(pair: ContactPair, offset: object) -> ContactPair:
+    assert pair.sphere is not None
+    x, y, z = check_vector("offset", offset, 3).tolist()
+    return replace(pair, sphere=replace(pair.sphere, offset=(x, y, z)))
 
 
-def _placement(scene: Scene) -> _Change:
-    def change(pair: ContactPair, placement: Any) -> ContactPair:
-        check_type("placement", placement, pin.SE3, "must be a pinocchio.SE3")
-        placement = check_placement("placement", placement)
-        in_joint = scene.frame_in_joint(pair.frame)[1] * placement
-        return replace(pair, placement=placement, shell_placement=in_joint)
-
-    return change
+def _set_placement(pair: ContactPair, placement: object) -> ContactPair:
+    check_type("placement", placement, pin.SE3, "must be a pinocchio.SE3")
+    return replace(pair, placement=check_placement("placement", placement))

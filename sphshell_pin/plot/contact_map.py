@@ -128,7 +128,7 @@ def element_values(result: Result, pairs: list[int], elements: int, quantity: st
 
 def _caution(result: Result, groups: list[PathGroup], quantity: str) -> str:
     """Say so where the recorded rows missed much of what the contacts did, else nothing."""
-    figures = result.stats.get("pairs", {})
+    figures = result.stats.pairs
     seen, done = 0.0, 0.0
     for pair in (path.pair for group in groups for path in group.paths):
         done_by_pair = figures.get(str(result.pairs[pair]))
@@ -136,11 +136,11 @@ def _caution(result: Result, groups: list[PathGroup], quantity: str) -> str:
             continue
         one = element_values(result, [pair], int(np.max(result.contacts.element)) + 1, quantity)
         if quantity == "peak":
-            seen, done = max(seen, float(one.max())), max(done, float(done_by_pair["peak_force"]))
+            seen, done = max(seen, float(one.max())), max(done, done_by_pair.peak_force)
         else:
             seen += float(one.sum())
-            force = float(done_by_pair["mean_force"]) if quantity == "impulse" else 1.0
-            done += force * float(done_by_pair["contact_time"])
+            force = done_by_pair.mean_force if quantity == "impulse" else 1.0
+            done += force * done_by_pair.contact_time
     # Contacts that share a row are in touch at once, which the time counts for each.
     away = done - seen if quantity == "time" else abs(done - seen)
     if away <= MISSED * done or done <= 0.0:

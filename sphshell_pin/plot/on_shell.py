@@ -50,7 +50,7 @@ def group_paths(result: Result, scene: Scene | None) -> list[PathGroup]:
         if path.on_shell and scene is not None:
             pair = scene.pairs[path.pair]
             shell = pair.shell
-            key = (id(shell), pair.joint_j, pair.shell_placement.homogeneous.tobytes())
+            key = (id(shell), pair.joint_j, pair.placement_j.homogeneous.tobytes())
         groups.setdefault(key, PathGroup(shell, [])).paths.append(path)
     return list(groups.values())
 

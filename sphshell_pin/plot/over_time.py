@@ -102,26 +102,24 @@ def _series(result: Result) -> list[PairSeries]:
 def _headline(result: Result) -> str:
     stats = result.stats
     parts = [f"{float(result.t[-1] - result.t[0]):g} s simulated"] if len(result.t) else []
-    if "dt" in stats and "integrator" in stats:
-        kind = str(stats["integrator"])
-        step = "mean dt" if kind in CONTROLLED else "dt"
-        parts.append(f"{kind}, {step} = {float(stats['dt']):.3g} s")
-    if "steps" in stats:
-        parts.append(f"{int(stats['steps'])} steps")
+    if stats.integrator:
+        step = "mean dt" if stats.integrator in CONTROLLED else "dt"
+        parts.append(f"{stats.integrator}, {step} = {stats.dt:.3g} s")
+        parts.append(f"{stats.steps} steps")
     return ", ".join(parts)
 
 
 def _pair_title(result: Result, pair: PairSeries) -> str:
-    stats = result.stats.get("pairs", {}).get(pair.name)
-    if not stats:
+    figures = result.stats.pairs.get(pair.name)
+    if figures is None:
         return pair.name
-    touches = count(int(stats["touches"]), "touch", "touches")
-    peak = float(stats["peak_force"])
+    touches = count(figures.touches, "touch", "touches")
+    peak = figures.peak_force
     # An impact may pass between two rows.
     unseen = " (between the recorded rows)" if peak > 1.2 * pair.peak else ""
     return (
-        f"{pair.name}: {float(stats['contact_time']):.3g} s in contact, {touches}, "
-        f"peak {peak:.4g} N{unseen}, mean {float(stats['mean_force']):.4g} N"
+        f"{pair.name}: {figures.contact_time:.3g} s in contact, {touches}, "
+        f"peak {peak:.4g} N{unseen}, mean {figures.mean_force:.4g} N"
     )
 
 

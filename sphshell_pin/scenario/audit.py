@@ -156,7 +156,7 @@ def _audit_shell(
         if log.row[i] != shown:
             shown = int(log.row[i])
             pin.forwardKinematics(model, data, np.asarray(result.q[shown], dtype=float))
-        shell = data.oMi[pair.joint_j] * pair.shell_placement
+        shell = data.oMi[pair.joint_j] * pair.placement_j
         normals[place] = shell.rotation.T @ log.normal_world[i]
         points[place] = shell.actInv(log.point_world[i])
         radii[place] = pair.sphere.radius

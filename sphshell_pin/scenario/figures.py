@@ -79,7 +79,7 @@ def measure(built: Built, result: Result, name: str) -> float:
     kind, _, rest = name.partition(".")
     if kind == "pairs":
         pair, _, figure = rest.rpartition(".")
-        return float(result.stats["pairs"][pair][figure])
+        return float(getattr(result.stats.pairs[pair], figure))
     if kind == "figures":
         try:
             return float(built.figures[rest](result, built.scene))
@@ -90,7 +90,7 @@ def measure(built: Built, result: Result, name: str) -> float:
         return _final(built.scene.model, result, rest)
     if kind == "energy":
         return measure_energy(result)[rest]
-    return float(result.stats[rest])
+    return float(getattr(result.stats, rest))
 
 
 def measure_energy(result: Result) -> dict[str, float]:

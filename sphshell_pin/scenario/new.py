@@ -37,10 +37,10 @@ from sphshell_pin.scenario.poses import take_stance
 from sphshell_pin.scenario.reading import parse_scenario
 from sphshell_pin.scenario.schema import (
     Box,
-    Cylinder,
     HalfSpace,
     Primitive,
     RobotSection,
+    RoundSolid,
     RunSection,
     Scenario,
     ShellSection,
@@ -309,7 +309,7 @@ def _shell_section(
         "box": Box(type="box", size=[2 * size, 2 * size, 0.4 * size]),
         "sphere": ball,
         "bowl": ball,
-        "cylinder": Cylinder(type="cylinder", radius=size, length=2 * size),
+        "cylinder": RoundSolid(type="cylinder", radius=size, length=2 * size),
     }
     return ShellSection(name=word, primitive=primitives[word]), word
 

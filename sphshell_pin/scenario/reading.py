@@ -20,7 +20,7 @@ from pydantic_core import ErrorDetails
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.errors import NameNotFound, ScenarioError
 from sphshell_pin.parameters import Ingredient, parameters_of
-from sphshell_pin.scenario.schema import LISTS, OneOf, RunSection, Scenario
+from sphshell_pin.scenario.schema import LISTS, STEPPING, OneOf, RunSection, Scenario
 
 # Pydantic's names of this fault in a model and in a dataclass.
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
@@ -116,7 +116,7 @@ def change_scenario(
     if "run.integrator" in changes:
         # Another kind of integrator has no use for the step or the tolerances of the file's.
         kind = Integrator.kinds.get(changes["run.integrator"].strip("\"'"))
-        for key in {"dt", "rtol", "atol"} - set(parameters_of(kind)):
+        for key in set(STEPPING) - set(parameters_of(kind)):
             if f"run.{key}" not in changes:
                 data["run"].pop(key, None)
     return _validated(data, path)
@@ -274,7 +274,7 @@ def _keys_of(table: str) -> Iterable[str]:
     return section.model_fields  # type: ignore[no-any-return]
 
 
-def _item_name(item: Mapping[str, Any]) -> str:
+def _item_name(item: Mapping[str, object]) -> str:
     return str(item.get("label") or item.get("name") or item.get("urdf") or "")
 
 

@@ -8,7 +8,7 @@ import hashlib
 import json
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -275,7 +275,7 @@ def _write_summary(
         "title": built.scenario.title,
         "complete": stopped is None,
         "stopped": None if stopped is None else str(stopped),
-        "stats": result.stats,
+        "stats": asdict(result.stats),
         "energy": measure_energy(result),
         "expected": [
             {"figure": v.figure, "expected": v.expected, "measured": v.measured, "met": v.met}

@@ -12,8 +12,10 @@ import functools
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypedDict, Unpack
 
+import coal
+import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -25,6 +27,7 @@ from pydantic import (
     PlainSerializer,
     SerializationInfo,
     Tag,
+    create_model,
     model_validator,
 )
 from pydantic_core import CoreSchema
@@ -36,6 +39,7 @@ from sphshell_pin.dynamics import controllers
 from sphshell_pin.dynamics.controllers import NoController
 from sphshell_pin.dynamics.integrators import Adaptive, Integrator, SemiImplicitEuler
 from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
+from sphshell_pin.shell import Shell
 
 Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -140,49 +144,60 @@ class RobotSection(Section):
         return self
 
 
+class ShellOptions(TypedDict):
+    """What a shell of a primitive takes besides its sizes."""
+
+    chord_error: float | None
+    segments: int | None
+    side: str
+    crease_angle: float
+    name: str
+
+
 class Box(Section):
-    """A box of edge lengths `size` [m], centred."""
+    """A box of edge lengths `size` [m], centered."""
 
     type: Literal["box"]
     size: Lengths3
 
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        return Shell.from_geometry(coal.Box(*self.size), **options)
+
 
 class SphereSurface(Section):
-    """A ball's surface [m], centred."""
+    """A ball's surface [m], centered."""
 
     type: Literal["sphere"]
     radius: Positive
 
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        return Shell.from_geometry(coal.Sphere(self.radius), **options)
 
-class Cylinder(Section):
-    """A cylinder along z [m], centred."""
 
-    type: Literal["cylinder"]
+class RoundSolid(Section):
+    """A cylinder, a cone, or a capsule (`length` without its caps) along z [m], centered."""
+
+    type: Literal["cylinder", "capsule", "cone"]
     radius: Positive
     length: Positive
 
-
-class Capsule(Section):
-    """A capsule along z [m], centred; `length` without its caps."""
-
-    type: Literal["capsule"]
-    radius: Positive
-    length: Positive
-
-
-class Cone(Section):
-    """A cone along z [m], centred."""
-
-    type: Literal["cone"]
-    radius: Positive
-    length: Positive
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        kinds = {"cylinder": coal.Cylinder, "capsule": coal.Capsule, "cone": coal.Cone}
+        return Shell.from_geometry(kinds[self.type](self.radius, self.length), **options)
 
 
 class Ellipsoid(Section):
-    """An ellipsoid of the three half axes `radii` [m], centred."""
+    """An ellipsoid of the three half axes `radii` [m], centered."""
 
     type: Literal["ellipsoid"]
     radii: Lengths3
+
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        return Shell.from_geometry(coal.Ellipsoid(*self.radii), **options)
 
 
 class HalfSpace(Section):
@@ -191,10 +206,14 @@ class HalfSpace(Section):
     type: Literal["half-space"]
     extent: Positive = 10.0
 
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        return Shell.from_geometry(plane, extent=self.extent, **options)
+
 
 Primitive = Annotated[
-    Box | SphereSurface | Cylinder | Capsule | Cone | Ellipsoid | HalfSpace,
-    Field(discriminator="type"),
+    Box | SphereSurface | RoundSolid | Ellipsoid | HalfSpace, Field(discriminator="type")
 ]
 
 
@@ -271,8 +290,18 @@ class SourceSection(Section):
 Controller = Annotated[Ingredient, OneOf(controllers.Controller)]
 
 
-_DT = parameters_of(SemiImplicitEuler)["dt"]
-_RTOL, _ATOL = parameters_of(Adaptive).values()
+def _bounds(about: Parameter) -> object:
+    return Field(gt=about.above, ge=about.at_least, le=about.at_most)
+
+
+# The parameters of all integrators, by name.
+STEPPING = {
+    name: about for kind in Integrator.kinds.values() for name, about in parameters_of(kind).items()
+}
+_keys: dict[str, Any] = {
+    name: (Annotated[float | None, _bounds(about), about], None) for name, about in STEPPING.items()
+}
+_Stepping: Any = create_model("_Stepping", __base__=Section, **_keys)
 
 
 def _check_integrator(kind: str) -> str:
@@ -282,16 +311,13 @@ def _check_integrator(kind: str) -> str:
     return kind
 
 
-class RunSection(Section):
+class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integrators have
     """How long and how finely to simulate [s]; `recording_speed` 0.1 films in slow motion.
 
-    The integrator is adaptive unless `dt` is given; `dt`, `rtol` and `atol` are its parameters.
+    The parameters of the integrator stand in this table; it is adaptive unless `dt` is given.
     """
 
     duration: Annotated[Positive, Parameter("s")]
-    dt: Annotated[float | None, Field(**_DT.bounds), _DT] = None
-    rtol: Annotated[float | None, Field(**_RTOL.bounds), _RTOL] = None
-    atol: Annotated[float | None, Field(**_ATOL.bounds), _ATOL] = None
     integrator: Annotated[str, AfterValidator(_check_integrator)] = ""
     control_dt: Annotated[Positive | None, Parameter("s", "control period")] = None
     record_dt: Annotated[Positive | None, Parameter("s", "time between rows")] = None
@@ -305,19 +331,20 @@ class RunSection(Section):
             # Not as something that was set: it follows a change of dt.
             self.__dict__["integrator"] = kind.kind
         taken = parameters_of(Integrator.kinds[self.integrator])
-        if self.dt is not None and "dt" not in taken:
+        foreign = [name for name in STEPPING if name not in taken]
+        wrong = [name for name in foreign if getattr(self, name) is not None]
+        if wrong:
+            others = [k for k, one in Integrator.kinds.items() if wrong[0] in parameters_of(one)]
             raise ValueError(
-                f"{self.integrator} takes rtol and atol, not dt: for fixed steps set "
-                "run.integrator to semi-implicit-euler, and leave rtol and atol out"
+                f"{self.integrator} takes {' and '.join(taken)}, not {' and '.join(foreign)}: "
+                f"leave {' and '.join(wrong)} out, or set run.integrator to {others[0]}"
             )
-        if (self.rtol is not None or self.atol is not None) and "rtol" not in taken:
-            raise ValueError(f"{self.integrator} takes dt, not rtol and atol: leave them out")
         return self
 
     def made(self) -> Integrator:
         """Return the integrator."""
-        values = {name: getattr(self, name) for name in ("dt", "rtol", "atol")}
         kind = Integrator.kinds[self.integrator]
+        values = {name: getattr(self, name) for name in parameters_of(kind)}
         made: Integrator = kind(**{k: v for k, v in values.items() if v is not None}).made()
         return made
 

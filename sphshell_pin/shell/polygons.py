@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from sphshell_pin import _core
-from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask, RawSurface
+from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask, RawSurface, offsets_of
 
 FLAT_AREA = 1e-12
 """A triangle of at most this share of its longest edge squared has no area."""
@@ -103,8 +103,7 @@ class Polygons:
     def take(self, polygons: Longs) -> Polygons:
         """Return the polygons named, in that order."""
         counts = self.counts[polygons]
-        offsets = np.zeros(len(polygons) + 1, np.int64)
-        np.cumsum(counts, out=offsets[1:])
+        offsets = offsets_of(counts)
         slots = np.repeat(self.offsets[polygons] - offsets[:-1], counts) + np.arange(offsets[-1])
         return self._gather(slots, offsets, self.source[polygons])
 
@@ -115,15 +114,12 @@ class Polygons:
     def drop_slots(self, mask: Mask) -> Polygons:
         """Without the corners where `mask` holds; polygons may be left with too few."""
         gone = np.bincount(self.polygon_of_slot[mask], minlength=len(self))
-        offsets = np.zeros(len(self) + 1, np.int64)
-        np.cumsum(self.counts - gone, out=offsets[1:])
-        return self._gather(np.flatnonzero(~mask), offsets, self.source)
+        return self._gather(np.flatnonzero(~mask), offsets_of(self.counts - gone), self.source)
 
     def insert(self, slots: Longs, vertices: Ints, normal_rows: Longs | None) -> Polygons:
         """With `vertices` put behind `slots`; several at one slot keep their order."""
         more = np.bincount(self.polygon_of_slot[slots], minlength=len(self))
-        offsets = np.zeros(len(self) + 1, np.int64)
-        np.cumsum(self.counts + more, out=offsets[1:])
+        offsets = offsets_of(self.counts + more)
         rows = None
         if self.normal_row is not None and normal_rows is not None:
             rows = np.insert(self.normal_row, slots + 1, normal_rows)
@@ -150,9 +146,8 @@ class Polygons:
         counts = np.concatenate([self.counts[kept], np.full(len(slots), 3)])
         source = np.concatenate([self.source[kept], self.source[polygon]])
         kept_slots = np.flatnonzero(~np.repeat(mask, self.counts))
-        offsets = np.zeros(len(counts) + 1, np.int64)
-        np.cumsum(counts, out=offsets[1:])
-        joined = self._gather(np.concatenate([kept_slots, slots.ravel()]), offsets, source)
+        slots = np.concatenate([kept_slots, slots.ravel()])
+        joined = self._gather(slots, offsets_of(counts), source)
         return joined.take(order)
 
     def _gather(self, slots: Longs, offsets: Longs, source: Ints) -> Polygons:

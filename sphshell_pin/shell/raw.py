@@ -117,25 +117,25 @@ def _vertices(vertices: object) -> Floats:
 
 
 def _polygons(elements: object) -> tuple[Longs, Ints]:
-    rows = elements if isinstance(elements, np.ndarray) else _as_table(elements)
+    if not isinstance(elements, (np.ndarray, Sequence)):
+        raise InvalidShell(f"elements must be an array or a list of lists, not {type(elements)}")
+    if len(elements) == 0:
+        raise InvalidShell("a surface needs at least one element; none given")
+    rows = elements
     if not isinstance(rows, np.ndarray):
-        return _ragged(rows)
+        if len({len(row) for row in rows if hasattr(row, "__len__")}) != 1:
+            return _ragged(rows)
+        rows = np.array(rows)
     if rows.ndim != 2 or rows.shape[1] < 3:
         raise InvalidShell(
             f"elements must be an (m, 3) or (m, 4) array of vertex indices, or a list of lists; "
             f"the one given has shape {rows.shape}"
         )
-    if len(rows) == 0:
-        raise InvalidShell("a surface needs at least one element; none given")
     if not np.issubdtype(rows.dtype, np.integer):
         raise InvalidShell(f"elements must hold integer vertex indices; they are {rows.dtype}")
-    lowest = rows.min()
-    if lowest < -1 or rows.max() > LARGEST_COUNT:
+    if rows.min() < -1 or rows.max() > LARGEST_COUNT:
         element, place = np.argwhere((rows < -1) | (rows > LARGEST_COUNT))[0]
         raise InvalidShell(f"element {element} uses vertex {rows[element, place]}: no such vertex")
-    if lowest >= 0:
-        starts = np.arange(len(rows) + 1, dtype=np.int64) * rows.shape[1]
-        return starts, np.array(rows, np.int32, order="C").reshape(-1)
     used = rows >= 0
     counts = used.sum(axis=1)
     ragged = np.flatnonzero((counts < 3) | (used[:, 1:] & ~used[:, :-1]).any(axis=1))
@@ -144,33 +144,24 @@ def _polygons(elements: object) -> tuple[Longs, Ints]:
             f"element {int(ragged[0])} is {rows[ragged[0]].tolist()}: it needs at least three "
             "corners, and -1 may stand only at the end of its row"
         )
-    offsets = np.zeros(len(rows) + 1, np.int64)
-    np.cumsum(counts, out=offsets[1:])
-    return offsets, rows[used].astype(np.int32)
-
-
-def _as_table(elements: object) -> npt.NDArray[np.int64] | Sequence[Sequence[int]]:
-    if not isinstance(elements, Sequence):
-        raise InvalidShell(f"elements must be an array or a list of lists, not {type(elements)}")
-    lengths = {len(row) for row in elements if hasattr(row, "__len__")}
-    if len(lengths) == 1:
-        return np.array(elements)
-    return elements
+    return offsets_of(counts), rows[used].astype(np.int32)
 
 
 def _ragged(rows: Sequence[Sequence[int]]) -> tuple[Longs, Ints]:
-    if len(rows) == 0:
-        raise InvalidShell("a surface needs at least one element; none given")
     kept: list[list[int]] = []
     for k, row in enumerate(rows):
         corners = [c for c in row if c != -1] if hasattr(row, "__iter__") else []
         if len(corners) < 3 or not all(isinstance(c, (int, np.integer)) for c in corners):
             raise InvalidShell(f"element {k} is {row!r}: it needs at least three vertex indices")
         kept.append(corners)
-    offsets = np.zeros(len(kept) + 1, np.int64)
-    np.cumsum([len(row) for row in kept], out=offsets[1:])
     flat = np.concatenate([np.asarray(row, np.int64) for row in kept])
-    return offsets, np.clip(flat, -LARGEST_COUNT, LARGEST_COUNT).astype(np.int32)
+    flat = np.clip(flat, -LARGEST_COUNT, LARGEST_COUNT)
+    return offsets_of(np.array(list(map(len, kept)))), flat.astype(np.int32)
+
+
+def offsets_of(counts: Longs) -> Longs:
+    """Where each of some rows starts that have `counts` (m,) entries, and the end (m + 1,)."""
+    return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
 
 
 def _corner_normals(

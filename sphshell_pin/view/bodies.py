@@ -35,14 +35,14 @@ SphereKey = tuple[int, bytes, float]
 
 def shell_key(pair: ContactPair) -> ShellKey:
     """Return a key: pairs with equal keys share the picture of their shell."""
-    place = pair.shell_placement.homogeneous.tobytes()
+    place = pair.placement_j.homogeneous.tobytes()
     return id(pair.shell), pair.joint_j, place, pair.method == "smooth"
 
 
 def sphere_key(pair: ContactPair) -> SphereKey:
     """Return a key: pairs with equal keys share the picture of their sphere."""
     radius = 0.0 if pair.sphere is None else pair.sphere.radius
-    return pair.joint_i, pair.sphere_placement.homogeneous.tobytes(), radius
+    return pair.joint_i, pair.placement_i.homogeneous.tobytes(), radius
 
 
 class DrawnShell:
@@ -56,7 +56,7 @@ class DrawnShell:
         self.joint = pair.joint_j
         self.node = visualizer[f"{index}_{node_name(shell.name)}"]
         self._curved = pair.method == "smooth"
-        self._offset = pair.shell_placement
+        self._offset = pair.placement_j
         self._colorings: dict[str, bool] = {}
         draw_shell(self.node, shell, index, curved=self._curved)
         self._move = mover(self.node)
@@ -95,7 +95,7 @@ class DrawnSphere:
     def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
         _, _, radius = sphere_key(pair)
         self.joint = pair.joint_i
-        self._offset = pair.sphere_placement
+        self._offset = pair.placement_i
         node = visualizer[f"{index}_{node_name(pair.name)}"]
         set_object(
             node["ball"],

@@ -136,7 +136,7 @@ def _in_shell(
     for place, row in enumerate(contacts.row):
         if shell is None or pair.joint_j != 0:
             pin.forwardKinematics(model, data, np.asarray(result.q[row], dtype=float))
-            shell = data.oMi[pair.joint_j] * pair.shell_placement
+            shell = data.oMi[pair.joint_j] * pair.placement_j
         points[place] = shell.actInv(contacts.point_world[place])
         normals[place] = shell.rotation.T @ contacts.normal_world[place]
     return points, normals

@@ -228,7 +228,7 @@ class Display:
         if visual_model is not None and len(visual_model.geometryObjects):
             return GeometryRobot(self.visualizer, self._model, visual_model)
         tips = [
-            (pair.joint_i, pair.sphere_placement.translation)
+            (pair.joint_i, pair.placement_i.translation)
             for pair in self.scene.pairs
             if pair.sphere is not None
         ]
@@ -253,7 +253,7 @@ def choose_view(
     """
     model, data = scene.model, scene.model.createData()
     boxes = [
-        (pair.joint_j, pair.shell_placement, *np.asarray(pair.shell.box))
+        (pair.joint_j, pair.placement_j, *np.asarray(pair.shell.box))
         for pair in scene.pairs
         if pair.shell is not None
     ]
@@ -270,7 +270,7 @@ def choose_view(
             around.append(np.array(data.oMi[joint].translation))
         for pair in scene.pairs:
             if pair.sphere is not None:
-                centres.append(data.oMi[pair.joint_i].act(pair.sphere_placement.translation))
+                centres.append(data.oMi[pair.joint_i].act(pair.placement_i.translation))
         if row == 0:
             for joint, placement, low, high in boxes:
                 where = data.oMi[joint] * placement

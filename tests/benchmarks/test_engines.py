@@ -73,6 +73,7 @@ def press_scene():
         pytest.skip(str(missing))
 
 
+@pytest.mark.slow
 @pytest.mark.robots
 def test_the_loop_and_ours_press_alike():
     scene = press_scene()

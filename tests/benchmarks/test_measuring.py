@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
+import os
 
 import pytest
 
+from sphshell_pin.benchmarks import processes
 from sphshell_pin.benchmarks.peers import measuring, tables, workers
 from sphshell_pin.benchmarks.peers.measuring import Ratio, Row, as_good_as, best_of, compared
 
@@ -48,38 +49,25 @@ def test_rows_come_from_a_process_of_its_own():
     assert rows[0].low <= rows[0].cost <= rows[0].high
 
 
-def test_a_lost_process_is_told_and_starts_anew():
+def test_a_lost_process_is_reported_and_starts_anew():
     worker = workers.Worker("ours")
     try:
-        with pytest.raises(workers.WorkerLost, match="took longer than 0 s"):
-            worker.ask("facts", "plate", timeout=0.0)
-        status, facts = worker.ask("facts", "plate")
-        assert status == "done"
-        assert facts["knobs"]
-        worker._process.kill()
-        worker._process.join()
-        with pytest.raises(workers.WorkerLost, match="ended with code"):
-            worker.ask("facts", "plate")
-        assert worker.ask("run", "plate", {"integrator": "None"})[0] == "failed"
+        with pytest.raises(workers.NoAnswer, match="took longer than 0 s"):
+            worker.run("plate", {"integrator": "Adaptive"}, 0, timeout=0.0)
+        assert worker.facts("plate")["knobs"]
+        with pytest.raises(workers.NoAnswer, match="AttributeError"):
+            worker.run("plate", {"integrator": "None"}, 0, timeout=60.0)
+        with pytest.raises(processes.ProcessLost, match="crashed"):
+            worker._process.call(60.0, os._exit, 3)
+        assert worker.facts("plate")["version"].startswith("sphshell_pin")
     finally:
         worker.close()
 
 
-def test_files_are_whole_and_json_is_strict(tmp_path):
+def test_the_page_has_every_scene_and_ratio():
     rows = [row("mujoco", 1e-3, math.nan, math.nan, note="diverged"), row("ours", 1e-6, 1e-5, 0.01)]
     ratios = [Ratio("swing", rows[0], rows[1], 100.0, 90.0, 110.0)]
-    tables.write_files(tmp_path, rows, ratios)
-
-    def refuse(name):
-        raise AssertionError(name)
-
-    text = (tmp_path / "results.json").read_text()
-    content = json.loads(text, parse_constant=refuse)
-    assert content["rows"][0]["errors"]["energy"] is None
-    assert content["ratios"][0]["median"] == 100.0
-    lines = (tmp_path / "results.csv").read_text().splitlines()
-    assert len(lines) == 3
-    assert all(len(line.split(",")) == len(lines[0].split(",")) for line in lines)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["results.csv", "results.json"]
-    assert "mujoco / ours = 100" in tables.text_tables(rows, ratios)
-    assert "| swing | mujoco | 100 [90, 110] |" in tables.page(rows, ratios)
+    page = tables.page(rows, ratios)
+    assert "| swing | MuJoCo | 100 | 90 | 110 |" in page
+    assert "| MuJoCo | dt 0.001 | 0.001 | - | - | - | - | diverged |" in page
+    assert "## Ball swings in a bowl without friction, triangles of 0.3 radii" in page

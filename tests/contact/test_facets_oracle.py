@@ -38,6 +38,7 @@ SURFACES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["facets", "elements"])
 @pytest.mark.parametrize("name", SURFACES)
 def test_same_set(name: str, method: str) -> None:

@@ -17,6 +17,7 @@ CLOSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["outside", "inside"])
 @pytest.mark.parametrize("name", CLOSED)
 def test_same_set_as_the_definition(name: str, side: str) -> None:

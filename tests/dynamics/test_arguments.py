@@ -29,7 +29,7 @@ def test_a_placement_that_is_no_rigid_motion(wrong: str) -> None:
     value = WRONG_PLACEMENTS[wrong]
     scene = Scene(ball())
     with pytest.raises(InvalidParameter, match="placement"):
-        scene.add_contact(Sphere(0.05, "ball"), plate(), placement=value)
+        scene.add_contact(Sphere(0.05, "ball"), plate(), placement=value, law=LAW)
     assert scene.pairs == ()
     with pytest.raises(InvalidParameter, match="placement"):
         CartesianImpedance("ball", [[0, 0, 0]], 1.0, 1.0, shell=plate(), placement=value)
@@ -37,7 +37,7 @@ def test_a_placement_that_is_no_rigid_motion(wrong: str) -> None:
 
 def test_a_rounded_placement_passes() -> None:
     rounded = pin.SE3(np.round(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), 8), np.ones(3))
-    pair = Scene(ball()).add_contact(Sphere(0.05, "ball"), plate(), placement=rounded)
+    pair = Scene(ball()).add_contact(Sphere(0.05, "ball"), plate(), placement=rounded, law=LAW)
     rounded.translation = np.zeros(3)
     assert pair.placement.translation == pytest.approx(np.ones(3))
 
@@ -60,7 +60,7 @@ def test_a_rounded_placement_passes() -> None:
 )
 def test_add_contact(wrong: dict, name: str) -> None:
     scene = Scene(ball())
-    given = {"sphere": Sphere(0.05, "ball"), "shell": plate(), **wrong}
+    given = {"sphere": Sphere(0.05, "ball"), "shell": plate(), "law": LAW, **wrong}
     with pytest.raises(SphshellError, match=name) as caught:
         scene.add_contact(**given)
     assert "\n" not in str(caught.value)
@@ -82,7 +82,7 @@ def test_names_of_frames(frame) -> None:
     with pytest.raises(InvalidParameter, match="frame"):
         CartesianImpedance(frame, [[0, 0, 0]], 1.0, 1.0)
     with pytest.raises(InvalidParameter, match="frame_j"):
-        Scene(ball()).add_contact_source(lambda a, b: None, "ball", frame)
+        Scene(ball()).add_contact_source(lambda a, b: None, "ball", frame, LAW)
 
 
 def test_replace_pair() -> None:
@@ -175,8 +175,8 @@ def twins() -> pin.Model:
 def test_of_frames_with_one_name_the_bodys_comes_first() -> None:
     model = twins()
     assert model.frames[find_frame(model, "ball")].type == pin.FrameType.BODY
-    pair = Scene(model).add_contact(Sphere(0.05, "ball"), plate())
-    assert pair.sphere_placement.translation == pytest.approx([0.2, 0, 0])
+    pair = Scene(model).add_contact(Sphere(0.05, "ball"), plate(), law=LAW)
+    assert pair.placement_i.translation == pytest.approx([0.2, 0, 0])
     CartesianImpedance("ball", [[0, 0, 0]], 1.0, 1.0).to_core(Scene(model), free_q([0, 0, 1]))
     with pytest.raises(FrameNotFound, match="ball"):
         find_frame(model, "bal")
@@ -190,10 +190,10 @@ def test_geometry_stays_on_its_joint_whatever_the_frames_are_called() -> None:
     floor = pin.GeometryObject("floor", 0, pin.SE3.Identity(), coal.Box(1.0, 1.0, 0.1))
     pair = pin.CollisionPair(geometry.addGeometryObject(tip), geometry.addGeometryObject(floor))
     geometry.addCollisionPair(pair)
-    (made,) = Scene.from_geometry(model, geometry).pairs
-    assert made.sphere_placement.isApprox(place)
+    (made,) = Scene.from_geometry(model, geometry, LAW).pairs
+    assert made.placement_i.isApprox(place)
     with pytest.raises(InvalidParameter, match="geometry_model"):
-        Scene.from_geometry(model, 5)
+        Scene.from_geometry(model, 5, LAW)
 
 
 @pytest.mark.parametrize("name", ["kp", "kd"])

@@ -232,11 +232,11 @@ def test_lift_off_forgets() -> None:
     v = [1.0, 0.3, -1.0, 5.0, 8.0, 1.0]
     rows = run(scene, ACCURATE, models.free_q([0, 0, R + 0.01]), v, 1.2)
     log = rows.contacts
-    numbers = np.unique(log.number)
+    numbers = np.unique(log.contact_id)
     touches = [e.t for e in rows.events if e.kind == "touch"]
     assert len(numbers) == len(touches) > 3
     for number in numbers:
-        first = np.nonzero(log.number == number)[0][0]
+        first = np.nonzero(log.contact_id == number)[0][0]
         assert log.t[first] == pytest.approx(touches[int(number)], abs=1e-12)
         assert np.linalg.norm(log.friction_force_world[first]) < 1e-6
 

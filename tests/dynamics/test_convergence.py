@@ -131,7 +131,7 @@ def test_restitution_of_impact(speed_mm: float, restitution: float, deepest_mm: 
     v0 = np.array([-speed_mm * MM])
     result = Simulation(scene, RungeKutta4(dt=1e-6)).run(np.array([RADIUS + 1e-6]), v0, 4e-3)
     assert result.v[-1, 0] / (speed_mm * MM) == pytest.approx(restitution, abs=1e-4)
-    deepest = result.stats["pairs"]["ball-plate"]["max_depth"]
+    deepest = result.stats.pairs["ball-plate"].max_depth
     assert deepest / MM == pytest.approx(deepest_mm, abs=1e-5)
 
 

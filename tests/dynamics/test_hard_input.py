@@ -8,7 +8,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import Interrupted, InvalidParameter, UnitWarning
-from tests import meshes
+from tests import meshes, models
 
 
 def ball_model(joint=None, inertia=None) -> pin.Model:
@@ -101,7 +101,7 @@ def test_normals_of_needles_do_not_depend_on_the_first_corner() -> None:
 def test_one_sided_open_shells_are_warned_of() -> None:
     scene = sp.Scene(ball_model())
     sheet = sp.Shell(*meshes.grid_plate(), side="outside")
-    scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=sheet)
+    scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=sheet, law=models.LAW)
     q = pin.neutral(scene.model)
     q[2] = 0.2
     assert any("one-sided" in warning for warning in scene.explain(q).warnings)
@@ -112,8 +112,10 @@ def test_millimetres_taken_for_metres_are_suspected() -> None:
     vertices, elements = meshes.grid_plate()
     large = sp.Shell(1000 * vertices, elements, name="plate")
     with pytest.warns(UnitWarning, match="'plate'.*unit='mm'"):
-        scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=large)
+        scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=large, law=models.LAW)
     assert any("unit='mm'" in warning for warning in scene.explain().warnings)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=sp.Shell(vertices, elements))
+        scene.add_contact(
+            sphere=sp.Sphere(0.1, "tip"), shell=sp.Shell(vertices, elements), law=models.LAW
+        )

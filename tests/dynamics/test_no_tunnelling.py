@@ -172,7 +172,7 @@ def test_pushed_past_and_back(side: float) -> None:
     depth = R - side * rows.q[log.row, 2]
     assert log.depth == pytest.approx(depth, abs=1e-12)
     assert np.array_equal(log.normal_world, np.tile([0, 0, side], (len(log.t), 1)))
-    assert rows.stats["pairs"][rows.pairs[0]]["max_depth"] == pytest.approx(1.4 * R, rel=1e-3)
+    assert rows.stats.pairs[rows.pairs[0]].max_depth == pytest.approx(1.4 * R, rel=1e-3)
 
 
 def test_after_it_lifted_off_the_memory_is_gone() -> None:
@@ -194,7 +194,7 @@ def test_round_the_rim_without_being_turned(integrator, beside: float) -> None:
     start = [0.5 + beside * R, 0.03, 1.26 * R]
     rows = run(scene, integrator, start, [0.0, 0.0, -0.2], 2.6 * R / 0.2)
     assert [e.kind for e in rows.events] == ["touch", "deep", "lift_off"]
-    depth = rows.stats["pairs"][rows.pairs[0]]["max_depth"]
+    depth = rows.stats.pairs[rows.pairs[0]].max_depth
     assert depth <= (1 - beside) * R * (1 + 1e-9)
     # k r^2 / 2 is what the contact holds at most; pushed the wrong way it would hold four times it.
     first_order = isinstance(integrator, sp.SemiImplicitEuler | sp.LinearlyImplicitEuler)
@@ -217,9 +217,9 @@ def test_round_the_rim_after_having_been_pushed_past() -> None:
 def test_far_away_nothing_is_spent() -> None:
     scene = scene_of(point_mass(gravity=9.81), sheet(), models.linear_law(1e4))
     rows = run(scene, sp.SemiImplicitEuler(1e-3), [0.0, 0.0, 50.0], [1.0, 0.0, 0.0], 1.0)
-    assert rows.stats["steps"] == 1000
-    assert rows.stats["evaluations"] <= 1001
-    assert rows.stats["rejected"] == 0
+    assert rows.stats.steps == 1000
+    assert rows.stats.evaluations <= 1001
+    assert rows.stats.rejected == 0
 
 
 def test_sliding_fast_after_a_hit_goes_back_to_fixed_steps() -> None:
@@ -228,7 +228,7 @@ def test_sliding_fast_after_a_hit_goes_back_to_fixed_steps() -> None:
     law = models.linear_law(1e4, 100.0)
     scene = scene_of(point_mass(gravity=9.81), sheet(20.0), law, friction=friction)
     down = run(scene, sp.SemiImplicitEuler(1e-3), [0.0, 0.0, 3 * R], [0.2, 0.0, -2.0], 1.0)
-    assert down.stats["evaluations"] < 3000
+    assert down.stats.evaluations < 3000
 
 
 @every

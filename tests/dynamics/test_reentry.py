@@ -122,7 +122,7 @@ def holder_of_a_pair() -> object:
     class Pair:
         def __init__(self) -> None:
             scene = sp.Scene(ball())
-            self.core = scene.add_contact_source(self.find, "ball", "universe").to_core()
+            self.core = scene.add_contact_source(self.find, "ball", "universe", LAW).to_core()
 
         def find(self, pose_i, pose_j):
             return some_contacts(0)
@@ -141,6 +141,7 @@ def holder_of_a_controller() -> object:
     return Controlled()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make", [holder_of_a_run, holder_of_a_scene, holder_of_a_pair, holder_of_a_controller]
 )
@@ -186,7 +187,7 @@ def test_many_contacts_of_a_source_cost_in_proportion() -> None:
     contacts = scene.contacts(Q)
     assert len(contacts) == 30_000
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(Q, None, 3e-4)
-    assert np.array_equal(result.contacts.number[-30_000:], np.arange(30_000))
+    assert np.array_equal(result.contacts.contact_id[-30_000:], np.arange(30_000))
 
 
 def test_the_core_refuses_arrays_of_other_lengths() -> None:

@@ -97,6 +97,7 @@ except Interrupted as stop:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     ["{}", "{'controller': lambda t, q, v, c: 0 * v, 'control_dt': 1e-3}"],
@@ -357,12 +358,12 @@ def test_rows_of_a_result() -> None:
     assert kinds[:2] == ["touch", "lift_off"]
     drop = ((0.2**2 + 2 * 9.81 * 0.01) ** 0.5 - 0.2) / 9.81
     assert result.events[0].t == pytest.approx(drop, abs=2e-4)
-    stats = result.stats["pairs"]["ball-plate"]
-    assert stats["touches"] == kinds.count("touch")
-    assert stats["max_depth"] >= log.depth.max() - 1e-12
-    assert stats["peak_force"] >= log.normal_force.max() - 1e-9
-    assert 0 < stats["mean_force"] < stats["peak_force"]
-    assert 0 < stats["contact_time"] < 0.3
+    stats = result.stats.pairs["ball-plate"]
+    assert stats.touches == kinds.count("touch")
+    assert stats.max_depth >= log.depth.max() - 1e-12
+    assert stats.peak_force >= log.normal_force.max() - 1e-9
+    assert 0 < stats.mean_force < stats.peak_force
+    assert 0 < stats.contact_time < 0.3
 
 
 def test_a_table_without_pandas_names_the_extra_that_brings_it(monkeypatch) -> None:

@@ -7,6 +7,7 @@ import io
 import json
 import math
 import random
+import sqlite3
 import tempfile
 import tomllib
 import xml.etree.ElementTree as ET
@@ -292,21 +293,28 @@ def journal_corpus() -> tuple[bytes, ...]:
     with tempfile.TemporaryDirectory() as home:
         path = Path(home) / "journal"
         journal = Journal(path, HEAD, len(OUTCOMES))
-        journal.add(OUTCOMES)
+        for outcome in OUTCOMES:
+            journal.add(outcome)
         journal.close()
         return (path.read_bytes(),)
 
 
 def damaged_journal(rng: random.Random) -> bytes:
-    """Return a journal some of whose entries were changed, without an eye on their checksums."""
-    lines = journal_corpus()[0].splitlines()
-    for _ in range(rng.choice((1, 1, 2))):
-        at = rng.randrange(len(lines))
-        try:
-            lines[at] = json.dumps(alter(rng, json.loads(lines[at]))).encode()
-        except (ValueError, RecursionError):
-            lines[at] = b"[" * 100_000
-    return b"\n".join(lines) + b"\n" * rng.randrange(2)
+    """Return a journal some of whose values were changed, but not their checksums."""
+    with tempfile.TemporaryDirectory() as home:
+        path = Path(home) / "journal"
+        path.write_bytes(journal_corpus()[0])
+        journal = sqlite3.connect(path)
+        table = rng.choice(("runs", "runs", "sweep"))
+        names = [row[1] for row in journal.execute(f"PRAGMA table_info({table})")]
+        for _ in range(rng.choice((1, 1, 2))):
+            name, row = rng.choice(names), rng.randrange(1, 5)
+            (old,) = journal.execute(f"SELECT {name} FROM {table}").fetchall()[0]
+            new = rng.choice((None, 1, 0.5, "", "[]", b"\xff", old, f"{old}0", "[" * 100_000))
+            journal.execute(f"UPDATE {table} SET {name} = ? WHERE rowid = ?", (new, row))
+        journal.commit()
+        journal.close()
+        return path.read_bytes()
 
 
 def urdf_corpus() -> tuple[bytes, ...]:

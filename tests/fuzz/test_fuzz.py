@@ -16,6 +16,8 @@ from tests.fuzz.readers import read
 from tests.fuzz.tables import prepare
 from tests.fuzz.watch import Report, Task, watch
 
+pytestmark = pytest.mark.slow
+
 BROKE = sorted((Path(__file__).parents[1] / "data" / "fuzz").iterdir())
 FILES, SECONDS = (sys.maxsize, 60.0) if os.environ.get("CI") else (500, 600.0)
 

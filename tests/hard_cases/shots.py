@@ -117,7 +117,7 @@ def _should_touch(shot: Shot, scene: sp.Scene, at: Array, v: Array) -> bool:
         return True
     # Curved elements stand off the flat ones, and may do so on the far side of them.
     points, triangles, _ = curved_mesh(pair.shell, 8)
-    corners = np.array([pair.shell_placement.act(p) for p in points])[triangles]
+    corners = np.array([pair.placement_j.act(p) for p in points])[triangles]
     speed = float(np.linalg.norm(v))
     return sweep(at, v / speed, 0.999 * shot.aim.radius, corners) < speed * shot.duration
 
@@ -166,7 +166,7 @@ def fly(number: int, shot: Shot, integrator: Any, tally: Tally) -> None:
     energy = result.energy
     gain = (energy.kinetic[-1] + energy.elastic[-1]) / energy.kinetic[0] - 1
     tally.gain.append(max(gain, 0.0) / allowed_gain(shot, integrator))
-    tally.depth.append(result.stats["pairs"]["shot"]["max_depth"] / shot.aim.radius)
+    tally.depth.append(result.stats.pairs["shot"].max_depth / shot.aim.radius)
 
 
 def _changed_side(shot: Shot, centres: Array) -> bool:

@@ -7,6 +7,8 @@ import pytest
 from tests.hard_cases.__main__ import MODULES, collect, row
 from tests.hard_cases.verdict import Case
 
+pytestmark = pytest.mark.slow
+
 CASES = collect()
 
 

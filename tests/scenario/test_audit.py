@@ -60,6 +60,7 @@ def exact(name, log):
     return RADIUS - (length - reach), way / length[:, None]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MADE)
 def test_audit_agrees_with_formulas(name, tmp_path):
     make, start, more = MADE[name]

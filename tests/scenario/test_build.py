@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sphshell_pin import ImpactLaw
+from sphshell_pin import Adaptive, ImpactLaw, RungeKutta4, SemiImplicitEuler
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build
 from tests.scenario.files import DROP, write
@@ -195,3 +195,26 @@ def test_an_unknown_method_is_answered_with_the_valid_ones(tmp_path):
     text = DROP.replace(LAW_LINE, f'method = "smoth"\n{LAW_LINE}')
     with pytest.raises(ScenarioError, match=r"'facets', 'smooth' or 'elements'"):
         build(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("keys", "integrator"),
+    [
+        ("", Adaptive()),
+        ("rtol = 1e-4\n", Adaptive(1e-4)),
+        ("dt = 2e-5\n", SemiImplicitEuler(2e-5)),
+        ('integrator = "runge-kutta-4"\n', RungeKutta4()),
+    ],
+)
+def test_the_integrator_is_adaptive_unless_dt_is_given(keys, integrator, tmp_path):
+    path = write(tmp_path, DROP.replace("dt = 1e-4\n", keys))
+    assert build(path).simulation.integrator == integrator
+    if not keys:
+        fixed = build(path, {"run.dt": "1e-3"}).simulation.integrator
+        assert fixed == SemiImplicitEuler(1e-3)
+
+
+def test_a_key_that_only_python_has_is_refused(tmp_path):
+    table = '[controller]\ntype = "gravity-compensation"\njoints = ["x"]\n[run]'
+    with pytest.raises(ScenarioError, match="unknown key 'joints'"):
+        build(write(tmp_path, DROP.replace("[run]", table)))

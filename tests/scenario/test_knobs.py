@@ -96,6 +96,7 @@ def test_a_value_set_from_outside_widens_the_range(tmp_path):
     assert (found.low, found.value, found.high) == (9e5, 5e6, 5e6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_shipped_knobs_hold_over_their_range(name):
     built = build(name)
@@ -187,3 +188,22 @@ def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
     live.change(before.key, 0.0)
     (after,) = live.knobs
     assert (after.low, after.high, after.value) == (before.low, before.high, 0.0)
+
+
+def test_labels_units_and_limits_are_those_of_the_description(tmp_path):
+    adams = 'law = { type = "adams", units = "in-lbf-s" }'
+    hertz = (
+        'law = { type = "hertz", radius = 0.01, young_1 = 1e9, poisson_1 = 0.3, young_2 = 1e9, '
+        "poisson_2 = 0.3, restitution = 0.5, speed = 1 }"
+    )
+    law = next(line for line in DROP.splitlines() if line.startswith("law"))
+    for text, key, label, unit, high in (
+        (adams, "k", "stiffness", "lbf/in^2.2", 1e6),
+        (adams, "c", "damping", "lbf s/in", 100.0),
+        (adams, "d", "full damping depth", "in", 1.0),
+        (hertz, "young_1", "Young's modulus 1", "Pa", 1e10),
+        (hertz, "restitution", "restitution", "", 1.0),
+    ):
+        path = write(tmp_path, DROP.replace(law, text) + knob(f"contact.ball-plate.law.{key}"))
+        (found,) = knobs_of(build(path))
+        assert (found.label, found.unit, found.high) == (label, unit, high)

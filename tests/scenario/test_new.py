@@ -82,6 +82,7 @@ CASES = [
 AT_HAND = ("arm", "ball", "three_link_finger")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("robot", "surface", "options"), CASES)
 def test_what_is_written_works(robot, surface, options, tmp_path):
     if robot not in AT_HAND:
@@ -100,6 +101,7 @@ def test_what_is_written_works(robot, surface, options, tmp_path):
     assert 0 < min(gaps) <= 2.01 * radius
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["ball", "arm"])
 def test_a_cad_file_works_without_a_unit(robot, tmp_path):
     pytest.importorskip("OCP")
@@ -114,6 +116,7 @@ def test_a_cad_file_works_without_a_unit(robot, tmp_path):
     assert sizes.max() == pytest.approx(5 * 0.0254, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_robot_that_stands_weighs_what_it_weighs(tmp_path):
     pytest.importorskip("example_robot_data")
     built = new_scenario("a1", out=tmp_path / "a1.toml").built

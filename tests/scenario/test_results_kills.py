@@ -28,6 +28,8 @@ from tests import meshes
 from tests.scenario.files import write
 from tests.scenario.operations import contents, counted, fill, interrupt, killed_at, visible
 
+pytestmark = pytest.mark.slow
+
 MESH = Path(__file__).parents[1] / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
 OTHERS = {"notes.txt": b"mine", "stopped/run.npz": b"stopped early"}
 

@@ -120,6 +120,7 @@ def test_what_was_computed_until_then_is_written(fault, built, tmp_path, monkeyp
     assert not json.loads((tmp_path / "out" / "summary.json").read_text())["complete"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [Interrupted, SimulationDiverged])
 def test_a_run_that_stops_early_spares_complete_results(fault, built, tmp_path, monkeypatch):
     out = tmp_path / "out"
@@ -140,6 +141,7 @@ def test_a_run_that_stops_early_spares_complete_results(fault, built, tmp_path, 
     assert (out / "notes.txt").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_partial_results_are_replaced_in_place(built, tmp_path, monkeypatch):
     out = tmp_path / "out"
     stop_early(monkeypatch)

@@ -145,17 +145,17 @@ def test_faces_written_one_by_one_are_joined(tmp_path):
     assert not any("joined within" in note for note in loose.health.notes)
 
 
-@pytest.mark.parametrize(("unit", "metres"), [("MM", 1e-3), ("M", 1.0), ("INCH", 0.0254)])
-def test_the_unit_of_the_header_is_taken(unit, metres, tmp_path):
+@pytest.mark.parametrize(("unit", "meters"), [("MM", 1e-3), ("M", 1.0), ("INCH", 0.0254)])
+def test_the_unit_of_the_header_is_taken(unit, meters, tmp_path):
     path = shapes.write_step(tmp_path / "box.step", ("box", shapes.box()), unit=unit)
     iges = shapes.write_iges(tmp_path / "box.iges", shapes.box(), "IN" if unit == "INCH" else unit)
     for file in (path, iges):
         shell = Shell.from_file(file)
         assert np.allclose(shell.box[1] - shell.box[0], [0.02, 0.03, 0.01])
-        assert shell.health.scale == pytest.approx(metres)
+        assert shell.health.scale == pytest.approx(meters)
         with pytest.warns(UnitWarning, match="though the file's header says"):
             larger = Shell.from_file(file, unit="ft")
-        assert larger.size == pytest.approx(shell.size * 0.3048 / metres)
+        assert larger.size == pytest.approx(shell.size * 0.3048 / meters)
     assert Shell.from_file(iges, scale=2.0).size == pytest.approx(2 * shell.size)
 
 
@@ -165,6 +165,7 @@ def test_brep_files_need_a_unit(tmp_path):
         Shell.from_file(path)
 
 
+@pytest.mark.slow
 def test_a_wire_holds_no_surface(tmp_path):
     edge = BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, 0), gp_Pnt(1, 0, 0)).Edge()
     files = [
@@ -259,6 +260,7 @@ def test_a_library_of_the_system_that_is_absent_is_named(reason, told, tmp_path,
     assert caught.value.reason == reason
 
 
+@pytest.mark.slow
 def test_the_library_is_never_imported(tmp_path):
     """So does reading a CAD file: another process imports it."""
     path = shapes.write_brep(tmp_path / "box.brep", shapes.box())

@@ -17,6 +17,8 @@ from sphshell_pin.shell.converting import convert
 from tests import meshes
 from tests.shell import cad_shapes as shapes
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def plate(tmp_path):

@@ -199,7 +199,7 @@ def test_reasons_and_normals_set_aside_are_counted_by_element():
     whys, counts = zip(*report.flat_because, strict=True)
     assert counts == (6, 2)
     assert "turns" in whys[0]
-    assert "witness" in whys[1]
+    assert "straightened" in whys[1]
     assert report.normals_set_aside == 2
     corner = shell.vertices[shell.triangles.ravel()[40]]
     assert report.set_aside_at == tuple(corner)

@@ -45,9 +45,7 @@ def bent_sheet(crease_angle: float = np.deg2rad(10.0)) -> Shell:
     raw = raw_surface(np.array(vertices, float), np.array(elements), np.array(normals))
     names = ("round", "tangent", "other")
     surface = clean_surface(replace(raw, faces=np.array(face, np.int32), face_names=names))
-    shell = Shell.__new__(Shell)
-    shell._set(surface, crease_angle, "both", "bent", None, None)
-    return shell
+    return Shell.from_surface(surface, crease_angle, name="bent")
 
 
 def kind_of(shell: Shell, x: float, y: float) -> int:

@@ -59,9 +59,9 @@ def test_round_trip(tmp_path, suffix, unit):
 def test_round_trip_with_normals(tmp_path, suffix):
     rng = np.random.default_rng(0)
     normals = rng.normal(size=(6, 4, 3)) * 0.1
-    centre = np.array([0.5, 0.5, 0.5])
+    center = np.array([0.5, 0.5, 0.5])
     for k, quad in enumerate(CUBE_QUADS):
-        normals[k] += 2 * (CUBE[quad].mean(axis=0) - centre)
+        normals[k] += 2 * (CUBE[quad].mean(axis=0) - center)
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
     shell = cube(normals=normals)
     path = tmp_path / f"cube.{suffix}"
@@ -191,8 +191,8 @@ def test_off_with_comments_colours_and_loose_lines(write):
         "one line": "OFF 8 6 0 " + (body + plain).replace("\n", " "),
         "comments": f"OFF # cube\n# by hand\n\n8 6 12 # counts\n{body}\n{plain}# end",
         "no edges": f"OFF\n8 6\n{body}{plain}",
-        "colours": f"OFF\n8 6 0\n{body}" + plain.replace("\n", " 3 255 0 0\n"),
-        "vertex colours": "COFF\n8 6 0\n" + body.replace("\n", " 1 0 0 1\n") + plain,
+        "colors": f"OFF\n8 6 0\n{body}" + plain.replace("\n", " 3 255 0 0\n"),
+        "vertex colors": "COFF\n8 6 0\n" + body.replace("\n", " 1 0 0 1\n") + plain,
     }
     for name, text in texts.items():
         shell = Shell.from_file(write("cube.off", text), unit="m")

@@ -89,7 +89,7 @@ def test_text_lines_are_skipped_and_said(write):
     lines[3:3] = ["! points of the cube", "x y z"]
     shell = Shell.from_file(write(["made by hand", *lines, "END"]))
     assert shell.is_closed
-    assert any("4 lines of text skipped" in note for note in shell.health.notes)
+    assert any("4 lines of text were skipped" in note for note in shell.health.notes)
     assert "made by hand" in str(shell.health)
 
 
@@ -137,7 +137,7 @@ def test_scale(write, options, size, word):
     assert any(word in note and "0.0254" in note for note in shell.health.notes)
 
 
-@pytest.mark.parametrize("scale", ["metres", 0.0, -1.0, np.nan, True])
+@pytest.mark.parametrize("scale", ["meters", 0.0, -1.0, np.nan, True])
 def test_wrong_scale(write, scale):
     with pytest.raises(InvalidParameter, match="apply"):
         Shell.from_file(write(version_1()), scale=scale)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import json
+import contextlib
+import sqlite3
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -86,12 +87,14 @@ def write(folder: Path, figure: str | None = None) -> Path:
 
 
 def entries(table: Path) -> list[dict[str, Any]]:
-    """Return the whole lines of a table's journal, without the first."""
+    """Return the rows of a table's journal; none while there is no journal."""
     journal = table.with_name(table.name + ".journal")
-    lines = (
-        journal.read_text(encoding="utf-8").splitlines(keepends=True) if journal.exists() else []
-    )
-    return [json.loads(line) for line in lines[1:] if line.endswith("\n")]
+    try:
+        with contextlib.closing(sqlite3.connect(f"file:{journal}?mode=ro", uri=True)) as file:
+            file.row_factory = sqlite3.Row
+            return [dict(row) for row in file.execute("SELECT * FROM runs ORDER BY rowid")]
+    except sqlite3.OperationalError:  # it is not there, or has no tables yet
+        return []
 
 
 def check_once(table: Path, runs: int) -> None:

@@ -1,7 +1,8 @@
-"""A sweep of 500 runs whose workers, and which itself, are killed.
+"""A sweep of many runs whose workers, and which itself, are killed.
 
-`python -m tests.study.sweep_survival` prints, for each way to make the runs, whether every run is
-in the table once, and whether the file is bit for bit that of runs made in turn in one process.
+`python -m tests.study.sweep_survival [RUNS]` prints, for each way to make the runs, whether every
+run is in the table once, and whether the file is bit for bit that of runs made in turn in one
+process.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from sphshell_pin.study.sweep import plan_sweep, run_plan
 from tests.study.cluster import Cluster
 from tests.study.resting import entries, write
 
-RUNS = 500
-VARY = ["contact.law.stiffness=1e4:1e6:log:125", "contact.law.exponent=1.5,1.75,2,2.25"]
+RUNS = int(sys.argv[1]) if len(sys.argv) > 1 else 500  # a multiple of 20
+VARY = [f"contact.law.stiffness=1e4:1e6:log:{RUNS // 4}", "contact.law.exponent=1.5,1.75,2,2.25"]
 COMMAND = [sys.executable, "-c", "from sphshell_pin.cli import main; main()", "sweep"]
 Progress = Callable[[int, int, int], None]
 
@@ -65,9 +66,9 @@ def main() -> int:
         for way, kills in (
             ("in turn, in one process", 0),
             ("two processes", 0),
-            ("two processes, workers killed after 100, 250, 400 runs", 3),
-            ("two processes, the sweep killed after 200 runs, resumed", 1),
-            ("Dask, two workers, one killed after 250 runs", 1),
+            ("two processes, workers killed three times", 3),
+            ("two processes, the sweep killed, resumed", 1),
+            ("Dask, two workers, one killed", 1),
         ):
             table = folder / f"{way}.parquet"
             deaths: list[str] = []
@@ -76,15 +77,15 @@ def main() -> int:
                 run_plan(plan, workers=0, out=table)
                 reference = table.read_bytes()
             elif way.startswith("Dask"):
-                stop = killer(table, (250,), deaths)
+                stop = killer(table, (RUNS // 2,), deaths)
                 run_plan(plan, scheduler=cluster.address, out=table, progress=stop)
             elif "resumed" in way:
-                kill_the_sweep(scenario, table, 200)
+                kill_the_sweep(scenario, table, 2 * RUNS // 5)
                 deaths.append("the sweep")
                 resumed = run_plan(plan, workers=2, out=table).resumed
-                assert 200 <= resumed < RUNS
+                assert 2 * RUNS // 5 <= resumed < RUNS
             else:
-                at = (100, 250, 400) if kills else ()
+                at = (RUNS // 5, RUNS // 2, 4 * RUNS // 5) if kills else ()
                 run_plan(plan, workers=2, out=table, progress=killer(table, at, deaths))
             took = time.perf_counter() - start
             times = Counter(one["run"] for one in entries(table))

@@ -15,6 +15,8 @@ from sphshell_pin.study.sweep import plan_sweep, run_plan, sweep
 from tests.study.cluster import Cluster
 from tests.study.resting import check_once, entries, write
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("distributed")
 pytest.importorskip("pyarrow")
 

@@ -15,6 +15,8 @@ from typer.testing import CliRunner
 from sphshell_pin.cli import app
 from tests.study.resting import check_once, entries, write
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.dynamics.scene import SceneContacts
+from sphshell_pin.dynamics.scene_contacts import ROW, SceneContacts
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.scenario.player import Rows
 from tests.view.stand_ins import contact_pair, plate
@@ -72,9 +72,12 @@ class BallPlayer:
         touching = self.depth() > 0.0
         force = self.knob_values["stiffness"] * self.depth()
         friction = [0.0] * 3 if self.friction is None else [-0.1 * force, 0.0, 0.0]
-        row = [0, self.q[0], self.q[1], 0, 0, 0, 1, self.depth(), force, *friction, *self.v]
-        rows = np.array([[*row, 0, 0, 0]]) if touching else np.zeros((0, 18))
-        return SceneContacts.from_rows(rows)
+        rows = np.zeros(int(touching), ROW)
+        rows["point_world"] = [self.q[0], self.q[1], 0]
+        rows["normal_world"] = [0, 0, 1]
+        rows["depth"], rows["normal_force"] = self.depth(), force
+        rows["friction_force_world"], rows["slip_velocity_world"] = friction, self.v
+        return SceneContacts.from_rows(rows.tobytes())
 
     def advance(self, duration, wall=np.inf):
         self.calls.append((duration, wall))
@@ -147,7 +150,7 @@ class ArmPlayer(BallPlayer):
         self.scene = SimpleNamespace(model=model, pairs=(pair,))
         self.q = pin.integrate(model, pin.neutral(model), np.linspace(0.1, 0.6, model.nv))
 
-    contacts = property(lambda _: SceneContacts.from_rows(np.zeros((0, 18))))
+    contacts = property(lambda _: SceneContacts.from_rows(b""))
 
     def advance(self, duration, wall=np.inf):
         return Rows.empty(1)

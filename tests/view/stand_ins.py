@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.dynamics.run_stats import RunStats
+
 CUBE_VERTICES = np.array(np.meshgrid(*3 * [(-0.5, 0.5)], indexing="ij")).reshape(3, -1).T
 CUBE_ELEMENTS = np.array(
     [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -52,8 +54,8 @@ def contact_pair(model, frame, radius, shell, shell_frame="universe", placement=
         sphere=None if radius is None else SimpleNamespace(radius=radius),
         shell=shell,
         placement=placement,
-        sphere_placement=sphere_frame.placement,
-        shell_placement=shell_body.placement * placement,
+        placement_i=sphere_frame.placement,
+        placement_j=shell_body.placement * placement,
         joint_i=sphere_frame.parentJoint,
         joint_j=shell_body.parentJoint,
         method="facets",
@@ -117,7 +119,7 @@ def a_result(t, q, rows=(), pairs=("tip",), **energy):
         pairs=list(pairs),
         contacts=contact_log(rows),
         energy=SimpleNamespace(**{**audit, "exchanged": 1.0, **energy}),
-        stats={},
+        stats=RunStats(),
         scene=None,
         origin=None,
     )

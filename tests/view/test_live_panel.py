@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from sphshell_pin.contact import BristleFriction, CoulombFriction
-from sphshell_pin.dynamics.scene import SceneContacts
+from sphshell_pin.dynamics.scene_contacts import ROW, SceneContacts
 from sphshell_pin.scenario.player import Rows
 from sphshell_pin.view.live.panel import MOST_LISTED, Panel, Strip, dump, list_contacts
 
@@ -73,16 +73,16 @@ def test_contacts_are_listed_in_millimetres_and_stick_or_slip():
         BristleFriction(0.3, 0.2, stiffness=1e5, v_stribeck=0.1),
     ]
     pairs = tuple(SimpleNamespace(friction=law) for law in laws)
-    rows = np.zeros((5, 18))
-    rows[:, 0] = [0, 1, 1, 2, 2]
-    rows[:, 7] = 2e-4
-    rows[:, 8] = 5.0
-    rows[:, 9:12] = [0.0, 0.3, 0.4]
-    rows[:, 12] = [1.0, 0.009, 0.011, 0.0009, 0.0011]
-    listed = list_contacts(SceneContacts.from_rows(rows), pairs)
+    rows = np.zeros(5, ROW)
+    rows["pair"] = [0, 1, 1, 2, 2]
+    rows["depth"], rows["normal_force"] = 2e-4, 5.0
+    rows["friction_force_world"] = [0.0, 0.3, 0.4]
+    slip = rows["slip_velocity_world"][:, 0]
+    slip[:] = [1.0, 0.009, 0.011, 0.0009, 0.0011]
+    listed = list_contacts(SceneContacts.from_rows(rows.tobytes()), pairs)
     assert [one["sticks"] for one in listed] == [None, True, False, True, False]
     np.testing.assert_allclose([one["depth"] for one in listed], 0.2)
     np.testing.assert_allclose([one["friction"] for one in listed], 0.5)
-    np.testing.assert_allclose([one["slip"] for one in listed], 1e3 * rows[:, 12])
-    many = SceneContacts.from_rows(np.zeros((3 * MOST_LISTED, 18)))
+    np.testing.assert_allclose([one["slip"] for one in listed], 1e3 * slip)
+    many = SceneContacts.from_rows(bytes(3 * MOST_LISTED * ROW.itemsize))
     assert len(list_contacts(many, pairs)) == MOST_LISTED

@@ -13,6 +13,8 @@ from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.scenario import build, run_built
 from tests.scenario.files import DROP, write
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):

@@ -47,15 +47,13 @@ void bind_contact(nb::module_& m) {
   m.def(
       "contact_force",
       [](const NormalLaw& law, const FrictionLaw* friction, double depth, const Vec3& normal,
-         const Vec3& relative) {
-        Meeting<double> meeting;
-        meeting.depth = depth;
-        meeting.normal = normal;
-        meeting.relative = relative;
-        const ContactForce<double> f =
-            contact_force(law, friction ? *friction : FrictionLaw(), 0.0, 1.0, meeting);
-        return nb::make_tuple(f.normal, f.friction, f.slip);
+         const Vec3& relative, double spin, const Vec3& bristle, double radius, double relaxation) {
+        const ContactKinematics<double> kinematics{depth, normal, relative, spin, bristle};
+        const ContactForce<double> f = contact_force(law, friction ? *friction : FrictionLaw(),
+                                                     radius, relaxation, kinematics);
+        return nb::make_tuple(f.normal, f.friction, f.torsion, f.bristle_rate);
       },
       nb::arg("law"), nb::arg("friction").none(), nb::arg("depth"), nb::arg("normal"),
-      nb::arg("relative"));
+      nb::arg("relative"), nb::arg("spin"), nb::arg("bristle"), nb::arg("radius"),
+      nb::arg("relaxation"));
 }

@@ -6,7 +6,6 @@
 #include "bindings/arrays.hpp"
 #include "bindings/callbacks.hpp"
 #include "bindings/evaluations.hpp"
-#include "bindings/one_user.hpp"
 #include "bindings/records.hpp"
 #include "dynamics/linearization.hpp"
 #include "dynamics/simulation.hpp"
@@ -52,12 +51,6 @@ std::vector<Vec3> to_points(const RowPoints& rows) {
   return out;
 }
 
-// At a state of its own, no part of a run: bristles are not stretched.
-void evaluate_alone(Scene& scene, const VectorX& q, const VectorX& v) {
-  scene.restart();
-  scene.evaluate(q, v, VectorX::Zero(scene.bristle_size()));
-}
-
 // A run for one user at a time.
 struct Run {
   OneUser user{"run"};
@@ -98,6 +91,10 @@ int visit_evaluations(const Evaluations& evaluations, visitproc visit, void* arg
       [&](const std::vector<Pair>& pairs) { return visit_sources(pairs, visit, arg); });
 }
 
+int visit_state(const OwnState& own, visitproc visit, void* arg) {
+  return visit_sources(own.state.scene().pairs(), visit, arg);
+}
+
 int visit_controller(const PythonController& controller, visitproc visit, void* arg) {
   Py_VISIT(controller.callable().ptr());
   return 0;
@@ -117,6 +114,39 @@ PyType_Slot* slots() {
   return all;
 }
 
+// What a scene answers at one state, with a memory of its own or without.
+template <class T>
+void bind_evaluations(nb::class_<T>& bound) {
+  bound
+      .def("external_forces",
+           [](T& self, const VectorX& q, const VectorX& v) {
+             return self.at(q, v, [&](Scene& scene, auto&& evaluate) {
+               evaluate();
+               const Forces none(scene.touching() ? 0 : scene.external().size(),
+                                 pinocchio::Force::Zero());
+               return to_python(scene.touching() ? scene.external() : none);
+             });
+           })
+      .def("contacts",
+           [](T& self, const VectorX& q, const VectorX& v) {
+             return self.at(q, v, [&](Scene& scene, auto&& evaluate) {
+               std::vector<ContactRow> rows;
+               evaluate();
+               scene.log(q, v, rows);
+               return to_bytes(std::move(rows));
+             });
+           })
+      .def("contact_derivatives", [](T& self, const VectorX& q, const VectorX& v) {
+        return self.at(q, v, [&](Scene& scene, auto&& evaluate) {
+          Linearization linearization(scene);
+          evaluate();
+          MatrixX by_q, by_v;
+          linearization.forces(q, v, by_q, by_v);
+          return std::pair(by_q, by_v);
+        });
+      });
+}
+
 }  // namespace
 }  // namespace sphshell
 
@@ -128,49 +158,23 @@ void bind_dynamics(nanobind::module_& m) {
            nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("shell").none(),
            nb::arg("source").none(), nb::arg("method"), nb::arg("law"), nb::arg("friction").none());
 
-  nb::class_<Evaluations>(m, "Scene", nb::type_slots(slots<Evaluations, visit_evaluations>()))
+  m.def("contact_row_type", &contact_row_type);
+
+  nb::class_<Evaluations> scene(m, "Scene",
+                                nb::type_slots(slots<Evaluations, visit_evaluations>()));
+  bind_evaluations(scene);
+  scene
       .def(
           "__init__",
           [](Evaluations* self, nb::handle model, const std::vector<const Pair*>& pairs) {
             new (self) Evaluations(model_of(model), copies(pairs));
           },
           nb::arg("model"), nb::arg("pairs"))
-      .def("external_forces",
-           [](Evaluations& self, const VectorX& q, const VectorX& v) {
-             return self.at(q, v, [&](Scene& scene) {
-               evaluate_alone(scene, q, v);
-               const Forces none(scene.touching() ? 0 : scene.external().size(),
-                                 pinocchio::Force::Zero());
-               return to_python(scene.touching() ? scene.external() : none);
-             });
-           })
-      .def("contacts",
-           [](Evaluations& self, const VectorX& q, const VectorX& v) {
-             return self.at(q, v, [&](Scene& scene) {
-               std::vector<ContactRow> rows;
-               evaluate_alone(scene, q, v);
-               scene.log(q, v, rows);
-               return rows_to_array(std::move(rows));
-             });
-           })
-      .def("contact_derivatives",
-           [](Evaluations& self, const VectorX& q, const VectorX& v) {
-             return self.at(q, v, [&](Scene& scene) {
-               Linearization linearization(scene);
-               evaluate_alone(scene, q, v);
-               MatrixX by_q, by_v;
-               linearization.forces(q, v, by_q, by_v);
-               return std::pair(by_q, by_v);
-             });
-           })
-      .def_prop_ro("bristle_size",
-                   [](Evaluations& self) {
-                     return self.with_scene([](Scene& scene) { return scene.bristle_size(); });
-                   })
+      .def_prop_ro("bristle_size", &Evaluations::bristle_size)
       .def("rates",
            [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
               const VectorX& tau) {
-             return self.at(q, v, [&](Scene& scene) {
+             return self.at(q, v, [&](Scene& scene, auto&&) {
                check_count("z", z.size(), scene.bristle_size());
                check_count("tau", tau.size(), v.size());
                scene.restart();
@@ -184,7 +188,7 @@ void bind_dynamics(nanobind::module_& m) {
           "rate_jacobian",
           [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
              const VectorX& tau, int repeat) {
-            return self.at(q, v, [&](Scene& scene) {
+            return self.at(q, v, [&](Scene& scene, auto&&) {
               check_count("z", z.size(), scene.bristle_size());
               check_count("tau", tau.size(), v.size());
               Linearization linearization(scene);
@@ -196,6 +200,18 @@ void bind_dynamics(nanobind::module_& m) {
             });
           },
           nb::arg("q"), nb::arg("v"), nb::arg("z"), nb::arg("tau"), nb::arg("repeat") = 1);
+
+  nb::class_<OwnState> state(m, "SceneState", nb::type_slots(slots<OwnState, visit_state>()));
+  bind_evaluations(state);
+  state
+      .def(
+          "__init__",
+          [](OwnState* self, nb::handle model, const std::vector<const Pair*>& pairs) {
+            new (self) OwnState(model_of(model), copies(pairs));
+          },
+          nb::arg("model"), nb::arg("pairs"))
+      .def("copy", [](const OwnState& self) { return new OwnState(self); })
+      .def("advance", &OwnState::advance, nb::arg("q"), nb::arg("v"), nb::arg("dt"));
 
   nb::class_<Controller>(m, "Controller");
   nb::class_<GravityCompensation, Controller>(m, "GravityCompensation")
@@ -243,16 +259,10 @@ void bind_dynamics(nanobind::module_& m) {
   nb::class_<RunSettings>(m, "RunSettings")
       .def(
           "__init__",
-          [](RunSettings* self, int integrator, double dt, double rtol, double atol,
+          [](RunSettings* self, std::string integrator, double dt, double rtol, double atol,
              double duration, double start_time, double control_dt, double record_dt) {
-            new (self) RunSettings{static_cast<Integrator>(integrator),
-                                   dt,
-                                   rtol,
-                                   atol,
-                                   duration,
-                                   start_time,
-                                   control_dt,
-                                   record_dt};
+            new (self) RunSettings{
+                {std::move(integrator), dt, rtol, atol}, duration, start_time, control_dt, record_dt};
           },
           nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"), nb::arg("atol"),
           nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"));
@@ -287,6 +297,11 @@ void bind_dynamics(nanobind::module_& m) {
             return static_cast<int>(self.simulation.advance(wall_seconds, until));
           },
           nb::arg("wall_seconds"), nb::arg("until") = std::numeric_limits<double>::infinity())
+      .def("deep_start",
+           [](Run& self) {
+             const Use use(self.user, "start");
+             return to_python(self.simulation.deep_start());
+           })
       .def(
           "change",
           [](Run& self, const std::vector<const Pair*>& pairs,
@@ -318,10 +333,7 @@ void bind_dynamics(nanobind::module_& m) {
       .def_prop_ro("time", &alone<&Simulation::time>)
       .def_prop_ro("q", &alone<&Simulation::q>)
       .def_prop_ro("v", &alone<&Simulation::v>)
-      .def_prop_ro("steps", &alone<&Simulation::steps>)
-      .def_prop_ro("full", &alone<&Simulation::full>)
-      .def_prop_ro("rejected", &alone<&Simulation::rejected>)
-      .def_prop_ro("evaluations", &alone<&Simulation::evaluations>)
+      .def_prop_ro("counts", [](Run& self) { return to_dict(alone<&Simulation::counts>(self)); })
       .def_prop_ro("last_step", &alone<&Simulation::last_step>)
       .def_prop_ro("wall_time", &alone<&Simulation::wall_time>)
       .def_prop_ro("summaries",

@@ -60,7 +60,7 @@ nb::dict step_parts(nb::handle model, const std::vector<const Pair*>& pairs, con
   const double query = time([&] {
     for (std::size_t k = 0; k < pairs.size(); ++k)
       if (pairs[k]->shell)
-        queries[k].find(*pairs[k]->shell, scene.states()[k].centre, pairs[k]->radius,
+        queries[k].find(*pairs[k]->shell, scene.states()[k].center, pairs[k]->radius,
                         pairs[k]->method);
   });
   const double evaluation = time([&] { scene.evaluate(q, v, z); });

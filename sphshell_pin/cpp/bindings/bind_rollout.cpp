@@ -25,25 +25,11 @@ double residual(const std::vector<double>& energy) {
   return sum;
 }
 
-nb::dict to_dict(const Outcome& outcome) {
-  nb::dict out;
-  nb::list through;
+nb::list through(const Outcome& outcome) {
+  nb::list pairs;
   for (const Event& event : outcome.record.events)
-    if (event.kind == Event::Kind::Through) through.append(event.pair);
-  out["through"] = through;
-  out["residual"] = residual(outcome.record.energy);
-  out["status"] = static_cast<int>(outcome.status);
-  out["fault"] = outcome.fault;
-  out["time"] = outcome.time;
-  out["last_step"] = outcome.last_step;
-  out["wall_time"] = outcome.wall_time;
-  out["steps"] = outcome.steps;
-  out["rejected"] = outcome.rejected;
-  out["evaluations"] = outcome.evaluations;
-  out["q"] = outcome.q;
-  out["v"] = outcome.v;
-  out["summaries"] = to_list(outcome.summaries);
-  return out;
+    if (event.kind == Event::Kind::Through) pairs.append(event.pair);
+  return pairs;
 }
 
 }  // namespace
@@ -51,6 +37,20 @@ nb::dict to_dict(const Outcome& outcome) {
 
 void bind_rollout(nanobind::module_& m) {
   using namespace sphshell;
+  nb::class_<Outcome>(m, "Outcome")
+      .def_prop_ro("status", [](const Outcome& self) { return static_cast<int>(self.status); })
+      .def_ro("fault", &Outcome::fault)
+      .def_prop_ro("deep_start", [](const Outcome& self) { return to_python(self.deep_start); })
+      .def_ro("time", &Outcome::time)
+      .def_ro("last_step", &Outcome::last_step)
+      .def_ro("wall_time", &Outcome::wall_time)
+      .def_prop_ro("counts", [](const Outcome& self) { return to_dict(self.counts); })
+      .def_prop_ro("q", [](const Outcome& self) { return self.q; })
+      .def_prop_ro("v", [](const Outcome& self) { return self.v; })
+      .def_prop_ro("summaries", [](const Outcome& self) { return to_list(self.summaries); })
+      .def_prop_ro("residual", [](const Outcome& self) { return residual(self.record.energy); })
+      .def_prop_ro("through", &through);
+
   nb::class_<Rollout>(m, "Rollout")
       .def(
           "__init__",
@@ -88,8 +88,12 @@ void bind_rollout(nanobind::module_& m) {
              self.give_back();
            })
       .def("__len__", [](const Rollout& self) { return self.outcomes().size(); })
-      .def("outcome", [](const Rollout& self,
-                         std::size_t number) { return to_dict(self.outcomes().at(number)); })
+      .def(
+          "outcome",
+          [](const Rollout& self, std::size_t number) -> const Outcome& {
+            return self.outcomes().at(number);
+          },
+          nb::rv_policy::reference_internal)
       .def("record", [](const Rollout& self, std::size_t number) {
         const auto& model = self.model();
         return to_dict(self.outcomes().at(number).record, model.nq, model.nv);

@@ -9,9 +9,10 @@ namespace {
 
 // Numbers go to and fro as plain memory: NumPy gives the interpreter's lock away when it copies,
 // and might not get it back (see gil.hpp).
-PyObject* bytes_of(const double* first, std::size_t count) {
+template <class T>
+PyObject* bytes_of(const T* first, std::size_t count) {
   return PyByteArray_FromStringAndSize(reinterpret_cast<const char*>(first),
-                                       static_cast<Py_ssize_t>(count * sizeof(double)));
+                                       static_cast<Py_ssize_t>(count * sizeof(T)));
 }
 
 PyObject* pack(std::initializer_list<PyObject*> items) {
@@ -73,9 +74,8 @@ void PythonController::torque(Scene& scene, double t, const VectorX& q, const Ve
   scene.log(q, v, rows);
   const AcquireGil gil;
   const nb::object answer = gil.call(callable_, [&] {
-    return pack(
-        {PyFloat_FromDouble(t), bytes_of(q.data(), q.size()), bytes_of(v.data(), v.size()),
-         bytes_of(rows.empty() ? nullptr : &rows[0].pair, rows.size() * ContactRow::kColumns)});
+    return pack({PyFloat_FromDouble(t), bytes_of(q.data(), q.size()), bytes_of(v.data(), v.size()),
+                 bytes_of(rows.data(), rows.size())});
   });
   const std::vector<double> torque = doubles_of(answer);
   tau = Eigen::Map<const VectorX>(torque.data(), static_cast<Eigen::Index>(torque.size()));

@@ -1,66 +1,89 @@
-// Evaluations of one scene, by any number of threads.
+// Evaluations of one scene: at single states by any number of threads, or along a motion.
 #pragma once
 
 #include <memory>
 #include <utility>
 #include <vector>
 
-#include "bindings/own_errors.hpp"
-#include "dynamics/scene.hpp"
+#include "bindings/one_user.hpp"
+#include "dynamics/scene_state.hpp"
 
 namespace sphshell {
 
-// A call has a Scene to itself: while its contact source runs, another thread, or the source
+inline void check_state(const Scene& scene, const VectorX& q, const VectorX& v) {
+  check_count("q", q.size(), scene.body().model().nq);
+  check_count("v", v.size(), scene.body().model().nv);
+}
+
+// A call has a state to itself: while its contact source runs, another thread, or the source
 // itself, may begin another. The interpreter's lock guards the fields.
 class Evaluations {
  public:
   Evaluations(const pinocchio::Model& model, std::vector<Pair> pairs)
-      : model_(model), pairs_(std::move(pairs)) {
-    idle_.push_back(std::make_unique<Scene>(model_, pairs_));
-  }
+      : first_(model, std::move(pairs)) {}
 
   Evaluations(const Evaluations&) = delete;
   Evaluations& operator=(const Evaluations&) = delete;
 
-  // work(scene) at a state (q, v), whose sizes are checked.
+  // work(scene, evaluate) at a state whose sizes are checked; evaluate() computes its forces.
   template <class Work>
   auto at(const VectorX& q, const VectorX& v, Work&& work) {
-    check_count("q", q.size(), model_.nq);
-    check_count("v", v.size(), model_.nv);
-    return with_scene(work);
-  }
-  template <class Work>
-  auto with_scene(Work&& work) {
-    std::unique_ptr<Scene> scene;
+    check_state(first_.scene(), q, v);
+    std::unique_ptr<SceneState> state;
     if (idle_.empty()) {
-      scene = std::make_unique<Scene>(model_, pairs_);
+      state = std::make_unique<SceneState>(first_);
     } else {
-      scene = std::move(idle_.back());
+      state = std::move(idle_.back());
       idle_.pop_back();
     }
-    const GiveBack give_back{idle_, scene};
-    return work(*scene);
+    const GiveBack give_back{idle_, state};
+    return work(state->scene(), [&] { state->evaluate(q, v); });
   }
+
+  int bristle_size() const { return first_.scene().bristle_size(); }
 
   // Those at work are not among them: what holds them is alive.
   template <class Visit>
   int for_each_pairs(Visit&& visit) const {
-    if (const int stop = visit(pairs_)) return stop;
-    for (const auto& scene : idle_)
-      if (const int stop = visit(scene->pairs())) return stop;
+    if (const int stop = visit(first_.scene().pairs())) return stop;
+    for (const auto& state : idle_)
+      if (const int stop = visit(state->scene().pairs())) return stop;
     return 0;
   }
 
  private:
+  using Idle = std::vector<std::unique_ptr<SceneState>>;
   struct GiveBack {
-    std::vector<std::unique_ptr<Scene>>& idle;
-    std::unique_ptr<Scene>& scene;
-    ~GiveBack() { idle.push_back(std::move(scene)); }
+    Idle& idle;
+    std::unique_ptr<SceneState>& state;
+    ~GiveBack() { idle.push_back(std::move(state)); }
   };
 
-  const pinocchio::Model model_;
-  const std::vector<Pair> pairs_;
-  std::vector<std::unique_ptr<Scene>> idle_;
+  const SceneState first_;  // the others are copies of it
+  Idle idle_;
+};
+
+// A SceneState for one user at a time.
+struct OwnState {
+  OneUser user{"SceneState"};
+  SceneState state;
+
+  OwnState(const pinocchio::Model& model, std::vector<Pair> pairs)
+      : state(model, std::move(pairs)) {}
+  OwnState(const OwnState& other) : state(other.state) {}
+
+  // As Evaluations::at, with what the state remembers.
+  template <class Work>
+  auto at(const VectorX& q, const VectorX& v, Work&& work) {
+    const Use use(user, "evaluation");
+    check_state(state.scene(), q, v);
+    return work(state.scene(), [&] { state.evaluate(q, v); });
+  }
+  void advance(const VectorX& q, const VectorX& v, double dt) {
+    const Use use(user, "advance");
+    check_state(state.scene(), q, v);
+    state.advance(q, v, dt);
+  }
 };
 
 }  // namespace sphshell

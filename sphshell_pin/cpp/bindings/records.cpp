@@ -2,13 +2,27 @@
 
 namespace sphshell {
 
-Array<double> rows_to_array(std::vector<ContactRow> rows) {
-  const std::size_t n = rows.size();
+Array<std::uint8_t> to_bytes(std::vector<ContactRow> rows) {
   auto* kept = new std::vector<ContactRow>(std::move(rows));
   nb::capsule owner(kept,
                     [](void* p) noexcept { delete static_cast<std::vector<ContactRow>*>(p); });
-  return Array<double>(reinterpret_cast<double*>(kept->data()),
-                       {n, std::size_t(ContactRow::kColumns)}, owner);
+  return Array<std::uint8_t>(kept->data(), {kept->size() * sizeof(ContactRow)}, owner);
+}
+
+nb::dict contact_row_type() {
+  nb::list names, formats, offsets;
+  for (const RowField& field : kContactRowFields) {
+    names.append(field.name);
+    formats.append(field.size == 1 ? nb::object(nb::str(field.type))
+                                   : nb::make_tuple(field.type, field.size));
+    offsets.append(field.offset);
+  }
+  nb::dict out;
+  out["names"] = names;
+  out["formats"] = formats;
+  out["offsets"] = offsets;
+  out["itemsize"] = sizeof(ContactRow);
+  return out;
 }
 
 nb::dict to_dict(Record record, int nq, int nv) {
@@ -26,11 +40,26 @@ nb::dict to_dict(Record record, int nq, int nv) {
   out["v"] = to_array(std::move(record.v), {n, std::size_t(nv)});
   out["energy"] = to_array(std::move(record.energy), {n, std::size_t(Record::kEnergies)});
   out["contact_row"] = to_array(std::move(record.contact_row));
-  out["contacts"] = rows_to_array(std::move(record.contacts));
+  out["contacts"] = to_bytes(std::move(record.contacts));
   out["event_t"] = to_array(std::move(event_t));
   out["event_pair"] = to_array(std::move(event_pair));
   out["event_kind"] = to_array(std::move(event_kind));
   return out;
+}
+
+nb::dict to_dict(const Counts& counts) {
+  nb::dict out;
+  out["steps"] = counts.steps;
+  out["rejected"] = counts.rejected;
+  out["evaluations"] = counts.evaluations;
+  out["event_steps"] = counts.event_steps;
+  out["event_queries"] = counts.event_queries;
+  return out;
+}
+
+nb::object to_python(const std::optional<DeepStart>& start) {
+  if (!start) return nb::none();
+  return nb::make_tuple(start->pair, start->depth);
 }
 
 nb::list to_list(const std::vector<PairSummary>& summaries) {

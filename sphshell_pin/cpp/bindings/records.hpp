@@ -10,8 +10,14 @@
 
 namespace sphshell {
 
-Array<double> rows_to_array(std::vector<ContactRow> rows);
+// The memory of rows; NumPy's view of it with contact_row_type() has named fields.
+Array<std::uint8_t> to_bytes(std::vector<ContactRow> rows);
+// Arguments of numpy.dtype.
+nb::dict contact_row_type();
 nb::dict to_dict(Record record, int nq, int nv);
+nb::dict to_dict(const Counts& counts);
+// (pair, depth [m]), or None.
+nb::object to_python(const std::optional<DeepStart>& start);
 nb::list to_list(const std::vector<PairSummary>& summaries);
 std::vector<Pair> copies(const std::vector<const Pair*>& pairs);
 

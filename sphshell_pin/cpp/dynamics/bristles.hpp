@@ -1,5 +1,5 @@
-// Where in the state the stretch of each contact's bristle stands, and what becomes of it when
-// contacts come, go, part and flow together.
+// Which slot of the state holds the stretch of each contact's bristle, and what becomes of it when
+// contacts begin, end, split and merge.
 #pragma once
 
 #include <vector>
@@ -10,7 +10,7 @@
 namespace sphshell {
 
 // Slots of 3 numbers each, in the order of the pairs and of the places of their contacts; behind
-// the known contacts of a pair some are spare, for those that a step meets on its way.
+// the known contacts of a pair are spare ones, for contacts that begin within a step.
 class Bristles {
  public:
   explicit Bristles(std::size_t pairs)
@@ -26,19 +26,20 @@ class Bristles {
     return slot < first_[k + 1] ? slot : -1;
   }
 
-  // Deals the slots anew at an accepted state, pair after pair, from the stretches in z.
-  void begin() { dealt_.clear(), next_[0] = 0; }
-  void deal_none(std::size_t k);
+  // At an accepted state all slots are assigned anew: begin(), then each pair in its order, then
+  // end(), which puts the stretches z in that order.
+  void begin() { stretches_.clear(), next_[0] = 0; }
+  void assign_none(std::size_t k);
   // `turned`: the stretches have followed their normals already.
-  void deal(std::size_t k, const std::vector<Contact>& contacts, const std::vector<int>& at,
-            const ContactTracker& tracker, const VectorX& z, bool torsional, bool turned);
+  void assign(std::size_t k, const std::vector<Contact>& contacts, const std::vector<int>& at,
+              const ContactTracker& tracker, const VectorX& z, bool torsional, bool turned);
   void end(VectorX& z);
 
  private:
   Vec3 stretch(std::size_t k, int place, const VectorX& z) const;
 
   std::vector<int> first_, next_;  // of each pair, and behind the last
-  std::vector<Vec3> dealt_;
+  std::vector<Vec3> stretches_;
   std::vector<char> has_;
   std::vector<int> used_;
 };

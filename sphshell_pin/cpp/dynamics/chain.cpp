@@ -1,36 +1,6 @@
 #include "dynamics/chain.hpp"
 
 namespace sphshell {
-namespace {
-
-Vector6 stacked(const Vec3& linear, const Vec3& angular) {
-  Vector6 out;
-  out << linear, angular;
-  return out;
-}
-
-// Rate of the twist b where it moves with the twist a.
-Vector6 motion_cross(const Vector6& a, const Vector6& b) {
-  const Vec3 velocity = a.head<3>(), spin = a.tail<3>();
-  const Vec3 b_velocity = b.head<3>(), b_spin = b.tail<3>();
-  return stacked(spin.cross(b_velocity) + velocity.cross(b_spin), spin.cross(b_spin));
-}
-
-// Rate of a wrench where it moves with the twist a.
-Vector6 force_cross(const Vector6& a, const Vector6& wrench) {
-  const Vec3 velocity = a.head<3>(), spin = a.tail<3>();
-  const Vec3 force = wrench.head<3>(), moment = wrench.tail<3>();
-  return stacked(spin.cross(force), spin.cross(moment) + velocity.cross(force));
-}
-
-Vector6 into(const pinocchio::SE3& frame, const Vector6& twist) {
-  const Vec3 velocity = twist.head<3>(), spin = twist.tail<3>();
-  const auto turn = frame.rotation().transpose();
-  return stacked(turn * (velocity - frame.translation().cross(spin)), turn * spin);
-}
-
-}  // namespace
-
 Chain::Chain(const pinocchio::Model& model, int joint_j, int joint_i) {
   const auto& to_j = model.supports[joint_j];
   const auto& to_i = model.supports[joint_i];
@@ -51,29 +21,30 @@ void Chain::add(const pinocchio::Model& model, int joint, double sign) {
 }
 
 void Chain::place(const Multibody& body, const pinocchio::SE3& world_from_shell, const VectorX& v) {
+  using pinocchio::Motion;
   turns_.clear();
-  Vector6 behind = Vector6::Zero();  // velocity of body i against the body behind the link
+  Motion behind = Motion::Zero();  // velocity of body i against the body behind the link
   for (auto link = links_.rbegin(); link != links_.rend(); ++link) {
-    Vector6 own = Vector6::Zero();
+    Motion own = Motion::Zero();
     for (int k = link->first; k < link->first + link->count; ++k) {
-      axes_.col(k) = link->sign * into(world_from_shell, body.axes().col(velocity_[k]));
-      own += v[velocity_[k]] * axes_.col(k);
+      const Motion axis = world_from_shell.actInv(Motion(body.axes().col(velocity_[k])));
+      axes_.col(k) = link->sign * axis.toVector();
+      own += Motion(v[velocity_[k]] * axes_.col(k));
     }
-    const Vector6 moved = link->sign > 0 ? Vector6(behind + own) : behind;
+    const Motion moved = link->sign > 0 ? behind + own : behind;
     for (int k = link->first; k < link->first + link->count; ++k)
-      twist_by_q_.col(k) = motion_cross(axes_.col(k), moved);
+      twist_by_q_.col(k) = Motion(axes_.col(k)).cross(moved).toVector();
     behind += own;
   }
-  twist_ = behind;
+  twist_ = behind.toVector();
   for (const TurningAxes& turning : body.turning())
     for (const Link& link : links_) {
       if (link.joint != turning.joint) continue;
       const pinocchio::SE3 pose = world_from_shell.actInv(body.world_from_joint(link.joint));
       for (int m = 0; m < link.count; ++m)
         for (int k = 0; k < link.count; ++k) {
-          const pinocchio::Motion slope(Vector6(turning.by_q.col(k + link.count * m)));
-          turns_.push_back(
-              {link.first + k, link.first + m, link.sign * Vector6(pose.act(slope).toVector())});
+          const Motion slope = pose.act(Motion(turning.by_q.col(k + link.count * m)));
+          turns_.push_back({link.first + k, link.first + m, link.sign * slope.toVector()});
           twist_by_q_.col(link.first + m) += v[velocity_[link.first + k]] * turns_.back().slope;
         }
     }
@@ -83,9 +54,10 @@ void Chain::add_force(const Vector6& wrench, VectorX& force, MatrixX& by_q) cons
   for (int k = 0; k < size(); ++k) force[velocity_[k]] += axes_.col(k).dot(wrench);
   for (const Link& link : links_)
     for (int m = link.first; m < link.first + link.count; ++m) {
-      const Vector6 with = force_cross(axes_.col(m), wrench);
+      const pinocchio::Motion axis(axes_.col(m));
+      const Vector6 rate = axis.cross(pinocchio::Force(wrench)).toVector();
       for (int k = link.moved; k < size(); ++k)
-        by_q(velocity_[k], velocity_[m]) -= axes_.col(k).dot(with);
+        by_q(velocity_[k], velocity_[m]) -= axes_.col(k).dot(rate);
     }
   for (const Turn& turn : turns_)
     by_q(velocity_[turn.axis], velocity_[turn.by]) += turn.slope.dot(wrench);

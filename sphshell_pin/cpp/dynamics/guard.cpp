@@ -20,7 +20,7 @@ constexpr double kMostTurned = 16;
 
 void Guard::begin(const Scene& scene) {
   for (std::size_t k = 0; k < known_.size(); ++k) {
-    known_[k].centre = scene.states()[k].centre;
+    known_[k].center = scene.states()[k].center;
     known_[k].touching = scene.states()[k].count > 0;
   }
 }
@@ -54,10 +54,10 @@ double Guard::allowed(Scene& scene, const State& from, const State& to) {
 // A lower bound of the gap at the begin of the step; the distance is looked up where the one known
 // is worn out.
 double Guard::gap(const Pair& pair, Known& known) const {
-  double distance = known.distance - (known.centre - known.anchor).norm();
+  double distance = known.distance - (known.center - known.anchor).norm();
   if (known.distance < 0 || distance < std::max(2 * pair.radius, 0.5 * known.distance)) {
-    known.anchor = known.centre;
-    known.distance = std::abs(pair.shell->closest_point(known.centre).distance);
+    known.anchor = known.center;
+    known.distance = std::abs(pair.shell->closest_point(known.center).distance);
     if (pair.method == Method::Smooth && pair.shell->curved() != nullptr)
       known.distance -= pair.shell->curved()->bulge();
     distance = known.distance;
@@ -65,7 +65,7 @@ double Guard::gap(const Pair& pair, Known& known) const {
   return std::max(0.0, distance - pair.radius);
 }
 
-// Length of the centre's path in the shell's frame, by chords.
+// Length of the center's path in the shell's frame, by chords.
 double Guard::path(Scene& scene, std::size_t k, const State& from, const State& to) {
   const Pair& pair = scene.pairs()[k];
   Multibody& body = scene.body();
@@ -74,20 +74,17 @@ double Guard::path(Scene& scene, std::size_t k, const State& from, const State& 
       std::max(from.v.lpNorm<Eigen::Infinity>(), to.v.lpNorm<Eigen::Infinity>()) * h;
   const int chords = static_cast<int>(std::ceil(std::min(turned, kMostTurned) / (0.5 * kTurn)));
   q_.resize(from.q.size());
-  Vec3 last = known_[k].centre;
+  Vec3 last = known_[k].center;
   double length = 0;
   for (int i = 1; i <= chords; ++i) {
     const double share = double(i) / chords;
     u_ = share * h * (from.v + 0.5 * share * (to.v - from.v));
     body.integrate(from.q, u_, q_);
     body.kinematics(q_);
-    SE3 shell = pair.placement_j;
-    if (pair.joint_j != 0) shell = body.world_from_joint(pair.joint_j) * shell;
-    Vec3 centre = pair.placement_i.translation();
-    if (pair.joint_i != 0) centre = body.world_from_joint(pair.joint_i).act(centre);
-    centre = shell.actInv(centre);
-    length += (centre - last).norm();
-    last = centre;
+    const Vec3 center = body.world_from(pair.joint_j, pair.placement_j)
+                            .actInv(body.world_from(pair.joint_i, pair.placement_i).translation());
+    length += (center - last).norm();
+    last = center;
   }
   return length;
 }

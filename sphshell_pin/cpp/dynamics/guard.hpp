@@ -7,9 +7,9 @@
 
 namespace sphshell {
 
-// A step may move the centre of a sphere, in the shell's frame, by the gap and a sixteenth of the
+// A step may move the center of a sphere, in the shell's frame, by the gap and a sixteenth of the
 // radius while they are apart, and by a quarter of the radius while they touch. So the force acts
-// before the centre comes near the surface, at any speed, and what is missed between two
+// before the center comes near the surface, at any speed, and what is missed between two
 // evaluations is a touch of at most r / 2000.
 class Guard {
  public:
@@ -23,9 +23,9 @@ class Guard {
 
  private:
   struct Known {
-    Vec3 centre = Vec3::Zero();  // at the begin of the step
+    Vec3 center = Vec3::Zero();  // at the begin of the step
     bool touching = false;
-    // A place of the centre, and its distance to the shell there at least.
+    // A place of the center, and its distance to the shell there at least.
     Vec3 anchor = Vec3::Zero();
     double distance = -1;
   };

@@ -1,19 +1,21 @@
 #include "dynamics/linearization.hpp"
 
+#include <pinocchio/spatial.hpp>
+
 namespace sphshell {
 namespace {
 
 // The displacement of a place that goes with a displacement of its body.
-Matrix36 velocity_at(const Vec3& place) {
+Matrix36 displacement_at(const Vec3& place) {
   Matrix36 out;
-  out << Mat3::Identity(), -cross_matrix(place);
+  out << Mat3::Identity(), -pinocchio::skew(place);
   return out;
 }
 
 }  // namespace
 
 Linearization::Linearization(Scene& scene) : scene_(scene) {
-  scene.want_turns();
+  scene.want_dn_dc();
   scene.body().want_derivatives();
   const pinocchio::Model& model = scene.body().model();
   for (const Pair& pair : scene.pairs()) chains_.emplace_back(model, pair.joint_j, pair.joint_i);
@@ -59,7 +61,7 @@ void Linearization::rates(const VectorX& q, const VectorX& v, const VectorX& z, 
 }
 
 // Fills by_q_ and by_v_, adds to force_, and where there is a jacobian writes what bristles have in
-// it, of the acceleration as generalised forces.
+// it, of the acceleration as generalized forces.
 void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* jacobian) {
   const Eigen::Index nv = v.size();
   by_q_.setZero(nv, nv);
@@ -79,7 +81,7 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
       const ContactSite site = site_of(active[next], chain.twist());
       contact_slopes(pair.law, pair.friction, scene_.relaxation(pair), site, slopes_);
       sum.wrench += slopes_.wrench;
-      sum.by_displacement += slopes_.by_place * velocity_at(site.place);
+      sum.by_displacement += slopes_.by_place * displacement_at(site.place);
       sum.by_twist += slopes_.by_twist;
       if (jacobian && active[next].slot >= 0) add_bristle(active[next], site, chain, *jacobian);
     }
@@ -102,7 +104,7 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
 void Linearization::add_bristle(const ActiveContact& active, const ContactSite& site,
                                 const Chain& chain, MatrixX& jacobian) {
   const Eigen::Index nv = force_.size(), z = 3 * active.slot;
-  const Matrix36 by_displacement = slopes_.rate_by_place * velocity_at(site.place);
+  const Matrix36 by_displacement = slopes_.rate_by_place * displacement_at(site.place);
   auto rate = jacobian.middleRows<3>(nv + z);
   for (int m = 0; m < chain.size(); ++m) {
     const int k = chain.velocity(m);
@@ -118,9 +120,9 @@ ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& t
   const Pair& pair = scene_.pairs()[active.pair];
   const PairState& state = scene_.states()[active.pair];
   const auto& turn = state.world_from_j.rotation();
-  ContactSite site{active.contact, state.centre, !pair.source, pair.radius, twist, Vec3::Zero()};
+  ContactSite site{active.contact, state.center, !pair.source, pair.radius, twist, Vec3::Zero()};
   if (pair.source) site.place = site.contact.point;
-  if (active.slot >= 0) site.stretch = turn.transpose() * active.meeting.bristle;
+  if (active.slot >= 0) site.stretch = turn.transpose() * active.kinematics.bristle;
   return site;
 }
 

@@ -18,7 +18,7 @@ class Linearization {
  public:
   explicit Linearization(Scene& scene);
 
-  // Derivatives (nv, nv) of the generalised contact forces (sum of J^T F).
+  // Derivatives (nv, nv) of the generalized contact forces (sum of J^T F).
   void forces(const VectorX& q, const VectorX& v, MatrixX& by_q, MatrixX& by_v);
 
   // Jacobian (nv + nz, 2 nv + nz) of (v', z') with respect to (u, v, z) at q exp(u), u = 0, where
@@ -41,7 +41,7 @@ class Linearization {
 
   Scene& scene_;
   std::vector<Chain> chains_;  // one per pair
-  VectorX force_;              // generalised
+  VectorX force_;              // generalized
   MatrixX by_q_, by_v_, inverse_mass_;
   std::vector<int> loaded_;  // velocities that contact forces act on
   std::vector<char> is_loaded_;

@@ -63,7 +63,22 @@ class Multibody {
   double potential_energy(const VectorX& q);
 
   const pinocchio::SE3& world_from_joint(int joint) const { return data_.oMi[joint]; }
+  // Where something at `placement` in the joint is in the world.
+  pinocchio::SE3 world_from(int joint, const pinocchio::SE3& placement) const {
+    return joint == 0 ? placement : data_.oMi[joint] * placement;
+  }
   const pinocchio::Motion& velocity(int joint) const { return data_.v[joint]; }
+  // Of the joint's body, in the world [m/s], [rad/s].
+  Eigen::Vector3d velocity_at(int joint, const Eigen::Vector3d& point_world) const {
+    if (joint == 0) return Eigen::Vector3d::Zero();
+    const pinocchio::SE3& pose = data_.oMi[joint];
+    const pinocchio::Motion& v = data_.v[joint];
+    return pose.rotation() * (v.linear() + v.angular().cross(pose.actInv(point_world)));
+  }
+  Eigen::Vector3d angular_velocity(int joint) const {
+    if (joint == 0) return Eigen::Vector3d::Zero();
+    return data_.oMi[joint].rotation() * data_.v[joint].angular();
+  }
   // Of place_axes(): one column per velocity, linear part first, about the world's origin.
   const Matrix6X& axes() const { return data_.J; }
   const std::vector<TurningAxes>& turning() const { return turning_; }

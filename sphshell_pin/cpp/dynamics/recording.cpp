@@ -1,91 +1,55 @@
-// What a run writes down.
-#include <algorithm>
+#include "dynamics/recording.hpp"
+
 #include <utility>
 
-#include "dynamics/simulation.hpp"
-
 namespace sphshell {
-namespace {
 
-constexpr std::size_t kRowsPerCall = 4096;
-constexpr std::size_t kContactsPerCall = 16384;
+Recorder::Recorder(std::size_t pairs, double start, double end, double record_dt)
+    : start_(start), end_(end), record_dt_(record_dt), summaries_(pairs), status_(pairs) {}
 
-}  // namespace
+Record Recorder::take() { return std::exchange(record_, {}); }
 
-void Simulation::reserve() {
-  const auto& model = scene_.body().model();
-  record_.t.reserve(kRowsPerCall);
-  record_.q.reserve(kRowsPerCall * static_cast<std::size_t>(model.nq));
-  record_.v.reserve(kRowsPerCall * static_cast<std::size_t>(model.nv));
-  record_.energy.reserve(kRowsPerCall * Record::kEnergies);
-  if (!scene_.pairs().empty()) {
-    record_.contacts.reserve(kContactsPerCall);
-    record_.contact_row.reserve(kContactsPerCall);
-  }
-  record_.events.reserve(256);
-}
-
-bool Simulation::full() const {
-  return record_.t.size() >= kRowsPerCall || record_.contacts.size() * 2 > kContactsPerCall ||
-         record_.events.size() > 128;
-}
-
-Record Simulation::take() {
-  Record out;
-  std::swap(out, record_);
-  reserve();
-  return out;
-}
-
-Record Simulation::snapshot() {
-  if (!started_) start();
-  Record out;
-  std::swap(out, record_);
+Record Recorder::snapshot(Scene& scene, const State& state) {
+  Record recorded = std::exchange(record_, {});
   const long rows = std::exchange(rows_, 0);
-  write_row(state_);
+  add_row(scene, state);
   rows_ = rows;
-  std::swap(out, record_);
-  return out;
+  return std::exchange(record_, std::move(recorded));
 }
 
-// Rows within the step to next_, and at its end.
-void Simulation::record_within(Stepper& stepper) {
-  const double end = settings_.start_time + settings_.duration;
-  if (settings_.record_dt > 0) {
+void Recorder::add_rows(Scene& scene, const Chart& chart, const Stepper& stepper, const State& from,
+                        const State& to) {
+  if (record_dt_ > 0) {
     // The end is a row, and none stands a round-off before it.
-    const double last = end - 1e-9 * settings_.record_dt;
+    const double last = end_ - 1e-9 * record_dt_;
     bool moved = false;
-    for (;; ++next_row_) {
-      const double t = settings_.start_time + double(next_row_) * settings_.record_dt;
-      if (t >= next_.t || t >= last) break;
-      stepper.interpolate((t - state_.t) / (next_.t - state_.t), interpolated_);
-      chart_.finish(t, interpolated_, between_);
-      scene_.evaluate(between_.q, between_.v, between_.z, true);
-      write_row(between_);
+    for (; due() < to.t && due() < last; ++next_row_) {
+      stepper.interpolate((due() - from.t) / (to.t - from.t), y_);
+      chart.finish(due(), y_, between_);
+      scene.evaluate(between_.q, between_.v, between_.z, true);
+      add_row(scene, between_);
       moved = true;
     }
     if (moved) {
-      scene_.restart();
-      scene_.evaluate(next_.q, next_.v, next_.z);
+      scene.restart();
+      scene.evaluate(to.q, to.v, to.z);
     }
-    const double t = settings_.start_time + double(next_row_) * settings_.record_dt;
-    if (next_.t < (t < last ? t : end)) return;
+    if (to.t < (due() < last ? due() : end_)) return;
     ++next_row_;
   }
-  scene_.evaluate(next_.q, next_.v, next_.z, true);
-  write_row(next_);
+  scene.evaluate(to.q, to.v, to.z, true);
+  add_row(scene, to);
 }
 
-// The scene's forces are those at the state.
-void Simulation::write_row(const State& state) {
-  scene_.log(state.q, state.v, record_.contacts);
+void Recorder::add_row(Scene& scene, const State& state) {
+  scene.log(state.q, state.v, record_.contacts);
   record_.contact_row.resize(record_.contacts.size(), double(rows_));
   record_.t.push_back(state.t);
-  record_.q.insert(record_.q.end(), state.q.data(), state.q.data() + state.q.size());
-  record_.v.insert(record_.v.end(), state.v.data(), state.v.data() + state.v.size());
-  const Powers& powers = scene_.powers();
-  const double kinetic = scene_.body().kinetic_energy(state.q, state.v);
-  const double potential = scene_.body().potential_energy(state.q);
+  record_.q.insert(record_.q.end(), state.q.begin(), state.q.end());
+  record_.v.insert(record_.v.end(), state.v.begin(), state.v.end());
+  const Powers& powers = scene.powers();
+  const double kinetic = scene.body().kinetic_energy(state.q, state.v);
+  const double potential = scene.body().potential_energy(state.q);
   const Ledger& ledger = state.ledger;
   for (double e : {kinetic, potential, powers.elastic + powers.bristles, ledger.damping,
                    ledger.friction - powers.bristles, ledger.control})
@@ -93,37 +57,35 @@ void Simulation::write_row(const State& state) {
   ++rows_;
 }
 
-void Simulation::note_pairs(double h) {
-  const auto event = [&](std::size_t k, Event::Kind kind) {
-    record_.events.push_back({state_.t, static_cast<int>(k), kind});
-  };
+void Recorder::add_step(const Scene& scene, double t, double h) {
   for (std::size_t k = 0; k < summaries_.size(); ++k) {
-    const PairState& now = scene_.states()[k];
+    const PairState& now = scene.states()[k];
     PairSummary& summary = summaries_[k];
-    pieces_[k] = now.pieces;
-    clamped_[k] = now.clamped;
-    if (touching_[k]) summary.contact_time += h;
-    summary.impulse += 0.5 * h * (normal_force_[k] + now.normal_force);
-    normal_force_[k] = now.normal_force;
+    PairStatus& status = status_[k];
+    const auto add_event = [&](Event::Kind kind) {
+      record_.events.push_back({t, static_cast<int>(k), kind});
+    };
+    if (status.touching) summary.contact_time += h;
+    summary.impulse += 0.5 * h * (status.normal_force + now.normal_force);
+    status.normal_force = now.normal_force;
     const bool touching = now.count > 0;
-    if (touching != bool(touching_[k])) {
-      event(k, touching ? Event::Kind::Touch : Event::Kind::LiftOff);
-      touching_[k] = touching;
-      deep_[k] = 0;
+    if (touching != status.touching) {
+      add_event(touching ? Event::Kind::Touch : Event::Kind::LiftOff);
+      status.touching = touching;
+      status.deep = false;
       if (touching) ++summary.touches;
     }
-    const double radius = scene_.pairs()[k].radius;
+    const double radius = scene.pairs()[k].radius;
     const bool through = now.pushed_through || (radius > 0 && now.depth > radius);
-    if (through && !through_[k]) event(k, Event::Kind::Through);
-    through_[k] = through;
+    if (through && !status.through) add_event(Event::Kind::Through);
+    status.through = through;
     if (!touching) continue;
     if (now.normal_force > summary.peak_force)
-      summary.peak_force = now.normal_force, summary.peak_force_time = state_.t;
-    if (now.depth > summary.max_depth)
-      summary.max_depth = now.depth, summary.max_depth_time = state_.t;
-    if (radius > 0 && now.depth > 0.5 * radius && !deep_[k]) {
-      deep_[k] = 1;
-      event(k, Event::Kind::Deep);
+      summary.peak_force = now.normal_force, summary.peak_force_time = t;
+    if (now.depth > summary.max_depth) summary.max_depth = now.depth, summary.max_depth_time = t;
+    if (radius > 0 && now.depth > 0.5 * radius && !status.deep) {
+      status.deep = true;
+      add_event(Event::Kind::Deep);
     }
   }
 }

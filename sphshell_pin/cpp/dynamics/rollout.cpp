@@ -2,33 +2,13 @@
 
 #include <chrono>
 #include <exception>
+#include <limits>
 #include <system_error>
 
 namespace sphshell {
 namespace {
 
-// How often a run under way looks whether it shall stop [s].
-constexpr double kGlance = 0.05;
-
-template <class T>
-void move_behind(std::vector<T>& all, std::vector<T>& more) {
-  if (all.empty()) {
-    all = std::move(more);
-    all.shrink_to_fit();
-  } else {
-    all.insert(all.end(), more.begin(), more.end());
-  }
-}
-
-void move_behind(Record& all, Record more) {
-  move_behind(all.t, more.t);
-  move_behind(all.q, more.q);
-  move_behind(all.v, more.v);
-  move_behind(all.energy, more.energy);
-  move_behind(all.contacts, more.contacts);
-  move_behind(all.contact_row, more.contact_row);
-  move_behind(all.events, more.events);
-}
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -97,31 +77,27 @@ void Rollout::work() {
 
 Outcome Rollout::run(Task task, Lent& lent) const {
   Outcome out;
+  // An exception that left a thread would end the process.
   try {
     Simulation run(model_, std::move(task.pairs), task.settings, std::move(task.controller),
                    std::move(task.q0), std::move(task.v0));
     try {
-      while (out.status == Simulation::Status::Running && !stopped_) {
-        out.status = run.advance(kGlance);
-        if (out.status != Simulation::Status::Running || run.full())
-          move_behind(out.record, run.take());
-      }
+      out.deep_start = run.deep_start();
+      if (!out.deep_start)
+        out.status = run.advance(kInfinity, kInfinity, &stopped_);
     } catch (const std::exception& error) {
       out.fault = error.what();
     }
-    if (out.status == Simulation::Status::Running) move_behind(out.record, run.take());
+    out.record = run.take();
     out.time = run.time();
     out.last_step = run.last_step();
     out.wall_time = run.wall_time();
-    out.steps = run.steps();
-    out.rejected = run.rejected();
-    out.evaluations = run.evaluations();
+    out.counts = run.counts();
     out.q = run.q();
     out.v = run.v();
     out.summaries = run.summaries();
     lent = run.give_back();
   } catch (const std::exception& error) {
-    // An exception that left a thread would end the process: of a short memory, say.
     out.fault = error.what();
   }
   return out;

@@ -28,8 +28,9 @@ struct Task {
 struct Outcome {
   Simulation::Status status = Simulation::Status::Running;  // if still so, it was stopped
   std::string fault;                                        // what a user's routine threw
+  std::optional<DeepStart> deep_start;                      // it did not begin
   double time = 0, last_step = 0, wall_time = 0;            // [s]
-  long steps = 0, rejected = 0, evaluations = 0;
+  Counts counts;
   VectorX q, v;
   std::vector<PairSummary> summaries;
   Record record;

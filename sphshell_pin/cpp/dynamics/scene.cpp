@@ -4,11 +4,6 @@
 #include <utility>
 
 namespace sphshell {
-namespace {
-
-bool turns_known(const Pair& pair) { return !pair.source && pair.method != Method::Elements; }
-
-}  // namespace
 
 Scene::Scene(const pinocchio::Model& model, std::vector<Pair> pairs)
     : body_(model),
@@ -21,16 +16,16 @@ Scene::Scene(const pinocchio::Model& model, std::vector<Pair> pairs)
       bristles_(pairs_.size()) {
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
-    body_.need(pair.joint_i);
-    body_.need(pair.joint_j);
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
     if (pair.friction.has_state()) {
       bristles_.add(k);
-      if (turns_known(pair)) queries_[k].want_dn_dc();
+      if (pair.has_dn_dc()) queries_[k].want_dn_dc();
     }
-    for (int j : {pair.joint_i, pair.joint_j})
-      if (j > 0 && std::find(pushed_.begin(), pushed_.end(), j) == pushed_.end())
-        pushed_.push_back(j);
+    for (int j : {pair.joint_i, pair.joint_j}) {
+      body_.need(j);
+      if (j > 0 && std::find(loaded_.begin(), loaded_.end(), j) == loaded_.end())
+        loaded_.push_back(j);
+    }
   }
   bristle_rates_.setZero(bristle_size());
   active_.reserve(64);
@@ -51,12 +46,12 @@ void Scene::restart() {
   for (Excursion& excursion : excursions_) excursion.moved = 0, excursion.touched = false;
 }
 
-void Scene::want_turns() {
+void Scene::want_dn_dc() {
   for (std::size_t k = 0; k < pairs_.size(); ++k)
-    if (turns_known(pairs_[k])) queries_[k].want_dn_dc();
+    if (pairs_[k].has_dn_dc()) queries_[k].want_dn_dc();
 }
 
-void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool numbered) {
+void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool identify) {
   active_.clear();
   if (needs_velocity_)
     body_.kinematics(q, v);
@@ -66,56 +61,53 @@ void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool 
     const Pair& pair = pairs_[k];
     PairState& state = states_[k];
     state = PairState();
-    state.world_from_j = pair.joint_j == 0
-                             ? pair.placement_j
-                             : body_.world_from_joint(pair.joint_j) * pair.placement_j;
-    std::vector<Contact>& contacts = find(k);
+    state.world_from_j = body_.world_from(pair.joint_j, pair.placement_j);
+    std::vector<Contact>& contacts = find_contacts(k);
     Excursion& excursion = excursions_[k];
-    excursion.moved = std::max(excursion.moved, (state.centre - excursion.from).norm());
+    excursion.moved = std::max(excursion.moved, (state.center - excursion.from).norm());
     excursion.touched = excursion.touched || !contacts.empty();
     ContactTracker& tracker = trackers_[k];
-    const bool matched =
-        !contacts.empty() && (numbered || tracker.deep() || pair.friction.has_state());
-    if (matched) {
-      const std::vector<int>& at = tracker.match(contacts, state.centre, pair.radius);
+    if (!contacts.empty() && (identify || tracker.deep() || pair.friction.has_state())) {
+      const std::vector<int>& at = tracker.match(contacts, state.center, pair.radius);
       for (std::size_t i = 0; i < contacts.size(); ++i)
-        add(k, contacts[i], bristles_.slot(k, at[i]), tracker.places()[at[i]].number);
+        add_contact(k, contacts[i], bristles_.slot(k, at[i]), tracker.places()[at[i]].number);
       state.pushed_through = tracker.pushed_through();
     } else {
       for (std::size_t i = 0; i < contacts.size(); ++i)
-        add(k, contacts[i], -1, static_cast<int>(i));
+        add_contact(k, contacts[i], -1, static_cast<int>(i));
     }
   }
-  exert(z);
+  compute_forces(z);
 }
 
 void Scene::revisit(const VectorX& q, const VectorX& v, const VectorX& z) {
   if (active_.empty()) return;
   if (needs_velocity_) body_.kinematics(q, v);
-  exert(z);
+  compute_forces(z);
 }
 
 void Scene::accept(VectorX& z) {
-  if (bristles_.any()) bristles_.begin();
+  bristles_.begin();
   std::size_t next = 0;
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     std::vector<Contact>& contacts = queries_[k].contacts;
-    excursions_[k].from = states_[k].centre;
+    const Vec3& center = states_[k].center;
+    excursions_[k].from = center;
     ContactTracker& tracker = trackers_[k];
     if (contacts.empty() && tracker.places().empty()) {
-      tracker.move_to(states_[k].centre);
-      if (bristles_.any()) bristles_.deal_none(k);
+      tracker.move_to(center);
+      bristles_.assign_none(k);
       continue;
     }
-    const std::vector<int>& at = tracker.match(contacts, states_[k].centre, pair.radius);
-    if (bristles_.any() && pair.friction.has_state())
-      bristles_.deal(k, contacts, at, tracker, z, pair.friction.torsional(), turns_known(pair));
-    else if (bristles_.any())
-      bristles_.deal_none(k);
-    tracker.accept(contacts, states_[k].centre, pair.radius);
+    const std::vector<int>& at = tracker.match(contacts, center, pair.radius);
+    if (pair.friction.has_state())
+      bristles_.assign(k, contacts, at, tracker, z, pair.friction.torsional(), pair.has_dn_dc());
+    else
+      bristles_.assign_none(k);
+    tracker.accept(contacts, center, pair.radius);
     for (std::size_t i = 0; i < contacts.size(); ++i)
-      active_[next++].number = tracker.places()[i].number;
+      active_[next++].contact_id = tracker.places()[i].number;
   }
   if (!bristles_.any()) return;
   bristles_.end(z);
@@ -124,100 +116,104 @@ void Scene::accept(VectorX& z) {
     place = i > 0 && active_[i].pair == active_[i - 1].pair ? place + 1 : 0;
     active_[i].slot = bristles_.slot(active_[i].pair, static_cast<int>(place));
   }
-  exert(z);
+  compute_forces(z);
 }
 
-void Scene::add(std::size_t k, const Contact& contact, int slot, int number) {
-  active_.emplace_back();
-  ActiveContact& active = active_.back();
-  active.pair = static_cast<int>(k);
-  active.slot = slot;
-  active.number = number;
-  active.contact = contact;
-}
-
-// The forces of the active contacts.
-void Scene::exert(const VectorX& z) {
-  powers_ = Powers();
-  bristle_rates_.setZero(bristle_size());
-  touching_ = !active_.empty();
-  if (!touching_) return;
-  for (int j : pushed_) external_[j].setZero();
-  for (PairState& state : states_) state.clear();
-  for (ActiveContact& active : active_) {
-    meet(active, z);
-    push(active);
-  }
-}
-
-std::vector<Contact>& Scene::find(std::size_t k) {
+std::vector<Contact>& Scene::find_contacts(std::size_t k) {
   const Pair& pair = pairs_[k];
   PairState& state = states_[k];
   Query& query = queries_[k];
   if (pair.source) {
     query.contacts.clear();
-    pair.source(pair.joint_i == 0 ? pair.placement_i
-                                  : body_.world_from_joint(pair.joint_i) * pair.placement_i,
-                state.world_from_j, query.contacts);
-    // As a shell's: in the frame of body j.
+    pair.source(body_.world_from(pair.joint_i, pair.placement_i), state.world_from_j,
+                query.contacts);
+    // In the frame of body j, as those of a shell.
     for (Contact& contact : query.contacts) {
       contact.point = state.world_from_j.actInv(contact.point);
       contact.normal = state.world_from_j.rotation().transpose() * contact.normal;
     }
-    state.centre.setZero();
+    state.center.setZero();
     return query.contacts;
   }
-  const Vec3& centre = pair.placement_i.translation();
-  state.centre = state.world_from_j.actInv(
-      pair.joint_i == 0 ? centre : body_.world_from_joint(pair.joint_i).act(centre));
-  query.find(*pair.shell, state.centre, pair.radius, pair.method);
-  // Friction belongs to a place, and its spring should not part and join at every border between
-  // elements: contacts that are nearly one are one. The elastic energy is that of their depths'
-  // sum, off by the square of what they differ by, 1e-4 at most.
+  const Vec3& center = pair.placement_i.translation();
+  state.center = state.world_from_j.actInv(
+      pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
+  query.find(*pair.shell, state.center, pair.radius, pair.method);
+  // Friction belongs to a place, and its spring should not be split and merged at every border
+  // between elements: contacts that are nearly one are one. The elastic energy is that of their
+  // depths' sum, off by the square of the depths' difference, 1e-4 at most.
   if (pair.friction.active() && query.contacts.size() > 1) {
-    merge_places(query.contacts, state.centre, pair.radius, merged_);
+    merge_places(query.contacts, state.center, pair.radius, merged_);
     query.contacts.swap(merged_);
   }
   return query.contacts;
 }
 
-// The force of a contact, and how its bristle goes on.
-void Scene::meet(ActiveContact& active, const VectorX& z) {
+void Scene::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {
+  ActiveContact& active = active_.emplace_back();
+  active.pair = static_cast<int>(k);
+  active.slot = slot;
+  active.contact_id = contact_id;
+  active.contact = contact;
+}
+
+void Scene::compute_forces(const VectorX& z) {
+  powers_ = Powers();
+  bristle_rates_.setZero(bristle_size());
+  touching_ = !active_.empty();
+  if (!touching_) return;
+  for (int j : loaded_) external_[j].setZero();
+  for (PairState& state : states_) state.clear_sums();
+  for (ActiveContact& active : active_) {
+    compute_kinematics(active, z);
+    compute_force(active, z);
+    add_force(active);
+  }
+}
+
+void Scene::compute_kinematics(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
   const SE3& world_from_j = states_[active.pair].world_from_j;
-  const Contact& contact = active.contact;
-  const auto& turn = world_from_j.rotation();
-  Meeting<double>& m = active.meeting;
-  m.depth = contact.depth;
-  active.point = world_from_j.act(contact.point);
-  m.normal = turn * contact.normal;
+  ContactKinematics<double>& m = active.kinematics;
+  active.point = world_from_j.act(active.contact.point);
+  m.depth = active.contact.depth;
+  m.normal = world_from_j.rotation() * active.contact.normal;
   m.relative.setZero();
   if (pair.needs_velocity()) m.relative = relative_velocity(pair, active.point);
   if (pair.friction.torsional())
-    m.spin = m.normal.dot(spin_of(pair.joint_i) - spin_of(pair.joint_j));
-  if (active.slot >= 0) m.bristle = turn * z.segment<3>(3 * active.slot);
-  active.force = contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), m);
-  if (active.slot >= 0)
-    bristle_rates_.segment<3>(3 * active.slot) = turn.transpose() * active.force.bristle_rate +
-                                                 turning(active, z.segment<3>(3 * active.slot));
+    m.spin =
+        m.normal.dot(body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
+  if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
+}
+
+void Scene::compute_force(ActiveContact& active, const VectorX& z) {
+  const Pair& pair = pairs_[active.pair];
+  active.force =
+      contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), active.kinematics);
+  if (active.slot < 0) return;
+  const auto& rotation = states_[active.pair].world_from_j.rotation();
+  const int at = 3 * active.slot;
+  bristle_rates_.segment<3>(at) =
+      rotation.transpose() * active.force.bristle_rate + rate_of_turning(active, z.segment<3>(at));
 }
 
 // How fast a stretch turns with the normal, in the shell's frame.
-Vec3 Scene::turning(const ActiveContact& active, const Vec3& stretch) const {
+Vec3 Scene::rate_of_turning(const ActiveContact& active, const Vec3& stretch) const {
   const Pair& pair = pairs_[active.pair];
-  if (!turns_known(pair)) return Vec3::Zero();
+  if (!pair.has_dn_dc()) return Vec3::Zero();
   const PairState& state = states_[active.pair];
-  const Vec3 centre_rate = state.world_from_j.rotation().transpose() *
-                           relative_velocity(pair, state.world_from_j.act(state.centre));
+  const Vec3 center_rate = state.world_from_j.rotation().transpose() *
+                           relative_velocity(pair, state.world_from_j.act(state.center));
   const Contact& contact = active.contact;
-  const Vec3 normal_rate = contact.dn_dc * centre_rate / contact.weight;
+  const Vec3 normal_rate = contact.dn_dc * center_rate / contact.weight;
   return contact.normal.cross(normal_rate).cross(stretch);
 }
 
-void Scene::push(const ActiveContact& active) {
+// Adds a contact to the forces on the joints and to the sums of its pair.
+void Scene::add_force(const ActiveContact& active) {
   const Pair& pair = pairs_[active.pair];
   const ContactForce<double>& f = active.force;
-  const Meeting<double>& m = active.meeting;
+  const ContactKinematics<double>& m = active.kinematics;
   const double weight = active.contact.weight;
   const Vec3 force = weight * (f.normal * m.normal + f.friction);
   const Vec3 moment = weight * f.torsion * m.normal;
@@ -238,51 +234,9 @@ void Scene::push(const ActiveContact& active) {
     powers_.bristles += 0.5 * share * pair.friction.bristle()->stiffness * f.bristle.squaredNorm();
 }
 
-// Contacts of one place as one, with the sum of their forces.
-void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows) {
-  if (active_.empty()) return;
-  if (!needs_velocity_) body_.kinematics(q, v);
-  for (std::size_t i = 0, begin = 0; i < active_.size(); ++i) {
-    const ActiveContact& active = active_[i];
-    if (i > 0 && active.pair != active_[i - 1].pair) begin = i;
-    const std::vector<Contact>& contacts = queries_[active.pair].contacts;
-    if (!leads(contacts, i - begin)) continue;
-    const Pair& pair = pairs_[active.pair];
-    const PairState& state = states_[active.pair];
-    const Contact whole = whole_of(contacts, i - begin, state.centre, pair.radius);
-    const Vec3 point = state.world_from_j.act(whole.point);
-    const Vec3 normal = state.world_from_j.rotation() * whole.normal;
-    Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
-    // One that is of no place stands alone.
-    const std::size_t first = i - begin, last = whole.place < 0 ? first + 1 : contacts.size();
-    for (std::size_t k = first; k < last; ++k) {
-      if (k != first && contacts[k].place != whole.place) continue;
-      const ActiveContact& other = active_[begin + k];
-      push += other.contact.weight * other.force.normal * other.meeting.normal;
-      friction += other.contact.weight * other.force.friction;
-    }
-    const Vec3 relative = relative_velocity(pair, point);
-    const Vec3 slip = relative - relative.dot(normal) * normal;
-    rows.push_back({double(active.pair),
-                    {point.x(), point.y(), point.z()},
-                    {normal.x(), normal.y(), normal.z()},
-                    whole.depth,
-                    push.dot(normal),
-                    {friction.x(), friction.y(), friction.z()},
-                    {slip.x(), slip.y(), slip.z()},
-                    double(whole.element),
-                    double(whole.feature),
-                    double(active.number)});
-  }
-}
-
-const VectorX& Scene::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
-  return touching_ ? body_.acceleration(q, v, tau, external_) : body_.acceleration(q, v, tau);
-}
-
 void Scene::apply(int joint, const Vec3& point_world, const Vec3& force_world,
                   const Vec3& moment_world) {
-  if (joint == 0) return;  // nothing feels a force on the world
+  if (joint == 0) return;  // the world does not move
   const SE3& pose = body_.world_from_joint(joint);
   const Vec3 force = pose.rotation().transpose() * force_world;
   external_[joint].linear() += force;
@@ -291,19 +245,51 @@ void Scene::apply(int joint, const Vec3& point_world, const Vec3& force_world,
 }
 
 Vec3 Scene::relative_velocity(const Pair& pair, const Vec3& point_world) const {
-  return velocity_at(pair.joint_i, point_world) - velocity_at(pair.joint_j, point_world);
+  return body_.velocity_at(pair.joint_i, point_world) -
+         body_.velocity_at(pair.joint_j, point_world);
 }
 
-Vec3 Scene::velocity_at(int joint, const Vec3& point_world) const {
-  if (joint == 0) return Vec3::Zero();
-  const SE3& pose = body_.world_from_joint(joint);
-  const pinocchio::Motion& v = body_.velocity(joint);
-  return pose.rotation() * (v.linear() + v.angular().cross(pose.actInv(point_world)));
+// Contacts of one place as one, with the sum of their forces.
+void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows) {
+  if (active_.empty()) return;
+  if (!needs_velocity_) body_.kinematics(q, v);
+  const auto write = [](double* to, const Vec3& x) { std::copy_n(x.data(), 3, to); };
+  for (std::size_t i = 0, begin = 0; i < active_.size(); ++i) {
+    const ActiveContact& active = active_[i];
+    if (i > 0 && active.pair != active_[i - 1].pair) begin = i;
+    const std::vector<Contact>& contacts = queries_[active.pair].contacts;
+    if (!leads(contacts, i - begin)) continue;
+    const Pair& pair = pairs_[active.pair];
+    const PairState& state = states_[active.pair];
+    const Contact whole = whole_of(contacts, i - begin, state.center, pair.radius);
+    const Vec3 point = state.world_from_j.act(whole.point);
+    const Vec3 normal = state.world_from_j.rotation() * whole.normal;
+    Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
+    // One without a place stands alone.
+    const std::size_t first = i - begin, last = whole.place < 0 ? first + 1 : contacts.size();
+    for (std::size_t k = first; k < last; ++k) {
+      if (k != first && contacts[k].place != whole.place) continue;
+      const ActiveContact& other = active_[begin + k];
+      push += other.contact.weight * other.force.normal * other.kinematics.normal;
+      friction += other.contact.weight * other.force.friction;
+    }
+    const Vec3 relative = relative_velocity(pair, point);
+    ContactRow& row = rows.emplace_back();
+    write(row.point, point);
+    write(row.normal, normal);
+    row.depth = whole.depth;
+    row.normal_force = push.dot(normal);
+    write(row.friction_force, friction);
+    write(row.slip_velocity, relative - relative.dot(normal) * normal);
+    row.pair = active.pair;
+    row.element = whole.element;
+    row.contact_id = active.contact_id;
+    row.feature = whole.feature;
+  }
 }
 
-Vec3 Scene::spin_of(int joint) const {
-  if (joint == 0) return Vec3::Zero();
-  return body_.world_from_joint(joint).rotation() * body_.velocity(joint).angular();
+const VectorX& Scene::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
+  return touching_ ? body_.acceleration(q, v, tau, external_) : body_.acceleration(q, v, tau);
 }
 
 }  // namespace sphshell

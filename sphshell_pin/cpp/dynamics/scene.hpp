@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -24,7 +26,7 @@ using ContactSource =
     std::function<void(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& contacts)>;
 
 // Body i carries the sphere, body j the shell. With a source, both placements are those of its
-// frames; else `placement_i` holds the sphere's centre and `placement_j` the shell.
+// frames; else `placement_i` holds the sphere's center and `placement_j` the shell.
 struct Pair {
   std::string name;
   int joint_i = 0, joint_j = 0;
@@ -35,56 +37,76 @@ struct Pair {
   Method method = Method::Facets;
   NormalLaw law;
   FrictionLaw friction;
-  double relaxation = 2e-5;  // in which bristles give way beyond their limit [s]
+  double relaxation = 2e-5;  // time in which bristles give way beyond their limit [s]
 
   bool needs_velocity() const { return law.needs_rate() || friction.active(); }
+  // Whether the derivative of a contact's normal is known.
+  bool has_dn_dc() const { return !source && method != Method::Elements; }
 };
 
 // One pair at one state.
 struct PairState {
-  int count = 0;            // of contacts, passes not counted
-  int pieces = 0;           // of contacts, less passes: changes where a depth goes through zero
-  int clamped = 0;          // of them, how many the law's clamp holds at no force
+  int count = 0;            // of contacts, saddles not counted
+  int pieces = 0;           // of contacts, less saddles: changes where a depth goes through zero
+  int clamped = 0;          // of contacts that the law's clamp holds at no force
   double depth = 0;         // largest [m]
   double normal_force = 0;  // sum [N]
   bool pushed_through = false;
   SE3 world_from_j = SE3::Identity();
-  Vec3 centre = Vec3::Zero();  // of the sphere, in the shell's frame [m]
+  Vec3 center = Vec3::Zero();  // of the sphere, in the shell's frame [m]
 
-  // Forgets what the contacts sum up to.
-  void clear() { count = pieces = clamped = 0, depth = normal_force = 0; }
+  void clear_sums() { count = pieces = clamped = 0, depth = normal_force = 0; }
 };
 
-// Of all pairs at one state: what their damping and friction take, and what is stored in them.
+// Of all pairs at one state: power lost in damping and friction, and energy stored.
 struct Powers {
   double damping = 0, friction = 0;  // [W]
   double elastic = 0, bristles = 0;  // [J]
 };
 
-// A contact at work.
 struct ActiveContact {
-  int pair, slot, number;   // slot: of its bristle in the state, or -1
-  Contact contact;          // in the frame of the shell, or of a source, that of body j
-  Vec3 point;               // in the world
-  Meeting<double> meeting;  // in the world
+  int pair, slot, contact_id;  // slot: of its bristle in z, or -1
+  Contact contact;             // in the frame of the shell, or of a source, that of body j
+  Vec3 point;                  // in the world
+  ContactKinematics<double> kinematics;  // in the world
   ContactForce<double> force;
 };
 
-// Columns of one logged contact.
+// A contact as it is recorded; points and vectors in the world.
 struct ContactRow {
-  static constexpr int kColumns = 18;
-  double pair, point[3], normal[3], depth, normal_force, friction[3], slip[3], element, feature,
-      number;
+  double point[3], normal[3], depth, normal_force, friction_force[3], slip_velocity[3];
+  std::int32_t pair, element, contact_id;
+  Feature feature;
 };
-static_assert(sizeof(ContactRow) == ContactRow::kColumns * sizeof(double));
+
+// The fields of a ContactRow; Python's structured type is made of them.
+struct RowField {
+  const char* name;
+  const char* type;  // NumPy's
+  int size;
+  std::size_t offset;
+};
+inline constexpr RowField kContactRowFields[] = {
+    {"pair", "i4", 1, offsetof(ContactRow, pair)},
+    {"point_world", "f8", 3, offsetof(ContactRow, point)},
+    {"normal_world", "f8", 3, offsetof(ContactRow, normal)},
+    {"depth", "f8", 1, offsetof(ContactRow, depth)},
+    {"normal_force", "f8", 1, offsetof(ContactRow, normal_force)},
+    {"friction_force_world", "f8", 3, offsetof(ContactRow, friction_force)},
+    {"slip_velocity_world", "f8", 3, offsetof(ContactRow, slip_velocity)},
+    {"element", "i4", 1, offsetof(ContactRow, element)},
+    {"feature", "u1", 1, offsetof(ContactRow, feature)},
+    {"contact_id", "i4", 1, offsetof(ContactRow, contact_id)},
+};
 
 // How far a sphere came from where a step began, in all evaluations since, and whether it touched.
 struct Excursion {
-  Vec3 from = Vec3::Zero();  // centre in the shell's frame
+  Vec3 from = Vec3::Zero();  // center in the shell's frame
   double moved = 0;          // [m]
   bool touched = false;
 };
 
+// A scene at one state: kinematics, contacts and forces. One per thread.
 class Scene {
  public:
   Scene(const pinocchio::Model& model, std::vector<Pair> pairs);
@@ -94,33 +116,33 @@ class Scene {
   // Hands the pairs over; nothing can be evaluated any more.
   std::vector<Pair> give_back() { return std::move(pairs_); }
 
-  // Contact forces at (q, v), with the bristles z (3 per slot, in the shells' frames). `numbered`:
-  // contacts are told apart even where no force asks for it.
-  void evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool numbered = false);
+  // Contact forces at (q, v), with the bristles z (3 per slot, in the shells' frames). With
+  // `identify` contacts get their ids even where no force depends on them.
+  void evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool identify = false);
   // The same with another velocity, at the placements of the last evaluate().
   void revisit(const VectorX& q, const VectorX& v, const VectorX& z);
-  // The state of the last evaluate() is the next of a run, and contacts go on from it. Slots are
-  // dealt anew: z is put in their order.
+  // Makes the state of the last evaluate() the one from which contacts and bristles go on. Slots
+  // are assigned anew: z is put in their order.
   void accept(VectorX& z);
+  // Returns to the accepted state: forgets the contacts found since.
+  void restart();
   // Rows of the contacts at (q, v), where the forces were last evaluated.
   void log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows);
-  // A step starts anew from the accepted state: forgets the contacts that it has met since.
-  void restart();
 
-  // Size of z. Slots of contacts to come are part of it.
+  // Size of z, spare slots for new contacts included.
   int bristle_size() const { return bristles_.size(); }
   // Of the last evaluate() (bristle_size) [m/s].
   const VectorX& bristle_rates() const { return bristle_rates_; }
   // Bristles give way no faster than this [s]: explicit fixed steps ask for it.
   void relax_in(double time) { relaxation_ = time; }
   double relaxation(const Pair& pair) const { return std::max(relaxation_, pair.relaxation); }
-  // Contacts know how their normals turn, from the next evaluate() on.
-  void want_turns();
+  // Contacts have dn_dc, where it is known, from the next evaluate() on.
+  void want_dn_dc();
 
   // The acceleration at the state of the last evaluate().
   const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau);
 
-  // Somebody else reads the placement and velocity of this joint after evaluate().
+  // evaluate() computes the placement and velocity of this joint, too.
   void need_velocity_of(int joint);
 
   bool touching() const { return touching_; }
@@ -135,16 +157,15 @@ class Scene {
   const Multibody& body() const { return body_; }
 
  private:
-  void add(std::size_t k, const Contact& contact, int slot, int number);
-  void exert(const VectorX& z);
-  std::vector<Contact>& find(std::size_t k);
-  void meet(ActiveContact& active, const VectorX& z);
-  Vec3 turning(const ActiveContact& active, const Vec3& stretch) const;
-  void push(const ActiveContact& active);
+  std::vector<Contact>& find_contacts(std::size_t k);
+  void add_contact(std::size_t k, const Contact& contact, int slot, int contact_id);
+  void compute_forces(const VectorX& z);
+  void compute_kinematics(ActiveContact& active, const VectorX& z);
+  void compute_force(ActiveContact& active, const VectorX& z);
+  void add_force(const ActiveContact& active);
   void apply(int joint, const Vec3& point_world, const Vec3& force_world, const Vec3& moment_world);
+  Vec3 rate_of_turning(const ActiveContact& active, const Vec3& stretch) const;
   Vec3 relative_velocity(const Pair& pair, const Vec3& point_world) const;
-  Vec3 velocity_at(int joint, const Vec3& point_world) const;
-  Vec3 spin_of(int joint) const;
 
   Multibody body_;
   std::vector<Pair> pairs_;
@@ -155,7 +176,7 @@ class Scene {
   std::vector<Excursion> excursions_;
   std::vector<ActiveContact> active_;
   Forces external_;
-  std::vector<int> pushed_;  // joints whose entry in external_ is not zero
+  std::vector<int> loaded_;  // joints that contacts act on
   Powers powers_;
   Bristles bristles_;
   VectorX bristle_rates_;

@@ -1,60 +1,38 @@
-// One run: the loop over the steps, and what it writes down.
+// One run: the loop over the steps, the controller's torques, and changes on the way.
 #pragma once
 
+#include <atomic>
 #include <limits>
 #include <memory>
-#include <string>
+#include <optional>
 #include <vector>
 
 #include "dynamics/controllers.hpp"
-#include "dynamics/guard.hpp"
-#include "dynamics/integrators/stepper.hpp"
 #include "dynamics/push.hpp"
+#include "dynamics/recording.hpp"
+#include "dynamics/stepping.hpp"
 
 namespace sphshell {
 
-enum class Integrator : int {
-  SemiImplicitEuler = 0,
-  RungeKutta4 = 1,
-  LinearlyImplicitEuler = 2,
-  Adaptive = 3,
-  Implicit = 4
-};
-
-struct RunSettings {
-  Integrator integrator = Integrator::SemiImplicitEuler;
-  double dt = 0;                        // of a fixed step [s]; 0: the error decides
-  double rtol = 0, atol = 0;            // per step, of the state
+struct RunSettings : StepSettings {
   double duration = 0, start_time = 0;  // [s]
   double control_dt = 0;  // hold the torques this long [s]; 0: evaluate at every stage
   double record_dt = 0;   // between recorded rows [s]; 0: every step
 };
 
-struct Event {
-  enum class Kind : int { Touch = 0, LiftOff = 1, Deep = 2, Through = 3 };
-  double t;
+// A sphere that starts too deep in a shell for its contacts to be trusted.
+struct DeepStart {
   int pair;
-  Kind kind;
+  double depth;  // [m]
 };
 
-// Figures of one pair over the run.
-struct PairSummary {
-  double contact_time = 0;  // [s]
-  double impulse = 0;       // of the normal force [N s]
-  double peak_force = 0;    // largest sum of the normal forces [N]
-  double peak_force_time = 0;
-  double max_depth = 0;  // [m]
-  double max_depth_time = 0;
-  int touches = 0;
-};
-
-// Recorded rows, in blocks: t, q, v, and the terms of the energy audit.
-struct Record {
-  static constexpr int kEnergies = 6;  // kinetic, potential, elastic, damping, friction, control
-  std::vector<double> t, q, v, energy;
-  std::vector<ContactRow> contacts;
-  std::vector<double> contact_row;  // the recorded row of each contact
-  std::vector<Event> events;
+// What the steps of a run cost.
+struct Counts {
+  long steps = 0;          // accepted
+  long rejected = 0;       // made, but their error or a sphere's motion was too large
+  long event_steps = 0;    // made to end at an event, but they missed it
+  long evaluations = 0;    // of the dynamics, in all of these
+  long event_queries = 0;  // of the contacts alone, to locate events on the dense output
 };
 
 // What a run uses and others may share, such as a user's routine.
@@ -70,14 +48,16 @@ class Simulation : private Torques {
   Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, RunSettings settings,
              std::shared_ptr<Controller> controller, VectorX q0, VectorX v0);
 
+  // The first pair whose sphere is deeper than half its radius at the start, or inside a closed
+  // one-sided shell on the wrong side, however far.
+  std::optional<DeepStart> deep_start();
   // Runs for about `wall_seconds` of wall-clock time, to the first step that ends at the time
-  // `until` or later, or until the records of this call are full.
-  Status advance(double wall_seconds, double until = std::numeric_limits<double>::infinity());
-  // No more rows fit: advance() returns at once until take() is called.
-  bool full() const;
+  // `until` or later, or until `stop` is set.
+  Status advance(double wall_seconds, double until = std::numeric_limits<double>::infinity(),
+                 const std::atomic<bool>* stop = nullptr);
   // Hands over what was recorded since the last call.
-  Record take();
-  // The state where the run stands as the only row of a record; what was recorded stays.
+  Record take() { return recorder_.take(); }
+  // The current state as the only row of a record; what was recorded stays.
   Record snapshot();
 
   // From now on the same pairs have other laws, friction (of the same kind) and radii, and the
@@ -91,17 +71,18 @@ class Simulation : private Torques {
   Lent give_back() { return {scene_.give_back(), std::move(controller_)}; }
 
   double progress() const {
-    return settings_.duration > 0 ? (state_.t - settings_.start_time) / settings_.duration : 1.0;
+    return settings_.duration > 0 ? (time() - settings_.start_time) / settings_.duration : 1.0;
   }
-  double time() const { return state_.t; }
-  const VectorX& q() const { return state_.q; }
-  const VectorX& v() const { return state_.v; }
-  long steps() const { return steps_; }
-  long rejected() const { return rejected_; }
-  long evaluations() const { return chart_.evaluations(); }
-  double last_step() const { return proposal_; }   // [s]
+  double time() const { return stepping_.state().t; }
+  const VectorX& q() const { return stepping_.state().q; }
+  const VectorX& v() const { return stepping_.state().v; }
+  Counts counts() const {
+    return {steps_, stepping_.rejected(), stepping_.event_steps(), stepping_.evaluations(),
+            stepping_.event_queries()};
+  }
+  double last_step() const { return stepping_.proposal(); }  // [s]
   double wall_time() const { return wall_time_; }  // spent in advance() [s]
-  const std::vector<PairSummary>& summaries() const { return summaries_; }
+  const std::vector<PairSummary>& summaries() const { return recorder_.summaries(); }
   const pinocchio::Model& model() const { return scene_.body().model(); }
   const std::vector<Pair>& pairs() const { return scene_.pairs(); }
   const Controller* controller() const { return controller_.get(); }
@@ -111,51 +92,32 @@ class Simulation : private Torques {
   bool follow_state() const override;
   bool follow_time() const override;
 
-  void reserve();
   void start();
   Status step();
-  bool fixed_step(double end);
-  void set_fine(bool fine);
-  bool is_finite() const;
-  Status controlled_step(Stepper& stepper, double end);
-  void attempt(Stepper& stepper, double h);
-  double error_of(const Stepper& stepper);
-  bool meets_event() const;
-  double step_to_event(Stepper& stepper, double h);
-  void keep(bool leaves_work);
+  Status replace_fixed_step(double end);
+  bool make_controlled(double end);
+  void accept();
   void hold_torques();
-  void note_pairs(double h);
-  void record_within(Stepper& stepper);
-  void write_row(const State& state);
   double end_of_step() const;
-  bool at_end() const { return state_.t >= settings_.start_time + settings_.duration; }
+  bool is_finite() const;
+  double end() const { return settings_.start_time + settings_.duration; }
+  bool at_end() const { return time() >= end(); }
 
   RunSettings settings_;
   Scene scene_;
   std::shared_ptr<Controller> controller_;
-  Chart chart_;
-  std::unique_ptr<Stepper> stepper_;
-  // For what a fixed step cannot resolve: a sphere that would pass through a shell in one.
-  std::unique_ptr<Stepper> fine_stepper_;
-  Guard guard_;
+  Stepping stepping_;
+  Recorder recorder_;
   Push push_;
-  State state_, next_, between_;
-  VectorX tau_, sizes_, interpolated_;
-  Powers last_;
-  std::vector<int> pieces_, clamped_;  // of each pair at state_
-  Record record_;
-  std::vector<PairSummary> summaries_;
-  std::vector<double> normal_force_;
-  std::vector<char> touching_, deep_, through_;
-  int fine_steps_ = 0;  // made of the fixed step under way
-  long grid_ = 0, grid_steps_ = 0, steps_ = 0, rejected_ = 0, rows_ = 0, next_row_ = 0;
+  VectorX tau_;
+  long grid_ = 0, grid_steps_ = 0, steps_ = 0;  // of the fixed step: which it is, how many there are
+  int fine_steps_ = 0;                          // made of the fixed step under way
   double wall_time_ = 0;
   double until_ = std::numeric_limits<double>::infinity();  // where advance() stops [s]
-  double next_control_ = 0;                                 // when held torques change next [s]
+  double next_control_;                                     // when held torques change next [s]
   long controls_ = 0;
   double kink_ = std::numeric_limits<double>::infinity();  // of the torques, next in time [s]
-  double proposal_ = 0, last_error_ = 1;                   // of the next step [s]; of the last one
-  bool started_ = false, finished_ = false, fine_ = false;
+  bool started_ = false, finished_ = false;
 };
 
 }  // namespace sphshell

@@ -25,7 +25,7 @@ def read_stl(path: Path) -> RawSurface:
         import trimesh
 
     try:
-        # From memory: a file that cannot be opened is then told from one that cannot be parsed.
+        # From memory: so a file that cannot be opened is not reported as damaged.
         data = io.BytesIO(_few_solids(path.read_bytes()))
     except OSError as error:
         raise ShellFileError(path, f"cannot be read ({error.strerror})") from error
@@ -132,9 +132,9 @@ def _check_reals(path: Path, line: int, words: list[str]) -> None:
         raise ShellFileError(path, f"'{' '.join(words)}': {error}", line) from None
 
 
-def _reals(path: Path, words: list[str]) -> Floats:
+def _reals(path: Path, words: list[str], width: int = 3) -> Floats:
     try:
-        return np.array(words, np.float64).reshape(-1, 3)
+        return np.array(words, np.float64).reshape(-1, width)
     except ValueError as error:
         raise ShellFileError(path, f"holds a coordinate that is not a number ({error})") from None
 
@@ -142,104 +142,70 @@ def _reals(path: Path, words: list[str]) -> Floats:
 def read_off(path: Path) -> RawSurface:
     """Read an .off file (also COFF, NOFF, STOFF): polygons of any size.
 
-    Line ends do not matter in the format, except that colours may follow the corners of a face up
+    Line ends do not matter in the format, except that colors may follow the corners of a face up
     to the end of its line: they are tried where the plain reading does not come out even.
     """
-    rows = [row.split("#", 1)[0].split() for row in read_text(path).splitlines()]
-    numbers = [k + 1 for k, row in enumerate(rows) if row]
-    rows = [row for row in rows if row]
-    if not rows or not rows[0][0].upper().endswith("OFF"):
+    lines = enumerate(read_text(path).splitlines(), start=1)
+    rows = [(number, row.split("#", 1)[0].split()) for number, row in lines]
+    rows = [(number, row) for number, row in rows if row]
+    if not rows or not rows[0][1][0].upper().endswith("OFF"):
         raise ShellFileError(path, "does not begin with 'OFF'", 1)
-    kind = rows[0][0].upper()
-    if "4" in kind or "n" in rows[0][0].replace("off", ""):
-        raise ShellFileError(path, f"{kind} is not three-dimensional: not readable", numbers[0])
-    if len(rows[0]) > 1 and rows[0][1].upper() == "BINARY":
-        raise ShellFileError(path, "binary .off files cannot be read: save it as text", numbers[0])
-    rows[0] = rows[0][1:]
-    words = [word for row in rows for word in row]
+    first, (word, *header) = rows[0]
+    kind = word.upper()
+    if "4" in kind or "n" in word.replace("off", ""):
+        raise ShellFileError(path, f"{kind} is not three-dimensional: not readable", first)
+    if header and header[0].upper() == "BINARY":
+        raise ShellFileError(path, "binary .off files cannot be read: save it as text", first)
+    data = [row for _, row in rows[1:]]
+    if not header and data:
+        header = data.pop(0)
+    words = header + [word for row in data for word in row]
     try:
         num_vertices, num_faces = int(words[0]), int(words[1])
     except (ValueError, IndexError):
-        reason = "must count vertices, faces and edges first"
-        raise ShellFileError(path, reason, numbers[0]) from None
-    head = 2 if len(rows[0]) == 2 or (not rows[0] and len(rows[1]) == 2) else 3
-    width = _off_width(kind, rows, num_vertices)
-    last = head + num_vertices * width
+        raise ShellFileError(path, "must count vertices, faces and edges first", first) from None
+    # With normals (N), colors (C, three or four numbers) or texture (ST): the first vertex tells.
+    width = 3 if kind == "OFF" or not data else max(len(data[0]), 3)
+    start = 2 if len(header) == 2 else 3
+    last = start + num_vertices * width
     if num_vertices < 3 or num_faces < 1 or last > len(words):
         raise ShellFileError(
             path,
             f"ends too early or is no surface: it promises {num_vertices} vertices and "
             f"{num_faces} faces",
         )
-    table = _reals(path, words[head:last]) if width == 3 else _wide(path, words[head:last], width)
-    faces = _off_faces(words, last, num_faces) or _off_faces_by_line(rows, last, num_faces)
+    table = _reals(path, words[start:last], width)
+    faces = _off_faces(words[last:], num_faces, True)
     if faces is None:
-        raise ShellFileError(
-            path, f"ends too early or holds a damaged face: {num_faces} faces were promised"
-        )
-    offsets, corners = pack_polygons(*faces)
+        # One face per line; what follows its corners is its color.
+        ends = np.cumsum([len(header), *map(len, data)])
+        at = int(np.searchsorted(ends, last))
+        lines_left = data[at : at + num_faces]
+        found = [_off_faces(row, 1, False) for row in lines_left]
+        if at == len(ends) or ends[at] != last or len(found) < num_faces or None in found:
+            raise ShellFileError(
+                path, f"ends too early or holds a damaged face: {num_faces} faces were promised"
+            )
+        faces = [corners for one in found if one for corners in one]
+    offsets, corners = pack_polygons(list(map(len, faces)), [v for face in faces for v in face])
     raw = finish(path, np.ascontiguousarray(table[:, :3]), offsets, corners)
     if "N" not in kind.replace("OFF", ""):
         return raw
     return RawSurface(raw.vertices, raw.offsets, raw.corners, table[corners, 3:6])
 
 
-def _off_width(kind: str, rows: list[list[str]], num_vertices: int) -> int:
-    """Numbers per vertex: 3, and more with normals (N), colours (C) or texture (ST)."""
-    prefix = kind.replace("OFF", "")
-    if not prefix:
-        return 3
-    # Colours come with three or four numbers: the first line of the vertices tells.
-    data = [row for row in rows if row]
-    first = data[1] if len(data) > 1 else []
-    return max(len(first), 3) if num_vertices else 3
-
-
-def _wide(path: Path, words: list[str], width: int) -> Floats:
-    try:
-        return np.array(words, np.float64).reshape(-1, width)
-    except ValueError as error:
-        raise ShellFileError(path, f"holds a coordinate that is not a number ({error})") from None
-
-
-def _off_faces(words: list[str], at: int, count: int) -> tuple[list[int], list[int]] | None:
-    """Return counts and corners if the words run out exactly with the last face, else None."""
-    counts: list[int] = []
-    corners: list[int] = []
+def _off_faces(words: list[str], count: int, all_words: bool) -> list[list[int]] | None:
+    """Read `count` faces; None if they are damaged, or are to be `all_words` and are not."""
+    faces: list[list[int]] = []
+    at = 0
     try:
         for _ in range(count):
             size = int(words[at])
-            part = words[at + 1 : at + 1 + size]
-            if size < 1 or len(part) < size:
+            face = [int(word) for word in words[at + 1 : at + 1 + size]]
+            if size < 1 or len(face) < size:
                 return None
-            corners += [int(word) for word in part]
-            counts.append(size)
+            faces.append(face)
             at += 1 + size
     except (ValueError, IndexError):
         return None
-    return (counts, corners) if at == len(words) else None
-
-
-def _off_faces_by_line(
-    rows: list[list[str]], skip: int, count: int
-) -> tuple[list[int], list[int]] | None:
-    """One face per line; what follows its corners on the line is its colour."""
-    passed = 0
-    start = 0
-    while start < len(rows) and passed < skip:
-        passed += len(rows[start])
-        start += 1
-    if passed != skip or len(rows) - start < count:
-        return None
-    counts: list[int] = []
-    corners: list[int] = []
-    try:
-        for row in rows[start : start + count]:
-            size = int(row[0])
-            if size < 1 or len(row) < 1 + size:
-                return None
-            corners += [int(word) for word in row[1 : 1 + size]]
-            counts.append(size)
-    except ValueError:
-        return None
-    return counts, corners
+    return None if all_words and at != len(words) else faces

@@ -1,12 +1,11 @@
 """Polygon files (.ply), text and binary.
 
 A reader of our own: trimesh refuses binary files whose elements have different numbers of corners,
-and takes truncated text files without a word.
+and accepts truncated text files.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin.errors import ShellFileError
-from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface
+from sphshell_pin.shell.raw import LARGEST_COUNT, Floats, Ints, Longs, RawSurface
 from sphshell_pin.shell.readers.text import finish, pack_polygons
 
 _TYPES = {
@@ -28,6 +27,7 @@ _TYPES = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
+_ORDER = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNERS = ("vertex_indices", "vertex_index")
 _TOO_SHORT = "ends too early: its header promises more"
 
@@ -47,6 +47,7 @@ class _Element:
 
 
 Polygons = tuple[Longs, Ints]
+_Values = npt.NDArray[Any]  # of the types that the header names
 
 
 def read_ply(path: Path) -> RawSurface:
@@ -64,8 +65,11 @@ def read_ply(path: Path) -> RawSurface:
     form, elements, start = _header(path, data)
     table: dict[str, Floats] = {}
     polygons: Polygons | None = None
-    source = _Text(data[start:]) if form == "ascii" else _Binary(data[start:], _ORDER[form])
     try:
+        body = data[start:]
+        if form == "ascii":  # as if it were binary, all numbers 64-bit reals
+            body = np.array(body.split(), np.float64).tobytes()
+        source = _Data(body)
         for element in elements:
             lists = [prop for prop in element.properties if prop.count_kind]
             if element.name == "vertex" and not lists:
@@ -73,10 +77,12 @@ def read_ply(path: Path) -> RawSurface:
             elif element.name == "face" and any(prop.name in _CORNERS for prop in lists):
                 polygons = source.polygons(element)
                 break  # what follows is of no use here
-            elif not lists:
-                source.table(element)
+            elif lists:
+                for _ in range(element.count):
+                    for prop in element.properties:
+                        source.values(prop)
             else:
-                source.polygons(element)
+                source.table(element)
     except (IndexError, ValueError) as error:
         raise ShellFileError(path, f"{_TOO_SHORT} ({error})") from error
     if polygons is None or any(axis not in table for axis in "xyz"):
@@ -89,9 +95,6 @@ def read_ply(path: Path) -> RawSurface:
     return RawSurface(raw.vertices, raw.offsets, raw.corners, normals[raw.corners])
 
 
-_ORDER = {"binary_little_endian": "<", "binary_big_endian": ">"}
-
-
 def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
     """Format, elements, and where the data start."""
     end = data.find(b"end_header")
@@ -100,6 +103,11 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
         raise ShellFileError(path, "is no .ply file, or its header is cut off")
     form = ""
     elements: list[_Element] = []
+
+    def kind(name: str) -> str:
+        binary = _ORDER.get(form, "<") + _TYPES[name]
+        return "<f8" if form == "ascii" else binary
+
     for number, row in enumerate(data[:end].decode("ascii", "replace").splitlines(), start=1):
         words = row.split()
         try:
@@ -110,10 +118,10 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
             elif words[0] == "element":
                 elements.append(_Element(words[1], int(words[2]), []))
             elif words[0] == "property" and words[1] == "list":
-                listed = _Property(words[4], _TYPES[words[3]], _TYPES[words[2]])
+                listed = _Property(words[4], kind(words[3]), kind(words[2]))
                 elements[-1].properties.append(listed)
             elif words[0] == "property":
-                elements[-1].properties.append(_Property(words[2], _TYPES[words[1]], None))
+                elements[-1].properties.append(_Property(words[2], kind(words[1]), None))
             else:
                 raise ValueError
         except (ValueError, IndexError, KeyError):
@@ -123,87 +131,59 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
     return form, elements, line_end + 1
 
 
-class _Text:
-    """The data of a text file, word by word."""
+class _Data:
+    """The data of a file, element by element."""
 
     def __init__(self, data: bytes) -> None:
-        self._words = data.split()
-        self._at = 0
-
-    def table(self, element: _Element) -> dict[str, Floats]:
-        width = len(element.properties)
-        rows = np.array(self._take(element.count * width), np.float64).reshape(-1, width)
-        return {prop.name: rows[:, k] for k, prop in enumerate(element.properties)}
-
-    def polygons(self, element: _Element) -> Polygons:
-        def read(prop: _Property) -> list[int]:
-            size = int(self._take(1)[0]) if prop.count_kind else 1
-            words = self._take(size)
-            return [int(word) for word in words] if prop.name in _CORNERS else []
-
-        return _one_by_one(element, read)
-
-    def _take(self, count: int) -> list[bytes]:
-        words = self._words[self._at : self._at + count]
-        if count < 0 or len(words) < count:
-            raise ValueError("not enough numbers")
-        self._at += count
-        return words
-
-
-class _Binary:
-    """The data of a binary file."""
-
-    def __init__(self, data: bytes, order: str) -> None:
         self._data = data
-        self._order = order
         self._at = 0
 
     def table(self, element: _Element) -> dict[str, Floats]:
-        kind = np.dtype([(p.name, self._order + p.kind) for p in element.properties])
-        rows = self._take(kind, element.count)
+        """Read an element without lists: its columns by name."""
+        rows = self._take(np.dtype([(p.name, p.kind) for p in element.properties]), element.count)
         return {prop.name: rows[prop.name].astype(np.float64) for prop in element.properties}
 
     def polygons(self, element: _Element) -> Polygons:
-        return self._alike(element) or _one_by_one(element, self._read)
+        """Read an element with lists; its corners are those of the properties named so."""
+        alike = self._alike(element)
+        if alike is not None:
+            return alike
+        rows = []
+        for _ in range(element.count):
+            values = [self.values(prop) for prop in element.properties]
+            found = zip(element.properties, values, strict=True)
+            rows.append(np.concatenate([v for p, v in found if p.name in _CORNERS]))
+        return pack_polygons([len(row) for row in rows], _whole(np.concatenate(rows)))
 
-    def _read(self, prop: _Property) -> list[int]:
-        size = 1
+    def values(self, prop: _Property) -> _Values:
+        count = 1
         if prop.count_kind:
-            size = int(self._take(np.dtype(self._order + prop.count_kind), 1)[0])
-        values = self._take(np.dtype(self._order + prop.kind), size)
-        return [int(value) for value in values] if prop.name in _CORNERS else []
+            count = int(_whole(self._take(np.dtype(prop.count_kind), 1))[0])
+        return self._take(np.dtype(prop.kind), count)
 
     def _alike(self, element: _Element) -> Polygons | None:
-        """All polygons at once, if all have as many corners as the first."""
+        """Read all polygons at once, if all have as many corners as the first."""
         start = self._at
-        fields: list[Any] = []
+        fields: list[tuple[str, str, tuple[int, ...]]] = []
         for prop in element.properties:
+            size = len(self.values(prop))
             if prop.count_kind:
-                size = int(self._take(np.dtype(self._order + prop.count_kind), 1)[0])
-                self._take(np.dtype(self._order + prop.kind), size)
-                fields.append((f"{prop.name} count", self._order + prop.count_kind))
-                fields.append((prop.name, self._order + prop.kind, (size,)))
-            else:
-                self._take(np.dtype(self._order + prop.kind), 1)
-                fields.append((prop.name, self._order + prop.kind))
+                fields.append((f"{prop.name} count", prop.count_kind, ()))
+            fields.append((prop.name, prop.kind, (size,)))
         self._at = start
         kind = np.dtype(fields)
         if start + element.count * kind.itemsize > len(self._data):
             return None
-        rows = np.frombuffer(self._data, kind, element.count, start)
+        rows = self._take(kind, element.count)
         for prop in element.properties:
             if prop.count_kind and (rows[f"{prop.name} count"] != rows[prop.name].shape[1]).any():
+                self._at = start
                 return None
-        self._at += element.count * kind.itemsize
-        name = next((p.name for p in element.properties if p.name in _CORNERS), None)
-        if name is None:
-            return pack_polygons([], [])
-        return pack_polygons(
-            np.full(len(rows), rows[name].shape[1]), rows[name].astype(np.int64).ravel()
-        )
+        name = next(prop.name for prop in element.properties if prop.name in _CORNERS)
+        corners = rows[name]
+        return pack_polygons(np.full(len(rows), corners.shape[1]), _whole(corners.ravel()))
 
-    def _take(self, kind: np.dtype[Any], count: int) -> npt.NDArray[Any]:
+    def _take(self, kind: np.dtype[Any], count: int) -> _Values:
         size = kind.itemsize * count
         # A row without properties has no bytes: its count needs a bound of its own.
         if not 0 <= count <= len(self._data) or self._at + size > len(self._data):
@@ -213,13 +193,9 @@ class _Binary:
         return values
 
 
-def _one_by_one(element: _Element, read: Callable[[_Property], list[int]]) -> Polygons:
-    counts: list[int] = []
-    corners: list[int] = []
-    for _ in range(element.count):
-        row: list[int] = []
-        for prop in element.properties:
-            row += read(prop)
-        counts.append(len(row))
-        corners += row
-    return pack_polygons(counts, corners)
+def _whole(values: _Values) -> Longs:
+    """Return indices; those of a text file were read as reals."""
+    reals = values.astype(np.float64)
+    if (reals != np.floor(reals)).any():
+        raise ValueError("an index is not a whole number")
+    return np.clip(reals, -LARGEST_COUNT, LARGEST_COUNT).astype(np.int64)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.errors import ShellFileError
-from sphshell_pin.shell.raw import LARGEST_COUNT, Floats, Ints, Longs, RawSurface
+from sphshell_pin.shell.raw import LARGEST_COUNT, Floats, Ints, Longs, RawSurface, offsets_of
 
 
 def read_text(path: Path) -> str:
@@ -32,9 +32,7 @@ def pack_polygons(
     counts: Sequence[int] | Longs, corners: Sequence[int] | Longs
 ) -> tuple[Longs, Ints]:
     """Offsets and corners from corner counts and indices from 0, see `indices`."""
-    offsets = np.zeros(len(counts) + 1, np.int64)
-    np.cumsum(counts, out=offsets[1:])
-    return offsets, indices(corners)
+    return offsets_of(np.asarray(counts, np.int64)), indices(corners)
 
 
 def indices(values: Sequence[int] | Longs) -> Ints:

@@ -1,22 +1,33 @@
-"""What a report holds: sections of findings, pictures and tables."""
+"""What a report holds: sections of findings, pictures and tables, each described once.
+
+A table is a csv file, an HTML table on the page and a Markdown table in the documents; a picture is
+a png file, which the page holds, too.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from importlib import import_module
-from typing import Any, Literal
+from typing import Literal
 
-Progress = Callable[[float], None]  # told the share of a section that is done, 0 to 1
+import numpy as np
+
+Progress = Callable[[float], None]
+"""Called with the share of a section that is done, 0 to 1."""
+Value = str | float | None
+
+TIMES = "\u00d7"  # the unit of ratios
 
 
 @dataclass(frozen=True)
 class Finding:
     """One figure, with its quartiles over the rounds and its aim where there are such.
 
-    `sense` says on which side of `aim` it should be; `shown` takes the place of the number in
-    text; a `headline` stands at the top of the page too.
+    `sense` says on which side of `aim` it should be; `shown` replaces the number in text; a
+    `headline` stands at the top of the page too.
     """
 
     key: str
@@ -29,6 +40,20 @@ class Finding:
     sense: Literal["<=", ">="] = "<="
     headline: bool = False
     shown: str | None = None
+
+    @classmethod
+    def of_rounds(
+        cls,
+        key: str,
+        what: str,
+        ratios: np.ndarray,
+        aim: float | None = None,
+        sense: Literal["<=", ">="] = "<=",
+        headline: bool = False,
+    ) -> Finding:
+        """Return the median of the ratios (rounds,) of every round, with its quartiles."""
+        median, low, high = quartiles(ratios)
+        return cls(key, what, median, TIMES, low, high, aim, sense, headline)
 
     @property
     def met(self) -> bool | None:
@@ -64,9 +89,9 @@ class Column:
 
     key: str
     heading: str
-    show: Callable[[Any], str] | None = None
+    show: Callable[..., str] | None = None
 
-    def cell(self, value: Any) -> str:
+    def cell(self, value: Value) -> str:
         """Return what the page shows."""
         if self.show is not None:
             return self.show(value)
@@ -79,20 +104,49 @@ class Table:
 
     name: str
     caption: str
-    columns: tuple[Column, ...]
-    rows: list[tuple[Any, ...]]
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Value]]
     folded: bool = False
+
+    @property
+    def cells(self) -> list[list[str]]:
+        """The rows as the page shows them."""
+        return [
+            [column.cell(value) for column, value in zip(self.columns, row, strict=True)]
+            for row in self.rows
+        ]
+
+    @property
+    def numeric(self) -> list[bool]:
+        """Whether a column holds numbers."""
+        firsts = (
+            next((row[k] for row in self.rows if row[k] is not None), "")
+            for k in range(len(self.columns))
+        )
+        return [not isinstance(first, str) for first in firsts]
+
+    def csv(self) -> str:
+        """Return the table as csv, with all digits."""
+        stream = io.StringIO()
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow([column.key for column in self.columns])
+        writer.writerows(self.rows)
+        return stream.getvalue()
+
+    def markdown(self) -> str:
+        """Return the table as Markdown."""
+        lines = [[c.heading for c in self.columns], ["---"] * len(self.columns), *self.cells]
+        return "".join(
+            f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n"
+            for line in lines
+        )
 
 
 @dataclass(frozen=True)
 class Picture:
-    """An inline SVG, what it shows for those who cannot see it, and its caption.
-
-    It is written as NAME.png, too.
-    """
+    """A picture as png, what it shows for those who cannot see it, and its caption."""
 
     name: str
-    svg: str
     png: bytes
     description: str
     caption: str
@@ -113,15 +167,34 @@ class Section:
     seconds: float = 0.0  # that measuring it took
 
 
-TIMES = "\u00d7"  # the unit of ratios
+def findings_table(findings: Sequence[Finding]) -> Table:
+    """Return findings as a table; its verdict is empty for a finding without an aim."""
+    words = {True: "met", False: "missed", None: ""}
+    return Table(
+        "findings",
+        "Findings.",
+        [Column(key, key) for key in ("finding", "figure", "quartiles", "aim", "verdict")],
+        [(f.what, f.text, f.spread_text, f.aim_text, words[f.met]) for f in findings],
+    )
 
 
-def benchmark(name: str) -> Any:
-    """Return a module of the benchmarks, which are installed inside the package."""
-    return import_module(f"sphshell_pin.benchmarks.{name}")
+def quartiles(figures: np.ndarray) -> tuple[float, float, float]:
+    """Return median, lower and upper quartile of figures (rounds,)."""
+    median, low, high = (float(one) for one in np.percentile(figures, [50, 25, 75]))
+    return median, low, high
 
 
-def number(value: Any) -> str:
+def times_columns(*first: Column) -> tuple[Column, ...]:
+    """Return columns for `quartiles` of times [s] after the columns `first`."""
+    return (
+        *first,
+        Column("median_s", "median [us]", microseconds),
+        Column("low_s", "lower quartile", microseconds),
+        Column("high_s", "upper quartile", microseconds),
+    )
+
+
+def number(value: float | None) -> str:
     """Return a number with three digits, as people write it."""
     if value is None:
         return ""
@@ -153,5 +226,5 @@ def with_unit(value: float, unit: str) -> str:
 
 
 def microseconds(seconds: float) -> str:
-    """Return a time in microseconds; below a nanosecond it is nothing."""
+    """Return a time in microseconds; below a nanosecond it is shown as 0."""
     return number(seconds * 1e6 if abs(seconds) >= 1e-9 else 0.0)

@@ -1,45 +1,40 @@
-"""What the pictures of the report share: colours that follow the page, labels, guides, SVG."""
+"""What the pictures of the report share: colors, labels, guide lines."""
 
 from __future__ import annotations
 
 import contextlib
 import io
 import math
-import re
 from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.study.report.contents import superscript
 
-# Stand-ins: the SVG names the page's colours instead, so that one picture serves light and dark.
-INK, FAINT, RULE, PAPER = "#a100f0", "#a100f1", "#a100f2", "#a100f3"
-SERIES = tuple(f"#a1000{k}" for k in range(1, 7))
-BLUE, GREEN, ORANGE, RED, VIOLET, GREY = SERIES
-_NAMES = {INK: "ink", FAINT: "faint", RULE: "rule", PAPER: "paper"} | {
-    color: f"s{k}" for k, color in enumerate(SERIES, 1)
-}
-_COLOURED = ("color", "facecolor", "edgecolor", "markerfacecolor", "markeredgecolor")
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK, FAINT, RULE, PAPER = "#1c2024", "#656d77", "#e2e3df", "#ffffff"
+BLUE, GREEN, ORANGE, RED, VIOLET, GREY = (
+    "#2160b8", "#14804a", "#c26a00", "#b8262f", "#7340b0", "#69737f",
+)  # fmt: skip
 SMALL, TEXT = 8.0, 9.0
-_STYLE: Any = {
-    "font.family": "sans-serif",
+DASHED = (0, (4, 3))
+_STYLE: dict[str, object] = {
     "font.size": TEXT,
     "text.color": INK,
     "axes.labelcolor": INK,
     "axes.edgecolor": FAINT,
-    "axes.titlecolor": INK,
     "axes.titlesize": TEXT + 0.5,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.linewidth": 0.7,
     "axes.axisbelow": True,
     "grid.color": RULE,
-    "grid.linewidth": 0.6,
     "xtick.color": FAINT,
     "ytick.color": FAINT,
     "xtick.labelcolor": INK,
@@ -50,79 +45,24 @@ _STYLE: Any = {
     "ytick.minor.size": 0,
     "lines.linewidth": 1.6,
     "lines.markersize": 4,
-    "svg.fonttype": "none",
 }
 
 
 @contextlib.contextmanager
-def drawing(width: float, height: float) -> Iterator[Any]:
+def drawing(width: float, height: float) -> Iterator[Figure]:
     """Give an empty figure of these inches; draw and write it inside."""
     figure = new_figure(width, height)
     from matplotlib import rc_context
 
-    with rc_context(_STYLE):
-        figure.patch.set_visible(False)
+    with rc_context(_STYLE):  # type: ignore[arg-type]
         yield figure
 
 
-def pictured(figure: Any, name: str) -> tuple[str, str, bytes]:
-    """Return the name, SVG and PNG of a picture."""
-    svg = to_svg(figure, name)
+def png_of(figure: Figure) -> bytes:
+    """Return the figure as a png file."""
     stream = io.BytesIO()
-    _take_colours(figure)
-    figure.patch.set_visible(True)
-    figure.savefig(stream, format="png", dpi=160, facecolor="white")
-    return name, svg, stream.getvalue()
-
-
-def _take_colours(figure: Any) -> None:
-    """Give a figure the light colours of the page in place of the stand-ins."""
-    from matplotlib.artist import getp
-    from matplotlib.colors import to_hex, to_rgba_array
-
-    css = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
-    light: dict[str, str] = {}
-    for variable, value in re.findall(r"--(\w+): (#\w+);", css):
-        light.setdefault(variable, value)  # the light colours come first
-    artists = figure.findobj()
-    # The boxes behind texts are nobody's children.
-    boxes = [one.get_bbox_patch() for one in artists if hasattr(one, "get_bbox_patch")]
-    for artist in (*artists, *(box for box in boxes if box is not None)):
-        for what in _COLOURED:
-            if not (hasattr(artist, f"set_{what}") and hasattr(artist, f"get_{what}")):
-                continue
-            try:
-                given = to_rgba_array(getp(artist, what))
-            except (TypeError, ValueError):
-                continue  # "none", "auto": not one of ours
-            if not any(to_hex(one) in _NAMES for one in given):
-                continue
-            taken = to_rgba_array([light.get(_NAMES.get(to_hex(one), ""), one) for one in given])
-            taken[:, 3] = given[:, 3]
-            getattr(artist, f"set_{what}")(taken if len(taken) > 1 else tuple(taken[0]))
-
-
-def to_svg(figure: Any, name: str) -> str:
-    """Return the figure as an SVG element of a page, with the page's colours.
-
-    `name` keeps its identifiers apart from those of other pictures.
-    """
-    from matplotlib import rc_context
-
-    stream = io.StringIO()
-    with rc_context({"svg.hashsalt": name}):
-        figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
-    text = stream.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", text)
-    text = re.sub(r'<g id="[^"]*"', "<g", text)
-    text = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font-size: \1px", text)
-    text = re.sub(r'<svg ([^>]*?)(?:width|height)="[^"]*" ', r"<svg \1", text)
-    text = re.sub(r'<svg ([^>]*?)(?:width|height)="[^"]*" ', r"<svg \1", text)
-    for color, variable in _NAMES.items():
-        text = text.replace(color, f"var(--{variable})")
-    return re.sub(r">\s+<", "><", text).strip()
+    figure.savefig(stream, format="png", dpi=160)
+    return stream.getvalue()
 
 
 def power_of_ten(value: float, _: object = None) -> str:
@@ -143,7 +83,7 @@ def many(value: float, _: object = None) -> str:
     return f"{value:g}"
 
 
-def logarithmic(axis: Any, *, counts: bool = False, every: tuple[int, int] = (1, 1)) -> None:
+def logarithmic(axis: Axes, *, counts: bool = False, every: tuple[int, int] = (1, 1)) -> None:
     """Make both scales logarithmic; `counts` are along x; label every so many decades."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
@@ -160,9 +100,9 @@ def logarithmic(axis: Any, *, counts: bool = False, every: tuple[int, int] = (1,
 
 
 def label_ends(
-    axis: Any, ends: Sequence[tuple[float, float, str, str]], *, gap: float = 0.075
+    axis: Axes, ends: Sequence[tuple[float, float, str, str]], *, gap: float = 0.075
 ) -> None:
-    """Write names beside the ends of lines: (x, y, name, colour); moved apart by `gap` of height.
+    """Write names beside the ends of lines: (x, y, name, color); moved apart by `gap` of height.
 
     The axis keeps the limits that it has now.
     """
@@ -183,25 +123,23 @@ def label_ends(
 
 
 def spread_apart(heights: Sequence[float], gap: float) -> list[float]:
-    """Return ascending heights moved as little as needed to be `gap` apart."""
-    groups: list[list[float]] = []
-    for height in heights:
-        groups.append([height, 1])
-        while len(groups) > 1 and _touch(groups[-2], groups[-1], gap):
-            (a, m), (b, n) = groups[-2:]
-            groups[-2:] = [[(a * m + b * n) / (m + n), m + n]]
-    return [middle + gap * (i - (n - 1) / 2) for middle, n in groups for i in range(round(n))]
+    """Return ascending heights moved so that neighbors are at least `gap` apart."""
+    moved = np.array(heights, dtype=float)
+    for _ in range(200):  # pushes both neighbors of each pair that is too close
+        short = np.maximum(gap - np.diff(moved), 0.0)
+        if not short.any():
+            break
+        push = 0.5 * (short + 1e-9 * (short > 0))
+        moved[:-1] -= push
+        moved[1:] += push
+    return [float(one) for one in moved]
 
 
-def _touch(below: list[float], above: list[float], gap: float) -> bool:
-    return above[0] - below[0] < gap * (below[1] + above[1]) / 2
-
-
-def guide(axis: Any, start: tuple[float, float], stop: float, exponent: float, name: str) -> None:
+def guide(axis: Axes, start: tuple[float, float], stop: float, exponent: float, name: str) -> None:
     """Draw a line y ~ x^exponent from `start` to x = `stop`, with its name behind its end."""
     x = np.array([start[0], stop])
     y = start[1] * (x / start[0]) ** exponent
-    axis.plot(x, y, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
+    axis.plot(x, y, color=FAINT, linewidth=0.9, linestyle=DASHED)
     axis.annotate(
         name, (x[1], y[1]), xytext=(3, 0), textcoords="offset points", color=FAINT,
         fontsize=SMALL - 0.5, ha="left", va="center",

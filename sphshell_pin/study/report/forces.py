@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from sphshell_pin.benchmarks import convergence, timing
+from sphshell_pin.benchmarks.convergence import Row
 from sphshell_pin.study.report.contents import (
     Column,
     Finding,
@@ -13,12 +13,12 @@ from sphshell_pin.study.report.contents import (
     Progress,
     Section,
     Table,
-    benchmark,
     microseconds,
     number,
 )
 from sphshell_pin.study.report.drawing import (
     BLUE,
+    DASHED,
     GREEN,
     ORANGE,
     RED,
@@ -27,15 +27,15 @@ from sphshell_pin.study.report.drawing import (
     guide,
     label_ends,
     logarithmic,
-    pictured,
+    png_of,
 )
 
 KEY, TITLE = "forces", "Error of the contact force"
 SMOOTH, ESTIMATED = "smooth, exact normals", "smooth, estimated normals"
-# Name, colour, marker, line: estimated normals are exact on a sphere, and one hides the other.
-LOOKS: dict[str, tuple[str, str, str, Any]] = {
+# Name, color, marker, line: estimated normals are exact on a sphere, and one hides the other.
+LOOKS = {
     SMOOTH: ("smooth", BLUE, "o", "-"),
-    ESTIMATED: ("smooth, estimated", GREEN, "s", (0, (3, 2))),
+    ESTIMATED: ("smooth, estimated", GREEN, "s", DASHED),
     "facets": ("facets", ORANGE, "^", "-"),
     "elements": ("elements", RED, "v", "-"),
 }
@@ -48,26 +48,21 @@ inside and the outside of a sphere of 4 r, the torus (inside) has radii of 6 r a
 plate is made of random triangles. The method "smooth" bends the elements to the normals of their
 vertices, exact ones or those estimated from the mesh; "facets" is the exact polyhedron; "elements"
 sums over all elements, as SPHSHL3 did. On a faceted bowl the sphere is pushed by both sides of
-every joint, and no refinement helps; the sum over elements grows without limit."""
+every edge, and refinement does not help; the sum over elements grows without limit."""
 
 
 def section(*, quick: bool, progress: Progress) -> Section:
     """Measure and return the section."""
-    convergence, timing = benchmark("convergence"), benchmark("timing")
-    names = list(convergence.REPORTED)
-    rows: list[Any] = []
+    names = convergence.REPORTED
+    rows: list[Row] = []
     for k, name in enumerate(names):
-        rows += convergence.measure(
-            name,
-            convergence.REPORTED[name],
-            rounds=3 if quick else 7,
-            progress=timing.part(progress, k / len(names), (k + 1) / len(names)),
-            finest=4 if quick else 5,
-        )
+        share = timing.part(progress, k / len(names), (k + 1) / len(names))
+        surface, rounds, finest = convergence.SURFACES[name], 3 if quick else 7, 4 if quick else 5
+        rows += convergence.measure(name, surface, rounds, share, finest)
     return assemble(names, rows)
 
 
-def assemble(names: list[str], rows: list[Any]) -> Section:
+def assemble(names: tuple[str, ...], rows: list[Row]) -> Section:
     """Return the section of measured rows."""
     return Section(
         KEY,
@@ -82,67 +77,57 @@ def assemble(names: list[str], rows: list[Any]) -> Section:
     )
 
 
-def of(rows: list[Any], surface: str, rule: str) -> list[Any]:
+def of(rows: list[Row], surface: str, rule: str) -> list[Row]:
     """Return the rows of one line, coarse to fine."""
     return [row for row in rows if (row.surface, row.rule) == (surface, rule)]
 
 
-def order(line: list[Any]) -> float:
+def order(line: list[Row]) -> float:
     """Return the power of h that the mean error follows, by a fit over all meshes."""
     side, error = np.array([(row.side, row.mean) for row in line]).T
     return float(np.polyfit(np.log(side), np.log(error), 1)[0])
 
 
-def error_at(line: list[Any], which: str = "mean", side: float = AT) -> float:
+def error_at(line: list[Row], which: str = "mean", side: float = AT) -> float:
     """Return the mean or largest error at h / r, between two meshes by a power law."""
     sides = np.log([row.side for row in reversed(line)])
     errors = np.log([getattr(row, which) for row in reversed(line)])
     return float(np.exp(np.interp(np.log(side), sides, errors)))
 
 
-def findings_of(rows: list[Any]) -> list[Finding]:
+def findings_of(rows: list[Row]) -> list[Finding]:
     """Return the figures that have aims."""
-    flat = max(row.largest for row in of(rows, "flat plate", SMOOTH))
     lines = [of(rows, name, SMOOTH) for name in CURVED]
     estimated = [of(rows, name, ESTIMATED) for name in CURVED]
+    error = f"force error at h / r = {AT}, exact normals: the worst mean of bowl, dome, torus"
+    lowest = "order of the force error in h, exact normals: lowest of bowl, dome, torus"
+    flat = "force error on a flat plate, any refinement, side force included"
     return [
-        Finding(
-            "force_error",
-            f"force error at h / r = {AT}, exact normals: the worst mean of bowl, dome, torus",
-            max(error_at(line) for line in lines),
-            aim=1e-4,
-            headline=True,
-        ),
+        Finding("force_error", error, max(map(error_at, lines)), aim=1e-4, headline=True),
         Finding(
             "force_error_largest",
             "the same, the largest error at any place",
             max(error_at(line, "largest") for line in lines),
         ),
-        Finding(
-            "force_order",
-            "order of the force error in h, exact normals: lowest of bowl, dome, torus",
-            min(order(line) for line in lines),
-            aim=3.5,
-            sense=">=",
-        ),
+        Finding("force_order", lowest, min(map(order, lines)), aim=3.5, sense=">="),
         Finding(
             "force_order_estimated",
             "the same with normals estimated from the mesh",
-            min(order(line) for line in estimated),
+            min(map(order, estimated)),
             aim=2.0,
             sense=">=",
         ),
         Finding(
             "flat_error",
-            "force error on a flat plate, any refinement, side force included",
             flat,
+            max(row.largest for row in of(rows, "flat plate", SMOOTH)),
             aim=1e-12,
             headline=True,
         ),
     ]
 
 
-def orders_table(names: list[str], rows: list[Any]) -> Table:
+def orders_table(names: tuple[str, ...], rows: list[Row]) -> Table:
     """Return order and error at h / r = AT of every method on every surface."""
     cells = []
     for name in names:
@@ -163,7 +148,7 @@ def orders_table(names: list[str], rows: list[Any]) -> Table:
             Column("order", "order"),
             Column("mean_error_at_0.3", "error at h/r = 0.3"),
             Column("largest_error_at_0.3", "largest"),
-            Column("finest_triangles", "finest mesh"),
+            Column("finest_triangles", "triangles of the finest mesh"),
             Column("finest_mean_error", "error there"),
             Column("query_s", "query [us]", microseconds),
         ),
@@ -171,7 +156,7 @@ def orders_table(names: list[str], rows: list[Any]) -> Table:
     )
 
 
-def errors_table(rows: list[Any]) -> Table:
+def errors_table(rows: list[Row]) -> Table:
     """Return every row that was measured."""
     return Table(
         "forces",
@@ -198,20 +183,24 @@ def errors_table(rows: list[Any]) -> Table:
     )
 
 
-def picture(names: list[str], rows: list[Any], *, against_time: bool) -> Picture:
+def picture(names: tuple[str, ...], rows: list[Row], *, against_time: bool) -> Picture:
     """Draw mean errors as lines, one panel per surface; against elements up to the largest, too."""
     looks = {rule: look for rule, look in LOOKS.items() if not against_time or rule != ESTIMATED}
+
+    def abscissa(row: Row) -> float:
+        return float(row.time.median * 1e6 if against_time else row.triangles)
+
     with drawing(7.8, 5.8) as figure:
-        figure.get_layout_engine().set(h_pad=0.09)
+        figure.set_layout_engine("constrained", h_pad=0.09)
         panels = figure.subplots(2, 2, sharex=True).ravel()
         for axis, name in zip(panels, names, strict=True):
-            flat = name not in CURVED
+            flat = name == "flat plate"
             logarithmic(axis, counts=True, every=(1, 3 if flat else 2))
             axis.set_ylim(*((1e-17, 1e3) if flat else (1e-10, 1e2)))
             axis.set_title(name)
             for rule, (_, color, marker, dashes) in looks.items():
                 line = of(rows, name, rule)
-                mean, x = [r.mean for r in line], [abscissa(r, against_time) for r in line]
+                mean, x = [r.mean for r in line], [abscissa(r) for r in line]
                 axis.plot(x, mean, color=color, marker=marker, linestyle=dashes)
                 if not against_time:
                     largest = [r.largest for r in line]
@@ -223,29 +212,25 @@ def picture(names: list[str], rows: list[Any], *, against_time: bool) -> Picture
             ends = []
             for rule, (label, color, _, _) in looks.items():
                 last = of(rows, name, rule)[-1]
-                ends.append((abscissa(last, against_time), last.mean, label, color))
+                ends.append((abscissa(last), last.mean, label, color))
             label_ends(axis, ends)
-        what = "time of a query [us]" if against_time else "elements"
-        figure.supxlabel(what, fontsize=SMALL + 1)
+        figure.supxlabel("time of a query [us]" if against_time else "elements", fontsize=SMALL + 1)
         figure.supylabel("error of the force / force", fontsize=SMALL + 1)
-        made = pictured(figure, "force_time" if against_time else "force_elements")
+        png = png_of(figure)
     if against_time:
         return Picture(
-            *made,
+            "force_time",
+            png,
             "Error of the force against the time of a query, three methods on four surfaces.",
             "What an error costs: mean error against the median time of a query on one core, from "
             "coarse to fine meshes along each line.",
         )
-    best = number(error_at(of(rows, "bowl", SMOOTH)))
+    best = number(error_at(of(rows, names[0], SMOOTH)))
     return Picture(
-        *made,
-        f"Error of the force against the number of elements; smooth reaches {best} on the bowl at "
-        f"h/r = {AT}.",
+        "force_elements",
+        png,
+        f"Error of the force against the number of elements; smooth reaches {best} on the "
+        f"{names[0]} at h/r = {AT}.",
         "Mean error (line) and up to the largest (band) against the number of elements, with the "
         "slopes of orders 2 and 4 in the size of the elements.",
     )
-
-
-def abscissa(row: Any, against_time: bool) -> float:
-    """Return the time of a query [us], or the number of elements."""
-    return float(row.time.median * 1e6 if against_time else row.triangles)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
+from sphshell_pin.benchmarks import hard_cases
+from sphshell_pin.benchmarks.hard_cases import Found, Row
 from sphshell_pin.study.report.contents import (
     Column,
     Finding,
@@ -12,7 +13,6 @@ from sphshell_pin.study.report.contents import (
     Progress,
     Section,
     Table,
-    benchmark,
 )
 from sphshell_pin.study.report.drawing import (
     BLUE,
@@ -20,15 +20,15 @@ from sphshell_pin.study.report.drawing import (
     RED,
     SMALL,
     drawing,
-    pictured,
+    png_of,
     power_of_ten,
 )
 
 KEY, TITLE = "hard_cases", "Hard cases"
 TEXT = """\
 Runs that are compared with a closed form, or with a bound that physics sets: impacts, rolling,
-surfaces, energy, shots, weak laws, extreme numbers, rest on slopes. Each verdict has a bound for
-its error."""
+surfaces, energy, impact tests, under-stiff laws, extreme numbers, rest on slopes. Each verdict has
+a bound for its error."""
 ABSENT = """\
 The hard cases are part of the checkout (tests/hard_cases), and this package is installed without
 it: run the report from a checkout to have them here."""
@@ -37,14 +37,13 @@ LEAST = 1e-16  # errors below, zero among them, are drawn here
 
 def section(*, quick: bool, progress: Progress) -> Section:
     """Run the cases where there is a checkout, and return the section."""
-    cases = benchmark("hard_cases")
-    root = cases.checkout()
+    root = hard_cases.checkout()
     if root is None:
         return Section(KEY, TITLE, TEXT, notes=[ABSENT.replace("\n", " ")])
-    return assemble(cases.measure(root, quick=quick, progress=progress), quick=quick)
+    return assemble(hard_cases.measure(root, quick=quick, progress=progress), quick=quick)
 
 
-def assemble(found: Any, *, quick: bool) -> Section:
+def assemble(found: Found, *, quick: bool) -> Section:
     """Return the section of the verdicts."""
     missed = [row for row in found.rows if not row.ok]
     held = len(found.rows) - len(missed)
@@ -73,7 +72,7 @@ def assemble(found: Any, *, quick: bool) -> Section:
     )
 
 
-def table(rows: list[Any]) -> Table:
+def table(rows: list[Row]) -> Table:
     """Return all verdicts."""
     return Table(
         "hard_cases",
@@ -102,7 +101,7 @@ def seven_digits(value: float | str) -> str:
     return value if isinstance(value, str) else f"{value:.7g}"
 
 
-def picture(rows: list[Any]) -> Picture:
+def picture(rows: list[Row]) -> Picture:
     """Draw each verdict as a dot: its error over its bound, in the row of its group."""
     groups = list(dict.fromkeys(row.group for row in rows))
     with drawing(7.8, 0.3 * len(groups) + 0.9) as figure:
@@ -130,9 +129,10 @@ def picture(rows: list[Any]) -> Picture:
         axis.tick_params(axis="y", length=0)
         axis.grid(visible=True, axis="x")
         axis.set_xlabel("error / bound")
-        made = pictured(figure, "hard_cases")
+        png = png_of(figure)
     return Picture(
-        *made,
+        "hard_cases",
+        png,
         f"Error over bound of {len(rows)} verdicts in {len(groups)} groups.",
         "A dot is a verdict: its error over what bounds it; no error at all is at the left edge.",
     )

@@ -3,8 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
+from sphshell_pin.benchmarks import (
+    analytic_cases,
+    swing,
+    timing,
+    work_precision,
+    work_precision_cases,
+)
+from sphshell_pin.benchmarks.work_precision import Row
+from sphshell_pin.benchmarks.work_precision_cases import Case
 from sphshell_pin.study.report.contents import (
     TIMES,
     Column,
@@ -13,10 +21,10 @@ from sphshell_pin.study.report.contents import (
     Progress,
     Section,
     Table,
-    benchmark,
 )
 from sphshell_pin.study.report.drawing import (
     BLUE,
+    DASHED,
     FAINT,
     GREEN,
     ORANGE,
@@ -27,7 +35,7 @@ from sphshell_pin.study.report.drawing import (
     guide,
     label_ends,
     logarithmic,
-    pictured,
+    png_of,
     power_of_ten,
 )
 
@@ -54,20 +62,17 @@ sticks and slips on a belt."""
 
 def section(*, quick: bool, progress: Progress) -> Section:
     """Measure and return the section."""
-    analytic, referenced = benchmark("analytic_cases"), benchmark("work_precision_cases")
-    work, timing = benchmark("work_precision"), benchmark("timing")
-    judges = [analytic.bob(), analytic.bounces(), analytic.glide()]
-    others = [referenced.bowl()]
+    judges = [analytic_cases.bob(), analytic_cases.bounces(), analytic_cases.glide()]
+    others = [work_precision_cases.bowl()]
     if not quick:
-        others += [referenced.press(), referenced.stick_slip()]
-    judges += [work.Judge(case) for case in others]
+        others += [work_precision_cases.press(), work_precision_cases.stick_slip()]
+    judges += [work_precision.Judge(case) for case in others]
     rows, cases = [], []
     for k, judge in enumerate(judges):
-        case = work.thinned(judge.case) if quick else judge.case
+        case = work_precision.thinned(judge.case) if quick else judge.case
         cases.append(case)
         share = timing.part(progress, 0.9 * k / len(judges), 0.9 * (k + 1) / len(judges))
-        rows += work.measure(case, judge, 1 if quick else 3, share)
-    swing = benchmark("swing")
+        rows += work_precision.measure(case, judge, 1 if quick else 3, share)
     swings = swing.measure(swing.mesh_scene(swing.bowl(0.15)), swing.reference_period())
     progress(1.0)
     notes = ["The Panda, the block and the finest settings were left out (--quick)."]
@@ -75,7 +80,7 @@ def section(*, quick: bool, progress: Progress) -> Section:
 
 
 def assemble(
-    cases: list[Any], rows: list[Any], swings: Any, notes: list[str] | None = None
+    cases: list[Case], rows: list[Row], swings: swing.Row, notes: list[str] | None = None
 ) -> Section:
     """Return the section of what was measured."""
     return Section(
@@ -89,7 +94,7 @@ def assemble(
     )
 
 
-def cheapest(rows: list[Any], case: str, integrators: tuple[str, ...], error: float) -> float:
+def cheapest(rows: list[Row], case: str, integrators: tuple[str, ...], error: float) -> float:
     """Return the least CPU time per simulated second of a setting with at most this error."""
     return min(
         (
@@ -101,7 +106,7 @@ def cheapest(rows: list[Any], case: str, integrators: tuple[str, ...], error: fl
     )
 
 
-def findings_of(rows: list[Any], swings: Any) -> list[Finding]:
+def findings_of(rows: list[Row], swings: swing.Row) -> list[Finding]:
     """Return the figures of the section."""
     stiff = cheapest(rows, "glide", EXPLICIT, 1e-4) / cheapest(rows, "glide", ("Implicit",), 1e-4)
     bounce = min(
@@ -133,7 +138,7 @@ def findings_of(rows: list[Any], swings: Any) -> list[Finding]:
     ]
 
 
-def costs_table(cases: list[Any], rows: list[Any]) -> Table:
+def costs_table(cases: list[Case], rows: list[Row]) -> Table:
     """Return what an error costs: the cheapest setting of each integrator."""
     cells = [
         (
@@ -154,7 +159,7 @@ def costs_table(cases: list[Any], rows: list[Any]) -> Table:
     )
 
 
-def rows_table(rows: list[Any]) -> Table:
+def rows_table(rows: list[Row]) -> Table:
     """Return every setting."""
     return Table(
         "integrators",
@@ -177,11 +182,11 @@ def rows_table(rows: list[Any]) -> Table:
     )
 
 
-def picture(cases: list[Any], rows: list[Any]) -> Picture:
+def picture(cases: list[Case], rows: list[Row]) -> Picture:
     """Draw cost against error, one panel per case."""
     lines = -(-len(cases) // 2)
     with drawing(7.8, 2.75 * lines) as figure:
-        figure.get_layout_engine().set(h_pad=0.12)
+        figure.set_layout_engine("constrained", h_pad=0.12)
         panels = figure.subplots(lines, 2, sharey=True, squeeze=False).ravel()
         for axis, case in zip(panels, cases, strict=False):
             logarithmic(axis, every=(2, 1))
@@ -192,7 +197,7 @@ def picture(cases: list[Any], rows: list[Any]) -> Picture:
                 axis.plot(
                     [r.error for r in found], [r.cpu for r in found], color=color, marker=marker
                 )
-            axis.axhline(1.0, color=FAINT, linewidth=0.8, linestyle=(0, (4, 3)))
+            axis.axhline(1.0, color=FAINT, linewidth=0.8, linestyle=DASHED)
             axis.invert_xaxis()
         guide(panels[0], (1e-4, 1.5e-3), 1e-7, -0.25, "order 4")
         panels[0].annotate(
@@ -209,16 +214,17 @@ def picture(cases: list[Any], rows: list[Any]) -> Picture:
         for axis in panels[len(cases) :]:
             axis.set_visible(False)
         figure.supylabel("CPU seconds per simulated second", fontsize=SMALL + 1)
-        made = pictured(figure, "integrators")
+        png = png_of(figure)
     return Picture(
-        *made,
+        "integrators",
+        png,
         "CPU time against error of five integrators, one panel per case.",
         "More precise to the right, dearer upwards; every line goes from coarse to fine settings. "
         f"Settings with an error above {LARGEST_DRAWN} are left to the table.",
     )
 
 
-def drawn(rows: list[Any], case: Any, integrator: str) -> list[Any]:
+def drawn(rows: list[Row], case: Case, integrator: str) -> list[Row]:
     """Return the rows of a line of the picture."""
     return [
         r

@@ -25,7 +25,7 @@ PACKAGES = (
 
 def describe(command: str) -> dict[str, str]:
     """Return what the page says of the machine and of this run, by heading."""
-    told = {
+    found = {
         "processor": processor(),
         "cores": cores(),
         "memory": memory(),
@@ -36,11 +36,11 @@ def describe(command: str) -> dict[str, str]:
         "date": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %z"),
         "command": command,
     }
-    return {heading: text for heading, text in told.items() if text}
+    return {heading: text for heading, text in found.items() if text}
 
 
 def processor() -> str:
-    """Return the model of the processor, as far as the system tells."""
+    """Return the model of the processor, as far as the system knows it."""
     with contextlib.suppress(OSError), open("/proc/cpuinfo", encoding="utf-8") as file:
         for line in file:
             if line.lower().startswith("model name"):
@@ -56,7 +56,7 @@ def cores() -> str:
 
 
 def memory() -> str:
-    """Return the size of the memory; empty where the system does not tell."""
+    """Return the size of the memory; empty where the system does not say."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         size = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
         return f"{size / 2**30:.1f} GiB"
@@ -72,7 +72,7 @@ def system() -> str:
 
 
 def load() -> str:
-    """Return how many processes wanted to run in the last minutes; empty where nobody tells."""
+    """Return how many processes wanted to run in the last minutes; empty where it is unknown."""
     with contextlib.suppress(OSError, AttributeError):
         one, five, _ = os.getloadavg()
         return f"{one:.2f} and {five:.2f} processes in the last 1 and 5 minutes"

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import dataclasses
-import io
 import json
 import math
 import time
@@ -13,19 +11,21 @@ import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.benchmarks import timing
 from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
 from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.study.report import forces, hard_cases, integrators, peers, queries, steps
-from sphshell_pin.study.report.contents import Progress, Section, Table, benchmark
+from sphshell_pin.study.report.contents import Column, Progress, Section, Table, findings_table
 from sphshell_pin.study.report.machine import describe
 from sphshell_pin.study.report.page import render
 
 PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
 _OWN = (".csv", ".png")
-Tell = Callable[[str, float], None]  # told the section's title and the share of all that is done
+Tell = Callable[[str, float], None]
+"""Called with the section's title and the share of all that is done."""
 
 
 class Measure(Protocol):
@@ -80,7 +80,7 @@ def make_report(
     """Measure everything, then write the page and its tables to the folder `out`.
 
     An error of one section is stated in that section. Nothing is written before all is measured, so
-    that an interrupted run leaves what was there. `tell` hears how far it is.
+    that an interrupted run leaves what was there. `tell` is called with the progress.
 
     Raises
     ------
@@ -135,7 +135,6 @@ def _measure(quick: bool, with_peers: bool, command: str, tell: Tell | None) -> 
 
 def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
     """Return the section, or one that says what went wrong."""
-    timing = benchmark("timing")
     begin = time.perf_counter()
     try:
         with warnings.catch_warnings():
@@ -146,18 +145,16 @@ def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
     except KeyboardInterrupt:
         raise
     except Exception as error:
-        told = (
-            str(error) if isinstance(error, SphshellError) else f"{type(error).__name__}: {error}"
-        )
-        section = Section(part.key, part.title, error=told)
+        known = isinstance(error, SphshellError)
+        text = str(error) if known else f"{type(error).__name__}: {error}"
+        section = Section(part.key, part.title, error=text)
     return dataclasses.replace(section, seconds=time.perf_counter() - begin)
 
 
 def _write(report: Report, out: Path, place: AtomicFolder) -> None:
     """Write page, tables and data; all of them take the place of an earlier report's at once."""
     tables = [table for section in report.sections for table in section.tables]
-    texts = {f"{table.name}.csv": csv_text(table) for table in tables}
-    texts[f"{FINDINGS}.csv"] = findings_text(report.sections)
+    texts = {f"{table.name}.csv": table.csv() for table in [*tables, _findings(report.sections)]}
     pictures = [picture for section in report.sections for picture in section.pictures]
     files = {name: text.encode() for name, text in texts.items()}
     files |= {f"{picture.name}.png": picture.png for picture in pictures}
@@ -181,34 +178,25 @@ def _files_of_old(out: Path) -> list[str]:
         return []
 
 
-def csv_text(table: Table) -> str:
-    """Return a table as csv, with all digits."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([column.key for column in table.columns])
-    writer.writerows(table.rows)
-    return stream.getvalue()
-
-
-def findings_text(sections: list[Section]) -> str:
-    """Return all findings as csv."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    keys = ("section", "key", "what", "value", "unit", "low", "high", "sense", "aim", "met")
-    writer.writerow((*keys, "text"))
-    for section in sections:
-        for f in section.findings:
-            sense = "" if f.aim is None else f.sense
-            writer.writerow(
-                (section.key, f.key, f.what, f.value, f.unit, f.low, f.high, sense, f.aim)
-                + (f.met, f.text)
-            )
-    return stream.getvalue()
+def _findings(sections: list[Section]) -> Table:
+    """Return all findings with all digits."""
+    keys = ("section", "key", "what", "value", "unit", "low", "high", "sense", "aim", "met", "text")
+    return Table(
+        FINDINGS,
+        "All findings.",
+        [Column(key, key) for key in keys],
+        [
+            (section.key, f.key, f.what, f.value, f.unit, f.low, f.high)
+            + ("" if f.aim is None else f.sense, f.aim, f.met, f.text)
+            for section in sections
+            for f in section.findings
+        ],
+    )
 
 
 def json_text(report: Report, files: list[str]) -> str:
-    """Return the report's data but for its tables, which are in `files`."""
-    data: dict[str, Any] = {
+    """Return the report's data; its tables as Markdown, with all digits they are in `files`."""
+    data = {
         "machine": report.machine,
         "files": files,
         "sections": [
@@ -218,16 +206,21 @@ def json_text(report: Report, files: list[str]) -> str:
                 "error": section.error,
                 "seconds": section.seconds,
                 "notes": section.notes,
-                "findings": [dataclasses.asdict(f) | {"met": f.met} for f in section.findings],
-                "tables": [table.name for table in section.tables],
+                "findings": [
+                    dataclasses.asdict(f) | {"met": f.met, "row": row}
+                    for f, row in zip(
+                        section.findings, findings_table(section.findings).cells, strict=True
+                    )
+                ],
+                "tables": {table.name: table.markdown() for table in section.tables},
             }
             for section in report.sections
         ],
     }
-    return json.dumps(_finite(data), indent=1) + "\n"
+    return json.dumps(_finite(data), indent=1, ensure_ascii=False) + "\n"
 
 
-def _finite(data: Any) -> Any:
+def _finite(data: object) -> object:
     """Return the data with None for what JSON has no number for."""
     if isinstance(data, dict):
         return {key: _finite(value) for key, value in data.items()}

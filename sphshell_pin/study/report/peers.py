@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
+from sphshell_pin.benchmarks.peers import measuring, scenes
+from sphshell_pin.benchmarks.peers.engine import Knob
+from sphshell_pin.benchmarks.peers.measuring import Ratio, Row
 from sphshell_pin.study.report.contents import (
     TIMES,
     Column,
@@ -13,7 +15,6 @@ from sphshell_pin.study.report.contents import (
     Progress,
     Section,
     Table,
-    benchmark,
     number,
 )
 from sphshell_pin.study.report.drawing import (
@@ -26,7 +27,7 @@ from sphshell_pin.study.report.drawing import (
     VIOLET,
     drawing,
     logarithmic,
-    pictured,
+    png_of,
 )
 
 KEY, TITLE = "peers", "Other engines"
@@ -63,21 +64,20 @@ def left_out() -> Section:
 
 def section(*, quick: bool, progress: Progress) -> Section:
     """Measure and return the section."""
-    measuring = benchmark("peers.measuring")
-    told: list[str] = []
+    lines = 0
 
-    def say(line: str) -> None:
-        told.append(line)
-        progress(len(told) / (len(told) + ABOUT / 2))
+    def count(_: str) -> None:
+        nonlocal lines
+        lines += 1
+        progress(lines / (lines + ABOUT / 2))
 
-    rows, ratios = measuring.measure(quick=quick, say=say)
-    titles = {name: make().title for name, make in benchmark("peers.scenes").SCENES.items()}
-    return assemble(rows, ratios, titles)
+    rows, ratios = measuring.measure(quick=quick, say=count)
+    return assemble(rows, ratios, {name: make().title for name, make in scenes.SCENES.items()})
 
 
-def assemble(rows: list[Any], ratios: list[Any], titles: dict[str, str]) -> Section:
+def assemble(rows: list[Row], ratios: list[Ratio], titles: dict[str, str]) -> Section:
     """Return the section of what was measured; `titles` of the scenes by name."""
-    scenes = list(dict.fromkeys(row.scene for row in rows))
+    names = list(dict.fromkeys(row.scene for row in rows))
     drawn = [row for row in rows if row.scene == SWING and not row.note]
     return Section(
         KEY,
@@ -87,7 +87,7 @@ def assemble(rows: list[Any], ratios: list[Any], titles: dict[str, str]) -> Sect
         pictures=[picture(drawn)] if drawn else [],
         tables=[
             ratios_table(ratios),
-            *(scene_table(rows, scene, titles.get(scene, scene)) for scene in scenes),
+            *(scene_table(rows, scene, titles.get(scene, scene)) for scene in names),
             settings_table(rows),
         ],
         notes=notes_of(rows),
@@ -99,14 +99,14 @@ def name_of(engine: str) -> str:
     return LOOKS.get(engine, (engine, GREY, "P"))[0]
 
 
-def notes_of(rows: list[Any]) -> list[str]:
+def notes_of(rows: list[Row]) -> list[str]:
     """Return versions, and who is missing."""
     versions = dict.fromkeys(row.version for row in rows if row.version)
     absent = any(row.note.startswith("not installed") for row in rows)
     return [f"Versions: {', '.join(versions)}.", *([MISSING] if absent else [])]
 
 
-def findings_of(ratios: list[Any]) -> list[Finding]:
+def findings_of(ratios: list[Ratio]) -> list[Finding]:
     """Return the ratios that count: the fastest peer at the press, the best at the swing."""
     press = [r for r in ratios if r.peer.scene == "press"]
     swings = [r for r in ratios if r.peer.scene.startswith(SWING)]
@@ -136,13 +136,13 @@ def findings_of(ratios: list[Any]) -> list[Finding]:
     return found
 
 
-def _finding(key: str, what: str, ratio: Any, aim: float) -> Finding:
+def _finding(key: str, what: str, ratio: Ratio, aim: float) -> Finding:
     return Finding(
         key, what, ratio.median, TIMES, ratio.low, ratio.high, aim, sense=">=", headline=True
     )
 
 
-def knob_text(knob: dict[str, Any]) -> str:
+def knob_text(knob: Knob) -> str:
     """Return a setting in a few words."""
     return ", ".join(
         f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {value}"
@@ -155,7 +155,7 @@ def errors_text(errors: dict[str, float]) -> str:
     return ", ".join(f"{name} {number(value)}" for name, value in errors.items())
 
 
-def ratios_table(ratios: list[Any]) -> Table:
+def ratios_table(ratios: list[Ratio]) -> Table:
     """Return every peer's ratio."""
     return Table(
         "peers_ratios",
@@ -180,7 +180,7 @@ def ratios_table(ratios: list[Any]) -> Table:
     )
 
 
-def scene_table(rows: list[Any], scene: str, title: str) -> Table:
+def scene_table(rows: list[Row], scene: str, title: str) -> Table:
     """Return all settings of all engines in one scene."""
     found = [row for row in rows if row.scene == scene]
     names = list(dict.fromkeys(name for row in found for name in row.errors))
@@ -207,9 +207,9 @@ def scene_table(rows: list[Any], scene: str, title: str) -> Table:
     )
 
 
-def settings_table(rows: list[Any]) -> Table:
+def settings_table(rows: list[Row]) -> Table:
     """Return what was set in each engine, and who recommends it."""
-    told = dict.fromkeys(
+    settings = dict.fromkeys(
         (name_of(row.engine), row.scene, name, str(text))
         for row in rows
         for name, text in row.settings.items()
@@ -223,12 +223,12 @@ def settings_table(rows: list[Any]) -> Table:
             Column("setting", "setting"),
             Column("text", "value and source"),
         ),
-        list(told),
+        list(settings),
         folded=True,
     )
 
 
-def picture(rows: list[Any]) -> Picture:
+def picture(rows: list[Row]) -> Picture:
     """Draw the cost of the swing against its errors, a dot per setting."""
     with drawing(7.8, 3.7) as figure:
         panels = figure.subplots(1, 2, sharey=True)
@@ -250,9 +250,10 @@ def picture(rows: list[Any]) -> Picture:
             handles, labels, loc="outside upper center", ncols=len(labels), frameon=False,
             fontsize=SMALL,
         )  # fmt: skip
-        made = pictured(figure, "peers")
+        png = png_of(figure)
     return Picture(
-        *made,
+        "peers",
+        png,
         f"CPU time against errors of the bowl swing for {', '.join(map(name_of, engines))}.",
         "The swing in the bowl, triangles of 0.3 r: a dot is a setting of an engine; more precise "
         "to the right, dearer upwards.",

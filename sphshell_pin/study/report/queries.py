@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
+from sphshell_pin.benchmarks import convergence, query, sizes, timing
+from sphshell_pin.benchmarks.sizes import Row
 from sphshell_pin.study.report.contents import (
     TIMES,
     Column,
@@ -15,9 +16,9 @@ from sphshell_pin.study.report.contents import (
     Progress,
     Section,
     Table,
-    benchmark,
-    microseconds,
     number,
+    quartiles,
+    times_columns,
 )
 from sphshell_pin.study.report.drawing import (
     BLUE,
@@ -30,9 +31,10 @@ from sphshell_pin.study.report.drawing import (
     guide,
     label_ends,
     logarithmic,
-    pictured,
+    png_of,
 )
 
+Times = dict[str, np.ndarray]
 KEY, TITLE = "queries", "Time and memory of a query"
 COLORS = {
     "smooth": (BLUE, "o"),
@@ -44,7 +46,7 @@ COLORS = {
 }
 TEXT = """\
 All contacts of a 10 mm sphere pressed 0.5 mm into a wavy sheet, at random positions that the caches
-do not know, on one core. Coal, in a compiled loop, collects a contact for every triangle that is
+do not know, on one core. Coal collects a contact for every triangle that is
 touched; trimesh, libigl and fcpw (in single precision) answer the smaller question of the one
 closest point. The sheet grows at equal size of its triangles, so that the sphere always touches the
 same number of them. In the picture every contestant has a process of its own; memory is what it
@@ -53,8 +55,6 @@ holds after its first query. The ratios among the findings are measured in turn 
 
 def section(*, quick: bool, progress: Progress) -> Section:
     """Measure and return the section."""
-    query, sizes, timing = benchmark("query"), benchmark("sizes"), benchmark("timing")
-    convergence = benchmark("convergence")
     rounds = 5 if quick else 15
     peers = query.measure_peers(rounds, timing.part(progress, 0.0, 0.1))
     cells = query.SHEETS[:3] if quick else query.SHEETS
@@ -68,10 +68,10 @@ def section(*, quick: bool, progress: Progress) -> Section:
 
 
 def assemble(
-    peers: dict[str, Any],
-    growth: dict[int, Any],
-    cost: dict[str, dict[str, Any]],
-    rows: list[Any],
+    peers: Times,
+    growth: dict[int, np.ndarray],
+    cost: dict[str, Times],
+    rows: list[Row],
     notes: list[str],
 ) -> Section:
     """Return the section of what was measured."""
@@ -86,20 +86,15 @@ def assemble(
     )
 
 
-def finding(key: str, what: str, figures: Any, **more: Any) -> Finding:
-    """Return a finding on a ratio that every round gave."""
-    spread = benchmark("timing").Spread.of(figures)
-    return Finding(key, what, spread.median, TIMES, spread.low, spread.high, **more)
-
-
 def findings_of(
-    peers: dict[str, Any], growth: dict[int, Any], cost: dict[str, dict[str, Any]]
+    peers: Times,
+    growth: dict[int, np.ndarray],
+    cost: dict[str, Times],
 ) -> list[Finding]:
     """Return the ratios that have aims."""
-    query = benchmark("query")
     this = peers[query.THIS]
     found = [
-        finding(
+        Finding.of_rounds(
             "query_coal",
             "query, 200 k triangles: time of coal::collide with all contacts / ours (facets)",
             peers[query.COAL] / this,
@@ -114,16 +109,16 @@ def findings_of(
     ):
         if name in peers:
             what = f"the same against {label}"
-            found.append(finding(key, what, peers[name] / this, aim=1.0, sense=">="))
+            found.append(Finding.of_rounds(key, what, peers[name] / this, aim=1.0, sense=">="))
     few, lot = min(growth), max(growth)
     found += [
-        finding(
+        Finding.of_rounds(
             "query_growth",
             f"query at equal contact patch: {number(lot)} / {number(few)} triangles",
             growth[lot] / growth[few],
             aim=4.0,
         ),
-        finding(
+        Finding.of_rounds(
             "query_smooth",
             "query, 200 k triangles: curved elements / flat ones",
             cost["wavy sheet"]["smooth"] / cost["wavy sheet"]["facets"],
@@ -133,35 +128,19 @@ def findings_of(
     return found
 
 
-def times_columns(*first: Column) -> tuple[Column, ...]:
-    """Return columns of a time and its quartiles behind `first`."""
-    return (
-        *first,
-        Column("median_s", "median [us]", microseconds),
-        Column("low_s", "lower quartile", microseconds),
-        Column("high_s", "upper quartile", microseconds),
-    )
-
-
-def spread(times: Any) -> tuple[float, float, float]:
-    """Return median and quartiles."""
-    of = benchmark("timing").Spread.of(np.asarray(times))
-    return of.median, of.low, of.high
-
-
-def peers_table(peers: dict[str, Any]) -> Table:
+def peers_table(peers: Times) -> Table:
     """Return the times on 200 k triangles."""
-    this = peers[benchmark("query").THIS]
+    this = peers[query.THIS]
     columns = times_columns(Column("code", "200 k triangles"))
     return Table(
         "queries_peers",
         "A query on 200 k triangles, in turn in one process; ours is the method facets.",
         (*columns, Column("over_ours", f"over ours [{TIMES}]")),
-        [(name, *spread(t), float(np.median(t / this))) for name, t in peers.items()],
+        [(name, *quartiles(t), float(np.median(t / this))) for name, t in peers.items()],
     )
 
 
-def cost_table(cost: dict[str, dict[str, Any]]) -> Table:
+def cost_table(cost: dict[str, Times]) -> Table:
     """Return the times of our methods."""
     columns = times_columns(Column("surface", "200 k triangles"), Column("method", "method"))
     return Table(
@@ -169,14 +148,14 @@ def cost_table(cost: dict[str, dict[str, Any]]) -> Table:
         "What a method costs.",
         (*columns, Column("over_facets", f"over facets [{TIMES}]")),
         [
-            (surface, method, *spread(t), float(np.median(t / times["facets"])))
+            (surface, method, *quartiles(t), float(np.median(t / times["facets"])))
             for surface, times in cost.items()
             for method, t in times.items()
         ],
     )
 
 
-def growth_table(growth: dict[int, Any]) -> Table:
+def growth_table(growth: dict[int, np.ndarray]) -> Table:
     """Return our time at equal contact patch."""
     few = growth[min(growth)]
     columns = times_columns(Column("triangles", "triangles"))
@@ -184,11 +163,11 @@ def growth_table(growth: dict[int, Any]) -> Table:
         "queries_growth",
         "Our query (facets) at equal contact patch, in turn in one process.",
         (*columns, Column("over_smallest", f"over the smallest [{TIMES}]")),
-        [(count, *spread(t), float(np.median(t / few))) for count, t in growth.items()],
+        [(count, *quartiles(t), float(np.median(t / few))) for count, t in growth.items()],
     )
 
 
-def sizes_table(rows: list[Any]) -> Table:
+def sizes_table(rows: list[Row]) -> Table:
     """Return times and memory of all contestants at all sizes."""
     columns = times_columns(
         Column("code", "code"), Column("question", "answers"), Column("triangles", "triangles")
@@ -211,11 +190,11 @@ def sizes_table(rows: list[Any]) -> Table:
     )
 
 
-def picture(rows: list[Any]) -> Picture:
+def picture(rows: list[Row]) -> Picture:
     """Draw time and memory against the number of triangles."""
     with drawing(7.8, 3.9) as figure:
         panels = figure.subplots(1, 2)
-        values: tuple[tuple[str, Callable[[Any], float]], ...] = (
+        values: tuple[tuple[str, Callable[[Row], float]], ...] = (
             ("time of a query [us]", lambda r: r.query.median * 1e6),
             ("memory held [MB]", lambda r: r.memory / 1e6),
         )
@@ -241,10 +220,11 @@ def picture(rows: list[Any]) -> Picture:
                 start = (min(count) * 3, 0.4 * min(value(r) for r in rows if value(r) > 0))
                 guide(axis, start, max(count) / 30, 1, "~ triangles")
             label_ends(axis, ends, gap=0.06)
-        made = pictured(figure, "queries")
+        png = png_of(figure)
     largest = max(r.triangles for r in rows)
     return Picture(
-        *made,
+        "queries",
+        png,
         f"Query time and memory from a thousand to {number(largest)} triangles for "
         f"{', '.join(sorted({r.name for r in rows}, key=list(COLORS).index))}.",
         "Left: median time of a query, with quartiles. Right: memory held after the first query.",

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
-from typing import Any
+from os import PathLike
 
 import numpy as np
+import pinocchio as pin
 
 from sphshell_pin.checks import check_finite, check_positive
 from sphshell_pin.errors import FrameNotFound, MissingExtra, NameNotFound, SphshellError
@@ -51,7 +52,7 @@ __all__ = [
 
 
 def check_robot(
-    robot: Any,
+    robot: str | PathLike[str] | pin.Model,
     *,
     frame: str | None = None,
     radius: float | None = None,
@@ -114,7 +115,7 @@ def check_robot(
 
 
 def contact_scene(
-    robot: Any,
+    robot: str | PathLike[str] | pin.Model,
     *,
     frame: str | None = None,
     radius: float | None = None,

@@ -158,7 +158,7 @@ def _energies(setting: Setting, rng: np.random.Generator) -> list[Finding]:
     pair = touch.scene.pairs[0]
     lossless = Scene(touch.scene.model)
     law = stopping_law(touch.mass, touch.speed, 0.2 * setting.radius)
-    lossless.add_contact(setting.sphere, setting.shell, pair.frame, pair.placement, law)
+    lossless.add_contact(setting.sphere, setting.shell, pair.frame_j, pair.placement, law)
     results = [
         _run(replace(touch, scene=scene), Adaptive(_RTOL), _DURATION)
         for scene in (touch.scene, lossless)
@@ -195,7 +195,7 @@ def _shot(setting: Setting, rng: np.random.Generator) -> list[Result]:
     # Whatever the joints do, the law can take up all the energy they have.
     heavy = 2.0 * pin.computeKineticEnergy(scene.model, data, touch.q, touch.v) / speed**2
     law = stopping_law(heavy, speed, 0.3 * radius)
-    scene.add_contact(setting.sphere, setting.shell, pair.frame, pair.placement, law)
+    scene.add_contact(setting.sphere, setting.shell, pair.frame_j, pair.placement, law)
     shot = replace(touch, scene=scene)
     return [_run(shot, how, step) for how in (Adaptive(), SemiImplicitEuler(step))]
 
@@ -204,7 +204,8 @@ def _contacts(setting: Setting, rng: np.random.Generator, poses: int) -> list[Fi
     """Ask the scene for contacts at many postures, the patch deep in the sphere to far from it."""
     touch = free_touch(setting, rng, 0.0, SPEED * setting.radius)
     scene = Scene(touch.scene.model)
-    scene.add_contact(setting.sphere, setting.shell, PLATE, method="facets")
+    law = touch.scene.pairs[0].law
+    scene.add_contact(setting.sphere, setting.shell, PLATE, law=law, method="facets")
     model, data = scene.model, scene.model.createData()
     kinds = ((-0.9, 0.0), (-1e-6, 1e-6), (0.0, 1.0), (5.0, 50.0))
     findings = []

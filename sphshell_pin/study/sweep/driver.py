@@ -1,16 +1,17 @@
-"""A sweep from its beginning to its table: plan, check, do what is not done yet, write."""
+"""A sweep from its start to its table: plan, check, do the runs that are missing, write."""
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import (
     InvalidParameter,
@@ -29,22 +30,21 @@ from sphshell_pin.scenario import (
 from sphshell_pin.scenario.build import build_scenario
 from sphshell_pin.scenario.figures import check_expectations
 from sphshell_pin.scenario.reading import look_up
-from sphshell_pin.study.sweep.cluster import ClusterPool
-from sphshell_pin.study.sweep.extras import need
+from sphshell_pin.study.sweep.cluster import run_on_cluster
 from sphshell_pin.study.sweep.grid import Axis, Value, Vary, axes_of, points_of, text_of
 from sphshell_pin.study.sweep.job import (
     FAILED,
     Job,
-    Outcome,
     Run,
     digest,
     digest_files,
     digest_settings,
     files_of,
+    need,
     versions,
 )
 from sphshell_pin.study.sweep.journal import SUFFIX, Journal
-from sphshell_pin.study.sweep.local import Here, LocalPool
+from sphshell_pin.study.sweep.local import run_locally
 from sphshell_pin.study.sweep.table import (
     check_place,
     check_suffix,
@@ -53,24 +53,13 @@ from sphshell_pin.study.sweep.table import (
     varied_columns,
     write_table,
 )
-from sphshell_pin.study.sweep.worker import changed, sweep_figures, verdict_names
+from sphshell_pin.study.sweep.worker import changed, run_one, sweep_figures, verdict_names
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Progress = Callable[[int, int, int], object]
 """Called with the numbers of runs done, failed among them, and in all."""
-
-
-class Pool(Protocol):
-    """Whoever does runs."""
-
-    deaths: int
-
-    def outcomes(self, runs: Iterable[Run]) -> Iterator[Outcome]:
-        """Yield the outcome of each run, in any order."""
-        ...
-
-    def close(self) -> None:
-        """Let go of the workers."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -86,11 +75,11 @@ class Plan:
     figures: tuple[str, ...]
     """Columns that a finished run fills."""
     job: Job
-    head: Mapping[str, Any]
-    """What tells this sweep from another."""
+    head: Mapping[str, object]
+    """What distinguishes this sweep from another."""
 
     @property
-    def varied(self) -> Any:
+    def varied(self) -> pd.DataFrame:
         """The columns of the varied keys, as a pandas.DataFrame."""
         return frame_of(varied_columns(self.axes, self.points))
 
@@ -99,8 +88,8 @@ class Plan:
 class SweepReport:
     """What a sweep left behind."""
 
-    table: Any
-    """pandas.DataFrame with a row for each run."""
+    table: pd.DataFrame
+    """A row for each run."""
     out: Path | None
     journal: Path | None
     resumed: int
@@ -124,7 +113,7 @@ def sweep(
     verdicts: bool = False,
     retry_failed: bool = False,
     progress: Progress | None = None,
-) -> Any:
+) -> pd.DataFrame:
     """Run a scenario many times with other values and return the table of its figures.
 
     Parameters
@@ -132,7 +121,7 @@ def sweep(
     scenario : name of a shipped one, or path of a file.
     vary : what varies: a mapping from dotted keys, as --set takes them, to sequences of values or
         to texts "lo:hi:n", "lo:hi:log:n", "a,b,c"; or texts "key=lo:hi:n". All combinations are
-        run; the last key turns fastest.
+        run; the last key varies fastest.
     changes : values by dotted key that are the same in all runs.
     together : let all keys take their first values in the first run, and so on, in place of all
         combinations.
@@ -140,9 +129,9 @@ def sweep(
         runs in this process.
     scheduler : address of a Dask scheduler, "tcp://host:port", whose workers do the runs instead.
     out : .parquet or .h5 file of the table. What is done is kept beside it, in `out` + ".journal";
-        the same call goes on from there, whatever ended the one before. None: nothing is kept.
+        the same call continues from there, whatever ended the one before. None: nothing is kept.
     verdicts : give each expectation of the scenario a column: 1 where met, 0 where missed.
-    retry_failed : do again the runs that the journal tells to have failed.
+    retry_failed : do again the runs that failed, as the journal says.
     progress : called with the numbers of runs done, failed among them, and in all.
 
     Returns
@@ -155,7 +144,7 @@ def sweep(
     Raises
     ------
     ScenarioError, NameNotFound, InvalidParameter
-        The scenario, a key or a value is wrong; told before anything runs.
+        The scenario, a key or a value is wrong; raised before anything runs.
     SweepError
         The journal is of another sweep, no scheduler answers, or a worker cannot do any run.
     ResultError
@@ -277,29 +266,29 @@ def run_plan(
     resumed = len(outcomes)
     failed = sum(one.status == FAILED for one in outcomes.values())
     missing = [run for run in plan.runs if run.number not in outcomes]
-    pool: Pool | None = None
-    try:
-        if progress is not None:
-            progress(len(outcomes), failed, len(plan.runs))
-        if missing and scheduler is not None:
-            pool = ClusterPool(plan.job, scheduler, tell)
-        elif missing:
-            pool = LocalPool(plan.job, workers) if workers else Here(plan.job)
-        for outcome in pool.outcomes(missing) if pool is not None else ():
-            if journal is not None:
-                journal.add([outcome])
-            outcomes[outcome.number] = outcome
-            failed += outcome.status == FAILED
-            if progress is not None:
-                progress(len(outcomes), failed, len(plan.runs))
-    except KeyboardInterrupt:
-        kept = f"are done and kept in {journal.path}" if journal is not None else "were done"
-        raise KeyboardInterrupt(f"{len(outcomes)} of {len(plan.runs)} runs {kept}") from None
-    finally:
-        if pool is not None:
-            pool.close()
-        if journal is not None:
-            journal.close()
+    deaths: list[int] = []
+    if scheduler is not None and missing:
+        done = run_on_cluster(plan.job, missing, scheduler, tell, deaths.append)
+    elif workers:
+        done = run_locally(plan.job, missing, workers, deaths.append)
+    else:
+        done = (run_one(plan.job, run) for run in missing)
+    with contextlib.closing(journal) if journal else contextlib.nullcontext():
+        try:
+            with contextlib.closing(done):
+                if progress is not None:
+                    progress(len(outcomes), failed, len(plan.runs))
+                for outcome in done:
+                    if journal is not None:
+                        journal.add(outcome)
+                    outcomes[outcome.number] = outcome
+                    failed += outcome.status == FAILED
+                    if progress is not None:
+                        progress(len(outcomes), failed, len(plan.runs))
+        except KeyboardInterrupt:
+            kept = f"are done and kept in {journal.path}" if journal is not None else "were done"
+            text = f"{len(outcomes)} of {len(plan.runs)} runs {kept}"
+            raise KeyboardInterrupt(text) from None
     columns = columns_of(plan.axes, plan.points, plan.digests, outcomes, plan.figures)
     if out is not None:
         write_table(out, columns, plan.head)
@@ -308,7 +297,7 @@ def run_plan(
         out=out,
         journal=None if journal is None else journal.path,
         resumed=resumed,
-        deaths=0 if pool is None else pool.deaths,
+        deaths=sum(deaths),
         failed=failed,
         notes=tuple(notes),
     )
@@ -330,23 +319,23 @@ def _check_keys(axes: Iterable[Axis], changes: Mapping[str, str], path: Path) ->
     """Refuse two keys for one value: which of them holds would be a matter of order."""
     scenario = read_scenario(path)
 
-    def spelt_out(key: str) -> str:
+    def full_name(key: str) -> str:
         try:
             return look_up(scenario, key, path)[1]
         except ScenarioError:
-            return key  # not in the file; read_scenario tells if no file may have it
+            return key  # not in the file; read_scenario raises if no file may have it
 
     keys = [axis.key for axis in axes]
-    meant = [spelt_out(key) for key in keys]
+    meant = [full_name(key) for key in keys]
     for key, whole in zip(keys, meant, strict=True):
         if meant.count(whole) > 1:
             raise InvalidParameter("vary", key, "is given twice: put all its values together")
-        if whole in map(spelt_out, changes):
+        if whole in map(full_name, changes):
             raise InvalidParameter("vary", key, "is set as well: leave one of the two out")
 
 
 def _build_one(runs: list[Run], scenario: Scenario, path: Path) -> tuple[Run, Built]:
-    """Build the first run, or else the last: where neither can be, none is worth a try."""
+    """Build the first run, or else the last: where neither can be, no run can be built."""
     faults: list[SphshellError] = []
     for run in (runs[0], runs[-1]):
         try:

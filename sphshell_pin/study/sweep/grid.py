@@ -9,7 +9,6 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from sphshell_pin.errors import InvalidParameter
 Value = bool | int | float | str
 """A value of a varied key, as a table holds it; a list of the scenario file is its text."""
 
-Vary = Mapping[str, str | Sequence[Any]]
+Vary = Mapping[str, str | Sequence[object]]
 
 MOST_RUNS = 1_000_000
 # Steps between the ends are rounded: 0.3 rather than 0.30000000000000004, on every machine.
@@ -76,7 +75,7 @@ def axes_of(vary: Vary | Iterable[str]) -> tuple[Axis, ...]:
 
 
 def points_of(axes: Sequence[Axis], together: bool) -> list[tuple[Value, ...]]:
-    """Return the values of each run in turn: the grid of `axes` (the last turns fastest).
+    """Return the values of each run in turn: the grid of `axes` (the last varies fastest).
 
     With `together` the first run takes the first value of every axis, and so on.
 
@@ -148,14 +147,14 @@ def _range(key: str, text: str, parts: list[str]) -> tuple[Value, ...]:
     return low, *inner, high
 
 
-def _word(text: str) -> Any:
+def _word(text: str) -> object:
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return float(text) if _NUMBER.fullmatch(text) else text
 
 
-def _plain(value: Any) -> Value:
+def _plain(value: object) -> Value:
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -165,7 +164,7 @@ def _plain(value: Any) -> Value:
     raise InvalidParameter("vary", value, "must be numbers, words, or lists of numbers")
 
 
-def _inner(value: Any) -> str:
+def _inner(value: object) -> str:
     """Return a value inside a list as TOML writes it."""
     plain = _plain(value)
     return json.dumps(plain) if isinstance(value, str) else text_of(plain)

@@ -1,4 +1,4 @@
-"""What the workers of a sweep are told, and what one run leaves behind."""
+"""What the workers of a sweep get, and what one run leaves behind."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
-from sphshell_pin.dynamics.controllers import PythonFunction
+from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario.schema import Scenario
 
 DONE, FAILED = "done", "failed"
+JsonObject = dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,21 @@ class Job:
     """Digests of the surfaces, robots and routines beside the scenario, by name."""
     versions: Mapping[str, str]
     token: str
-    """Tells this job from any other."""
+    """Identifies this job."""
+
+
+def need(module: str) -> ModuleType:
+    """Return the optional `module`.
+
+    Raises
+    ------
+    MissingExtra
+        It is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError as missing:
+        raise MissingExtra(module.partition(".")[0], "sweep", "a sweep") from missing
 
 
 def digest_settings(scenario: Scenario) -> str:
@@ -63,18 +79,22 @@ def digest_settings(scenario: Scenario) -> str:
     return digest(scenario.model_dump(mode="json"))
 
 
-def digest(data: Any) -> str:
+def digest(data: object) -> str:
     """Return the SHA-256 of `data`, made of what JSON knows, in hexadecimal digits."""
     text = json.dumps(data, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def files_of(scenario: Scenario) -> set[str]:
-    """Return the files that `scenario` names: surfaces, URDFs, Python routines."""
+    """Return the files that `scenario` names: surfaces, URDFs, Python routines, tables of laws."""
     routines = [one.find for one in scenario.source] + list(scenario.figures.values())
-    if isinstance(scenario.controller, PythonFunction):
-        routines.append(scenario.controller.function)
     named = [one.file for one in scenario.shell] + [one.urdf for one in scenario.robot]
+    stated = [scenario.controller]
+    for one in scenario.contact:
+        stated += one.law, one.friction
+    for other in scenario.source:
+        stated += other.law, other.friction
+    named += [file for one in stated for file in one.files]
     named += [routine.rpartition(":")[0] for routine in routines]
     return {name for name in named if name}
 

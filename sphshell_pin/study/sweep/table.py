@@ -1,4 +1,4 @@
-"""The table of a sweep: one row for each run, in their order, without anything that is of today."""
+"""The table of a sweep: one row for each run, in their order; nothing in it depends on the time."""
 
 from __future__ import annotations
 
@@ -6,18 +6,20 @@ import contextlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ResultError
-from sphshell_pin.study.sweep.extras import need
 from sphshell_pin.study.sweep.grid import Axis, Value
-from sphshell_pin.study.sweep.job import Outcome
+from sphshell_pin.study.sweep.job import Outcome, need
 
-Columns = dict[str, NDArray[Any]]
+if TYPE_CHECKING:
+    import pandas as pd
+
+Columns = dict[str, NDArray[np.generic]]
 
 PARQUET = (".parquet", ".pq")
 HDF5 = (".h5", ".hdf5")
@@ -81,12 +83,12 @@ def varied_columns(axes: Sequence[Axis], points: Sequence[tuple[Value, ...]]) ->
     return {axis.key: _varied([point[i] for point in points]) for i, axis in enumerate(axes)}
 
 
-def frame_of(columns: Columns) -> Any:
+def frame_of(columns: Columns) -> pd.DataFrame:
     """Return the table as a pandas.DataFrame."""
     return need("pandas").DataFrame(columns)
 
 
-def write_table(path: Path, columns: Columns, description: Mapping[str, Any]) -> None:
+def write_table(path: Path, columns: Columns, description: Mapping[str, object]) -> None:
     """Write the table to `path`, Parquet or HDF5 by its suffix, in place of an earlier one.
 
     The same columns and description give the same bytes.
@@ -129,7 +131,7 @@ def _write_parquet(file: IO[bytes], columns: Columns, description: str) -> None:
 def _write_hdf5(file: IO[bytes], columns: Columns, description: str) -> None:
     h5py = need("h5py")
     # One array of records: a column's name may hold the slash that would make it a folder.
-    fields: list[tuple[str, Any]] = []
+    fields: list[tuple[str, np.dtype[np.generic]]] = []
     encoded: Columns = {}
     for name, values in columns.items():
         if _is_text(values):
@@ -148,7 +150,7 @@ def _write_hdf5(file: IO[bytes], columns: Columns, description: str) -> None:
         dataset.attrs["description"] = description
 
 
-def _varied(values: Sequence[Value]) -> NDArray[Any]:
+def _varied(values: Sequence[Value]) -> NDArray[np.generic]:
     kinds = {type(value) for value in values}
     if kinds == {bool}:
         return np.array(values, dtype=np.bool_)
@@ -161,9 +163,9 @@ def _varied(values: Sequence[Value]) -> NDArray[Any]:
     return _texts([str(value) for value in values])
 
 
-def _texts(values: Sequence[str]) -> NDArray[Any]:
+def _texts(values: Sequence[str]) -> NDArray[np.generic]:
     return np.array(values, dtype=object)
 
 
-def _is_text(values: NDArray[Any]) -> bool:
+def _is_text(values: NDArray[np.generic]) -> bool:
     return bool(values.dtype == object)

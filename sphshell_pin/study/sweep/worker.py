@@ -9,8 +9,8 @@ import time
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
+from sphshell_pin.dynamics import Result
 from sphshell_pin.errors import Interrupted, SphshellError, SweepError
 from sphshell_pin.scenario import Built, judge
 from sphshell_pin.scenario.build import build_scenario
@@ -58,8 +58,8 @@ def changed(scenario: Scenario, run: Run, path: Path) -> Scenario:
     return found
 
 
-def prepare(job: Job) -> int:
-    """Make this process ready for the runs of `job`; return its number among the system's.
+def prepare(job: Job) -> None:
+    """Make this process ready for the runs of `job`.
 
     Raises
     ------
@@ -68,7 +68,6 @@ def prepare(job: Job) -> int:
     """
     with _turn:
         _prepare(job)
-    return os.getpid()
 
 
 def run_one(job: Job, run: Run) -> Outcome:
@@ -93,7 +92,7 @@ def _prepare(job: Job) -> None:
     if other:
         wanted = ", ".join(f"{name} {version}" for name, version in job.versions.items())
         raise SweepError(
-            f"worker {_here()} has {', '.join(other)}; the sweep was begun with {wanted}"
+            f"worker {_here()} has {', '.join(other)}; the sweep was started with {wanted}"
         )
     try:
         path = _path(job)
@@ -108,7 +107,9 @@ def _prepare(job: Job) -> None:
         raise
     except Exception as fault:
         # Most faults cannot be sent from one process to another; their sentence can.
-        raise SweepError(f"worker {_here()} cannot build the scenario: {_told(fault)}") from None
+        raise SweepError(
+            f"worker {_here()} cannot build the scenario: {_sentence(fault)}"
+        ) from None
     _built.clear()
     _built[job.token] = built
 
@@ -129,22 +130,22 @@ def _try_run(job: Job, run: Run) -> tuple[str, str, dict[str, float]]:
             _built[job.token] = built
             result, stopped = simulate(built)
     except (Exception, SystemExit) as fault:  # a routine of the user's may call exit()
-        return FAILED, _told(fault, path), {}
+        return FAILED, _sentence(fault, path), {}
     if isinstance(stopped, Interrupted):
         raise KeyboardInterrupt
     if stopped is not None:
-        return FAILED, _told(stopped, path), {}
+        return FAILED, _sentence(stopped, path), {}
     return _measure(job, built, result)
 
 
-def _measure(job: Job, built: Built, result: Any) -> tuple[str, str, dict[str, float]]:
+def _measure(job: Job, built: Built, result: Result) -> tuple[str, str, dict[str, float]]:
     """Return all figures that can be measured; the first that cannot makes the run a failed one."""
     error, figures = "", {}
     for name in sweep_figures(built):
         try:
             figures[name] = measure(built, result, name)
         except (Exception, SystemExit) as fault:
-            error = error or _told(fault)
+            error = error or _sentence(fault)
     if job.verdicts and not error:
         wanted = verdict_names(built.scenario)
         figures |= {
@@ -155,14 +156,14 @@ def _measure(job: Job, built: Built, result: Any) -> tuple[str, str, dict[str, f
     return FAILED if error else DONE, error, figures
 
 
-def _told(fault: BaseException, path: Path | None = None) -> str:
+def _sentence(fault: BaseException, path: Path | None = None) -> str:
     """Return the sentence of `fault`, the same wherever the scenario stands."""
-    told = str(fault)
+    text = str(fault)
     if path is not None:
-        told = told.removeprefix(f"{path}: ").replace(f"{path.parent}{os.sep}", "")
+        text = text.removeprefix(f"{path}: ").replace(f"{path.parent}{os.sep}", "")
     if not isinstance(fault, SphshellError):
-        told = f"{type(fault).__name__}: {told}"
-    return ", ".join([" ".join(told.split()), *getattr(fault, "__notes__", ())])
+        text = f"{type(fault).__name__}: {text}"
+    return ", ".join([" ".join(text.split()), *getattr(fault, "__notes__", ())])
 
 
 def _here() -> str:

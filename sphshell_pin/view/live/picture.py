@@ -240,7 +240,7 @@ class _Trails:
             pair = pairs[index]
             if pair.shell is None:
                 continue
-            where = self._display.data.oMi[pair.joint_j] * pair.shell_placement
+            where = self._display.data.oMi[pair.joint_j] * pair.placement_j
             self._extend(index, where.actInv(contacts.point_world[k]))
 
     def _extend(self, index: int, point: FloatArray) -> None:

@@ -41,6 +41,7 @@ def order(name: str, depth: float, exact: bool) -> float:
     return float(np.polyfit(np.log(sides[used]), np.log(rms[used]), 1)[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", DEPTHS)
 @pytest.mark.parametrize("name", SURFACES)
 def test_order_with_exact_normals(name: str, depth: float) -> None:

@@ -192,6 +192,7 @@ def seat(columns: int, rows: int) -> Shell:
     return Shell(vertices, meshes._split(elements, np.zeros(len(elements), bool)), normals=normals)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("columns", "error"), [(32, 0.15), (64, 0.02), (128, 0.003)])
 def test_ball_in_a_countersink(columns: int, error: float) -> None:
     """Ball in a conical seat of 32, 64, 128 columns, touched round; of one to 15, 2, 0.3 %."""

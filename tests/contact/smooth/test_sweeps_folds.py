@@ -13,6 +13,8 @@ from tests.contact.smooth.sweeps import (
     assert_continuous,
 )
 
+pytestmark = pytest.mark.slow
+
 ANGLES = (1, 2, 5, 10, 16, 20, 30, 45, 60, 90, 120, 150, 170)
 SIZE = 4.0
 

@@ -20,6 +20,8 @@ from tests.contact.smooth.sweeps import (
 )
 from tests.contact.smooth.test_potential import query
 
+pytestmark = pytest.mark.slow
+
 
 def rolled(name: str, depth: float, count: int, length: float, nodes: int, seed: int = 0):
     """Paths over a smooth surface: of constant depth, but on the wavy sheet of constant height."""

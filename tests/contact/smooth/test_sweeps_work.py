@@ -14,6 +14,8 @@ from tests.contact.smooth.test_sweeps_edges import along_edges, edged, over_vert
 from tests.contact.smooth.test_sweeps_folds import KINDS, fold, fold_paths
 from tests.contact.smooth.test_sweeps_smooth import SMOOTH, rolled
 
+pytestmark = pytest.mark.slow
+
 
 def work_case(name: str):
     """A shell, and paths of a depth of 0.04 to 0.06 over its joints."""

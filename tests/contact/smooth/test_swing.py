@@ -31,6 +31,8 @@ from sphshell_pin.benchmarks.swing import (
     swing,
 )
 
+pytestmark = pytest.mark.slow
+
 PERIODS = 2
 # The elements are far better than the bars that were asked for; keep them so.
 BETTER = 50

@@ -191,6 +191,7 @@ POLYHEDRA = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [0.1, 0.4])
 @pytest.mark.parametrize("name", POLYHEDRA)
 def test_pieces_of_polyhedra(name: str, radius: float) -> None:

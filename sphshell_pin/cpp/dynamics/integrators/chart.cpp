@@ -120,6 +120,7 @@ void Chart::start(VectorX& y) const {
 
 void Chart::finish(double t, const VectorX& y, State& out) const {
   out.t = t;
+  out.q.resize(origin_->q.size());
   place(y, out.q, out.v);
   out.z = y.segment(2 * nv_, nz());
   const auto work = y.tail<kWork>();

@@ -3,13 +3,13 @@
 namespace sphshell {
 
 void SemiImplicitEuler::begin(Chart& chart) {
-  chart.start(y_);
+  chart.start(start_);
   chart.rate_at_origin(rate_);
 }
 
 void SemiImplicitEuler::step(Chart& chart, double h, State& out) {
-  const int nv = chart.nv(), all = static_cast<int>(y_.size());
-  chart.start(y_);
+  const int nv = chart.nv(), all = static_cast<int>(start_.size());
+  y_ = start_;
   y_.segment(nv, all - nv - Chart::kWork) += h * rate_.segment(nv, all - nv - Chart::kWork);
   y_.head(nv) = h * y_.segment(nv, nv);
   // Bristles are springs: they move like positions, with the new velocity.
@@ -24,7 +24,8 @@ void SemiImplicitEuler::step(Chart& chart, double h, State& out) {
 
 void ExplicitRungeKutta::begin(Chart& chart) {
   chart.start(start_);
-  chart.rate_at_origin(k_[0]);
+  chart.rate_at_origin(rate_);
+  k_[0] = rate_;
 }
 
 void ExplicitRungeKutta::step(Chart& chart, double h, State& out) {

@@ -14,9 +14,6 @@ class SemiImplicitEuler : public Stepper {
   void begin(Chart& chart) override;
   void step(Chart& chart, double h, State& out) override;
   bool leaves_work() const override { return true; }
-
- private:
-  VectorX rate_;
 };
 
 // Runge-Kutta methods: stage i is y + h sum_j a[i][j] k[j].
@@ -36,7 +33,7 @@ class ExplicitRungeKutta : public Stepper {
   std::vector<Row> rows_;        // of the stages behind the first
   std::vector<double> weights_;  // of all stages
   std::vector<VectorX> k_;
-  VectorX start_, stage_;
+  VectorX stage_;
   double h_ = 0;
 };
 

@@ -6,13 +6,7 @@ namespace sphshell {
 namespace {
 
 using Group = CurvedSegment::Group;
-using Mat3 = Eigen::Matrix3d;
-
-Mat3 skew(const Vec3& x) {
-  Mat3 out;
-  out << 0, -x.z(), x.y(), x.z(), 0, -x.x(), -x.y(), x.x(), 0;
-  return out;
-}
+using pinocchio::skew;
 
 // Of a step in a difference quotient.
 constexpr double kDifference = 1e-7;
@@ -104,7 +98,7 @@ void ImplicitStepper::to_chart(Chart& chart) {
   }
 }
 
-void ImplicitStepper::factorise(double gamma_h) {
+void ImplicitStepper::factorize(double gamma_h) {
   matrix_ = -jacobian_;
   matrix_.diagonal().array() += 1 / gamma_h;
   lu_.compute(matrix_);
@@ -118,7 +112,7 @@ void ImplicitStepper::solve(VectorX& x) {
 }
 
 void LinearlyImplicitEuler::step(Chart& chart, double h, State& out) {
-  factorise(h);
+  factorize(h);
   const int n = static_cast<int>(rate_of_time_.size());
   VectorX& change = error_;
   change = rate_;
@@ -153,7 +147,7 @@ void Rodas::step(Chart& chart, double h, State& out) {
       {8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136,
        -6.058818238834054}};
   h_ = h;
-  factorise(kGamma * h);
+  factorize(kGamma * h);
   const double t = chart.origin().t;
   const int n = static_cast<int>(rate_of_time_.size());
   for (int i = 0; i < kStages; ++i) {

@@ -1,4 +1,4 @@
-// Linearly implicit methods: one Jacobian and one factorisation a step, no iteration.
+// Linearly implicit methods: one Jacobian and one factorization a step, no iteration.
 #pragma once
 
 #include <Eigen/LU>
@@ -13,13 +13,14 @@ class ImplicitStepper : public Stepper {
  public:
   explicit ImplicitStepper(Scene& scene) : linearization_(scene) {}
   void begin(Chart& chart) override;
+  bool is_implicit() const override { return true; }
 
  protected:
-  void factorise(double gamma_h);
+  void factorize(double gamma_h);
   // In place; work is no part of the system.
   void solve(VectorX& x);
 
-  VectorX start_, rate_, rate_of_time_;
+  VectorX rate_of_time_;
 
  private:
   void linearize_torques(Chart& chart);

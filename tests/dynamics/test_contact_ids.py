@@ -33,7 +33,7 @@ def test_one_number_over_many_elements() -> None:
     start = 0.03003 * np.array([np.sin(turn), 0.002, -np.cos(turn)])
     log = ball(bowl, start).contacts
     assert len(np.unique(log.element)) > 10
-    ids, counts = np.unique(log.number[log.t > 0.01], return_counts=True)
+    ids, counts = np.unique(log.contact_id[log.t > 0.01], return_counts=True)
     assert len(ids) == 1
     assert counts[0] > 4000
 
@@ -43,7 +43,7 @@ def test_a_new_touch_is_a_new_contact() -> None:
     result = ball(plate, [0.01, 0.02, 0.015], duration=0.4)
     touches = [e for e in result.events if e.kind == "touch"]
     assert len(touches) >= 2
-    assert np.array_equal(np.unique(result.contacts.number), np.arange(len(touches)))
+    assert np.array_equal(np.unique(result.contacts.contact_id), np.arange(len(touches)))
 
 
 @pytest.mark.parametrize("cells", [1, 4])
@@ -53,6 +53,6 @@ def test_two_walls_two_numbers(cells: int) -> None:
     result = ball(sp.Shell(vertices, triangles), [1e-6, -0.05, height], velocity=[0, 0.1, 0])
     log = result.contacts
     left = log.normal_world[:, 0] > 0
-    assert len(np.unique(log.number[left & (log.t > 0.05)])) == 1
-    assert len(np.unique(log.number[~left & (log.t > 0.05)])) == 1
-    assert not set(log.number[left]) & set(log.number[~left])
+    assert len(np.unique(log.contact_id[left & (log.t > 0.05)])) == 1
+    assert len(np.unique(log.contact_id[~left & (log.t > 0.05)])) == 1
+    assert not set(log.contact_id[left]) & set(log.contact_id[~left])

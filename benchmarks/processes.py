@@ -1,0 +1,55 @@
+"""Work in a process of its own: for its memory, or because it may crash or hang."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import ParamSpec, TypeVar
+
+P, T = ParamSpec("P"), TypeVar("T")
+
+
+class ProcessLost(Exception):
+    """The process crashed, or took too long and was ended; the message says which."""
+
+
+class OwnProcess:
+    """A fresh interpreter that calls functions of modules; it starts anew after it was lost."""
+
+    def __init__(self, begin: Callable[..., object] | None = None, *arguments: object) -> None:
+        self._begin = begin, arguments
+        self._pool: ProcessPoolExecutor | None = None
+
+    def call(
+        self, timeout: float | None, function: Callable[P, T], *args: P.args, **named: P.kwargs
+    ) -> T:
+        """Return what `function` returns there, within `timeout` [s], or raise what it raises.
+
+        Raises ProcessLost, too.
+        """
+        if self._pool is None:
+            begin, arguments = self._begin
+            context = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(1, context, begin, arguments)
+        try:
+            return self._pool.submit(function, *args, **named).result(timeout)
+        except BrokenProcessPool:
+            self.close()
+            raise ProcessLost("the process crashed") from None
+        except TimeoutError:
+            self.close()
+            raise ProcessLost(f"took longer than {timeout:.0f} s") from None
+        except BaseException as error:
+            if not isinstance(error, Exception):
+                self.close()
+            raise
+
+    def close(self) -> None:
+        """End the process at once."""
+        if self._pool is not None:
+            for process in list((self._pool._processes or {}).values()):
+                process.kill()
+            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool = None

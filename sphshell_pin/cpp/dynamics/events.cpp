@@ -1,0 +1,121 @@
+#include "dynamics/events.hpp"
+
+#include <algorithm>
+#include <boost/math/tools/toms748_solve.hpp>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+
+namespace sphshell {
+namespace {
+
+// How far outside the sphere contacts are looked for, as a share of the radius.
+constexpr double kMargin = 0.25;
+constexpr std::uintmax_t kMostLooks = 200;
+
+long count_positive(const std::vector<double>& values) {
+  return std::count_if(values.begin(), values.end(), [](double value) { return value > 0; });
+}
+
+}  // namespace
+
+void Events::begin() {
+  for (std::size_t k = 0; k < at_begin_.size(); ++k) {
+    const PairState& now = scene_.states()[k];
+    at_begin_[k] = {now.pieces, now.clamped, now.centre};
+  }
+}
+
+bool Events::changed(std::size_t k) const {
+  const PairState& now = scene_.states()[k];
+  return now.pieces != at_begin_[k].pieces || now.clamped != at_begin_[k].clamped;
+}
+
+bool Events::met() const {
+  for (std::size_t k = 0; k < at_begin_.size(); ++k)
+    if (changed(k)) return true;
+  return false;
+}
+
+bool Events::met_at(double theta, const Chart& chart, const Stepper& stepper) {
+  ++queries_;
+  stepper.interpolate(theta, y_);
+  chart.finish(chart.origin().t, y_, state_);
+  scene_.evaluate(state_.q, state_.v, state_.z);
+  return met();
+}
+
+// A sphere that is larger by the margin has contacts with a gap, too.
+void Events::measure(std::size_t k, double margin, Gauges& out) {
+  for (std::vector<double>& values : out) values.clear();
+  const Pair& pair = scene_.pairs()[k];
+  if (pair.shell) {
+    query_.find(*pair.shell, scene_.states()[k].centre, pair.radius + margin, pair.method);
+    for (const Contact& contact : query_.contacts)
+      out[contact.weight > 0 ? Minimum : Saddle].push_back(contact.depth - margin);
+  }
+  for (const ActiveContact& active : scene_.active()) {
+    if (active.pair != static_cast<int>(k)) continue;
+    const Meeting<double>& m = active.meeting;
+    // Laws are linear in the rate: the force against the opposite rate is 2 elastic - unclamped.
+    const auto opposed = pair.law.force(m.depth, -m.normal.dot(m.relative));
+    out[Clamp].push_back(active.force.normal > 0 ? -active.force.normal
+                                                 : opposed.total - 2 * opposed.elastic);
+  }
+  for (std::vector<double>& values : out)
+    std::sort(values.begin(), values.end(), std::greater<double>());
+}
+
+double Events::locate(double before, double after, double tolerance, const Chart& chart,
+                      const Stepper& stepper) {
+  met_at(after, chart, stepper);
+  std::size_t k = 0;
+  while (k + 1 < at_begin_.size() && !changed(k)) ++k;
+  const double radius = scene_.pairs()[k].radius;
+  const Vec3 end = scene_.states()[k].centre;
+  const double margin = std::min(1.1 * (end - at_begin_[k].centre).norm(), kMargin * radius);
+  measure(k, margin, after_);
+  met_at(before, chart, stepper);
+  const Vec3 start = scene_.states()[k].centre;
+  measure(k, margin, before_);
+
+  // The quantity that changes its sign, and where it stands at both ends.
+  int kind = 0;
+  while (kind < kKinds && count_positive(before_[kind]) == count_positive(after_[kind])) ++kind;
+  std::size_t index = 0;
+  double known = 0;
+  Vec3 from = end;
+  if (kind < kKinds) {
+    const long counts[] = {count_positive(before_[kind]), count_positive(after_[kind])};
+    index = static_cast<std::size_t>(std::min(counts[0], counts[1]));
+    const bool comes = counts[1] > counts[0];
+    known = (comes ? after_ : before_)[kind][index];
+    if (!comes) from = start;
+  }
+  // Its sign is that of met(), whatever else happens in the step.
+  const auto value = [&](const Gauges& gauges, const Vec3& centre, bool is_met) {
+    double size = 1;
+    if (kind < kKinds) {
+      // Out of sight, a contact is farther than the margin; a depth changes no faster than the
+      // centre moves.
+      size = gauges[kind].size() > index ? std::abs(gauges[kind][index])
+             : kind == Clamp             ? known
+                             : std::max(margin, (centre - from).norm() - known);
+      size = std::max(size, std::numeric_limits<double>::min());
+    }
+    return is_met ? size : -size;
+  };
+  std::uintmax_t looks = kMostLooks;
+  const auto bracket = boost::math::tools::toms748_solve(
+      [&](double theta) {
+        const bool is_met = met_at(theta, chart, stepper);
+        if (kind < kKinds) measure(k, margin, between_);
+        return value(between_, scene_.states()[k].centre, is_met);
+      },
+      before, after, value(before_, start, false), value(after_, end, true),
+      [&](double a, double b) { return b - a <= tolerance; }, looks);
+  return bracket.second;
+}
+
+}  // namespace sphshell

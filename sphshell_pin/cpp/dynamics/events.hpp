@@ -1,0 +1,53 @@
+// Where within a step the motion has a kink.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "dynamics/integrators/stepper.hpp"
+
+namespace sphshell {
+
+// An event is a change of sign: of a contact's depth (touch, lift-off), of a saddle's depth, or of
+// the force that a law clamps at zero. Events are located on the dense output of a step, where a
+// look costs a query of the contacts and no evaluation of the dynamics.
+class Events {
+ public:
+  explicit Events(Scene& scene) : scene_(scene), at_begin_(scene.pairs().size()) {}
+
+  // A step begins where the scene was last evaluated.
+  void begin();
+  // Whether an event lies between there and where the scene was last evaluated.
+  bool met() const;
+  // Whether one lies between there and the share theta of the stepper's last step; evaluates the
+  // scene there.
+  bool met_at(double theta, const Chart& chart, const Stepper& stepper);
+  // The share of the stepper's last step where the first event has just been met, to within
+  // `tolerance`. None has been met at `before`, one has at `after`.
+  double locate(double before, double after, double tolerance, const Chart& chart,
+                const Stepper& stepper);
+
+  long queries() const { return queries_; }  // states looked at
+
+ private:
+  struct Start {
+    int pieces = 0, clamped = 0;
+    Vec3 centre = Vec3::Zero();  // of the sphere, in the shell's frame
+  };
+  // Quantities of one pair that change sign at its events, positive ones first in each list.
+  enum Kind { Minimum, Saddle, Clamp, kKinds };
+  using Gauges = std::array<std::vector<double>, kKinds>;
+
+  bool changed(std::size_t k) const;
+  void measure(std::size_t k, double margin, Gauges& out);
+
+  Scene& scene_;
+  std::vector<Start> at_begin_;
+  Query query_;
+  Gauges before_, after_, between_;
+  State state_;
+  VectorX y_;
+  long queries_ = 0;
+};
+
+}  // namespace sphshell

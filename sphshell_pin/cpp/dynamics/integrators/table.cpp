@@ -1,0 +1,47 @@
+#include "dynamics/integrators/table.hpp"
+
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+
+#include "dynamics/integrators/explicit.hpp"
+#include "dynamics/integrators/implicit.hpp"
+
+namespace sphshell {
+namespace {
+
+template <class Method>
+std::unique_ptr<Stepper> make(Scene& scene) {
+  if constexpr (std::is_constructible_v<Method, Scene&>)
+    return std::make_unique<Method>(scene);
+  else
+    return std::make_unique<Method>();
+}
+
+struct Entry {
+  std::string_view name;
+  std::unique_ptr<Stepper> (*make)(Scene&);
+};
+
+// A new method is one line here, and the class of that name in dynamics/integrators.py.
+constexpr Entry kIntegrators[] = {
+    {"semi-implicit-euler", make<SemiImplicitEuler>},
+    {"runge-kutta-4", make<RungeKutta4>},
+    {"linearly-implicit-euler", make<LinearlyImplicitEuler>},
+    {"adaptive", make<DormandPrince>},
+    {"implicit", make<Rodas>},
+};
+
+}  // namespace
+
+std::unique_ptr<Stepper> make_stepper(std::string_view integrator, Scene& scene) {
+  std::string names;
+  for (const Entry& entry : kIntegrators) {
+    if (entry.name == integrator) return entry.make(scene);
+    names += (names.empty() ? "" : ", ") + std::string(entry.name);
+  }
+  throw std::invalid_argument("integrator '" + std::string(integrator) +
+                              "' does not exist; the table has: " + names);
+}
+
+}  // namespace sphshell

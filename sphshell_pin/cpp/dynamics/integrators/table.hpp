@@ -1,0 +1,14 @@
+// Integration methods by the names that scenarios give them.
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "dynamics/integrators/stepper.hpp"
+
+namespace sphshell {
+
+// Throws std::invalid_argument, which lists the names, for any other.
+std::unique_ptr<Stepper> make_stepper(std::string_view integrator, Scene& scene);
+
+}  // namespace sphshell

@@ -1,0 +1,48 @@
+// A scene along a motion that somebody else integrates.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "dynamics/scene.hpp"
+
+namespace sphshell {
+
+// Remembers what the forces depend on besides q and v: which contacts there are, on which side of
+// its shell each sphere is, and how far bristles are stretched.
+class SceneState {
+ public:
+  SceneState(const pinocchio::Model& model, std::vector<Pair> pairs)
+      : scene_(model, std::move(pairs)), z_(VectorX::Zero(scene_.bristle_size())) {}
+
+  // Forces at (q, v), with the memory as it is: they do not change it.
+  void evaluate(const VectorX& q, const VectorX& v) {
+    scene_.restart();
+    scene_.evaluate(q, v, z_, true);
+  }
+
+  // The motion has come to (q, v), in dt [s]. Bristles are stretched as SemiImplicitEuler does it:
+  // with the new velocity, at the contacts where the step began. The first call only begins.
+  void advance(const VectorX& q, const VectorX& v, double dt) {
+    if (begun_ && z_.size() > 0) {
+      scene_.relax_in(dt);
+      evaluate(q_, v);
+      z_ += dt * scene_.bristle_rates();
+    }
+    evaluate(q, v);
+    scene_.accept(z_);
+    q_ = q;
+    begun_ = true;
+  }
+
+  Scene& scene() { return scene_; }
+  const Scene& scene() const { return scene_; }
+  const VectorX& bristles() const { return z_; }
+
+ private:
+  Scene scene_;
+  VectorX q_, z_;
+  bool begun_ = false;
+};
+
+}  // namespace sphshell

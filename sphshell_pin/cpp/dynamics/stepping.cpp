@@ -1,0 +1,231 @@
+#include "dynamics/stepping.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "dynamics/integrators/table.hpp"
+
+namespace sphshell {
+namespace {
+
+constexpr double kFineTolerance = 1e-6;  // of the steps that replace a fixed one
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// A step ends behind its event by this share of its length at most, and of rtol.
+constexpr double kEventShare = 1e-3;
+// How far beyond the end of a step, as a share of it, its dense output still locates an event.
+constexpr double kBeyond = 0.05;
+constexpr int kMostEventSteps = 8;  // in one step
+// Up to this error the dense output of a rejected step shows where the event is.
+constexpr double kUsableError = 1e6;
+
+// Of the numbers near t.
+double spacing(double t) { return std::numeric_limits<double>::epsilon() * std::abs(t); }
+
+}  // namespace
+
+Stepping::Stepping(Scene& scene, Torques& torques, const StepSettings& settings, State start)
+    : settings_(settings),
+      scene_(scene),
+      chart_(scene, torques),
+      stepper_(make_stepper(settings.integrator, scene)),
+      guard_(scene),
+      events_(scene),
+      state_(std::move(start)),
+      next_(state_) {
+  set_fine(false);
+}
+
+void Stepping::set_fine(bool fine) {
+  if (fine && !fine_stepper_)
+    fine_stepper_ = make_stepper(stepper_->is_implicit() ? "implicit" : "adaptive", scene_);
+  active_ = (fine ? fine_stepper_ : stepper_).get();
+  const bool is_explicit = settings_.dt > 0 && !active_->is_implicit() && !fine;
+  scene_.relax_in(is_explicit ? settings_.dt : 0);
+}
+
+void Stepping::restart() {
+  scene_.evaluate(state_.q, state_.v, state_.z, true);
+  last_ = scene_.powers();
+  scene_.accept(state_.z);
+  guard_.begin(scene_);
+  events_.begin();
+  proposal_ = kInfinity;
+  new_motion_ = true;
+  last_error_ = 1;
+}
+
+void Stepping::attempt(double h) {
+  scene_.restart();
+  active_->step(chart_, h, next_);
+}
+
+bool Stepping::make_fixed(double end) {
+  chart_.begin(state_);
+  active_->begin(chart_);
+  active_->step(chart_, end - state_.t, next_);
+  next_.t = end;
+  active_->complete(chart_, next_);
+  scene_.evaluate(next_.q, next_.v, next_.z);
+  if (guard_.allowed(scene_, state_, next_) >= 1) return true;
+  scene_.restart();
+  scene_.evaluate(state_.q, state_.v, state_.z);
+  proposal_ = std::min(proposal_, 0.1 * (end - state_.t));
+  new_motion_ = false;
+  last_error_ = 1;
+  return false;
+}
+
+Stepping::Made Stepping::make_controlled(double end) {
+  const double left = end - state_.t;
+  const double shortest = 8 * spacing(end);
+  if (left <= spacing(end)) {
+    state_.t = end;
+    return Made::Nothing;
+  }
+  chart_.begin(state_);
+  active_->begin(chart_);
+  if (std::exchange(new_motion_, false)) proposal_ = first_step();
+  // No short step is left over at the end.
+  double h = proposal_ > 0.95 * left ? left : std::min(proposal_, 0.5 * left);
+  h = std::min(std::max(h, 4 * shortest), left);
+  const double order = active_->order_of_error();
+  bool rejected = false;
+  int event_steps = 0;
+  double error = 0;
+  for (;;) {
+    if (h < shortest && h < left) {
+      proposal_ = h;
+      return Made::Stuck;
+    }
+    attempt(h);
+    next_.t = h == left ? end : state_.t + h;
+    error = error_norm();
+    // At the resolution of time an error is round-off.
+    const bool too_large = !(error <= 1) && !(h <= 4 * shortest && std::isfinite(error));
+    if (!too_large || (error < kUsableError && event_steps < kMostEventSteps)) {
+      scene_.evaluate(next_.q, next_.v, next_.z);
+      const double allowed = guard_.allowed(scene_, state_, next_);
+      if (!too_large && allowed < 1) {
+        ++rejected_;
+        h *= std::clamp(0.95 * allowed, 0.01, 0.9);
+        continue;
+      }
+      const bool is_met = events_.met();
+      if (allowed >= 1 && (is_met || (event_steps > 0 && !too_large)) &&
+          event_steps < kMostEventSteps) {
+        const double wanted = to_event(h, left, shortest, is_met);
+        if (wanted != h) {
+          ++event_steps_;
+          ++event_steps;
+          h = wanted;
+          continue;
+        }
+      }
+      if (!too_large) {
+        new_motion_ = is_met;
+        break;
+      }
+    }
+    ++rejected_;
+    rejected = true;
+    h *= error < 1e300 ? std::clamp(0.9 * std::pow(error, -1 / order), 0.1, 0.9) : 0.1;
+  }
+  active_->complete(chart_, next_);
+  // PI control (Gustafsson 1991).
+  double factor = 0.9 * std::pow(std::max(error, 1e-10), -0.7 / order) *
+                  std::pow(std::max(last_error_, 1e-10), 0.4 / order);
+  factor = std::clamp(factor, 0.2, rejected ? 1.0 : 5.0);
+  last_error_ = new_motion_ ? 1 : std::max(error, 1e-4);
+  // A step cut short by `end` says nothing against the one proposed.
+  if (h < left || factor * h >= proposal_ || error >= 0.5) proposal_ = factor * h;
+  return Made::Step;
+}
+
+// The length of the step that ends just behind the event, seen from one of length h; h where that
+// will do, or where there is no event.
+double Stepping::to_event(double h, double left, double shortest, bool is_met) {
+  const double rtol = settings_.dt > 0 ? kFineTolerance : settings_.rtol;
+  const double resolution = std::max(kEventShare * rtol, shortest / h);
+  const double near = 1 - resolution;
+  double before = 0, after = 1;
+  if (is_met) {
+    if (!events_.met_at(near, chart_, *active_)) return h;
+  } else {
+    after = std::min(1 + kBeyond, left / h);
+    if (after <= 1 || !events_.met_at(after, chart_, *active_)) return h;
+    before = 1;
+  }
+  const double share = events_.locate(before, after, 0.1 * resolution, chart_, *active_);
+  return std::min(std::max(share * (1 + 0.5 * resolution) * h, 4 * shortest), left);
+}
+
+// The largest error of the state, against the tolerance of each part.
+double Stepping::error_norm() const {
+  const VectorX& error = active_->error();
+  const VectorX& y = active_->end();
+  const int nv = chart_.nv();
+  if (!y.allFinite() || !error.allFinite()) return kInfinity;
+  double worst = weighted(error, y);
+  const bool replaced = settings_.dt > 0;
+  const double rtol = replaced ? kFineTolerance : settings_.rtol;
+  const double atol = replaced ? 1e-2 * kFineTolerance : settings_.atol;
+  for (const ActiveContact& active : scene_.active()) {
+    if (active.slot < 0) continue;
+    const BristleFriction& friction = *scene_.pairs()[active.pair].friction.bristle();
+    const Vec3 z = y.segment<3>(2 * nv + 3 * active.slot);
+    const double limit = friction.mu_static * active.force.normal / friction.stiffness;
+    const double e = error.segment<3>(2 * nv + 3 * active.slot).norm();
+    worst = std::max(worst, e / (1e-6 * atol + rtol * (z.norm() + limit)));
+  }
+  return worst;
+}
+
+// The largest part of a change of positions and velocities, against its tolerance at y.
+double Stepping::weighted(const VectorX& change, const VectorX& y) const {
+  const bool replaced = settings_.dt > 0;
+  const double rtol = replaced ? kFineTolerance : settings_.rtol;
+  const double atol = replaced ? 1e-2 * kFineTolerance : settings_.atol;
+  const int nv = chart_.nv();
+  double worst = 0;
+  scene_.body().sizes(state_.q, sizes_);
+  for (int i = 0; i < nv; ++i)
+    worst = std::max(worst, std::abs(change[i]) / (atol + rtol * sizes_[i]));
+  scene_.body().speeds(y.segment(nv, nv), sizes_);
+  for (int i = 0; i < nv; ++i)
+    worst = std::max(worst, std::abs(change[nv + i]) / (atol + rtol * sizes_[i]));
+  return worst;
+}
+
+// The first step of a motion of which nothing is known: Hairer, Norsett, Wanner, Solving Ordinary
+// Differential Equations I, II.4.
+double Stepping::first_step() {
+  const double rtol = settings_.dt > 0 ? kFineTolerance : settings_.rtol;
+  const VectorX &start = active_->start(), &rate = active_->rate();
+  const double speed = weighted(rate, start);
+  const double h = speed > 0 ? 0.01 / (rtol * speed) : 1e-6;
+  probe_ = start + h * rate;
+  scene_.restart();
+  chart_.rate(state_.t + h, probe_, rate_);
+  rate_ -= rate;
+  const double change = weighted(rate_, start) / h, most = std::max(speed, change);
+  if (!(most > 0) || !std::isfinite(most)) return h;
+  return std::min(100 * h, std::pow(0.01 / most, 1.0 / active_->order_of_error()));
+}
+
+void Stepping::accept() {
+  const Powers now = scene_.powers();
+  const double h = next_.t - state_.t;
+  if (active_->leaves_work()) {
+    next_.ledger.damping += 0.5 * h * (last_.damping + now.damping);
+    next_.ledger.friction += 0.5 * h * (last_.friction + now.friction);
+  }
+  last_ = now;
+  scene_.accept(next_.z);
+  std::swap(state_, next_);
+  guard_.begin(scene_);
+  events_.begin();
+}
+
+}  // namespace sphshell

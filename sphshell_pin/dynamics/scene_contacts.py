@@ -1,0 +1,69 @@
+"""The contacts of a scene as columns, read from the core's rows with named fields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin import _core
+from sphshell_pin.checks import read_only
+from sphshell_pin.deprecation import renamed
+
+Array = NDArray[np.float64]
+Columns = dict[str, NDArray[Any]]  # of numbers of several kinds
+Rows = bytes | bytearray | NDArray[np.uint8]
+
+ROW = np.dtype(_core.contact_row_type())
+"""The structured type of the core's rows: its fields are those of SceneContacts."""
+
+
+@dataclass(frozen=True)
+class SceneContacts:
+    """Contacts of a scene at one state, as columns; vectors and points in the world.
+
+    With k contacts: `pair` (k,) index into scene.pairs; `point_world`, `normal_world` (k, 3) from
+    the shell to the sphere; `depth` (k,) [m]; `normal_force` (k,) [N]; `friction_force_world`
+    (k, 3) on the sphere [N]; `slip_velocity_world` (k, 3) of the sphere's surface against the
+    shell [m/s]; `element` (k,), `feature` (k,) as in ContactSet; `contact_id` (k,): in a run, or
+    with a SceneState, a contact keeps its id, which no other of its pair had or will have, while it
+    moves over elements and smooth edges; at a single state it is the index in the list of its pair.
+
+    At a saddle, where contacts merge, `normal_force` is negative: the contacts push less
+    than they would one by one.
+    """
+
+    pair: NDArray[np.int32]
+    point_world: Array
+    normal_world: Array
+    depth: Array
+    normal_force: Array
+    friction_force_world: Array
+    slip_velocity_world: Array
+    element: NDArray[np.int32]
+    feature: NDArray[np.uint8]
+    contact_id: NDArray[np.int32]
+
+    number = renamed("number", "contact_id")
+
+    def __len__(self) -> int:
+        """Return the number of contacts."""
+        return len(self.depth)
+
+    @property
+    def force_world(self) -> Array:
+        """Total force on the sphere of each contact, (k, 3) [N]."""
+        return self.normal_force[:, None] * self.normal_world + self.friction_force_world
+
+    @classmethod
+    def from_rows(cls, rows: Rows) -> SceneContacts:
+        """Build from the memory of the core's rows."""
+        return cls(**columns(rows))
+
+
+def columns(rows: Rows) -> Columns:
+    """Return the fields of the core's rows, read-only, by name."""
+    table = np.frombuffer(rows, ROW)
+    return {name: read_only(table[name]) for name in ROW.names or ()}

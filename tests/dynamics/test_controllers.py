@@ -1,0 +1,49 @@
+"""Where a controller finds what it needs of the scene."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter
+from tests import models
+
+PLACE = pin.SE3(pin.rpy.rpyToMatrix(0.2, 0.0, 0.3), np.array([0.1, 0.0, 0.2]))
+PATH = [[0.0, 0.0, 0.0], [0.05, 0.02, 0.0]]
+
+
+def press(**more) -> sp.CartesianImpedance:
+    return sp.CartesianImpedance("ball", PATH, 100.0, 10.0, 1.0, joints=["ball_joint"], **more)
+
+
+def moved(scene: sp.Scene, controller: sp.CartesianImpedance):
+    start = np.array([0.1, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0])
+    return sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(start, None, 0.05, controller).q
+
+
+def test_the_place_of_a_shell_is_found_where_the_contacts_have_it() -> None:
+    shell, scene = models.plate(), sp.Scene(models.ball())
+    sphere = sp.Sphere(0.01, "ball")
+    for name in ("one", "two"):
+        scene.add_contact(sphere, shell, placement=PLACE, law=sp.ImpactLaw(1e5), name=name)
+    found = moved(scene, press(shell=shell))
+    np.testing.assert_array_equal(found, moved(scene, press(shell=shell, placement=PLACE)))
+    elsewhere = moved(scene, press(shell=shell, shell_frame="universe"))
+    assert np.abs(found - elsewhere).max() > 1e-4
+    scene.add_contact(sphere, shell, law=sp.ImpactLaw(1e5), name="three")
+    with pytest.raises(InvalidParameter, match=r"several places .*give shell_frame"):
+        moved(scene, press(shell=shell))
+
+
+def test_gains_and_posture_by_joint() -> None:
+    model = models.arm()
+    first = model.names[1]
+    controller = sp.JointPD({first: 3.0}, 1.0, {first: 0.5})
+    start = pin.neutral(model)
+    assert controller.gain("kp", model).tolist() == [3.0, *[0.0] * (model.nv - 1)]
+    assert controller.posture(model, start)[0] == 0.5
+    for wrong in (sp.JointPD({"x": 3.0}, 1.0), sp.JointPD(1.0, 1.0, {"x": 0.5})):
+        with pytest.raises(InvalidParameter, match=rf"joint 'x'.*{first}"):
+            wrong.to_core(sp.Scene(model), start)

@@ -1,0 +1,163 @@
+"""A scene's state in the user's own loop: the memory of friction and of contacts."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter, NotPicklable
+from tests import meshes, models
+
+R, K, G, DT = 0.05, 1e5, 9.81, 1e-4
+BRISTLE = sp.BristleFriction(0.5, 0.4, K, 100.0)
+SLOPE = 0.3  # [rad], below atan(0.5)
+
+
+def on_slope(friction: sp.BristleFriction = BRISTLE, free: bool = False) -> sp.Scene:
+    """1 kg on an inclined plate; a block that cannot turn, or a ball that can."""
+    model = models.empty()
+    lump = pin.Inertia.FromSphere(1.0, R)
+    if free:
+        light = pin.Inertia.FromSphere(1e-6, R)
+        carrier = models.add_body(model, "carrier", pin.JointModelTranslation(), inertia=light)
+        models.add_body(model, "ball", pin.JointModelSpherical(), carrier, inertia=lump)
+    else:
+        models.add_body(model, "ball", pin.JointModelTranslation(), inertia=lump)
+    scene = sp.Scene(model)
+    place = pin.SE3(pin.utils.rotate("y", SLOPE), np.zeros(3))
+    plate = sp.Shell(*meshes.random_plate(60, seed=3, size=4.0))
+    law = models.linear_law(K, 300.0)
+    scene.add_contact(
+        sp.Sphere(R, "ball"), plate, placement=place, law=law, friction=friction, name="tip"
+    )
+    return scene
+
+
+def start(scene: sp.Scene, gap: float = -1e-5) -> tuple[np.ndarray, np.ndarray]:
+    q = scene.neutral
+    q[:3] = (R + gap) * np.array([np.sin(SLOPE), 0, np.cos(SLOPE)])
+    return q, np.zeros(scene.model.nv)
+
+
+def own_loop(scene: sp.Scene, q, v, steps: int, remember: bool = True):
+    """Semi-implicit Euler with pin.aba."""
+    model, data = scene.model.copy(), scene.model.createData()
+    state = scene.state(q, v) if remember else None
+    for _ in range(steps):
+        fext = scene.external_forces(q, v, state=state)
+        v = v + DT * pin.aba(model, data, q, v, np.zeros(model.nv), fext)
+        q = pin.integrate(model, q, DT * v)
+        if state is not None:
+            state.advance(q, v, DT)
+    return q, v, state
+
+
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("torsional", [False, True])
+@pytest.mark.parametrize("speed", [0.0, 0.4])
+def test_the_own_loop_moves_as_a_run(free: bool, torsional: bool, speed: float) -> None:
+    """Sticking, and sliding with spin; the ball of the second begins above the plate."""
+    scene = on_slope(sp.BristleFriction(0.5, 0.4, K, 100.0, torsional=torsional), free)
+    q, v = start(scene, 1e-4 if speed else -1e-5)
+    v[:2] = speed, 0.5 * speed
+    if free:
+        v[5] = 10 * speed
+    run = sp.Simulation(scene, sp.SemiImplicitEuler(DT)).run(q, v, 2000 * DT)
+    last_q, last_v, state = own_loop(scene, q, v, 2000)
+    assert last_q == pytest.approx(run.q[-1], abs=1e-12)
+    assert last_v == pytest.approx(run.v[-1], abs=1e-10)
+    contacts, row = scene.contacts(last_q, last_v, state), run.contacts.at_row(len(run.t) - 1)
+    assert contacts.contact_id.tolist() == row.contact_id.tolist()
+    assert contacts.friction_force_world == pytest.approx(row.friction_force_world, abs=1e-3)
+
+
+def test_a_block_on_a_slope_stays_only_with_a_state() -> None:
+    scene = on_slope()
+    q, v = start(scene)
+    settled, _, _ = own_loop(scene, q, v, 5000)
+    later, _, _ = own_loop(scene, q, v, 20000)
+    assert later == pytest.approx(settled, abs=1e-9)
+    assert np.linalg.norm(later - q) < 3 * G / K
+    slid, _, _ = own_loop(scene, q, v, 5000, remember=False)
+    assert np.linalg.norm(slid - q) > 1e-3
+
+
+def test_evaluations_change_nothing_and_copies_are_independent() -> None:
+    scene = on_slope()
+    q, v, state = own_loop(scene, *start(scene), 500)
+    held = scene.contacts(q, v, state)
+    assert np.linalg.norm(held.friction_force_world) > 1.0
+    for other in (state.copy(), copy.copy(state), copy.deepcopy(state)):
+        assert np.array_equal(scene.contacts(q, v, other).force_world, held.force_world)
+        other.advance(q + [0.0, 0.0, 1.0], v, DT)
+        other.advance(q, v, DT)
+        unstretched = scene.contacts(q, v).friction_force_world
+        assert np.array_equal(scene.contacts(q, v, other).friction_force_world, unstretched)
+        scene.external_forces(q + 0.1, v + 1.0, state)
+        scene.contact_derivatives(q, v + 1.0, state)
+        assert np.array_equal(scene.contacts(q, v, state).force_world, held.force_world)
+
+
+def test_contacts_have_ids() -> None:
+    """A ball that lifts off and comes back has another contact."""
+    scene = on_slope()
+    q, v = start(scene)
+    state, ids = scene.state(), []
+    for height in (0.0, 0.0, 1.0, 0.0):
+        state.advance(q + [0.0, 0.0, height], v, DT)
+        ids += scene.contacts(q + [0.0, 0.0, height], v, state).contact_id.tolist()
+    assert ids == [0, 0, 1]
+
+
+def test_wrong_states_are_refused() -> None:
+    scene = on_slope()
+    q, v = start(scene)
+    state = scene.state(q, v)
+    with pytest.raises(InvalidParameter, match="state of this scene"):
+        on_slope().contacts(q, v, state)
+    with pytest.raises(InvalidParameter, match=r"scene\.state\(q, v\)"):
+        scene.contacts(q, v, "state")
+    with pytest.raises(InvalidParameter, match="dt"):
+        state.advance(q, v, -1.0)
+    scene.replace_pair("tip", friction=None)
+    with pytest.raises(InvalidParameter, match="make another"):
+        state.advance(q, v, DT)
+    with pytest.raises(NotPicklable, match=r"scene\.state"):
+        pickle.dumps(state)
+
+
+def test_contact_wrench_with_a_state_moves_as_a_run() -> None:
+    """A block on a plate that turns: the contact is where the block is, and held by the bristle."""
+    friction = sp.BristleFriction(0.5, 0.4, K, 100.0)
+    law = models.linear_law(K, 300.0)
+    spin = 2.0
+    model = models.empty()
+    models.add_body(model, "disc", pin.JointModelRZ())
+    models.add_body(model, "ball", pin.JointModelTranslation())
+    data = model.createData()
+    x, n = 0.3, np.array([0.0, 0.0, 1.0])
+    q, v = np.array([0.0, x, 0.0, R - G / K]), np.array([spin, 0.0, spin * x, 0.0])
+    state = sp.BristleState()
+    for _ in range(4000):
+        pin.forwardKinematics(model, data, q, v)
+        centre = q[1:]
+        disc, block = (data.oMi[j].act(data.v[j]) for j in (1, 2))
+        contact = (np.array([*centre[:2], 0.0]), n, R - centre[2], block, disc, law, friction)
+        state.advance(*contact, dt=DT)
+        wrench, _ = sp.contact_wrench(*contact, state=state)
+        v[1:] += DT * (wrench.linear + [0.0, 0.0, -G])
+        q += DT * v
+    radius = np.hypot(q[1], q[2])
+    angle = np.arctan2(q[2], q[1]) - q[0]
+    stretch = spin**2 * x / K
+    assert radius == pytest.approx(x, abs=3 * stretch + 0.6 * spin**2 * x * DT * 4000 * DT)
+    assert angle == pytest.approx(0.0, abs=1e-4)
+    assert state.stretch_world @ n == pytest.approx(0.0, abs=1e-12)
+    assert pickle.loads(pickle.dumps(state)).stretch_world.tolist() == state.stretch_world.tolist()
+    state.advance(*contact[:2], -1e-3, *contact[3:], dt=DT)
+    assert not state.stretch_world.any()
