@@ -2,16 +2,9 @@
 
 #include <chrono>
 #include <exception>
-#include <limits>
 #include <system_error>
 
 namespace sphshell {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
-
 Rollout::Rollout(const pinocchio::Model& model, int threads) : model_(model) {
   try {
     while (static_cast<int>(threads_.size()) < threads) threads_.emplace_back([this] { work(); });
