@@ -264,8 +264,11 @@ void bind_dynamics(nanobind::module_& m) {
           "__init__",
           [](RunSettings* self, std::string integrator, double dt, double rtol, double atol,
              double duration, double start_time, double control_dt, double record_dt) {
-            new (self) RunSettings{
-                {std::move(integrator), dt, rtol, atol}, duration, start_time, control_dt, record_dt};
+            new (self) RunSettings{{std::move(integrator), dt, rtol, atol},
+                                   duration,
+                                   start_time,
+                                   control_dt,
+                                   record_dt};
           },
           nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"), nb::arg("atol"),
           nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"));
