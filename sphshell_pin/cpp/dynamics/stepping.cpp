@@ -24,6 +24,7 @@ constexpr double kUsableError = 1e6;
 // A derivative of the force is not bounded at an event (depth^1.5): there the estimate of the error
 // is too small, and the error falls with a lower order.
 constexpr double kErrorAtKink = 0.05, kOrderAtKink = 2.5, kFirstShare = 0.15;
+constexpr int kMostKinkRejections = 3;  // in one step; then the error is taken as it is
 
 // Of the numbers near t.
 double spacing(double t) { return std::numeric_limits<double>::epsilon() * std::abs(t); }
@@ -100,7 +101,7 @@ Stepping::Made Stepping::make_controlled(double end) {
   h = std::min(std::max(h, 4 * shortest), left);
   const double order = active_->order_of_error();
   bool rejected = false;
-  int event_steps = 0;
+  int event_steps = 0, kink_rejections = 0;
   double error = 0;
   for (;;) {
     if (h < shortest && h < left) {
@@ -113,11 +114,12 @@ Stepping::Made Stepping::make_controlled(double end) {
     error = error_norm();
     // At the resolution of time an error is round-off.
     const bool shortest_yet = h <= 4 * shortest && std::isfinite(error);
-    double limit = after_event ? kErrorAtKink : 1;
+    const double kink_limit = kink_rejections < kMostKinkRejections ? kErrorAtKink : 1;
+    double limit = after_event ? kink_limit : 1;
     const bool small = error <= limit || shortest_yet;
     bool is_met = false;
     if (small || (error < kUsableError && event_steps < kMostEventSteps)) {
-      if (!active_->evaluates_end()) scene_.evaluate(next_.q, next_.v, next_.z);
+      scene_.evaluate(next_.q, next_.v, next_.z);
       const double allowed = guard_.allowed(scene_, state_, next_, true);
       if (allowed < 1 && small) {
         ++rejected_;
@@ -125,7 +127,7 @@ Stepping::Made Stepping::make_controlled(double end) {
         continue;
       }
       is_met = allowed >= 1 && events_.met();
-      const bool to_locate = event_steps == 0 ? is_met : error <= kErrorAtKink;
+      const bool to_locate = event_steps == 0 ? is_met : error <= kink_limit;
       if (to_locate && event_steps < kMostEventSteps) {
         const double wanted =
             std::min(std::max(step_to_event(h, left, is_met), 4 * shortest), left);
@@ -136,7 +138,7 @@ Stepping::Made Stepping::make_controlled(double end) {
           continue;
         }
       }
-      if (is_met) limit = kErrorAtKink;
+      if (is_met) limit = kink_limit;
     }
     if (error <= limit || shortest_yet) {
       new_motion_ = is_met;
@@ -145,6 +147,7 @@ Stepping::Made Stepping::make_controlled(double end) {
     ++rejected_;
     rejected = true;
     const double power = -1 / (limit < 1 ? kOrderAtKink : order);
+    if (limit < 1) ++kink_rejections;
     h *= error < 1e300 ? std::clamp(0.9 * std::pow(error / limit, power), 0.1, 0.9) : 0.1;
   }
   active_->complete(chart_, next_);

@@ -49,7 +49,6 @@ class DormandPrince : public ExplicitRungeKutta {
  public:
   DormandPrince();
   void step(Chart& chart, double h, State& out) override;
-  bool evaluates_end() const override { return true; }
   int order_of_error() const override { return 5; }
   void interpolate(double theta, VectorX& y) const override;
 };

@@ -15,9 +15,6 @@ class Stepper {
   // Once, after a step that is kept: what its end or its work still needs.
   virtual void complete(Chart& /*chart*/, State& /*out*/) {}
 
-  // True where step() leaves the scene evaluated at the end of the step.
-  virtual bool evaluates_end() const { return false; }
-
   // Of a method that estimates its error: the order of the estimate, and the estimate of the last
   // step, beside y.
   virtual int order_of_error() const { return 0; }
