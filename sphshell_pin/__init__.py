@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import HuntCrossleyLaw as HuntCrossleyLaw
     from sphshell_pin.contact import ImpactLaw as ImpactLaw
     from sphshell_pin.contact import Sphere as Sphere
+    from sphshell_pin.contact import TableLaw as TableLaw
     from sphshell_pin.contact import contact_wrench as contact_wrench
     from sphshell_pin.dynamics import Adaptive as Adaptive
     from sphshell_pin.dynamics import CartesianImpedance as CartesianImpedance
@@ -62,6 +63,7 @@ _HOME = {
     "Simulation": "dynamics",
     "Sphere": "contact",
     "SphshellError": "errors",
+    "TableLaw": "contact",
     "contact_wrench": "contact",
 }
 _PARTS = ("contact", "dynamics", "errors", "robots", "scenario", "shell", "units", "view")

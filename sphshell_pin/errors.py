@@ -1,4 +1,4 @@
-"""Every fault the package raises on purpose, below one root; each carries the data it speaks of."""
+"""The errors of the package, with one base class; the data of a message are attributes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result import Result
@@ -21,14 +21,16 @@ _LONGEST_VALUE = 200
 
 
 class SphshellError(Exception):
-    """Root of all faults of this package; its text is one sentence a user can act on."""
+    """Base class of all errors of this package; its text is one sentence that says what to do."""
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """Let it be raised in another process: `args` are the text, not what __init__ takes."""
         return _again, (type(self), self.args, self.__dict__)
 
 
-def _again(kind: type[SphshellError], args: tuple[Any, ...], data: dict[str, Any]) -> SphshellError:
+def _again(
+    kind: type[SphshellError], args: tuple[object, ...], data: dict[str, object]
+) -> SphshellError:
     error = kind.__new__(kind, *args)
     error.__dict__.update(data)
     return error
@@ -40,7 +42,7 @@ class InvalidParameter(SphshellError, ValueError):
     def __init__(self, name: str, value: object, must: str, given: str | None = None) -> None:
         """Say that parameter `name` has `value` but `must` (e.g. "must be positive [m]").
 
-        `given` takes the place of "= value" in the text.
+        `given` replaces "= value" in the text.
         """
         super().__init__(f"{name} {f'= {_shown(value)}' if given is None else given} {must}")
         self.name = name
@@ -48,9 +50,9 @@ class InvalidParameter(SphshellError, ValueError):
 
 
 class UnitMissing(InvalidParameter):
-    """A surface file without a unit of its own: `path`, `size` of its box diagonal as it stands.
+    """A surface file that states no unit: `path`, `size` of its box diagonal in its own numbers.
 
-    Most formats have none; in STEP and IGES files it may be missing, or one nobody knows.
+    Most formats have none; in STEP and IGES files it may be missing or unknown.
     """
 
     def __init__(self, path: str | PathLike[str], size: float, units: Iterable[str]) -> None:
@@ -64,7 +66,7 @@ class UnitMissing(InvalidParameter):
         """Say what to do; `option` is how the caller states a unit, with {} in its place."""
         mm, m = option.format("mm"), option.format("m")
         suffix = self.path.suffix.lower()
-        # These may carry one; this one does not.
+        # These may state one; this one does not.
         header = suffix in (".step", ".stp", ".iges", ".igs")
         lacking = f"the header of {self.path.name} states" if header else f"{suffix} files carry"
         return (
@@ -75,11 +77,11 @@ class UnitMissing(InvalidParameter):
 
 
 class UnitWarning(UserWarning):
-    """A shell is so large beside its sphere or robot that its unit was probably taken wrongly."""
+    """A shell is so much larger than its sphere or robot that its unit is probably wrong."""
 
 
 class WeakLawWarning(UserWarning):
-    """A law is so weak that the sphere's centre is expected to be pushed through the shell."""
+    """A law is so compliant that the sphere's center is expected to pass through the shell."""
 
 
 class InvalidShell(SphshellError, ValueError):
@@ -87,7 +89,7 @@ class InvalidShell(SphshellError, ValueError):
 
 
 class ShellFileError(SphshellError, ValueError):
-    """A surface file that cannot be read: `path`, and `line` (1-based) where one is to blame."""
+    """A surface file that cannot be read: `path`, and `line` (1-based) where it is known."""
 
     def __init__(self, path: str | PathLike[str], reason: str, line: int | None = None) -> None:
         """Say what is wrong with the file at `path`."""
@@ -99,14 +101,14 @@ class ShellFileError(SphshellError, ValueError):
 
 
 class NameNotFound(SphshellError, LookupError):
-    """A name nothing carries: `kind`, `name`, and the `valid` ones."""
+    """A name that does not exist: `kind`, `name`, and the `valid` ones."""
 
     def __init__(
         self, kind: str, name: str, owner: str, valid: Iterable[str], see: str = ""
     ) -> None:
         """Say that `owner` has no `kind` called `name`, and list what it has.
 
-        Of a long list the nearest names are told; `see` is where the others stand.
+        Of a long list the message has the nearest names; `see` is where to find the others.
         """
         self.kind = kind
         self.name = name
@@ -128,7 +130,7 @@ class FrameNotFound(NameNotFound):
 
 
 class MissingExtra(SphshellError, ImportError):
-    """An optional package is not installed: `package`, and the `extra` that brings it."""
+    """An optional package is not installed: `package`, and the `extra` that installs it."""
 
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         """Say what `purpose` needs `package`, and how to install it."""
@@ -140,7 +142,7 @@ class MissingExtra(SphshellError, ImportError):
 
 
 class UnusableExtra(MissingExtra):
-    """An optional `package` is installed but cannot be loaded: `reason`, as the system tells it."""
+    """An optional `package` is installed but cannot be loaded: `reason`, of the system."""
 
     def __init__(self, package: str, extra: str, purpose: str, reason: str, debian: str) -> None:
         """Say what `purpose` needs `package`, which needs the system packages `debian`."""
@@ -194,7 +196,7 @@ class ResultError(SphshellError, OSError):
 
 
 class SimulationDiverged(SphshellError, ArithmeticError):
-    """The state stopped being finite at time `t` [s]; `result` holds all that came before."""
+    """The state stopped being finite at time `t` [s]; `result` holds all until then."""
 
     def __init__(self, t: float, why: str, result: Result) -> None:
         """Say when and why the run had to stop."""
@@ -207,7 +209,7 @@ class SimulationDiverged(SphshellError, ArithmeticError):
 
 
 class Interrupted(SphshellError, KeyboardInterrupt):
-    """Ctrl-C during a run at time `t` [s]; `result` holds all that came before."""
+    """Ctrl-C during a run at time `t` [s]; `result` holds all until then."""
 
     def __init__(self, t: float, result: Result) -> None:
         """Say when the run was interrupted."""
@@ -217,7 +219,7 @@ class Interrupted(SphshellError, KeyboardInterrupt):
 
 
 class RunFailed(SphshellError, RuntimeError):
-    """A user's routine that broke in a run at time `t` [s]; `result` holds all that came before."""
+    """A user's routine that failed in a run at time `t` [s]; `result` holds all until then."""
 
     def __init__(self, t: float, why: str, result: Result) -> None:
         """Say when and what the routine raised."""
@@ -236,11 +238,11 @@ class RolloutInterrupted(SphshellError, KeyboardInterrupt):
 
 
 class NotPicklable(SphshellError, TypeError):
-    """Something that belongs to the process that made it: it cannot be pickled or copied."""
+    """An object of one process, which cannot be pickled or copied."""
 
 
 class Busy(SphshellError, RuntimeError):
-    """An object for one user at a time that is in use: `what`, by which call it is (`doing`)."""
+    """An object for one caller at a time that is in use: `what`, and the call, `doing`."""
 
     def __init__(self, what: str, doing: str, thread: int) -> None:
         """Say that `what` is in its method `doing`, in the thread with the identifier `thread`."""
@@ -260,7 +262,7 @@ class SweepError(SphshellError, RuntimeError):
 
 
 def add_origin(error: Exception, what: str) -> None:
-    """Note on `error`, which user code has just raised, `what` it was and where it stands."""
+    """Add a note to `error`, which user code has just raised: `what` raised it, and where."""
     place = error.__traceback__ and error.__traceback__.tb_next
     where = ""
     if place:

@@ -5,11 +5,15 @@ from __future__ import annotations
 import importlib.util
 import re
 import shlex
+import sys
 import tomllib
+from collections import defaultdict
+from decimal import Decimal
 from pathlib import Path
 
 import pytest
 import typer
+from typer.testing import CliRunner
 
 from sphshell_pin.cli import app
 from sphshell_pin.errors import MissingExtra
@@ -19,6 +23,7 @@ ROOT = Path(__file__).parent.parent
 PAGES = [
     ROOT / "README.md",
     ROOT / "CHANGELOG.md",
+    ROOT / "CONTRIBUTING.md",
     ROOT / "scenarios" / "README.md",
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
@@ -26,6 +31,9 @@ FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 INLINE_CODE = re.compile(r"`[^`\n]*`")
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+PRINT = re.compile(r"^\s*print\(.*\)  # (.+)$")
+PRINTED = re.compile(r"<!-- printed by: (.+) -->\s*```text\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # A line of a block, or code within a line; what follows may go on behind a backslash.
 COMMAND = re.compile(r"(?:^ *(?:\$ )?|`)(sphshell-pin (?:[^`\n\\]|\\\n)*)", re.MULTILINE)
 
@@ -58,8 +66,14 @@ def anchors(page: Path) -> set[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("page", with_blocks("python"), ids=name_of)
 def test_the_python_of_a_page_runs(page, tmp_path, monkeypatch):
+    """It prints what the comments behind its prints say."""
     monkeypatch.chdir(tmp_path)
-    namespace: dict[str, object] = {"__name__": "page"}
+    printed: dict[int, str] = defaultdict(str)
+
+    def record(*values: object) -> None:
+        printed[sys._getframe(1).f_lineno] += " ".join(map(str, values)) + "\n"
+
+    namespace: dict[str, object] = {"__name__": "page", "print": record}
     for above, text in blocks(page, "python"):
         # Blank lines in front: a traceback then names the line of the page.
         code = compile("\n" * above + text, str(page), "exec")
@@ -67,6 +81,49 @@ def test_the_python_of_a_page_runs(page, tmp_path, monkeypatch):
             exec(code, namespace)
         except MissingExtra as missing:
             pytest.skip(f"{name_of(page)}, line {above + 1}: {missing}")
+        for number, line in enumerate(text.splitlines(), above + 1):
+            if told := PRINT.search(line):
+                assert is_printed(told[1], printed[number]), (number, told[1], printed[number])
+
+
+def is_printed(told: str, printed: str) -> bool:
+    """Compare what a comment says: all its numbers, in order, or else its words.
+
+    A number is right within one unit of its last digit; "..." stands for any text.
+    """
+    if not re.match(r"[-+]?\d", told):
+        return bool(re.search(".*".join(map(re.escape, told.split("..."))), printed, re.DOTALL))
+    found = iter(NUMBER.findall(printed))
+    return all(any(is_near(number, other) for other in found) for number in NUMBER.findall(told))
+
+
+def is_near(told: str, found: str) -> bool:
+    unit = Decimal(told).as_tuple().exponent
+    return abs(Decimal(told) - Decimal(found)) <= Decimal(1).scaleb(unit)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if PRINTED.search(page.read_text("utf-8"))], ids=name_of
+)
+def test_the_commands_of_a_page_print_what_it_shows(page, tmp_path, monkeypatch):
+    """`<!-- printed by: COMMAND -->` stands above what the last of its commands prints, in part."""
+    monkeypatch.chdir(tmp_path)
+    for commands, block in PRINTED.findall(page.read_text(encoding="utf-8")):
+        for command in commands.split(" && "):
+            done = CliRunner().invoke(app, shlex.split(command)[1:])
+            assert done.exit_code == 0, done.output
+        printed = {shape(line): NUMBER.findall(line) for line in done.output.splitlines()}
+        for line in filter(shape, block.splitlines()):
+            assert shape(line) in printed, f"not printed: {line}"
+            for told, found in zip(NUMBER.findall(line), printed[shape(line)], strict=True):
+                # Residuals are rounding errors, which other processors do not share.
+                assert is_near(told, found) or "residual" in line, line
+
+
+def shape(line: str) -> str:
+    """Return the words of a line."""
+    return " ".join(re.findall(r"[a-zA-Z][\w-]*", NUMBER.sub("", line)))
 
 
 @pytest.mark.parametrize("page", with_blocks("toml"), ids=name_of)

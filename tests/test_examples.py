@@ -67,7 +67,7 @@ def test_a_parameter_study(run):
     mu, mass, k = names["coefficients"], names["mass"], names["stiffnesses"]
     np.testing.assert_allclose(names["times"], 2.0 / (7.0 * mu * 9.81), rtol=0.01)
     np.testing.assert_allclose(names["speeds"], 5.0 / 7.0, rtol=1e-3)
-    peaks = [one["peak_force"] for one in names["study"]]
+    peaks = [one.peak_force for one in names["study"]]
     np.testing.assert_allclose(peaks, np.sqrt(k * mass), rtol=0.03)
-    durations = [one["contact_time"] for one in names["study"]]
+    durations = [one.contact_time for one in names["study"]]
     np.testing.assert_allclose(durations, np.pi * np.sqrt(mass / k), rtol=0.03)

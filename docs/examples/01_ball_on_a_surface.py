@@ -25,7 +25,7 @@ result = sp.Simulation(scene, sp.Adaptive()).run(q0, duration=1.5, record_dt=2e-
 
 # %%
 figures = result.stats.pairs["ball-bowl"]
-print(f"{figures['touches']} touches, hardest {figures['peak_force']:.0f} N")
+print(f"{figures.touches} touches, hardest {figures.peak_force:.0f} N")
 print(f"energy residual {np.abs(result.energy.residual).max():.1e} J")
 
 # %% [markdown]

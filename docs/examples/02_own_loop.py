@@ -1,5 +1,5 @@
 # %% [markdown]
-"""A fingertip on a wall, in a loop of one's own.
+"""A fingertip on a wall, in your own loop.
 
 The package finds the contacts and their wrenches; the controller, the dynamics and the time
 stepping are plain Pinocchio. This is the way into an existing simulator, estimator or optimizer.

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 import sphshell_pin as sp
 from sphshell_pin import robots
+from sphshell_pin.dynamics import PairFigures
 
 RADIUS, SPEED, GRAVITY = 0.012, 1.0, 9.81
 ball = robots.load("ball")
@@ -72,7 +73,7 @@ figure.savefig("friction.png", dpi=120)
 
 
 # %%
-def drop(stiffness: float) -> dict[str, float]:
+def drop(stiffness: float) -> PairFigures:
     """Let the ball hit the plane at SPEED, once; return the figures of the contact."""
     scene = sp.Scene(ball.model)
     law = sp.ImpactLaw(stiffness, exponent=1.0, damping=0.0, full_damping_depth=1e-6)
@@ -80,27 +81,24 @@ def drop(stiffness: float) -> dict[str, float]:
     q0 = np.array([0, 0, RADIUS + 1e-6, 0, 0, 0, 1])
     v0 = np.array([0, 0, -SPEED, 0, 0, 0])
     result = sp.Simulation(scene, sp.Adaptive()).run(q0, v0, duration=0.02)
-    figures: dict[str, float] = result.stats.pairs["ball-plane"]
-    return figures
+    return result.stats.pairs["ball-plane"]
 
 
 stiffnesses = np.geomspace(1e4, 1e7, 7)  # [N/m]
 study = [drop(stiffness) for stiffness in stiffnesses]
 for stiffness, one in zip(stiffnesses, study, strict=True):
-    print(
-        f"k = {stiffness:8.2e} N/m: {one['peak_force']:6.1f} N, {one['contact_time'] * 1e3:.3f} ms"
-    )
+    print(f"k = {stiffness:8.2e} N/m: {one.peak_force:6.1f} N, {one.contact_time * 1e3:.3f} ms")
 
 # %%
 figure = Figure(figsize=(9, 4), layout="constrained")
 pushes, lasts = figure.subplots(1, 2)
 pushes.loglog(stiffnesses, SPEED * np.sqrt(stiffnesses * mass), color="0.6", label="v sqrt(k m)")
-pushes.loglog(stiffnesses, [one["peak_force"] for one in study], "o", label="simulated")
+pushes.loglog(stiffnesses, [one.peak_force for one in study], "o", label="simulated")
 pushes.set(xlabel="stiffness [N/m]", ylabel="peak force [N]")
 lasts.loglog(
     stiffnesses, 1e3 * np.pi * np.sqrt(mass / stiffnesses), color="0.6", label="pi sqrt(m / k)"
 )
-lasts.loglog(stiffnesses, [1e3 * one["contact_time"] for one in study], "o", label="simulated")
+lasts.loglog(stiffnesses, [1e3 * one.contact_time for one in study], "o", label="simulated")
 lasts.set(xlabel="stiffness [N/m]", ylabel="duration of the impact [ms]")
 for axis in (pushes, lasts):
     axis.grid(alpha=0.3, which="both")

@@ -14,7 +14,7 @@ _RENAME_SWAP = 2  # macOS
 
 
 def exchange(one: Path, other: Path) -> None:
-    """Let two folders of one file system exchange their names: nobody sees a state in between.
+    """Exchange the names of two folders of one file system, without a state in between.
 
     Raises
     ------

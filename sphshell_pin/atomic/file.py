@@ -17,7 +17,7 @@ from sphshell_pin.errors import ResultError
 
 @contextlib.contextmanager
 def atomic_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
-    """Yield an empty file that takes the place of the one at `path` if the block ends well.
+    """Yield an empty file that replaces the one at `path` if the block ends well.
 
     Whatever ends the process, `path` holds the old bytes or all of the new ones; after a power cut,
     too. The new file is written as `.NAME.writing` beside the old one. One that a killed process
@@ -57,7 +57,7 @@ def write_whole(path: str | PathLike[str], data: bytes) -> Path:
         with atomic_file(path) as file:
             file.write(data)
     except OSError as fault:
-        raise ResultError(path, f"cannot be written ({fault.strerror})") from fault
+        raise ResultError(path, f"cannot be written: {fault.strerror}") from fault
     return path
 
 

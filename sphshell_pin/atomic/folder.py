@@ -61,7 +61,7 @@ class AtomicFolder:
         self._inner = frozenset(inner)
         self._made: list[Path] = []
         self._lock: tuple[Path, int] | None = None
-        # Without a lock nobody knows whether another process has ended: its files are left alone.
+        # Without a lock it is unknown whether another process has ended: its files are left alone.
         self._suffix = ""
 
     def __enter__(self) -> Self:
@@ -188,7 +188,7 @@ class AtomicFolder:
         return self._folder.parent / f".{self._folder.name}.{name}", self._folder / f".{name}"
 
     def _may_leave(self) -> bool:
-        """Whether the folder may be exchanged, as far as can be told beforehand."""
+        """Whether the folder may be exchanged, as far as is known beforehand."""
         parent = self._folder.parent
         if os.path.ismount(self._folder) or os.stat(parent).st_dev != os.stat(self._folder).st_dev:
             return False
@@ -267,8 +267,8 @@ def _write_list(place: Path, new: Iterable[str], old: Iterable[str]) -> None:
 def _read_list(place: Path) -> tuple[list[str], list[str]] | None:
     """Return the names that come and those that go; None if not all of it was written."""
     try:
-        told = json.loads((place / _READY).read_text(encoding="utf-8"))
-        return list(told["new"]), list(told["old"])
+        names = json.loads((place / _READY).read_text(encoding="utf-8"))
+        return list(names["new"]), list(names["old"])
     except (FileNotFoundError, ValueError):
         return None
 

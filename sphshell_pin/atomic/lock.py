@@ -47,9 +47,9 @@ def lock_file(path: Path, *, wait: bool = True) -> tuple[int, bool]:
 
 def sign(descriptor: int) -> None:
     """Write into a locked file who has it, and since when."""
-    told = f"{os.getpid()} {socket.gethostname()} {time.strftime('%Y-%m-%d %H:%M:%S')}\n"
+    text = f"{os.getpid()} {socket.gethostname()} {time.strftime('%Y-%m-%d %H:%M:%S')}\n"
     os.ftruncate(descriptor, 0)
-    os.pwrite(descriptor, told.encode(), 0)
+    os.pwrite(descriptor, text.encode(), 0)
 
 
 def holder(path: Path) -> str:

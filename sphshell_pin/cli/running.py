@@ -128,11 +128,11 @@ def _print_report(report: RunReport) -> None:
     for name, pair in stats.pairs.items():
         table.add_row(
             plain(name),
-            f"{pair['contact_time']:.4g} s",
-            f"{pair['touches']}",
-            f"{pair['peak_force']:.4g} N",
-            f"{pair['mean_force']:.4g} N",
-            f"{pair['max_depth'] * 1e3:.4g} mm",
+            f"{pair.contact_time:.4g} s",
+            f"{pair.touches}",
+            f"{pair.peak_force:.4g} N",
+            f"{pair.mean_force:.4g} N",
+            f"{pair.max_depth * 1e3:.4g} mm",
         )
     console.print(table)
     energy = measure_energy(report.result)

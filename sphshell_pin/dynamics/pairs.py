@@ -62,6 +62,10 @@ class ContactPair:
 
     def to_core(self) -> _core.Pair:
         """Build the C++ binding of this pair."""
+        source = None
+        if self.find is not None:
+            has_state = self.friction is not None and self.friction.has_state
+            source = checked_source(self.find, self.name, has_state)
         return _core.Pair(
             name=self.name,
             joint_i=self.joint_i,
@@ -70,12 +74,8 @@ class ContactPair:
             placement_j=self.placement_j.homogeneous,
             radius=0.0 if self.sphere is None else self.sphere.radius,
             shell=None if self.shell is None else self.shell.core_for(self.method),
-            source=None if self.find is None else self._source(self.find),
+            source=source,
             method=int(Method.from_name(self.method)),
             law=self.law.core,
             friction=None if self.friction is None else self.friction.core,
         )
-
-    def _source(self, find: Find) -> Find:
-        has_state = self.friction is not None and self.friction.has_state
-        return checked_source(find, self.name, has_state)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.run_stats import RunStats
 from sphshell_pin.dynamics.scene import Scene
-from sphshell_pin.dynamics.scene_contacts import SceneContacts, columns
+from sphshell_pin.dynamics.scene_contacts import Columns, SceneContacts, columns
 from sphshell_pin.errors import MissingExtra
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ class Result:
     @classmethod
     def from_blocks(
         cls,
-        blocks: list[dict[str, NDArray[np.generic]]],
+        blocks: list[Columns],
         pairs: tuple[str, ...],
         stats: RunStats,
         scene: Scene,
@@ -189,19 +189,19 @@ class Result:
         from sphshell_pin.dynamics.result_file import origin_in_file, write_result
 
         target = Path(path)
-        arrays = {"t": self.t, "q": self.q, "v": self.v}
+        arrays: Columns = {"t": self.t, "q": self.q, "v": self.v}
         for part in ("contacts", "energy"):
             value = getattr(self, part)
             arrays |= {f"{part}.{f.name}": getattr(value, f.name) for f in fields(value)}
-        origin = self.origin
+        origin = None
+        if self.origin is not None:
+            home = Path(target.parent if home is None else home)
+            origin = origin_in_file(self.origin.scenario, self.origin.settings, home)
         header = {
             "pairs": self.pairs,
             "stats": asdict(self.stats),
             "events": [[e.t, e.pair, e.kind] for e in self.events],
-            "origin": origin
-            and origin_in_file(
-                origin.scenario, origin.settings, Path(target.parent if home is None else home)
-            ),
+            "origin": origin,
         }
         write_result(target, header, arrays)
         return target
@@ -222,7 +222,9 @@ class Result:
         header, arrays = read_result(path, max_size)
         log = {f.name: arrays[f"contacts.{f.name}"] for f in fields(ContactLog)}
         energy = {f.name: arrays[f"energy.{f.name}"] for f in fields(EnergyAudit)}
-        stated = header.origin
+        origin = None
+        if header.origin is not None:
+            origin = Origin(header.origin.found_from(Path(path).parent), header.origin.settings)
         return cls(
             t=arrays["t"],
             q=arrays["q"],
@@ -232,7 +234,7 @@ class Result:
             events=tuple(Event(*e) for e in header.events),
             energy=EnergyAudit(**energy),
             stats=header.stats,
-            origin=stated and Origin(stated.found_from(Path(path).parent), stated.settings),
+            origin=origin,
         )
 
     def to_dataframe(self) -> pd.DataFrame:

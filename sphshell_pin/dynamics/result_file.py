@@ -23,6 +23,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.dynamics.run_stats import RunStats
+from sphshell_pin.dynamics.scene_contacts import Columns
 from sphshell_pin.errors import ResultError
 
 LARGEST_HEADER = 1 << 26  # characters; a million events need less
@@ -98,9 +99,7 @@ def origin_in_file(scenario: str, settings: dict[str, object], home: Path) -> di
     return {"scenario": scenario, "settings": settings, "path": path}
 
 
-def write_result(
-    path: Path, header: dict[str, object], arrays: Mapping[str, NDArray[np.generic]]
-) -> None:
+def write_result(path: Path, header: Mapping[str, object], arrays: Columns) -> None:
     """Write a compressed .npz file, whole or not at all; ResultError where that fails."""
     named = {_IN_FILE[name]: array for name, array in arrays.items()}
     named["header"] = np.array(json.dumps({"format": 1, **header}))
@@ -111,9 +110,7 @@ def write_result(
         raise ResultError(path, f"cannot write the results: {error.strerror}") from error
 
 
-def read_result(
-    path: str | PathLike[str], max_size: float
-) -> tuple[Header, dict[str, NDArray[np.generic]]]:
+def read_result(path: str | PathLike[str], max_size: float) -> tuple[Header, Columns]:
     """Return the header and the ARRAYS of the results at `path`.
 
     Raises
@@ -136,7 +133,7 @@ def read_result(
 
 def _read(
     path: str | PathLike[str], archive: zipfile.ZipFile, max_size: float
-) -> tuple[Header, dict[str, NDArray[np.generic]]]:
+) -> tuple[Header, Columns]:
     files = {one.filename: one for one in archive.infolist()}
     shapes: dict[str, tuple[int, ...]] = {}
     parts = {"header": "header.npy"} | {name: f"{_IN_FILE[name]}.npy" for name in ARRAYS}
@@ -221,9 +218,7 @@ def _header(path: str | PathLike[str], text: str) -> Header:
     return header
 
 
-def _check_values(
-    path: str | PathLike[str], arrays: dict[str, NDArray[np.generic]], pairs: int
-) -> None:
+def _check_values(path: str | PathLike[str], arrays: Columns, pairs: int) -> None:
     for name, least, most in (
         ("contacts.row", 0, len(arrays["t"]) - 1),
         ("contacts.pair", 0, pairs - 1),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from sphshell_pin.checks import read_only
 from sphshell_pin.deprecation import renamed
 
 Array = NDArray[np.float64]
+Columns = dict[str, NDArray[Any]]  # of numbers of several kinds
 Rows = bytes | bytearray | NDArray[np.uint8]
 
 ROW = np.dtype(_core.contact_row_type())
@@ -61,7 +63,7 @@ class SceneContacts:
         return cls(**columns(rows))
 
 
-def columns(rows: Rows) -> dict[str, NDArray[np.generic]]:
+def columns(rows: Rows) -> Columns:
     """Return the fields of the core's rows, read-only, by name."""
     table = np.frombuffer(rows, ROW)
     return {name: read_only(table[name]) for name in ROW.names or ()}

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import as_floats
 from sphshell_pin.errors import InvalidParameter, add_origin
 
 Array = NDArray[np.float64]
-Find = Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]
+Find = Callable[[pin.SE3, pin.SE3], tuple[ArrayLike, ArrayLike, ArrayLike]]
 
-# More take 0.6 kB each for every evaluation, and as a rule are a mistake of the routine.
+# Each takes 0.6 kB in every evaluation: more are, as a rule, a mistake of the routine.
 _MOST = 1_000_000
-# Bristles stretch from step to step: each contact is looked for among all of the step before.
+# With bristles each contact is compared with all of the step before.
 _MOST_WITH_BRISTLES = 1_000
 
 _SHAPES = "must return points (k, 3), normals (k, 3), depths (k,)"
@@ -25,11 +24,11 @@ _SHAPES = "must return points (k, 3), normals (k, 3), depths (k,)"
 
 def checked_source(
     find: Find, name: str, bristles: bool = False
-) -> Callable[[pin.SE3, pin.SE3], tuple[Any, Any, Any]]:
-    """Wrap a user's routine so that what reaches the core has the right shapes and unit normals.
+) -> Callable[[pin.SE3, pin.SE3], tuple[Array, Array, Array]]:
+    """Wrap a user's routine so that the core gets arrays of the right shapes, and unit normals.
 
-    With `bristles` the contacts have a BristleFriction, and may not be so many. InvalidParameter
-    names the source `name`; what the routine itself raises passes, with a note.
+    With `bristles` the contacts have a BristleFriction, and fewer are allowed. InvalidParameter
+    names the source `name`; exceptions of the routine itself pass, with a note.
     """
     where = f"contact source '{name}'"
     most = _MOST_WITH_BRISTLES if bristles else _MOST
@@ -43,7 +42,7 @@ def checked_source(
             raise
         try:
             points, normals, depths = answer
-            count = len(depths)
+            count = len(depths)  # type: ignore[arg-type]  # what has no length is refused
         except (TypeError, ValueError):
             raise InvalidParameter(where, answer, _SHAPES) from None
         if count > most:
@@ -65,7 +64,7 @@ def checked_source(
     return checked
 
 
-def _rows(vectors: Any) -> Array:
+def _rows(vectors: ArrayLike) -> Array:
     """Return vectors (k, 3); an empty list is none."""
     rows = as_floats(vectors)
     return rows if rows.size else np.zeros((0, 3))

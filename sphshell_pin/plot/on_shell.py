@@ -50,7 +50,7 @@ def group_paths(result: Result, scene: Scene | None) -> list[PathGroup]:
         if path.on_shell and scene is not None:
             pair = scene.pairs[path.pair]
             shell = pair.shell
-            key = (id(shell), pair.joint_j, pair.shell_placement.homogeneous.tobytes())
+            key = (id(shell), pair.joint_j, pair.placement_j.homogeneous.tobytes())
         groups.setdefault(key, PathGroup(shell, [])).paths.append(path)
     return list(groups.values())
 
@@ -71,7 +71,7 @@ def eye_direction(normal: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Picture:
-    """One axis with a shell on it, seen from `toward` (3,); `factor` makes its unit of metres.
+    """One axis with a shell on it, seen from `toward` (3,); `factor` converts metres to its unit.
 
     The picture reaches from `low` to `high` (3,) [m].
     """
@@ -163,7 +163,7 @@ class Picture:
         return fine
 
     def kept(self, points: FloatArray) -> NDArray[np.int64]:
-        """Return the indices of those points of a path (k, 3) [m] that can be told apart."""
+        """Return the indices of those points of a path (k, 3) [m] that differ in the picture."""
         return spaced(points, self.size / MOST_STEPS)
 
     def mark_start(self, point: FloatArray, name: str, *, hidden: bool = False) -> None:

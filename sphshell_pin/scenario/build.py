@@ -10,12 +10,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import coal
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.controllers import Controller, PythonFunction, ShellPlace
+from sphshell_pin.dynamics.controllers import Callback, Controller, PythonFunction, ShellPlace
+from sphshell_pin.dynamics.explain import Explanation
 from sphshell_pin.errors import (
     InvalidParameter,
     NameNotFound,
@@ -44,6 +45,8 @@ from sphshell_pin.scenario.reading import (
 )
 
 Array = npt.NDArray[np.float64]
+# A user's own; what it takes depends on where the scenario names it.
+Function = Callable[..., Any]
 
 
 @dataclass(frozen=True)
@@ -56,17 +59,17 @@ class Built:
     scene: sp.Scene
     q0: Array
     v0: Array
-    controller: Any
+    controller: Controller | Callback | None
     simulation: sp.Simulation
-    visual_model: Any
-    """pinocchio.GeometryModel of the scene's model."""
+    visual_model: pin.GeometryModel
+    """Geometry of the scene's model."""
     assembly: Assembly
     """The robots as one model; the same object as before where a rebuild could keep it."""
     shells: Mapping[str, sp.Shell]
     """The surfaces by name; the same objects as before where a rebuild could keep them."""
-    functions: Mapping[str, Callable[..., Any]]
+    functions: Mapping[str, Function]
     """The user's own functions by "file.py:function", loaded once."""
-    figures: Mapping[str, Callable[[Any, Any], float]]
+    figures: Mapping[str, Callable[[sp.Result, sp.Scene], float]]
     """The scenario's own figures: functions of (result, scene)."""
 
 
@@ -119,7 +122,7 @@ def build_scenario(
     path: Path,
     reuse: Built | None = None,
     *,
-    function: Callable[[str, Path, str], Callable[..., Any]] = load_function,
+    function: Callable[[str, Path, str], Function] = load_function,
 ) -> Built:
     """Build a scenario that is already read; `path` is its file, which others stand beside.
 
@@ -130,7 +133,7 @@ def build_scenario(
     assembly = _assemble(scenario, path, reuse)
     functions = {} if reuse is None else dict(reuse.functions)
 
-    def load(where: str, key: str) -> Callable[..., Any]:
+    def load(where: str, key: str) -> Function:
         if where not in functions:
             functions[where] = function(where, path, key)
         return functions[where]
@@ -215,20 +218,24 @@ def _kept_shell(section: schema.ShellSection, reuse: Built | None) -> sp.Shell |
     return None
 
 
-def explain_built(built: Built) -> Any:
+def explain_built(built: Built) -> Explanation:
     """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
     return built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
 
 
 def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
-    options: dict[str, Any] = {
-        "side": section.side,
-        "crease_angle": np.deg2rad(section.crease_angle_deg),
-        "name": section.name,
-    }
+    crease_angle = float(np.deg2rad(section.crease_angle_deg))
     with blamed_on(path, key):
-        if section.file is not None:
-            file = path.parent / section.file
+        if section.primitive is not None:
+            shell = section.primitive.shell(
+                chord_error=section.chord_error,
+                segments=section.segments,
+                side=section.side,
+                crease_angle=crease_angle,
+                name=section.name,
+            )
+        else:
+            file = path.parent / str(section.file)
             if not os.path.isfile(file):
                 raise SphshellError(f"no such surface file: {file}")
             shell = sp.Shell.from_file(
@@ -240,35 +247,11 @@ def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell
                 faces=section.faces,
                 time_limit=section.time_limit,
                 memory_limit=section.memory_limit,
-                **options,
+                side=section.side,
+                crease_angle=crease_angle,
+                name=section.name,
             )
-        else:
-            if section.chord_error is not None:
-                options["chord_error"] = section.chord_error
-            if section.segments is not None:
-                options["segments"] = section.segments
-            if isinstance(section.primitive, schema.HalfSpace):
-                options["extent"] = section.primitive.extent
-            shell = sp.Shell.from_geometry(_to_coal(section.primitive), **options)
         return shell if section.magnify == 1.0 else shell.transformed(scale=section.magnify)
-
-
-def _to_coal(primitive: Any) -> Any:
-    match primitive:
-        case schema.Box():
-            return coal.Box(*primitive.size)
-        case schema.SphereSurface():
-            return coal.Sphere(primitive.radius)
-        case schema.Cylinder():
-            return coal.Cylinder(primitive.radius, primitive.length)
-        case schema.Capsule():
-            return coal.Capsule(primitive.radius, primitive.length)
-        case schema.Cone():
-            return coal.Cone(primitive.radius, primitive.length)
-        case schema.Ellipsoid():
-            return coal.Ellipsoid(*primitive.radii)
-        case _:
-            return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
 
 
 def _add_contact(
@@ -283,7 +266,7 @@ def _add_contact(
             raise NameNotFound("shell", contact.shell, "the scenario", shells)
     shell, section = shells[contact.shell]
     with blamed_on(path, key), warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnitWarning)  # Scene.explain tells it for every scenario
+        warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
         sphere = contact.sphere
         x, y, z = sphere.offset
         scene.add_contact(
@@ -304,8 +287,8 @@ def _build_controller(
     q0: Array,
     shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
     path: Path,
-    load: Callable[[str, str], Callable[..., Any]],
-) -> Controller | Callable[..., Any] | None:
+    load: Callable[[str, str], Function],
+) -> Controller | Function | None:
     def find_shell(name: str) -> ShellPlace:
         with blamed_on(path, "controller.shell"):
             if name not in shells:

@@ -12,8 +12,10 @@ import functools
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypedDict, Unpack
 
+import coal
+import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -37,6 +39,7 @@ from sphshell_pin.dynamics import controllers
 from sphshell_pin.dynamics.controllers import NoController
 from sphshell_pin.dynamics.integrators import Adaptive, Integrator, SemiImplicitEuler
 from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
+from sphshell_pin.shell import Shell
 
 Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -141,49 +144,60 @@ class RobotSection(Section):
         return self
 
 
+class ShellOptions(TypedDict):
+    """What a shell of a primitive takes besides its sizes."""
+
+    chord_error: float | None
+    segments: int | None
+    side: str
+    crease_angle: float
+    name: str
+
+
 class Box(Section):
-    """A box of edge lengths `size` [m], centred."""
+    """A box of edge lengths `size` [m], centered."""
 
     type: Literal["box"]
     size: Lengths3
 
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        return Shell.from_geometry(coal.Box(*self.size), **options)
+
 
 class SphereSurface(Section):
-    """A ball's surface [m], centred."""
+    """A ball's surface [m], centered."""
 
     type: Literal["sphere"]
     radius: Positive
 
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        return Shell.from_geometry(coal.Sphere(self.radius), **options)
 
-class Cylinder(Section):
-    """A cylinder along z [m], centred."""
 
-    type: Literal["cylinder"]
+class RoundSolid(Section):
+    """A cylinder, a cone, or a capsule (`length` without its caps) along z [m], centered."""
+
+    type: Literal["cylinder", "capsule", "cone"]
     radius: Positive
     length: Positive
 
-
-class Capsule(Section):
-    """A capsule along z [m], centred; `length` without its caps."""
-
-    type: Literal["capsule"]
-    radius: Positive
-    length: Positive
-
-
-class Cone(Section):
-    """A cone along z [m], centred."""
-
-    type: Literal["cone"]
-    radius: Positive
-    length: Positive
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        kinds = {"cylinder": coal.Cylinder, "capsule": coal.Capsule, "cone": coal.Cone}
+        return Shell.from_geometry(kinds[self.type](self.radius, self.length), **options)
 
 
 class Ellipsoid(Section):
-    """An ellipsoid of the three half axes `radii` [m], centred."""
+    """An ellipsoid of the three half axes `radii` [m], centered."""
 
     type: Literal["ellipsoid"]
     radii: Lengths3
+
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        return Shell.from_geometry(coal.Ellipsoid(*self.radii), **options)
 
 
 class HalfSpace(Section):
@@ -192,10 +206,14 @@ class HalfSpace(Section):
     type: Literal["half-space"]
     extent: Positive = 10.0
 
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        return Shell.from_geometry(plane, extent=self.extent, **options)
+
 
 Primitive = Annotated[
-    Box | SphereSurface | Cylinder | Capsule | Cone | Ellipsoid | HalfSpace,
-    Field(discriminator="type"),
+    Box | SphereSurface | RoundSolid | Ellipsoid | HalfSpace, Field(discriminator="type")
 ]
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sphshell_pin.shell.cleaned import CleanedSurface
-from sphshell_pin.shell.closest_points import ClosestPoints
 from sphshell_pin.shell.health import ShellHealth
+from sphshell_pin.shell.queries import ClosestPoints
 from sphshell_pin.shell.shell import Shell
 
 if TYPE_CHECKING:

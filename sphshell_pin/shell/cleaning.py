@@ -1,6 +1,6 @@
-"""From raw polygons to a surface fit for contact: nothing valid lost, nothing repaired in silence.
+"""From raw polygons to a surface for contact: all valid elements are kept, all repairs reported.
 
-The order of the steps matters: welding makes edges meet, dropping what has no area or stands twice
+The order of the steps matters: welding makes edges shared, dropping what has no area or is double
 opens the edges that T-junctions lie on, splitting those makes polygons, and only triangles and
 planar quads can be wound alike. Dropping the slivers a triangulation may leave opens cracks again,
 so these steps run until none changes anything.
@@ -8,18 +8,18 @@ so these steps run until none changes anything.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.cleaned import CleanedSurface
-from sphshell_pin.shell.corner_normals import settle_normals, unit_normals
+from sphshell_pin.shell.corner_normals import Found, settle_normals, unit_normals
 from sphshell_pin.shell.health import Place, ShellHealth
 from sphshell_pin.shell.joints import settle_joints
-from sphshell_pin.shell.orientation import Borders, Oriented, as_triangles, find_borders, orient
+from sphshell_pin.shell.orientation import Borders, Oriented, find_borders, orient, split_elements
 from sphshell_pin.shell.polygons import Polygons, examine_quads, without_area
 from sphshell_pin.shell.raw import Floats, Ints, Mask, RawSurface, raw_surface
 
@@ -30,7 +30,7 @@ PLANAR_TOLERANCE = 1e-10
 """A quad whose corners leave their mean plane by at most this share of the diagonal is planar."""
 
 MOST_PASSES = 20
-"""Two passes settle what files hold; elements tangled within the tolerance might go on for ever."""
+"""Two passes settle what files hold; elements tangled within the tolerance might never end."""
 
 MOST_INSERTED = 1_000_000
 """T-junctions that any surface may have; one of more corners may have four for each of them."""
@@ -56,11 +56,7 @@ def clean_surface(raw: RawSurface) -> CleanedSurface:
     InvalidShell
         If no element with an area is left.
     """
-    found: dict[str, Any] = {
-        "input_vertices": len(raw.vertices),
-        "input_elements": raw.num_polygons,
-        "notes": raw.notes,
-    }
+    found = _given(raw)
     table = unit_normals(raw, found)
     polygons, vertices = _without_unused(Polygons.from_raw(raw), raw.vertices)
     size = box_diagonal(vertices)
@@ -105,18 +101,22 @@ def take_surface(raw: RawSurface) -> CleanedSurface:
             "have it dropped"
         )
     as_given = orient(polygons, raw.vertices, keep_winding=True)
-    found: dict[str, Any] = {
-        "input_vertices": len(raw.vertices),
-        "input_elements": raw.num_polygons,
-        "notes": raw.notes,
-        "cleaned": False,
-    }
+    found = _given(raw)
+    found["cleaned"] = False
     table = unit_normals(raw, found)
     return _with_faces(_assemble(as_given, raw.vertices, table, found, turn_normals=False), raw)
 
 
+def _given(raw: RawSurface) -> Found:
+    """Begin the record of the cleaning: ShellHealth's fields by name, 0 unless they are set."""
+    found: Found = defaultdict(int)
+    found["input_vertices"], found["input_elements"] = len(raw.vertices), raw.num_polygons
+    found["notes"] = raw.notes
+    return found
+
+
 def box_diagonal(points: Floats) -> float:
-    """Diagonal of the box round points (n, 3) [m]."""
+    """Diagonal of the box around points (n, 3) [m]."""
     return float(np.linalg.norm([np.ptp(np.ascontiguousarray(points[:, k])) for k in range(3)]))
 
 
@@ -142,17 +142,12 @@ def _mend(
     table: Floats | None,
     tolerance: float,
     size: float,
-    found: dict[str, Any],
+    found: Found,
 ) -> tuple[Polygons, Floats | None]:
     """Polygons of three or four corners, each with area and none twice, edge to edge."""
     counts = polygons.counts
     found["polygons"] = int((counts > 4).sum())
     found["largest_polygon"] = int(counts.max())
-    for name in ("degenerate_elements", "duplicate_elements", "opposite_duplicates"):
-        found[name] = 0
-    for name in ("t_junctions", "warped_quads", "concave_quads", "tangled_polygons"):
-        found[name] = 0
-    found["largest_warp"] = 0.0
     most = max(MOST_INSERTED, 4 * len(polygons.corners))
     given = np.ones(len(polygons), np.bool_)  # input elements of which something is left
     for _ in range(MOST_PASSES):
@@ -169,9 +164,7 @@ def _mend(
     return _drop_flat(polygons, vertices, given, found), table
 
 
-def _drop_flat(
-    polygons: Polygons, vertices: Floats, given: Mask, found: dict[str, Any]
-) -> Polygons:
+def _drop_flat(polygons: Polygons, vertices: Floats, given: Mask, found: Found) -> Polygons:
     """Without repeated corners and without elements that have no area."""
     while (repeated := _core.mend_repeats(polygons.offsets, polygons.corners)).size:
         polygons = polygons.drop_slots(repeated.view(np.bool_))
@@ -193,7 +186,7 @@ def _drop_flat(
     return polygons
 
 
-def _drop_duplicates(polygons: Polygons, given: Mask, found: dict[str, Any]) -> Polygons:
+def _drop_duplicates(polygons: Polygons, given: Mask, found: Found) -> Polygons:
     edges = polygons.edges
     first, opposite = _core.mend_duplicates(
         polygons.offsets, polygons.corners, edges.slot_edge, edges.users
@@ -251,7 +244,7 @@ def _split_t_junctions(
 
 
 def _triangulate(
-    polygons: Polygons, vertices: Floats, tolerance: float, size: float, found: dict[str, Any]
+    polygons: Polygons, vertices: Floats, tolerance: float, size: float, found: Found
 ) -> Polygons:
     """With everything but triangles and planar, convex quads cut into triangles."""
     cut = polygons.counts > 4
@@ -293,26 +286,24 @@ def _assemble(
     oriented: Oriented,
     vertices: Floats,
     table: Floats | None,
-    found: dict[str, Any],
+    found: Found,
     turn_normals: bool = True,
 ) -> CleanedSurface:
     polygons = oriented.polygons
-    triangles, triangle_element = as_triangles(polygons, vertices)
+    slots, triangle_element = split_elements(polygons, vertices)
+    triangles = polygons.corners[slots]
     normals = None
     if table is not None and polygons.normal_row is not None:
         normals = settle_normals(table, polygons, vertices, found, turn_normals)
     elements = np.full((len(polygons), 4), -1, np.int32)
-    if polygons.only_triangles:
-        elements[:, :3] = triangles
-    else:
-        place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
-        elements[polygons.polygon_of_slot, place] = polygons.corners
+    place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
+    elements[polygons.polygon_of_slot, place] = polygons.corners
     in_use = _in_use(triangles, len(vertices))
-    borders = find_borders(polygons, vertices, oriented.component)
+    borders = find_borders(oriented, vertices)
     starts = np.arange(0, triangles.size + 1, 3)
     health = ShellHealth(
         **found,
-        **_holes(borders, oriented.area),
+        **_holes(borders),
         vertices=len(vertices),
         elements=len(polygons),
         triangles=len(triangles),
@@ -350,9 +341,9 @@ def _with_faces(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
     return replace(surface, normals=normals, element_face=faces, face_names=raw.face_names)
 
 
-def _holes(borders: Borders, component_area: Floats) -> dict[str, Any]:
+def _holes(borders: Borders) -> Found:
     """Boundary loops that look like a lost element rather than the rim of a sheet."""
-    share = borders.loop_area / component_area[borders.loop_component]
+    share = borders.loop_area / borders.loop_surface
     few = borders.loop_edges <= SMALL_HOLE_EDGES
     small = (few & (share < SMALL_HOLE_AREA)) | (share < TINY_HOLE_AREA)
     # One or two open edges enclose nothing: they bound a fin between non-manifold edges.
@@ -364,7 +355,7 @@ def _holes(borders: Borders, component_area: Floats) -> dict[str, Any]:
         "holes": int(holes.size),
         "hole_edges": int(borders.loop_edges[largest]),
         "largest_hole_area": float(borders.loop_area[largest]),
-        "hole_at": _place(borders.loop_centre[largest]),
+        "hole_at": _place(borders.loop_center[largest]),
     }
 
 

@@ -39,7 +39,7 @@ class Method(IntEnum):
 
 
 class ElasticLaw(Protocol):
-    """What a normal law tells of its elastic part, see `sphshell_pin.contact.NormalLaw`."""
+    """The elastic part of a normal law, see `sphshell_pin.contact.NormalLaw`."""
 
     def normal_force(self, depth: float) -> float:
         """Force [N] at a depth [m]."""

@@ -6,7 +6,6 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -154,41 +153,25 @@ def exchange(
     )
 
 
-class _Surface(Protocol):
-    """What a file holds, and its distance from points."""
-
-    held: Held
-    notes: tuple[str, ...]
-
-    def shell(self) -> Shell:
-        """Return it as elements."""
-
-    def distances(self, points: Floats) -> Floats:
-        """Distances (n,) of points (n, 3) [m]."""
-
-    def samples(self, count: int, rng: np.random.Generator) -> Floats:
-        """Random points (n <= count, 3), spread by area [m]."""
-
-
-def _surface(path: Path, unit: str | None, options: CadOptions) -> _Surface:
+def _surface(path: Path, unit: str | None, options: CadOptions) -> _Mesh | _Faces:
     if path.suffix.lower() in CAD_SUFFIXES:
         return _Faces(path, unit, options)
     return _Mesh(path, unit)
 
 
-def _write(path: Path, unit: str, source: _Surface, options: CadOptions) -> None:
+def _write(path: Path, unit: str, source: _Mesh | _Faces, options: CadOptions) -> None:
     if path.suffix.lower() not in CAD_SUFFIXES:
         path.write_bytes(encoded(path, source.shell(), unit))
         return
-    from sphshell_pin.shell.cad.units import MILLIMETRE
+    from sphshell_pin.shell.cad.units import MILLIMETER
     from sphshell_pin.shell.cad.writing import faceted, parts_of, write_cad
 
     if isinstance(source, _Faces):
         model = source.model
-        write_cad(path, parts_of(model, options.faces is None), model.metres, unit)
+        write_cad(path, parts_of(model, options.faces is None), model.meters, unit)
     else:
         shell = source.shell()
-        write_cad(path, [(shell.name, faceted(shell))], MILLIMETRE, unit)
+        write_cad(path, [(shell.name, faceted(shell))], MILLIMETER, unit)
 
 
 class _Mesh:
@@ -202,12 +185,15 @@ class _Mesh:
         self.notes = shell.health.notes
 
     def shell(self) -> Shell:
+        """Return the elements as they are."""
         return self._shell
 
     def distances(self, points: Floats) -> Floats:
+        """Distances (n,) of points (n, 3) [m]."""
         return np.abs(self._shell.closest_points(points, method="facets").distances)
 
     def samples(self, count: int, rng: np.random.Generator) -> Floats:
+        """Random points (count, 3), spread by area [m]."""
         corners = self._shell.vertices[self._shell.triangles]
         area = np.linalg.norm(area_vectors(corners), axis=1)
         chosen = rng.choice(len(area), count, p=area / area.sum())
@@ -223,7 +209,7 @@ class _Faces:
         from sphshell_pin.shell.cad.surface import load_cad
 
         cad = load_cad(path, unit, options)
-        self._faces, self._metres, self._raw = TrimmedFaces(cad), cad.model.metres, cad.polygons()
+        self._faces, self._meters, self._raw = TrimmedFaces(cad), cad.model.meters, cad.polygons()
         self.model, self.notes = cad.whole, cad.notes()
         size, area = self._faces.extent
         self.held = Held(
@@ -231,8 +217,8 @@ class _Faces:
             cad.unit,
             len(self.model.faces),
             "CAD faces",
-            size * self._metres,
-            area * self._metres**2,
+            size * self._meters,
+            area * self._meters**2,
         )
 
     def shell(self) -> Shell:
@@ -242,7 +228,7 @@ class _Faces:
         return Shell(self._raw.vertices, elements, normals, name=self.held.path.stem)
 
     def distances(self, points: Floats) -> Floats:
-        return self._faces.distances(points / self._metres) * self._metres
+        return self._faces.distances(points / self._meters) * self._meters
 
     def samples(self, count: int, rng: np.random.Generator) -> Floats:
-        return self._faces.samples(count, rng) * self._metres
+        return self._faces.samples(count, rng) * self._meters

@@ -8,13 +8,16 @@ import numpy as np
 
 from sphshell_pin.shell.orientation import split_elements
 from sphshell_pin.shell.polygons import Polygons
-from sphshell_pin.shell.raw import Floats, Mask, RawSurface
+from sphshell_pin.shell.raw import Floats, Mask, RawSurface, area_vectors
+
+Found = dict[str, Any]
+"""Findings about a surface, under the names of ShellHealth's fields."""
 
 UNIT_TOLERANCE = 1e-3
-"""Normals off unit length by less than this were rounded when written; more is worth a word."""
+"""Normals off unit length by less than this were rounded when written; more is reported."""
 
 
-def unit_normals(raw: RawSurface, found: dict[str, Any]) -> Floats | None:
+def unit_normals(raw: RawSurface, found: Found) -> Floats | None:
     """Return unit normals (c, 3) of all corners, zero where there is none to be had.
 
     What was found about them goes into `found`, under the names of ShellHealth.
@@ -39,7 +42,7 @@ def settle_normals(
     table: Floats,
     polygons: Polygons,
     vertices: Floats,
-    found: dict[str, Any],
+    found: Found,
     turn: bool = True,
 ) -> Floats:
     """Return normals (t, 3, 3) of the triangle corners, on the side of their elements.
@@ -48,10 +51,9 @@ def settle_normals(
     normal. Missing normals become the element's. What was found goes into `found`, under the names
     of ShellHealth.
     """
-    split = split_elements(polygons, vertices)
-    corners = vertices[polygons.corners[split.slots]]
-    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sums = [np.bincount(split.element, spans[:, k], len(polygons)) for k in range(3)]
+    slots, element = split_elements(polygons, vertices)
+    spans = area_vectors(vertices[polygons.corners[slots]])
+    sums = [np.bincount(element, spans[:, k], len(polygons)) for k in range(3)]
     vectors = np.stack(sums, axis=1).astype(np.float64)
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
     corner = table[polygons.normal_row]
@@ -68,4 +70,4 @@ def settle_normals(
     along = np.where(missing, 1.0, along)
     found["opposing_normals"] = int((along < 0.0).sum())
     found["largest_normal_angle"] = float(np.arccos(np.clip(along.min(), -1.0, 1.0)))
-    return np.ascontiguousarray(corner[split.slots])
+    return np.ascontiguousarray(corner[slots])

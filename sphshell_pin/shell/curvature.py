@@ -1,7 +1,7 @@
 """How far the curved elements of the method "smooth" stand off the flat ones, and which are flat.
 
-A curved element takes its shape from normals alone. Where these say more than the elements round it
-bear out, as averaged normals on a box do, it leaves the surface that was meant.
+The shape of a curved element follows from normals alone. Where these contradict the elements around
+it, as averaged normals on a box do, it leaves the surface that was meant.
 """
 
 from __future__ import annotations
@@ -11,21 +11,18 @@ import numpy as np
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.curved import points_on
 from sphshell_pin.shell.health import LARGE_OF_HEIGHT, CurvatureReport, Place
-from sphshell_pin.shell.raw import Bytes, Floats, Longs
+from sphshell_pin.shell.raw import Bytes, Floats, Longs, area_vectors
 
-CURVED = 0
-FLAT_BECAUSE = (
-    "curved",
-    "no side of them bends: nothing around them turns",
-    "straightened: their neighbours do not bear witness to a bend",
-    "kept straight: curved ones would leave the exact CAD face",
-)
-"""What the codes of `_core.Shell.bending` mean, and one more."""
-
-OFF_FACE = 3
+CURVED, OFF_FACE = 0, 3
+FLAT_BECAUSE = {
+    1: "no side of them bends: nothing around them turns",
+    2: "straightened: their neighbors do not bend",
+    OFF_FACE: "kept straight: curved ones would leave the exact CAD face",
+}
+"""What the codes of `_core.Shell.bending` mean where they are not CURVED, and one more."""
 
 LARGE_OF_LENGTH = 0.05
-"""It must also be that share of its longest side off: along a bend, a needle rightly stands off by
+"""It must also be that share of its longest side off: along a bend, a needle is correctly off by
 more than its own height."""
 
 COARSE, FINE = 6, 30
@@ -36,28 +33,38 @@ AT_ONCE = 5_000
 
 
 def curvature_report(shell: ShellBase) -> CurvatureReport:
-    """Measure the curved elements of `shell`; it makes them if nothing has touched them yet."""
+    """Measure the curved elements of `shell`; it makes them if no query has yet."""
+    core = shell.core_for("smooth")
     # A point is a mean of the control points: none is farther off than the farthest of them.
-    bound = np.linalg.norm(shell.core_for("smooth").lifts, axis=2).max(axis=1)
+    bound = np.linalg.norm(core.lifts, axis=2).max(axis=1)
+    corners = shell.vertices[shell.triangles]
+    sides = np.roll(corners, -1, axis=1) - corners
+    longest = np.linalg.norm(sides, axis=2).max(axis=1)
+    height = np.linalg.norm(area_vectors(corners), axis=1) / longest
     worst, largest, at = _largest_distance(shell, bound)
-    height, longest = _heights(shell)
+    limit = np.maximum(LARGE_OF_HEIGHT * height, LARGE_OF_LENGTH * longest)
+    rows = np.flatnonzero(bound > limit)
+    large = rows[_distances(shell, rows, COARSE).max(axis=1, initial=0.0) > limit[rows]]
     code = _bending(shell)
-    curved = int((code == CURVED).sum())
-    reasons = [
-        (FLAT_BECAUSE[one], int((code == one).sum())) for one in np.unique(code) if one != CURVED
-    ]
-    aside, aside_at = _set_aside(shell)
+    aside = (
+        np.flatnonzero(core.normals_set_aside) if shell.normals is not None else np.zeros(0, int)
+    )
+    first = None
+    if len(aside):
+        first = _place(shell.vertices[shell.triangles.ravel()[aside[0]]])
     return CurvatureReport(
         elements=shell.num_elements,
-        curved=curved,
-        flat_because=tuple(reasons),
+        curved=int((code == CURVED).sum()),
+        flat_because=tuple(
+            (why, int((code == k).sum())) for k, why in FLAT_BECAUSE.items() if (code == k).any()
+        ),
         largest=largest,
         at=None if largest == 0.0 else _place(at),
         of_size=largest / shell.size,
         of_height=largest / float(height[worst]),
-        large=_count_large(shell, bound, height, longest),
-        normals_set_aside=aside,
-        set_aside_at=aside_at,
+        large=len(np.unique(shell.triangle_element[large])),
+        normals_set_aside=len(aside),
+        set_aside_at=first,
     )
 
 
@@ -66,12 +73,13 @@ def distances_at(shell: ShellBase, divisions: int) -> Floats:
 
     The points are those of `curved_mesh` with as many divisions.
     """
-    chosen = np.arange(len(shell.triangles))
-    parts = [
-        _off_flat(shell, rows, divisions)[0]
-        for rows in np.split(chosen, range(AT_ONCE, len(chosen), AT_ONCE))
-    ]
-    return np.concatenate(parts)
+    return _distances(shell, np.arange(len(shell.triangles)), divisions)
+
+
+def _distances(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
+    """Distances (n, k) [m] of points of the curved triangles `rows` from the flat ones."""
+    parts = np.split(rows, range(AT_ONCE, len(rows), AT_ONCE))
+    return np.concatenate([_off_flat(shell, some, divisions)[0] for some in parts])
 
 
 def _largest_distance(shell: ShellBase, bound: Floats) -> tuple[int, float, Floats]:
@@ -81,29 +89,15 @@ def _largest_distance(shell: ShellBase, bound: Floats) -> tuple[int, float, Floa
     """
     order = np.argsort(-bound, kind="stable")
     largest, worst = 0.0, 0
-    for start in range(0, len(order), AT_ONCE):
-        rows = order[start : start + AT_ONCE]
+    for rows in np.split(order, range(AT_ONCE, len(order), AT_ONCE)):
         if bound[rows[0]] <= largest:
             break
         found = _off_flat(shell, rows, COARSE)[0].max(axis=1)
         if found.max() > largest:
             largest, worst = float(found.max()), int(rows[np.argmax(found)])
-    if largest == 0.0:
-        return worst, 0.0, shell.vertices[shell.triangles[worst, 0]]
     found, points = _off_flat(shell, np.array([worst]), FINE)
     highest = int(np.argmax(found[0]))
-    return worst, float(found[0, highest]), points[0, highest]
-
-
-def _count_large(shell: ShellBase, bound: Floats, height: Floats, longest: Floats) -> int:
-    """Count elements with a triangle that is far off for its own size."""
-    limit = np.maximum(LARGE_OF_HEIGHT * height, LARGE_OF_LENGTH * longest)
-    rows = np.flatnonzero(bound > limit)
-    large = [
-        some[_off_flat(shell, some, COARSE)[0].max(axis=1) > limit[some]]
-        for some in np.split(rows, range(AT_ONCE, len(rows), AT_ONCE))
-    ]
-    return len(np.unique(shell.triangle_element[np.concatenate(large)]))
+    return worst, float(found[0, highest]) if largest else 0.0, points[0, highest]
 
 
 def _off_flat(shell: ShellBase, rows: Longs, divisions: int) -> tuple[Floats, Floats]:
@@ -115,29 +109,21 @@ def _off_flat(shell: ShellBase, rows: Longs, divisions: int) -> tuple[Floats, Fl
 
 def _to_triangles(points: Floats, corners: Floats) -> Floats:
     """Distances (n, k) of points (n, k, 3) from triangles (n, 3, 3)."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal /= np.where(length > 0.0, length, 1.0)
     nearest = np.full(points.shape[:2], np.inf)
     inside = np.broadcast_to(length > 0.0, points.shape[:2]).copy()
     for k in range(3):
-        start, way = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
+        start, span = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
         offset = points - start[:, None]
-        square = np.maximum(np.einsum("nx,nx->n", way, way), np.finfo(float).tiny)
-        along = np.clip(np.einsum("nkx,nx->nk", offset, way) / square[:, None], 0.0, 1.0)
-        away = np.linalg.norm(offset - along[:, :, None] * way[:, None], axis=2)
+        square = np.maximum(np.einsum("nx,nx->n", span, span), np.finfo(float).tiny)
+        along = np.clip(np.einsum("nkx,nx->nk", offset, span) / square[:, None], 0.0, 1.0)
+        away = np.linalg.norm(offset - along[:, :, None] * span[:, None], axis=2)
         nearest = np.minimum(nearest, away)
-        inside &= np.einsum("nkx,nx->nk", offset, np.cross(normal, way)) >= 0.0
-    upright = np.abs(np.einsum("nkx,nx->nk", points - corners[:, :1], normal))
-    return np.asarray(np.where(inside, np.minimum(upright, nearest), nearest))
-
-
-def _heights(shell: ShellBase) -> tuple[Floats, Floats]:
-    """Smallest height (t,) and longest side (t,) of each triangle [m]."""
-    corners = shell.vertices[shell.triangles]
-    sides = np.roll(corners, -1, axis=1) - corners
-    longest = np.linalg.norm(sides, axis=2).max(axis=1)
-    return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / longest, longest
+        inside &= np.einsum("nkx,nx->nk", offset, np.cross(normal, span)) >= 0.0
+    height = np.abs(np.einsum("nkx,nx->nk", points - corners[:, :1], normal))
+    return np.asarray(np.where(inside, np.minimum(height, nearest), nearest))
 
 
 def _bending(shell: ShellBase) -> Bytes:
@@ -152,14 +138,6 @@ def _bending(shell: ShellBase) -> Bytes:
     np.minimum.at(lowest, shell.triangle_element, codes)
     np.maximum.at(highest, shell.triangle_element, codes)
     return np.where(lowest == CURVED, lowest, highest)
-
-
-def _set_aside(shell: ShellBase) -> tuple[int, Place | None]:
-    """How many given normals the elements contradict, and where one of them is."""
-    corners = np.flatnonzero(shell.core_for("smooth").normals_set_aside)
-    if shell.normals is None or not len(corners):
-        return 0, None
-    return len(corners), _place(shell.vertices[shell.triangles.ravel()[corners[0]]])
 
 
 def _place(point: Floats) -> Place:

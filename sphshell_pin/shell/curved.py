@@ -12,7 +12,7 @@ def points_on(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
     """Points (n, k, 3) [m] of n triangles of `shell`, curved as the method "smooth" has them.
 
     The k points of each are those of a grid that cuts each side into `divisions` pieces: corner 0
-    first, then by steps towards corner 2, by steps towards corner 1.
+    first, then by steps toward corner 2, by steps toward corner 1.
     """
     u, v = (np.array(_grid(divisions)) / divisions).T
     return points_at(shell, rows, np.stack([1 - u - v, u, v], axis=1))
@@ -21,7 +21,7 @@ def points_on(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
 def points_at(shell: ShellBase, rows: Longs, weights: Floats) -> Floats:
     """Points (n, k, 3) [m] of n curved triangles at barycentric weights (k, 3)."""
     w, u, v = weights.T
-    # Bernstein's polynomials of the control points that are lifted off the flat triangle.
+    # Bernstein's polynomials of the control points, with their offsets from the flat triangle.
     sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
     inner = np.stack([*sides, 6 * u * v * w])
     corners, lifts = shell.vertices[shell.triangles[rows]], shell.core_for("smooth").lifts[rows]

@@ -13,7 +13,7 @@ Place = tuple[float, float, float]
 
 LARGE_OF_HEIGHT = 0.2
 """A curved element this far off, as a share of its smallest height, is one to look at. Sides that
-turn by 30 degrees, the most within a patch, stand off by 0.07 of their length."""
+turn by 30 degrees, the most within a patch, are off by 0.07 of their length."""
 
 _REPAIRS = (
     (
@@ -46,7 +46,7 @@ _REPAIRS = (
     ),
     (
         "cavities",
-        "{cavities:closed component} inside another taken as a cavity and wound towards its inside",
+        "{cavities:closed component} inside another taken as a cavity and wound toward its inside",
     ),
     (
         "missing_normals",
@@ -117,7 +117,7 @@ class CurvatureReport:
     at : that point [m]; None if all elements are flat
     of_size, of_height : the same as a share of the box diagonal, and of the smallest height of the
         triangle it is in
-    large : elements whose distance is large for their own height: what they stand for is doubtful
+    large : elements whose distance is large for their own height: their normals are doubtful
     normals_set_aside : corners whose given normal was not used, as the elements contradict it
     set_aside_at : one of them [m], or None
     """
@@ -140,7 +140,7 @@ class CurvatureReport:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """One sentence, if curved elements stand off so far that their normals are doubtful."""
+        """One sentence, if curved elements are so far off that their normals are doubtful."""
         if not self.large:
             return ()
         are = "element bends" if self.large == 1 else "elements bend"
@@ -186,7 +186,7 @@ class ShellHealth:
     Attributes
     ----------
     name, source, unit, scale : of the surface; the file it came from, the unit its numbers were
-        taken in, the factor from the numbers of the file to metres
+        taken in, the factor from the numbers of the file to meters
     cleaned : False if the surface was taken as it came (`clean=False`)
     input_vertices, input_elements : as given
     vertices, elements, triangles, quads : what is left; a planar quad is one element

@@ -1,4 +1,4 @@
-"""A surface file in metres: its reader, its unit, and the SCALE of .shl files."""
+"""A surface file in meters: its reader, its unit, and the SCALE of .shl files."""
 
 from __future__ import annotations
 
@@ -31,26 +31,12 @@ def load_surface(
     With a crease angle above 0 the sides that curvature would take off the faces of a CAD file are
     marked as straight.
 
-    Returns the surface in metres, the unit taken, and metres per file unit.
+    Returns the surface in meters, the unit taken, and meters per file unit.
 
-    Raises
-    ------
-    InvalidShell
-        If no surface can be made of what the file holds.
-    UnitMissing
-        If `unit` is not stated where the format has none.
-    InvalidParameter
-        If unit, scale or suffix is unknown, or an option is out of range or not for this format.
-    NameNotFound
-        If a body or face is not in the file.
-    ShellFileError
-        If the file is missing, empty, truncated or damaged, or if OpenCASCADE crashes on it or goes
-        beyond the limits of time or memory.
-    MissingExtra
-        If the library that reads CAD files is not installed.
+    Raises as `Shell.from_file` does.
     """
     if unit is not None:
-        metres_per_unit(unit)  # an unknown unit is said before a long file is read
+        metres_per_unit(unit)  # an unknown unit is reported before a long file is read
     number = _check_scale(scale)
     file, suffix = reader_for(path)
     if suffix not in CAD_SUFFIXES:
@@ -101,18 +87,18 @@ def _load_shl(
     if scale is None:
         scale = "apply" if unit is None else "ignore"
     length = metres_per_unit(unit) if unit is not None else 1.0
-    said = f"unit '{unit}'" if unit is not None else "metres"
+    taken = f"unit '{unit}'" if unit is not None else "meters"
     if scale == "apply":
         factor = length * written
-        note = f"SCALE {written:.9g} of the file applied to its numbers, as {said} per file unit"
+        note = f"SCALE {written:.9g} of the file applied to its numbers, as {taken} per file unit"
         if unit is not None:
-            note = f"SCALE {written:.9g} of the file applied to its numbers, then taken in {said}"
+            note = f"SCALE {written:.9g} of the file applied to its numbers, then taken in {taken}"
     elif scale == "ignore":
         factor = length
-        note = f"SCALE {written:.9g} of the file ignored, its numbers taken in {said}"
+        note = f"SCALE {written:.9g} of the file ignored, its numbers taken in {taken}"
     else:
         factor = length * number
-        note = f"scale {number:.9g} used in place of SCALE {written:.9g}, result taken in {said}"
+        note = f"scale {number:.9g} used in place of SCALE {written:.9g}, result taken in {taken}"
     version = f".shl version {found.version}"
     return found.raw.scaled(factor).noting(version, note), unit or "m", factor
 

@@ -1,4 +1,4 @@
-"""Options every way of making or asking a shell has, and their checks."""
+"""Options of all constructors and queries of a shell, and their checks."""
 
 from __future__ import annotations
 

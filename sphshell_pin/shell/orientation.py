@@ -1,4 +1,4 @@
-"""Which way elements are wound: consistent in a component, outward where it is closed."""
+"""The winding of elements: consistent in a component, outward where it is closed."""
 
 from __future__ import annotations
 
@@ -11,25 +11,11 @@ from sphshell_pin.shell.polygons import Polygons, examine_quads
 from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask
 
 
-@dataclass(frozen=True)
-class Split:
-    """Elements as triangles, those of one element side by side.
+def split_elements(polygons: Polygons, vertices: Floats) -> tuple[Longs, Ints]:
+    """Split polygons with three or four corners into triangles, those of one side by side.
 
-    Attributes
-    ----------
-    slots : (t, 3) corner slots of the polygons
-    element : (t,) polygon of each triangle
+    Returns the corner slots of the triangles (t, 3), and the polygon (t,) of each.
     """
-
-    slots: Longs
-    element: Ints
-
-
-def split_elements(polygons: Polygons, vertices: Floats) -> Split:
-    """Triangles of polygons with three or four corners."""
-    if polygons.only_triangles:
-        count = len(polygons)
-        return Split(np.arange(3 * count).reshape(-1, 3), np.arange(count, dtype=np.int32))
     counts = polygons.counts
     starts = np.cumsum(counts - 2) - (counts - 2)
     slots = np.empty((int((counts - 2).sum()), 3), np.int64)
@@ -40,20 +26,9 @@ def split_elements(polygons: Polygons, vertices: Floats) -> Split:
         first = polygons.offsets[quads]
         corners = vertices[polygons.corners[first[:, None] + np.arange(4)]]
         other = examine_quads(corners).other_diagonal[:, None]
-        one = np.where(other, [0, 1, 3], [0, 1, 2])
-        two = np.where(other, [1, 2, 3], [0, 2, 3])
-        slots[starts[quads]] = first[:, None] + one
-        slots[starts[quads] + 1] = first[:, None] + two
-    element = np.repeat(np.arange(len(polygons), dtype=np.int32), counts - 2)
-    return Split(slots, element)
-
-
-def as_triangles(polygons: Polygons, vertices: Floats) -> tuple[Ints, Ints]:
-    """Vertices (t, 3) of the triangles of `split_elements`, and the polygon (t,) of each."""
-    if polygons.only_triangles:
-        return polygons.corners.reshape(-1, 3), np.arange(len(polygons), dtype=np.int32)
-    split = split_elements(polygons, vertices)
-    return polygons.corners[split.slots], split.element
+        slots[starts[quads]] = first[:, None] + np.where(other, [0, 1, 3], [0, 1, 2])
+        slots[starts[quads] + 1] = first[:, None] + np.where(other, [1, 2, 3], [0, 2, 3])
+    return slots, np.repeat(np.arange(len(polygons), dtype=np.int32), counts - 2)
 
 
 @dataclass(frozen=True)
@@ -64,7 +39,7 @@ class Oriented:
     ----------
     polygons : wound consistently
     component : (m,) of each polygon, connected across edges of exactly two polygons
-    closed : (components,) each edge is run through as often one way as the other
+    closed : (components,) its directed edges cancel
     one_sided : (components,) no consistent winding exists (a Moebius strip)
     flipped : (m,) wound the other way than in the input
     reversed_components : components turned as a whole
@@ -87,7 +62,7 @@ class Oriented:
 def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> Oriented:
     """Wind polygons of three and four corners alike within each component.
 
-    A closed component is wound outward; inside another closed one it is a cavity, wound towards
+    A closed component is wound outward; inside another closed one it is a cavity, wound toward
     its inside, and so on by turns. An open one keeps the winding most of its area has. With
     `keep_winding` nothing is turned, and a component counts as closed only if it need not be.
     """
@@ -102,14 +77,19 @@ def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> 
     if keep_winding:
         odd_ones = np.bincount(component, flip, number)
         closed &= (odd_ones == 0) | (odd_ones == np.bincount(component, minlength=number))
-    triangles, element = as_triangles(polygons, vertices)
+    slots, element = split_elements(polygons, vertices)
+    triangles = polygons.corners[slots]
     # The volume about a point near the surface loses the least to rounding.
     volume, total_area, turned_area, largest = _core.mend_sums(
         vertices, triangles, element, component, flipped, number, vertices.mean(axis=0)
     )
     # The middle of the largest triangle: the place least likely to lie on another component.
     places = vertices[triangles[largest]].mean(axis=1)
-    inward = _nesting(vertices, triangles, component[element], places, closed) % 2 == 1
+    depth = np.zeros(number, np.int32)  # how many other closed components enclose each closed one
+    if closed.sum() > 1:
+        owner = component[element]
+        depth = _core.mend_nesting(vertices, triangles, owner, places, closed.astype(np.uint8))
+    inward = depth % 2 == 1
     reverse = np.where(
         closed, (volume < 0.0) != inward, turned_area > 1e-9 * np.maximum(total_area, 1e-300)
     )
@@ -151,17 +131,6 @@ def _closed_components(polygons: Polygons, component: Ints, flip: Mask, number: 
     return closed
 
 
-def _nesting(vertices: Floats, triangles: Ints, owner: Ints, places: Floats, closed: Mask) -> Ints:
-    """(components,) how many other closed components enclose the place (3,) of each closed one.
-
-    owner : (t,) component of each triangle
-    """
-    if int(closed.sum()) < 2:
-        return np.zeros(len(closed), np.int32)
-    depth: Ints = _core.mend_nesting(vertices, triangles, owner, places, closed.astype(np.uint8))
-    return depth
-
-
 @dataclass(frozen=True)
 class Borders:
     """Open edges of oriented polygons, and the loops they form.
@@ -173,8 +142,8 @@ class Borders:
     non_manifold : edges of three or more
     loop_edges : (loops,) edges of each boundary loop
     loop_area : (loops,) size of the area vector each loop spans [m^2]
-    loop_centre : (loops, 3) mean corner [m]
-    loop_component : (loops,) component of one of its elements
+    loop_center : (loops, 3) mean corner [m]
+    loop_surface : (loops,) area of the largest component that it bounds [m^2]
     non_manifold_at : (3,) middle of the first non-manifold edge [m], or None
     """
 
@@ -183,13 +152,14 @@ class Borders:
     non_manifold: int
     loop_edges: Longs
     loop_area: Floats
-    loop_centre: Floats
-    loop_component: Ints
+    loop_center: Floats
+    loop_surface: Floats
     non_manifold_at: Floats | None
 
 
-def find_borders(polygons: Polygons, vertices: Floats, component: Ints) -> Borders:
+def find_borders(oriented: Oriented, vertices: Floats) -> Borders:
     """Count the edges of oriented polygons and follow the open ones."""
+    polygons = oriented.polygons
     slot_edge, users = polygons.edges.slot_edge, polygons.edges.users
     single: Mask = users == 1
     slots = np.flatnonzero(single[slot_edge])
@@ -200,13 +170,14 @@ def find_borders(polygons: Polygons, vertices: Floats, component: Ints) -> Borde
     loop = _core.mend_components(len(used), np.ascontiguousarray(pairs))
     loops = int(loop.max()) + 1 if loop.size else 0
     sums = np.stack([np.bincount(loop, vertices[used, k], loops) for k in range(3)], axis=1)
-    centre = sums / np.maximum(np.bincount(loop, minlength=loops), 1)[:, None]
+    center = sums / np.maximum(np.bincount(loop, minlength=loops), 1)[:, None]
     edge_loop = loop[pairs[:, 0]]
-    middle = centre[edge_loop]
+    middle = center[edge_loop]
     spanned = 0.5 * np.cross(vertices[start] - middle, vertices[stop] - middle)
     area = np.stack([np.bincount(edge_loop, spanned[:, k], loops) for k in range(3)], axis=1)
-    owner = np.zeros(loops, np.int32)
-    owner[edge_loop] = component[polygons.polygon_of_slot[slots]]
+    surface = np.zeros(loops)
+    component = oriented.component[polygons.polygon_of_slot[slots]]
+    np.maximum.at(surface, edge_loop, oriented.area[component])
     many = np.flatnonzero(users > 2)
     return Borders(
         edges=len(users),
@@ -214,7 +185,7 @@ def find_borders(polygons: Polygons, vertices: Floats, component: Ints) -> Borde
         non_manifold=len(many),
         loop_edges=np.bincount(edge_loop, minlength=loops),
         loop_area=np.sqrt((area**2).sum(axis=1)),
-        loop_centre=centre,
-        loop_component=owner,
+        loop_center=center,
+        loop_surface=surface,
         non_manifold_at=vertices[polygons.edges.ends[many[0]]].mean(axis=0) if many.size else None,
     )

@@ -2,7 +2,7 @@
 
 The shell is in the geometry's own frame: the placement of a pinocchio.GeometryObject is not
 applied, as it is where the shell is mounted. Nor is its `meshScale`: Pinocchio applies it when it
-loads a mesh, and it tells viewers about the file, not about the geometry.
+loads a mesh, and it is meant for viewers of the file.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from sphshell_pin.shell.raw import Floats, RawSurface, raw_surface
 from sphshell_pin.shell.revolution import Revolution, arc
 
 DEFAULT_CHORD_ERROR = 1e-3
-"""Largest distance between tessellation and solid, as a share of the solid's round diameter."""
+"""Largest distance between tessellation and solid, as a share of the solid's diameter."""
 
 DEFAULT_EXTENT = 10.0
 """Side of the square that stands for a half-space or a plane [m]."""
 
 FEWEST_SEGMENTS = 16
 MOST_OF_BALL, MOST_OF_ROD = 1000, 100_000
-"""Segments round a full circle: half a million elements, or corners of a cylinder's ends."""
+"""Segments around a full circle: half a million elements, or corners of a cylinder's ends."""
 
 
 def geometry_surface(
@@ -43,7 +43,7 @@ def geometry_surface(
         Halfspace, Plane or TriangleP; or a pinocchio.GeometryObject that holds one
     chord_error : largest distance between the elements and a round solid [m]; 1e-3 of its diameter
         unless given
-    segments : elements round a full circle, instead of `chord_error`; at most 1000 of a solid that
+    segments : elements around a full circle, instead of `chord_error`; at most 1000 of a solid that
         is round in both directions, 100 000 of a cylinder or a cone
     extent : side [m] of the square that stands for a half-space or a plane; 10 m unless given
 
@@ -111,7 +111,7 @@ def _round(
         raise InvalidParameter(
             "chord_error",
             wanted,
-            f"needs more than {most} segments round a circle: take a larger one",
+            f"needs more than {most} segments around a circle: take a larger one",
         )
     n = max(FEWEST_SEGMENTS, 4 * math.floor(count / 4.0))
     while error_of(n) > wanted:
@@ -205,7 +205,7 @@ def _triangle(shape: coal.TriangleP, _: float | None, __: int | None) -> Arrays:
 
 
 def _square(shape: coal.Halfspace | coal.Plane, extent: float) -> RawSurface:
-    """Return a square round the point nearest to the origin, wound along the shape's normal."""
+    """Return a square around the point nearest to the origin, wound along the shape's normal."""
     normal = np.array(shape.n, np.float64)
     least = np.zeros(3)
     least[int(np.argmin(np.abs(normal)))] = 1.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy.typing as npt
 
 from sphshell_pin.checks import (
@@ -14,16 +16,39 @@ from sphshell_pin.checks import (
 )
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.base import ShellBase
-from sphshell_pin.shell.closest_points import ClosestPoints
 from sphshell_pin.shell.contact_set import ContactSet, Method
 from sphshell_pin.shell.options import thread_count
 from sphshell_pin.shell.raw import Bytes, Floats, Ints
+
+
+@dataclass(frozen=True)
+class ClosestPoints:
+    """Where the surface is nearest to each of n points, in the shell's frame.
+
+    Attributes
+    ----------
+    points : (n, 3) on the surface [m]
+    normals : (n, 3) unit, toward the point, or with flat elements that of the element, or the mean
+        one of the edge or vertex; on the outer side by the winding
+    distances : (n,) [m], negative behind the surface
+    elements : (n,) row of shell.elements
+    """
+
+    points: Floats
+    normals: Floats
+    distances: Floats
+    elements: Ints
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.distances)
+
 
 Columns = tuple[Floats, Floats, Floats, Ints, Bytes, Floats, Floats]
 
 
 class Queries(ShellBase):
-    """What a sphere or a point can ask a shell."""
+    """The contact and closest-point queries of a shell."""
 
     def contacts(
         self,
@@ -113,4 +138,6 @@ class Queries(ShellBase):
         places = check_points("points", points)
         core = self.core_for(method)
         found = core.closest_points(places, smooth, thread_count(threads))
-        return ClosestPoints(*(read_only(column) for column in found))
+        for column in found:
+            read_only(column)
+        return ClosestPoints(*found)

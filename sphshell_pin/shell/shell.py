@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class Shell(Queries):
     """A surface of three- and four-sided elements, open or closed, in its own frame [m].
 
-    The surface is cleaned when it is made; `health` says what was found and repaired. All arrays
+    The surface is cleaned when it is made; `health` lists what was found and repaired. All arrays
     are read-only.
 
     Parameters
@@ -112,7 +112,7 @@ class Shell(Queries):
         ----------
         path : the file; its suffix names the format
         unit : unit of length of its numbers ("m", "mm", "cm", "in", "ft", ...). It must be stated,
-            except for .shl files, which carry metres per file unit (SCALE), and for STEP and IGES,
+            except for .shl files, which carry meters per file unit (SCALE), and for STEP and IGES,
             which carry a unit: another one that is stated is taken instead, with a UnitWarning
         scale : of a .shl file: "apply" its SCALE (default where no unit is stated), "ignore" it
             (default otherwise), or a number to use instead; of other files a number by which the
@@ -169,7 +169,7 @@ class Shell(Queries):
     ) -> Shell:
         """Turn a pinocchio.GeometryObject or a coal geometry into a shell, in its own frame.
 
-        Meshes are taken as they are, in metres; Box, Sphere, Cylinder, Capsule, Cone, Ellipsoid and
+        Meshes are taken as they are, in meters; Box, Sphere, Cylinder, Capsule, Cone, Ellipsoid and
         Convex become closed shells with exact normals; Halfspace and Plane a square sheet. The
         placement of a GeometryObject is not applied: it is where the shell is to be mounted.
 
@@ -178,7 +178,7 @@ class Shell(Queries):
         geometry : the geometry
         chord_error : largest distance between the elements and a round solid [m], 1e-3 of its
             diameter unless given
-        segments : elements round a full circle, instead of chord_error
+        segments : elements around a full circle, instead of chord_error
         extent : side of the square that stands for a half-space [m], 10 m unless given
         side, crease_angle, name : as of Shell; the name is the object's unless given
 

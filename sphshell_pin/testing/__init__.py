@@ -1,18 +1,19 @@
 """Assertions on scenes, runs and shells for the test suites of other packages.
 
-Each measures something against a way apart from the compiled core, raises AssertionError with what,
-where and how much, and returns the error that it measured. With pytest the plugin
+Each compares something with computations independent of the compiled core, raises AssertionError
+with what, where and how much, and returns the error that it measured. With pytest the plugin
 `pytest_sphshell_pin` adds fixtures that use them.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from numpy.typing import ArrayLike
 
 from sphshell_pin.dynamics import Result, Scene
+from sphshell_pin.shell import Shell
 from sphshell_pin.testing.conservation import elastic_energy, energy, momentum
 from sphshell_pin.testing.differences import derivatives
-from sphshell_pin.testing.finding import Finding
+from sphshell_pin.testing.finding import Finding, Optional
 from sphshell_pin.testing.forces import balance, reaction
 from sphshell_pin.testing.found import contacts_of_scene, contacts_of_shell, passage
 
@@ -31,7 +32,11 @@ __all__ = [
 
 
 def assert_forces_balance(
-    scene: Scene, q: Any, v: Any = None, tau: Any = None, tolerance: float = 1e-8
+    scene: Scene,
+    q: ArrayLike,
+    v: Optional = None,
+    tau: Optional = None,
+    tolerance: float = 1e-8,
 ) -> float:
     """Assert that ABA with `scene.external_forces` gives M^-1 (tau - nle + J^T f).
 
@@ -45,7 +50,9 @@ def assert_forces_balance(
     return balance(scene, q, v, tau).require("the forces do not balance", tolerance)
 
 
-def assert_wrenches_cancel(scene: Scene, q: Any, v: Any = None, tolerance: float = 1e-12) -> float:
+def assert_wrenches_cancel(
+    scene: Scene, q: ArrayLike, v: Optional = None, tolerance: float = 1e-12
+) -> float:
     """Assert that the wrenches on all bodies sum to zero: action against reaction.
 
     Of scenes whose pairs join two moving bodies; InvalidParameter for one that touches the
@@ -82,7 +89,11 @@ def assert_lossless_energy_kept(result: Result, rtol: float = 1e-6) -> float:
 
 
 def assert_derivatives(
-    scene: Scene, q: Any, v: Any = None, tau: Any = None, tolerance: float = 1e-6
+    scene: Scene,
+    q: ArrayLike,
+    v: Optional = None,
+    tau: Optional = None,
+    tolerance: float = 1e-6,
 ) -> float:
     """Assert that the analytic derivatives of forces and accelerations are those of differences.
 
@@ -95,9 +106,9 @@ def assert_derivatives(
 
 
 def assert_no_contact_missed(
-    shell: Any,
+    shell: Shell,
     radius: float,
-    centers: Any = None,
+    centers: Optional = None,
     *,
     count: int = 200,
     seed: int = 0,
@@ -116,11 +127,11 @@ def assert_no_contact_missed(
     return finding.require("a contact is missed or made up", tolerance)
 
 
-def assert_contacts_found(scene: Scene, q: Any, tolerance: float = 1e-9) -> float:
+def assert_contacts_found(scene: Scene, q: ArrayLike, tolerance: float = 1e-9) -> float:
     """Assert the same of all pairs of a scene at q (nq,), placed by Pinocchio's frames."""
     return contacts_of_scene(scene, q).require("a contact is missed or made up", tolerance)
 
 
 def assert_not_passed_through(result: Result) -> float:
-    """Assert that no sphere's centre went through its shell between two recorded rows of a run."""
+    """Assert that no sphere's center went through its shell between two recorded rows of a run."""
     return passage(result).require("a sphere passed through its shell", 0.0)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -26,7 +24,7 @@ def momentum(result: Result) -> Finding:
     Raises InvalidParameter if the system is not closed, or the run touched nothing: the measure
     would say nothing.
     """
-    scene = _scene_of(result)
+    scene = scene_of(result)
     _check_closed(scene, result)
     model, data = scene.model, scene.model.createData()
     impulse = sum(one.impulse for one in result.stats.pairs.values())
@@ -58,7 +56,7 @@ def energy(result: Result) -> Finding:
     the controller's work are those of `result.energy`. The error is the largest over the recorded
     rows.
     """
-    scene = _scene_of(result)
+    scene = scene_of(result)
     audit = result.energy
     kinetic, potential = _energies(scene, result)
     parts = np.array(
@@ -82,7 +80,7 @@ def elastic_energy(result: Result) -> Finding:
 
     Raises InvalidParameter if a contact has damping or friction, or if there was a controller.
     """
-    scene = _scene_of(result)
+    scene = scene_of(result)
     stored = np.zeros(len(result.t))
     for k, pair in enumerate(scene.pairs):
         law = pair.law
@@ -117,7 +115,8 @@ def _residual(result: Result, parts: Array) -> Finding:
     return Finding(float(off[k]) / exchanged if exchanged > 0.0 else float(off[k]), where)
 
 
-def _scene_of(result: Any) -> Scene:
+def scene_of(result: object) -> Scene:
+    """Return the scene of a run; InvalidParameter for a result that was loaded."""
     if not isinstance(result, Result):
         raise InvalidParameter("result", type(result).__name__, "must be a sphshell_pin.Result")
     if result.scene is None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.dynamics import Scene
-from sphshell_pin.testing.finding import Finding, worst
+from sphshell_pin.testing.finding import Finding, Optional, worst
 from sphshell_pin.testing.forces import joint_jacobian, joint_names
 
 Array = NDArray[np.float64]
@@ -30,7 +29,7 @@ _Pair = tuple[Array, Array]
 _Compared = tuple[str, _Function, _Pair]
 
 
-def derivatives(scene: Scene, q: Any, v: Any = None, tau: Any = None) -> Finding:
+def derivatives(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None) -> Finding:
     """Compare the derivatives of contact forces and accelerations by q and by v to differences.
 
     `scene.contact_derivatives` and the Jacobian of the accelerations on which `Implicit` runs,
@@ -96,7 +95,7 @@ def _at_best(scene: Scene, q: Array, v: Array, what: str, f: _Function, got: _Pa
 
 
 def differences(
-    f: _Function, model: Any, q: Array, v: Array, step_q: float, step_v: float
+    f: _Function, model: pin.Model, q: Array, v: Array, step_q: float, step_v: float
 ) -> tuple[Array, Array]:
     """Return central differences (m, nv) of f(q, v) -> (m,), by the tangent of q and by v."""
     by_q = [

@@ -5,6 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from numpy.typing import ArrayLike
+
+Optional = ArrayLike | None
+"""A velocity or torques; None stands for zero."""
+
 
 @dataclass(frozen=True)
 class Finding:

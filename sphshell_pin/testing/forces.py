@@ -8,20 +8,19 @@ ABA.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.testing.finding import Finding
+from sphshell_pin.testing.finding import Finding, Optional
 
 Array = NDArray[np.float64]
 
 
-def point_jacobian(model: Any, data: Any, joint: int, point_world: Array) -> Array:
+def point_jacobian(model: pin.Model, data: pin.Data, joint: int, point_world: Array) -> Array:
     """Return the Jacobian (3, nv) of the point of `joint`'s body that is at `point_world` (3,).
 
     Linear velocity in world axes [m/s]; `data` holds the joints' Jacobians
@@ -33,12 +32,12 @@ def point_jacobian(model: Any, data: Any, joint: int, point_world: Array) -> Arr
     return np.asarray(at_origin[:3] - pin.skew(point_world) @ at_origin[3:])
 
 
-def joint_jacobian(model: Any, data: Any, joint: int, axes: Any) -> Array:
+def joint_jacobian(model: pin.Model, data: pin.Data, joint: int, axes: pin.ReferenceFrame) -> Array:
     """Return the Jacobian (6, nv) of a joint; Pinocchio gives a vector where nv is one."""
     return np.asarray(pin.getJointJacobian(model, data, joint, axes)).reshape(6, model.nv)
 
 
-def contact_torques(scene: Scene, data: Any, q: Array, v: Array) -> Array:
+def contact_torques(scene: Scene, data: pin.Data, q: Array, v: Array) -> Array:
     """Return the contact forces as joint torques (nv,): the sum of J^T f over `scene.contacts`."""
     model = scene.model
     pin.computeJointJacobians(model, data, q)
@@ -53,7 +52,7 @@ def contact_torques(scene: Scene, data: Any, q: Array, v: Array) -> Array:
     return total
 
 
-def joint_names(model: Any) -> list[str]:
+def joint_names(model: pin.Model) -> list[str]:
     """Return the name of the joint to which each of the nv velocities belongs."""
     names = [""] * model.nv
     for joint, name in zip(model.joints, model.names, strict=True):
@@ -62,18 +61,18 @@ def joint_names(model: Any) -> list[str]:
     return names
 
 
-def mass_matrix(model: Any, data: Any, q: Array) -> Array:
+def mass_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
     """Return the whole mass matrix (nv, nv)."""
     upper = np.triu(np.asarray(pin.crba(model, data, q)).reshape(model.nv, model.nv))
     return np.asarray(upper + np.triu(upper, 1).T)
 
 
-def balance(scene: Scene, q: Any, v: Any = None, tau: Any = None) -> Finding:
+def balance(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None) -> Finding:
     """Compare ABA with `scene.external_forces` to M^-1 (tau - nle + J^T f), with f the contacts'.
 
     The error is the difference of the two accelerations relative to what the contacts add to them
     (without contacts, to all of it), both measured by the mass matrix, sqrt(a . M a), so that
-    metres and radians, heavy and light links may be told in one number.
+    meters and radians, heavy and light links can be measured by one number.
 
     Raises InvalidParameter for a state or torques of the wrong size, and where the mass matrix is
     singular: forward dynamics has no answer there.
@@ -112,7 +111,7 @@ def balance(scene: Scene, q: Any, v: Any = None, tau: Any = None) -> Finding:
     return Finding(size(off) / scale if scale > 0.0 else size(off), where)
 
 
-def reaction(scene: Scene, q: Any, v: Any = None) -> Finding:
+def reaction(scene: Scene, q: ArrayLike, v: Optional = None) -> Finding:
     """Sum the wrenches of `scene.external_forces` on all bodies, about the contacts' middle.
 
     The error is relative to the largest wrench, lengths measured by the way from that middle to the
@@ -125,7 +124,7 @@ def reaction(scene: Scene, q: Any, v: Any = None) -> Finding:
             raise InvalidParameter(
                 "scene",
                 pair.name,
-                "is a contact with the universe, whose wrench is not told: put it on a free body",
+                "touches the universe, whose wrench is not computed: put it on a free body",
             )
     model, data = scene.model, scene.model.createData()
     pin.forwardKinematics(model, data, q)
@@ -148,11 +147,11 @@ def reaction(scene: Scene, q: Any, v: Any = None) -> Finding:
         float(np.linalg.norm(total[3:])) / (largest * lever),
     )
     where = (
-        f"the wrenches about {_told(middle)} m leave a force of {_told(total[:3])} N and a torque "
-        f"of {_told(total[3:])} N m, where one body is pushed with {largest:.6g} N"
+        f"the wrenches about {_text(middle)} m leave a force of {_text(total[:3])} N and a torque "
+        f"of {_text(total[3:])} N m, where one body is pushed with {largest:.6g} N"
     )
     return Finding(error, where)
 
 
-def _told(vector: Array) -> str:
+def _text(vector: Array) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in vector) + ")"

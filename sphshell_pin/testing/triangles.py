@@ -3,45 +3,28 @@
 from __future__ import annotations
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Points times triangles that are tried at once: some tens of megabytes.
-_AT_ONCE = 200_000
-
 
 def distances(points: Array, corners: Array) -> Array:
     """Return the distance (n, t) [m] of each of points (n, 3) to each triangle (t, 3, 3)."""
-    rows = max(1, _AT_ONCE // max(1, len(corners)))
-    parts = [_distances(points[k : k + rows], corners) for k in range(0, len(points), rows)]
-    return np.concatenate(parts) if parts else np.zeros((0, len(corners)))
+    return np.array([np.linalg.norm(closest(point, corners) - point, axis=1) for point in points])
 
 
-def _distances(points: Array, corners: Array) -> Array:
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    inside = np.ones((len(points), len(corners)), dtype=bool)
-    nearest = np.full((len(points), len(corners)), np.inf)
-    for p, q in ((a, b), (b, c), (c, a)):
-        side = q - p
-        away = points[:, None, :] - p
-        along = np.einsum("ntx,tx->nt", away, side) / np.einsum("tx,tx->t", side, side)
-        foot = np.clip(along, 0.0, 1.0)[..., None] * side
-        nearest = np.minimum(nearest, np.linalg.norm(away - foot, axis=2))
-        # Inside is where the foot of the perpendicular is on the inner hand of every side.
-        inside &= np.einsum("ntx,tx->nt", away, np.cross(normal, side)) >= 0.0
-    height = np.abs(np.einsum("ntx,tx->nt", points[:, None, :] - a, normal))
-    return np.where(inside, height, nearest)
+def closest(point: Array, corners: Array) -> Array:
+    """Return the point (t, 3) of each triangle (t, 3, 3) that is closest to `point` (3,)."""
+    same = np.broadcast_to(point, (len(corners), 3))
+    return np.asarray(trimesh.triangles.closest_point(corners, same))  # type: ignore[no-untyped-call]
 
 
-def feet(point: Array, corners: Array) -> tuple[Ints, Array]:
-    """Return the triangles (k,) of (t, 3, 3) nearest to `point` (3,) at their inside, and where.
+def closest_inside(point: Array, corners: Array) -> tuple[Ints, Array]:
+    """Return the triangles (k,) of (t, 3, 3) closest to `point` (3,) at their inside, and where.
 
-    Feet (k, 3) of the perpendiculars well inside: there the distance has a strict minimum, whatever
-    the neighbours are.
+    Points (k, 3) well inside: there the distance has a strict minimum, whatever the neighbors are.
     """
     a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(u, v)
@@ -73,9 +56,9 @@ def pieces(triangles: Ints, touched: NDArray[np.bool_]) -> list[Ints]:
 
 
 def crossed(start: Array, end: Array, corners: Array) -> Ints:
-    """Return the triangles (t, 3, 3) through which the way from `start` (3,) to `end` (3,) leads.
+    """Return the triangles (t, 3, 3) through which the path from `start` (3,) to `end` (3,) leads.
 
-    By Moeller and Trumbore (1997); a way within a triangle's plane crosses nothing.
+    By Moeller and Trumbore (1997); a path within a triangle's plane crosses nothing.
     """
     a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     way = end - start

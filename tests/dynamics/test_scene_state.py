@@ -21,8 +21,13 @@ SLOPE = 0.3  # [rad], below atan(0.5)
 def on_slope(friction: sp.BristleFriction = BRISTLE, free: bool = False) -> sp.Scene:
     """1 kg on an inclined plate; a block that cannot turn, or a ball that can."""
     model = models.empty()
-    joint = pin.JointModelFreeFlyer() if free else pin.JointModelTranslation()
-    models.add_body(model, "ball", joint, inertia=pin.Inertia.FromSphere(1.0, R))
+    lump = pin.Inertia.FromSphere(1.0, R)
+    if free:
+        light = pin.Inertia.FromSphere(1e-6, R)
+        carrier = models.add_body(model, "carrier", pin.JointModelTranslation(), inertia=light)
+        models.add_body(model, "ball", pin.JointModelSpherical(), carrier, inertia=lump)
+    else:
+        models.add_body(model, "ball", pin.JointModelTranslation(), inertia=lump)
     scene = sp.Scene(model)
     place = pin.SE3(pin.utils.rotate("y", SLOPE), np.zeros(3))
     plate = sp.Shell(*meshes.random_plate(60, seed=3, size=4.0))
@@ -64,10 +69,8 @@ def test_the_own_loop_moves_as_a_run(free: bool, torsional: bool, speed: float) 
         v[5] = 10 * speed
     run = sp.Simulation(scene, sp.SemiImplicitEuler(DT)).run(q, v, 2000 * DT)
     last_q, last_v, state = own_loop(scene, q, v, 2000)
-    # A free ball's velocity is composed in another order there.
-    tolerance = 1e-7 if free and speed else 1e-12
-    assert last_q == pytest.approx(run.q[-1], abs=tolerance)
-    assert last_v == pytest.approx(run.v[-1], abs=30 * tolerance)
+    assert last_q == pytest.approx(run.q[-1], abs=1e-12)
+    assert last_v == pytest.approx(run.v[-1], abs=1e-10)
     contacts, row = scene.contacts(last_q, last_v, state), run.contacts.at_row(len(run.t) - 1)
     assert contacts.contact_id.tolist() == row.contact_id.tolist()
     assert contacts.friction_force_world == pytest.approx(row.friction_force_world, abs=1e-3)
@@ -88,12 +91,13 @@ def test_evaluations_change_nothing_and_copies_are_independent() -> None:
     scene = on_slope()
     q, v, state = own_loop(scene, *start(scene), 500)
     held = scene.contacts(q, v, state)
-    assert np.linalg.norm(held.friction_force_world) > 0.1
+    assert np.linalg.norm(held.friction_force_world) > 1.0
     for other in (state.copy(), copy.copy(state), copy.deepcopy(state)):
         assert np.array_equal(scene.contacts(q, v, other).force_world, held.force_world)
         other.advance(q + [0.0, 0.0, 1.0], v, DT)
         other.advance(q, v, DT)
-        assert not scene.contacts(q, v, other).friction_force_world.any()
+        unstretched = scene.contacts(q, v).friction_force_world
+        assert np.array_equal(scene.contacts(q, v, other).friction_force_world, unstretched)
         scene.external_forces(q + 0.1, v + 1.0, state)
         scene.contact_derivatives(q, v + 1.0, state)
         assert np.array_equal(scene.contacts(q, v, state).force_world, held.force_world)
@@ -133,7 +137,7 @@ def test_contact_wrench_with_a_state_moves_as_a_run() -> None:
     law = models.linear_law(K, 300.0)
     spin = 2.0
     model = models.empty()
-    models.add_body(model, "disc", pin.JointModelRZ(), inertia=pin.Inertia.Random() * 1e9)
+    models.add_body(model, "disc", pin.JointModelRZ())
     models.add_body(model, "ball", pin.JointModelTranslation())
     data = model.createData()
     x, n = 0.3, np.array([0.0, 0.0, 1.0])

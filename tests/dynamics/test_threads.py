@@ -69,8 +69,9 @@ def find(i, j):
     return np.tile([x, 0.0, 0.0], (n, 1)), np.tile([0.0, 0.0, 1.0], (n, 1)), np.full(n, 1e-4)
 
 scene = sp.Scene(ball())
-scene.add_contact_source(find, "ball", "universe")
-scene.add_contact_source(find, "universe", "ball", name="back")
+law = sp.ImpactLaw.from_adams()
+scene.add_contact_source(find, "ball", "universe", law)
+scene.add_contact_source(find, "universe", "ball", law, name="back")
 states = [free_q([x, 0.0, 0.0]) for x in (0.0, 0.5, 1.0)]
 counts = [len(scene.contacts(q)) for q in states]
 def again(k):
@@ -180,7 +181,8 @@ DAEMONS = {
 def test_the_interpreter_ends_while_a_daemon_thread_computes(call: str) -> None:
     done = run(f"""
 scene2 = sp.Scene(ball())
-scene2.add_contact_source(lambda i, j: ([[0, 0, 0]], [[0, 0, 1.0]], [1e-4]), "ball", "universe")
+find = lambda i, j: ([[0, 0, 0]], [[0, 0, 1.0]], [1e-4])
+scene2.add_contact_source(find, "ball", "universe", sp.ImpactLaw.from_adams())
 threading.Thread(target=lambda: {DAEMONS[call]}, daemon=True).start()
 time.sleep(0.15)
 print("end")

@@ -51,11 +51,11 @@ class Nearest:
 
 
 class ExactShape:
-    """A shape, scaled by `metres` per unit, whose faces and edges can be asked for distances."""
+    """A shape, scaled by `meters` per unit, whose faces and edges can be asked for distances."""
 
-    def __init__(self, shape: Any, metres: float = 1e-3, seed_share: float = 2e-3) -> None:
+    def __init__(self, shape: Any, meters: float = 1e-3, seed_share: float = 2e-3) -> None:
         copy = BRepBuilderAPI_Copy(shape, True, False).Shape()
-        self.metres = metres
+        self.meters = meters
         self.faces = [TopoDS.Face(face) for face in _parts(copy, TopAbs_FACE)]
         size = max(1e-12, _size(self.faces))
         BRepMesh_IncrementalMesh(copy, seed_share * size, False, 0.2, False)
@@ -88,7 +88,7 @@ class ExactShape:
 
     def closest(self, points: Array) -> Nearest:
         """Closest point of the trimmed faces to each of points (n, 3) [m]."""
-        places = np.asarray(points, float) / self.metres
+        places = np.asarray(points, float) / self.meters
         distance = np.full(len(places), np.inf)
         closest, normal = np.zeros_like(places), np.zeros_like(places)
         on_edge = np.zeros(len(places), bool)
@@ -108,7 +108,7 @@ class ExactShape:
                         distance[k], closest[k] = off, foot
                         normal[k] = self._normal(int(face), uv)
         if self._edge_seeds is None:
-            return Nearest(distance * self.metres, closest * self.metres, normal, on_edge)
+            return Nearest(distance * self.meters, closest * self.meters, normal, on_edge)
         away, near = self._edge_seeds.query(places, min(EDGE_SEEDS, self._edge_seeds.n))
         for k in np.flatnonzero(away[:, 0] - self._edge_reach < distance):
             for edge in np.unique(self._edge_of[near[k]]):
@@ -118,7 +118,7 @@ class ExactShape:
                 if off < distance[k] * (1 - 1e-9):
                     distance[k], closest[k], on_edge[k] = off, foot, True
                     normal[k] = (places[k] - foot) / max(off, 1e-300)
-        return Nearest(distance * self.metres, closest * self.metres, normal, on_edge)
+        return Nearest(distance * self.meters, closest * self.meters, normal, on_edge)
 
     def samples(self, count: int, rng: np.random.Generator) -> Array:
         """Random points (n <= count, 3) of the trimmed faces [m], spread by area."""
@@ -134,7 +134,7 @@ class ExactShape:
             at = weights @ uv[rows[row[pick]]]
             if self._holds(k, at):
                 found.append(self.surfaces[k].Value(*at.tolist()).Coord())
-        return np.array(found) * self.metres
+        return np.array(found) * self.meters
 
     def _holds(self, face: int, uv: Array) -> bool:
         return bool(self.inside[face].Perform(gp_Pnt2d(*uv.tolist())) != TopAbs_OUT)

@@ -83,8 +83,8 @@ def force_errors(shell: Shell, known: Known, count: int = 200) -> Array:
     point, normal = known.normals(np.random.default_rng(7), count)
     depth = 0.1 * known.radius
     errors = []
-    for centre, way in zip(point + (known.radius - depth) * normal, normal, strict=True):
-        contacts = shell.contacts(centre, known.radius)
+    for center, way in zip(point + (known.radius - depth) * normal, normal, strict=True):
+        contacts = shell.contacts(center, known.radius)
         force = (contacts.depth[:, None] ** 1.5 * contacts.normal).sum(axis=0)
         errors.append(np.linalg.norm(force - depth**1.5 * way) / depth**1.5)
     return np.array(errors)

@@ -11,7 +11,7 @@ import pytest
 from sphshell_pin.shell import CleanedSurface
 
 DATA = Path(__file__).parents[1] / "data" / "corpus"
-"""Other people's surfaces whose licences allow a copy; README.md there has origins and licences."""
+"""Other people's surfaces whose licenses allow a copy; README.md there has origins and licenses."""
 
 MORE_DATA = Path(os.environ.get("SPHSHELL_SURFACES", Path(__file__).parents[3] / "shared" / "data"))
 """Where further ones may be that are not in the repository: ../shared/data beside the clone."""
@@ -32,7 +32,7 @@ def surface_file(name: str) -> Path:
     for folder in (DATA, MORE_DATA):
         if (folder / name).is_file():
             return folder / name
-    pytest.skip(f"{name} is not in the repository, for its licence, nor in {MORE_DATA}")
+    pytest.skip(f"{name} is not in the repository, for its license, nor in {MORE_DATA}")
 
 
 def plate(n, height=0.0):

@@ -100,7 +100,7 @@ def test_long_elements_beside_nearly_tangent_joints(turns, scale, tmp_path):
 
 
 def test_curved_elements_do_not_overshoot_at_narrow_bends():
-    """This blade has bends of 12 degrees within a millimetre.
+    """This blade has bends of 12 degrees within a millimeter.
 
     A flat element may end in one and be near all along; curved to the normal there it is not.
     """

@@ -14,10 +14,12 @@ from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, U
 from sphshell_pin.shell.converting import convert
 from tests.shell import cad_shapes as shapes
 
+pytestmark = pytest.mark.slow
+
 SIDES = np.array([20.0, 30.0, 10.0])
 """Of the box in the files, as their numbers have it."""
 
-MILLIMETRE = "SI_UNIT(.MILLI.,.METRE.)"
+MILLIMETER = "SI_UNIT(.MILLI.,.METRE.)"
 
 
 @pytest.fixture(scope="module")
@@ -49,11 +51,11 @@ def prefixed(prefix):
     return f"LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT({prefix},.METRE.) );"
 
 
-def converted(name, millimetres):
+def converted(name, millimeters):
     return (
         f"CONVERSION_BASED_UNIT('{name}',#9001) LENGTH_UNIT() NAMED_UNIT(#9003) );\n"
-        f"#9001=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE({millimetres}),#9002);\n"
-        f"#9002=(LENGTH_UNIT() NAMED_UNIT(*) {MILLIMETRE});\n"
+        f"#9001=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE({millimeters}),#9002);\n"
+        f"#9002=(LENGTH_UNIT() NAMED_UNIT(*) {MILLIMETER});\n"
         "#9003=DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.);"
     )
 
@@ -77,20 +79,19 @@ UNITS = {
     "nm": (prefixed(".NANO."), 1e-9, "1e-09 m"),
     "inch": (converted("INCH", "25.4"), 0.0254, "in"),
     "foot, in lower case": (converted("foot", "3.048E2"), 0.3048, "ft"),
-    "millimetre of its own": (converted("MILLIMETRE", "1."), 1e-3, "mm"),
+    "millimeter of its own": (converted("MILLIMETER", "1."), 1e-3, "mm"),
     "furlong": (converted("FURLONG", "201168."), 201.168, "201.168 m"),
     "inch that is none": (converted("INCH", "30."), 0.03, "0.03 m"),
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", UNITS)
 def test_step_units_are_taken_by_their_length_not_by_their_name(name, step, tmp_path):
-    entities, metres, called = UNITS[name]
+    entities, meters, called = UNITS[name]
     path = written(tmp_path, with_unit(step, entities))
     shell = Shell.from_file(path)
-    assert np.allclose(sides(shell), SIDES * metres, rtol=1e-12, atol=0.0)
-    assert shell.health.scale == pytest.approx(metres, rel=1e-12)
+    assert np.allclose(sides(shell), SIDES * meters, rtol=1e-12, atol=0.0)
+    assert shell.health.scale == pytest.approx(meters, rel=1e-12)
     assert shell.unit == called
     with pytest.warns(UnitWarning, match=re.escape(f"header says '{called}'")):
         other = Shell.from_file(path, "yd")
@@ -109,18 +110,18 @@ def test_a_step_file_without_a_unit_needs_one(step, tmp_path):
         told = r"unit = None must be stated, as the header of part\.step states none: one of m, "
         with pytest.raises(UnitMissing, match=told + r".*measures 1[\d.]+ units: say unit='mm'"):
             Shell.from_file(path)
-        for unit, metres in (("mm", 1e-3), ("m", 1.0), ("in", 0.0254)):
+        for unit, meters in (("mm", 1e-3), ("m", 1.0), ("in", 0.0254)):
             shell = Shell.from_file(path, unit)
-            assert np.allclose(sides(shell), SIDES * metres, rtol=1e-12, atol=0.0)
-            assert shell.health.scale == metres
+            assert np.allclose(sides(shell), SIDES * meters, rtol=1e-12, atol=0.0)
+            assert shell.health.scale == meters
 
 
 def test_several_units_hold_for_their_own_parts(step, tmp_path):
     path = written(tmp_path, with_unit(step, converted("INCH", "25.4"), part=1))
     both = Shell.from_file(path)
-    for body, metres in (("box", 1e-3), ("pin", 0.0254)):
+    for body, meters in (("box", 1e-3), ("pin", 0.0254)):
         own = Shell.from_file(path, bodies=[body])
-        assert np.allclose(np.ptp(own.vertices, axis=0), SIDES * metres, rtol=1e-12, atol=0.0)
+        assert np.allclose(np.ptp(own.vertices, axis=0), SIDES * meters, rtol=1e-12, atol=0.0)
     assert any("units 'mm', 'in' from the file's header" in note for note in both.health.notes)
     with pytest.raises(InvalidParameter, match=r"the 2 units 'mm', 'in' that part\.step states"):
         Shell.from_file(path, "mm")
@@ -158,7 +159,7 @@ def with_header(iges, edit, delimiter=",", ends=";"):
 
 
 @pytest.mark.parametrize(
-    ("stated", "metres", "called"),
+    ("stated", "meters", "called"),
     [
         ("2,2HMM", 1e-3, "mm"),
         ("3,2HMM", 1e-3, "mm"),
@@ -171,11 +172,11 @@ def with_header(iges, edit, delimiter=",", ends=";"):
         ("11,3HUIN", 2.54e-8, "2.54e-08 m"),
     ],
 )
-def test_iges_units_come_by_flag_or_by_name(stated, metres, called, iges, tmp_path):
+def test_iges_units_come_by_flag_or_by_name(stated, meters, called, iges, tmp_path):
     text = with_header(iges, lambda table: table.replace(",2,2HMM,", f",{stated},"))
     path = written(tmp_path, text, ".iges")
     shell = Shell.from_file(path)
-    assert np.allclose(np.ptp(shell.vertices, axis=0), SIDES * metres, rtol=1e-12, atol=0.0)
+    assert np.allclose(np.ptp(shell.vertices, axis=0), SIDES * meters, rtol=1e-12, atol=0.0)
     assert shell.unit == called
     with pytest.warns(UnitWarning, match=re.escape(f"header says '{called}'")):
         other = Shell.from_file(path, "yd")

@@ -29,7 +29,7 @@ def test_sizes_out_of_range_are_refused(exponent: int) -> None:
 
 @pytest.mark.parametrize("exponent", [-12, -9, -3, 3, 9, 14])
 def test_sizes_within_range_find_the_same(exponent: int) -> None:
-    """The contacts are those of the surface of one metre, in its units."""
+    """The contacts are those of the surface of one meter, in its units."""
     scale, rng = 10.0**exponent, np.random.default_rng(0)
     here, there, touched = wavy(1.0), wavy(scale), 0
     for _ in range(300):

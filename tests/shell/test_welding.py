@@ -42,8 +42,8 @@ def test_tolerance_is_a_share_of_the_box(factor, merged):
 def test_grid_finds_what_all_pairs_find(seed, count, spread):
     rng = np.random.default_rng(seed)
     tolerance = 1e-3
-    centres = rng.uniform(0, 1, (4, 3))
-    points = centres[rng.integers(0, 4, count)] + rng.normal(size=(count, 3)) * spread * tolerance
+    centers = rng.uniform(0, 1, (4, 3))
+    points = centers[rng.integers(0, 4, count)] + rng.normal(size=(count, 3)) * spread * tolerance
     points[rng.random(count) < 0.2] = points[0]
     near = np.linalg.norm(points[:, None] - points[None], axis=2) <= tolerance
     group = np.arange(count)

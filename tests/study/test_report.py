@@ -34,7 +34,7 @@ from sphshell_pin.study.report import queries as queries_section
 from sphshell_pin.study.report import steps as steps_section
 from sphshell_pin.study.report.contents import Column, Finding, Section, Table, number
 from sphshell_pin.study.report.drawing import spread_apart
-from tests.view.test_recording_in_browser import browser  # noqa: F401
+from tests.view.conftest import browser  # noqa: F401
 
 pytest.importorskip("matplotlib")
 KEYS = ["forces", "queries", "integrators", "steps", "hard_cases", "peers"]
@@ -99,7 +99,7 @@ def hard(*, quick, progress):
 
 def peers(*, quick, progress):
     swing = {"period": 1e-4, "energy": 1e-3}
-    ours = PeerRow("bowl", "ours", "sphshell_pin 0", knob={"dt": 1e-3}, errors=swing, cost=0.01)
+    ours = PeerRow("bowl", "ours", "sphshell_pin 0", params={"dt": 1e-3}, errors=swing, cost=0.01)
     other = replace(ours, engine="mujoco", settings={"solver": "<Newton>"}, cost=1.0)
     press = replace(ours, scene="press", errors={"pressed [mm]": 0.1}, unit="us / step")
     absent = PeerRow("bowl", "drake", note="not installed: no module named pydrake")

@@ -48,9 +48,9 @@ void bind_contact(nb::module_& m) {
       "contact_force",
       [](const NormalLaw& law, const FrictionLaw* friction, double depth, const Vec3& normal,
          const Vec3& relative, double spin, const Vec3& bristle, double radius, double relaxation) {
-        const Meeting<double> meeting{depth, normal, relative, spin, bristle};
-        const ContactForce<double> f =
-            contact_force(law, friction ? *friction : FrictionLaw(), radius, relaxation, meeting);
+        const ContactKinematics<double> kinematics{depth, normal, relative, spin, bristle};
+        const ContactForce<double> f = contact_force(law, friction ? *friction : FrictionLaw(),
+                                                     radius, relaxation, kinematics);
         return nb::make_tuple(f.normal, f.friction, f.torsion, f.bristle_rate);
       },
       nb::arg("law"), nb::arg("friction").none(), nb::arg("depth"), nb::arg("normal"),

@@ -120,7 +120,7 @@ void bind_evaluations(nb::class_<T>& bound) {
   bound
       .def("external_forces",
            [](T& self, const VectorX& q, const VectorX& v) {
-             return self.at(q, v, [&](Scene& scene, auto&& evaluate) {
+             return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
                evaluate();
                const Forces none(scene.touching() ? 0 : scene.external().size(),
                                  pinocchio::Force::Zero());
@@ -129,7 +129,7 @@ void bind_evaluations(nb::class_<T>& bound) {
            })
       .def("contacts",
            [](T& self, const VectorX& q, const VectorX& v) {
-             return self.at(q, v, [&](Scene& scene, auto&& evaluate) {
+             return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
                std::vector<ContactRow> rows;
                evaluate();
                scene.log(q, v, rows);
@@ -137,7 +137,7 @@ void bind_evaluations(nb::class_<T>& bound) {
              });
            })
       .def("contact_derivatives", [](T& self, const VectorX& q, const VectorX& v) {
-        return self.at(q, v, [&](Scene& scene, auto&& evaluate) {
+        return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
           Linearization linearization(scene);
           evaluate();
           MatrixX by_q, by_v;
@@ -170,14 +170,11 @@ void bind_dynamics(nanobind::module_& m) {
             new (self) Evaluations(model_of(model), copies(pairs));
           },
           nb::arg("model"), nb::arg("pairs"))
-      .def_prop_ro("bristle_size",
-                   [](Evaluations& self) {
-                     return self.with_scene([](Scene& scene) { return scene.bristle_size(); });
-                   })
+      .def_prop_ro("bristle_size", &Evaluations::bristle_size)
       .def("rates",
            [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
               const VectorX& tau) {
-             return self.at(q, v, [&](Scene& scene, auto&&) {
+             return self.at(q, v, [&](SceneData& scene, auto&&) {
                check_count("z", z.size(), scene.bristle_size());
                check_count("tau", tau.size(), v.size());
                scene.restart();
@@ -191,7 +188,7 @@ void bind_dynamics(nanobind::module_& m) {
           "rate_jacobian",
           [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
              const VectorX& tau, int repeat) {
-            return self.at(q, v, [&](Scene& scene, auto&&) {
+            return self.at(q, v, [&](SceneData& scene, auto&&) {
               check_count("z", z.size(), scene.bristle_size());
               check_count("tau", tau.size(), v.size());
               Linearization linearization(scene);

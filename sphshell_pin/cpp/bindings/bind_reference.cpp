@@ -10,7 +10,7 @@
 
 #include "bindings/records.hpp"
 #include "dynamics/multibody.hpp"
-#include "dynamics/scene.hpp"
+#include "dynamics/scene_data.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/vector.h>
@@ -43,7 +43,7 @@ double bare_dynamics(nb::handle model, VectorX q, VectorX v, double dt, int step
 // "law" holds the forces of the contacts and what gathers and audits them.
 nb::dict step_parts(nb::handle model, const std::vector<const Pair*>& pairs, const VectorX& q,
                     const VectorX& v, double dt, int repeats) {
-  Scene scene(model_of(model), copies(pairs));
+  SceneData scene(model_of(model), copies(pairs));
   const VectorX z = VectorX::Zero(scene.bristle_size()), tau = VectorX::Zero(v.size());
   const VectorX step = dt * v;
   VectorX next = q;
@@ -60,7 +60,7 @@ nb::dict step_parts(nb::handle model, const std::vector<const Pair*>& pairs, con
   const double query = time([&] {
     for (std::size_t k = 0; k < pairs.size(); ++k)
       if (pairs[k]->shell)
-        queries[k].find(*pairs[k]->shell, scene.states()[k].centre, pairs[k]->radius,
+        queries[k].find(*pairs[k]->shell, scene.states()[k].center, pairs[k]->radius,
                         pairs[k]->method);
   });
   const double evaluation = time([&] { scene.evaluate(q, v, z); });

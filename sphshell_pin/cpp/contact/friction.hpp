@@ -29,10 +29,10 @@ Vector3<S> in_ball(const Vector3<S>& x, const S& radius) {
   return x * (radius / sqrt(length2));
 }
 
-// Where and how the two bodies meet. relative: velocity of the sphere's body against the shell's at
-// the contact point [m/s]; spin: along the normal of their relative angular velocity [rad/s].
+// The state of a contact. relative: velocity of the sphere's body against the shell's at the
+// contact point [m/s]; spin: of their relative angular velocity along the normal [rad/s].
 template <class S>
-struct Meeting {
+struct ContactKinematics {
   S depth;
   Vector3<S> normal, relative;
   S spin = S(0);
@@ -52,7 +52,7 @@ struct NoFriction {
   double coefficient(double) const { return 0; }
 
   template <class S>
-  void add(ContactForce<S>&, const Meeting<S>&, double, double) const {}
+  void add(ContactForce<S>&, const ContactKinematics<S>&, double, double) const {}
 };
 
 // ADAMS's Coulomb friction, regularized over two slip speeds: it creeps.
@@ -76,7 +76,7 @@ struct CoulombFriction {
   double coefficient(double speed) const { return speed * over_speed(speed * speed); }
 
   template <class S>
-  void add(ContactForce<S>& out, const Meeting<S>&, double, double) const {
+  void add(ContactForce<S>& out, const ContactKinematics<S>&, double, double) const {
     out.friction = -out.normal * over_speed(S(out.slip.squaredNorm())) * out.slip;
   }
 };
@@ -114,7 +114,8 @@ struct BristleFriction {
   double coefficient(double speed) const { return stribeck(speed * speed); }
 
   template <class S>
-  void add(ContactForce<S>& out, const Meeting<S>& m, double radius, double relaxation) const {
+  void add(ContactForce<S>& out, const ContactKinematics<S>& m, double radius,
+           double relaxation) const {
     using std::sqrt;
     Vector3<S> w = out.slip;
     S arm(0);
@@ -152,7 +153,7 @@ struct FrictionLaw {
 
 template <class S>
 ContactForce<S> contact_force(const NormalLaw& law, const FrictionLaw& friction, double radius,
-                              double relaxation, const Meeting<S>& m) {
+                              double relaxation, const ContactKinematics<S>& m) {
   ContactForce<S> out;
   const S gap_rate = m.normal.dot(m.relative);
   const NormalForce<S> push = law.force(m.depth, gap_rate);
@@ -164,10 +165,10 @@ ContactForce<S> contact_force(const NormalLaw& law, const FrictionLaw& friction,
 }
 
 // Power lost by the normal damping, and that of friction, which bristles partly store [W].
-inline double damping_power(const ContactForce<double>& f, const Meeting<double>& m) {
+inline double damping_power(const ContactForce<double>& f, const ContactKinematics<double>& m) {
   return -(f.normal - f.elastic) * m.normal.dot(m.relative);
 }
-inline double friction_power(const ContactForce<double>& f, const Meeting<double>& m) {
+inline double friction_power(const ContactForce<double>& f, const ContactKinematics<double>& m) {
   return -f.friction.dot(f.slip) - f.torsion * m.spin;
 }
 

@@ -32,9 +32,9 @@ void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
 // not change with the axes it is written in.
 template <int N>
 void differentiate(const NormalLaw& law, const FrictionLaw& friction, double radius,
-                   double relaxation, const Meeting<double>& at, LawSlopes& out) {
+                   double relaxation, const ContactKinematics<double>& at, LawSlopes& out) {
   using S = Dual<N>;
-  Meeting<S> m;
+  ContactKinematics<S> m;
   m.depth = S::seed(at.depth, 0);
   for (int i = 0; i < 3; ++i) {
     m.normal[i] = at.normal[i];
@@ -48,7 +48,8 @@ void differentiate(const NormalLaw& law, const FrictionLaw& friction, double rad
   read<N>(f.bristle_rate, out.rate, out.rate_by);
 }
 
-// The rate of the bristle's turning with the normal, added to `out`; see Scene::turning.
+// The rate of the bristle's turning with the normal, added to `out`; see
+// SceneData::rate_of_turning.
 void add_turning(const ContactSite& site, const Mat3& normal_by_place,
                  const Eigen::RowVector3d& weight_by_place, ContactSlopes& out) {
   const Contact& contact = site.contact;
@@ -86,7 +87,7 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     point_by = Mat3::Identity() + n * depth_by - (site.radius - contact.depth) * normal_by;
   }
 
-  Meeting<double> m;
+  ContactKinematics<double> m;
   m.depth = contact.depth;
   m.normal = n;
   m.relative = site.twist.head<3>() + spin.cross(point);

@@ -26,7 +26,7 @@ class Chain {
   const Vector6& twist() const { return twist_; }
   const Matrix6X& twist_by_q() const { return twist_by_q_; }  // (6, size)
 
-  // Adds the generalised forces (nv) of `wrench` on body i and its opposite on body j, and their
+  // Adds the generalized forces (nv) of `wrench` on body i and its opposite on body j, and their
   // derivative (nv, nv) with respect to q where the wrench is held in the shell's frame.
   void add_force(const Vector6& wrench, VectorX& force, MatrixX& by_q) const;
 

@@ -18,14 +18,14 @@ constexpr double kMostTurned = 16;
 
 }  // namespace
 
-void Guard::begin(const Scene& scene) {
+void Guard::begin(const SceneData& scene) {
   for (std::size_t k = 0; k < known_.size(); ++k) {
-    known_[k].centre = scene.states()[k].centre;
+    known_[k].center = scene.states()[k].center;
     known_[k].touching = scene.states()[k].count > 0;
   }
 }
 
-double Guard::allowed(Scene& scene, const State& from, const State& to, bool gap_at_end) {
+double Guard::allowed(SceneData& scene, const State& from, const State& to, bool gap_at_end) {
   double share = std::numeric_limits<double>::infinity();
   const double h = to.t - from.t;
   const double turned =
@@ -46,7 +46,7 @@ double Guard::allowed(Scene& scene, const State& from, const State& to, bool gap
     if (moved <= slack) continue;
     double limit = slack + (known.touching ? 0 : gap(pair, known));
     if (gap_at_end && moved > limit && !known.touching)
-      limit += std::max(0.0, distance(pair, scene.states()[k].centre) - pair.radius);
+      limit += std::max(0.0, distance(pair, scene.states()[k].center) - pair.radius);
     share = std::min(share, limit / moved);
   }
   if (turned > kTurn) scene.body().kinematics(to.q, to.v);
@@ -54,8 +54,8 @@ double Guard::allowed(Scene& scene, const State& from, const State& to, bool gap
 }
 
 // A lower bound of the distance to the shell.
-double Guard::distance(const Pair& pair, const Vec3& centre) {
-  const double distance = std::abs(pair.shell->closest_point(centre).distance);
+double Guard::distance(const Pair& pair, const Vec3& center) {
+  const double distance = std::abs(pair.shell->closest_point(center).distance);
   const bool is_curved = pair.method == Method::Smooth && pair.shell->curved() != nullptr;
   return is_curved ? distance - pair.shell->curved()->bulge() : distance;
 }
@@ -63,16 +63,16 @@ double Guard::distance(const Pair& pair, const Vec3& centre) {
 // A lower bound of the gap at the begin of the step; the distance is looked up where the one known
 // is worn out.
 double Guard::gap(const Pair& pair, Known& known) const {
-  double distance = known.distance - (known.centre - known.anchor).norm();
+  double distance = known.distance - (known.center - known.anchor).norm();
   if (known.distance < 0 || distance < std::max(2 * pair.radius, 0.5 * known.distance)) {
-    known.anchor = known.centre;
-    distance = known.distance = Guard::distance(pair, known.centre);
+    known.anchor = known.center;
+    distance = known.distance = Guard::distance(pair, known.center);
   }
   return std::max(0.0, distance - pair.radius);
 }
 
-// Length of the centre's path in the shell's frame, by chords.
-double Guard::path(Scene& scene, std::size_t k, const State& from, const State& to) {
+// Length of the center's path in the shell's frame, by chords.
+double Guard::path(SceneData& scene, std::size_t k, const State& from, const State& to) {
   const Pair& pair = scene.pairs()[k];
   Multibody& body = scene.body();
   const double h = to.t - from.t;
@@ -80,7 +80,7 @@ double Guard::path(Scene& scene, std::size_t k, const State& from, const State& 
       std::max(from.v.lpNorm<Eigen::Infinity>(), to.v.lpNorm<Eigen::Infinity>()) * h;
   const int chords = static_cast<int>(std::ceil(std::min(turned, kMostTurned) / (0.5 * kTurn)));
   q_.resize(from.q.size());
-  Vec3 last = known_[k].centre;
+  Vec3 last = known_[k].center;
   double length = 0;
   for (int i = 1; i <= chords; ++i) {
     const double share = double(i) / chords;
@@ -89,11 +89,11 @@ double Guard::path(Scene& scene, std::size_t k, const State& from, const State& 
     body.kinematics(q_);
     SE3 shell = pair.placement_j;
     if (pair.joint_j != 0) shell = body.world_from_joint(pair.joint_j) * shell;
-    Vec3 centre = pair.placement_i.translation();
-    if (pair.joint_i != 0) centre = body.world_from_joint(pair.joint_i).act(centre);
-    centre = shell.actInv(centre);
-    length += (centre - last).norm();
-    last = centre;
+    Vec3 center = pair.placement_i.translation();
+    if (pair.joint_i != 0) center = body.world_from_joint(pair.joint_i).act(center);
+    center = shell.actInv(center);
+    length += (center - last).norm();
+    last = center;
   }
   return length;
 }

@@ -7,33 +7,33 @@
 
 namespace sphshell {
 
-// A step may move the centre of a sphere, in the shell's frame, by the gap and a sixteenth of the
+// A step may move the center of a sphere, in the shell's frame, by the gap and a sixteenth of the
 // radius while they are apart, and by a quarter of the radius while they touch. So the force acts
-// before the centre comes near the surface, at any speed, and what is missed between two
+// before the center comes near the surface, at any speed, and what is missed between two
 // evaluations is a touch of at most r / 2000.
 class Guard {
  public:
-  explicit Guard(const Scene& scene) : known_(scene.pairs().size()) {}
+  explicit Guard(const SceneData& scene) : known_(scene.pairs().size()) {}
 
   // The scene's last evaluate() was at the state where the next step begins.
-  void begin(const Scene& scene);
+  void begin(const SceneData& scene);
   // The share of the step from `from` to `to` that is allowed; 1 or more: all of it. The scene's
   // last evaluate() was at `to`. With `gap_at_end`, a sphere that is apart may also move by the gap
   // at the end: it cannot have touched on a way of that length either.
-  double allowed(Scene& scene, const State& from, const State& to, bool gap_at_end = false);
+  double allowed(SceneData& scene, const State& from, const State& to, bool gap_at_end = false);
 
  private:
   struct Known {
-    Vec3 centre = Vec3::Zero();  // at the begin of the step
+    Vec3 center = Vec3::Zero();  // at the begin of the step
     bool touching = false;
-    // A place of the centre, and its distance to the shell there at least.
+    // A place of the center, and its distance to the shell there at least.
     Vec3 anchor = Vec3::Zero();
     double distance = -1;
   };
 
-  static double distance(const Pair& pair, const Vec3& centre);
+  static double distance(const Pair& pair, const Vec3& center);
   double gap(const Pair& pair, Known& known) const;
-  double path(Scene& scene, std::size_t k, const State& from, const State& to);
+  double path(SceneData& scene, std::size_t k, const State& from, const State& to);
 
   std::vector<Known> known_;
   VectorX u_, q_;

@@ -14,7 +14,7 @@ Matrix36 displacement_at(const Vec3& place) {
 
 }  // namespace
 
-Linearization::Linearization(Scene& scene) : scene_(scene) {
+Linearization::Linearization(SceneData& scene) : scene_(scene) {
   scene.want_dn_dc();
   scene.body().want_derivatives();
   const pinocchio::Model& model = scene.body().model();
@@ -61,7 +61,7 @@ void Linearization::rates(const VectorX& q, const VectorX& v, const VectorX& z, 
 }
 
 // Fills by_q_ and by_v_, adds to force_, and where there is a jacobian writes what bristles have in
-// it, of the acceleration as generalised forces.
+// it, of the acceleration as generalized forces.
 void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* jacobian) {
   const Eigen::Index nv = v.size();
   by_q_.setZero(nv, nv);
@@ -120,9 +120,9 @@ ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& t
   const Pair& pair = scene_.pairs()[active.pair];
   const PairState& state = scene_.states()[active.pair];
   const auto& turn = state.world_from_j.rotation();
-  ContactSite site{active.contact, state.centre, !pair.source, pair.radius, twist, Vec3::Zero()};
+  ContactSite site{active.contact, state.center, !pair.source, pair.radius, twist, Vec3::Zero()};
   if (pair.source) site.place = site.contact.point;
-  if (active.slot >= 0) site.stretch = turn.transpose() * active.meeting.bristle;
+  if (active.slot >= 0) site.stretch = turn.transpose() * active.kinematics.bristle;
   return site;
 }
 

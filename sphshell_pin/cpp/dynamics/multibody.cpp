@@ -67,12 +67,12 @@ void Multibody::kinematics(const VectorX& q, const VectorX& v) {
 }
 
 const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
-  return pinocchio::aba(model_, data_, q, v, tau);
+  return pinocchio::aba(model_, data_, VectorRef(q), VectorRef(v), VectorRef(tau));
 }
 
 const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
                                        const Forces& external) {
-  return pinocchio::aba(model_, data_, q, v, tau, external);
+  return pinocchio::aba(model_, data_, VectorRef(q), VectorRef(v), VectorRef(tau), external);
 }
 
 void Multibody::acceleration_derivatives(const VectorX& q, const VectorX& v, const VectorX& tau,

@@ -104,7 +104,7 @@ class Simulation : private Torques {
   bool at_end() const { return time() >= end(); }
 
   RunSettings settings_;
-  Scene scene_;
+  SceneData scene_;
   std::shared_ptr<Controller> controller_;
   Stepping stepping_;
   Recorder recorder_;

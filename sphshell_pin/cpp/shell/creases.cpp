@@ -10,13 +10,11 @@
 namespace sphshell {
 namespace {
 
-// Normals closer than this [rad] are one.
-constexpr double kSameNormal = 1e-3;
 // Where joints turn this much [rad], no normals of a file make one surface of them.
 constexpr double kSurelySharp = 1.2;
 // A wall ends in a fillet where its element bends by less than this share of the fillet's, and is
 // longer by this factor.
-constexpr double kWall = 0.1, kLonger = 2.5;
+constexpr double kWall = 0.1, kLongWall = 2.5;
 // A crease goes on along a joint in the same direction (cosine) that turns alike (factor).
 constexpr float kOnward = 0.85f, kSameTurn = 1.3f;
 constexpr int kMostRounds = 40;
@@ -200,7 +198,7 @@ bool CreaseSearch::separate_walls() {
     const int side = curved_side(claims_[e]);
     const Claim &curved = claims_[e][side], &wall = claims_[e][1 - side];
     const double left = 2 * std::abs(joints_[e].angle - curved.turn) / wall.height;
-    if (wall.height > kLonger * curved.height && left <= kWall * std::abs(curved.curvature))
+    if (wall.height > kLongWall * curved.height && left <= kWall * std::abs(curved.curvature))
       added.push_back(static_cast<int>(e));
   }
   for (int e : added) crease_[e] = 1;

@@ -7,6 +7,9 @@
 
 namespace sphshell {
 
+// Normals closer than this [rad] are one: what they disagree about is noise.
+constexpr double kSameNormal = 1e-3;
+
 struct CornerNormals {
   std::vector<Vec3> normals;  // unit, per triangle corner (3 per triangle)
   std::vector<char>

@@ -16,8 +16,6 @@ namespace sphshell {
 namespace {
 
 constexpr double kAny = std::numeric_limits<double>::infinity();
-// Normals closer than this [rad] are one: what they disagree about is noise.
-constexpr double kSameNormal = 1e-3;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 

@@ -10,8 +10,7 @@
 namespace sphshell {
 namespace {
 
-using Tree = PointTree<2>;
-using Vec2 = Tree::Point;
+using Vec2 = PointTree<2>::Point;
 
 double cross(const Vec2& a, const Vec2& b, const Vec2& c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -141,7 +140,7 @@ class Clipper {
       if (copies_[i] > 0) left.push_back(static_cast<std::int32_t>(i));
     }
     planted_ = left_ = left.size();
-    tree_ = Tree(flat_.front().data(), std::move(left));
+    tree_ = PointTree<2>(flat_.front().data(), std::move(left));
   }
 
   // Finds the score of corner i, after its neighbours changed or what blocked it is gone.
@@ -259,12 +258,13 @@ class Clipper {
       const Vec2 low{std::min({a[0], b[0], c[0]}) - grow, std::min({a[1], b[1], c[1]}) - grow};
       const Vec2 high{std::max({a[0], b[0], c[0]}) + grow, std::max({a[1], b[1], c[1]}) + grow};
       // Rounding is monotone: the computed product of no point in the box is beyond its extremes.
-      const auto extreme = [](const Vec2& from, const Vec2& to, const Tree::Box& box, bool most) {
+      const auto extreme = [](const Vec2& from, const Vec2& to, const PointTree<2>::Box& box,
+                              bool most) {
         return cross(from, to,
                      {(to[1] > from[1]) == most ? box.low[0] : box.high[0],
                       (to[0] > from[0]) == most ? box.high[1] : box.low[1]});
       };
-      const auto meets = [&](const Tree::Box& box) {
+      const auto meets = [&](const PointTree<2>::Box& box) {
         if (box.low[0] > high[0] || box.low[1] > high[1] || box.high[0] < low[0] ||
             box.high[1] < low[1]) {
           return false;
@@ -334,7 +334,7 @@ class Clipper {
   std::vector<int> blocker_;  // of each blocked ear: the holder of a vertex in it, else -1
   std::vector<std::vector<int>> waiting_;  // of each holder: ears that it blocks or once blocked
   bool many_ = false;                      // corners; what follows is used only then
-  Tree tree_;                              // of the holders
+  PointTree<2> tree_;                      // of the holders
   std::size_t planted_ = 0, left_ = 0;     // holders when the tree was built, and now
   std::vector<int> order_, rank_;          // corners by x, y, z of their points
   Tournament ears_, shapes_;               // by rank: scores, and shapes as they stand

@@ -9,10 +9,8 @@
 namespace sphshell {
 namespace {
 
-using Tree = PointTree<3>;
-
 // Slab test of the segment against the box grown by the tolerance: never misses a point.
-bool meets(const Tree::Box& box, const double* a, const double* b, double tolerance) {
+bool meets(const PointTree<3>::Box& box, const double* a, const double* b, double tolerance) {
   double enter = 0.0, leave = 1.0;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = box.low[axis] - tolerance, high = box.high[axis] + tolerance;
@@ -38,7 +36,7 @@ Insertions find_t_junctions(const PolygonView& polygons, const double* points,
                             const std::vector<std::int32_t>& candidates, double tolerance,
                             std::size_t most) {
   Insertions out;
-  const Tree tree(points, candidates);
+  const PointTree<3> tree(points, candidates);
   struct Hit {
     double parameter;
     std::int32_t vertex;
@@ -62,7 +60,7 @@ Insertions find_t_junctions(const PolygonView& polygons, const double* points,
     const std::array<double, 3> d{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
     const double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     hits.clear();
-    const auto near = [&](const Tree::Box& box) { return meets(box, a, b, tolerance); };
+    const auto near = [&](const PointTree<3>::Box& box) { return meets(box, a, b, tolerance); };
     tree.search(near, [&](std::int32_t vertex) {
       if (owner[static_cast<std::size_t>(vertex)] == open_polygons[k]) return false;
       const double* p = points + 3 * static_cast<std::size_t>(vertex);

@@ -19,7 +19,7 @@ namespace {
 constexpr double kPlanarTolerance = 16 * std::numeric_limits<double>::epsilon();
 
 // Normals of two CAD faces that were made equal where they join may have been rounded since [rad].
-constexpr double kSameNormal = 1e-6;
+constexpr double kEqualNormals = 1e-6;
 
 // Consecutive labels of the sets, in the order of first appearance.
 std::vector<int> labels(DisjointSets& sets, std::size_t size, int& count) {
@@ -221,7 +221,7 @@ bool CadFaces::smooth(int h, int g) const {
   const int t = triangle_of(h), u = triangle_of(g);
   if (face[t] == face[u]) return true;
   const auto same = [&](int i, int j) {
-    return (normals[i] - normals[j]).squaredNorm() < kSameNormal * kSameNormal;
+    return (normals[i] - normals[j]).squaredNorm() < kEqualNormals * kEqualNormals;
   };
   return same(h, 3 * u + next_corner(side_of(g))) && same(3 * t + next_corner(side_of(h)), g);
 }

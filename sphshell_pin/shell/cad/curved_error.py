@@ -1,7 +1,7 @@
-"""How far curved elements are from the exact faces, and keeping those straight that are too far.
+"""The error of curved elements from the exact faces; sides whose error is too large stay straight.
 
 The tessellation is measured flat. Contact uses the elements curved to meet the normals at their
-corners, and where these do not stand for the whole side, as beside a joint that is nearly tangent,
+corners, and where these do not represent the whole side, as beside a joint that is nearly tangent,
 a curved side may leave a face that the straight one is on.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from OCP.gp import gp_Pnt, gp_Vec
 
 from sphshell_pin.shell.base import ShellBase
-from sphshell_pin.shell.cad.face_mesh import ALONG, CURVED, FaceMesh
+from sphshell_pin.shell.cad.face_mesh import ALONG, FaceMesh
 from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.surface import CadSurface
 from sphshell_pin.shell.cleaned import CleanedSurface
@@ -23,6 +23,9 @@ from sphshell_pin.shell.raw import Floats, Ints, Longs, Mask
 _ON_SIDES = [np.roll([1 - share, share, 0.0], side) for side in range(3) for share in ALONG]
 WEIGHTS = np.array([*_ON_SIDES, [1 / 3, 1 / 3, 1 / 3]])
 """Where triangles are measured (k, 3): along the sides 0, 1 and 2, and in the middle."""
+
+CURVED = 0.25
+"""Curved sides must be nearer than this share of the chord error."""
 
 MOST_ROUNDS = 6
 """Times sides are straightened and measured again: a straight side changes middles beside it."""
@@ -66,7 +69,7 @@ def hold_curvature(
     A curved side, or the sides of a curved middle, farther off than the share CURVED of the stated
     chord error are kept straight, unless straight ones are no nearer.
 
-    factor : metres per unit of the model; crease_angle : of the shell [rad]
+    factor : meters per unit of the model; crease_angle : of the shell [rad]
     """
     places = _Places(surface, cad, factor)
     limit = CURVED * cad.stated
@@ -84,7 +87,7 @@ def hold_curvature(
             break
         straight |= bad
     count = _count_sides(surface, straight)
-    note = _note(found, cad.stated, cad.model.metres, count, bent)
+    note = _note(found, cad.stated, cad.model.meters, count, bent)
     health = surface.health.labelled(notes=(*surface.health.notes, note))
     return replace(surface, straight=straight if count else None, health=health)
 

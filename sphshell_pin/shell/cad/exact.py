@@ -65,12 +65,12 @@ class _Edge:
 
 
 class TrimmedFaces:
-    """The trimmed faces that a tessellation stands for [units of the model]."""
+    """The trimmed faces that a tessellation approximates [units of the model]."""
 
     def __init__(self, cad: CadSurface) -> None:
         self._cad = cad
         raw = cad.polygons()
-        points, triangles = raw.vertices / cad.model.metres, raw.corners.reshape(-1, 3)
+        points, triangles = raw.vertices / cad.model.meters, raw.corners.reshape(-1, 3)
         self._corners = points[triangles]
         self._shell = Shell(points, triangles, crease_angle=0.0)
         self._inside = cache(lambda face: IntTools_FClass2d(cad.sewn.faces[face], TRIMMING))

@@ -25,17 +25,8 @@ from sphshell_pin.shell.raw import Floats, Longs, Mask
 ALONG = (0.25, 0.5, 0.75)
 """Where along a side the distance is measured."""
 
-CURVED = 0.25
-"""Curved sides inside a face must be nearer than this share of the chord error."""
-
-MOST_TURN = 0.7
-"""The surface may turn by this along a side inside a face [rad]; curved elements need it small."""
-
-TURN_ROUNDS = 3
-"""Times sides are halved for that: along a kink the turn never falls."""
-
 LIMIT_STEP = 1e-4
-"""Part of the way to the middle of the triangle at which the limit of a normal is taken."""
+"""Share of the distance to the middle of the triangle at which the limit of a normal is taken."""
 
 
 @dataclass(frozen=True)
@@ -55,19 +46,19 @@ class Border:
         if self.curve.GetType() == GeomAbs_Line:
             ends = np.array([self.curve.Value(t).Coord() for t in (self.at[0], self.at[-1])])
             return float(np.linalg.norm(corners[[0, -1]] - ends, axis=1).max())
-        start, way = corners[:-1], np.diff(corners, axis=0)
+        start, span = corners[:-1], np.diff(corners, axis=0)
         shares = np.array((0.0, *ALONG))[:, None]
         places = ((1.0 - shares) * self.at[:-1] + shares * self.at[1:]).ravel()
         exact = np.array([self.curve.Value(t).Coord() for t in places.tolist()]).reshape(-1, 3)
         own = np.tile(np.arange(len(start)), len(shares))
-        away = _to_segments(exact, start[own], way[own])
+        away = _to_segments(exact, start[own], span[own])
         # Where curve and polyline run at different speeds, another side is the nearest. The
         # farthest first: it seldom takes more than a few to know the largest distance.
         largest = 0.0
         for k in np.argsort(-away):
             if away[k] <= largest:
                 break
-            largest = max(largest, float(_to_segments(exact[k], start, way).min()))
+            largest = max(largest, float(_to_segments(exact[k], start, span).min()))
         return largest
 
 
@@ -121,43 +112,34 @@ class FaceMesh:
     def refined(self, tolerance: float, rounds: int) -> tuple[FaceMesh, float]:
         """Halve sides inside the face until all points measured are within `tolerance`.
 
-        Also where the surface turns by more than MOST_TURN along a side, a few times. Returns the
-        mesh and the largest distance measured. Sides on the border stay: the face across them has
-        the same.
+        Returns the mesh and the largest distance measured. Sides on the border stay: the face
+        across them has the same.
         """
         if self.surface.flat:
             return self, float(np.linalg.norm(self.points - self.exact, axis=1).max(initial=0.0))
-        mesh, largest, known = self, 0.0, 0
+        mesh, largest = self, 0.0
         for turn in range(rounds + 1):
             sides, of_triangle = mesh.sides()
-            at_sides, middles = mesh._errors(sides, of_triangle, known, tolerance)
+            at_sides, middles = mesh._errors(sides, tolerance)
+            largest = max(at_sides.max(initial=0.0), middles.max(initial=0.0))
             inner = np.bincount(of_triangle.ravel(), minlength=len(sides)) == 2
-            marked = np.zeros(len(sides), np.bool_)
-            if turn < rounds:
-                fresh = np.unique(of_triangle[known:])
-                curved = CURVED * tolerance
-                far = at_sides > tolerance
-                far[fresh] |= mesh._bulges(sides[fresh], curved - at_sides[fresh], curved) > curved
-                marked = mesh._too_long(sides, far, turn)
-                # A triangle too far in its middle alone: its longest side inside the face.
-                length = np.linalg.norm(mesh.points[sides[:, 0]] - mesh.points[sides[:, 1]], axis=1)
-                longest = np.argmax(np.where(inner, length, -1.0)[of_triangle], axis=1)
-                wanted = (middles > tolerance) & ~(marked & inner)[of_triangle].any(axis=1)
-                marked[of_triangle[wanted, longest[wanted]]] = True
-                marked &= inner
-            whole = ~marked[of_triangle].any(axis=1)
-            kept = (at_sides[~marked].max(initial=0.0), middles[whole].max(initial=0.0))
-            largest = max(largest, float(max(kept)))
-            if not marked.any():
+            marked: Mask = inner & (at_sides > tolerance)
+            # A triangle too far in its middle alone: its longest side inside the face.
+            length = np.linalg.norm(mesh.points[sides[:, 0]] - mesh.points[sides[:, 1]], axis=1)
+            longest = np.argmax(np.where(inner, length, -1.0)[of_triangle], axis=1)
+            wanted = (middles > tolerance) & ~marked[of_triangle].any(axis=1)
+            marked[of_triangle[wanted, longest[wanted]]] = True
+            marked &= inner
+            if turn == rounds or not marked.any():
                 break
-            mesh, known = mesh._split(sides, of_triangle, marked), int(whole.sum())
-        return mesh, largest
+            mesh = mesh._split(sides, of_triangle, marked)
+        return mesh, float(largest)
 
     def corner_normals(self) -> Floats:
         """Exact unit normals (t, 3, 3) at the corners, on the face's outer side.
 
         Where the surface has none, as at the pole of a sphere or the tip of a cone, or several, as
-        along a kink, it is the limit on the way from the middle of the triangle.
+        along a kink, it is the limit from the middle of the triangle.
         """
         corners = self.normals[self.triangles]
         limits: Mask = np.asarray(~corners.any(axis=2) | self.surface.kinked, np.bool_)
@@ -168,7 +150,7 @@ class FaceMesh:
     def parameters(self, nodes: Longs) -> Floats:
         """Parameters (k, c, 2) of the c nodes of k sides or triangles.
 
-        A pole takes those of the other nodes, so that what lies between them is on the way.
+        A pole takes those of the other nodes: the parameters between them belong to points between.
         """
         uv, free = self.uv[nodes], self.free[nodes]
         if not free.any():
@@ -177,60 +159,17 @@ class FaceMesh:
         mean = np.where(free, 0.0, uv).sum(axis=1, keepdims=True) / np.maximum(count, 1)
         return np.where(free & (count > 0), mean, uv)
 
-    def _errors(
-        self, sides: Longs, of_triangle: Longs, known: int, tolerance: float
-    ) -> tuple[Floats, Floats]:
-        """Largest distance to the surface along each side and at each middle; 0 where `known`.
-
-        known : number of triangles, the first ones, that were measured before
-        """
-        at_sides, middles = np.zeros(len(sides)), np.zeros(len(self.triangles))
-        fresh = np.unique(of_triangle[known:])
-        ends = sides[fresh]
-        between = self.parameters(ends)
+    def _errors(self, sides: Longs, tolerance: float) -> tuple[Floats, Floats]:
+        """Largest distance to the surface along each side, and at the middle of each triangle."""
+        at_sides = np.zeros(len(sides))
+        between = self.parameters(sides)
         for share in ALONG:
-            points = (1.0 - share) * self.points[ends[:, 0]] + share * self.points[ends[:, 1]]
+            points = (1.0 - share) * self.points[sides[:, 0]] + share * self.points[sides[:, 1]]
             uv = (1.0 - share) * between[:, 0] + share * between[:, 1]
-            off = self.surface.distances(points, uv, tolerance)
-            at_sides[fresh] = np.maximum(at_sides[fresh], off)
-        new = self.triangles[known:]
-        points, uv = self.points[new].mean(axis=1), self.parameters(new).mean(axis=1)
-        middles[known:] = self.surface.distances(points, uv, tolerance)
-        return at_sides, middles
-
-    def _too_long(self, sides: Longs, far: Mask, turn: int) -> Mask:
-        """Sides that are `far` from the surface, or along which it turns too much."""
-        if turn >= TURN_ROUNDS:
-            return far
-        first, second = self.normals[sides[:, 0]], self.normals[sides[:, 1]]
-        defined = first.any(axis=1) & second.any(axis=1)
-        turned: Mask = defined & (dot(first, second) < np.cos(MOST_TURN))
-        return far | turned
-
-    def _bulges(self, sides: Longs, spare: Floats, tolerance: float) -> Floats:
-        """Distances of sides (s,) from the surface, where each lies highest when it is curved.
-
-        A side whose ends stand for little of it, such as one that ends in a narrow bend, may be
-        near while it is straight, but not once it is curved to meet the normals. `spare` (s,) is
-        what it may bulge without being measured: there the distance is 0.
-        """
-        ends, upright = self.points[sides], self.normals[sides]
-        way = ends[:, 1] - ends[:, 0]
-        # What the tangents at the ends are off the side; they lie in the tangent planes there.
-        first, last = (-dot(upright[:, k], way)[:, None] * upright[:, k] for k in (0, 1))
-        shares = np.array(ALONG)[:, None, None]
-        lifts = shares * (1 - shares) * ((1 - shares) * first - shares * last)
-        highest = np.argmax(np.linalg.norm(lifts, axis=2), axis=0)
-        lift = lifts[highest, np.arange(len(sides))]
-        chosen = np.flatnonzero(np.linalg.norm(lift, axis=1) > spare)
-        share = np.array(ALONG)[highest[chosen], None]
-        between = self.parameters(sides[chosen])
-        uv = (1 - share) * between[:, 0] + share * between[:, 1]
-        found = np.zeros(len(sides))
-        found[chosen] = self.surface.distances(
-            ends[chosen, 0] + share * way[chosen] + lift[chosen], uv, tolerance
-        )
-        return found
+            at_sides = np.maximum(at_sides, self.surface.distances(points, uv, tolerance))
+        points = self.points[self.triangles].mean(axis=1)
+        uv = self.parameters(self.triangles).mean(axis=1)
+        return at_sides, self.surface.distances(points, uv, tolerance)
 
     def _split(self, sides: Longs, of_triangle: Longs, marked: Mask) -> FaceMesh:
         """Halve the sides where `marked` (s,) holds, with new nodes on the surface."""
@@ -268,9 +207,9 @@ class FaceMesh:
     def _limits(self, chosen: Mask) -> Floats:
         uv = self.parameters(self.triangles)
         start = uv[chosen]
-        way = np.broadcast_to(uv.mean(axis=1)[:, None], uv.shape)[chosen] - start
-        near, far = (self.surface.nodes(start + k * LIMIT_STEP * way)[1] for k in (1.0, 2.0))
-        # Carried on from two places on the way, the limit is exact to second order.
+        toward = np.broadcast_to(uv.mean(axis=1)[:, None], uv.shape)[chosen] - start
+        near, far = (self.surface.nodes(start + k * LIMIT_STEP * toward)[1] for k in (1.0, 2.0))
+        # Extrapolated from two places, the limit is exact to second order.
         limit = 2.0 * near - far
         length = np.linalg.norm(limit, axis=1, keepdims=True)
         return np.asarray(limit / np.where(length > 0.0, length, 1.0))
@@ -316,8 +255,8 @@ def _borders(face: Occ, found: Occ, location: Occ) -> Iterator[Border]:
         )
 
 
-def _to_segments(point: Floats, start: Floats, way: Floats) -> Floats:
+def _to_segments(point: Floats, start: Floats, span: Floats) -> Floats:
     """Distances of points (3,) or (n, 3) from segments (n, 3)."""
-    square = np.maximum(dot(way, way), np.finfo(float).tiny)
-    along = np.clip(dot(point - start, way) / square, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(point - start - along[:, None] * way, axis=1))
+    square = np.maximum(dot(span, span), np.finfo(float).tiny)
+    along = np.clip(dot(point - start, span) / square, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(point - start - along[:, None] * span, axis=1))

@@ -14,7 +14,7 @@ MOST_STEPS = 8
 """Of Newton's method to a closest point; it starts next to it."""
 
 MOST_STATIONARY_STEPS = 40
-"""Of Newton's method towards a stationary point of the distance."""
+"""Of Newton's method toward a stationary point of the distance."""
 
 SINGULAR = 1e-10
 """Where |du x dv| is below this share of the largest |du| |dv|, a surface has no normal."""
@@ -66,8 +66,8 @@ class FaceSurface:
         """
         if self.flat and len(points):
             place, by_u, by_v = (row[0] for row in self.derivatives(uv[:1]))
-            upright = np.cross(by_u, by_v)
-            return np.asarray(np.abs((points - place) @ (upright / np.linalg.norm(upright))))
+            normal = np.cross(by_u, by_v)
+            return np.asarray(np.abs((points - place) @ (normal / np.linalg.norm(normal))))
         distance = np.full(len(points), np.inf)
         at, left = uv.copy(), np.arange(len(points))
         for _ in range(MOST_STEPS):

@@ -1,6 +1,7 @@
 """What a CAD child does: all that the package needs of OpenCASCADE.
 
-These run in the child's process, where a crash or a hang harms nobody; `run_in_child` calls them.
+`run_in_child` has them run in the child's process, where a crash or a hang does not affect the
+caller.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from sphshell_pin.shell.raw import Floats, Ints
 Alive = Callable[[], None]
 
 BETWEEN = 100
-"""Contacts after which the audit says that it goes on."""
+"""Contacts after which the audit reports that it continues."""
 
 
 def read(
@@ -37,7 +38,7 @@ def read(
 ) -> tuple[CleanedSurface, str, float]:
     """Read, tessellate and clean a CAD file.
 
-    Returns the surface [m], the unit taken, and metres per unit of the file, `scale` included.
+    Returns the surface [m], the unit taken, and meters per unit of the file, `scale` included.
     """
     cad = load_cad(path, unit, options)
     raw = cad.polygons().noting(*cad.notes()).scaled(scale).noting(*notes)
@@ -46,7 +47,7 @@ def read(
     except InvalidShell as error:
         raise InvalidShell(f"{path}: {error}") from error
     if crease_angle > 0.0:
-        surface = hold_curvature(surface, cad, scale * cad.model.metres, crease_angle)
+        surface = hold_curvature(surface, cad, scale * cad.model.meters, crease_angle)
     return surface, cad.unit, cad.factor * scale
 
 
@@ -68,19 +69,19 @@ def stationary_points(
     there is none, 1 for a point of an edge or a vertex, which has no normal, 2 for one of a face.
     """
     cad = load_cad(path, unit, options)
-    metres = cad.model.metres
+    meters = cad.model.meters
     for scale in scales:
-        metres *= scale
+        meters *= scale
     faces = TrimmedFaces(cad)
     points, normals = np.zeros(centers.shape), np.zeros(centers.shape)
     kinds = np.zeros(len(centers), np.int32)
     for k, (center, contact) in enumerate(zip(centers, contacts, strict=True)):
         if k % BETWEEN == 0:
             alive()
-        found = faces.stationary_point(center / metres, contact / metres)
+        found = faces.stationary_point(center / meters, contact / meters)
         if found is None:
             continue
-        points[k], kinds[k] = metres * found.point, 1
+        points[k], kinds[k] = meters * found.point, 1
         if found.normal is not None:
             normals[k], kinds[k] = found.normal, 2
     return points, normals, kinds

@@ -44,7 +44,7 @@ def without_kinks(model: CadModel) -> tuple[CadModel, int]:
         divide.SetSurfaceCriterion(GeomAbs_C1)
         divide.SetBoundaryCriterion(GeomAbs_C0)
         divide.SetPCurveCriterion(GeomAbs_C0)
-        divide.Perform(False)  # in the same context: neighbours get the same new vertices
+        divide.Perform(False)  # in the same context: neighbors get the same new vertices
     faces: list[CadFace] = []
     for face in model.faces:
         pieces = faces_of(context.Apply(face.shape))
@@ -67,7 +67,7 @@ def _has_kink(face: Occ) -> bool:
         fill(found, GeomAbs_C1)
         reach = ACROSS * (surface.high - surface.low)[column]
         for knot in (found.Value(k) for k in range(2, number + 1)):
-            before, after = (_normals(surface, column, knot + way * reach) for way in (-1, 1))
+            before, after = (_normals(surface, column, knot + sign * reach) for sign in (-1, 1))
             defined = before.any(axis=1) & after.any(axis=1)
             along = np.einsum("ij,ij->i", before, after)
             if (defined & (along < np.cos(TANGENT_ANGLE))).any():

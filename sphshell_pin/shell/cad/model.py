@@ -22,7 +22,7 @@ from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.shell.cad.units import HeaderUnit
 
 LARGEST = 1
-"""Which tolerance ShapeAnalysis_ShapeTolerance is to tell: the largest, not the mean."""
+"""Makes ShapeAnalysis_ShapeTolerance return the largest tolerance, not the mean."""
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,9 @@ class CadModel:
     notes: tuple[str, ...] = ()
 
     @property
-    def metres(self) -> float:
+    def meters(self) -> float:
         """Metres per unit of `shape`."""
-        return self.unit.shape_metres
+        return self.unit.shape_meters
 
     @property
     def shape(self) -> Occ:
@@ -109,7 +109,7 @@ def compound(shapes: Sequence[Occ]) -> Occ:
 
 
 def subshapes(shape: Occ, kind: Occ, avoid: Occ = None) -> Iterator[Occ]:
-    """Walk the parts of `shape` of one kind, oriented and placed as they stand in it.
+    """Iterate over the parts of `shape` of one kind, with their orientation and place in it.
 
     With `avoid`, without those inside a part of that kind.
     """
@@ -138,7 +138,7 @@ def count_open_edges(shape: Occ) -> int:
 
 
 def box_size(shape: Occ) -> float:
-    """Diagonal of the box round a shape [its units]; 0 if it is empty."""
+    """Diagonal of the box around a shape [its units]; 0 if it is empty."""
     box = Bnd_Box()
     # The quick box may be far too large: it holds the poles of the splines.
     BRepBndLib.AddOptimal_s(shape, box, False, False)

@@ -101,7 +101,7 @@ def _read_step(path: Path, data: bytes) -> CadModel:
 
 
 def _walk(label: Occ, location: Occ, parts: list[Part]) -> None:
-    """Gather the parts of an assembly, each where it stands."""
+    """Collect the parts of an assembly, each in its place."""
     if XCAFDoc_ShapeTool.IsReference_s(label):
         location = location.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label))
         referred = TDF_Label()

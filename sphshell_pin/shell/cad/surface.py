@@ -19,7 +19,7 @@ from sphshell_pin.shell.cad.units import take_unit
 from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface, area_vectors
 
 CHORD_ERROR = 1e-3
-"""Share of the box diagonal that the elements may be off the exact surface, unless said."""
+"""Share of the box diagonal that the elements may be off the exact surface, unless stated."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class CadSurface:
     @property
     def factor(self) -> float:
         """Metres per unit of the file."""
-        return self.model.unit.metres
+        return self.model.unit.meters
 
     def notes(self) -> tuple[str, ...]:
         """Sentences about what was read and how near it was met."""
@@ -71,7 +71,7 @@ class CadSurface:
             count += len(mesh.points)
         triangles = np.concatenate(corners)
         return RawSurface(
-            vertices=np.concatenate(points) * self.model.metres,
+            vertices=np.concatenate(points) * self.model.meters,
             offsets=3 * np.arange(len(triangles) + 1, dtype=np.int64),
             corners=triangles.ravel().astype(np.int32),
             normals=np.concatenate(normals).reshape(-1, 3),
@@ -132,32 +132,32 @@ def load_cad(path: Path, unit: str | None, options: CadOptions) -> CadSurface:
     """
     model = read_model(path).selected(options.bodies, options.faces)
     size = box_size(model.shape)
-    held, taken, told = take_unit(path, model.unit, unit, size)
-    notes = (*model.notes, told) if told else model.notes
+    held, taken, note = take_unit(path, model.unit, unit, size)
+    notes = (*model.notes, note) if note else model.notes
     whole = model = replace(model, unit=held, notes=notes)
     model, kinked = without_kinks(model)
     if kinked:
         note = f"{kinked} of the faces with a kink inside, divided along it"
         model = replace(model, notes=(*model.notes, note))
     chord_error = options.chord_error
-    stated = size * CHORD_ERROR if chord_error is None else chord_error / model.metres
-    sewn = sew(model, size, None if options.sew is None else options.sew / model.metres)
-    found = tessellate(sewn.shape, sewn.faces, size, stated, model.metres)
+    stated = size * CHORD_ERROR if chord_error is None else chord_error / model.meters
+    sewn = sew(model, size, None if options.sew is None else options.sew / model.meters)
+    found = tessellate(sewn.shape, sewn.faces, size, stated, model.meters)
     return CadSurface(whole, model, size, taken, sewn, found, stated)
 
 
 def _notes(surface: CadSurface) -> list[str]:
     """Say what was found about sewing and chord error."""
     model, sewn, found, stated = surface.model, surface.sewn, surface.found, surface.stated
-    metres = model.metres
+    meters = model.meters
     count = len(model.faces)
     notes = [
         f"{count} CAD face{'' if count == 1 else 's'}, tolerance of the file "
-        f"{model.tolerance * metres:.3g} m"
+        f"{model.tolerance * meters:.3g} m"
     ]
     if sewn.tolerance > 0.0:
         notes.append(
-            f"borders of faces joined within {sewn.tolerance * metres:.3g} m: open edges of the "
+            f"borders of faces joined within {sewn.tolerance * meters:.3g} m: open edges of the "
             f"faces {sewn.before} before, {sewn.after} after"
         )
     for k, mesh in enumerate(found.meshes):
@@ -172,8 +172,8 @@ def _notes(surface: CadSurface) -> list[str]:
         "faces do not meet more exactly"
     )
     notes.append(
-        f"chord error {stated * metres:.3g} m stated, {found.error * metres:.3g} m measured "
-        f"({found.interior * metres:.3g} m from the surfaces, {found.border * metres:.3g} m from "
+        f"chord error {stated * meters:.3g} m stated, {found.error * meters:.3g} m measured "
+        f"({found.interior * meters:.3g} m from the surfaces, {found.border * meters:.3g} m from "
         f"their borders): {held}"
     )
     return notes

@@ -1,4 +1,4 @@
-"""From trimmed faces to triangles within a stated distance, which is measured."""
+"""Tessellation of trimmed faces within a stated chord error, which is measured."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def sew(model: CadModel, size: float, tolerance: float | None) -> Sewn:
         if joined.IsNull():
             continue
         after = count_open_edges(joined)
-        # As they stand in the sewn shape: that may have turned them.
+        # The faces of the sewn shape, which may have reversed them.
         found = ShapeMap()
         TopExp.MapShapes_s(joined, TopAbs_FACE, found)
         rows = [found.FindIndex(sewing.ModifiedSubShape(face)) for face in faces]
@@ -115,12 +115,12 @@ def sew(model: CadModel, size: float, tolerance: float | None) -> Sewn:
 
 
 def tessellate(
-    shape: Occ, faces: tuple[Occ, ...], size: float, chord_error: float, metres: float
+    shape: Occ, faces: tuple[Occ, ...], size: float, chord_error: float, meters: float
 ) -> Tessellation:
-    """Lay triangles on all faces; refine until they are as near as asked, or no nearer.
+    """Tessellate all faces; refine until they are as near as asked, or no nearer.
 
     shape : what holds the faces; size : its diagonal; chord_error : largest distance [its units];
-    metres : per unit
+    meters : per unit
 
     Raises
     ------
@@ -129,7 +129,7 @@ def tessellate(
     InvalidShell
         If no face can be given triangles.
     """
-    _check_count(shape, faces, size, chord_error, metres)
+    _check_count(shape, faces, size, chord_error, meters)
     target = MARGIN * chord_error
     deflection = target
     best: Tessellation | None = None
@@ -203,7 +203,7 @@ def _meet(meshes: list[FaceMesh | None]) -> list[FaceMesh | None]:
 
 
 def _check_count(
-    shape: Occ, faces: tuple[Occ, ...], size: float, chord_error: float, metres: float
+    shape: Occ, faces: tuple[Occ, ...], size: float, chord_error: float, meters: float
 ) -> None:
     """Refuse what would take too many triangles, judged by how a coarse mesh bends."""
     coarse = 2e-3 * size
@@ -219,16 +219,16 @@ def _check_count(
         enough *= 1.1
     raise InvalidParameter(
         "chord_error",
-        float(f"{chord_error * metres:.6g}"),
+        float(f"{chord_error * meters:.6g}"),
         f"would take about {expected:.2g} triangles, more than {MOST_TRIANGLES:.0e}: take at "
-        f"least {enough * metres:.2g} [m]",
+        f"least {enough * meters:.2g} [m]",
     )
 
 
 def _expected(mesh: FaceMesh, chord_error: float) -> float:
     """Triangles into which those of a coarse mesh would have to be cut.
 
-    A side of length l along which the normal turns by an angle a stands off by l a / 8. One that
+    A side of length l along which the normal turns by an angle a is off by l a / 8. One that
     bends in a single direction, as on a cylinder, is cut across that alone.
     """
     ends = mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]]

@@ -14,8 +14,8 @@ from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, U
 from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
 
-MILLIMETRE = 1e-3
-"""OpenCASCADE's tolerances are meant for numbers in millimetres: STEP and IGES are read in them."""
+MILLIMETER = 1e-3
+"""OpenCASCADE's tolerances are meant for numbers in millimeters: STEP and IGES are read in them."""
 
 SAME = 1e-9
 """Units whose lengths differ by less than this share are one."""
@@ -31,13 +31,13 @@ class HeaderUnit:
     Attributes
     ----------
     names : of the units stated: none, one, or several, each applied to its own part of the file
-    metres : per unit of the file; of several, and of none, per unit of the shape
-    shape_metres : metres per unit of the shape as it was read, 1 if no unit is known
+    meters : per unit of the file; of several, and of none, per unit of the shape
+    shape_meters : meters per unit of the shape as it was read, 1 if no unit is known
     """
 
     names: tuple[str, ...]
-    metres: float
-    shape_metres: float
+    meters: float
+    shape_meters: float
 
 
 NO_UNIT = HeaderUnit((), 1.0, 1.0)
@@ -46,7 +46,7 @@ NO_UNIT = HeaderUnit((), 1.0, 1.0)
 def step_unit(model: Occ) -> HeaderUnit:
     """Return the unit in which a STEP file (StepData_StepModel) gives its lengths.
 
-    OpenCASCADE has brought the lengths to millimetres, each by the unit of its own context; where
+    OpenCASCADE has brought the lengths to millimeters, each by the unit of its own context; where
     there is none it has left them.
     """
     found: list[float] = []
@@ -58,13 +58,13 @@ def step_unit(model: Occ) -> HeaderUnit:
             continue
         factors = STEPConstruct_UnitContext()
         factors.ComputeFactors(context)
-        metres = factors.LengthFactor() * MILLIMETRE
-        if factors.LengthDone() and not any(math.isclose(metres, one) for one in found):
-            found.append(metres)
+        meters = factors.LengthFactor() * MILLIMETER
+        if factors.LengthDone() and not any(math.isclose(meters, one) for one in found):
+            found.append(meters)
     if not found:
         return NO_UNIT
-    metres = found[0] if len(found) == 1 else MILLIMETRE
-    return HeaderUnit(tuple(map(_called, found)), metres, MILLIMETRE)
+    meters = found[0] if len(found) == 1 else MILLIMETER
+    return HeaderUnit(tuple(map(_called, found)), meters, MILLIMETER)
 
 
 def iges_unit(path: Path, header: Occ) -> HeaderUnit:
@@ -75,20 +75,20 @@ def iges_unit(path: Path, header: Occ) -> HeaderUnit:
     ShellFileError
         If its flag is none that IGES has: OpenCASCADE would read everything as points.
     """
-    metres = float(header.UnitValue()) * MILLIMETRE
-    if metres == 0.0:
+    meters = float(header.UnitValue()) * MILLIMETER
+    if meters == 0.0:
         raise ShellFileError(
             path, f"states a unit of length by flag {header.UnitFlag()}, which IGES does not have"
         )
     if header.UnitFlag() == NAMED:
         return NO_UNIT
-    return HeaderUnit((_called(metres),), metres, MILLIMETRE)
+    return HeaderUnit((_called(meters),), meters, MILLIMETER)
 
 
 def take_unit(
     path: Path, header: HeaderUnit, unit: str | None, size: float
 ) -> tuple[HeaderUnit, str, str]:
-    """Return the unit that holds, its name, and a sentence about it.
+    """Return the unit that is valid, its name, and a sentence about it.
 
     unit : as stated, it wins over that of the header; size : of the shape [its units]
 
@@ -117,22 +117,22 @@ def take_unit(
             f"cannot take the place of the {len(names)} units {_listed(names)} that {path.name} "
             "states, each for its own part: leave it out",
         )
-    if math.isclose(stated, header.metres, rel_tol=SAME):
+    if math.isclose(stated, header.meters, rel_tol=SAME):
         return header, unit, f"unit '{unit}', as the file's header has it"
     # The header's factor taken back: these are the numbers of the file.
-    metres = header.shape_metres / header.metres * stated
+    meters = header.shape_meters / header.meters * stated
     note = (
         f"unit '{unit}' as stated, though the file's header says '{names[0]}': the surface "
-        f"measures {size * metres:.4g} m, not {size * header.shape_metres:.4g} m"
+        f"measures {size * meters:.4g} m, not {size * header.shape_meters:.4g} m"
     )
     warnings.warn(f"{path.name}: {note}", UnitWarning, stacklevel=2)
-    return replace(header, metres=stated, shape_metres=metres), unit, note
+    return replace(header, meters=stated, shape_meters=meters), unit, note
 
 
-def _called(metres: float) -> str:
+def _called(meters: float) -> str:
     """Name of a unit, its length if it has none."""
-    known = (name for name, one in METRES_PER_UNIT.items() if math.isclose(one, metres))
-    return next(known, f"{metres:.9g} m")
+    known = (name for name, one in METRES_PER_UNIT.items() if math.isclose(one, meters))
+    return next(known, f"{meters:.9g} m")
 
 
 def _listed(names: tuple[str, ...]) -> str:

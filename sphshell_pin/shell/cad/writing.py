@@ -33,14 +33,14 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad.model import CadModel, compound
 from sphshell_pin.shell.cad.options import BREP_SUFFIXES, STEP_SUFFIXES, Occ
-from sphshell_pin.shell.cad.units import MILLIMETRE
+from sphshell_pin.shell.cad.units import MILLIMETER
 from sphshell_pin.units import metres_per_unit
 
 if TYPE_CHECKING:
     from sphshell_pin.shell.shell import Shell
 
 MOST_FACETS = 20_000
-"""A face takes about 1 kB in a STEP file, and CAD programs choke on more of them."""
+"""A face takes about 1 kB in a STEP file, and CAD programs fail on more of them."""
 
 STEP_UNITS = {"mm": "MM", "m": "M", "cm": "CM", "in": "INCH", "ft": "FT", "km": "KM", "um": "UM"}
 IGES_UNITS = {"mm": "MM", "m": "M", "cm": "CM", "in": "IN", "ft": "FT", "km": "KM", "um": "UM"}
@@ -63,8 +63,8 @@ def parts_of(model: CadModel, whole: bool) -> list[Part]:
     ]
 
 
-def write_cad(path: Path, parts: Sequence[Part], metres: float, unit: str) -> None:
-    """Write named shapes, of `metres` per number, in the format the suffix names.
+def write_cad(path: Path, parts: Sequence[Part], meters: float, unit: str) -> None:
+    """Write named shapes, of `meters` per number, in the format the suffix names.
 
     Raises
     ------
@@ -75,14 +75,14 @@ def write_cad(path: Path, parts: Sequence[Part], metres: float, unit: str) -> No
     """
     suffix = path.suffix.lower()
     if suffix in BREP_SUFFIXES:
-        shapes = [_scaled(shape, metres / metres_per_unit(unit)) for _, shape in parts]
+        shapes = [_scaled(shape, meters / metres_per_unit(unit)) for _, shape in parts]
         done = BRepTools.Write_s(shapes[0] if len(shapes) == 1 else compound(shapes), str(path))
     else:
         names = STEP_UNITS if suffix in STEP_SUFFIXES else IGES_UNITS
         known = [name for name in names if metres_per_unit(name) == metres_per_unit(unit)]
         if not known:
             raise InvalidParameter("unit", unit, f"must be one of: {', '.join(names)}")
-        parts = [(name, _scaled(shape, metres / MILLIMETRE)) for name, shape in parts]
+        parts = [(name, _scaled(shape, meters / MILLIMETER)) for name, shape in parts]
         write = _write_step if suffix in STEP_SUFFIXES else _write_iges
         done = write(path, parts, names[known[0]])
     if not done:
@@ -106,7 +106,7 @@ def faceted(shell: Shell) -> Occ:
     builder = BRep_Builder()
     whole = TopoDS_Shell()
     builder.MakeShell(whole)
-    points = [gp_Pnt(*point) for point in (shell.vertices / MILLIMETRE).tolist()]
+    points = [gp_Pnt(*point) for point in (shell.vertices / MILLIMETER).tolist()]
     vertices = [BRepBuilderAPI_MakeVertex(point).Vertex() for point in points]
     edges: dict[tuple[int, int], Occ] = {}
     first = np.searchsorted(shell.triangle_element, np.arange(shell.num_elements))

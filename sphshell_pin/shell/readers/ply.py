@@ -1,7 +1,7 @@
 """Polygon files (.ply), text and binary.
 
 A reader of our own: trimesh refuses binary files whose elements have different numbers of corners,
-and takes truncated text files without a word.
+and accepts truncated text files.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Version 1 is `NPTS NPOLY SCALE`, the points, then polygons `n i1 .. in` with indices from 1. Version
 2 starts with a line `Version: 2`, its header is `NPTS NPOLY NNORM SCALE`, and NNORM unit normals
-follow the polygons, one per point (points repeat where normals differ). SCALE is metres per file
+follow the polygons, one per point (points repeat where normals differ). SCALE is meters per file
 unit in the files seen. Winding cannot be trusted, and counts may be written as reals.
 """
 
@@ -19,10 +19,10 @@ from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface
 from sphshell_pin.shell.readers.text import finish, pack_polygons, read_text
 
-# No two neighbours in a pattern match the same text: a long line would cost its length squared.
+# No two neighbors in a pattern match the same text: a long line would cost its length squared.
 _VERSION = re.compile(r"\s*version\s*(?:[:=]\s*)?([\d.]+)\s*$", re.IGNORECASE)
 _FORTRAN_EXPONENT = str.maketrans("dD", "eE")
-# What a line of numbers may be made of; the words a real may be spelled with are not among it.
+# The characters of a line of numbers; nan and inf are not among them.
 _NUMBERS = re.compile(r"(?=[^0-9]*[0-9])[-+0-9.eEdD\s]*$")
 _NOT_FINITE = re.compile(r"(?i)(?<![a-z])[-+]?(nan|inf|infinity)(?![a-z])")
 
@@ -37,7 +37,7 @@ class ShlSurface:
 
 
 class _Lines:
-    """Lines of a file that hold numbers only; `number` is where they stand in it (from 1)."""
+    """Lines of a file that hold numbers only; `number` is their line in it (from 1)."""
 
     def __init__(self, path: Path, rows: list[str], start: int) -> None:
         self._path = path

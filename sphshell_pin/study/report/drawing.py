@@ -54,7 +54,7 @@ def drawing(width: float, height: float) -> Iterator[Figure]:
     figure = new_figure(width, height)
     from matplotlib import rc_context
 
-    with rc_context(_STYLE):
+    with rc_context(_STYLE):  # type: ignore[arg-type]
         yield figure
 
 

@@ -1,4 +1,4 @@
-"""Is contact right on this robot? Seven checks against ways apart from the compiled core.
+"""Seven checks of contact on a robot, by computations independent of the compiled core.
 
 `check_robot` takes a name that sphshell_pin.robots knows or a URDF file, and returns a RobotReport.
 """
@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
-from typing import Any
+from os import PathLike
 
 import numpy as np
+import pinocchio as pin
 
 from sphshell_pin.checks import check_finite, check_positive
 from sphshell_pin.errors import FrameNotFound, MissingExtra, NameNotFound, SphshellError
@@ -22,9 +23,8 @@ from sphshell_pin.study.robot_check.report import (
     RobotReport,
     as_json,
     as_markdown,
+    as_table,
     remarks,
-    told,
-    write,
 )
 from sphshell_pin.study.robot_check.setting import Touch, fixed_touch, free_touch, setting_of
 
@@ -41,17 +41,16 @@ __all__ = [
     "all_names",
     "as_json",
     "as_markdown",
+    "as_table",
     "check_known",
     "check_robot",
     "contact_scene",
     "remarks",
-    "told",
-    "write",
 ]
 
 
 def check_robot(
-    robot: Any,
+    robot: str | PathLike[str] | pin.Model,
     *,
     frame: str | None = None,
     radius: float | None = None,
@@ -114,7 +113,7 @@ def check_robot(
 
 
 def contact_scene(
-    robot: Any,
+    robot: str | PathLike[str] | pin.Model,
     *,
     frame: str | None = None,
     radius: float | None = None,

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
+from sphshell_pin.robots.description import read_model
 
 # Robots that are no URDF end on these.
 _SUFFIXES = (".urdf", ".xml", ".sdf", ".xacro", ".mjcf")
@@ -25,7 +25,7 @@ class Subject:
     """A robot to check: its `name`, the LoadedRobot, and `notes` on what its file leaves open."""
 
     name: str
-    robot: Any
+    robot: robots.LoadedRobot
     shipped: str | None
     """The name under which sphshell_pin.robots knows it, or None."""
     notes: tuple[str, ...] = field(default=())
@@ -33,7 +33,7 @@ class Subject:
 
 def all_names() -> list[str]:
     """Return the names of all robots this machine has: own ones and example-robot-data's."""
-    return list(importlib.import_module("sphshell_pin.robots").names())
+    return list(robots.names())
 
 
 def is_path(robot: str) -> bool:
@@ -41,10 +41,10 @@ def is_path(robot: str) -> bool:
     return Path(robot).suffix.lower() in _SUFFIXES or "/" in robot or os.path.isfile(robot)
 
 
-def check_known(robots: Iterable[str]) -> None:
-    """Raise SphshellError for the first of `robots` that is neither a name nor a file."""
+def check_known(names: Iterable[str]) -> None:
+    """Raise SphshellError for the first of `names` that is neither a name nor a file."""
     known = all_names()
-    for robot in robots:
+    for robot in names:
         if is_path(robot):
             if not os.path.isfile(robot):
                 what = "is a folder, not a URDF file" if os.path.isdir(robot) else "no such file"
@@ -53,14 +53,13 @@ def check_known(robots: Iterable[str]) -> None:
             raise NameNotFound("robot", robot, "sphshell_pin.robots", known, "sphshell-pin list")
 
 
-def load_subject(robot: Any, *, free_flyer: bool = False) -> Subject:
+def load_subject(robot: str | PathLike[str] | pin.Model, *, free_flyer: bool = False) -> Subject:
     """Load the robot of a name or a URDF file without its meshes, or take a pinocchio.Model.
 
     Of collision geometry only the spheres are taken, which may be its fingertips. `free_flyer`
     frees the root link of a URDF file. Raises NameNotFound, and RobotError for a description that
     cannot be read.
     """
-    robots = importlib.import_module("sphshell_pin.robots")
     if isinstance(robot, pin.Model):
         if free_flyer:
             raise InvalidParameter("free_flyer", free_flyer, "is for URDF files: the model is made")
@@ -78,10 +77,10 @@ def load_subject(robot: Any, *, free_flyer: bool = False) -> Subject:
     if robot in robots.OWN:
         file = robots.URDF_FOLDER / f"{robot}.urdf"
         return _from_urdf(file, robot, robot, free_flyer=robots.OWN[robot])
-    return _from_library(robot, robots)
+    return _from_library(robot)
 
 
-def _from_library(name: str, robots: Any) -> Subject:
+def _from_library(name: str) -> Subject:
     from example_robot_data import robots_loader
 
     loader = robots_loader.ROBOTS[name]
@@ -110,11 +109,8 @@ def _from_library(name: str, robots: Any) -> Subject:
 
 
 def _from_urdf(file: Path, name: str, shipped: str | None, *, free_flyer: bool) -> Subject:
-    robots = importlib.import_module("sphshell_pin.robots")
     try:
-        model = importlib.import_module("sphshell_pin.robots.description").read_model(
-            file, free_flyer=free_flyer
-        )
+        model = read_model(file, free_flyer=free_flyer)
         tree = ET.parse(file)  # well-formed and not deep: this has been checked
     except (ValueError, RuntimeError, OSError, LookupError) as error:
         reason = " ".join(str(error).split())
@@ -147,5 +143,5 @@ def _keep_spheres(root: ET.Element) -> None:
 
 def listed(names: list[str], most: int = 4) -> str:
     """Return the names in quotes; of more than `most` the first, and how many there are."""
-    told = ", ".join(f"'{name}'" for name in names[:most])
-    return f"{told}, ... ({len(names)} of them)" if len(names) > most else told
+    text = ", ".join(f"'{name}'" for name in names[:most])
+    return f"{text}, ... ({len(names)} of them)" if len(names) > most else text

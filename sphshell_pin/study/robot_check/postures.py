@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 _SINGULAR = 1e-9
 
 
-def random_posture(model: Any, rng: np.random.Generator) -> Array:
+def random_posture(model: pin.Model, rng: np.random.Generator) -> Array:
     """Return a random configuration (nq,) within the joints' limits.
 
     Where a joint has none (or more than a turn) it lies within half a turn [rad] or half a metre of
@@ -50,7 +50,7 @@ def random_posture(model: Any, rng: np.random.Generator) -> Array:
     return q
 
 
-def massless_joints(model: Any, postures: list[Array]) -> list[str]:
+def massless_joints(model: pin.Model, postures: list[Array]) -> list[str]:
     """Return the joints to hold so that forward dynamics has an answer at one of `postures`.
 
     First those that move no mass or inertia at all; then, as long as it is needed, the last one on
@@ -73,13 +73,13 @@ def massless_joints(model: Any, postures: list[Array]) -> list[str]:
     return held
 
 
-def regularity(model: Any, data: Any, q: Array) -> float:
+def regularity(model: pin.Model, data: pin.Data, q: Array) -> float:
     """Return how far the mass matrix at q (nq,) is from singular: 0 if it is, 1 if diagonal."""
     pivots = _pivots(model, data, q)
     return float(pivots.min(initial=1.0)) if np.isfinite(pivots).all() else 0.0
 
 
-def _pivots(model: Any, data: Any, q: Array) -> Array:
+def _pivots(model: pin.Model, data: pin.Data, q: Array) -> Array:
     """Return by what ABA divides (nv,): the inertia at each joint, other joints free to yield.
 
     Relative to that with the other joints held.
@@ -90,7 +90,7 @@ def _pivots(model: Any, data: Any, q: Array) -> Array:
         return np.asarray(np.array(data.D) / held)
 
 
-def _kept(model: Any, rest: Any, q: Array) -> Array:
+def _kept(model: pin.Model, rest: Any, q: Array) -> Array:
     """Return of q (nq,) of `model` what the joints of its part `rest` have."""
     parts = [
         q[joint.idx_q : joint.idx_q + joint.nq]

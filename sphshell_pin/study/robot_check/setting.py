@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -35,7 +34,7 @@ _TRIES = 60
 class Setting:
     """A robot with its sphere: `model` without the joints that are held, the patch, and notes."""
 
-    model: Any
+    model: pin.Model
     sphere: Sphere
     shell: Shell
     notes: tuple[str, ...]
@@ -54,7 +53,7 @@ class Touch:
     q: Array
     v: Array
     speed: float
-    """Of the sphere's centre against the patch [m/s]."""
+    """Of the sphere's center against the patch [m/s]."""
     mass: float
     """That the contact feels along its normal [kg]."""
 
@@ -150,7 +149,7 @@ def free_touch(setting: Setting, rng: np.random.Generator, gap: float, speed: fl
 
 
 def meeting_posture(
-    model: Any, data: Any, setting: Setting, rng: np.random.Generator, gap: float
+    model: pin.Model, data: pin.Data, setting: Setting, rng: np.random.Generator, gap: float
 ) -> Array:
     """Return a random posture (nq,) of a `free_touch`'s model with the patch `gap` [radii] away."""
     q = random_posture(model, rng)
@@ -162,7 +161,7 @@ def meeting_posture(
     return q
 
 
-def random_torques(model: Any, q: Array, rng: np.random.Generator) -> Array:
+def random_torques(model: pin.Model, q: Array, rng: np.random.Generator) -> Array:
     """Return random torques (nv,) that move light and heavy joints alike."""
     weight = np.diag(mass_matrix(model, model.createData(), q))
     return np.asarray(np.sqrt(weight) * rng.normal(size=model.nv))
@@ -175,12 +174,12 @@ def stopping_law(mass: float, speed: float, depth: float) -> ImpactLaw:
 
 @dataclass(frozen=True)
 class _Contact:
-    """Where on the patch, and from where, the sphere meets it: all lengths in metres."""
+    """Where on the patch, and from where, the sphere meets it: all lengths in meters."""
 
     normal: Array
     """In the world, from the patch to the sphere (3,)."""
     gap: float
-    spot: Any
+    place: pin.SE3
     """SE3 in the patch: origin at the place, z along its normal, turned at random."""
     radius: float
 
@@ -191,18 +190,20 @@ class _Contact:
         askew = rng.normal(size=3)
         askew -= (askew @ way) * way
         normal = -way + rng.uniform(0.1, 0.5) * askew / np.linalg.norm(askew)
-        place = rng.uniform(-0.25, 0.25, 2) * _HALF * radius
-        z, up = _wave(place[0], place[1], radius)
+        xy = rng.uniform(-0.25, 0.25, 2) * _HALF * radius
+        z, up = _wave(xy[0], xy[1], radius)
         turn = _frame_along(up) @ pin.AngleAxis(rng.uniform(0, 2 * np.pi), np.eye(3)[2]).matrix()
-        spot = pin.SE3(turn, np.array([*place, z]))
-        return cls(normal / np.linalg.norm(normal), gap * radius, spot, radius)
+        place = pin.SE3(turn, np.array([*xy, z]))
+        return cls(normal / np.linalg.norm(normal), gap * radius, place, radius)
 
-    def pose(self, model: Any, data: Any, sphere: Sphere) -> Any:
+    def pose(self, model: pin.Model, data: pin.Data, sphere: Sphere) -> pin.SE3:
         """Return where the patch is in the world (SE3)."""
         point = self._point(model, data, sphere)[1]
-        return pin.SE3(_frame_along(self.normal), point) * self.spot.inverse()
+        return pin.SE3(_frame_along(self.normal), point) * self.place.inverse()
 
-    def mass(self, model: Any, data: Any, q: Array, sphere: Sphere, other: int = 0) -> float:
+    def mass(
+        self, model: pin.Model, data: pin.Data, q: Array, sphere: Sphere, other: int = 0
+    ) -> float:
         """Return the mass [kg] that the contact feels along its normal, against joint `other`."""
         joint, point = self._point(model, data, sphere)
         pin.computeJointJacobians(model, data, q)
@@ -211,15 +212,15 @@ class _Contact:
         half = np.triu(np.asarray(pin.computeMinverse(model, data, q)).reshape(len(row), len(row)))
         return 1.0 / float(row @ (half + np.triu(half, 1).T) @ row)
 
-    def _point(self, model: Any, data: Any, sphere: Sphere) -> tuple[int, Array]:
+    def _point(self, model: pin.Model, data: pin.Data, sphere: Sphere) -> tuple[int, Array]:
         joint, center = center_of(model, data, sphere)
         return joint, center - (self.radius + self.gap) * self.normal
 
 
 def _motion(
-    model: Any, sphere: Sphere, rng: np.random.Generator, speed: float
+    model: pin.Model, sphere: Sphere, rng: np.random.Generator, speed: float
 ) -> tuple[Array, Array, Array]:
-    """Return q, v and the direction (3,) in which the sphere's centre moves with `speed` [m/s]."""
+    """Return q, v and the direction (3,) in which the sphere's center moves with `speed` [m/s]."""
     data = model.createData()
     # A posture where two axes are nearly one is legal, but its accelerations run away: a last way.
     for wanted in (1e-3, 1e-4, 1e-9):
@@ -251,11 +252,12 @@ def _law(mass: float, speed: float, radius: float) -> tuple[NormalLaw, CoulombFr
     return law, CoulombFriction(0.3, 0.2, 0.2 * speed, speed)
 
 
-def _floating(model: Any, sphere: Sphere) -> Any:
+def _floating(model: pin.Model, sphere: Sphere) -> pin.Model:
     """Return the robot with a free root, and a free plate, without gravity.
 
     Of its frames only that of the sphere is kept. The links that are fixed to the world are not in
-    a model: a lump as heavy as the rest stands for them.
+    a model: a body as heavy as the rest stands for them. pinocchio.appendModel refuses models with
+    two frames of one name, or with limits that exclude everything.
     """
     whole = pin.Model()
     whole.gravity.vector = np.zeros(6)
@@ -287,11 +289,11 @@ def _floating(model: Any, sphere: Sphere) -> Any:
     return whole
 
 
-def _flies(joint: Any) -> bool:
+def _flies(joint: pin.JointModel) -> bool:
     return bool(joint.shortname() == "JointModelFreeFlyer")
 
 
-def _add_free(model: Any, name: str, inertia: Any) -> int:
+def _add_free(model: pin.Model, name: str, inertia: pin.Inertia) -> int:
     """Add a free body called `name`, with a frame; return its joint."""
     joint = int(model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name))
     model.addJointFrame(joint)
@@ -299,7 +301,7 @@ def _add_free(model: Any, name: str, inertia: Any) -> int:
     return joint
 
 
-def _wave(x: Any, y: Any, radius: float) -> tuple[Any, Any]:
+def _wave(x: Array, y: Array, radius: float) -> tuple[Array, Array]:
     """Return the height of the patch at x, y [m], and its unit normal, pointing up."""
     k = 2.0 * np.pi / (_WAVE * radius)
     z = 0.5 * _HEIGHT * radius * (np.sin(k * x) + np.cos(k * y))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -26,7 +24,11 @@ _FEWEST = 4.0
 
 
 def find_sphere(
-    subject: Subject, model: Any, rng: np.random.Generator, frame: str | None, radius: float | None
+    subject: Subject,
+    model: pin.Model,
+    rng: np.random.Generator,
+    frame: str | None,
+    radius: float | None,
 ) -> tuple[Tip, list[str]]:
     """Return the sphere to check with, and a note where its place is a guess.
 
@@ -59,8 +61,8 @@ def _sphere(tip: Tip, shift: Array | float = 0.0) -> Sphere:
     return Sphere(tip.radius, tip.frame, tuple(np.array(tip.offset) + shift))
 
 
-def _lever(model: Any, sphere: Sphere, rng: np.random.Generator) -> float:
-    """Return the farthest that a joint moves the sphere's centre [m/rad or m/m], of some postures.
+def _lever(model: pin.Model, sphere: Sphere, rng: np.random.Generator) -> float:
+    """Return the farthest that a joint moves the sphere's center [m/rad or m/m], of some postures.
 
     Of a joint that slides, which moves it as far as one likes, it is 1.
     """
@@ -74,7 +76,7 @@ def _lever(model: Any, sphere: Sphere, rng: np.random.Generator) -> float:
     return longest
 
 
-def _longest_limb(model: Any) -> str:
+def _longest_limb(model: pin.Model) -> str:
     """Return the last frame of the limb with most joints; of equal ones that which reaches most."""
     depth, reach = np.zeros(model.njoints, int), np.zeros(model.njoints)
     for j in range(1, model.njoints):
@@ -90,7 +92,7 @@ def _longest_limb(model: Any) -> str:
     return str(model.frames[best].name)
 
 
-def _reach(model: Any) -> float:
+def _reach(model: pin.Model) -> float:
     """Return the length of the longest chain of joint placements [m]."""
     reach = np.zeros(model.njoints)
     for j in range(1, model.njoints):
@@ -99,7 +101,7 @@ def _reach(model: Any) -> float:
     return float(reach.max())
 
 
-def moved_sphere(model: Any, tip: Tip, rng: np.random.Generator) -> tuple[Sphere, list[str]]:
+def moved_sphere(model: pin.Model, tip: Tip, rng: np.random.Generator) -> tuple[Sphere, list[str]]:
     """Return the sphere, moved off its frame if no joint moves that frame's origin."""
     shift = 10.0 * tip.radius
     for offset in (np.zeros(3), *(shift * np.eye(3))):
@@ -112,15 +114,15 @@ def moved_sphere(model: Any, tip: Tip, rng: np.random.Generator) -> tuple[Sphere
     )
 
 
-def center_of(model: Any, data: Any, sphere: Sphere) -> tuple[int, Array]:
-    """Return the joint that carries the sphere, and its centre (3,) in the world; `data` is set."""
+def center_of(model: pin.Model, data: pin.Data, sphere: Sphere) -> tuple[int, Array]:
+    """Return the joint that carries the sphere, and its center (3,) in the world; `data` is set."""
     frame = find_frame(model, sphere.frame)
     return int(model.frames[frame].parentJoint), np.array(
         data.oMf[frame].act(np.array(sphere.offset))
     )
 
 
-def placed_data(model: Any, q: Array, data: Any = None) -> Any:
+def placed_data(model: pin.Model, q: Array, data: pin.Data | None = None) -> pin.Data:
     """Return `data` (new ones are dear for large models) with the frames' placements at q (nq,)."""
     data = model.createData() if data is None else data
     pin.framesForwardKinematics(model, data, q)

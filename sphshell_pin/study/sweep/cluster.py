@@ -9,15 +9,16 @@ import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import Any, TypeAlias
 
 from sphshell_pin.errors import InvalidParameter, SweepError
 from sphshell_pin.study.sweep.job import FAILED, Job, Outcome, Run, need
 from sphshell_pin.study.sweep.local import KILLED
 from sphshell_pin.study.sweep.worker import run_one
 
-if TYPE_CHECKING:
-    from distributed import Client, Future
+# Classes of distributed, most of which has no types.
+Client: TypeAlias = Any
+Future: TypeAlias = Any
 
 # So many runs are with the scheduler at a time: enough for any cluster, few enough to keep track.
 _AHEAD = 1000

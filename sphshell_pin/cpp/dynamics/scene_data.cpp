@@ -1,11 +1,11 @@
-#include "dynamics/scene.hpp"
+#include "dynamics/scene_data.hpp"
 
 #include <algorithm>
 #include <utility>
 
 namespace sphshell {
 
-Scene::Scene(const pinocchio::Model& model, std::vector<Pair> pairs)
+SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs)
     : body_(model),
       pairs_(std::move(pairs)),
       queries_(pairs_.size(), Query(true)),
@@ -31,27 +31,27 @@ Scene::Scene(const pinocchio::Model& model, std::vector<Pair> pairs)
   active_.reserve(64);
 }
 
-void Scene::change(std::vector<Pair> pairs) {
+void SceneData::change(std::vector<Pair> pairs) {
   pairs_ = std::move(pairs);
   for (const Pair& pair : pairs_) needs_velocity_ = needs_velocity_ || pair.needs_velocity();
 }
 
-void Scene::need_velocity_of(int joint) {
+void SceneData::need_velocity_of(int joint) {
   body_.need(joint);
   needs_velocity_ = true;
 }
 
-void Scene::restart() {
+void SceneData::restart() {
   for (ContactTracker& tracker : trackers_) tracker.restart();
   for (Excursion& excursion : excursions_) excursion.moved = 0, excursion.touched = false;
 }
 
-void Scene::want_dn_dc() {
+void SceneData::want_dn_dc() {
   for (std::size_t k = 0; k < pairs_.size(); ++k)
     if (pairs_[k].has_dn_dc()) queries_[k].want_dn_dc();
 }
 
-void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool identify) {
+void SceneData::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool identify) {
   active_.clear();
   if (needs_velocity_)
     body_.kinematics(q, v);
@@ -64,11 +64,11 @@ void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool 
     state.world_from_j = body_.world_from(pair.joint_j, pair.placement_j);
     std::vector<Contact>& contacts = find_contacts(k);
     Excursion& excursion = excursions_[k];
-    excursion.moved = std::max(excursion.moved, (state.centre - excursion.from).norm());
+    excursion.moved = std::max(excursion.moved, (state.center - excursion.from).norm());
     excursion.touched = excursion.touched || !contacts.empty();
     ContactTracker& tracker = trackers_[k];
     if (!contacts.empty() && (identify || tracker.deep() || pair.friction.has_state())) {
-      const std::vector<int>& at = tracker.match(contacts, state.centre, pair.radius);
+      const std::vector<int>& at = tracker.match(contacts, state.center, pair.radius);
       for (std::size_t i = 0; i < contacts.size(); ++i)
         add_contact(k, contacts[i], bristles_.slot(k, at[i]), tracker.places()[at[i]].number);
       state.pushed_through = tracker.pushed_through();
@@ -80,19 +80,19 @@ void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool 
   compute_forces(z);
 }
 
-void Scene::revisit(const VectorX& q, const VectorX& v, const VectorX& z) {
+void SceneData::revisit(const VectorX& q, const VectorX& v, const VectorX& z) {
   if (active_.empty()) return;
   if (needs_velocity_) body_.kinematics(q, v);
   compute_forces(z);
 }
 
-void Scene::accept(VectorX& z) {
+void SceneData::accept(VectorX& z) {
   bristles_.begin();
   std::size_t next = 0;
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     std::vector<Contact>& contacts = queries_[k].contacts;
-    const Vec3& center = states_[k].centre;
+    const Vec3& center = states_[k].center;
     excursions_[k].from = center;
     ContactTracker& tracker = trackers_[k];
     if (contacts.empty() && tracker.places().empty()) {
@@ -119,7 +119,7 @@ void Scene::accept(VectorX& z) {
   compute_forces(z);
 }
 
-std::vector<Contact>& Scene::find_contacts(std::size_t k) {
+std::vector<Contact>& SceneData::find_contacts(std::size_t k) {
   const Pair& pair = pairs_[k];
   PairState& state = states_[k];
   Query& query = queries_[k];
@@ -132,24 +132,24 @@ std::vector<Contact>& Scene::find_contacts(std::size_t k) {
       contact.point = state.world_from_j.actInv(contact.point);
       contact.normal = state.world_from_j.rotation().transpose() * contact.normal;
     }
-    state.centre.setZero();
+    state.center.setZero();
     return query.contacts;
   }
   const Vec3& center = pair.placement_i.translation();
-  state.centre = state.world_from_j.actInv(
+  state.center = state.world_from_j.actInv(
       pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
-  query.find(*pair.shell, state.centre, pair.radius, pair.method);
+  query.find(*pair.shell, state.center, pair.radius, pair.method);
   // Friction belongs to a place, and its spring should not be split and merged at every border
   // between elements: contacts that are nearly one are one. The elastic energy is that of their
   // depths' sum, off by the square of the depths' difference, 1e-4 at most.
   if (pair.friction.active() && query.contacts.size() > 1) {
-    merge_places(query.contacts, state.centre, pair.radius, merged_);
+    merge_places(query.contacts, state.center, pair.radius, merged_);
     query.contacts.swap(merged_);
   }
   return query.contacts;
 }
 
-void Scene::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {
+void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {
   ActiveContact& active = active_.emplace_back();
   active.pair = static_cast<int>(k);
   active.slot = slot;
@@ -157,7 +157,7 @@ void Scene::add_contact(std::size_t k, const Contact& contact, int slot, int con
   active.contact = contact;
 }
 
-void Scene::compute_forces(const VectorX& z) {
+void SceneData::compute_forces(const VectorX& z) {
   powers_ = Powers();
   bristle_rates_.setZero(bristle_size());
   touching_ = !active_.empty();
@@ -171,10 +171,10 @@ void Scene::compute_forces(const VectorX& z) {
   }
 }
 
-void Scene::compute_kinematics(ActiveContact& active, const VectorX& z) {
+void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
   const SE3& world_from_j = states_[active.pair].world_from_j;
-  Meeting<double>& m = active.meeting;
+  ContactKinematics<double>& m = active.kinematics;
   active.point = world_from_j.act(active.contact.point);
   m.depth = active.contact.depth;
   m.normal = world_from_j.rotation() * active.contact.normal;
@@ -186,10 +186,10 @@ void Scene::compute_kinematics(ActiveContact& active, const VectorX& z) {
   if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
 }
 
-void Scene::compute_force(ActiveContact& active, const VectorX& z) {
+void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
   active.force =
-      contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), active.meeting);
+      contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), active.kinematics);
   if (active.slot < 0) return;
   const auto& rotation = states_[active.pair].world_from_j.rotation();
   const int at = 3 * active.slot;
@@ -198,22 +198,22 @@ void Scene::compute_force(ActiveContact& active, const VectorX& z) {
 }
 
 // How fast a stretch turns with the normal, in the shell's frame.
-Vec3 Scene::rate_of_turning(const ActiveContact& active, const Vec3& stretch) const {
+Vec3 SceneData::rate_of_turning(const ActiveContact& active, const Vec3& stretch) const {
   const Pair& pair = pairs_[active.pair];
   if (!pair.has_dn_dc()) return Vec3::Zero();
   const PairState& state = states_[active.pair];
   const Vec3 center_rate = state.world_from_j.rotation().transpose() *
-                           relative_velocity(pair, state.world_from_j.act(state.centre));
+                           relative_velocity(pair, state.world_from_j.act(state.center));
   const Contact& contact = active.contact;
   const Vec3 normal_rate = contact.dn_dc * center_rate / contact.weight;
   return contact.normal.cross(normal_rate).cross(stretch);
 }
 
 // Adds a contact to the forces on the joints and to the sums of its pair.
-void Scene::add_force(const ActiveContact& active) {
+void SceneData::add_force(const ActiveContact& active) {
   const Pair& pair = pairs_[active.pair];
   const ContactForce<double>& f = active.force;
-  const Meeting<double>& m = active.meeting;
+  const ContactKinematics<double>& m = active.kinematics;
   const double weight = active.contact.weight;
   const Vec3 force = weight * (f.normal * m.normal + f.friction);
   const Vec3 moment = weight * f.torsion * m.normal;
@@ -234,8 +234,8 @@ void Scene::add_force(const ActiveContact& active) {
     powers_.bristles += 0.5 * share * pair.friction.bristle()->stiffness * f.bristle.squaredNorm();
 }
 
-void Scene::apply(int joint, const Vec3& point_world, const Vec3& force_world,
-                  const Vec3& moment_world) {
+void SceneData::apply(int joint, const Vec3& point_world, const Vec3& force_world,
+                      const Vec3& moment_world) {
   if (joint == 0) return;  // the world does not move
   const SE3& pose = body_.world_from_joint(joint);
   const Vec3 force = pose.rotation().transpose() * force_world;
@@ -244,13 +244,13 @@ void Scene::apply(int joint, const Vec3& point_world, const Vec3& force_world,
       pose.actInv(point_world).cross(force) + pose.rotation().transpose() * moment_world;
 }
 
-Vec3 Scene::relative_velocity(const Pair& pair, const Vec3& point_world) const {
+Vec3 SceneData::relative_velocity(const Pair& pair, const Vec3& point_world) const {
   return body_.velocity_at(pair.joint_i, point_world) -
          body_.velocity_at(pair.joint_j, point_world);
 }
 
 // Contacts of one place as one, with the sum of their forces.
-void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows) {
+void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows) {
   if (active_.empty()) return;
   if (!needs_velocity_) body_.kinematics(q, v);
   const auto write = [](double* to, const Vec3& x) { std::copy_n(x.data(), 3, to); };
@@ -261,7 +261,7 @@ void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& row
     if (!leads(contacts, i - begin)) continue;
     const Pair& pair = pairs_[active.pair];
     const PairState& state = states_[active.pair];
-    const Contact whole = whole_of(contacts, i - begin, state.centre, pair.radius);
+    const Contact whole = whole_of(contacts, i - begin, state.center, pair.radius);
     const Vec3 point = state.world_from_j.act(whole.point);
     const Vec3 normal = state.world_from_j.rotation() * whole.normal;
     Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
@@ -270,7 +270,7 @@ void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& row
     for (std::size_t k = first; k < last; ++k) {
       if (k != first && contacts[k].place != whole.place) continue;
       const ActiveContact& other = active_[begin + k];
-      push += other.contact.weight * other.force.normal * other.meeting.normal;
+      push += other.contact.weight * other.force.normal * other.kinematics.normal;
       friction += other.contact.weight * other.force.friction;
     }
     const Vec3 relative = relative_velocity(pair, point);
@@ -288,7 +288,7 @@ void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& row
   }
 }
 
-const VectorX& Scene::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
+const VectorX& SceneData::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
   return touching_ ? body_.acceleration(q, v, tau, external_) : body_.acceleration(q, v, tau);
 }
 
