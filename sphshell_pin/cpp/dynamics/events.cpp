@@ -57,7 +57,7 @@ void Events::measure(std::size_t k, double margin, Gauges& out) {
   }
   for (const ActiveContact& active : scene_.active()) {
     if (active.pair != static_cast<int>(k)) continue;
-    const Meeting<double>& m = active.meeting;
+    const ContactKinematics<double>& m = active.kinematics;
     // Laws are linear in the rate: the force against the opposite rate is 2 elastic - unclamped.
     const auto opposed = pair.law.force(m.depth, -m.normal.dot(m.relative));
     out[Clamp].push_back(active.force.normal > 0 ? -active.force.normal
