@@ -87,11 +87,8 @@ double Guard::path(SceneData& scene, std::size_t k, const State& from, const Sta
     u_ = share * h * (from.v + 0.5 * share * (to.v - from.v));
     body.integrate(from.q, u_, q_);
     body.kinematics(q_);
-    SE3 shell = pair.placement_j;
-    if (pair.joint_j != 0) shell = body.world_from_joint(pair.joint_j) * shell;
-    Vec3 center = pair.placement_i.translation();
-    if (pair.joint_i != 0) center = body.world_from_joint(pair.joint_i).act(center);
-    center = shell.actInv(center);
+    const Vec3 center = body.world_from(pair.joint_j, pair.placement_j)
+                            .actInv(body.world_from(pair.joint_i, pair.placement_i).translation());
     length += (center - last).norm();
     last = center;
   }
