@@ -163,7 +163,7 @@ def draft_text(
     elif robot.start:
         text += _POSTURE
         text += "".join(f"{_key(joint)} = {_toml(q)}\n" for joint, q in robot.start.items())
-    primitive = None if shell.primitive is None else shell.primitive.model_dump()
+    primitive = shell.model_dump()["primitive"]
     text += _fill(_SHELL, shell=shell, primitive=primitive)
     if plan.root is None:
         angles = np.rad2deg(pin.rpy.matrixToRpy(plan.placement.rotation))

@@ -7,7 +7,6 @@ import importlib
 import os
 import re
 import tomllib
-import types
 import typing
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
@@ -15,15 +14,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.errors import NameNotFound, ScenarioError
-from sphshell_pin.parameters import Ingredient, parameters_of
-from sphshell_pin.scenario.schema import LISTS, STEPPING, OneOf, RunSection, Scenario
+from sphshell_pin.parameters import parameters_of
+from sphshell_pin.scenario.schema import LISTS, STEPPING, RunSection, Scenario
 
-# Pydantic's names of this fault in a model and in a dataclass.
-UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 TOO_DEEP = "is not valid TOML: its tables or lists are nested too deeply"
 # A key of a hundred parts: the time and memory of tomllib grow with their square.
 _LONG_KEY = re.compile(r"""(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""")
@@ -270,7 +266,7 @@ def _spelt_out(node: Any, head: str) -> str:
 
 def _keys_of(table: str) -> Iterable[str]:
     """Return the keys that a table of a list of LISTS may have."""
-    (section,) = _arguments(Scenario.model_fields[table].annotation)
+    (section,) = typing.get_args(Scenario.model_fields[table].annotation)
     return section.model_fields  # type: ignore[no-any-return]
 
 
@@ -282,126 +278,41 @@ def _explain(
     error: ValidationError, path: str | PathLike[str], data: Mapping[str, Any]
 ) -> ScenarioError:
     """Turn the first of pydantic's complaints into one sentence with the valid choices."""
-    # An unknown key often hides a missing one ("stifness" for "stiffness"): it is told first.
-    details = sorted(error.errors(), key=lambda one: one["type"] not in UNKNOWN_KEY)
+    details = sorted(error.errors(), key=lambda one: one["type"] != "unknown_key")
     first = details[0]
-    key, section = _locate(first["loc"], data)
-    reason, value = _reason(first, section)
+    kind, context, value = first["type"], first.get("ctx", {}), first["input"]
+    loc = first["loc"]
+    if kind == "unknown_key":
+        loc, value = (*loc, context["key"]), context["value"]
+    reason = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    reason = reason[:1].lower() + reason[1:]
+    if kind == "missing":
+        reason, value = "is missing", None
+    elif kind in ("model_type", "dataclass_type"):
+        reason = "must be a table { key = value, ... }"
     if len(details) > 1:
         reason += f" (and {len(details) - 1} more: first repair this one)"
-    return ScenarioError(path, key, reason, value)
+    if kind not in ("model_type", "dataclass_type", "unknown_key"):
+        value = value if isinstance(value, str | int | float | bool) else None
+    return ScenarioError(path, _key_at(loc, data, ends=kind == "missing"), reason, value)
 
 
-def _reason(detail: ErrorDetails, section: type[BaseModel] | None) -> tuple[str, object]:
-    kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
-    if kind in UNKNOWN_KEY and section is not None:
-        valid = list(_types_of(section))
-        near = difflib.get_close_matches(str(detail["loc"][-1]), valid, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        return f"unknown key; {hint}valid keys: {_listed(valid)}", value
-    if kind == "union_tag_invalid":
-        return f"unknown type '{context['tag']}'; valid types: {context['expected_tags']}", None
-    if kind == "union_tag_not_found":
-        return f"type is missing; valid types: {_listed(_tags(detail['loc']))}", None
-    if kind == "missing":
-        return "is missing", None
-    if kind in ("model_type", "dataclass_type"):
-        return "must be a table { key = value, ... }", value
-    message = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
-    plain = value if isinstance(value, str | int | float | bool) else None
-    return message[:1].lower() + message[1:], plain
+def _key_at(loc: Sequence[int | str], data: object, *, ends: bool) -> str:
+    """Return the dotted key of a pydantic location in `data`; `ends`: its last part is missing.
 
-
-def _locate(
-    loc: Iterable[int | str], data: Mapping[str, Any]
-) -> tuple[str, type[BaseModel] | None]:
-    """Return the dotted key of a pydantic location in `data`, and the section of its last part."""
-    key, section, annotation = "", None, Scenario
-    here: Any = annotation
-    for part in loc:
-        tagged = _by_tag(here)
-        if isinstance(part, str) and part in tagged:
-            here = tagged[part]
-            continue
+    Other names that `data` does not have are those of the branches of a union.
+    """
+    key, node = "", data
+    for k, part in enumerate(loc):
         if isinstance(part, int):
-            items = data[key] if key in LISTS else ()
-            items = [items] if isinstance(items, Mapping) else items
+            items = node if isinstance(node, list) else [node]
             key = item_key(key, items, part) if part < len(items) else f"{key}[{part}]"
-            here = next(iter(_arguments(here)), None)
-            continue
-        models = [one for one in _members(here) if _is_section(one)]
-        if models:
-            section = models[0]
-            key += f".{part}" if key else part
-            here = _types_of(section).get(part)
-            continue
-        members = [one for one in _members(here) if one is not type(None)]
-        if len(members) > 1:
-            # Pydantic's own name for a branch of a union is no key of the file.
-            branch = str(part).split("[", maxsplit=1)[0]
-            here = next((m for m in members if m.__name__ == branch), None)
-            continue
-        tables = [one for one in _members(here) if typing.get_origin(one) is dict]
-        if tables:
-            key += f'."{part}"' if "." in part else f".{part}"
-            here = typing.get_args(tables[0])[1]
-            section = None
-    return key, section
-
-
-def _tags(loc: Iterable[int | str]) -> list[str]:
-    """Return the valid types at a location that gave none."""
-    here: Any = Scenario
-    for part in loc:
-        if isinstance(part, int):
-            here = next(iter(_arguments(here)), None)
-        elif _by_tag(here).get(str(part)) is not None:
-            here = _by_tag(here)[str(part)]
-        else:
-            section = next((one for one in _members(here) if _is_section(one)), None)
-            here = None if section is None else _types_of(section).get(str(part))
-    return list(_by_tag(here))
-
-
-def _by_tag(annotation: object) -> dict[str, type]:
-    """Return what a table may be, by its key `type`."""
-    found: dict[str, type] = {}
-    for one in _members(annotation):
-        if _is_section(one) and issubclass(one, Ingredient):
-            found[one.kind] = one
-        elif _is_section(one) and "type" in one.model_fields:
-            for tag in typing.get_args(one.model_fields["type"].annotation):
-                found[str(tag)] = one
-    return found
-
-
-def _is_section(annotation: object) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel | Ingredient)
-
-
-def _types_of(section: type) -> dict[str, object]:
-    """Return the types of the keys of a table."""
-    if issubclass(section, BaseModel):
-        return {k: field.rebuild_annotation() for k, field in section.model_fields.items()}
-    types = typing.get_type_hints(section)
-    return {name: types[name] for name in parameters_of(section)}
-
-
-def _members(annotation: Any) -> list[Any]:
-    """Return what a union may be, whatever it is wrapped in."""
-    origin = typing.get_origin(annotation)
-    if origin is typing.Annotated:
-        whole, *notes = typing.get_args(annotation)
-        families = [note.family for note in notes if isinstance(note, OneOf)]
-        return list(families[0].kinds.values()) if families else _members(whole)
-    if origin in (typing.Union, types.UnionType):
-        return [inner for one in typing.get_args(annotation) for inner in _members(one)]
-    return [annotation]
-
-
-def _arguments(annotation: Any) -> list[Any]:
-    lists = [one for one in _members(annotation) if typing.get_origin(one) is list]
-    return [typing.get_args(one)[0] for one in lists]
+            node = items[part] if part < len(items) else None
+        elif isinstance(node, Mapping) and (part in node or (ends and k == len(loc) - 1)):
+            name = f'"{part}"' if "." in part else part
+            key = f"{key}.{name}" if key else name
+            node = node.get(part)
+    return key
 
 
 def _listed(names: Iterable[str]) -> str:

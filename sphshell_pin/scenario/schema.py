@@ -7,30 +7,17 @@ them when it stands alone, `robot/name` as soon as there are several robots.
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-import operator
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypedDict, Unpack
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-import coal
-import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
-    BeforeValidator,
     ConfigDict,
-    Discriminator,
     Field,
-    GetCoreSchemaHandler,
-    PlainSerializer,
-    SerializationInfo,
-    Tag,
     create_model,
     model_validator,
 )
-from pydantic_core import CoreSchema
 
 from sphshell_pin.contact import Friction as FrictionLaw
 from sphshell_pin.contact import NormalLaw
@@ -39,11 +26,9 @@ from sphshell_pin.dynamics import controllers
 from sphshell_pin.dynamics.controllers import NoController
 from sphshell_pin.dynamics.integrators import Adaptive, Integrator, SemiImplicitEuler
 from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
-from sphshell_pin.shell import Shell
+from sphshell_pin.scenario.primitives import Primitive
+from sphshell_pin.scenario.tables import OneOf, Positive, Vector3, refuse_unknown_keys
 
-Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Lengths3 = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 LISTS = ("robot", "shell", "contact", "source", "knob")
 """Tables of which there may be several."""
 
@@ -56,61 +41,13 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-
-@dataclass(frozen=True)
-class OneOf:
-    """Annotation of a table that states one of a `family`; its key `type` says which."""
-
-    family: type[Ingredient]
-
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Build what reads and writes such tables."""
-        members = [
-            Annotated[kind, BeforeValidator(_without_type(kind)), Tag(name)]
-            for name, kind in self.family.kinds.items()
-        ]
-        either = functools.reduce(operator.or_, members)
-        return handler.generate_schema(
-            Annotated[either, Discriminator(_kind_of), PlainSerializer(_to_table)]
-        )
-
-
-def _kind_of(value: object) -> str | None:
-    kind = value.get("type") if isinstance(value, Mapping) else getattr(value, "kind", None)
-    return kind if isinstance(kind, str) else None
-
-
-def _without_type(kind: type[Ingredient]) -> Callable[[object], object]:
-    """Return what takes the key `type` off a table, and refuses fields that no file may state."""
-
-    def check(value: object) -> object:
-        if not isinstance(value, Mapping):
-            return value
-        known = parameters_of(kind)
-        for key in value:
-            if key in kind.__dataclass_fields__ and key not in known:
-                raise ValueError(f"unknown key '{key}'; valid keys: {', '.join(known)}")
-        return {k: v for k, v in value.items() if k != "type"}
-
-    return check
-
-
-def _to_table(value: Ingredient, info: SerializationInfo) -> dict[str, object]:
-    """Return the table that states `value`, without defaults where these may be left out."""
-    table: dict[str, object] = {"type": value.kind}
-    for one in dataclasses.fields(value):
-        given = getattr(value, one.name)
-        if one.name in parameters_of(value) and not (info.exclude_unset and given == one.default):
-            table[one.name] = _plain(given)
-    return table
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    return dict(value) if isinstance(value, Mapping) else value
+    @model_validator(mode="before")
+    @classmethod
+    def check_keys(cls, data: object) -> object:
+        """Refuse an unknown key first: it often hides a missing one ("stifness")."""
+        if isinstance(data, Mapping):
+            refuse_unknown_keys(data, list(cls.model_fields))
+        return data
 
 
 class Placement(Section):
@@ -144,79 +81,6 @@ class RobotSection(Section):
         return self
 
 
-class ShellOptions(TypedDict):
-    """What a shell of a primitive takes besides its sizes."""
-
-    chord_error: float | None
-    segments: int | None
-    side: str
-    crease_angle: float
-    name: str
-
-
-class Box(Section):
-    """A box of edge lengths `size` [m], centered."""
-
-    type: Literal["box"]
-    size: Lengths3
-
-    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
-        """Return its surface."""
-        return Shell.from_geometry(coal.Box(*self.size), **options)
-
-
-class SphereSurface(Section):
-    """A ball's surface [m], centered."""
-
-    type: Literal["sphere"]
-    radius: Positive
-
-    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
-        """Return its surface."""
-        return Shell.from_geometry(coal.Sphere(self.radius), **options)
-
-
-class RoundSolid(Section):
-    """A cylinder, a cone, or a capsule (`length` without its caps) along z [m], centered."""
-
-    type: Literal["cylinder", "capsule", "cone"]
-    radius: Positive
-    length: Positive
-
-    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
-        """Return its surface."""
-        kinds = {"cylinder": coal.Cylinder, "capsule": coal.Capsule, "cone": coal.Cone}
-        return Shell.from_geometry(kinds[self.type](self.radius, self.length), **options)
-
-
-class Ellipsoid(Section):
-    """An ellipsoid of the three half axes `radii` [m], centered."""
-
-    type: Literal["ellipsoid"]
-    radii: Lengths3
-
-    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
-        """Return its surface."""
-        return Shell.from_geometry(coal.Ellipsoid(*self.radii), **options)
-
-
-class HalfSpace(Section):
-    """A square of edge length `extent` [m] in the plane z = 0, facing +z."""
-
-    type: Literal["half-space"]
-    extent: Positive = 10.0
-
-    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
-        """Return its surface."""
-        plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-        return Shell.from_geometry(plane, extent=self.extent, **options)
-
-
-Primitive = Annotated[
-    Box | SphereSurface | RoundSolid | Ellipsoid | HalfSpace, Field(discriminator="type")
-]
-
-
 class ShellSection(Section):
     """A surface: a file beside the scenario, or a primitive."""
 
@@ -224,7 +88,7 @@ class ShellSection(Section):
     file: str | None = None
     unit: str | None = None
     scale: Literal["apply", "ignore"] | Positive | None = None
-    primitive: Primitive | None = None
+    primitive: Annotated[Primitive, OneOf(Primitive)] | None = None
     chord_error: Positive | None = None
     bodies: Annotated[list[str], Field(min_length=1)] | None = None
     faces: Annotated[list[str | int], Field(min_length=1)] | None = None
