@@ -181,7 +181,7 @@ def draft_text(
         text += _fill(template, contact=plan.contact, **friction)
     control, mean_force = plan.control, None
     if isinstance(control, Press):
-        path = _rounded(control.way, digits)
+        path = _rounded(control.path, digits)
         text += _fill(_PRESS, tip=plan.tips[0], shell=shell, path=path, press=control)
         if control.even:
             mean_force = {"value": control.force, "rtol": 0.15, "atol": 0.03}

@@ -1,4 +1,4 @@
-"""A scenario file on its way to a Scenario: find it, read it, change values, say what is wrong."""
+"""From a scenario file to a Scenario: find it, read it, change values, report what is wrong."""
 
 from __future__ import annotations
 
@@ -228,7 +228,7 @@ def _change(
 def _descend(
     data: dict[str, Any], key: str, path: str | PathLike[str]
 ) -> tuple[Any, str, list[str]]:
-    """Follow the dotted `key` as far as `data` goes: the table or list, the rest, the way there."""
+    """Follow the dotted `key` as far as `data` goes: table or list, the rest, the names so far."""
     rest, trail = key, list[str]()
     node: Any = data
     while True:
@@ -243,19 +243,19 @@ def _descend(
             if not alone or rest.split(".")[0] not in _keys_of(trail[-1]):
                 return node, rest, trail
             # The name of a table alone may be left out of the key.
-            node, trail = node[0], [*trail, _spelt_out(node, "0")]
+            node, trail = node[0], [*trail, _spelled_out(node, "0")]
             continue
         if not isinstance(heads[head], dict | list):
             raise ScenarioError(path, key, f"'{head}' is a value, it holds no further keys")
         single = node is data and head in LISTS and isinstance(heads[head], dict)
-        trail = [*trail, _spelt_out(node, head)]
+        trail = [*trail, _spelled_out(node, head)]
         rest, node = rest[len(head) + 1 :], heads[head]
         # A table alone is a list of one: its name may stand in the key as in a list's.
         if single and (name := _item_name(node)) not in node:
             rest = rest.removeprefix(f"{name}.")
 
 
-def _spelt_out(node: Any, head: str) -> str:
+def _spelled_out(node: Any, head: str) -> str:
     """Return the name of the item that `head` is the index of, where that name tells it."""
     if not isinstance(node, list) or not head.isdecimal() or not isinstance(node[0], dict):
         return head

@@ -37,7 +37,7 @@ Count = Annotated[int, Field(ge=3)]
 
 
 class Section(BaseModel):
-    """A table of the file: frozen, and without room for keys nobody reads."""
+    """A table of the file: frozen; unknown keys are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -51,14 +51,14 @@ class Section(BaseModel):
 
 
 class Placement(Section):
-    """Where something stands in its reference frame: first rolled, pitched, yawed, then moved."""
+    """A placement in a reference frame: first rolled, pitched, yawed, then moved."""
 
     xyz: Annotated[Vector3, Parameter("m")] = [0.0, 0.0, 0.0]
     rpy_deg: Annotated[Vector3, Parameter("deg")] = [0.0, 0.0, 0.0]
 
 
 class RobotSection(Section):
-    """A robot or a single body: shipped (`name`) or one's own (`urdf`)."""
+    """A robot or a single body: shipped (`name`) or your own (`urdf`)."""
 
     name: str | None = None
     urdf: str | None = None
@@ -107,7 +107,7 @@ class ShellSection(Section):
         if (self.file is None) == (self.primitive is None):
             raise ValueError("give either file or primitive, not both")
         if self.file is None and (self.unit is not None or self.scale is not None):
-            raise ValueError("unit and scale belong to a file; a primitive's sizes are in metres")
+            raise ValueError("unit and scale belong to a file; a primitive's sizes are in meters")
         if self.file is None and (self.bodies is not None or self.faces is not None):
             raise ValueError("bodies and faces belong to a CAD file, not to a primitive")
         if self.file is None and (self.time_limit is not None or self.memory_limit is not None):
@@ -122,7 +122,7 @@ Friction = Annotated[Ingredient, OneOf(FrictionLaw)]
 
 
 class SphereSection(Section):
-    """The sphere of a contact: `radius` [m], centre `offset` [m] in the robot's `frame`."""
+    """The sphere of a contact: `radius` [m], center `offset` [m] in the robot's `frame`."""
 
     frame: str
     radius: Annotated[Positive, Parameter("m", "sphere radius")]
