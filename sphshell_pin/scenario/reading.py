@@ -11,7 +11,7 @@ import typing
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from pydantic import BaseModel, ValidationError
 
@@ -23,6 +23,8 @@ from sphshell_pin.scenario.schema import LISTS, STEPPING, RunSection, Scenario
 TOO_DEEP = "is not valid TOML: its tables or lists are nested too deeply"
 # A key of a hundred parts: the time and memory of tomllib grow with their square.
 _LONG_KEY = re.compile(r"""(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""")
+# What tomllib gives: tables, lists and values in each other.
+Toml: TypeAlias = Any
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -118,7 +120,7 @@ def change_scenario(
     return _validated(data, path)
 
 
-def _with_table(key: str, data: Mapping[str, Any]) -> str:
+def _with_table(key: str, data: Mapping[str, Toml]) -> str:
     """Return `key` with the table that was left out before it, if that is run or controller."""
     if key.partition(".")[0] not in Scenario.model_fields:
         for table, known in (
@@ -133,7 +135,7 @@ def _with_table(key: str, data: Mapping[str, Any]) -> str:
 class Found(NamedTuple):
     """What is at a dotted key of a scenario."""
 
-    value: Any
+    value: Toml
     key: str
     """The key with all names spelled out."""
     parts: list[str]
@@ -163,14 +165,14 @@ def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> Found:
     return Found(value, ".".join([*trail, last]), [*trail, last])
 
 
-def _validated(data: dict[str, Any], path: str | PathLike[str]) -> Scenario:
+def _validated(data: dict[str, Toml], path: str | PathLike[str]) -> Scenario:
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
         raise _explain(error, path, data) from None
 
 
-def item_key(table: str, items: Sequence[Any], index: int) -> str:
+def item_key(table: str, items: Sequence[Toml], index: int) -> str:
     """Return the dotted key of an item of a list: by its label or name, else by its index."""
     entries = [dict(one) if isinstance(one, BaseModel | Mapping) else {} for one in items]
     names = [str(one.get("label") or one.get("name") or "") for one in entries]
@@ -187,7 +189,7 @@ def _read_text(path: str | PathLike[str]) -> str:
         raise ScenarioError(path, "", "is not a text file in UTF-8") from None
 
 
-def _parse_value(text: str) -> Any:
+def _parse_value(text: str) -> Toml:
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError):
@@ -195,7 +197,7 @@ def _parse_value(text: str) -> Any:
 
 
 def _change(
-    data: dict[str, Any], key: str, value: Any, path: str | PathLike[str], scenario: Scenario
+    data: dict[str, Toml], key: str, value: Toml, path: str | PathLike[str], scenario: Scenario
 ) -> None:
     """Put `value` in place of the one at the dotted `key`; names of list items may hold dots.
 
@@ -226,11 +228,11 @@ def _change(
 
 
 def _descend(
-    data: dict[str, Any], key: str, path: str | PathLike[str]
-) -> tuple[Any, str, list[str]]:
+    data: dict[str, Toml], key: str, path: str | PathLike[str]
+) -> tuple[Toml, str, list[str]]:
     """Follow the dotted `key` as far as `data` goes: table or list, the rest, the names so far."""
     rest, trail = key, list[str]()
-    node: Any = data
+    node: Toml = data
     while True:
         if isinstance(node, list):
             heads = {_item_name(item): item for item in node if isinstance(item, dict)}
@@ -255,7 +257,7 @@ def _descend(
             rest = rest.removeprefix(f"{name}.")
 
 
-def _spelled_out(node: Any, head: str) -> str:
+def _spelled_out(node: Toml, head: str) -> str:
     """Return the name of the item that `head` is the index of, where that name tells it."""
     if not isinstance(node, list) or not head.isdecimal() or not isinstance(node[0], dict):
         return head
@@ -275,7 +277,7 @@ def _item_name(item: Mapping[str, object]) -> str:
 
 
 def _explain(
-    error: ValidationError, path: str | PathLike[str], data: Mapping[str, Any]
+    error: ValidationError, path: str | PathLike[str], data: Mapping[str, Toml]
 ) -> ScenarioError:
     """Turn the first of pydantic's complaints into one sentence with the valid choices."""
     details = sorted(error.errors(), key=lambda one: one["type"] != "unknown_key")

@@ -279,7 +279,7 @@ class Scenario(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def take_single_tables(cls, data: Any) -> Any:
+    def take_single_tables(cls, data: object) -> object:
         """Read `[robot]` as the list of one that `[[robot]]` would have been."""
         if not isinstance(data, dict):
             return data
