@@ -14,8 +14,15 @@ from sphshell_pin.dynamics.controllers import Controller
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient, parameter, parameters_of, table, table_row
+from sphshell_pin.scenario.primitives import Primitive
 
-FAMILIES = {"law": NormalLaw, "friction": Friction, "controller": Controller, "run": Integrator}
+FAMILIES = {
+    "law": NormalLaw,
+    "friction": Friction,
+    "controller": Controller,
+    "run": Integrator,
+    "primitive": Primitive,
+}
 
 
 def concrete(family: type[Ingredient]) -> list[type[Ingredient]]:
@@ -94,6 +101,9 @@ def test_every_parameter_is_described(kind):
 VALUES = {
     "stiffness": 1e5,
     "radius": 0.01,
+    "length": 0.02,
+    "size": [0.1, 0.2, 0.3],
+    "radii": [0.1, 0.2, 0.3],
     "young_1": 1e9,
     "poisson_1": 0.3,
     "young_2": 1e9,
@@ -154,7 +164,7 @@ def test_the_documents_have_the_tables_of_the_descriptions(family):
         assert table(kind) in page, f"docs/laws.md: a table is now\n{table(kind)}"
 
 
-@pytest.mark.parametrize("family", ["law", "friction", "controller"])
+@pytest.mark.parametrize("family", ["law", "friction", "controller", "primitive"])
 def test_the_reference_of_scenario_files_has_the_keys_of_the_descriptions(family):
     page = (DOCS / "scenarios.md").read_text(encoding="utf-8")
     for kind in FAMILIES[family].kinds.values():
