@@ -198,8 +198,8 @@ def _print_report(plan: Plan, report: SweepReport, files: list[Path]) -> None:
         console.print(ranges)
     failed = report.table[report.table["status"] == "failed"]
     for _, row in failed.head(_MOST_FAILURES).iterrows():
-        values = ", ".join(f"{axis.key} = {row[axis.key]}" for axis in plan.axes)
-        typer.echo(f"run {row['run']} failed ({values}): {row['error']}", err=True)
+        values = [f"{axis.key} = {row[axis.key]} {axis.unit}".rstrip() for axis in plan.axes]
+        typer.echo(f"run {row['run']} failed ({', '.join(values)}): {row['error']}", err=True)
     if len(failed) > _MOST_FAILURES:
         typer.echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)
     names = ", ".join(str(file) for file in files)
