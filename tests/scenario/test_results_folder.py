@@ -61,6 +61,7 @@ def test_a_second_run_is_told_who_writes_until_that_process_is_killed(
     assert sorted(os.listdir(tmp_path)) == ["drop.toml", "out"]
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_sentence_and_exit_code_2(tmp_path, monkeypatch):
     arguments = ["run", write(tmp_path), "--out", tmp_path / "out", "--no-recording"]
     assert call(*arguments).exit_code == 0
@@ -70,7 +71,7 @@ def test_a_full_disk_is_one_sentence_and_exit_code_2(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     # In the pictures, when the numbers are written already.
-    monkeypatch.setattr("sphshell_pin.plot.figure.atomic_file", full)
+    monkeypatch.setattr("sphshell_pin.atomic.file.atomic_file", full)
     told = call(*arguments)
     assert told.exit_code == 2
     assert told.stderr.splitlines()[-1].endswith("cannot be written: No space left on device")
