@@ -7,7 +7,7 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,6 +26,8 @@ from sphshell_pin.cli.app import (
 )
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from sphshell_pin.study.sweep import Plan, SweepReport
 
 # So many failed runs are listed one by one.
@@ -151,7 +153,7 @@ def _drawn(plan: Plan, plot: list[str], *, wanted: bool) -> list[str]:
     return plot or own + peaks
 
 
-def _draw(table: Any, figures: list[str], file: Path, *, all_: bool) -> list[Path]:
+def _draw(table: pd.DataFrame, figures: list[str], file: Path, *, all_: bool) -> list[Path]:
     """Write pictures of the figures beside the table's `file`; return their paths.
 
     Unless `all_` are wanted, only the first that any run has is drawn.
