@@ -57,7 +57,7 @@ def write_whole(path: str | PathLike[str], data: bytes) -> Path:
         with atomic_file(path) as file:
             file.write(data)
     except OSError as fault:
-        raise ResultError(path, f"cannot be written ({fault.strerror})") from fault
+        raise ResultError(path, f"cannot be written: {fault.strerror}") from fault
     return path
 
 

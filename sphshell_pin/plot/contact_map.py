@@ -112,7 +112,7 @@ def element_values(result: Result, pairs: list[int], elements: int, quantity: st
     element = np.asarray(log.element, dtype=np.int64)[own]
     row = np.asarray(log.row, dtype=np.int64)[own]
     force = np.asarray(log.normal_force, dtype=float)[own]
-    # Each row stands for half the time to its neighbours.
+    # Each row stands for half the time to its neighbors.
     half = 0.5 * np.diff(np.asarray(result.t, dtype=float))
     share = np.append(half, 0.0) + np.append(0.0, half)
     values = np.zeros(elements)
@@ -131,16 +131,16 @@ def _caution(result: Result, groups: list[PathGroup], quantity: str) -> str:
     figures = result.stats.pairs
     seen, done = 0.0, 0.0
     for pair in (path.pair for group in groups for path in group.paths):
-        told = figures.get(str(result.pairs[pair]))
-        if told is None:
+        done_by_pair = figures.get(str(result.pairs[pair]))
+        if done_by_pair is None:
             continue
         one = element_values(result, [pair], int(np.max(result.contacts.element)) + 1, quantity)
         if quantity == "peak":
-            seen, done = max(seen, float(one.max())), max(done, told.peak_force)
+            seen, done = max(seen, float(one.max())), max(done, done_by_pair.peak_force)
         else:
             seen += float(one.sum())
-            force = told.mean_force if quantity == "impulse" else 1.0
-            done += force * told.contact_time
+            force = done_by_pair.mean_force if quantity == "impulse" else 1.0
+            done += force * done_by_pair.contact_time
     # Contacts that share a row are in touch at once, which the time counts for each.
     away = done - seen if quantity == "time" else abs(done - seen)
     if away <= MISSED * done or done <= 0.0:

@@ -71,7 +71,7 @@ def eye_direction(normal: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Picture:
-    """One axis with a shell on it, seen from `toward` (3,); `factor` makes its unit of metres.
+    """One axis with a shell on it, seen from `toward` (3,); `factor` converts metres to its unit.
 
     The picture reaches from `low` to `high` (3,) [m].
     """
@@ -163,7 +163,7 @@ class Picture:
         return fine
 
     def kept(self, points: FloatArray) -> NDArray[np.int64]:
-        """Return the indices of those points of a path (k, 3) [m] that can be told apart."""
+        """Return the indices of those points of a path (k, 3) [m] that differ in the picture."""
         return spaced(points, self.size / MOST_STEPS)
 
     def mark_start(self, point: FloatArray, name: str, *, hidden: bool = False) -> None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 NOWHERE, ON_FACE = 0, 2
-"""Kinds of places next to a contact, as `cad.jobs.feet` tells them."""
+"""Kinds of places next to a contact, as `cad.jobs.feet` returns them."""
 
 
 @dataclass(frozen=True)
@@ -162,17 +162,17 @@ def _audit_shell(
         radii[place] = pair.sphere.radius
         centers[place] = points[place] + (radii[place] - log.depth[i]) * normals[place]
     errors = np.full((len(own), 2), np.nan)
-    for place, foot in enumerate(zip(*_feet(section, built.path, centers, points), strict=True)):
-        at, exact, kind = foot
-        way, normal = centers[place] - at, normals[place]
-        exact = exact if kind == ON_FACE else way
+    for place, found in enumerate(zip(*_feet(section, built.path, centers, points), strict=True)):
+        at, exact, kind = found
+        offset, normal = centers[place] - at, normals[place]
+        exact = exact if kind == ON_FACE else offset
         length = float(np.linalg.norm(exact))
         if kind == NOWHERE or length == 0.0:
             continue
         # On the side of the surface on which the contact is.
         exact = exact * np.sign(exact @ normal) / length
         depth = log.depth[own[place]]
-        errors[place, 0] = depth - (radii[place] - float(way @ exact))
+        errors[place, 0] = depth - (radii[place] - float(offset @ exact))
         errors[place, 1] = np.arctan2(np.linalg.norm(np.cross(exact, normal)), exact @ normal)
     return errors
 
@@ -194,7 +194,7 @@ def _feet(
     scale = section.scale if isinstance(section.scale, int | float) else 1.0
     arguments = (file, section.unit, options, (scale, section.magnify), centers, points)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnitWarning)  # told when the shell was made
+        warnings.simplefilter("ignore", UnitWarning)  # reported when the shell was made
         points, normals, kinds = run_in_child(
             "stationary_points", arguments, file, "--audit-cad", options
         )

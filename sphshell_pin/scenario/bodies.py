@@ -12,8 +12,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.checks import off_unit_length
-from sphshell_pin.dynamics.models import set_joint
-from sphshell_pin.errors import MissingExtra, NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.dynamics.models import find_joint, set_joint
+from sphshell_pin.errors import MissingExtra, ScenarioError, SphshellError
 from sphshell_pin.robots import LoadedRobot, load, load_urdf
 from sphshell_pin.scenario.reading import item_key
 from sphshell_pin.scenario.schema import Placement, RobotSection, Scenario
@@ -89,7 +89,7 @@ def assemble(
         q, v = _start(model, robot.q0, section, path, key)
         for j, joint in enumerate(section.lock):
             with blamed_on(path, f"{key}.lock[{j}]"):
-                joint_spans(model, joint, "the robot")
+                joint_spans(model, joint)
         prefix = ""
         if several:
             label = section.label or robot.name
@@ -139,18 +139,9 @@ def restrict(model: pin.Model, reduced: pin.Model, q: Array, v: Array) -> tuple[
     return q_reduced, v_reduced
 
 
-def joint_spans(model: pin.Model, name: str, owner: str = "the model") -> tuple[slice, slice]:
-    """Return the places of a joint's numbers in q and in v.
-
-    Raises
-    ------
-    NameNotFound
-        The model has no such joint; `owner` is what the message calls the model.
-    """
-    names = list(model.names)[1:]
-    if name not in names:
-        raise NameNotFound("joint", name, owner, names)
-    joint = model.joints[model.getJointId(name)]
+def joint_spans(model: pin.Model, name: str) -> tuple[slice, slice]:
+    """Return the places of a joint's numbers in q and in v; NameNotFound lists the joints."""
+    joint = find_joint(model, name)
     return slice(joint.idx_q, joint.idx_q + joint.nq), slice(joint.idx_v, joint.idx_v + joint.nv)
 
 
@@ -182,7 +173,7 @@ def _start(
     for name, value in section.speed.items():
         where = f'{key}.speed."{name}"'
         with blamed_on(path, where):
-            _, span = joint_spans(model, name, "the robot")
+            _, span = joint_spans(model, name)
         values = np.atleast_1d(np.array(value, dtype=float))
         count = span.stop - span.start
         if len(values) != count:

@@ -50,15 +50,15 @@ def load_function(where: str, path: Path, key: str) -> Callable[..., object]:
 
 
 def unloaded(where: str, path: Path, key: str) -> Callable[..., object]:
-    """Return what stands for the function that "file.py:function" names; nothing is executed.
+    """Return a stand-in for the function that "file.py:function" names; nothing is executed.
 
-    Called, it raises SphshellError, which says how to have the function itself.
+    Called, it raises SphshellError, which states how to load the function.
     """
 
     def refuse(*arguments: object, **keywords: object) -> object:
         raise SphshellError(
             f"{path}: {key}: '{where}' was not loaded, as no code is executed to show a finished "
-            "run: if you trust it, say Replay(result, trust_code=True)"
+            "run: if you trust it, use Replay(result, trust_code=True)"
         )
 
     return refuse

@@ -30,9 +30,9 @@ ROW_DT = 5e-3
 class LiveRun:
     """Plays the scenario of `built` from its start on, without an end.
 
-    It is a player, as the live page wants one. Knobs of laws, friction, radii and the controller
-    act on the run under way; with others it starts anew, from where it is if it can. A run that
-    cannot go on says why in `ended`, and waits for `reset` or another value.
+    It is a player of the live page. Parameters of laws, friction, radii and the controller act on
+    the run under way; with others it starts again, from where it is if it can. `ended` is
+    why a run cannot go on; it waits for `reset` or another value.
 
     What it shows may be read in any thread; `advance`, `reset`, `change` and `push` are for one
     thread at a time, and raise Busy in others.
@@ -51,7 +51,7 @@ class LiveRun:
         self._begin(_open_run(built, built.q0, built.v0, 0.0))
 
     def _begin(self, run: OpenRun) -> None:
-        """Go on with `run`, which stands at its start."""
+        """Go on with `run`, which is at its start."""
         self._run = run
         self._fault: str | None = None
         self._push: tuple[str, Array, float] | None = None
@@ -93,7 +93,7 @@ class LiveRun:
 
     @property
     def residual(self) -> float:
-        """Energy that appeared from nowhere since the start [J]: the integration's error."""
+        """Change of the total energy since the start [J]: the integration's error."""
         return float(self._row.energy.total[0] - self._total)
 
     @property
@@ -108,7 +108,7 @@ class LiveRun:
 
     @property
     def knobs(self) -> tuple[Knob, ...]:
-        """The knobs of the scenario, with the values they stand at."""
+        """The parameters of the scenario with a slider, with their present values."""
         return self._knobs
 
     @property
@@ -150,8 +150,8 @@ class LiveRun:
             rows = self._run.advance(duration, wall)
             now = self._run.snapshot()
         except Exception as error:
-            said = str(error) if isinstance(error, SphshellError) else repr(error)
-            self._fault = ", ".join([said, *getattr(error, "__notes__", ())])
+            reason = str(error) if isinstance(error, SphshellError) else repr(error)
+            self._fault = ", ".join([reason, *getattr(error, "__notes__", ())])
             return Rows.empty(pairs)
         self._exchanged += _exchanged(self._row, rows, now)
         self._row = now
@@ -168,7 +168,7 @@ class LiveRun:
 
     @one_at_a_time
     def reset(self) -> None:
-        """Start anew, with the knobs as they stand."""
+        """Start again with the present values of the parameters."""
         self._begin(_open_run(self.built, self.built.q0, self.built.v0, 0.0))
 
     @one_at_a_time
@@ -211,7 +211,7 @@ class LiveRun:
         )
 
     def _go_on(self, run: OpenRun) -> None:
-        """Go on with `run`, which stands where this one does: with its push and its audit."""
+        """Go on with `run`, which is in the state of this one: with its push and its audit."""
         residual, exchanged, push = self.residual, self._exchanged, self._push
         self._begin(run)
         self._total -= residual

@@ -65,7 +65,7 @@ PLACES: dict[str, tuple[float, float, float]] = {
     "+y": (0.0, 1.0, 0.0),
     "-y": (0.0, -1.0, 0.0),
 }
-"""Where the surface stands, seen from the tip."""
+"""Where the surface is placed, seen from the tip."""
 
 # Half the size of a surface that needs no file, in radii of the sphere.
 _SIZE = 15.0
@@ -115,7 +115,7 @@ def new_scenario(
     bodies, faces
         Of a CAD file: those to take, by name or number; by default all of it.
     frame, radius
-        Of the sphere [m], which stands in the frame's origin; by default a known fingertip or foot.
+        Of the sphere [m], whose center is the frame's origin; by default a known fingertip or foot.
     material, against
         What the sphere and the surface are made of, names of MATERIALS; by default a free body is
         of steel, any other sphere of rubber, or of plastic where rubber is too soft.
@@ -181,7 +181,7 @@ def _build_text(text: str, path: Path, reuse: Built) -> Built:
 
 @dataclass(frozen=True)
 class _Request:
-    """What the user said of the contact; `word` stood for the surface."""
+    """What the user asked for; `word` names a surface that needs no file."""
 
     material: str | None
     against: str

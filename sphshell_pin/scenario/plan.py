@@ -165,7 +165,7 @@ def plan_press(
         posture_stiffness=tuple(_round(pull * one) for one in stance.joint_inertia),
         joint_damping=tuple(_round(0.7 * math.sqrt(pull) * one) for one in stance.joint_inertia),
     )
-    why = [f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.said}"]
+    why = [f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}"]
     why.append(
         f"the surface's middle stands {_mm(gap)} before the sphere, which presses along "
         f"{_axis(stance.approach)}"
@@ -211,7 +211,7 @@ def plan_fall(
     start[:3] += spot.centre - centre
     speed = math.sqrt(2 * GRAVITY * gap)
     why = (
-        f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.said}",
+        f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
         f"it falls {_mm(gap)} beside the middle of the surface, at {speed:.2g} m/s",
     )
     contact = _contact(materials, speed, 0.005)
@@ -244,7 +244,8 @@ def plan_stand(
     bristle = (_round(slope), _round(0.2 * math.sqrt(slope * mass / len(tips))))
     contact = replace(base, bristle=bristle)
     why = [
-        f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.said}" for tip in tips
+        f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}"
+        for tip in tips
     ]
     why.append(f"the robot floats, {_mm(gap)} above the surface, and its joints hold the posture")
     if len(tips) < 3:

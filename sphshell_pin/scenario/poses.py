@@ -1,4 +1,4 @@
-"""How a robot stands to press: a posture that can move its tip, the way there, what it weighs."""
+"""How a robot presses: a posture that can move its tip, a direction, the effective mass."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 
 # How far a tip may slide, as a part of its reach.
 SLIDE = 0.15
-# Mobility along the way of approach, as a part of the best one, below which a posture is singular.
+# Mobility along the approach, as a part of the best one, below which a posture is singular.
 _MOBILE = 0.02
 # The same, which a posture that has to be bent shall reach.
 _EASY = 0.1
@@ -76,7 +76,7 @@ def take_stance(model: pin.Model, q: Array, tip: Tip, approach: Array | None) ->
 
     `approach` (3,) is where the tip shall press; by default down if its limb points down, else as
     it points, or where it moves best if it cannot move there. A posture in which it cannot move is
-    bent a little, always in the same way.
+    bent a little, always in the same direction.
     """
     lock = _joints_aside(model, tip)
     inside = _into_limits(model, q)
@@ -211,8 +211,8 @@ def _forward(data: pin.Data, pose: pin.SE3, tip: Tip) -> Array:
     """Return where there is nothing of the robot before the tip: down, or as its limb points.
 
     A sphere before its frame is pressed as the frame points, else the frame would be dragged beside
-    it; any other as the way to it from the last joint that is not inside it. On a surface that lies
-    beside that way or behind it the limb would pass through the surface.
+    it; any other along the line to it from the last joint that is not inside it. On a surface
+    beside that line or behind it the limb would pass through the surface.
     """
     if tip.offset.any():
         ahead: Array = pose.rotation @ tip.offset
@@ -265,7 +265,7 @@ def _upright(axis: Array, *, free: bool = True) -> Array:
 
 
 def _roomier(model: pin.Model, q: Array, linear: Array, mass_matrix: Array, axis: Array) -> Array:
-    """Return `axis` or its opposite: the way along which the joints are farther from limits."""
+    """Return `axis` or its opposite: the direction in which the joints are farther from limits."""
     rates = np.linalg.solve(mass_matrix, linear.T @ axis)
     rooms = []
     for sign in (1.0, -1.0):

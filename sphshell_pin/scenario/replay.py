@@ -42,7 +42,7 @@ class Replay:
     Raises
     ------
     ResultError
-        Nothing says which scene ran, or the scenario's robot or contacts are not those of the run.
+        It is unknown which scene ran, or the scenario's robot or contacts are not those of the run.
     SphshellError
         The result cannot be read, or `scenario` cannot be built.
     """
@@ -123,7 +123,7 @@ class Replay:
 
     @property
     def residual(self) -> float:
-        """Energy that appeared from nowhere since the start [J]."""
+        """Change of the total energy since the start [J]: the integration's error."""
         return float(self._residual[self._row])
 
     @property

@@ -89,7 +89,7 @@ def run_scenario(
     ScenarioError, NameNotFound, MissingExtra
         The scenario cannot be built.
     ResultError
-        The folder cannot be written, or another run is writing it; told before the run starts.
+        The folder cannot be written, or another run is writing it; raised before the run starts.
     SphshellError
         There is no CAD surface to audit.
     KeyboardInterrupt
@@ -142,7 +142,7 @@ def run_built(
 
 
 def _judge(built: Built, result: Result) -> tuple[tuple[Verdict, ...], Exception | None]:
-    """Return the verdicts; or the fault of a figure of the user's, told when all is written."""
+    """Return the verdicts; or the fault of a figure of the user's, raised when all is written."""
     try:
         return tuple(judge(built, result)), None
     except Exception as fault:
@@ -156,7 +156,7 @@ def simulate(
     run = built.scenario.run
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", WeakLawWarning)  # explain_built tells it
+            warnings.simplefilter("ignore", WeakLawWarning)  # explain_built reports it
             result = built.simulation.run(
                 built.q0,
                 built.v0,
@@ -173,7 +173,7 @@ def simulate(
 
 
 def origin_of(built: Built) -> Origin:
-    """Return what a Result says of the scenario that it came from."""
+    """Return the origin that a Result of this scenario records."""
     shipped = shipped_scenarios().get(built.name)
     scenario = built.name if shipped == built.path else str(built.path.absolute())
     settings = built.scenario.model_dump(mode="json")

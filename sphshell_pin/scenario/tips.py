@@ -25,7 +25,7 @@ class Tip:
     frame: str
     radius: float
     offset: Array
-    said: str
+    source: str
 
 
 def find_tips(
@@ -51,7 +51,9 @@ def find_tips(
     if known:
         chosen = known if floats(robot.model) else known[:1]
         return [_sized(one, radius) for one in chosen]
-    return [_sized(Tip(one, 0.0, np.zeros(3), said), radius) for one, said in _ends(robot.model)]
+    return [
+        _sized(Tip(one, 0.0, np.zeros(3), source), radius) for one, source in _ends(robot.model)
+    ]
 
 
 def floats(model: pin.Model) -> bool:
@@ -61,12 +63,12 @@ def floats(model: pin.Model) -> bool:
 
 def _known(robot: LoadedRobot, shipped: str | None) -> list[Tip]:
     if shipped in TIPS:
-        spheres, said = fingertips(shipped), "a fingertip this package knows of"
+        spheres, source = fingertips(shipped), "a fingertip this package knows of"
     else:
-        spheres, said = end_spheres(robot), "the sphere of its collision geometry"
+        spheres, source = end_spheres(robot), "the sphere of its collision geometry"
     model = robot.model
     return [
-        Tip(one.frame, one.radius, np.array(one.offset), said)
+        Tip(one.frame, one.radius, np.array(one.offset), source)
         for one in spheres
         if int(model.frames[find_frame(model, one.frame)].parentJoint) > 0
     ]
@@ -77,10 +79,10 @@ def _sized(tip: Tip, radius: float | None) -> Tip:
         # A centre that stands one radius before the frame goes on touching it.
         touching = tip.radius and abs(np.linalg.norm(tip.offset) - tip.radius) < 1e-9
         offset = tip.offset * (radius / tip.radius) if touching else tip.offset
-        return Tip(tip.frame, radius, offset, tip.said)
+        return Tip(tip.frame, radius, offset, tip.source)
     if not tip.radius:
         raise SphshellError(
-            f"frame '{tip.frame}' carries no sphere that is known: say its radius in metres, for "
+            f"frame '{tip.frame}' carries no sphere that is known: state its radius in metres, for "
             "a fingertip --radius 0.012"
         )
     return tip
@@ -102,6 +104,6 @@ def _ends(model: pin.Model) -> list[tuple[str, str]]:
         if len(found) == 1 or (found and floats(model)):
             return [(name, f"an end of the robot called '{word}'") for name in found]
     raise SphshellError(
-        f"the robot has several ends: say which frame carries the sphere with --frame, for "
+        f"the robot has several ends: state which frame carries the sphere with --frame, for "
         f"instance one of {', '.join(names[:8]) or ', '.join(f.name for f in model.frames)}"
     )

@@ -27,20 +27,20 @@ if TYPE_CHECKING:
 SPHERE_COLOR = 0x2F6FDE
 
 COLORINGS = ("distance", "patches")
-"""Ways to colour a shell; of several that are on the first is seen."""
+"""Ways to color a shell; of several that are on the first is seen."""
 
 ShellKey = tuple[int, int, bytes, bool]
 SphereKey = tuple[int, bytes, float]
 
 
 def shell_key(pair: ContactPair) -> ShellKey:
-    """Return what tells the picture of one pair's shell from another's."""
+    """Return a key: pairs with equal keys share the picture of their shell."""
     place = pair.placement_j.homogeneous.tobytes()
     return id(pair.shell), pair.joint_j, place, pair.method == "smooth"
 
 
 def sphere_key(pair: ContactPair) -> SphereKey:
-    """Return what tells the picture of one pair's sphere from another's."""
+    """Return a key: pairs with equal keys share the picture of their sphere."""
     radius = 0.0 if pair.sphere is None else pair.sphere.radius
     return pair.joint_i, pair.placement_i.homogeneous.tobytes(), radius
 
@@ -71,9 +71,9 @@ class DrawnShell:
         return self.shell.curvature_report().largest if self._curved else 0.0
 
     def show_coloring(self, part: str, on: bool, largest: float = 0.0) -> None:
-        """Show or hide one of COLORINGS; each is drawn when it is first asked for.
+        """Show or hide one of COLORINGS; each is drawn when it is first shown.
 
-        largest : distance of the last colour [m], of "distance"
+        largest : distance of the last color [m], of "distance"
         """
         if on and part not in self._colorings:
             if part == "patches":

@@ -74,10 +74,10 @@ class ContactRows:
 
 @dataclass(frozen=True)
 class ContactPath:
-    """The way of one pair's contact: `points` and `normals` (k, 3) [m] at recorded rows `row` (k,).
+    """The path of a pair's contact: `points` and `normals` (k, 3) [m] at recorded rows `row` (k,).
 
     They are in the shell's frame if `on_shell`, else in the world; `force` (k,) is the normal force
-    [N]. `runs` are index arrays into them: within a run the contact neither let go nor jumped.
+    [N]. `runs` are index arrays into them: within a run the contact neither ended nor jumped.
     """
 
     pair: int

@@ -117,7 +117,7 @@ class Display:
 
     @property
     def largest_distance(self) -> float:
-        """The distance between curved and flat elements that has the last colour [m].
+        """The distance between curved and flat elements that has the last color [m].
 
         It is the largest of all shells.
         """
@@ -125,7 +125,7 @@ class Display:
 
     @property
     def coloring(self) -> str | None:
-        """What the colours of the shells mean, if they are those of "distance"."""
+        """What the colors of the shells mean, if they are those of "distance"."""
         if "distance" in self._hidden:
             return None
         return range_text(self.largest_distance)

@@ -1,4 +1,4 @@
-"""What meshcat's page can draw but its Python package cannot say: typed lines, draw order, depth.
+"""Objects that meshcat's page draws but its Python package lacks: draw order, depth, typed lines.
 
 Every object is a three.js JSON description, sent to any `meshcat.Visualizer` as one command.
 """
@@ -133,7 +133,7 @@ def rod(radius_start: float, radius_end: float) -> Json:
 
 
 def material(kind: str, color: int, opacity: float = 1.0, **properties: object) -> Json:
-    """Material `kind` ("MeshPhong", "MeshBasic", "LineBasic"), two-sided unless told otherwise."""
+    """Material `kind` ("MeshPhong", "MeshBasic", "LineBasic"), two-sided by default."""
     return {
         "type": f"{kind}Material",
         "color": color,
@@ -180,7 +180,7 @@ def set_object(
 def mover(visualizer: Visualizer) -> Move:
     """Return the routine that places the visualizer's node at a homogeneous matrix (4, 4).
 
-    A window that knows a shorter way than one command per matrix offers it as `mover(path)`.
+    A window that needs no command per matrix has its own `mover(path)`.
     """
     short = getattr(visualizer.window, "mover", None)
     move: Move = visualizer.set_transform if short is None else short(visualizer.path.lower())

@@ -1,4 +1,4 @@
-"""One HTML file with a meshcat scene and its animation: opens offline, asks nobody for anything."""
+"""One HTML file with a meshcat scene and its animation, without external requests."""
 
 from __future__ import annotations
 
@@ -78,8 +78,8 @@ class FilmWindow:
                 name = hashlib.sha256(value.encode()).hexdigest()[:16]
                 if name not in self._texts:
                     text, numbers = take_out_numbers(value)
-                    told = {"type": "text", "name": name, "text": text, "numbers": numbers}
-                    self._texts[name] = told
+                    stored = {"type": "text", "name": name, "text": text, "numbers": numbers}
+                    self._texts[name] = stored
                 return {"$text": name}
             if isinstance(value, Ext) and len(value.data) > SHARED_TEXT:
                 name = hashlib.sha256(value.data).hexdigest()[:16]
@@ -161,7 +161,7 @@ def _pose_tracks(times: FloatArray, matrices: FloatArray) -> list[Json]:
         step = np.abs(np.diff(values, axis=0)).max(axis=1, initial=0.0)
         if np.ptp(values, axis=0).max(initial=0.0) <= 1e-9:
             continue
-        # Keys amid a standstill say nothing.
+        # Keys within a standstill are not needed.
         moves = step > 1e-9
         kept = np.ones(len(values), dtype=bool)
         kept[1:-1] = moves[:-1] | moves[1:]
@@ -181,7 +181,7 @@ def render_page(
 ) -> str:
     """Return the HTML of a page that replays `commands`.
 
-    `legend` holds (colour, sentence) pairs; `clock` says "start" and "speed" of the simulated time
+    `legend` holds (color, sentence) pairs; `clock` has "start" and "speed" of the simulated time
     [s] and [s/s].
     """
     import umsgpack

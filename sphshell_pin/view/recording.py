@@ -89,8 +89,8 @@ def render_recording(
     frames are kept per second of the page, `speed` seconds of simulated time pass in one second of
     it. Each frame shows the recorded row nearest in time, or, where a touch begins and ends between
     two frames, that touch at its peak. `arrows` is "components" (normal and friction) or "total".
-    `color` says what the colours of the shells show: nothing ("surface"), the patches ("patches"),
-    or how far curved elements stand off the flat ones ("distance").
+    `color` is what the colors of the shells show: nothing ("surface"), the patches ("patches"),
+    or how far curved elements are from the flat ones ("distance").
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
     positive, another `color`, or a geometry model that does not fit.
@@ -227,7 +227,7 @@ def _forces(contacts: ContactRows, arrows: ArrowKind) -> FloatArray:
     """Magnitudes of all arrows that `contacts` bring into the picture [N]."""
     if arrows == "total":
         return largest_force(contacts)
-    # Friction is a fraction of the normal force: it shares its scale, and has no say in it.
+    # Friction is a fraction of the normal force: it shares its scale.
     return contacts.normal_force
 
 
@@ -283,7 +283,7 @@ def _legend(
 
 
 def _color_keys(display: Display) -> list[tuple[str, str]]:
-    """Return what the legend says of the colours of shells."""
+    """Return the legend of the colors of shells."""
     meaning = display.coloring
     return [] if meaning is None else [(f"linear-gradient(90deg, {', '.join(RAMP)})", meaning)]
 
@@ -293,5 +293,5 @@ def _css(color: int) -> str:
 
 
 def _digits(speed: float, fps: float) -> int:
-    """Return the decimals that tell two frames apart, two at least."""
+    """Return the decimals in which two frames differ, two at least."""
     return max(2, int(np.ceil(-np.log10(speed / fps))))

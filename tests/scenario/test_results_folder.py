@@ -71,7 +71,7 @@ def test_a_full_disk_is_one_sentence_and_exit_code_2(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     # In the pictures, when the numbers are written already.
-    monkeypatch.setattr("sphshell_pin.plot.figure.atomic_file", full)
+    monkeypatch.setattr("sphshell_pin.atomic.file.atomic_file", full)
     told = call(*arguments)
     assert told.exit_code == 2
     assert told.stderr.splitlines()[-1].endswith("cannot be written: No space left on device")

@@ -80,23 +80,6 @@ def test_another_site_can_neither_frame_nor_drive_nor_read_it(live, tab, other_s
     assert not live.server.watched
 
 
-def test_a_name_that_was_made_to_lead_here_is_refused(live, tab):
-    answer = tab.goto(live.url.replace("127.0.0.1", "evil.example"))
-    assert answer.status == 403
-    assert "by an IP address of its machine" in tab.content()
-
-
-def test_a_tab_needs_the_token(live, tab):
-    tab.goto(live.url)
-    tab.wait_for_function(READY)
-    second = tab.context.new_page()
-    for address in (live.url.partition("?")[0], live.url + "x"):
-        assert second.goto(address).status == 403
-        assert "the whole address that was printed" in second.content()
-    second.goto(live.url)
-    second.wait_for_function(READY)
-
-
 def test_a_notebook_shows_it_in_a_frame(live, tab, other_site):
     other_site.body = live._repr_html_()
     tab.goto(f"http://localhost:{other_site.port}/")

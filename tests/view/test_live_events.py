@@ -22,13 +22,13 @@ BAD = {
     "truth for a number": '{"type": "speed", "value": true}',
     "number for a truth": '{"type": "run", "on": 1}',
     "not a number": '{"type": "speed", "value": NaN}',
-    "infinite": '{"type": "knob", "key": "k", "value": Infinity}',
-    "beyond floats": '{"type": "knob", "key": "k", "value": 1' + 400 * "0" + "}",
+    "infinite": '{"type": "parameter", "key": "k", "value": Infinity}',
+    "beyond floats": '{"type": "parameter", "key": "k", "value": 1' + 400 * "0" + "}",
     "negative": '{"type": "step", "seconds": -1}',
-    "a long name": json.dumps({"type": "knob", "key": 300 * "k", "value": 1.0}),
+    "a long name": json.dumps({"type": "parameter", "key": 300 * "k", "value": 1.0}),
     "a direction of no length": json.dumps({**PUSH, "direction": [0, 0, 0]}),
     "a direction of two": json.dumps({**PUSH, "direction": [0, 1]}),
-    "huge": json.dumps({"type": "knob", "key": LARGEST_MESSAGE * "k", "value": 1.0}),
+    "huge": json.dumps({"type": "parameter", "key": LARGEST_MESSAGE * "k", "value": 1.0}),
     "deep": 8_000 * "[",
 }
 

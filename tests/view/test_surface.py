@@ -1,5 +1,6 @@
 import numpy as np
 
+import sphshell_pin as sp
 from sphshell_pin.view.surface import SurfaceMesh, great_circles, outlined_edges, tube
 from tests.view.stand_ins import CUBE_ELEMENTS, CUBE_VERTICES, quad_shell
 
@@ -52,3 +53,10 @@ def test_great_circles_lie_on_the_sphere_in_three_planes():
     assert np.linalg.matrix_rank(vertices) == 3
     steps = np.linalg.norm(vertices[segments[:, 0]] - vertices[segments[:, 1]], axis=1)
     np.testing.assert_allclose(steps, steps[0])
+
+
+def test_the_drawn_edges_are_those_of_the_file():
+    """A quad's diagonal is no edge of its shell, and is not drawn as one."""
+    cube = sp.Shell(CUBE_VERTICES, CUBE_ELEMENTS)
+    assert len(outlined_edges(cube)) == 12
+    assert len(SurfaceMesh.of(cube).vertices) == 24

@@ -1,4 +1,4 @@
-"""The live page: a scene that keeps running while one looks at it, pushes it, turns its knobs."""
+"""The live page: a running scene to look at, with its parameters to change and bodies to push."""
 
 from sphshell_pin.view.live.loop import Live
 from sphshell_pin.view.live.opening import preview

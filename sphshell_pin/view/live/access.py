@@ -1,4 +1,4 @@
-"""Who may see the live page: whoever has its address, which ends with a token."""
+"""Access to the live page: by its address, which ends with a token."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ class Access:
         self._framed = site[0] if site else "'none'"
 
     def check(self, request: HTTPServerRequest) -> tuple[str, str]:
-        """Return the token that `request` has, and the file that it asks for.
+        """Return the token that `request` has, and the file that it names.
 
-        Raises PermissionError, whose text is one sentence for the person who asked.
+        Raises PermissionError, whose text is one sentence for the user.
         """
         host = request.headers.get("Host", "").lower()
         if not self.is_own(host):

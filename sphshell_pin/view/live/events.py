@@ -1,4 +1,4 @@
-"""What a browser may say: one JSON object a message, checked before anybody acts on it."""
+"""The messages of a browser: one JSON object each, checked before it is used."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ FIELDS: dict[str, _Fields] = {
     "step": {"seconds": _not_negative},
     "reset": {},
     "speed": {"value": _not_negative},
-    "knob": {"key": _text, "value": _number},
+    "parameter": {"key": _text, "value": _number},
     "push": {
         "body": _text,
         "direction": _direction,
@@ -81,13 +81,13 @@ FIELDS: dict[str, _Fields] = {
     "seek": {"t": _number},
     "seen": {"frame": _number},
 }
-"""What each kind of event must say, and the check of each value."""
+"""The fields of each kind of event, and the check of each value."""
 
 
 def read_event(message: str | bytes) -> Event:
     """Return the event that `message` is: {"type": kind, field: value, ...}.
 
-    Raises BadMessage, whose text says in one sentence what is wrong.
+    Raises BadMessage, whose text is one sentence.
     """
     if not isinstance(message, str):
         raise BadMessage("a message must be text, not bytes")
@@ -117,12 +117,12 @@ def read_event(message: str | bytes) -> Event:
 def newest(events: list[tuple[Client, Event]]) -> list[tuple[Client, Event]]:
     """Keep of a slider's many values only the last, where the last one came; join steps.
 
-    Else a key held down, where physics is slow, would go on for long after it was let go.
+    Else, where physics is slow, a key that was held down would act long after its release.
     """
     kept: list[tuple[Client, Event]] = []
     seen: set[tuple[object, ...]] = set()
     for client, event in reversed(events):
-        if event["type"] in ("knob", "speed", "arrows", "seek"):
+        if event["type"] in ("parameter", "speed", "arrows", "seek"):
             key = (event["type"], event.get("key"))
             if key in seen:
                 continue

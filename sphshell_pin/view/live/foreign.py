@@ -1,4 +1,4 @@
-"""A picture in somebody else's meshcat window: fewer commands, as each one is waited for."""
+"""A picture in another meshcat window: fewer commands, as the sender waits for each answer."""
 
 from __future__ import annotations
 

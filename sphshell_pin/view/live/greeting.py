@@ -1,4 +1,4 @@
-"""What a browser is told first: what there is to see, to turn and to push."""
+"""The first message to a browser: what there is to see, to change and to push."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 SLOWEST, FASTEST = 0.01, 10.0  # speeds that the page offers
 STRIP_SECONDS = 6.0  # of the clock on the wall, that the strip shows at the speed of now
 
-_KNOB = ("key", "label", "unit", "low", "high", "log", "value")
+_PARAMETER = ("key", "label", "unit", "low", "high", "log", "value")
 _COLORS = {"normal": NORMAL_COLOR, "friction": FRICTION_COLOR, "cone": CONE_COLOR}
 
 
@@ -33,15 +33,15 @@ def check_speed(speed: float) -> float:
 def greeting(player: Player, picture: str | None) -> Json:
     """Return what does not change while `player` runs; `picture` is the page of the scene, if any.
 
-    Its "session" tells one run from the next on the same port.
+    Its "session" differs from one run to the next on the same port.
     """
     return {
         "session": secrets.token_hex(8),
         "title": player.title,
         "pairs": [pair.name for pair in player.scene.pairs],
         "bodies": list(player.bodies),
-        "knobs": [
-            {name: getattr(knob, name) for name in _KNOB}
+        "parameters": [
+            {name: getattr(knob, name) for name in _PARAMETER}
             | {"restart": bool(getattr(knob, "restart", False))}
             for knob in player.knobs
         ],

@@ -46,9 +46,8 @@ class Live:
     `start` plays it in a thread of its own and returns; `run` plays it in the caller's until
     `stop` or Ctrl-C. `visualizer` is an existing meshcat.Visualizer or pinocchio
     MeshcatVisualizer: the scene is then drawn there, and the page shows its own controls round a
-    frame with that picture. `speed` is simulated seconds per second,
-    from 0.01 to 10. Not `running`, it waits for
-    the button; with `wait`, for the first browser.
+    frame with that picture. `speed` is simulated seconds per second, from 0.01 to 10. Not
+    `running`, it waits for the button; with `wait`, for the first browser.
 
     Raises MissingExtra without meshcat, SphshellError where the port is taken, InvalidParameter
     for a `speed` or a `visualizer` that is none.
@@ -84,7 +83,7 @@ class Live:
         self._holds: dict[Client, Event] = {}
         self._pushed: tuple[str, FloatArray, float] | None = None
         self._changed = True
-        self._knob_values = self._read_knobs()
+        self._parameter_values = self._read_parameters()
         self._next_panel = 0.0
         self._simulated = 0.0
         # Simulated time gone beyond what was due: a fixed step may be longer than a frame.
@@ -105,7 +104,7 @@ class Live:
 
     @property
     def url(self) -> str:
-        """Where the page is; it ends with a token, without which nobody may look or play."""
+        """The address of the page; it ends with a token, without which access is refused."""
         return self.server.url
 
     @property
@@ -177,20 +176,18 @@ class Live:
                 time.sleep(left)
 
     def frame(self, wall: float) -> None:
-        """Handle what browsers said, go on by `wall` [s] at the speed chosen, and draw."""
+        """Handle the events of browsers, go on by `wall` [s] at the speed chosen, and draw."""
         watched = self.server.watched
         for client, event in newest(self.server.events()):
             try:
                 self._handle(client, event)
-            except BadMessage as fault:
-                self.server.tell(client, str(fault))
             except SphshellError as fault:
-                self.server.tell(client, str(fault))
+                self.server.report(client, str(fault))
             except Exception as fault:
-                # Whatever a browser asks for, the run goes on.
-                self.server.tell(client, f"{type(fault).__name__}: {fault}")
+                # No request of a browser ends the run.
+                self.server.report(client, f"{type(fault).__name__}: {fault}")
             self._changed = True
-            self._knob_values = self._read_knobs()
+            self._parameter_values = self._read_parameters()
         if self._waiting and watched:
             self._waiting = False
             wall = 0.0
@@ -207,11 +204,11 @@ class Live:
         if self._changed and (self._foreign is None or self._foreign.due(now)):
             self._changed = False
             try:
-                # A run that diverges has its say in the panel, not on the terminal.
+                # A diverging run is reported in the panel, not on the terminal.
                 with np.errstate(all="ignore"):
                     self.picture.update(self.player, self._push_shown())
             except Exception as fault:
-                # What cannot be drawn is told in the panel, which goes on.
+                # A picture that fails is reported in the panel, which goes on.
                 self.fault = fault
                 self.running = False
             self._window.commit()
@@ -222,11 +219,11 @@ class Live:
         self.server.wake()
 
     def scene_news(self, since: int) -> tuple[int, bytes | None]:
-        """Answer the server: what changed in the scene after frame `since`."""
+        """Return for the server what changed in the scene after frame `since`."""
         return self._window.news(since)
 
     def panel_news(self, since: int) -> tuple[int, list[str]]:
-        """Answer the server: what the panel says that is newer than `since`."""
+        """Return for the server the messages of the panel that are newer than `since`."""
         return self._panel.news(since)
 
     def _follow(self, due: float) -> None:
@@ -286,14 +283,14 @@ class Live:
             case "speed":
                 self.speed = min(max(event["value"], SLOWEST), FASTEST)
                 self._pace.clear()
-            case "knob":
+            case "parameter":
                 if event["key"] not in {knob.key for knob in player.knobs}:
                     raise NameNotFound(
-                        "knob", event["key"], "this run", [knob.key for knob in player.knobs]
+                        "parameter", event["key"], "this run", [knob.key for knob in player.knobs]
                     )
                 before = player.time
                 player.change(event["key"], event["value"])
-                if player.time < before:  # it started anew
+                if player.time < before:  # it started again
                     self._start_anew()
             case "push":
                 self._push(event, event["seconds"])
@@ -347,7 +344,7 @@ class Live:
             raise BadMessage("only a finished run has a time to go to")
         back = t < self.player.time
         self._start_strip()
-        # Up to there from a little earlier, for the strip: nothing is computed anew.
+        # Up to there from a little earlier, for the strip: nothing is computed again.
         span = STRIP_SECONDS * self.speed
         self.player.seek(t - span)
         rows = self.player.advance(max(0.0, t - self.player.time), BUDGET)
@@ -381,9 +378,9 @@ class Live:
         point = frame_point(display.scene.model, display.data, body)
         return None if point is None else PushShown.at(point, force)
 
-    # What the panel says
+    # The panel
 
-    def _read_knobs(self) -> dict[str, float]:
+    def _read_parameters(self) -> dict[str, float]:
         return {knob.key: knob.value for knob in self.player.knobs}
 
     def _state(self) -> Json:
@@ -402,7 +399,7 @@ class Live:
             "relative": abs(residual) / exchanged if exchanged > 0.0 else math.nan,
             "exchanged": exchanged,
             "ended": self._why_ended(),
-            "knobs": self._knob_values,
+            "parameters": self._parameter_values,
             "show": self.picture.shown,
             "arrows": self.picture.magnification,
             "scale": str(self.picture.arrow_scale),

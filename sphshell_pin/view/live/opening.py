@@ -63,9 +63,9 @@ def preview(
         Open the page in the web browser, where there is a screen.
     color
         What the colours of the shells show: nothing ("surface"), the patches ("patches"), or how
-        far curved elements stand off the flat ones ("distance"). The page can change it.
+        far curved elements are from the flat ones ("distance"). The page can change it.
     told
-        Called with the page's address, which ends with a token: who has it may look and play.
+        Called with the page's address, which ends with a token and gives access.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def preview(
         if live.server.is_open:
             port = live.server.port
             print(
-                f"everybody who has this address and reaches port {port} may look and play",
+                f"everybody who has this address and reaches port {port} has access",
                 file=sys.stderr,
             )
         if open:

@@ -63,8 +63,8 @@ class Panel:
             clear = self._cleared > since
             rows = [text for number, text in self._rows if number > since]
             if rows or clear:
-                told = "true" if clear else "false"
-                texts.append(f'{{"type":"rows","clear":{told},"rows":[{",".join(rows)}]}}')
+                cleared = "true" if clear else "false"
+                texts.append(f'{{"type":"rows","clear":{cleared},"rows":[{",".join(rows)}]}}')
             if self._state[0] > since:
                 texts.append(self._state[1])
             return self._number, texts

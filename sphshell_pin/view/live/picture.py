@@ -118,7 +118,7 @@ class Picture:
         return self._scale.factor
 
     def clear(self) -> None:
-        """Start afresh: no trails, and a scale that is yet to be found."""
+        """Remove the trails, and choose the scale again."""
         self._trails.clear()
         self._scale.forget()
 
@@ -195,7 +195,7 @@ class _Scale:
         self.forget()
 
     def forget(self) -> None:
-        """Look for a scale anew."""
+        """Choose the scale again."""
         self._seen: list[float] = []
         self._found = ArrowScale.from_forces(np.zeros(0), self._length)
 
@@ -255,7 +255,7 @@ class _Trails:
         points.append(point)
         self._undrawn[index] = self._undrawn.get(index, 0) + 1
         full = len(points) >= POINTS_OF_PIECE
-        # A piece is drawn anew as it grows: every few points will do.
+        # A piece is drawn again as it grows: every few points will do.
         if full or self._undrawn[index] >= 4:
             self._draw(index)
         if full:
@@ -280,7 +280,7 @@ def _pool(scene: Scene) -> int:
 
 
 def frame_point(model: pin.Model, data: pin.Data, name: str) -> FloatArray | None:
-    """Return where the origin of a frame or joint stands (3,) [m]; None if there is none."""
+    """Return the origin (3,) [m] of a frame or joint in the world; None if there is none."""
     if model.existFrame(name):
         frame = model.frames[model.getFrameId(name)]
         return np.array((data.oMi[frame.parentJoint] * frame.placement).translation)

@@ -1,4 +1,4 @@
-"""What the live page plays: a run that goes on for ever, or a finished one."""
+"""What the live page plays: a run that has no end, or a finished one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class Player(Protocol):
     """A scene in motion, advanced piece by piece; SI units, world frame.
 
-    `scene` may become another object when a knob is turned; its model stays the same.
+    `scene` may become another object when a parameter changes; its model stays the same.
     """
 
     @property
@@ -50,7 +50,7 @@ class Player(Protocol):
 
     @property
     def residual(self) -> float:
-        """Energy that appeared from nowhere since the start [J]."""
+        """Change of the total energy since the start [J]: the integration's error."""
 
     @property
     def exchanged(self) -> float:
@@ -58,7 +58,7 @@ class Player(Protocol):
 
     @property
     def knobs(self) -> tuple[Knob, ...]:
-        """What can be turned, with the values of now."""
+        """The parameters with sliders, with their present values."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -66,7 +66,7 @@ class Player(Protocol):
 
     @property
     def duration(self) -> float | None:
-        """Length of a replay [s]; None where it goes on for ever."""
+        """Length of a replay [s]; None where it has no end."""
 
     @property
     def ended(self) -> str | None:
@@ -79,7 +79,7 @@ class Player(Protocol):
         """Go back to the start."""
 
     def change(self, key: str, value: float) -> None:
-        """Turn a knob; raise SphshellError, and go on unchanged, where it cannot be."""
+        """Set a parameter; raise SphshellError, and go on unchanged, where it cannot be."""
 
     def push(self, body: str, force_world: FloatArray, seconds: float) -> None:
         """Push the origin of a body with `force_world` (3,) [N] for `seconds` [s]."""

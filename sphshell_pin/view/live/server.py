@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 PAGE = Path(__file__).with_name("page")
 MOST_EVENTS = 2_000  # waiting to be handled; more are refused
 
-MOST_UNSAID = 50  # answers to a browser that does not read; more are dropped
+MOST_UNSENT = 50  # answers to a browser that does not read; more are dropped
 
 # A stranger may connect, too: not so often, nor for so long, that no file can be opened any more.
 MOST_CONNECTIONS = 200
 SILENCE = 10.0  # [s] until the next request, or the rest of one
 
-# A browser says what it has drawn. This many frames go out unanswered; after the time [s], as in
-# a tab that is hidden and draws nothing, the next one goes out all the same.
+# A browser confirms what it has drawn. This many frames are sent unconfirmed; after the time [s],
+# as in a tab that is hidden and draws nothing, the next one is sent all the same.
 FRAMES_AHEAD = 2
 PATIENCE = 1.0
 
@@ -42,7 +42,7 @@ _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 
 
 class Source(Protocol):
-    """Where the server gets what browsers are told; called in the server's thread."""
+    """Where the server gets its messages from; called in the server's thread."""
 
     def scene_news(self, since: int) -> tuple[int, bytes | None]:
         """Return the last frame's number, and what changed in the scene after frame `since`."""
@@ -56,7 +56,7 @@ class Client(Protocol):
 
     wake: asyncio.Event
 
-    def say(self, data: Mapping[str, object]) -> None:
+    def send(self, data: Mapping[str, object]) -> None:
         """Send one text, without waiting."""
 
     def close(self, code: int, reason: str) -> None:
@@ -113,7 +113,7 @@ class Server:
 
     @property
     def url(self) -> str:
-        """Where the page is; whoever has this address may look and play."""
+        """The address of the page, which gives access to it."""
         return self._address(self.access.token)
 
     @property
@@ -141,17 +141,17 @@ class Server:
         return [self._events.popleft() for _ in range(len(self._events))]
 
     def wake(self) -> None:
-        """Let every browser be told what is new; returns at once."""
+        """Send every browser what is new; returns at once."""
         if self.clients and not self._woken:
             self._woken = True
             self._call(self._wake)
 
-    def tell(self, client: Client, text: str) -> None:
+    def report(self, client: Client, text: str) -> None:
         """Send one browser a sentence that it shows."""
-        self._call(lambda: client.say({"type": "error", "text": text}))
+        self._call(lambda: client.send({"type": "error", "text": text}))
 
     def stop(self) -> None:
-        """Say goodbye to the browsers and end the thread."""
+        """Close the connections and end the thread."""
         if not self._stopping:
             self._stopping = True
             self._call(lambda: self._loop.create_task(self._close()))
@@ -167,7 +167,7 @@ class Server:
         self.arrived.set()
 
     def leave(self, client: Client) -> None:
-        """Forget a browser that has gone; what it held, it lets go."""
+        """Forget a browser that has gone, and end the push that it held."""
         self.clients.discard(client)
         self._events.append((client, {"type": "release"}))
         self.arrived.set()
@@ -187,7 +187,7 @@ class Server:
     async def _close(self) -> None:
         self._http.stop()
         for client in list(self.clients):
-            client.say({"type": "end"})
+            client.send({"type": "end"})
         await asyncio.sleep(0.01)
         for client in list(self.clients):
             client.close(1001, "the run has ended")
@@ -247,13 +247,13 @@ def _remedy(number: int | None) -> str:
 
 
 def _handlers() -> tuple[type, type]:
-    """Make the two handlers; tornado is not loaded before somebody wants the page."""
+    """Make the two handlers; tornado is not loaded before the page is asked for."""
     import tornado.iostream
     import tornado.web
     import tornado.websocket
 
     class Guarded(tornado.web.RequestHandler):
-        """What both have in common: nobody without the token, no frames, no tracebacks."""
+        """What both have in common: no access without the token, no frames, no tracebacks."""
 
         def initialize(self, server: Server, files: dict[str, Path]) -> None:
             self._server, self._files = server, files
@@ -304,7 +304,7 @@ def _handlers() -> tuple[type, type]:
             self.write(content)
 
     class SocketHandler(Guarded, tornado.websocket.WebSocketHandler):
-        """One browser: what it has been told, and what it says."""
+        """One browser: what was sent to it, and its events."""
 
         def initialize(self, server: Server, files: dict[str, Path]) -> None:
             super().initialize(server, files)
@@ -334,28 +334,28 @@ def _handlers() -> tuple[type, type]:
                 else:
                     self._server.take(self, event)
             except BadMessage as fault:
-                self.say({"type": "error", "text": str(fault)})
+                self.send({"type": "error", "text": str(fault)})
 
         def on_close(self) -> None:
             if self._pump_task is not None:  # else it went before it was let in
                 self._server.leave(self)
                 self._pump_task.cancel()
 
-        def say(self, data: Mapping[str, object]) -> None:
-            """Send one text, without waiting; nobody minds if the browser has gone."""
-            if len(self._answers) < MOST_UNSAID:
-                answer = asyncio.ensure_future(self._say(json.dumps(data)))
+        def send(self, data: Mapping[str, object]) -> None:
+            """Send one text, without waiting; a browser that has gone is no error."""
+            if len(self._answers) < MOST_UNSENT:
+                answer = asyncio.ensure_future(self._send(json.dumps(data)))
                 self._answers.add(answer)
                 answer.add_done_callback(self._answers.discard)
 
-        async def _say(self, text: str) -> None:
+        async def _send(self, text: str) -> None:
             try:
                 await self.write_message(text)
             except (tornado.websocket.WebSocketClosedError, tornado.iostream.StreamClosedError):
                 return
 
         async def _pump(self) -> None:
-            """Tell the browser what is new, at the pace at which it takes it."""
+            """Send the browser what is new, as fast as it draws."""
             try:
                 while True:
                     await self._turn()

@@ -1,6 +1,6 @@
 """The scene as browsers are to see it: what is drawn, where it is, and since when.
 
-No queue stands between the simulation and a browser. Everything carries the number of the frame in
+There is no queue between the simulation and a browser. Everything has the number of the frame in
 which it last changed, and each browser is given what changed since the frame it saw last: a slow
 one skips frames, a late one starts at frame zero and gets the whole scene.
 """

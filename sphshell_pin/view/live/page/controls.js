@@ -86,14 +86,14 @@ export class Slider {
   }
 }
 
-// One knob: label, number with unit, slider.
-export function make_knob(knob, changed) {
+// One parameter: label, number with unit, slider.
+export function make_parameter(parameter, changed) {
   const row = document.createElement("div");
   row.className = "row";
   const label = document.createElement("label");
-  label.textContent = knob.label;
-  label.title = knob.key;
-  if (knob.restart) {
+  label.textContent = parameter.label;
+  label.title = parameter.key;
+  if (parameter.restart) {
     const mark = document.createElement("span");
     mark.className = "restart";
     mark.textContent = "restarts";
@@ -105,15 +105,15 @@ export function make_knob(knob, changed) {
   const field = document.createElement("input");
   field.type = "text";
   field.inputMode = "decimal";
-  field.setAttribute("aria-label", knob.label);
+  field.setAttribute("aria-label", parameter.label);
   const unit = document.createElement("i");
-  write_unit(unit, knob.unit);
+  write_unit(unit, parameter.unit);
   entry.append(field, unit);
   const range = document.createElement("input");
   Object.assign(range, { type: "range", min: 0, max: STEPS, step: 1 });
-  range.id = `knob-${knob.key}`;
-  range.dataset.knob = knob.key;
+  range.id = `parameter-${parameter.key}`;
+  range.dataset.parameter = parameter.key;
   label.htmlFor = range.id;
   row.append(label, entry, range);
-  return { row, slider: new Slider(range, { ...knob, field }, changed) };
+  return { row, slider: new Slider(range, { ...parameter, field }, changed) };
 }

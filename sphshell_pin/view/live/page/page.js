@@ -1,13 +1,13 @@
-// The panel and the connection: what the run says is shown, what the user does is sent.
+// The panel and the connection: it shows the state of the run and sends the user's input.
 "use strict";
 
 import { Chart } from "./chart.js";
-import { element, make_knob, number, Slider } from "./controls.js";
+import { element, make_parameter, number, Slider } from "./controls.js";
 import { Picture } from "./scene.js";
 
 const PARTS = {
   robot: "Robot", spheres: "Spheres", arrows: "Force arrows", points: "Contact points",
-  trails: "Trails", cones: "Friction cones", wireframe: "Wireframe", patches: "Patch colours",
+  trails: "Trails", cones: "Friction cones", wireframe: "Wireframe", patches: "Patch colors",
   distance: "Curved-flat distance",
 };
 const AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
@@ -16,7 +16,7 @@ const SLOW = 100; // [ms] from a frame to its picture
 
 let hello = null, state = null, socket = null, picture = null, chart = null;
 let messages = 0, seen = 0;
-const knobs = new Map(), sliders = {}, boxes = new Map();
+const parameters = new Map(), sliders = {}, boxes = new Map();
 
 function send(event) {
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(event));
@@ -106,15 +106,15 @@ function greet(data) {
   fill(element("body"), data.bodies.map((name) => [name, name]));
   element("push-section").hidden = !data.bodies.length;
   const replay = data.duration !== null;
-  element("knob-section").hidden = replay;
+  element("parameter-section").hidden = replay;
   element("scrub").hidden = !replay;
-  if (!data.knobs.length) {
-    element("knobs").innerHTML = '<p class="hint">This scenario has no knobs: add [[knob]] to it.</p>';
+  if (!data.parameters.length) {
+    element("parameters").innerHTML = '<p class="hint">This scenario lists no parameters: add [[knob]] tables to it.</p>';
   }
-  for (const knob of data.knobs) {
-    const { row, slider } = make_knob(knob, (value) => send({ type: "knob", key: knob.key, value }));
-    element("knobs").append(row);
-    knobs.set(knob.key, slider);
+  for (const parameter of data.parameters) {
+    const { row, slider } = make_parameter(parameter, (value) => send({ type: "parameter", key: parameter.key, value }));
+    element("parameters").append(row);
+    parameters.set(parameter.key, slider);
   }
   sliders.speed = new Slider(element("speed"), {
     low: data.speeds[0], high: data.speeds[1], log: true, value: 1, output: element("speed-value"),
@@ -159,7 +159,7 @@ function show(data) {
   element("coloring").lastChild.textContent = data.coloring ?? "";
   sliders.speed.follow(data.speed);
   sliders.arrows.follow(data.arrows);
-  for (const [key, value] of Object.entries(data.knobs)) knobs.get(key)?.follow(value);
+  for (const [key, value] of Object.entries(data.parameters)) parameters.get(key)?.follow(value);
   for (const [part, on] of Object.entries(data.show)) {
     const box = boxes.get(part);
     if (box) box.checked = on;
