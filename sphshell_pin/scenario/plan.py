@@ -134,11 +134,11 @@ def plan_press(
         )
     gap = TIP_GAP * tip.radius
     spot, turned, points, even = _place_to_press(shell, tip, stance, gap, toward, inside=inside)
-    placement = pin.SE3(turned, stance.centre - turned @ spot.centre)
+    placement = pin.SE3(turned, stance.center - turned @ spot.center)
     force = _round(_suitable_force(stance, tip.radius, materials) if press is None else press)
     rate = _round(WAY_RATE * tip.radius)
-    aside = turned.T @ (stance.origin - stance.centre)
-    # The tip's frame, which follows the way, need not stand in the sphere's centre.
+    aside = turned.T @ (stance.origin - stance.center)
+    # The tip's frame, which follows the way, need not stand in the sphere's center.
     way = points + aside - spot.normal * (spot.normal @ aside)
     contact = _contact(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
     softest = contact.mu_static * force / (TIP_LAG * tip.radius)
@@ -193,7 +193,7 @@ def plan_press(
 def plan_fall(
     shell: Any,
     tip: Tip,
-    centre: Array,
+    center: Array,
     root: Array,
     materials: tuple[Material, Material],
     *,
@@ -201,14 +201,14 @@ def plan_fall(
 ) -> Plan:
     """Plan a scenario in which a free body falls on the surface, which stands as its file says.
 
-    `centre` (3,) [m] is the sphere's in the world when the root is at `root` (7,).
+    `center` (3,) [m] is the sphere's in the world when the root is at `root` (7,).
     """
     gap = FALL_GAP * tip.radius
     # Beside the middle: a ball in a bowl rolls then.
     beside = FALL_BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
     spot = find_touch_point(shell, tip.radius, gap, toward=UP, inside=inside, beside=beside)
     start = root.copy()
-    start[:3] += spot.centre - centre
+    start[:3] += spot.center - center
     speed = math.sqrt(2 * GRAVITY * gap)
     why = (
         f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
@@ -221,7 +221,7 @@ def plan_fall(
 def plan_stand(
     shell: Any,
     tips: tuple[Tip, ...],
-    centres: Array,
+    centers: Array,
     mass: float,
     joint_inertia: Array,
     leg: float,
@@ -229,11 +229,11 @@ def plan_stand(
 ) -> Plan:
     """Plan a scenario in which a floating robot of `mass` [kg] stands on spheres.
 
-    `centres` (k, 3) [m] are those of the `tips` in the world, `joint_inertia` [kg m^2] the
+    `centers` (k, 3) [m] are those of the `tips` in the world, `joint_inertia` [kg m^2] the
     diagonal of the mass matrix of its motors, `leg` [m] the distance of its root from the tips.
     """
     gap = FOOT_GAP * min(tip.radius for tip in tips)
-    place = _under(shell, centres, np.array([tip.radius for tip in tips]), gap)
+    place = _under(shell, centers, np.array([tip.radius for tip in tips]), gap)
     load = mass * GRAVITY / len(tips)
     kp = load * 0.5 * leg / SAG
     # A leg turns the body above it as much as itself.
@@ -309,22 +309,22 @@ def _place_to_press(
     return first
 
 
-def _under(shell: Any, centres: Array, radii: Array, gap: float) -> Any:
+def _under(shell: Any, centers: Array, radii: Array, gap: float) -> Any:
     """Return where the shell stands so that the nearest of the spheres has the `gap` [m] to it.
 
     Its middle stands under the middle of the spheres; where none of them would then come down on
     it, under the first one.
     """
     spot = find_touch_point(shell, float(radii[0]), gap, toward=UP)
-    for anchor in (centres.mean(axis=0), centres[0]):
+    for anchor in (centers.mean(axis=0), centers[0]):
         aside = anchor - spot.point
         heights = []
-        for centre, radius in zip(centres, radii, strict=True):
-            above = centre - aside
+        for center, radius in zip(centers, radii, strict=True):
+            above = center - aside
             above[2] = shell.box[1, 2] + 2 * (radius + gap)
-            down = come_down(shell, above, -UP, float(radius), gap).centre[2]
+            down = come_down(shell, above, -UP, float(radius), gap).center[2]
             if down > shell.box[0, 2] - radius:
-                heights.append(centre[2] - down)
+                heights.append(center[2] - down)
         if heights:
             return pin.SE3(np.eye(3), np.array([aside[0], aside[1], min(heights)]))
     raise SphshellError("no foot comes down on the surface: it is too small")
