@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.benchmarks.processes import OwnProcess
-from sphshell_pin.benchmarks.surfaces import height, touching_centres, wavy_sheet
+from sphshell_pin.benchmarks.surfaces import height, touching_centers, wavy_sheet
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ THIS, GIVEN, LIBIGL = "this, curved contact", "this, normals given", "libigl AAB
 class Cost:
     """What building took: triangles, CPU time [s], bytes kept and at the highest, above the arrays.
 
-    Memory is 0 where the system does not tell it (elsewhere than on Linux).
+    Memory is 0 where it is unknown (elsewhere than on Linux).
     """
 
     triangles: int
@@ -37,14 +37,14 @@ class Cost:
     peak: int
 
 
-def build_ours(vertices: Array, triangles: NDArray[np.int32], centre: Array) -> object:
+def build_ours(vertices: Array, triangles: NDArray[np.int32], center: Array) -> object:
     from sphshell_pin import Shell
 
     shell = Shell(vertices, triangles)
-    return shell, shell.contacts(centre, RADIUS)
+    return shell, shell.contacts(center, RADIUS)
 
 
-def build_with_normals(vertices: Array, triangles: NDArray[np.int32], centre: Array) -> object:
+def build_with_normals(vertices: Array, triangles: NDArray[np.int32], center: Array) -> object:
     from sphshell_pin import Shell
 
     x, y, _ = vertices.T
@@ -52,16 +52,16 @@ def build_with_normals(vertices: Array, triangles: NDArray[np.int32], centre: Ar
     slope_y = (height(x, y + 1e-6) - height(x, y - 1e-6)) / 2e-6
     normals = np.c_[-slope_x, -slope_y, np.ones(len(x))]
     shell = Shell(vertices, triangles, normals)
-    return shell, shell.contacts(centre, RADIUS)
+    return shell, shell.contacts(center, RADIUS)
 
 
-def build_libigl(vertices: Array, triangles: NDArray[np.int32], centre: Array) -> object:
+def build_libigl(vertices: Array, triangles: NDArray[np.int32], center: Array) -> object:
     import igl
 
     corners = triangles.astype(np.int64)
     tree = igl.AABB()
     tree.init(vertices, corners)
-    return corners, tree, tree.squared_distance(vertices, corners, centre[None])
+    return corners, tree, tree.squared_distance(vertices, corners, center[None])
 
 
 BUILDERS = {THIS: build_ours, GIVEN: build_with_normals, LIBIGL: build_libigl}
@@ -90,11 +90,11 @@ def measure_here(name: str, cells: int, size: float) -> Cost:
     build = BUILDERS[name]
     build(*wavy_sheet(2, 0.1), np.zeros(3))  # imports
     vertices, triangles = wavy_sheet(cells, size)
-    centre = touching_centres(1, size, RADIUS, DEPTH)[0]
+    center = touching_centers(1, size, RADIUS, DEPTH)[0]
     forget_highest()
     before, _ = resident()
     start = time.process_time()
-    built = build(vertices, triangles, centre)
+    built = build(vertices, triangles, center)
     cpu = time.process_time() - start
     now, highest = resident()
     del built

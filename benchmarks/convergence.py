@@ -25,7 +25,7 @@ from sphshell_pin.benchmarks.surfaces import (
     plate,
     sheet,
     torus,
-    touching_centres,
+    touching_centers,
     wavy_sheet,
 )
 from sphshell_pin.benchmarks.timing import (
@@ -61,7 +61,7 @@ class Surface:
     inside: bool
 
     def touching(self, seed: int, count: int) -> tuple[Array, Array]:
-        """Return centres (count, 3) of spheres DEPTH deep, and the exact unit forces (count, 3)."""
+        """Return centers (count, 3) of spheres DEPTH deep, and the exact unit forces (count, 3)."""
         points, outward = self.places(np.random.default_rng(seed), count)
         normals = -outward if self.inside else outward
         return points + (RADIUS - DEPTH) * normals, normals
@@ -140,11 +140,11 @@ RULES = {
 }
 
 
-def relative_forces(shell: Shell, method: str, centres: Array) -> Array:
+def relative_forces(shell: Shell, method: str, centers: Array) -> Array:
     """Return the forces (n, 3) of the law k depth^1.5, divided by the exact magnitude."""
-    forces = np.empty((len(centres), 3))
-    for i, centre in enumerate(centres):
-        terms = shell.contacts(centre, RADIUS, method=method).terms
+    forces = np.empty((len(centers), 3))
+    for i, center in enumerate(centers):
+        terms = shell.contacts(center, RADIUS, method=method).terms
         forces[i] = (terms.weight * (terms.depth / DEPTH) ** EXPONENT) @ terms.normal
     return forces
 
@@ -153,7 +153,7 @@ def measure(
     name: str, surface: Surface, rounds: int = 0, progress: Progress = silent, finest: int = 5
 ) -> list[Row]:
     """Measure every rule on the first `finest` meshes of a surface; queries timed in `rounds`."""
-    centres, normals = surface.touching(0, PLACES)
+    centers, normals = surface.touching(0, PLACES)
     elsewhere, _ = surface.touching(1, TIMED_PLACES)
     rows, contestants = [], {}
     meshes = surface.meshes()[:finest]
@@ -162,7 +162,7 @@ def measure(
         exact = Shell(mesh.vertices, mesh.triangles, normals=mesh.normals)
         for label, (method, exact_normals) in RULES.items():
             shell = exact if exact_normals else estimated
-            rows.append(row_of(name, label, mesh, relative_forces(shell, method, centres), normals))
+            rows.append(row_of(name, label, mesh, relative_forces(shell, method, centers), normals))
             contestants[str(len(rows) - 1)] = query_contestant(shell, elsewhere, method)
         progress(0.5 * (k + 1) / len(meshes))
     if rounds == 0:
@@ -194,9 +194,9 @@ def measure_cost(rounds: int, progress: Progress = silent) -> dict[str, dict[str
     """Return the times of a query [s] of each method on 200 k triangles, wavy and flat."""
     depth = 0.0005
     vertices, triangles = wavy_sheet(316, 1.0)
-    centres = touching_centres(20_000, 1.0, QUERY_RADIUS, depth)
-    above = centres * [1.0, 1.0, 0.0] + [0.0, 0.0, QUERY_RADIUS - depth]
-    surfaces = {"wavy sheet": (vertices, centres), "flat plate": (vertices * [1, 1, 0], above)}
+    centers = touching_centers(20_000, 1.0, QUERY_RADIUS, depth)
+    above = centers * [1.0, 1.0, 0.0] + [0.0, 0.0, QUERY_RADIUS - depth]
+    surfaces = {"wavy sheet": (vertices, centers), "flat plate": (vertices * [1, 1, 0], above)}
     found = {}
     for k, (name, (corners, places)) in enumerate(surfaces.items()):
         shell = Shell(corners, triangles)

@@ -107,14 +107,14 @@ def measure(scenario: str, kinds: tuple[str, ...], seconds: float) -> str:
             factor = (live.player.time - simulated) / elapsed
             taken = 1e3 * np.array(frame.times[frames:])
             physics = 1e3 * np.array(advance.times[advances:])
-            told = (count.value - seen) / elapsed
+            seen_rate = (count.value - seen) / elapsed
     finally:
         live.stop()
     page = taken[: len(physics)] - physics[: len(taken)]
     low, middle, high = np.percentile(page, [25, 50, 75])
     name = " + ".join(kinds) or "none"
     return (
-        f"{name:14s} {len(taken) / elapsed:8.1f} {told if 'fast' in kinds else np.nan:10.1f} "
+        f"{name:14s} {len(taken) / elapsed:8.1f} {seen_rate if 'fast' in kinds else np.nan:10.1f} "
         f"{factor:9.3f} {np.median(taken):8.2f} {np.max(taken):8.1f} "
         f"{middle:8.2f} [{low:.2f}, {high:.2f}]"
     )

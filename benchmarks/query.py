@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
-from sphshell_pin.benchmarks.surfaces import touching_centres, wavy_sheet
+from sphshell_pin.benchmarks.surfaces import touching_centers, wavy_sheet
 from sphshell_pin.benchmarks.timing import Progress, median_us, ratio, silent, take_turns
 
 Array = NDArray[np.float64]
 RADIUS, DEPTH = 0.010, 0.0005
 
 
-def query_contestant(shell: Shell, centres: Array, method: str = "facets") -> Callable[[], float]:
-    radii = np.full(len(centres), RADIUS)
+def query_contestant(shell: Shell, centers: Array, method: str = "facets") -> Callable[[], float]:
+    radii = np.full(len(centers), RADIUS)
 
     def run() -> float:
         start = time.perf_counter()
-        shell.contacts_batch(centres, radii, method=method, threads=1)
-        return (time.perf_counter() - start) / len(centres)
+        shell.contacts_batch(centers, radii, method=method, threads=1)
+        return (time.perf_counter() - start) / len(centers)
 
     return run
 
@@ -39,7 +39,7 @@ def coal_tree(vertices: Array, triangles: NDArray[np.int32]) -> coal.BVHModelOBB
 
 
 def coal_contestant(
-    vertices: Array, triangles: NDArray[np.int32], centres: Array
+    vertices: Array, triangles: NDArray[np.int32], centers: Array
 ) -> Callable[[], float]:
     """Time coal.collide, called from Python, which adds about 1 us to some 100 us."""
     tree, sphere = coal_tree(vertices, triangles), coal.Sphere(RADIUS)
@@ -48,17 +48,17 @@ def coal_contestant(
 
     def run() -> float:
         start = time.perf_counter()
-        for centre in centres:
-            place.setTranslation(centre)
+        for center in centers:
+            place.setTranslation(center)
             result.clear()
             coal.collide(sphere, place, tree, there, request, result)
-        return (time.perf_counter() - start) / len(centres)
+        return (time.perf_counter() - start) / len(centers)
 
     return run
 
 
 def libigl_contestant(
-    vertices: Array, triangles: NDArray[np.int32], centres: Array
+    vertices: Array, triangles: NDArray[np.int32], centers: Array
 ) -> Callable[[], float] | None:
     try:
         import igl
@@ -70,14 +70,14 @@ def libigl_contestant(
 
     def run() -> float:
         start = time.perf_counter()
-        tree.squared_distance(vertices, corners, centres)
-        return (time.perf_counter() - start) / len(centres)
+        tree.squared_distance(vertices, corners, centers)
+        return (time.perf_counter() - start) / len(centers)
 
     return run
 
 
 def fcpw_contestant(
-    vertices: Array, triangles: NDArray[np.int32], centres: Array
+    vertices: Array, triangles: NDArray[np.int32], centers: Array
 ) -> Callable[[], float] | None:
     try:
         import fcpw
@@ -88,14 +88,14 @@ def fcpw_contestant(
     scene.set_object_vertices(np.asfortranarray(vertices, dtype=np.float32), 0)
     scene.set_object_triangles(np.asfortranarray(triangles, dtype=np.int32), 0)
     scene.build(fcpw.aggregate_type.bvh_surface_area, True)
-    points = np.asfortranarray(centres, dtype=np.float32)
-    reach = np.full(len(centres), RADIUS**2, dtype=np.float32)
+    points = np.asfortranarray(centers, dtype=np.float32)
+    reach = np.full(len(centers), RADIUS**2, dtype=np.float32)
 
     def run() -> float:
         found = fcpw.interaction_3D_list()
         start = time.perf_counter()
         scene.find_closest_points(points, reach, found)
-        return (time.perf_counter() - start) / len(centres)
+        return (time.perf_counter() - start) / len(centers)
 
     return run
 
@@ -112,14 +112,14 @@ def measure_peers(rounds: int, progress: Progress = silent) -> dict[str, Array]:
     """
     vertices, triangles = wavy_sheet(316, 1.0)
     shell = Shell(vertices, triangles)
-    centres = touching_centres(20_000, 1.0, RADIUS, DEPTH)
+    centers = touching_centers(20_000, 1.0, RADIUS, DEPTH)
     contestants = {
-        THIS: query_contestant(shell, centres),
-        COAL: coal_contestant(vertices, triangles, centres[:2000]),
+        THIS: query_contestant(shell, centers),
+        COAL: coal_contestant(vertices, triangles, centers[:2000]),
     }
     peers = {
-        LIBIGL: libigl_contestant(vertices, triangles, centres),
-        FCPW: fcpw_contestant(vertices, triangles, centres),
+        LIBIGL: libigl_contestant(vertices, triangles, centers),
+        FCPW: fcpw_contestant(vertices, triangles, centers),
     }
     contestants |= {name: run for name, run in peers.items() if run is not None}
     return take_turns(contestants, rounds, progress)
@@ -146,8 +146,8 @@ def measure_sizes(
     contestants = {}
     for cells, size in sheets:
         shell = Shell(*wavy_sheet(cells, size))
-        centres = touching_centres(20_000, size, RADIUS, DEPTH)
-        contestants[str(shell.num_elements)] = query_contestant(shell, centres)
+        centers = touching_centers(20_000, size, RADIUS, DEPTH)
+        contestants[str(shell.num_elements)] = query_contestant(shell, centers)
     return {int(n): t for n, t in take_turns(contestants, rounds, progress).items()}
 
 

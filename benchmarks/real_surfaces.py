@@ -32,7 +32,7 @@ Find = Callable[[Array], ContactSet]
 MESHES, CAD = (".stl", ".obj", ".ply", ".off"), (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
 LENGTH, STRIDE, DEPTH = 30.0, 0.1, 0.05  # of a walk, in radii
 JUMP, ENERGY = 1e-6, 1e-4  # shares above which a jump or a run is shown
-# Of a run, in radii and s, with a mass of 1 kg. A spring pulls the centre with 1 N for each radius
+# Of a run, in radii and s, with a mass of 1 kg. A spring pulls the center with 1 N for each radius
 # where the ball touches first, to a point REACH behind: unlike gravity it keeps the ball there.
 REACH, HEIGHT, IMPACT_DEPTH, DURATION = 6.0, 2.0, 0.07, 40.0
 SLIDE_DEPTH, SLIDE_SPEED = 0.03, 0.7
@@ -96,14 +96,14 @@ def unexplained(before: ContactSet, after: ContactSet, move: Array) -> float:
 
 
 def jump(before: ContactSet, after: ContactSet, move: Array) -> float:
-    """Return the jump of the potential between two near centres, as a share of it."""
+    """Return the jump of the potential between two near centers, as a share of it."""
     most = max((c.terms.depth**1.5).sum() for c in (before, after)) * float(np.linalg.norm(move))
     scale = max(potential(before), potential(after))
     return max(unexplained(before, after, move) - most, 0.0) / scale if scale > 0 else 0.0
 
 
 def steepest(find: Find, start: Array, end: Array, width: float) -> tuple[Array, Array]:
-    """Return two centres `width` apart between which the potential changes most, by halving.
+    """Return two centers `width` apart between which the potential changes most, by halving.
 
     It stops early where a tenth of a jump that counts is no longer unexplained.
     """
@@ -163,7 +163,7 @@ def shown(found: ContactSet) -> str:
 
 @dataclass(frozen=True)
 class Jump:
-    """Jump / potential, the centre (3,) beside it [m], and the terms on both sides."""
+    """Jump / potential, the center (3,) beside it [m], and the terms on both sides."""
 
     share: float
     center: Array
@@ -189,7 +189,7 @@ def walk_all(files: list[Path], count: int) -> None:
     """Print jumps of the potential along `count` walks a file."""
     print(f"Jumps of the potential above {JUMP:.0e} of it, {count} walks a file, depth {DEPTH} r")
     print(f"{'':40s} triangles  path / r  jumps  per 1000 r  largest  seconds")
-    told = []
+    remarks = []
     for path in files:
         shell, began = load(path), time.perf_counter()
         length, sizes = 0.0, []
@@ -200,7 +200,7 @@ def walk_all(files: list[Path], count: int) -> None:
             sizes += [found.share for found in jumps]
             if jumps:
                 worst = max(jumps, key=lambda found: found.share)
-                told.append(
+                remarks.append(
                     f"  {path.name} walk {seed}: r = {walk.radius!r} m, {len(jumps)} jumps, the "
                     f"largest {worst.share:.1e} at {worst.center.tolist()}\n    {worst.terms}"
                 )
@@ -210,14 +210,14 @@ def walk_all(files: list[Path], count: int) -> None:
             f"{time.perf_counter() - began:8.1f}",
             flush=True,
         )
-    print("\n".join(told))
+    print("\n".join(remarks))
 
 
 @dataclass(frozen=True)
 class Run:
-    """A frictionless run: what to start, and where; the origin is the ball's centre at the start.
+    """A frictionless run: what to start, and where; the origin is the ball's center at the start.
 
-    `radius` [m], `start` (3,) of the centre in the shell's frame [m], `speed` (3,) [m/s],
+    `radius` [m], `start` (3,) of the center in the shell's frame [m], `speed` (3,) [m/s],
     `goal` (3,) of the spring, from the start [m], `stiffness` of the contact [N/m^1.5].
     """
 
@@ -325,7 +325,7 @@ def run_all(files: list[Path], count: int, method: str, seconds: float) -> None:
         f"{'':40s}  runs stopped failed  touches  depth / r   median  largest "
         f"> {ENERGY:.0e}  seconds"
     )
-    told = []
+    remarks = []
     for path in files:
         shell, began = load(path), time.perf_counter()
         losses: list[Loss] = []
@@ -344,15 +344,15 @@ def run_all(files: list[Path], count: int, method: str, seconds: float) -> None:
                 if time.perf_counter() < limit:
                     raise
                 stopped, result = stopped + 1, error.result
-                told.append(f"{who}: stopped at t = {result.t[-1]:.3g} s")
+                remarks.append(f"{who}: stopped at t = {result.t[-1]:.3g} s")
             except SphshellError as error:
                 failed += 1
-                told.append(f"{who}: {type(error).__name__}: {error}")
+                remarks.append(f"{who}: {type(error).__name__}: {error}")
                 continue
             loss = audit(result, run)
             losses.append(loss)
             if not loss.share <= ENERGY:
-                told.append(
+                remarks.append(
                     f"{who}: {loss.share:.1e}, of it {loss.step_share:.1e} in the step to "
                     f"t = {loss.t:.6g} s at {loss.center.tolist()}"
                 )
@@ -365,7 +365,7 @@ def run_all(files: list[Path], count: int, method: str, seconds: float) -> None:
             f"{np.count_nonzero(~(shares <= ENERGY)):7d} {time.perf_counter() - began:8.1f}",
             flush=True,
         )
-    print("\n".join(told), flush=True)
+    print("\n".join(remarks), flush=True)
 
 
 def main() -> None:

@@ -26,7 +26,7 @@ from sphshell_pin.benchmarks.query import (
     libigl_contestant,
     query_contestant,
 )
-from sphshell_pin.benchmarks.surfaces import Array, touching_centres, wavy_sheet
+from sphshell_pin.benchmarks.surfaces import Array, touching_centers, wavy_sheet
 from sphshell_pin.benchmarks.timing import Progress, Spread, machine, one_core, silent
 
 # Cells along a side of the sheet, at equal size of the cells: 968 to 5 M triangles.
@@ -66,7 +66,7 @@ class Row:
 
 
 def resident() -> float:
-    """Return the memory that this process holds [bytes]; NaN where the system does not tell."""
+    """Return the memory that this process holds [bytes]; NaN where it is unknown."""
     try:
         with open("/proc/self/statm", encoding="ascii") as file:
             return float(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -75,7 +75,7 @@ def resident() -> float:
 
 
 def available() -> float:
-    """Return the memory that is free for programs [bytes]; infinity where nobody tells."""
+    """Return the memory that is free for programs [bytes]; infinity where it is unknown."""
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
             for line in file:
@@ -86,32 +86,32 @@ def available() -> float:
     return float("inf")
 
 
-def trimesh_contestant(vertices: Array, triangles: Any, centres: Array) -> Callable[[], float]:
+def trimesh_contestant(vertices: Array, triangles: Any, centers: Array) -> Callable[[], float]:
     import trimesh
 
     mesh = trimesh.Trimesh(vertices, triangles, process=False)
 
     def run() -> float:
         start = time.perf_counter()
-        trimesh.proximity.closest_point(mesh, centres)
-        return (time.perf_counter() - start) / len(centres)
+        trimesh.proximity.closest_point(mesh, centers)
+        return (time.perf_counter() - start) / len(centers)
 
     return run
 
 
-def contestant(name: str, vertices: Array, triangles: Any, centres: Array) -> Callable[[], float]:
+def contestant(name: str, vertices: Array, triangles: Any, centers: Array) -> Callable[[], float]:
     """Build what answers the queries of `name`."""
     if name in (OURS, OURS_FLAT):
         from sphshell_pin import Shell
 
-        return query_contestant(Shell(vertices, triangles), centres, name)
+        return query_contestant(Shell(vertices, triangles), centers, name)
     makers: dict[str, Any] = {
         TRIMESH: trimesh_contestant,
         LIBIGL: libigl_contestant,
         FCPW: fcpw_contestant,
         COAL: coal_contestant,
     }
-    made: Callable[[], float] = makers[name](vertices, triangles, centres)
+    made: Callable[[], float] = makers[name](vertices, triangles, centers)
     return made
 
 
@@ -122,10 +122,10 @@ def build(name: str, cells: int) -> tuple[float, float]:
     """Build in this process, for `time_round`; return the time [s] and the memory [bytes]."""
     size = cells * SIDE
     vertices, triangles = wavy_sheet(cells, size)
-    centres = touching_centres(QUERIES.get(name, 20_000), size, RADIUS, DEPTH)
-    contestant(name, *wavy_sheet(4, 4 * SIDE), centres[:1])()  # imports what it needs
+    centers = touching_centers(QUERIES.get(name, 20_000), size, RADIUS, DEPTH)
+    contestant(name, *wavy_sheet(4, 4 * SIDE), centers[:1])()  # imports what it needs
     before, start = resident(), time.perf_counter()
-    run = contestant(name, vertices, triangles, centres)
+    run = contestant(name, vertices, triangles, centers)
     if name != COAL:
         run()  # some build at the first query
     cost = time.perf_counter() - start, resident() - before

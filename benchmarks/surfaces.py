@@ -28,8 +28,8 @@ def wavy_sheet(cells: int, size: float) -> tuple[Array, NDArray[np.int32]]:
     return vertices, np.concatenate([np.c_[a, b, c], np.c_[a, c, d]]).astype(np.int32)
 
 
-def touching_centres(count: int, size: float, radius: float, depth: float) -> Array:
-    """Return random centres (count, 3) of spheres at about `depth` in the sheet."""
+def touching_centers(count: int, size: float, radius: float, depth: float) -> Array:
+    """Return random centers (count, 3) of spheres at about `depth` in the sheet."""
     xy = np.random.default_rng(0).uniform(-0.45 * size, 0.45 * size, (count, 2))
     x, y = xy.T
     slope_x = AMPLITUDE * WAVE_X * np.cos(WAVE_X * x) * np.cos(WAVE_Y * y)

@@ -105,9 +105,9 @@ def exact_scene() -> Scene:
     """Return the ball and the exact bowl; what is wrong there is the stepper's."""
 
     def touch(ball: pin.SE3, _: pin.SE3) -> tuple[list[Array], list[Array], list[float]]:
-        centre: Array = ball.translation
-        out = float(np.linalg.norm(centre))
-        outward = centre / out
+        center: Array = ball.translation
+        out = float(np.linalg.norm(center))
+        outward = center / out
         return [BOWL * outward], [-outward], [out - ARM]
 
     scene = Scene(ball_model())
@@ -116,7 +116,7 @@ def exact_scene() -> Scene:
 
 
 def start(azimuth: float) -> Array:
-    """Return the centre (3,) [m] at the turning point of the exact bowl, in balance."""
+    """Return the center (3,) [m] at the turning point of the exact bowl, in balance."""
     reach = ARM + START_DEPTH
     side = reach * math.sin(ANGLE)
     return np.array([side * math.cos(azimuth), side * math.sin(azimuth), -reach * math.cos(ANGLE)])
@@ -244,29 +244,29 @@ def measure(
     )
 
 
-def long_run(scene: Scene, centre: Array, swings: int) -> Result:
+def long_run(scene: Scene, center: Array, swings: int) -> Result:
     """Run for so many periods of the bowl, with a row every millisecond."""
     simulation = Simulation(scene, RungeKutta4(DT))
-    return simulation.run(centre, duration=swings * closed_forms()[1], record_dt=1e-3)
+    return simulation.run(center, duration=swings * closed_forms()[1], record_dt=1e-3)
 
 
 def ellipsoid_start(azimuth: float) -> Array:
-    """Return a centre (3,) [m] in balance where the ellipsoid is 40 degrees from its bottom."""
+    """Return a center (3,) [m] in balance where the ellipsoid is 40 degrees from its bottom."""
     out = np.array([math.sin(ANGLE) * math.cos(azimuth), math.sin(ANGLE) * math.sin(azimuth), 0])
     out[2] = -math.cos(ANGLE)
     point = out * ELLIPSOID
     normal = out / ELLIPSOID
     normal /= np.linalg.norm(normal)
     depth = MASS * GRAVITY * -normal[2] / STIFFNESS
-    centre: Array = point - (RADIUS - depth) * normal
-    return centre
+    center: Array = point - (RADIUS - depth) * normal
+    return center
 
 
 def ellipsoid_energy(scene: Scene, azimuth: float, swings: int) -> float:
     """Return the largest change of energy over the energy of a swing in the ellipsoid."""
-    centre = ellipsoid_start(azimuth)
-    fall = float(centre[2] + ELLIPSOID[2] - RADIUS)
-    changes = energy_changes(long_run(scene, centre, swings), MASS * GRAVITY * fall)
+    center = ellipsoid_start(azimuth)
+    fall = float(center[2] + ELLIPSOID[2] - RADIUS)
+    changes = energy_changes(long_run(scene, center, swings), MASS * GRAVITY * fall)
     return float(np.abs(changes).max())
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-Progress = Callable[[float], None]  # told the share that is done, 0 to 1
+Progress = Callable[[float], None]  # called with the share that is done, 0 to 1
 
 
 def silent(share: float) -> None:

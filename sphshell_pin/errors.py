@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result import Result
@@ -23,12 +23,14 @@ _LONGEST_VALUE = 200
 class SphshellError(Exception):
     """Base class of all errors of this package; its text is one sentence that says what to do."""
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """Let it be raised in another process: `args` are the text, not what __init__ takes."""
         return _again, (type(self), self.args, self.__dict__)
 
 
-def _again(kind: type[SphshellError], args: tuple[Any, ...], data: dict[str, Any]) -> SphshellError:
+def _again(
+    kind: type[SphshellError], args: tuple[object, ...], data: dict[str, object]
+) -> SphshellError:
     error = kind.__new__(kind, *args)
     error.__dict__.update(data)
     return error

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 Mesh = tuple[NDArray[np.float64], NDArray[np.int32]]
-
-GOLDEN = (1.0 + 5.0**0.5) / 2.0
 
 
 def _cells(rows: int, columns: int) -> NDArray[np.int64]:
@@ -43,7 +42,7 @@ def random_plate(
     """Plate z = 0 of about `elements` triangles: jittered grid, random diagonals, slivers.
 
     Slivers: a tenth of the rows and columns are squeezed to a thousandth of their width, and no two
-    neighbours of them are, so that no triangle folds over.
+    neighbors of them are, so that no triangle folds over.
     """
     rng = np.random.default_rng(seed)
     n = max(1, round((elements / 2) ** 0.5))
@@ -91,36 +90,8 @@ def cube(size: float = 1.0, quads: bool = False) -> Mesh:
 
 def icosphere(subdivisions: int = 1, radius: float = 1.0) -> Mesh:
     """Closed icosphere about the origin, outward winding."""
-    g = GOLDEN
-    points = [
-        np.array(p) / np.hypot(1.0, g)
-        for p in [
-            (-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g),
-            (0, -1, -g), (0, 1, -g), (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1),
-        ]
-    ]  # fmt: skip
-    triangles = [
-        (0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4),
-        (11, 10, 2), (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8),
-        (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1),
-    ]  # fmt: skip
-    for _ in range(subdivisions):
-        middles: dict[tuple[int, int], int] = {}
-
-        def middle(i: int, j: int, middles: dict[tuple[int, int], int] = middles) -> int:
-            key = (min(i, j), max(i, j))
-            if key not in middles:
-                point = points[i] + points[j]
-                middles[key] = len(points)
-                points.append(point / np.linalg.norm(point))
-            return middles[key]
-
-        finer = []
-        for a, b, c in triangles:
-            ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
-            finer += [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
-        triangles = finer
-    return np.array(points) * radius, np.array(triangles, dtype=np.int32)
+    ball = trimesh.creation.icosphere(subdivisions, radius)
+    return np.array(ball.vertices), np.array(ball.faces, dtype=np.int32)
 
 
 def needles(count: int = 24, aspect: float = 1e4, seed: int = 0) -> Mesh:
@@ -163,8 +134,8 @@ def v_groove(angle: float = 0.5, size: float = 1.0, cells: int = 1) -> Mesh:
 def l_plate(cells: int = 1) -> Mesh:
     """Flat L at z = 0: the square [-0.5, 0.5]^2 without its quarter x, y > 0 (reentrant corner)."""
     vertices, triangles = grid_plate(2 * cells, 2 * cells)
-    centre = vertices[triangles].mean(axis=1)
-    kept = triangles[(centre[:, 0] < 0) | (centre[:, 1] < 0)]
+    center = vertices[triangles].mean(axis=1)
+    kept = triangles[(center[:, 0] < 0) | (center[:, 1] < 0)]
     used, mapped = np.unique(kept, return_inverse=True)
     return vertices[used], mapped.reshape(-1, 3).astype(np.int32)
 
@@ -186,8 +157,8 @@ def bowl(cells: int = 8, size: float = 1.0, radius: float = 2.0) -> Mesh:
 def soup(triangles: int = 40, seed: int = 0, spread: float = 0.6) -> Mesh:
     """Unconnected random triangles in the unit box, many of them through each other."""
     rng = np.random.default_rng(seed)
-    centre = rng.uniform(-0.5, 0.5, (triangles, 1, 3))
-    vertices = (centre + rng.uniform(-spread, spread, (triangles, 3, 3))).reshape(-1, 3)
+    center = rng.uniform(-0.5, 0.5, (triangles, 1, 3))
+    vertices = (center + rng.uniform(-spread, spread, (triangles, 3, 3))).reshape(-1, 3)
     return vertices, np.arange(3 * triangles, dtype=np.int32).reshape(-1, 3)
 
 

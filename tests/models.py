@@ -48,7 +48,7 @@ def add_body(
 
 
 def ball(gravity: float = 9.81, mass: float = 1.0, radius: float = 0.05) -> pin.Model:
-    """Free ball whose centre is the frame "ball"."""
+    """Free ball whose center is the frame "ball"."""
     model = empty(gravity)
     inertia = pin.Inertia.FromSphere(mass, radius)
     add_body(model, "ball", pin.JointModelFreeFlyer(), inertia=inertia)
@@ -56,7 +56,7 @@ def ball(gravity: float = 9.81, mass: float = 1.0, radius: float = 0.05) -> pin.
 
 
 def slider(gravity: float = 9.81, mass: float = 1.0) -> pin.Model:
-    """Mass on a vertical prismatic joint, frame "ball" at its centre: q is the centre's height."""
+    """Mass on a vertical prismatic joint, frame "ball" at its center: q is the center's height."""
     model = empty(gravity)
     add_body(model, "ball", pin.JointModelPZ(), inertia=pin.Inertia.FromSphere(mass, 0.05))
     return model
@@ -73,7 +73,7 @@ def plate(size: float = 1.0, count: int = 8, side: str = "both") -> Shell:
 
 
 def linear_law(stiffness: float, damping: float = 0.0) -> ImpactLaw:
-    """Spring and dashpot whose damping is constant from a micrometre of depth on."""
+    """Spring and dashpot whose damping is constant from a micrometer of depth on."""
     return ImpactLaw(stiffness, 1.0, damping, 1e-6)
 
 
@@ -125,7 +125,7 @@ def two_free_state(depth: float = 0.01, radius: float = 0.05) -> tuple[Vector, V
     v_table = np.array([-0.1, 0.2, 0.1, 3.0, -4.0, 12.0])
     model = empty()
     add_body(model, "table", pin.JointModelFreeFlyer())
-    # The ball's centre rides along with the table, but for a small velocity of its own.
+    # The ball's center rides along with the table, but for a small velocity of its own.
     along = pin.Motion(v_table)
     world = table.act(along)
     v_ball[:3] += world.linear + np.cross(world.angular, center)
@@ -148,4 +148,4 @@ def arm() -> pin.Model:
     return model
 
 
-ARM_Q = np.array([0.3, 1.6, 0.9])  # the tip a few centimetres over the plate
+ARM_Q = np.array([0.3, 1.6, 0.9])  # the tip a few centimeters over the plate

@@ -1,11 +1,13 @@
-"""Importing the package brings in what every user needs, and nothing else."""
+"""Importing the package brings in what every user needs, and nothing else; imports go one way."""
 
 from __future__ import annotations
 
+import ast
 import json
 import shutil
 import subprocess
 import sys
+from graphlib import CycleError, TopologicalSorter
 from importlib.metadata import version
 from pathlib import Path
 
@@ -99,3 +101,68 @@ def test_a_checkout_that_is_not_built_says_so(tmp_path: Path) -> None:
     assert "pip install -e ." in said
     assert "another folder" in said
     assert "circular" not in said
+
+
+# A module imports from its own layer and from those before it. All others, such as errors and
+# units, are before the first.
+LAYERS = (
+    ("shell",),
+    ("contact",),
+    ("dynamics",),
+    ("sphshell_pin",),  # its public names are those of the folders above
+    ("scenario",),
+    ("plot", "view"),
+    ("study", "testing"),
+    ("cli",),
+)
+LEVEL = {folder: k for k, folders in enumerate(LAYERS) for folder in folders}
+PICTURES = "sphshell_pin.dynamics.result"  # results offer their own
+
+
+def imports_of(file: Path, modules: set[str]) -> set[str]:
+    """Return which of `modules` are imported anywhere in `file`, but for type hints alone."""
+    nodes = [ast.parse(file.read_text(encoding="utf-8"))]
+    found: set[str] = set()
+    while nodes:
+        node = nodes.pop()
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            nodes += node.orelse
+            continue
+        nodes += ast.iter_child_nodes(node)
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file}: relative import"
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {name if name in modules else str(node.module) for name in names}
+    return found & modules
+
+
+@pytest.fixture(scope="module")
+def graph() -> dict[str, set[str]]:
+    """What each module of the package imports, imports inside functions included."""
+    files = {
+        ".".join(file.relative_to(PACKAGE.parent).with_suffix("").parts): file
+        for file in [*PACKAGE.rglob("*.py"), PACKAGE / "_core.pyi"]
+    }
+    modules = {name.removesuffix(".__init__"): file for name, file in files.items()}
+    edges = {name: imports_of(file, set(modules)) - {name} for name, file in modules.items()}
+    edges[PICTURES] = {name for name in edges[PICTURES] if level(name) <= level(PICTURES)}
+    return edges
+
+
+def level(module: str) -> int:
+    """Return the layer of a module's folder."""
+    return LEVEL.get((module.split(".") * 2)[1], -1)
+
+
+def test_no_imports_run_in_circles(graph: dict[str, set[str]]) -> None:
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(" imports ".join(reversed(error.args[1])))
+
+
+def test_imports_go_down_the_layers(graph: dict[str, set[str]]) -> None:
+    edges = [(name, other) for name, others in graph.items() for other in others]
+    assert not [f"{name} -> {other}" for name, other in edges if level(other) > level(name)]

@@ -17,7 +17,7 @@ import pytest
 
 import sphshell_pin
 from sphshell_pin import errors
-from tests.view.test_recording_in_browser import browser  # noqa: F401
+from tests.view.conftest import browser  # noqa: F401
 
 pytestmark = pytest.mark.slow
 

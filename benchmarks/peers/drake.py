@@ -22,7 +22,7 @@ from sphshell_pin.benchmarks.peers.drake_plant import (
     sum_of_forces,
     wall_forces,
 )
-from sphshell_pin.benchmarks.peers.engine import Knob, Trajectory
+from sphshell_pin.benchmarks.peers.engine import Params, Trajectory
 from sphshell_pin.benchmarks.peers.merged import merged_urdf, obj_text
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
 from sphshell_pin.benchmarks.peers.scenes import (
@@ -30,8 +30,8 @@ from sphshell_pin.benchmarks.peers.scenes import (
     Bowl,
     Cylinder,
     Groove,
+    Impact,
     Scene,
-    Shot,
 )
 from sphshell_pin.benchmarks.peers.shapes import Surface
 from sphshell_pin.benchmarks.swing import BOWL
@@ -77,7 +77,7 @@ class Drake:
             settings["patch"] += "which a point does not: the truth is that of a point"
         return settings
 
-    def knobs(self, scene: Scene) -> list[Knob]:
+    def param_sets(self, scene: Scene) -> list[Params]:
         """Return integrators, with accuracy or time step [s], and the edge of tetrahedra [m]."""
         if isinstance(scene, PressScene):
             return [
@@ -89,28 +89,28 @@ class Drake:
         discrete = [
             {"contact": name, "dt": dt} for name in ("kLagged", "kSap") for dt in (1e-3, 2e-4)
         ]
-        if isinstance(scene, Shot):
+        if isinstance(scene, Impact):
             steps = [explicit | {"max_step": dt, "accuracy": 1e-3} for dt in scene.dts[1:]]
             steps += [{"contact": "kSap", "dt": dt} for dt in scene.dts]
-            return [knob | coarse for knob in steps]
+            return [params | coarse for params in steps]
         if isinstance(scene, Bowl):  # the best first: time may be short
             good = [explicit | {"accuracy": k} | fine for k in (1e-3, 1e-4)]
             cheap = [explicit | {"accuracy": k} | coarse for k in (1e-3, 1e-2)]
-            return [*good, *cheap, *(knob | coarse for knob in discrete)]
+            return [*good, *cheap, *(params | coarse for params in discrete)]
         if scene.mu:
-            knobs = [knob | coarse for knob in discrete]
+            param_sets = [params | coarse for params in discrete]
             if not scene.table_speed:  # stiff: it would take minutes on the table
-                knobs.append(explicit | {"accuracy": 1e-2} | coarse)
-            return knobs
+                param_sets.append(explicit | {"accuracy": 1e-2} | coarse)
+            return param_sets
         # At rest: a short step gains nothing, a fine ball does.
         resting = [explicit | {"accuracy": 1e-3}, *discrete[::2]]
-        return [knob | edge for edge in (finest, coarse) for knob in resting]
+        return [params | edge for edge in (finest, coarse) for params in resting]
 
-    def run(self, scene: Scene, knob: Knob) -> Trajectory:
+    def run(self, scene: Scene, params: Params) -> Trajectory:
         """Build the plant and run it."""
         if isinstance(scene, PressScene):
-            return self._press(scene, knob)
-        return self._ball(scene, knob)
+            return self._press(scene, params)
+        return self._ball(scene, params)
 
     @cached_property
     def _folder(self) -> Any:
@@ -134,8 +134,8 @@ class Drake:
             self._files[surface] = path
         return Mesh(str(self._files[surface]))
 
-    def _touch(self, plant: Any, scene: Scene, knob: Knob, ball: Any, ground: Any) -> None:
-        """Give the ball (body and place of the centre) and the ground their shapes and the law."""
+    def _touch(self, plant: Any, scene: Scene, params: Params, ball: Any, ground: Any) -> None:
+        """Give the ball (body and place of the center) and the ground their shapes and the law."""
         from pydrake.geometry import (
             AddCompliantHydroelasticProperties,
             AddContactMaterial,
@@ -146,16 +146,16 @@ class Drake:
         from pydrake.math import RigidTransform
         from pydrake.multibody.plant import CoulombFriction
 
-        body, centre = ball
+        body, center = ball
         for place, shape, stiff in (
-            ((body, RigidTransform(centre)), Sphere(scene.radius), False),
+            ((body, RigidTransform(center)), Sphere(scene.radius), False),
             ((ground, RigidTransform()), self._mesh(scene.surface), True),
         ):
             properties = ProximityProperties()
             if stiff:
                 AddRigidHydroelasticProperties(properties)
             else:
-                AddCompliantHydroelasticProperties(knob["edge"], modulus(scene), properties)
+                AddCompliantHydroelasticProperties(params["edge"], modulus(scene), properties)
             friction = CoulombFriction(scene.mu, scene.mu)
             dissipation = scene.damping / load(scene)
             AddContactMaterial(properties, dissipation, friction=friction)
@@ -163,10 +163,10 @@ class Drake:
             properties.AddProperty("material", "relaxation_time", scene.damping / scene.stiffness)
             plant.RegisterCollisionGeometry(*place, shape, "mesh" if stiff else "ball", properties)
 
-    def _ball(self, scene: BallScene, knob: Knob) -> Trajectory:
+    def _ball(self, scene: BallScene, params: Params) -> Trajectory:
         from pydrake.multibody.tree import PdControllerGains, RevoluteJoint, SpatialInertia
 
-        builder, plant = empty(knob, scene.gravity)
+        builder, plant = empty(params, scene.gravity)
         inertia = SpatialInertia.SolidSphereWithMass(scene.mass, scene.radius)
         ball = plant.AddRigidBody("ball", inertia)
         ground = plant.world_body()
@@ -182,9 +182,9 @@ class Drake:
             motor = plant.AddJointActuator("motor", hinge)
             motor.set_controller_gains(PdControllerGains(p=1e-9, d=MOTOR))
             ground = table
-        self._touch(plant, scene, knob, (ball, np.zeros(3)), ground)
+        self._touch(plant, scene, params, (ball, np.zeros(3)), ground)
         plant.Finalize()
-        simulator, context = simulation(builder, plant, knob)
+        simulator, context = simulation(builder, plant, params)
         if scene.rolls:
             from pydrake.math import RigidTransform
             from pydrake.multibody.math import SpatialVelocity
@@ -199,11 +199,11 @@ class Drake:
             hinge.set_angular_rate(context, scene.table_speed)
             wanted = plant.get_desired_state_input_port(table.model_instance())
             wanted.FixValue(context, [0.0, scene.table_speed])
-        t, states, cpu, steps = advance(simulator, plant, scene, knob)
+        t, states, cpu, steps = advance(simulator, plant, scene, params)
         rows = [motion_of(plant, context, ball, state) for state in states]
         position, velocity, spin = (np.array(column) for column in zip(*rows, strict=True))
         force = None
-        if not scene.mu and not isinstance(scene, (Bowl, Shot)):  # where they are asked for
+        if not scene.mu and not isinstance(scene, (Bowl, Impact)):  # where they are asked for
             force = np.array([sum_of_forces(plant, context, state) for state in states])
         return Trajectory(
             t=t,
@@ -218,14 +218,14 @@ class Drake:
             energy=energy(scene, position, velocity) if isinstance(scene, Bowl) else None,
         )
 
-    def _press(self, scene: PressScene, knob: Knob) -> Trajectory:
-        arm = self._arm(scene, knob)
+    def _press(self, scene: PressScene, params: Params) -> Trajectory:
+        arm = self._arm(scene, params)
         plant, context = arm.plant, arm.context
         arm.simulator.get_mutable_context().SetTime(0.0)
         plant.SetPositionsAndVelocities(context, np.r_[scene.q0, np.zeros(len(scene.q0))])
         short = replace(scene, steps=min(scene.steps, PRESS_STEPS))
-        t, states, cpu, steps = advance(arm.simulator, plant, short, knob)
-        position, velocity, spin = motion_of(plant, context, arm.body, states[-1], arm.centre)
+        t, states, cpu, steps = advance(arm.simulator, plant, short, params)
+        position, velocity, spin = motion_of(plant, context, arm.body, states[-1], arm.center)
         return Trajectory(
             t=t[-1:],
             position=position[None],
@@ -237,16 +237,16 @@ class Drake:
             force=sum_of_forces(plant, context, states[-1])[None],
         )
 
-    def _arm(self, scene: PressScene, knob: Knob) -> Arm:
+    def _arm(self, scene: PressScene, params: Params) -> Arm:
         """Return the arm, kept for runs that follow: the mesh takes seconds to load."""
         from pydrake.multibody.parsing import Parser
         from pydrake.multibody.tree import PdControllerGains
 
-        key = (scene, *knob.items())
+        key = (scene, *params.items())
         if key in self._arms:
             return self._arms[key]
         self._arms.clear()
-        builder, plant = empty(knob, scene.gravity)
+        builder, plant = empty(params, scene.gravity)
         text = merged_urdf(scene, sphere=False)
         model = Parser(plant).AddModelsFromString(text, "urdf")[0]
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("link0"))
@@ -254,14 +254,14 @@ class Drake:
             actuator = plant.AddJointActuator(f"motor{i}", plant.GetJointByName(f"joint{i}"))
             actuator.set_controller_gains(PdControllerGains(p=scene.kp, d=scene.kd))
         plant.set_gravity_enabled(model, False)
-        link, centre = tip(scene)
+        link, center = tip(scene)
         body = plant.GetBodyByName(f"link{link}")
-        self._touch(plant, scene, knob, (body, centre), plant.world_body())
+        self._touch(plant, scene, params, (body, center), plant.world_body())
         plant.Finalize()
-        simulator, context = simulation(builder, plant, knob)
+        simulator, context = simulation(builder, plant, params)
         wanted = np.r_[scene.q_ref, np.zeros(len(scene.q_ref))]
         plant.get_desired_state_input_port(model).FixValue(context, wanted)
-        self._arms[key] = Arm(plant, simulator, context, body, centre)
+        self._arms[key] = Arm(plant, simulator, context, body, center)
         return self._arms[key]
 
 
@@ -273,7 +273,7 @@ class Arm:
     simulator: Any
     context: Any
     body: Any
-    centre: Array
+    center: Array
 
 
 def load(scene: Scene) -> float:
@@ -286,7 +286,7 @@ def load(scene: Scene) -> float:
         return scene.stiffness * scene.depth
     if isinstance(scene, Bowl):
         return PERIOD_MATCH * scene.weight
-    if isinstance(scene, Shot):  # what stops it
+    if isinstance(scene, Impact):  # what stops it
         return math.sqrt(scene.stiffness * scene.mass) * abs(scene.velocity[2])
     return scene.weight
 

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.benchmarks.peers.engine import CannotDo, Knob
+from sphshell_pin.benchmarks.peers.engine import CannotDo, Params
 from sphshell_pin.benchmarks.peers.scenes import Scene
 
 Array = NDArray[np.float64]
 
 
-def empty(knob: Knob, gravity: Any) -> tuple[Any, Any]:
-    """Return a builder and its plant, continuous unless the knob has a time step."""
+def empty(params: Params, gravity: Any) -> tuple[Any, Any]:
+    """Return a builder and its plant, continuous unless the params has a time step."""
     from pydrake.multibody.plant import (
         AddMultibodyPlantSceneGraph,
         ContactModel,
@@ -24,10 +24,10 @@ def empty(knob: Knob, gravity: Any) -> tuple[Any, Any]:
     from pydrake.systems.framework import DiagramBuilder
 
     builder = DiagramBuilder()
-    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=knob.get("dt", 0.0))
+    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=params.get("dt", 0.0))
     plant.set_contact_model(ContactModel.kHydroelastic)
-    if "dt" in knob:
-        approximation = getattr(DiscreteContactApproximation, knob["contact"])
+    if "dt" in params:
+        approximation = getattr(DiscreteContactApproximation, params["contact"])
         plant.set_discrete_contact_approximation(approximation)
         # Forces are asked for afterwards, at states that were recorded.
         plant.SetUseSampledOutputPorts(False)
@@ -47,24 +47,24 @@ def slide(plant: Any, ball: Any) -> None:
         parent = child
 
 
-def simulation(builder: Any, plant: Any, knob: Knob) -> tuple[Any, Any]:
+def simulation(builder: Any, plant: Any, params: Params) -> tuple[Any, Any]:
     """Return a simulator and the plant's context."""
     from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
     simulator = Simulator(builder.Build())
-    if "accuracy" in knob:
+    if "accuracy" in params:
         config = SimulatorConfig(
-            integration_scheme=knob["integrator"],
-            accuracy=knob["accuracy"],
+            integration_scheme=params["integrator"],
+            accuracy=params["accuracy"],
             use_error_control=True,
-            max_step_size=knob["max_step"],
+            max_step_size=params["max_step"],
         )
         ApplySimulatorConfig(config, simulator)
     return simulator, plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
 
 
 def advance(
-    simulator: Any, plant: Any, scene: Scene, knob: Knob
+    simulator: Any, plant: Any, scene: Scene, params: Params
 ) -> tuple[Array, list[Array], float, int]:
     """Run; return times (n,) [s], states there, CPU time of the steps [s] and their number.
 
@@ -94,26 +94,26 @@ def advance(
         simulator.AdvanceTo(scene.duration)
     except RuntimeError as error:
         reason = str(error).partition("\n")[0]
-        raise CannotDo(f"{knob} stops at t = {root.get_time():.3g} s: {reason}") from error
+        raise CannotDo(f"{params} stops at t = {root.get_time():.3g} s: {reason}") from error
     cpu = time.process_time() - before - reading
     row()
     return np.array(t), states, cpu, int(simulator.get_num_steps_taken())
 
 
 def motion_of(
-    plant: Any, context: Any, body: Any, state: Array, centre: Any = (0.0, 0.0, 0.0)
+    plant: Any, context: Any, body: Any, state: Array, center: Any = (0.0, 0.0, 0.0)
 ) -> tuple[Array, Array, Array]:
     """Return place [m], velocity [m/s] and angular velocity [rad/s] of a body's point."""
     plant.SetPositionsAndVelocities(context, state)
     pose = plant.EvalBodyPoseInWorld(context, body)
     motion = plant.EvalBodySpatialVelocityInWorld(context, body)
-    arm = pose.rotation() @ np.array(centre)
+    arm = pose.rotation() @ np.array(center)
     spin = motion.rotational()
     return pose.translation() + arm, motion.translational() + np.cross(spin, arm), spin
 
 
 def contacts(plant: Any, context: Any) -> list[Any]:
-    """Return what Drake tells of the contact surfaces."""
+    """Return what Drake reports of the contact surfaces."""
     results = plant.get_contact_results_output_port().Eval(context)
     count = results.num_hydroelastic_contacts()
     return [results.hydroelastic_contact_info(i) for i in range(count)]
@@ -131,7 +131,7 @@ def sum_of_forces(plant: Any, context: Any, state: Array) -> Array:
 def wall_forces(plant: Any, context: Any) -> Array:
     """Return the force (k, 3) [N] of each facet of the contact surfaces on the ball.
 
-    Drake tells the sum of a surface; it is shared out as pressure times area is.
+    Drake reports the sum of a surface; it is divided in proportion to pressure times area.
     """
     forces: list[Array] = []
     for contact in contacts(plant, context):
@@ -140,11 +140,11 @@ def wall_forces(plant: Any, context: Any) -> Array:
         mesh = surface.tri_mesh_W() if triangles else surface.poly_mesh_W()
         field = surface.tri_e_MN() if triangles else surface.poly_e_MN()
         faces = range(surface.num_faces())
-        centres = [mesh.element_centroid(i) for i in faces]
+        centers = [mesh.element_centroid(i) for i in faces]
         pushes = np.array(
             [
-                field.EvaluateCartesian(i, centre) * surface.area(i) * surface.face_normal(i)
-                for i, centre in zip(faces, centres, strict=True)
+                field.EvaluateCartesian(i, center) * surface.area(i) * surface.face_normal(i)
+                for i, center in zip(faces, centers, strict=True)
             ]
         )
         whole = np.linalg.norm(contact.F_Ac_W().translational())

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from sphshell_pin.benchmarks.peers.scenes import Scene
 
 Array = NDArray[np.float64]
-Knob = dict[str, Any]
+Params = dict[str, Any]
 
 
 class CannotDo(Exception):
@@ -24,9 +24,9 @@ class CannotDo(Exception):
 class Trajectory:
     """How the ball moved, in the world, at n instants.
 
-    `t` (n,) [s], `position` (n, 3) of the centre [m], `velocity` (n, 3) [m/s], `angular_velocity`
+    `t` (n,) [s], `position` (n, 3) of the center [m], `velocity` (n, 3) [m/s], `angular_velocity`
     (n, 3) [rad/s] (zero where the ball cannot turn); `force` (n, 3) of all contacts on the ball [N]
-    and `energy` (n,) [J] with what the contacts store, where the engine tells them;
+    and `energy` (n,) [J] with what the contacts store, where the engine reports them;
     `contact_forces` (k, 3) [N] of the k contacts on the ball at the end, likewise. `cpu` [s] is the
     CPU time of the stepping alone, of `simulated` [s] in `steps` steps: neither building nor
     reading.
@@ -58,13 +58,13 @@ class Engine(Protocol):
         Raises CannotDo.
         """
 
-    def knobs(self, scene: Scene) -> list[Knob]:
+    def param_sets(self, scene: Scene) -> list[Params]:
         """Return what is swept, from coarse to fine: time steps or tolerances, and integrators.
 
         Raises CannotDo.
         """
 
-    def run(self, scene: Scene, knob: Knob) -> Trajectory:
+    def run(self, scene: Scene, params: Params) -> Trajectory:
         """Run the scene from its start for its duration.
 
         Rows are those of `scene.record_dt`, or of every step where that is longer. Anything that

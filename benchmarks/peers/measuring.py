@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sphshell_pin.benchmarks.peers.engine import Knob
+from sphshell_pin.benchmarks.peers.engine import Params
 from sphshell_pin.benchmarks.peers.scenes import SCENES
 from sphshell_pin.benchmarks.peers.workers import ENGINES, NoAnswer, Ran, Worker
 
@@ -32,7 +32,7 @@ class Row:
     engine: str
     version: str = ""
     settings: dict[str, str] = field(default_factory=dict)
-    knob: Knob = field(default_factory=dict)
+    params: Params = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     unit: str = ""
     cost: float = math.nan
@@ -102,22 +102,22 @@ class Field:
         self.say(f"  {SCENES[scene]().title}: {facts['version']}")
         base = Row(scene, engine, facts["version"], facts["settings"])
         before = start
-        for k, knob in enumerate(facts["knobs"]):
+        for k, params in enumerate(facts["param_sets"]):
             now = time.monotonic()
             # Settings go from coarse to fine: the next one takes at least as long as the last.
             if k and now - start + (now - before) > budget:
-                left = len(facts["knobs"]) - k
+                left = len(facts["param_sets"]) - k
                 rows.append(Row(scene, engine, note=f"{left} more left out: {budget:g} s used"))
                 break
             before = now
-            row = self.row_of(base, knob)
+            row = self.row_of(base, params)
             self.say(line(row))
             rows.append(row)
             if row.note.startswith("took longer"):
                 break
         return rows
 
-    def row_of(self, base: Row, knob: Knob) -> Row:
+    def row_of(self, base: Row, params: Params) -> Row:
         """Run one setting: all variants once, and again while that is short."""
         scene = SCENES[base.scene]()
         variants = range(min(len(scene.variants()), self.budget.variants))
@@ -127,9 +127,9 @@ class Field:
         for turn in range(5):
             for variant in variants:
                 try:
-                    found = self.workers[base.engine].run(base.scene, knob, variant, timeout)
+                    found = self.workers[base.engine].run(base.scene, params, variant, timeout)
                 except NoAnswer as reason:
-                    return replace(base, knob=knob, note=str(reason))
+                    return replace(base, params=params, note=str(reason))
                 costs.append(cost_of(scene.unit, found))
                 if turn == 0:
                     errors.append(found["errors"])
@@ -140,7 +140,7 @@ class Field:
         joined = scene.joined(errors)
         return replace(
             base,
-            knob=knob,
+            params=params,
             errors=joined,
             unit=scene.unit,
             cost=float(median),
@@ -158,7 +158,7 @@ class Field:
             costs = []
             for row in (peer, ours):
                 variant = turn % 2 if row.scene in SWINGS else 0
-                found = self.workers[row.engine].run(row.scene, row.knob, variant, LONGEST)
+                found = self.workers[row.engine].run(row.scene, row.params, variant, LONGEST)
                 costs.append(cost_of(unit, found))
             ratios.append(costs[0] / costs[1])
         low, median, high = np.percentile(ratios, [25, 50, 75])
@@ -167,12 +167,12 @@ class Field:
 
 def line(row: Row) -> str:
     """Return a row as one line of progress."""
-    knob = " ".join(
-        f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.knob.values()
+    params = " ".join(
+        f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.params.values()
     )
     errors = "  ".join(f"{name} {value:.1e}" for name, value in row.errors.items())
     cost = "" if row.note else f"{row.cost:.4g} {row.unit}"
-    return f"  {row.scene:10s} {row.engine:9s} {knob:40s} {errors}  {cost} {row.note}".rstrip()
+    return f"  {row.scene:10s} {row.engine:9s} {params:40s} {errors}  {cost} {row.note}".rstrip()
 
 
 def measure(

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.benchmarks.peers.engine import CpuClock, Knob, Trajectory
+from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
 from sphshell_pin.benchmarks.peers.scenes import (
     BallScene,
     Bowl,
     Cylinder,
     Groove,
+    Impact,
     Plate,
     Scene,
-    Shot,
     Turntable,
 )
 from sphshell_pin.benchmarks.peers.shapes import Surface
@@ -56,13 +56,13 @@ class MuJoCo:
             settings["friction"] = (
                 f"elliptic cones, impratio {IMPRATIO:g} (Modeling, Solver settings: against slip)"
             )
-        if isinstance(scene, Shot):
+        if isinstance(scene, Impact):
             settings["flag"] = "speculative, on and off (Changelog 4.0: against tunnelling)"
         if isinstance(scene, PressScene):
             settings["control"] = "position actuators with kv; gravcomp = 1, or gravity off"
         return settings
 
-    def knobs(self, scene: Scene) -> list[Knob]:
+    def param_sets(self, scene: Scene) -> list[Params]:
         """Return integrators, steps, and the surface: boxes, or cells of a height field [m]."""
         if isinstance(scene, PressScene):
             common = {"integrator": "implicitfast", "dt": scene.dt, "surface": FIELD}
@@ -89,13 +89,13 @@ class MuJoCo:
                 | {"cell": scene.surface.spacing / share}
                 for share, integrator, dt, d in tried
             ]
-        if isinstance(scene, Shot):
+        if isinstance(scene, Impact):
             return [
                 {"integrator": "RK4", "dt": dt, "surface": BOXES, "speculative": speculative}
                 for speculative in (False, True)
                 for dt in scene.dts
             ]
-        surfaces: list[Knob] = []
+        surfaces: list[Params] = []
         if not isinstance(scene, Cylinder | Turntable):
             surfaces.append({"surface": FIELD, "cell": scene.surface.spacing})
         if not isinstance(scene, Plate):
@@ -107,19 +107,21 @@ class MuJoCo:
             for dt in scene.dts
         ]
 
-    def run(self, scene: Scene, knob: Knob) -> Trajectory:
+    def run(self, scene: Scene, params: Params) -> Trajectory:
         """Run in one call of rollout."""
-        return run_press(scene, knob) if isinstance(scene, PressScene) else run_ball(scene, knob)
+        return (
+            run_press(scene, params) if isinstance(scene, PressScene) else run_ball(scene, params)
+        )
 
 
-def option_of(scene: Scene, knob: Knob) -> str:
+def option_of(scene: Scene, params: Params) -> str:
     """Return the element of the options."""
-    gravity = (0, 0, 0) if knob.get("gravity") == "off" else scene.gravity
-    cone = knob.get("cone", "elliptic")
+    gravity = (0, 0, 0) if params.get("gravity") == "off" else scene.gravity
+    cone = params.get("cone", "elliptic")
     friction = f'cone="{cone}" impratio="{IMPRATIO if cone == "elliptic" else 1}"'
-    flag = '<flag speculative="enable"/>' if knob.get("speculative") else ""
+    flag = '<flag speculative="enable"/>' if params.get("speculative") else ""
     return (
-        f'<option timestep="{knob["dt"]}" integrator="{knob["integrator"]}" solver="Newton" '
+        f'<option timestep="{params["dt"]}" integrator="{params["integrator"]}" solver="Newton" '
         f'tolerance="1e-10" gravity="{text(gravity)}" {friction}>{flag}</option>'
     )
 
@@ -135,13 +137,15 @@ def law_of(scene: Scene, mass: float, d: float) -> tuple[tuple[float, ...], tupl
     return solref, (d, d, 1.0, 0.5, 1.0)
 
 
-def pairs(scene: BallScene, knob: Knob, count: int) -> str:
+def pairs(scene: BallScene, params: Params, count: int) -> str:
     """Return the elements of the contacts between the ball and `count` geoms of the surface."""
-    solref, solimp = law_of(scene, scene.mass, knob.get("impedance", FIRM if scene.mu else SPRING))
+    solref, solimp = law_of(
+        scene, scene.mass, params.get("impedance", FIRM if scene.mu else SPRING)
+    )
     law = f'solref="{text(solref)}" solimp="{text(solimp)}" margin="0"'
     if scene.mu:
         # What slips stops within two steps, the shortest that the documentation allows.
-        stop = f'solreffriction="{2 * knob["dt"]} 1"'
+        stop = f'solreffriction="{2 * params["dt"]} 1"'
         law += f' condim="3" friction="{scene.mu} {scene.mu} 0 0 0" {stop}'
     else:
         law += ' condim="1"'
@@ -179,7 +183,7 @@ def boxes(surface: Surface) -> str:
     for k, box in enumerate(surface.boxes):
         axes = text([box.rotation[:, 0], box.rotation[:, 1]])
         geoms.append(
-            f'<geom name="surface{k}" type="box" pos="{text(box.centre)}" '
+            f'<geom name="surface{k}" type="box" pos="{text(box.center)}" '
             f'size="{text(box.half)}" xyaxes="{axes}"/>'
         )
     return "".join(geoms)
@@ -195,11 +199,11 @@ def compiled(xml: str, field: Field | None) -> Any:
     return model
 
 
-def ball_model(scene: BallScene, knob: Knob) -> Any:
+def ball_model(scene: BallScene, params: Params) -> Any:
     """Return the compiled model of a ball on a surface."""
     field = None
-    if knob["surface"] == FIELD:
-        field = Field(scene.surface, knob["cell"], (0.0, 0.0))
+    if params["surface"] == FIELD:
+        field = Field(scene.surface, params["cell"], (0.0, 0.0))
     surface = field.geom() if field else boxes(scene.surface)
     count = 1 if field else len(scene.surface.boxes)
     if scene.table_speed:
@@ -209,7 +213,7 @@ def ball_model(scene: BallScene, knob: Knob) -> Any:
         )
     slides = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
     inertia = text([scene.inertia] * 3)
-    xml = f"""<mujoco>{option_of(scene, knob)}
+    xml = f"""<mujoco>{option_of(scene, params)}
       <default><geom contype="0" conaffinity="0"/></default>
       <asset>{field.asset() if field else ""}</asset>
       <worldbody>
@@ -220,7 +224,7 @@ def ball_model(scene: BallScene, knob: Knob) -> Any:
         </body>
         {surface}
       </worldbody>
-      <contact>{pairs(scene, knob, count)}</contact></mujoco>"""
+      <contact>{pairs(scene, params, count)}</contact></mujoco>"""
     return compiled(xml, field)
 
 
@@ -239,11 +243,11 @@ def rolled_out(model: Any, data: Any, steps: int) -> tuple[Array, float]:
     return np.concatenate([start[None], states[0]]), clock.spent
 
 
-def run_ball(scene: BallScene, knob: Knob) -> Trajectory:
+def run_ball(scene: BallScene, params: Params) -> Trajectory:
     """Run a ball."""
     import mujoco
 
-    model = ball_model(scene, knob)
+    model = ball_model(scene, params)
     data = mujoco.MjData(model)
     q, v = np.array(scene.position), np.array(scene.velocity)
     if scene.rolls:
@@ -251,9 +255,9 @@ def run_ball(scene: BallScene, knob: Knob) -> Trajectory:
     data.qpos[: len(q)], data.qvel[: len(v)] = q, v
     if scene.table_speed:
         data.qvel[-1] = scene.table_speed
-    steps = round(scene.duration / knob["dt"])
+    steps = round(scene.duration / params["dt"])
     states, cpu = rolled_out(model, data, steps)
-    states = states[:: max(1, round(scene.record_dt / knob["dt"]))]
+    states = states[:: max(1, round(scene.record_dt / params["dt"]))]
     qpos, qvel = states[:, 1 : 1 + model.nq], states[:, 1 + model.nq : 1 + model.nq + model.nv]
     spin = np.zeros((len(states), 3))
     if scene.rolls:
@@ -268,7 +272,7 @@ def run_ball(scene: BallScene, knob: Knob) -> Trajectory:
         velocity=qvel[:, :3],
         angular_velocity=spin,
         cpu=cpu,
-        simulated=steps * knob["dt"],
+        simulated=steps * params["dt"],
         steps=steps,
         force=np.array([force.sum(axis=0) for force in forces]) if forces else None,
         contact_forces=forces[-1] if forces else None,
@@ -292,14 +296,14 @@ def contact_forces(model: Any, data: Any, state: Array) -> Array:
     return forces
 
 
-def press_model(scene: PressScene, knob: Knob) -> Any:
+def press_model(scene: PressScene, params: Params) -> Any:
     """Return the compiled model of the Panda, its inertias and frames those of the URDF."""
     import mujoco
 
     spec = mujoco.MjSpec.from_string(scene.urdf)
     spec.compiler.fusestatic = True
     x, y, _ = scene.place
-    field = Field(scene.surface, knob["cell"], (x, y))
+    field = Field(scene.surface, params["cell"], (x, y))
     joints = [joint.name for joint in spec.joints]
     for joint in joints:
         servo = spec.add_actuator(target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
@@ -315,25 +319,25 @@ def press_model(scene: PressScene, knob: Knob) -> Any:
         type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="field", pos=[x, y, field.low]
     )
     for body in spec.bodies:
-        body.gravcomp = 1.0 if knob["gravity"] == "gravcomp" else 0.0
+        body.gravcomp = 1.0 if params["gravity"] == "gravcomp" else 0.0
     tip = next(g for g in spec.geoms if g.type == mujoco.mjtGeom.mjGEOM_SPHERE)
     tip.name = FRAME
-    option = mujoco.MjModel.from_xml_string(f"<mujoco>{option_of(scene, knob)}</mujoco>").opt
+    option = mujoco.MjModel.from_xml_string(f"<mujoco>{option_of(scene, params)}</mujoco>").opt
     model = spec.compile()
     for name in ("timestep", "integrator", "solver", "tolerance", "gravity", "cone", "impratio"):
         setattr(model.opt, name, getattr(option, name))
     # The mass by which MuJoCo scales the law of the fingertip.
     mass = 1 / float(model.body_invweight0[-1, 0])
-    model.geom_solref[:], model.geom_solimp[:] = law_of(scene, mass, knob["impedance"])
+    model.geom_solref[:], model.geom_solimp[:] = law_of(scene, mass, params["impedance"])
     model.geom_friction[:] = scene.mu, 0.0, 0.0
     return model
 
 
-def run_press(scene: PressScene, knob: Knob) -> Trajectory:
+def run_press(scene: PressScene, params: Params) -> Trajectory:
     """Run the Panda; the only row is the last."""
     import mujoco
 
-    model = press_model(scene, knob)
+    model = press_model(scene, params)
     data = mujoco.MjData(model)
     data.qpos[:], data.ctrl[:] = scene.q0, scene.q_ref
     states, cpu = rolled_out(model, data, scene.steps)

@@ -11,9 +11,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from sphshell_pin.benchmarks.peers.engine import CpuClock, Knob, Trajectory
+from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
-from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Scene, Shot
+from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Impact, Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
 from sphshell_pin.dynamics.advance import advance, start_run
 
@@ -44,7 +44,7 @@ class Ours:
         settings["integrator"] = "docs/dynamics.md, choosing an integrator"
         return settings
 
-    def knobs(self, scene: Scene) -> list[Knob]:
+    def param_sets(self, scene: Scene) -> list[Params]:
         """Return integrators with their steps or tolerances."""
         if isinstance(scene, PressScene):
             return [{"integrator": "SemiImplicitEuler", "dt": scene.dt}]
@@ -57,32 +57,32 @@ class Ours:
                 for dt in dts
             ]
             return [*steps, *adaptive]
-        if isinstance(scene, Shot):
+        if isinstance(scene, Impact):
             return [{"integrator": "SemiImplicitEuler", "dt": dt} for dt in scene.dts] + adaptive
         steps = [{"integrator": "SemiImplicitEuler", "dt": dt} for dt in scene.dts]
         if not scene.mu:
             return [*steps, *adaptive]
         implicit = [{"integrator": "Implicit", "rtol": 10.0**-e} for e in (3, 4, 5, 6)]
         # Longer steps do not resolve the bristles.
-        return [*(knob for knob in steps if knob["dt"] < 2e-4), *implicit, *adaptive]
+        return [*(params for params in steps if params["dt"] < 2e-4), *implicit, *adaptive]
 
-    def run(self, scene: Scene, knob: Knob) -> Trajectory:
+    def run(self, scene: Scene, params: Params) -> Trajectory:
         """Run twice: once timed, with the last row alone, once for the rows."""
-        integrator = integrator_of(knob)
+        integrator = integrator_of(params)
         if isinstance(scene, PressScene):
             return run_press(scene, sp.Simulation(press_scene(scene), integrator))
         built, q0, v0 = ball_scene(scene)
         simulation = sp.Simulation(built, integrator)
         cpu = timed(simulation, q0, v0, scene.duration, None)
-        record = max(scene.record_dt, knob.get("dt", 0.0))
+        record = max(scene.record_dt, params.get("dt", 0.0))
         result = simulation.run(q0, v0, scene.duration, record_dt=record)
         return read(scene, result, cpu)
 
 
-def integrator_of(knob: Knob) -> Any:
-    """Return the integrator that a knob names."""
-    settings = {name: value for name, value in knob.items() if name != "integrator"}
-    return getattr(sp, knob["integrator"])(**settings)
+def integrator_of(params: Params) -> Any:
+    """Return the integrator that a params names."""
+    settings = {name: value for name, value in params.items() if name != "integrator"}
+    return getattr(sp, params["integrator"])(**settings)
 
 
 def timed(simulation: sp.Simulation, q0: Array, v0: Any, duration: float, control: Any) -> float:

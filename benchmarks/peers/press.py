@@ -33,7 +33,7 @@ class PressScene:
     fingertip as a collision sphere on the link FRAME. The law: linear spring and dashpot, Coulomb
     friction.
 
-    Truth: none; the fingertip's depth in the exact sheet at the end is told, to see that every
+    Truth: none; the fingertip's depth in the exact sheet at the end is reported, to see that every
     engine presses.
     """
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.benchmarks.peers.engine import CpuClock, Knob, Trajectory
+from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.merged import merged_urdf, obj_text
 from sphshell_pin.benchmarks.peers.press import PressScene
-from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Scene, Shot
+from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Impact, Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
 
 Array = NDArray[np.float64]
@@ -51,27 +51,27 @@ class PyBullet:
             settings["arm"] = "fixed links merged, no joint limits, no gravity in place of its "
             settings["arm"] += "compensation; PD torques in C++ by pdControlPlugin (pdControl.py)"
             settings["stepping"] = "a Python loop of stepSimulation"
-        elif isinstance(scene, Shot):
+        elif isinstance(scene, Impact):
             settings["ccd"] = "ccdSweptSphereRadius as swept (experimentalCcdSphereRadius.py)"
         return settings
 
-    def knobs(self, scene: Scene) -> list[Knob]:
+    def param_sets(self, scene: Scene) -> list[Params]:
         """Return time steps [s], with the largest gap [m] of a contact point that is kept."""
         if isinstance(scene, PressScene):
             return [{"dt": scene.dt, "breaking": gap} for gap in (2e-3, 1e-4)]
-        if isinstance(scene, Shot):
+        if isinstance(scene, Impact):
             gaps = [{"dt": dt, "breaking": 2e-3} for dt in scene.dts]
-            return [knob | {"ccd": on} for knob in gaps for on in (True, False)]
+            return [params | {"ccd": on} for params in gaps for on in (True, False)]
         steps = (1e-3, 2e-4, 2e-3) if isinstance(scene, Bowl) else scene.dts[:2]
         gaps = (1e-3, 1e-4, 2e-3)  # the last is the default
         return [{"dt": dt, "breaking": gap} for dt in steps for gap in gaps]
 
-    def run(self, scene: Scene, knob: Knob) -> Trajectory:
+    def run(self, scene: Scene, params: Params) -> Trajectory:
         """Run the scene in a world of its own."""
-        with world(scene, knob) as bullet:
+        with world(scene, params) as bullet:
             if isinstance(scene, PressScene):
                 return self._press(bullet, scene)
-            return self._ball(bullet, scene, knob)
+            return self._ball(bullet, scene, params)
 
     @cached_property
     def _folder(self) -> Any:
@@ -95,7 +95,7 @@ class PyBullet:
         )
         return shape
 
-    def _ball(self, bullet: Any, scene: BallScene, knob: Knob) -> Trajectory:
+    def _ball(self, bullet: Any, scene: BallScene, params: Params) -> Trajectory:
         surface = self._mesh(bullet, scene.surface)
         if scene.table_speed:
             ground = turning(bullet, surface, scene.table_speed)
@@ -115,7 +115,7 @@ class PyBullet:
         if held:
             # Without the mass, too, it would be taken as zero: a body that never moves.
             bullet.changeDynamics(ball, -1, mass=scene.mass, localInertiaDiagonal=[HEAVY] * 3)
-        if knob.get("ccd"):
+        if params.get("ccd"):
             bullet.changeDynamics(ball, -1, ccdSweptSphereRadius=0.5 * scene.radius * SCALE)
 
         def row() -> tuple[Array, Array, Array, Array]:
@@ -124,7 +124,7 @@ class PyBullet:
             force = point_forces(bullet.getContactPoints(ball, ground)).sum(axis=0)
             return np.array(place) / SCALE, np.array(velocity) / SCALE, np.array(spin), force
 
-        dt = knob["dt"]
+        dt = params["dt"]
         each = max(1, round(scene.record_dt / dt))
         count = -(-round(scene.duration / dt) // each)
         rows, cpu = stepped(bullet.stepSimulation, each, count, row)
@@ -182,7 +182,7 @@ class PyBullet:
 
 
 @contextmanager
-def world(scene: Scene, knob: Knob) -> Iterator[Any]:
+def world(scene: Scene, params: Params) -> Iterator[Any]:
     """Connect to an empty world, and disconnect at the end."""
     import pybullet
 
@@ -191,11 +191,11 @@ def world(scene: Scene, knob: Knob) -> Iterator[Any]:
         # The arm's gravity is compensated: it has none.
         gravity = (0.0, 0.0, 0.0) if isinstance(scene, PressScene) else scene.gravity
         pybullet.setGravity(*scaled(gravity))
-        pybullet.setTimeStep(knob["dt"])
+        pybullet.setTimeStep(params["dt"])
         pybullet.setPhysicsEngineParameter(
             numSolverIterations=50,
             solverResidualThreshold=0.0,
-            contactBreakingThreshold=knob["breaking"] * SCALE,
+            contactBreakingThreshold=params["breaking"] * SCALE,
         )
         yield pybullet
     finally:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.benchmarks.peers.engine import CpuClock, Knob, Trajectory
+from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
 from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
@@ -51,7 +51,7 @@ class PythonLoop:
             )
         return settings
 
-    def knobs(self, scene: Scene) -> list[Knob]:
+    def param_sets(self, scene: Scene) -> list[Params]:
         """Return the time steps; the Panda's loop also as the sum of its compiled parts."""
         if isinstance(scene, PressScene):
             return [{"dt": scene.dt, "loop": loop} for loop in (PARTS, PYTHON)]
@@ -59,13 +59,13 @@ class PythonLoop:
             return [{"dt": dt} for dt in (1e-3, 2e-4)]
         return [{"dt": dt} for dt in scene.dts if dt > 5e-6]
 
-    def run(self, scene: Scene, knob: Knob) -> Trajectory:
+    def run(self, scene: Scene, params: Params) -> Trajectory:
         """Run the loop."""
         if isinstance(scene, PressScene):
-            if knob["loop"] == PARTS:
+            if params["loop"] == PARTS:
                 return compiled_parts(scene)
-            return run_press(scene, knob["dt"])
-        return run_ball(scene, knob["dt"])
+            return run_press(scene, params["dt"])
+        return run_ball(scene, params["dt"])
 
 
 @lru_cache(maxsize=2)
@@ -86,17 +86,17 @@ class Finder:
         self.request = coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, MOST)
         self.result = coal.CollisionResult()
 
-    def collide(self, centre: Array) -> None:
+    def collide(self, center: Array) -> None:
         """Let Coal find all contacts."""
-        self.placement.setTranslation(centre)
+        self.placement.setTranslation(center)
         self.result.clear()
         self.coal.collide(
             self.mesh, self.mesh_placement, self.sphere, self.placement, self.request, self.result
         )
 
-    def contacts(self, centre: Array) -> list[tuple[float, Array]]:
+    def contacts(self, center: Array) -> list[tuple[float, Array]]:
         """Return depth [m] and normal (3,), towards the sphere, of each place of touch."""
-        self.collide(centre)
+        self.collide(center)
         found = [(-c.penetration_depth, c.normal) for c in self.result.getContacts()]
         found.sort(key=lambda one: -one[0])
         kept: list[tuple[float, Array]] = []
@@ -109,9 +109,9 @@ class Finder:
 def forces_of(
     scene: Scene, contacts: list[tuple[float, Array]], velocity: Array, spin: Array, table: Array
 ) -> tuple[Array, Array, list[Array]]:
-    """Return force [N] and torque [N m] about the centre on the sphere, and each contact's force.
+    """Return force [N] and torque [N m] about the center on the sphere, and each contact's force.
 
-    `velocity` of the centre [m/s], `spin` [rad/s]; `table` is the surface's velocity there [m/s].
+    `velocity` of the center [m/s], `spin` [rad/s]; `table` is the surface's velocity there [m/s].
     """
     force, torque, each = np.zeros(3), np.zeros(3), []
     for depth, normal in contacts:
@@ -165,13 +165,13 @@ def run_ball(scene: BallScene, dt: float) -> Trajectory:
             if scene.rolls:
                 turn = pin.Quaternion(q[3:7]).matrix()
                 spin = turn @ v[3:]
-            centre = q[:3]
-            contacts = finder.contacts(centre)
+            center = q[:3]
+            contacts = finder.contacts(center)
             force, torque, each = forces_of(
-                scene, contacts, v[:3], spin, np.cross(axis, centre) if scene.table_speed else axis
+                scene, contacts, v[:3], spin, np.cross(axis, center) if scene.table_speed else axis
             )
             if k % every == 0:
-                rows.append((k * dt, centre.copy(), v[:3].copy(), spin.copy(), force))
+                rows.append((k * dt, center.copy(), v[:3].copy(), spin.copy(), force))
             fext[joint] = pin.Force(turn.T @ force, turn.T @ torque)
             v = v + dt * pin.aba(model, data, q, v, tau, fext)
             q = pin.integrate(model, q, dt * v)

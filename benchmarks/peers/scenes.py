@@ -20,8 +20,8 @@ from sphshell_pin.benchmarks.peers.truths import (
     Bowl,
     Cylinder,
     Groove,
+    Impact,
     Plate,
-    Shot,
     Slope,
     Turntable,
 )
@@ -140,11 +140,11 @@ def slope() -> Slope:
 
 
 @cache
-def shot() -> Shot:
+def impact() -> Impact:
     radius, mass, speed = 0.005, 0.004, 100.0
-    return Shot(
-        name="shot",
-        title="Ball of 5 mm shot at a thin sheet at 100 m/s",
+    return Impact(
+        name="impact",
+        title="Ball of 5 mm hits a thin sheet at 100 m/s",
         surface=shapes.plate(0.05, 2e-3, thickness=1e-3),
         duration=4e-3,
         record_dt=4e-3,
@@ -170,6 +170,6 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "turntable": turntable,
     "groove": groove,
     "slope": slope,
-    "shot": shot,
+    "impact": impact,
     "press": press,
 }

@@ -19,9 +19,9 @@ Height = Callable[[Array, Array], Array]
 
 @dataclass(frozen=True)
 class Box:
-    """A box: `centre` (3,) [m], `half` sides (3,) [m], `rotation` (3, 3) to the world."""
+    """A box: `center` (3,) [m], `half` sides (3,) [m], `rotation` (3, 3) to the world."""
 
-    centre: Array
+    center: Array
     half: Array
     rotation: Array
 
@@ -122,10 +122,10 @@ def cylinder(radius: float, bottom: float, top: float, spacing: float) -> Surfac
     for k in range(around):
         turn = 2 * math.pi * k / around
         cos, sin = math.cos(turn), math.sin(turn)
-        centre = np.array([cos, sin, 0.0]) * (radius + thick / 2)
-        centre[2] = (top + bottom) / 2
+        center = np.array([cos, sin, 0.0]) * (radius + thick / 2)
+        center[2] = (top + bottom) / 2
         rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        boxes.append(Box(centre, half, rotation))
+        boxes.append(Box(center, half, rotation))
     return Surface(vertices, triangles, -out, spacing, radius, boxes=tuple(boxes))
 
 
@@ -141,8 +141,8 @@ def groove(opening: float, half: float, spacing: float) -> Surface:
         normal = np.array([-sign * math.cos(opening), 0.0, math.sin(opening)])
         rotation = np.c_[along, np.cross(normal, along), normal]
         length = half / math.sin(opening) / 2
-        centre = length * along - half * normal
-        boxes.append(Box(centre, np.array([length, half, half]), rotation))
+        center = length * along - half * normal
+        boxes.append(Box(center, np.array([length, half, half]), rotation))
     return Surface(
         vertices,
         triangles,

@@ -2,7 +2,7 @@
 
 The ball is solid, I = 2/5 m r^2; its law is a linear spring and dashpot, force = k depth +
 c d(depth)/dt, never pulling. One point counts for both bodies, the closest point of the surface:
-the lever of friction about the centre is a = r - depth, and b = I / (m a^2) stands where a hard
+the lever of friction about the center is a = r - depth, and b = I / (m a^2) stands where a hard
 ball has 2/5.
 """
 
@@ -60,7 +60,7 @@ class BallScene(ABC):
 
     @property
     def inertia(self) -> float:
-        """I of the ball about its centre [kg m^2]."""
+        """I of the ball about its center [kg m^2]."""
         return 0.4 * self.mass * self.radius**2
 
     @property
@@ -137,7 +137,7 @@ class Bowl(BallScene):
     def errors(self, found: Trajectory) -> dict[str, float]:
         """Return `period` and `energy`: the largest change / energy of the swing.
 
-        What the contact stores is taken in the way that favours the engine: as the engine tells,
+        What the contact stores is taken in the way that favours the engine: as the engine reports,
         or k depth^2 / 2 in the exact bowl, or only where the ball turns round: there the load, and
         with it the stored energy of any law, is that of the start.
         """
@@ -295,14 +295,14 @@ class Slope(BallScene):
 
 
 @dataclass(frozen=True)
-class Shot(BallScene):
-    """Shot at a thin sheet, from 16 distances that differ by less than a step's way.
+class Impact(BallScene):
+    """Impact at a thin sheet, from 16 distances that differ by less than a step's way.
 
     Truth: it bounces off with the speed with which it came.
     """
 
     def variants(self) -> tuple[BallScene, ...]:
-        """Return one shot for each distance."""
+        """Return one impact for each distance."""
         way = abs(self.velocity[2]) * max(self.dts)
         start = self.position[2]
         return tuple(

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from functools import cache
 from typing import TypedDict
 
-from sphshell_pin.benchmarks.peers.engine import CannotDo, Engine, Knob
+from sphshell_pin.benchmarks.peers.engine import CannotDo, Engine, Params
 from sphshell_pin.benchmarks.peers.scenes import SCENES
 from sphshell_pin.benchmarks.processes import OwnProcess, ProcessLost
 from sphshell_pin.benchmarks.timing import one_core
@@ -30,7 +30,7 @@ class Facts(TypedDict):
 
     version: str
     settings: dict[str, str]
-    knobs: list[Knob]
+    param_sets: list[Params]
 
 
 class Ran(TypedDict):
@@ -65,13 +65,15 @@ def _begin() -> None:
 def _facts(name: str, scene: str) -> Facts:
     engine, built = engine_called(name), SCENES[scene]()
     return Facts(
-        version=engine.version(), settings=engine.settings(built), knobs=engine.knobs(built)
+        version=engine.version(),
+        settings=engine.settings(built),
+        param_sets=engine.param_sets(built),
     )
 
 
-def _run(name: str, scene: str, knob: Knob, variant: int) -> Ran:
+def _run(name: str, scene: str, params: Params, variant: int) -> Ran:
     one = SCENES[scene]().variants()[variant]
-    found = engine_called(name).run(one, knob)
+    found = engine_called(name).run(one, params)
     return Ran(
         errors=one.errors(found), cpu=found.cpu, simulated=found.simulated, steps=found.steps
     )
@@ -89,10 +91,10 @@ class Worker:
         with self._reasons():
             return self._process.call(STARTING, _facts, self.name, scene)
 
-    def run(self, scene: str, knob: Knob, variant: int, timeout: float) -> Ran:
+    def run(self, scene: str, params: Params, variant: int, timeout: float) -> Ran:
         """Run a setting of a scene; give it up after `timeout` [s]."""
         with self._reasons():
-            return self._process.call(timeout, _run, self.name, scene, knob, variant)
+            return self._process.call(timeout, _run, self.name, scene, params, variant)
 
     def close(self) -> None:
         """End the process."""

@@ -76,9 +76,9 @@ def faults(context: typer.Context) -> Iterator[None]:
             raise
         known = isinstance(error, SphshellError)
         # Any other fault is a defect, or comes from the user's routines: say where to look.
-        told = str(error) if known else f"{type(error).__name__}: {error}"
-        told = ", ".join([told, *getattr(error, "__notes__", ())])
-        typer.echo(f"error: {told}{'' if known else ' (see it with --debug)'}", err=True)
+        text = str(error) if known else f"{type(error).__name__}: {error}"
+        text = ", ".join([text, *getattr(error, "__notes__", ())])
+        typer.echo(f"error: {text}{'' if known else ' (see it with --debug)'}", err=True)
         raise typer.Exit(ERROR) from None
 
 
@@ -87,13 +87,13 @@ def _plain_warnings() -> Iterator[None]:
     """Print each warning of this package once, as a sentence without its place in the code."""
     from sphshell_pin import errors
 
-    told: set[str] = set()
+    shown: set[str] = set()
 
     def show(message: Warning | str, *rest: Any, **named: Any) -> None:
         if getattr(errors, type(message).__name__, None) is not type(message):
             usual(message, *rest, **named)
-        elif str(message) not in told:
-            told.add(str(message))
+        elif str(message) not in shown:
+            shown.add(str(message))
             typer.echo(f"warning: {message}", err=True)
 
     with warnings.catch_warnings():
@@ -182,5 +182,5 @@ def length_of(option: str, text: str | None) -> float | None:
     try:
         number = float(found[1] if found else text)
     except ValueError:
-        raise InvalidParameter(option, text, "must be a length: 0.012 (metres), 12mm") from None
+        raise InvalidParameter(option, text, "must be a length: 0.012 (meters), 12mm") from None
     return number * (metres_per_unit(found[2]) if found and found[2] else 1.0)

@@ -62,13 +62,14 @@ def check_robot_(
 ) -> None:
     """Check contact on robots: forces, momentum, energy, derivatives, contacts missed.
 
-    A sphere is put on the robot, a curved shell under it, and what comes out is compared with
-    results that the compiled core has no part in. Exit code 1: a check failed; 2: a robot could
-    not be checked.
+    A sphere is put on the robot and a curved shell under it; the contact is compared with
+    computations independent of the compiled core. Exit code 1: a check failed; 2: a robot could not
+    be checked.
 
     Example: sphshell-pin check-robot panda my_robot.urdf
     """
     with faults(context):
+        from sphshell_pin.atomic import write_whole
         from sphshell_pin.errors import SphshellError
         from sphshell_pin.study import robot_check as study
 
@@ -91,10 +92,11 @@ def check_robot_(
             typer.echo(f"interrupted: {left} of {len(names)} robots were not checked", err=True)
             raise typer.Exit(INTERRUPTED)
         if json is not None:
-            study.write(json, study.as_json(reports, seed, sizes))
+            write_whole(json, study.as_json(reports, seed, sizes).encode())
         if write is not None:
-            told = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
-            study.write(write, study.as_markdown(reports, f"{told} --write {write}"))
+            command = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
+            page = study.as_markdown(reports, f"{command} --write {write}")
+            write_whole(write, page.encode())
         verdicts = [one.verdict for one in reports]
         # A robot that was asked for by name and cannot be checked is wrong input, and so is what
         # no robot there is can be checked with.
@@ -135,7 +137,7 @@ def _check(
         try:
             for name in names:
 
-                def tell(title: str, name: str = name) -> None:
+                def show(title: str, name: str = name) -> None:
                     bar.update(task, description=f"{Path(name).name}: {title}")
 
                 try:
@@ -146,7 +148,7 @@ def _check(
                         free_flyer=free_flyer,
                         seed=seed,
                         sizes=sizes,
-                        progress=tell,
+                        progress=show,
                     )
                 except FrameNotFound as error:
                     if len(names) == 1:
@@ -161,34 +163,26 @@ def _check(
 
 
 def _print(reports: Sequence[RobotReport]) -> None:
-    from sphshell_pin.study.robot_check import CHECKS, PASS, remarks, told
+    from sphshell_pin.study.robot_check import CHECKS, PASS, as_table, remarks
 
     console = terminal()
-    titles = [check.title for check in CHECKS.values()]
     if not sys.stdout.isatty():
         console.width = _PIPE_WIDTH
-    # Where all columns do not fit, frame and size are left out and the titles cut: a figure that
-    # folds cannot be read.
+    # On a narrow terminal without the frame and the size, and with short titles: a figure that is
+    # folded cannot be read.
     narrow = console.width < _WIDE
-    titles = [title[:6] for title in titles] if narrow else titles
+    titles = [check.title[: 6 if narrow else None] for check in CHECKS.values()]
     table = make_table("robot", *([] if narrow else ["frame", "nq/nv"]), *titles, "verdict")
-    for column in table.columns:
+    for column in table.columns[1 if narrow else 2 :]:
         column.no_wrap = True
-    if narrow:
-        table.padding = (0, 1, 0, 0)
-        table.columns[0].no_wrap = False
-    else:
-        table.columns[1].justify, table.columns[1].no_wrap = "left", False
-    for one in reports:
-        figures = []
-        for key in CHECKS:
-            text = told(one.findings[key].error) if key in one.findings else ""
-            figures.append(f"[red]{text}[/red]" if text and not one.met(key) else text)
-        colour = "green" if one.verdict == PASS else "red"
-        size = f"{one.nq}/{one.nv}" if one.nv else ""
-        what = [] if narrow else [plain(one.frame), size]
-        verdict = f"[{colour}]{one.verdict}[/{colour}]"
-        table.add_row(plain(one.name), *what, *figures, verdict)
+    for one, (name, frame, size, *figures, verdict) in zip(reports, as_table(reports), strict=True):
+        shown = [
+            f"[red]{text}[/red]" if text and not one.met(key) else text
+            for key, text in zip(CHECKS, figures, strict=True)
+        ]
+        color = "green" if verdict == PASS else "red"
+        where = [] if narrow else [plain(frame), size]
+        table.add_row(plain(name), *where, *shown, f"[{color}]{verdict}[/{color}]")
     console.print(table)
     for sentence in remarks(reports):
         console.print(sentence, markup=False, highlight=False)

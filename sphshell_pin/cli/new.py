@@ -97,20 +97,20 @@ def new(
 def _show(made: NewScenario) -> None:
     console = terminal()
 
-    def tell(text: str) -> None:
+    def show(text: str) -> None:
         console.print(text, markup=False, highlight=False)
 
     for section in made.built.scenario.shell:
         if section.file is not None:
-            tell(f"{made.built.shells[section.name].health}\n")
-    tell(f"{made.explanation}\n")
-    tell("Chosen:")
+            show(f"{made.built.shells[section.name].health}\n")
+    show(f"{made.explanation}\n")
+    show("Chosen:")
     for one in made.why:
-        tell(f"  {one}")
-    tell(f"\nWritten: {made.path}")
-    tell("Next:")
+        show(f"  {one}")
+    show(f"\nWritten: {made.path}")
+    show("Next:")
     for command in ("run", "view"):
-        tell(f"  sphshell-pin {command} {_quoted(made.path)}")
+        show(f"  sphshell-pin {command} {_quoted(made.path)}")
 
 
 def _quoted(path: Path) -> str:

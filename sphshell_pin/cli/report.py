@@ -30,7 +30,7 @@ def report(
 
     Contact forces, queries, integrators, steps and hard cases, each against its aim. The machine
     should have nothing else to do. Exit code 1: a section could not
-    be measured; an aim that was missed is told, and is no error.
+    be measured; a missed aim is listed, and is no error.
 
     Example: sphshell-pin report --quick
     """
@@ -40,7 +40,7 @@ def report(
         from sphshell_pin.study.report import PAGE, make_report
 
         # Without --out: the folder is no part of what was measured.
-        told = ["sphshell-pin report", *["--quick"] * quick, *["--peers"] * peers]
+        command = ["sphshell-pin report", *["--quick"] * quick, *["--peers"] * peers]
         bar = progress_bar(TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn())
         with bar:
             task = bar.add_task("report", total=1.0)
@@ -48,7 +48,7 @@ def report(
                 out,
                 quick=quick,
                 with_peers=peers,
-                command=" ".join(told),
+                command=" ".join(command),
                 tell=lambda title, share: bar.update(task, description=title, completed=share),
             )
         _print(made)

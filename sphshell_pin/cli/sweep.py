@@ -28,7 +28,7 @@ from sphshell_pin.cli.app import (
 if TYPE_CHECKING:
     from sphshell_pin.study.sweep import Plan, SweepReport
 
-# So many failed runs are told one by one.
+# So many failed runs are listed one by one.
 _MOST_FAILURES = 5
 
 
@@ -80,7 +80,7 @@ def sweep(
 ) -> None:
     """Run a scenario with many values, over processes or a Dask cluster; write one table.
 
-    The same command goes on where an earlier one was stopped.
+    The same command resumes where an earlier one was stopped.
 
     Example: sphshell-pin sweep sphere_on_shell --vary contact.law.k=1e3:1e5:log:20
     """
@@ -116,14 +116,14 @@ def _bar() -> Iterator[tuple[Callable[[int, int, int], object], Callable[[str], 
     """Show a bar on a terminal; yield what moves it and what prints a sentence beside it."""
     from rich.progress import MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
-    failures = TextColumn("[red]{task.fields[told]}[/red]")
+    failures = TextColumn("[red]{task.fields[failures]}[/red]")
     bar = progress_bar(MofNCompleteColumn(), failures, TimeRemainingColumn())
     with bar:
-        task = bar.add_task("runs", total=None, told="")
+        task = bar.add_task("runs", total=None, failures="")
 
         def progress(done: int, failed: int, total: int) -> None:
-            told = f"{failed} failed" if failed else ""
-            bar.update(task, completed=done, total=total, told=told)
+            failures = f"{failed} failed" if failed else ""
+            bar.update(task, completed=done, total=total, failures=failures)
 
         yield progress, lambda sentence: typer.echo(sentence, err=True)
 

@@ -29,6 +29,8 @@ from sphshell_pin.errors import InvalidParameter, SphshellError, add_origin
 from sphshell_pin.parameters import Ingredient, parameter
 from sphshell_pin.shell import Shell
 
+__all__ = ["CartesianImpedance", "GravityCompensation", "JointPD"]
+
 Array = NDArray[np.float64]
 
 

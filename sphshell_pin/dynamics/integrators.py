@@ -6,6 +6,14 @@ from dataclasses import dataclass
 
 from sphshell_pin.parameters import Ingredient, parameter
 
+__all__ = [
+    "Adaptive",
+    "Implicit",
+    "LinearlyImplicitEuler",
+    "RungeKutta4",
+    "SemiImplicitEuler",
+]
+
 
 class Integrator(Ingredient):
     """Base of the integrators: `kind` is their name in files and in the compiled core."""

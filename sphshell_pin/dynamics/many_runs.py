@@ -187,7 +187,7 @@ def _one_each(
     controller: AnyController | Sequence[AnyController], count: int
 ) -> Sequence[AnyController]:
     """Return the controller of each run."""
-    if not isinstance(controller, list | tuple):
+    if not isinstance(controller, Sequence):
         return [controller] * count
     if len(controller) != count:
         raise InvalidParameter(

@@ -299,11 +299,11 @@ def _assemble(
     place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
     elements[polygons.polygon_of_slot, place] = polygons.corners
     in_use = _in_use(triangles, len(vertices))
-    borders = find_borders(polygons, vertices, oriented.component)
+    borders = find_borders(oriented, vertices)
     starts = np.arange(0, triangles.size + 1, 3)
     health = ShellHealth(
         **found,
-        **_holes(borders, oriented.area),
+        **_holes(borders),
         vertices=len(vertices),
         elements=len(polygons),
         triangles=len(triangles),
@@ -341,9 +341,9 @@ def _with_faces(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
     return replace(surface, normals=normals, element_face=faces, face_names=raw.face_names)
 
 
-def _holes(borders: Borders, component_area: Floats) -> Found:
+def _holes(borders: Borders) -> Found:
     """Boundary loops that look like a lost element rather than the rim of a sheet."""
-    share = borders.loop_area / component_area[borders.loop_component]
+    share = borders.loop_area / borders.loop_surface
     few = borders.loop_edges <= SMALL_HOLE_EDGES
     small = (few & (share < SMALL_HOLE_AREA)) | (share < TINY_HOLE_AREA)
     # One or two open edges enclose nothing: they bound a fin between non-manifold edges.

@@ -143,7 +143,7 @@ class Borders:
     loop_edges : (loops,) edges of each boundary loop
     loop_area : (loops,) size of the area vector each loop spans [m^2]
     loop_center : (loops, 3) mean corner [m]
-    loop_component : (loops,) component of one of its elements
+    loop_surface : (loops,) area of the largest component that it bounds [m^2]
     non_manifold_at : (3,) middle of the first non-manifold edge [m], or None
     """
 
@@ -153,12 +153,13 @@ class Borders:
     loop_edges: Longs
     loop_area: Floats
     loop_center: Floats
-    loop_component: Ints
+    loop_surface: Floats
     non_manifold_at: Floats | None
 
 
-def find_borders(polygons: Polygons, vertices: Floats, component: Ints) -> Borders:
+def find_borders(oriented: Oriented, vertices: Floats) -> Borders:
     """Count the edges of oriented polygons and follow the open ones."""
+    polygons = oriented.polygons
     slot_edge, users = polygons.edges.slot_edge, polygons.edges.users
     single: Mask = users == 1
     slots = np.flatnonzero(single[slot_edge])
@@ -174,8 +175,9 @@ def find_borders(polygons: Polygons, vertices: Floats, component: Ints) -> Borde
     middle = center[edge_loop]
     spanned = 0.5 * np.cross(vertices[start] - middle, vertices[stop] - middle)
     area = np.stack([np.bincount(edge_loop, spanned[:, k], loops) for k in range(3)], axis=1)
-    owner = np.zeros(loops, np.int32)
-    owner[edge_loop] = component[polygons.polygon_of_slot[slots]]
+    surface = np.zeros(loops)
+    component = oriented.component[polygons.polygon_of_slot[slots]]
+    np.maximum.at(surface, edge_loop, oriented.area[component])
     many = np.flatnonzero(users > 2)
     return Borders(
         edges=len(users),
@@ -184,6 +186,6 @@ def find_borders(polygons: Polygons, vertices: Floats, component: Ints) -> Borde
         loop_edges=np.bincount(edge_loop, minlength=loops),
         loop_area=np.sqrt((area**2).sum(axis=1)),
         loop_center=center,
-        loop_component=owner,
+        loop_surface=surface,
         non_manifold_at=vertices[polygons.edges.ends[many[0]]].mean(axis=0) if many.size else None,
     )

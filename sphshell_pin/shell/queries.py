@@ -138,4 +138,6 @@ class Queries(ShellBase):
         places = check_points("points", points)
         core = self.core_for(method)
         found = core.closest_points(places, smooth, thread_count(threads))
-        return ClosestPoints(*(read_only(column) for column in found))
+        for column in found:
+            read_only(column)
+        return ClosestPoints(*found)

@@ -8,19 +8,16 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ShellFileError
-from sphshell_pin.shell.raw import Floats, Ints
+from sphshell_pin.shell.base import ShellBase
+from sphshell_pin.shell.raw import Floats, Ints, Mask, area_vectors
 from sphshell_pin.units import metres_per_unit
-
-if TYPE_CHECKING:
-    from sphshell_pin.shell.shell import Shell
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,7 @@ class Written:
     name: str
 
     @property
-    def used(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    def used(self) -> Mask:
         """(m, 4) which corners exist."""
         return self.elements >= 0
 
@@ -51,7 +48,7 @@ class Written:
         ]
 
 
-def write_surface(path: str | os.PathLike[str], shell: Shell, unit: str) -> None:
+def write_surface(path: str | os.PathLike[str], shell: ShellBase, unit: str) -> None:
     """Write `shell` in the format the suffix names, see `Shell.to_file`."""
     path = Path(path)
     data = encoded(path, shell, unit)
@@ -62,7 +59,7 @@ def write_surface(path: str | os.PathLike[str], shell: Shell, unit: str) -> None
         raise ShellFileError(path, f"cannot be written ({error.strerror})") from error
 
 
-def encoded(path: Path, shell: Shell, unit: str) -> bytes:
+def encoded(path: Path, shell: ShellBase, unit: str) -> bytes:
     """Return the contents of a file of `shell`, in the format the suffix of `path` names.
 
     Raises
@@ -109,34 +106,36 @@ def _points(vertices: Floats, start: str = "") -> list[str]:
     return [f"{start}{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
 
 
-def _split_by_normal(surface: Written, normals: Floats) -> tuple[Floats, Ints, Floats]:
-    """Points repeated where normals differ: points, elements over them, and a normal for each."""
+def _split_by_normal(surface: Written, normals: Floats) -> tuple[Written, Floats]:
+    """Return the surface with points repeated where normals differ, and a normal for each."""
     used = surface.used
-    corner = surface.elements[used]
-    normal = normals[used]
+    corner, normal = surface.elements[used], normals[used]
     # Normals that agree to single precision are one, as far as a file is concerned.
     key = np.column_stack([corner.astype(np.float64), np.round(normal, 7) + 0.0])
     _, first, place = np.unique(key, axis=0, return_index=True, return_inverse=True)
     elements = np.full_like(surface.elements, -1)
     elements[used] = place.ravel()
-    return surface.vertices[corner[first]], elements, normal[first]
+    points = surface.vertices[corner[first]]
+    return replace(surface, vertices=points, elements=elements), normal[first]
+
+
+def _text(lines: list[str]) -> bytes:
+    return ("\n".join(lines) + "\n").encode()
 
 
 def _shl(surface: Written) -> bytes:
     if surface.normals is None:
         header = [f"{len(surface.vertices)} {len(surface.elements)} {surface.scale!r}"]
-        lines = header + _points(surface.vertices) + surface.rows(1)
-    else:
-        points, elements, normals = _split_by_normal(surface, surface.normals)
-        split = Written(points, elements, surface.triangles, None, surface.scale, surface.name)
-        counts = f"{len(points)} {len(elements)} {len(normals)} {surface.scale!r}"
-        lines = ["Version: 2", counts, *_points(points), *split.rows(1), *_points(normals)]
-    return ("\n".join(lines) + "\n").encode()
+        return _text(header + _points(surface.vertices) + surface.rows(1))
+    split, normals = _split_by_normal(surface, surface.normals)
+    counts = f"{len(normals)} {len(split.elements)} {len(normals)} {surface.scale!r}"
+    body = _points(split.vertices) + split.rows(1) + _points(normals)
+    return _text(["Version: 2", counts, *body])
 
 
 def _stl(surface: Written) -> bytes:
     corners = surface.vertices[surface.triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
     table = np.zeros(len(corners), kind)
@@ -150,7 +149,7 @@ def _obj(surface: Written) -> bytes:
     lines = [f"o {surface.name.replace(' ', '_')}", *_points(surface.vertices, "v ")]
     if surface.normals is None:
         faces = ["f " + row.split(" ", 1)[1] for row in surface.rows(1)]
-        return ("\n".join(lines + faces) + "\n").encode()
+        return _text(lines + faces)
     flat = surface.normals[surface.used]
     table, place = np.unique(np.round(flat, 15) + 0.0, axis=0, return_inverse=True)
     lines += _points(table, "vn ")
@@ -159,34 +158,31 @@ def _obj(surface: Written) -> bytes:
     for corners, normals in zip(surface.elements.tolist(), which.tolist(), strict=True):
         pairs = zip(corners, normals, strict=True)
         lines.append("f " + " ".join(f"{v + 1}//{n + 1}" for v, n in pairs if v >= 0))
-    return ("\n".join(lines) + "\n").encode()
+    return _text(lines)
 
 
 def _off(surface: Written) -> bytes:
     header = ["OFF", f"{len(surface.vertices)} {len(surface.elements)} 0"]
-    return ("\n".join([*header, *_points(surface.vertices), *surface.rows(0)]) + "\n").encode()
+    return _text(header + _points(surface.vertices) + surface.rows(0))
 
 
 def _ply(surface: Written) -> bytes:
-    points, elements = surface.vertices, surface.elements
-    columns = ["x", "y", "z"]
-    data = points
+    columns, data = ["x", "y", "z"], surface.vertices
     if surface.normals is not None:
-        points, elements, normals = _split_by_normal(surface, surface.normals)
+        surface, normals = _split_by_normal(surface, surface.normals)
         columns += ["nx", "ny", "nz"]
-        data = np.column_stack([points, normals])
+        data = np.column_stack([surface.vertices, normals])
     head = [
         "ply",
         "format ascii 1.0",
-        f"element vertex {len(points)}",
+        f"element vertex {len(data)}",
         *(f"property double {column}" for column in columns),
-        f"element face {len(elements)}",
+        f"element face {len(surface.elements)}",
         "property list uchar int vertex_indices",
         "end_header",
     ]
     body = [" ".join(repr(x) for x in row) for row in data.tolist()]
-    split = Written(points, elements, surface.triangles, None, surface.scale, surface.name)
-    return ("\n".join(head + body + split.rows(0)) + "\n").encode()
+    return _text(head + body + surface.rows(0))
 
 
 WRITERS: dict[str, Callable[[Written], bytes]] = {

@@ -133,5 +133,5 @@ def assert_contacts_found(scene: Scene, q: ArrayLike, tolerance: float = 1e-9) -
 
 
 def assert_not_passed_through(result: Result) -> float:
-    """Assert that no sphere's centre went through its shell between two recorded rows of a run."""
+    """Assert that no sphere's center went through its shell between two recorded rows of a run."""
     return passage(result).require("a sphere passed through its shell", 0.0)

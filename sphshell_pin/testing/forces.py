@@ -72,7 +72,7 @@ def balance(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None
 
     The error is the difference of the two accelerations relative to what the contacts add to them
     (without contacts, to all of it), both measured by the mass matrix, sqrt(a . M a), so that
-    metres and radians, heavy and light links may be told in one number.
+    meters and radians, heavy and light links can be measured by one number.
 
     Raises InvalidParameter for a state or torques of the wrong size, and where the mass matrix is
     singular: forward dynamics has no answer there.
@@ -124,7 +124,7 @@ def reaction(scene: Scene, q: ArrayLike, v: Optional = None) -> Finding:
             raise InvalidParameter(
                 "scene",
                 pair.name,
-                "is a contact with the universe, whose wrench is not told: put it on a free body",
+                "touches the universe, whose wrench is not computed: put it on a free body",
             )
     model, data = scene.model, scene.model.createData()
     pin.forwardKinematics(model, data, q)
@@ -147,11 +147,11 @@ def reaction(scene: Scene, q: ArrayLike, v: Optional = None) -> Finding:
         float(np.linalg.norm(total[3:])) / (largest * lever),
     )
     where = (
-        f"the wrenches about {_told(middle)} m leave a force of {_told(total[:3])} N and a torque "
-        f"of {_told(total[3:])} N m, where one body is pushed with {largest:.6g} N"
+        f"the wrenches about {_text(middle)} m leave a force of {_text(total[:3])} N and a torque "
+        f"of {_text(total[3:])} N m, where one body is pushed with {largest:.6g} N"
     )
     return Finding(error, where)
 
 
-def _told(vector: Array) -> str:
+def _text(vector: Array) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in vector) + ")"

@@ -21,7 +21,7 @@ from sphshell_pin.testing.triangles import closest_inside, crossed, distances, p
 
 Array = NDArray[np.float64]
 
-# Points nearer to each other, in radii, are one: how far off they are is told apart from that.
+# Points nearer to each other, in radii, count as one; how far off they are is measured separately.
 _SAME = 1e-3
 
 
@@ -122,7 +122,7 @@ def sphere_centers(corners: Array, radius: float, count: int, rng: np.random.Gen
     points = samples(corners, count, rng)
     home = np.argmin(distances(points, corners), axis=1)
     away = np.array([radius * rng.uniform(*kinds[k % len(kinds)]) for k in range(count)])
-    # Along the normal most centres are as near as meant; askew they meet edges and borders.
+    # Along the normal most centers are as near as meant; askew they meet edges and borders.
     askew = rng.normal(size=(count, 3)) * np.where(np.arange(count) % 3 == 2, 0.5, 0.0)[:, None]
     direction = normals[home] * rng.choice([-1.0, 1.0], count)[:, None] + askew
     direction /= np.linalg.norm(direction, axis=1)[:, None]

@@ -28,9 +28,9 @@ def coarse(scene, **changes):
     return replace(scene, surface=scenes.shapes.plate(0.06, 0.02), **changes)
 
 
-@pytest.mark.parametrize("knob", [EXPLICIT, SAP])
+@pytest.mark.parametrize("params", [EXPLICIT, SAP])
 @pytest.mark.parametrize("rolls", [True, False])
-def test_free_flight_is_a_parabola(engine, knob, rolls):
+def test_free_flight_is_a_parabola(engine, params, rolls):
     velocity, spin = np.array([0.3, -0.2, 0.5]), np.array([4.0, 5.0, -6.0]) * rolls
     scene = coarse(
         scenes.plate(),
@@ -40,11 +40,11 @@ def test_free_flight_is_a_parabola(engine, knob, rolls):
         angular_velocity=tuple(spin),
         duration=0.1,
     )
-    found = engine.run(scene, knob)
+    found = engine.run(scene, params)
     np.testing.assert_allclose(found.t[-1], 0.1)
     # Semi-implicit Euler falls by dt * t / 2 * g further than the parabola.
     exact = [0, 0, 0.2] + np.outer(found.t, velocity)
-    exact[:, 2] -= 0.5 * 9.81 * found.t * (found.t + knob.get("dt", 0.0))
+    exact[:, 2] -= 0.5 * 9.81 * found.t * (found.t + params.get("dt", 0.0))
     np.testing.assert_allclose(found.position, exact, atol=1e-9)
     np.testing.assert_allclose(found.velocity[-1], velocity + [0, 0, -0.981], atol=1e-9)
     np.testing.assert_allclose(found.angular_velocity, np.tile(spin, (len(found.t), 1)), atol=1e-9)
@@ -74,10 +74,10 @@ def test_the_modulus_gives_the_load_at_the_depth_of_the_spring(build):
     scene = build()
     depth = drake.load(scene) / scene.stiffness
     # The patch by quadrature, from the exact shapes: pressure modulus * (r - s) / r, s the distance
-    # from the ball's centre.
+    # from the ball's center.
     across = np.linspace(0, 2.0 * np.sqrt(scene.radius * depth), 20001)
     if isinstance(scene, scenes.Bowl):
-        out = swing.ARM + depth  # from the middle of the bowl to the centre of the ball
+        out = swing.ARM + depth  # from the middle of the bowl to the center of the ball
         height = np.sqrt(swing.BOWL**2 - across**2) - out
     else:
         height = scene.radius - depth
@@ -113,7 +113,7 @@ def test_the_law_of_the_bowl_has_the_period_of_the_spring():
 
 
 def test_a_long_step_passes_through_the_sheet(engine):
-    scene = scenes.shot()
+    scene = scenes.impact()
     assert scene.errors(engine.run(scene, SAP | {"edge": 5e-4})) == {"passed": 1.0}
 
 
@@ -121,7 +121,7 @@ def test_every_scene_has_settings_and_a_first_setting(engine):
     for build in scenes.SCENES.values():
         scene = build()
         assert all(setting for setting in engine.settings(scene).values())
-        assert engine.knobs(scene)[0]["edge"] > 0
+        assert engine.param_sets(scene)[0]["edge"] > 0
 
 
 def test_the_free_arm_follows_its_control(engine):

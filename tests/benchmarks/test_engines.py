@@ -16,13 +16,13 @@ from sphshell_pin.benchmarks.peers.python_loop import PYTHON, Finder, PythonLoop
 from sphshell_pin.errors import MissingExtra
 
 
-def joined(engine, scene, knob, variants=None):
+def joined(engine, scene, params, variants=None):
     runs = scene.variants()[:variants]
-    return scene.joined([one.errors(engine.run(one, knob)) for one in runs])
+    return scene.joined([one.errors(engine.run(one, params)) for one in runs])
 
 
 @pytest.mark.parametrize(
-    ("scene", "knob", "bar"),
+    ("scene", "params", "bar"),
     [
         ("plate", {"integrator": "SemiImplicitEuler", "dt": 1e-4}, 1e-11),
         ("bowl", {"integrator": "RungeKutta4", "dt": 2e-3}, 2e-5),
@@ -30,11 +30,11 @@ def joined(engine, scene, knob, variants=None):
         ("turntable", {"integrator": "Implicit", "rtol": 1e-4}, 1e-4),
         ("groove", {"integrator": "SemiImplicitEuler", "dt": 1e-4}, 1e-11),
         ("slope", {"integrator": "Implicit", "rtol": 1e-4}, 1e-9),
-        ("shot", {"integrator": "Adaptive", "rtol": 1e-6}, 1e-6),
+        ("impact", {"integrator": "Adaptive", "rtol": 1e-6}, 1e-6),
     ],
 )
-def test_ours_is_near_the_truth(scene, knob, bar):
-    errors = joined(Ours(), scenes.SCENES[scene](), knob, 3)
+def test_ours_is_near_the_truth(scene, params, bar):
+    errors = joined(Ours(), scenes.SCENES[scene](), params, 3)
     assert max(errors.values()) < bar
 
 
@@ -90,8 +90,8 @@ def test_the_loop_and_ours_press_alike():
 def test_mujoco_has_the_arm_of_pinocchio():
     mujoco = pytest.importorskip("mujoco")
     scene = press_scene()
-    knob = peer.MuJoCo().knobs(scene)[0]
-    theirs = peer.press_model(scene, knob)
+    params = peer.MuJoCo().param_sets(scene)[0]
+    theirs = peer.press_model(scene, params)
     data = mujoco.MjData(theirs)
     q = np.array(scene.q0) + 0.1
     data.qpos[:] = q
@@ -110,24 +110,24 @@ def test_mujoco_has_the_arm_of_pinocchio():
 
 
 @pytest.mark.parametrize(
-    ("scene", "knob", "bar"),
+    ("scene", "params", "bar"),
     [
         ("groove", {"integrator": "RK4", "dt": 1e-3, "surface": "boxes"}, 1e-9),
         ("slope", {"integrator": "implicitfast", "dt": 1e-3, "surface": "boxes"}, 5e-3),
         ("turntable", {"integrator": "implicitfast", "dt": 1e-3, "surface": "boxes"}, 0.1),
     ],
 )
-def test_mujoco_is_near_the_truth_on_boxes(scene, knob, bar):
+def test_mujoco_is_near_the_truth_on_boxes(scene, params, bar):
     pytest.importorskip("mujoco")
-    assert max(joined(peer.MuJoCo(), scenes.SCENES[scene](), knob).values()) < bar
+    assert max(joined(peer.MuJoCo(), scenes.SCENES[scene](), params).values()) < bar
 
 
 def test_mujoco_swings_on_a_height_field():
     pytest.importorskip("mujoco")
     scene = scenes.bowl(0.3)
-    knob = {"integrator": "implicitfast", "dt": 1e-3, "surface": "height field", "impedance": 0.3}
-    knob["cell"] = scene.surface.spacing / 2
-    errors = joined(peer.MuJoCo(), scene, knob, 1)
+    params = {"integrator": "implicitfast", "dt": 1e-3, "surface": "height field", "impedance": 0.3}
+    params["cell"] = scene.surface.spacing / 2
+    errors = joined(peer.MuJoCo(), scene, params, 1)
     assert errors["period"] < 1e-2
     assert errors["energy"] < 5e-2
 

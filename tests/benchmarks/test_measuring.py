@@ -15,7 +15,7 @@ from sphshell_pin.benchmarks.peers.measuring import Ratio, Row, as_good_as, best
 def row(engine, period, energy, cost, **more):
     errors = {"period": period, "energy": energy}
     return Row(
-        "bowl", engine, knob={"dt": 1e-3}, errors=errors, unit="CPU s / s", cost=cost, **more
+        "bowl", engine, params={"dt": 1e-3}, errors=errors, unit="CPU s / s", cost=cost, **more
     )
 
 
@@ -54,7 +54,7 @@ def test_a_lost_process_is_reported_and_starts_anew():
     try:
         with pytest.raises(workers.NoAnswer, match="took longer than 0 s"):
             worker.run("plate", {"integrator": "Adaptive"}, 0, timeout=0.0)
-        assert worker.facts("plate")["knobs"]
+        assert worker.facts("plate")["param_sets"]
         with pytest.raises(workers.NoAnswer, match="AttributeError"):
             worker.run("plate", {"integrator": "None"}, 0, timeout=60.0)
         with pytest.raises(processes.ProcessLost, match="crashed"):

@@ -14,7 +14,7 @@ from sphshell_pin.benchmarks.peers import scenes
 from sphshell_pin.benchmarks.peers.merged import merged_urdf
 from sphshell_pin.benchmarks.peers.pybullet import PyBullet
 
-KNOB = {"dt": 1e-3, "breaking": 1e-4}
+PARAMS = {"dt": 1e-3, "breaking": 1e-4}
 
 
 @pytest.fixture(scope="module")
@@ -37,11 +37,11 @@ def test_free_flight_is_a_parabola_in_real_units(engine):
         angular_velocity=tuple(spin),
         duration=0.1,
     )
-    found = engine.run(scene, KNOB)
+    found = engine.run(scene, PARAMS)
     assert found.steps == 100
     np.testing.assert_allclose(found.t[-1], 0.1)
     # Semi-implicit Euler falls by dt * t / 2 * g further than the parabola.
-    fall = -0.5 * 9.81 * found.t * (found.t + KNOB["dt"])
+    fall = -0.5 * 9.81 * found.t * (found.t + PARAMS["dt"])
     exact = [0, 0, 0.2] + np.outer(found.t, velocity)
     exact[:, 2] += fall
     np.testing.assert_allclose(found.position, exact, atol=1e-9)
@@ -51,12 +51,12 @@ def test_free_flight_is_a_parabola_in_real_units(engine):
 
 def test_the_weight_is_carried_at_the_depth_of_the_spring(engine):
     scene = coarse(scenes.plate())
-    # Over the middle of a triangle: next to an edge both neighbours push, each with the spring.
+    # Over the middle of a triangle: next to an edge both neighbors push, each with the spring.
     corners = scene.surface.vertices[scene.surface.triangles]
     middles = corners[np.ptp(corners[:, :, 2], axis=1) == 0].mean(axis=1)
     x, y, _ = middles[np.argmin(np.linalg.norm(middles, axis=1))]
     scene = replace(scene, position=(x, y, scene.position[2]))
-    found = engine.run(scene, KNOB)
+    found = engine.run(scene, PARAMS)
     np.testing.assert_allclose(found.force[-50:].mean(axis=0), [0, 0, scene.weight], atol=2e-3)
     depth = scene.radius - found.position[-1, 2]
     assert depth == pytest.approx(scene.weight / scene.stiffness, rel=0.05)
@@ -64,7 +64,7 @@ def test_the_weight_is_carried_at_the_depth_of_the_spring(engine):
 
 def test_friction_holds_a_body_that_cannot_turn(engine):
     scene = replace(scenes.slope(), rolls=False)
-    found = engine.run(scene, KNOB)
+    found = engine.run(scene, PARAMS)
     # The whole force of the plate, friction included, balances the tilted gravity.
     carried = found.force[-100:].mean(axis=0)
     np.testing.assert_allclose(carried, -scene.mass * np.array(scene.gravity), atol=5e-3)
@@ -72,7 +72,7 @@ def test_friction_holds_a_body_that_cannot_turn(engine):
 
 
 def test_continuous_collision_detection_stops_the_shot(engine):
-    scene = scenes.shot().variants()[3]
+    scene = scenes.impact().variants()[3]
     passed = [
         engine.run(scene, {"dt": 1e-3, "breaking": 2e-3, "ccd": on}).position[-1, 2] < 0
         for on in (False, True)
@@ -84,7 +84,7 @@ def test_every_scene_has_settings_and_a_first_setting(engine):
     for build in scenes.SCENES.values():
         scene = build()
         assert all(scene_setting for scene_setting in engine.settings(scene).values())
-        assert engine.knobs(scene)[0]["dt"] > 0
+        assert engine.param_sets(scene)[0]["dt"] > 0
 
 
 @pytest.mark.parametrize("scale", [1.0, 10.0])

@@ -177,7 +177,7 @@ def test_at_rest_the_plate_and_the_groove_are_right():
 
 
 def test_a_shot_passed_or_came_back():
-    scene = scenes.shot()
+    scene = scenes.impact()
     t = np.array([0.0, scene.duration])
     back = np.array([[0, 0, 0.02], [0, 0, 0.3]])
     velocity = np.array([[0, 0, -100.0], [0, 0, 90.0]])
@@ -207,7 +207,7 @@ def test_the_surface_is_one_thing_in_all_its_forms(name):
     if surface.boxes:
         distance = np.full(len(surface.vertices), np.inf)
         for box in surface.boxes:
-            local = np.abs((surface.vertices - box.centre) @ box.rotation) - box.half
+            local = np.abs((surface.vertices - box.center) @ box.rotation) - box.half
             outside = np.linalg.norm(np.maximum(local, 0), axis=1)
             distance = np.minimum(distance, outside + np.maximum(-local.max(axis=1), 0))
         # On the surface of a box, up to the sagitta of the cylinder's facets.

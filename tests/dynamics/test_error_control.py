@@ -321,6 +321,7 @@ def zoo_start(scene: sp.Scene) -> tuple[np.ndarray, np.ndarray]:
     return q, rng.uniform(-2.0, 2.0, scene.model.nv)
 
 
+@pytest.mark.slow
 def test_all_kinds_of_joints_agree() -> None:
     scene = zoo()
     q, v = zoo_start(scene)

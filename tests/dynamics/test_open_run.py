@@ -40,7 +40,7 @@ def test_pieces_are_the_run_in_one(integrator, friction) -> None:
     np.testing.assert_array_equal(last.q[0], whole.q[-1])
     np.testing.assert_array_equal(last.v[0], whole.v[-1])
     np.testing.assert_array_equal(np.concatenate([one.t for one in pieces]), whole.t)
-    for name in ("number", "depth", "friction_force_world"):
+    for name in ("contact_id", "depth", "friction_force_world"):
         joined = np.concatenate([getattr(one.contacts, name) for one in pieces])
         np.testing.assert_array_equal(joined, getattr(whole.contacts, name))
     times = np.concatenate([one.contacts.t for one in pieces])

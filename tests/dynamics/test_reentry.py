@@ -155,6 +155,7 @@ def test_cycles_through_a_routine_are_collected(make) -> None:
     assert kept.__dict__
 
 
+@pytest.mark.slow
 def test_what_others_hold_of_a_cycle_survives() -> None:
     kept = holder_of_a_run()
     run, watched = kept.run, weakref.ref(kept)

@@ -64,7 +64,7 @@ def slider_scene(law) -> sp.Scene:
 def assert_same_bits(a: sp.Result, b: sp.Result) -> None:
     for name in ("t", "q", "v"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
-    for name in ("depth", "number", "friction_force_world", "t", "row"):
+    for name in ("depth", "contact_id", "friction_force_world", "t", "row"):
         np.testing.assert_array_equal(getattr(a.contacts, name), getattr(b.contacts, name))
     np.testing.assert_array_equal(a.energy.total, b.energy.total)
     assert a.events == b.events

@@ -388,6 +388,19 @@ def test_save_and_load(tmp_path: Path) -> None:
         Result.load(tmp_path / "text.npz")
 
 
+def test_a_file_of_version_0_1_is_read() -> None:
+    """It calls the ids of contacts numbers."""
+    result = Result.load(Path(__file__).parents[1] / "data" / "run_of_version_0_1.npz")
+    assert (len(result.t), result.stats.steps, result.stats.integrator) == (
+        11,
+        200,
+        "SemiImplicitEuler",
+    )
+    figures = result.stats.pairs["ball-plate"]
+    assert figures.peak_force >= result.contacts.normal_force.max() > 0
+    assert set(result.contacts.contact_id) == {0}
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_unwritable_folder(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)

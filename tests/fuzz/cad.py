@@ -9,19 +9,17 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
-import re
+import random
 import resource
 import sys
 import tempfile
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from sphshell_pin import Shell, SphshellError
+from tests.fuzz.mutate import damage
 
 TIME_LIMIT = 10.0
 """Given to OpenCASCADE for each file [s]."""
@@ -31,10 +29,6 @@ HANG = 20.0
 
 MOST_MEMORY = 2e9
 """Of this process [bytes]."""
-
-NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eED][-+]?\d+)?")
-NUMBERS = (b"0", b"-1", b"1", b"nan", b"inf", b"1e308", b"-1e308", b"1e-308", b"1e15", b"0.5", b"9")
-WHOLE = (b"2147483647", b"-2147483648", b"4294967296", b"99999999999999999999")
 
 KINDS = {
     "makes OpenCASCADE crash": "child crashed",
@@ -60,81 +54,6 @@ def bases(folder: Path) -> list[Path]:
         made.append(shapes.write_iges(folder / f"{name}_solid.iges", shape, solids=1))
         made.append(shapes.write_brep(folder / f"{name}.brep", shape))
     return made
-
-
-def mutated(data: bytes, rng: np.random.Generator) -> bytes:
-    """Return a file with one to four changes."""
-    for _ in range(rng.integers(1, 5)):
-        data = CHANGES[rng.integers(len(CHANGES))](data, rng)
-    return data
-
-
-def _flip_bits(data: bytes, rng: np.random.Generator) -> bytes:
-    changed = bytearray(data)
-    for place in rng.integers(len(data), size=rng.integers(1, 9)):
-        changed[place] ^= 1 << rng.integers(8)
-    return bytes(changed)
-
-
-def _change_lines(data: bytes, rng: np.random.Generator) -> bytes:
-    """Delete, double or swap lines."""
-    lines = data.split(b"\n")
-    a, b = rng.integers(len(lines), size=2)
-    kind = rng.integers(3)
-    if kind == 0:
-        del lines[a : a + rng.integers(1, 4)]
-    elif kind == 1:
-        lines.insert(b, lines[a])
-    else:
-        lines[a], lines[b] = lines[b], lines[a]
-    return b"\n".join(lines)
-
-
-def _change_number(data: bytes, rng: np.random.Generator) -> bytes:
-    """Put a number that is extreme, or another one of the file, in the place of one."""
-    found = list(NUMBER.finditer(data))
-    if not found:
-        return data
-    one, other = (found[k] for k in rng.integers(len(found), size=2))
-    pool = (*NUMBERS, *WHOLE, other[0], b"-" + one[0], one[0] + b"e9")
-    return data[: one.start()] + pool[rng.integers(len(pool))] + data[one.end() :]
-
-
-def _change_digits(data: bytes, rng: np.random.Generator) -> bytes:
-    """Change digits where they stand: IGES has fixed columns."""
-    places = [k for k, byte in enumerate(data) if chr(byte).isdigit()]
-    changed = bytearray(data)
-    for place in (
-        rng.choice(places, size=min(len(places), int(rng.integers(1, 6)))) if places else ()
-    ):
-        changed[place] = ord("0") + int(rng.integers(10))
-    return bytes(changed)
-
-
-def _cut(data: bytes, rng: np.random.Generator) -> bytes:
-    """Take out a piece, seldom the end: that is refused before OpenCASCADE reads the file."""
-    start = int(rng.integers(len(data))) if data else 0
-    return data[:start] + (b"" if rng.random() < 0.1 else data[start + int(rng.integers(1, 200)) :])
-
-
-def _insert(data: bytes, rng: np.random.Generator) -> bytes:
-    """Put in bytes, or another piece of the file."""
-    place, start = (int(k) for k in rng.integers(len(data) + 1, size=2))
-    length = int(rng.integers(1, 100))
-    piece = rng.bytes(length) if rng.random() < 0.5 else data[start : start + length]
-    return data[:place] + piece + data[place:]
-
-
-CHANGES: tuple[Callable[[bytes, np.random.Generator], bytes], ...] = (
-    _flip_bits,
-    _change_lines,
-    _change_number,
-    _change_number,
-    _change_digits,
-    _change_digits,
-    _cut,
-    _insert,
-)
 
 
 def outcome(path: Path, time_limit: float = TIME_LIMIT) -> str:
@@ -170,10 +89,10 @@ def main() -> int:
         for row in range(given.count):
             if time.monotonic() - start > given.seconds:
                 break
-            rng = np.random.default_rng((given.seed, row))
-            base = files[rng.integers(len(files))]
+            rng = random.Random(f"{given.seed}/{row}")
+            base = rng.choice(files)
             path = folder / f"cad_{given.seed}_{row}{base.suffix}"
-            path.write_bytes(mutated(base.read_bytes(), rng))
+            path.write_bytes(damage(rng, base.read_bytes()))
             before = time.monotonic()
             faulthandler.dump_traceback_later(given.time_limit + HANG, exit=True)
             ended = outcome(path, given.time_limit)

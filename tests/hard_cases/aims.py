@@ -1,4 +1,4 @@
-"""Random shots at the targets: where from, how fast, under which laws."""
+"""Random impacts at the targets: where from, how fast, under which laws."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.hard_cases.targets import Array, Target, all_targets, borders, sweep
 
 # Depth at which the law has taken up all of the sphere's energy, in radii.
 STOPPED_AT = 0.3
-# A shot past an edge passes it this much closer than a radius, or beside its own centre line.
+# A impact past an edge passes it this much closer than a radius, or beside its own center line.
 MARGIN = 1e-3
 
 
@@ -43,7 +43,7 @@ class Aim:
 
 
 @dataclass(frozen=True)
-class Shot:
+class ImpactTest:
     """A sphere that flies straight from `start` [m] with `velocity` [m/s] and touches.
 
     `approach` [m] to the first touch; `dt` [s] of the steppers with a fixed step; `grazes`: it
@@ -85,7 +85,7 @@ class Shot:
             placement=self.aim.placement,
             law=self.law,
             friction=self.friction,
-            name="shot",
+            name="impact",
         )
         return scene
 
@@ -98,14 +98,14 @@ class Shot:
         return np.concatenate([self.start, self.turn]), v
 
 
-def draw(rng: np.random.Generator, groups: int, each: int) -> list[Shot]:
-    """Return `groups` times `each` shots; a group shares target and radius."""
+def draw(rng: np.random.Generator, groups: int, each: int) -> list[ImpactTest]:
+    """Return `groups` times `each` impacts; a group shares target and radius."""
     targets = all_targets()
-    shots = []
+    impacts = []
     for k in range(groups):
         aim = _aim(rng, targets[k % len(targets)])
-        shots += [_shot(rng, aim) for _ in range(each)]
-    return shots
+        impacts += [_impact(rng, aim) for _ in range(each)]
+    return impacts
 
 
 def _aim(rng: np.random.Generator, target: Target) -> Aim:
@@ -122,7 +122,7 @@ def _unit(rng: np.random.Generator) -> Array:
     return np.asarray(u / np.linalg.norm(u))
 
 
-def _shot(rng: np.random.Generator, aim: Aim) -> Shot:
+def _impact(rng: np.random.Generator, aim: Aim) -> ImpactTest:
     r = aim.radius
     speed, dt = 10 ** rng.uniform(0, 3), 10 ** rng.uniform(-4, -2)
     inside = aim.target.interior is not None and rng.random() < 0.3
@@ -139,11 +139,11 @@ def _shot(rng: np.random.Generator, aim: Aim) -> Shot:
         if rng.random() < 0.5:
             approach = max(approach, rng.uniform(0.3, 2.5) * speed * dt)
         start = far + (touch - approach) * along
-    assert np.isfinite(approach), "a shot that touches nothing"
+    assert np.isfinite(approach), "a impact that touches nothing"
     mass = rng.uniform(1000, 8000) * 4 / 3 * np.pi * r**3
     law = _law(rng, mass, speed, r)
     q = rng.normal(size=4)
-    return Shot(
+    return ImpactTest(
         aim=aim,
         start=start,
         velocity=speed * along,
@@ -163,7 +163,7 @@ def _line(rng: np.random.Generator, aim: Aim) -> tuple[Array, Array, bool]:
     vertices, elements = aim.target.mesh
     along = aim.placement.rotation @ _unit(rng)
     kind = rng.random()
-    # A bent border lies beside the flat one: there only the nearer shots are sure to touch.
+    # A bent border lies beside the flat one: there only the nearer impacts are sure to touch.
     curved = aim.target.curved
     if kind < 0.7:
         corners = vertices[elements[rng.integers(len(elements))]]

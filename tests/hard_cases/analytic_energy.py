@@ -37,7 +37,7 @@ from tests.hard_cases.balls import (
     state,
     velocities,
 )
-from tests.hard_cases.verdict import Verdict, at_most, case, compare
+from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 from tests.oracle.mechanics import total_momentum
 
 Array = NDArray[np.float64]
@@ -58,15 +58,13 @@ def drift(scene: sp.Scene, swings: int = SWINGS) -> tuple[float, float]:
     return float(changes[-200:].mean() - changes[:200].mean()), float(np.abs(changes).max())
 
 
-def of_energy(tried: str, figures: tuple[float, float], largest: float) -> list[Verdict]:
-    return [
-        at_most("drift of energy / that of a swing", tried, "0", figures[0], 1e-8),
-        at_most("largest change of energy", tried, "0", figures[1], largest),
-    ]
+def of_energy(tried: str, figures: tuple[float, float], largest: float) -> Verdicts:
+    yield at_most("drift of energy / that of a swing", tried, "0", figures[0], 1e-8)
+    yield at_most("largest change of energy", tried, "0", figures[1], largest)
 
 
 @case("100 swings in a bowl")
-def swings() -> list[Verdict]:
+def swings() -> Verdicts:
     """From element to element the normal turns by 1e-7 rad at h / r = 0.15, an eighth at 0.075.
 
     The error control cannot see it, and what it costs at each border may add up.
@@ -76,17 +74,15 @@ def swings() -> list[Verdict]:
     turn = swing.any_turn().T
     mesh = Mesh(fine.vertices @ turn, fine.triangles, fine.normals @ turn)
     coarse = drift(swing.mesh_scene(swing.bowl(0.15)))
-    return [
-        *of_energy(tried.format(0.075), drift(swing.mesh_scene(mesh)), 1e-7),
-        at_most("largest change of energy", tried.format(0.15), "0", coarse[1], 1e-6),
-    ]
+    yield from of_energy(tried.format(0.075), drift(swing.mesh_scene(mesh)), 1e-7)
+    yield at_most("largest change of energy", tried.format(0.15), "0", coarse[1], 1e-6)
 
 
 @case("swings in the exact bowl", slow=True)
-def exact_swings() -> list[Verdict]:
+def exact_swings() -> Verdicts:
     """What the surface has no part in: a contact source is called at every evaluation."""
     tried = "20 swings, the surface by its formula (contact source)"
-    return of_energy(tried, drift(swing.exact_scene(), 20), 1e-8)
+    yield from of_energy(tried, drift(swing.exact_scene(), 20), 1e-8)
 
 
 def free_body(moments: tuple[float, float, float]) -> pin.Model:
@@ -115,22 +111,18 @@ def top_error(integrator: object) -> float:
 
 
 @case("order of the steppers with a free top")
-def top() -> list[Verdict]:
-    verdicts = []
+def top() -> Verdicts:
     tried, name = "symmetric top, 300 rad/s, 0.1 s, against its closed form", "order of {}"
     for integrator, order in FIXED:
         steps = (2e-4, 1e-4) if order == 4 else (1e-6, 5e-7)
         seen = order_by_step(top_error, integrator, steps)
         title = name.format(integrator.__name__)
-        verdicts.append(compare(title, tried, "error ~ dt^p", order, seen, 0.1, scale=1.0))
+        yield compare(title, tried, "error ~ dt^p", order, seen, 0.1, scale=1.0)
     for integrator, span in BY_TOLERANCE:
         power, last = order_by_tolerance(top_error, integrator, span)
         title = f"{integrator.__name__}, rtol {span[0]:g} to {span[1]:g}"
-        verdicts += [
-            falls(title, tried, power),
-            at_most(f"{integrator.__name__}({span[1]:g}) [rad]", tried, "0", last, 1e2 * span[1]),
-        ]
-    return verdicts
+        yield falls(title, tried, power)
+        yield at_most(f"{integrator.__name__}({span[1]:g}) [rad]", tried, "0", last, 1e2 * span[1])
 
 
 # What energy and momentum of a tumbling body may change by.
@@ -154,33 +146,28 @@ def tumbling(integrator: object, duration: float = 0.5) -> tuple[Array, float]:
 
 
 @case("tumbling at 300 rad/s")
-def free_tumbling() -> list[Verdict]:
+def free_tumbling() -> Verdicts:
     """The explicit Euler gains, the implicit one loses, both in proportion to spin^2 dt."""
-    verdicts = []
     body = "free body of three moments"
     for integrator, bound in DEFAULTS:
         energy, momentum = tumbling(integrator)
         tried = f"{body}, 0.5 s, {integrator}"
-        verdicts += [
-            at_most("change of energy", tried, "0", np.abs(energy).max(), bound),
-            at_most("change of angular momentum", tried, "0", momentum, bound),
-        ]
+        yield at_most("change of energy", tried, "0", np.abs(energy).max(), bound)
+        yield at_most("change of angular momentum", tried, "0", momentum, bound)
     for kind in FIRST_ORDER:
         seen = order_by_step(
             lambda stepper: np.abs(tumbling(stepper, 0.05)[0]).max(), kind, (1e-6, 5e-7)
         )
         title, tried = f"order of the energy, {kind.__name__}", f"{body}, 0.05 s"
-        verdicts.append(compare(title, tried, "change ~ spin^2 dt", 1.0, seen, 0.1, scale=1.0))
+        yield compare(title, tried, "change ~ spin^2 dt", 1.0, seen, 0.1, scale=1.0)
     implicit = sp.LinearlyImplicitEuler()
     gain = float(tumbling(implicit)[0].max())
-    verdicts.append(at_most("gain of energy", f"{body}, 0.5 s, {implicit}", "none", gain, 1e-12))
-    return verdicts
+    yield at_most("gain of energy", f"{body}, 0.5 s, {implicit}", "none", gain, 1e-12)
 
 
 @case("a fast spin under a rolling ball")
-def spinning_ball() -> list[Verdict]:
+def spinning_ball() -> Verdicts:
     """A ball that rolls on while it spins about the vertical: neither changes."""
-    verdicts = []
     law = spring(1e5)
     depth = law.depth_at(MASS * GRAVITY)
     speed = 0.1
@@ -198,17 +185,13 @@ def spinning_ball() -> list[Verdict]:
         seen = velocities(result)
         tried = f"0.1 m/s, {SPIN:g} rad/s about the vertical, 2 s, {integrator}"
         turn = np.abs(result.v[:, 5] / SPIN - 1).max()
-        verdicts += [
-            at_most("change of speed", tried, "0", np.abs(seen[:, 0] / speed - 1).max(), bound),
-            at_most("change of spin", tried, "0", turn, bound),
-        ]
-    return verdicts
+        yield at_most("change of speed", tried, "0", np.abs(seen[:, 0] / speed - 1).max(), bound)
+        yield at_most("change of spin", tried, "0", turn, bound)
 
 
 @case("a fast ball put on a turntable")
-def on_turntable() -> list[Verdict]:
+def on_turntable() -> Verdicts:
     """Friction between the two only takes: their energy never rises."""
-    verdicts = []
     law = spring(1e5)
     for integrator in (sp.RungeKutta4(2e-5), PRECISE, sp.Implicit(1e-7)):
         model = free_ball()
@@ -225,8 +208,5 @@ def on_turntable() -> list[Verdict]:
         gain = float((energy - np.minimum.accumulate(energy)).max() / energy[0])
         residual = float(np.abs(result.energy.residual).max() / energy[0])
         tried = f"tilted spin of {SPIN:g} rad/s, table at 6 rad/s, 1 s, {integrator}"
-        verdicts += [
-            at_most("largest rise of energy", tried, "0", gain, 1e-8),
-            at_most("residual of the energy", tried, "0", residual, 1e-8),
-        ]
-    return verdicts
+        yield at_most("largest rise of energy", tried, "0", gain, 1e-8)
+        yield at_most("residual of the energy", tried, "0", residual, 1e-8)

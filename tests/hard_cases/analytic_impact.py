@@ -27,7 +27,7 @@ from tests.hard_cases.balls import (
     state,
     velocities,
 )
-from tests.hard_cases.verdict import Verdict, case, compare
+from tests.hard_cases.verdict import Verdict, Verdicts, case, compare
 from tests.oracle.laws import hunt_crossley_restitution
 
 PRECISE = sp.Adaptive(1e-9)
@@ -65,8 +65,7 @@ def touch_time(exponent: float, depth: float, speed: float) -> float:
 
 
 @case("impact without damping")
-def undamped() -> list[Verdict]:
-    verdicts = []
+def undamped() -> Verdicts:
     soft = sp.ImpactLaw(1e5, 1.0)
     for title, law, speed in (
         ("spring", soft, 1.0),
@@ -79,25 +78,21 @@ def undamped() -> list[Verdict]:
         duration = touch_time(e, depth, speed)
         seen = impact(law, speed, duration)
         tried = f"{title}, {speed:g} m/s"
-        verdicts += [
-            compare("time of the touch", tried, "gap / v", GAP / speed, seen.touch, 1e-6),
-            compare("time in touch", tried, "2 I depth / v", duration, seen.duration, 1e-6),
-            compare(
-                "largest depth",
-                tried,
-                "((e + 1) m v^2 / (2 k))^(1 / (e + 1))",
-                depth,
-                seen.depth,
-                1e-6,
-            ),
-            compare("restitution", tried, "1", 1.0, seen.restitution, 1e-6),
-        ]
-    return verdicts
+        yield compare("time of the touch", tried, "gap / v", GAP / speed, seen.touch, 1e-6)
+        yield compare("time in touch", tried, "2 I depth / v", duration, seen.duration, 1e-6)
+        yield compare(
+            "largest depth",
+            tried,
+            "((e + 1) m v^2 / (2 k))^(1 / (e + 1))",
+            depth,
+            seen.depth,
+            1e-6,
+        )
+        yield compare("restitution", tried, "1", 1.0, seen.restitution, 1e-6)
 
 
 @case("impact of Hunt and Crossley")
-def hunt_crossley() -> list[Verdict]:
-    verdicts = []
+def hunt_crossley() -> Verdicts:
     for wanted, speed in ((0.9, 0.5), (0.5, 0.5), (0.5, 5.0), (0.1, 1.0)):
         # The dissipation gives `wanted` at 0.5 m/s; at other speeds restitution is another.
         law = sp.ImpactLaw.hertz(RADIUS, 1e9, 0.3, 1e9, 0.3, restitution=wanted, speed=0.5)
@@ -106,10 +101,7 @@ def hunt_crossley() -> list[Verdict]:
         seen = impact(law, speed, 3 * about)
         tried = f"b = {law.dissipation:.4g} s/m, {speed:g} m/s"
         formula = "x - ln(1 + x) = -y - ln(1 - y), x = b v, y = b v'"
-        verdicts.append(
-            compare("restitution", tried, formula, expected, seen.restitution, 1e-6, scale=1.0)
-        )
-    return verdicts
+        yield compare("restitution", tried, formula, expected, seen.restitution, 1e-6, scale=1.0)
 
 
 def bounce(t: float, height: float, stiffness: float) -> tuple[float, float]:
@@ -174,21 +166,16 @@ def falls(name: str, tried: str, power: float) -> Verdict:
 
 
 @case("order of the fixed steps")
-def fixed_orders() -> list[Verdict]:
-    verdicts = []
+def fixed_orders() -> Verdicts:
     for integrator, order in FIXED:
         steps = (1e-4, 5e-5) if order == 4 else (1e-5, 5e-6)
         seen = order_by_step(oscillation_error, integrator, steps)
         name, tried = integrator.__name__, "ball that bobs on a spring, m z'' = -m g + k depth"
-        verdicts.append(
-            compare(f"order of {name}", tried, "error ~ dt^p", order, seen, 0.1, scale=1.0)
-        )
-    return verdicts
+        yield compare(f"order of {name}", tried, "error ~ dt^p", order, seen, 0.1, scale=1.0)
 
 
 @case("error against tolerance")
-def tolerances() -> list[Verdict]:
-    verdicts = []
+def tolerances() -> Verdicts:
     for integrator, span in BY_TOLERANCE:
         for tried, error in (
             ("ball that bobs on a spring", oscillation_error),
@@ -196,16 +183,13 @@ def tolerances() -> list[Verdict]:
         ):
             power, last = order_by_tolerance(error, integrator, span)
             name = f"{integrator.__name__}, rtol {span[0]:g} to {span[1]:g}"
-            verdicts += [
-                falls(name, tried, power),
-                compare(
-                    f"{integrator.__name__}({span[1]:g})",
-                    tried,
-                    "closed form of flights and touches" if error is bouncing_error else "cosine",
-                    0.0,
-                    last,
-                    1e2 * span[1],
-                    scale=1.0,
-                ),
-            ]
-    return verdicts
+            yield falls(name, tried, power)
+            yield compare(
+                f"{integrator.__name__}({span[1]:g})",
+                tried,
+                "closed form of flights and touches" if error is bouncing_error else "cosine",
+                0.0,
+                last,
+                1e2 * span[1],
+                scale=1.0,
+            )

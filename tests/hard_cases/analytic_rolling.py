@@ -1,7 +1,7 @@
 """Rolling and sliding on flat walls. A solid ball, r = 10 mm, m = 50 g, I = 2/5 m r^2.
 
 One point counts for both bodies, the contact point on the shell: the lever of friction about the
-centre is `r - depth`, and `b = I / (m (r - depth)^2)` stands where a hard ball has 2/5. The depths
+center is `r - depth`, and `b = I / (m (r - depth)^2)` stands where a hard ball has 2/5. The depths
 are large enough for the difference to show where the law says b.
 """
 
@@ -34,7 +34,7 @@ from tests.hard_cases.balls import (
     turned,
     velocities,
 )
-from tests.hard_cases.verdict import Verdict, at_most, case, compare
+from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
 Array = NDArray[np.float64]
 SOFT = spring(1e5)
@@ -45,8 +45,7 @@ def coulomb(mu: float) -> sp.CoulombFriction:
 
 
 @case("incline")
-def incline() -> list[Verdict]:
-    verdicts = []
+def incline() -> Verdicts:
     for degrees, mu, make in (
         (5, 0.3, bristle),
         (30, 0.5, bristle),
@@ -73,13 +72,11 @@ def incline() -> list[Verdict]:
         tried = f"A = {degrees} deg, mu = {mu:g}, {type(friction).__name__}"
         name = "rolling acceleration" if rolls else "sliding acceleration"
         seen = (along[2] - along[1]) / (result.t[2] - result.t[1])
-        verdicts.append(compare(name, tried, law, expected, seen, 1e-6))
-    return verdicts
+        yield compare(name, tried, law, expected, seen, 1e-6)
 
 
 @case("from sliding to rolling")
-def sliding_to_rolling() -> list[Verdict]:
-    verdicts = []
+def sliding_to_rolling() -> Verdicts:
     speed, mu = 0.5, 0.2
     depth = SOFT.depth_at(MASS * GRAVITY)
     b = beta(depth)
@@ -94,21 +91,17 @@ def sliding_to_rolling() -> list[Verdict]:
         seen = result.t[1] + (along[1] - along[-1]) / pace
         tried = f"v0 = {speed:g} m/s, mu = {mu:g}, {make.__name__}"
         law = "v0 b / ((1 + b) mu g), 2 v0 / (7 mu g)"
-        verdicts += [
-            compare("end of the slide", tried, law, slide, seen, 1e-4),
-            compare(
-                "speed of rolling", tried, "v0 / (1 + b), 5/7 v0", speed / (1 + b), along[-1], 1e-6
-            ),
-        ]
-    return verdicts
+        yield compare("end of the slide", tried, law, slide, seen, 1e-4)
+        yield compare(
+            "speed of rolling", tried, "v0 / (1 + b), 5/7 v0", speed / (1 + b), along[-1], 1e-6
+        )
 
 
 TABLE_INERTIA = 1e4  # [kg m^2]: the ball does not slow the table
 
 
 @case("turntable")
-def turntable() -> list[Verdict]:
-    verdicts = []
+def turntable() -> Verdicts:
     depth = SOFT.depth_at(MASS * GRAVITY)
     b = beta(depth)
     up = np.array([0.0, 0.0, 1.0])
@@ -129,18 +122,16 @@ def turntable() -> list[Verdict]:
         seen = (angle[-1] - angle[0]) / (result.t[-1] - result.t[50]) / turn
         law = "b / (1 + b), 2/7 (Weckesser, Am. J. Phys. 65 (1997) 736)"
         tried = f"table at {turn:.3g} rad/s, two orbits"
-        verdicts.append(compare("orbit / table", tried, law, b / (1 + b), seen, 1e-5))
-    return verdicts
+        yield compare("orbit / table", tried, law, b / (1 + b), seen, 1e-5)
 
 
 @case("V-groove")
-def v_groove() -> list[Verdict]:
+def v_groove() -> Verdicts:
     """Both contact points are at rest: the ball turns about the line through them.
 
-    Its distance from the centre is h = (r - depth) sin(half angle), and each wall carries
+    Its distance from the center is h = (r - depth) sin(half angle), and each wall carries
     m g cos A / (2 sin(half angle)).
     """
-    verdicts = []
     for half, degrees in ((45, 20), (30, 20), (60, 10)):
         angle, opening = math.radians(degrees), math.radians(half)
         depth = SOFT.depth_at(MASS * GRAVITY * math.cos(angle) / (2 * math.sin(opening)))
@@ -157,8 +148,7 @@ def v_groove() -> list[Verdict]:
         tried = f"walls at {half} deg from the middle, A = {degrees} deg"
         law = "g sin A / (1 + 2 r^2 / (5 h^2)), h = (r - depth) sin(half angle)"
         seen = (along[2] - along[1]) / (result.t[2] - result.t[1])
-        verdicts.append(compare("rolling acceleration", tried, law, expected, seen, 1e-6))
-    return verdicts
+        yield compare("rolling acceleration", tried, law, expected, seen, 1e-6)
 
 
 ECCENTRIC, TOP_SPIN, TOP_TILT = 0.002, 150.0, 0.3
@@ -168,7 +158,7 @@ TOP_MU = 0.1
 def jellett(result: Result) -> tuple[Array, Array]:
     """Return -L . a at the rows [kg m^2/s], as it is and without the part of the changing depth.
 
-    L is about the centre of mass, a leads from there to the contact; that part is the integral of
+    L is about the center of mass, a leads from there to the contact; that part is the integral of
     L_z d(height).
     """
     quaternions, height = result.q[:, 3:7], result.q[:, 2]
@@ -181,7 +171,7 @@ def jellett(result: Result) -> tuple[Array, Array]:
 
 
 def run_top(friction: sp.BristleFriction | sp.CoulombFriction) -> Result:
-    """Spin the eccentric sphere about the vertical, its centre of mass at rest."""
+    """Spin the eccentric sphere about the vertical, its center of mass at rest."""
     model, law = models.empty(GRAVITY), spring(1e6)
     inertia = pin.Inertia(MASS, np.array([0.0, 0.0, -ECCENTRIC]), INERTIA * np.eye(3))
     models.add_body(model, "ball", pin.JointModelFreeFlyer(), inertia=inertia)
@@ -201,33 +191,29 @@ def tilts(result: Result) -> Array:
 
 
 @case("tippe top")
-def tippe_top() -> list[Verdict]:
-    """A sphere whose centre of mass is off its centre, spun up, slides and stands on its head.
+def tippe_top() -> Verdicts:
+    """A sphere whose center of mass is off its center, spun up, slides and stands on its head.
 
     L' = a x F and the symmetry of the inertia give (L . a)' = L_z height' for any force F at the
     contact: zero at constant depth. It rises while it slides; how friction sticks plays no part.
     """
     law = "-L . a constant (Jellett 1872; Gray and Nickel, Am. J. Phys. 68 (2000) 821)"
     runs = {make.__name__: run_top(make(TOP_MU)) for make in (bristle, coulomb)}
-    verdicts = []
     for name, result in runs.items():
         raw, corrected = jellett(result)
         end = math.degrees(tilts(result)[-1])
         tried = f"{TOP_SPIN:g} rad/s, {name}; the tilt grew from 17 to {end:.0f} deg"
-        verdicts += [
-            at_most("Jellett's invariant", tried, law, np.abs(raw / raw[0] - 1).max(), 1e-4),
-            at_most(
-                "... with the change of depth",
-                tried,
-                "-L . a - integral of L_z d(height) constant",
-                np.abs(corrected / corrected[0] - 1).max(),
-                1e-7,
-            ),
-        ]
+        yield at_most("Jellett's invariant", tried, law, np.abs(raw / raw[0] - 1).max(), 1e-4)
+        yield at_most(
+            "... with the change of depth",
+            tried,
+            "-L . a - integral of L_z d(height) constant",
+            np.abs(corrected / corrected[0] - 1).max(),
+            1e-7,
+        )
     after = [float(tilts(result)[len(result.t) // 2]) for result in runs.values()]
     tried = "tilt after 1 s [rad], bristles against CoulombFriction"
-    verdicts.append(compare("same slide", tried, "both push with mu N", after[1], after[0], 1e-3))
-    return verdicts
+    yield compare("same slide", tried, "both push with mu N", after[1], after[0], 1e-3)
 
 
 MU_SLOPE, OF_CONE = 0.5, 0.9
@@ -248,25 +234,22 @@ def creep(integrator: object, friction: object, duration: float) -> float:
 
 
 @case("stands on a slope")
-def stands() -> list[Verdict]:
+def stands() -> Verdicts:
     friction = bristle(MU_SLOPE, stiffness=1e5, mass=MASS)
     steppers = (sp.Adaptive(1e-6), sp.Implicit(1e-6), sp.LinearlyImplicitEuler(1e-3))
     tried = "slope of 0.9 mu_s, 60 s, BristleFriction, {}"
-    return [
-        at_most(
+    for stepper in steppers:
+        yield at_most(
             "creep [m/s], last 30 s",
             tried.format(stepper),
             "0",
             creep(stepper, friction, 60.0),
             1e-9,
         )
-        for stepper in steppers
-    ]
 
 
 @case("creeps on a slope")
-def creeps() -> list[Verdict]:
-    verdicts = []
+def creeps() -> Verdicts:
     for v_static in (1e-2, 1e-3):
         friction = sp.CoulombFriction(MU_SLOPE, MU_SLOPE, v_static, 2 * v_static)
         # (3 x - x^3) / 2 = c has the root x = 2 sin(asin(c) / 3).
@@ -274,5 +257,4 @@ def creeps() -> list[Verdict]:
         tried = f"slope of 0.9 mu_s, CoulombFriction, v_static = {v_static:g} m/s"
         law = "mu_s (3 x - x^3) / 2 = tan A, x = s / v_static"
         seen = creep(PRECISE, friction, 1.0)
-        verdicts.append(compare("creep [m/s]", tried, law, expected, seen, 1e-6))
-    return verdicts
+        yield compare("creep [m/s]", tried, law, expected, seen, 1e-6)

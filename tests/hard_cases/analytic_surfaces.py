@@ -1,7 +1,7 @@
 """Rolling and sliding in curved walls. Meshes of triangles with sides of 0.15 r and exact normals.
 
 The ball (r = 10 mm, m = 50 g, I = 2/5 m r^2) touches at one point for both bodies, so it rolls on
-the lever `r - depth`, with `b = I / (m (r - depth)^2)`, and its centre is at `R - r + depth` from
+the lever `r - depth`, with `b = I / (m (r - depth)^2)`, and its center is at `R - r + depth` from
 the axis of a hollow wall. The springs are stiff, the depth is about 1e-5 r: where it changes on the
 way, that of the start is taken.
 """
@@ -26,14 +26,14 @@ from tests.hard_cases.balls import (
     STIFF,
     beta,
     bristle,
-    centre_at,
+    center_at,
     event_times,
     scene_of,
     spring,
     state,
     velocities,
 )
-from tests.hard_cases.verdict import Verdict, at_most, case, compare
+from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
 Array = NDArray[np.float64]
 STILL = np.zeros(3)
@@ -51,14 +51,13 @@ def pendulum(angle: float, stretch: float) -> float:
 
 
 @case("rolls in a bowl")
-def rolling_bowl() -> list[Verdict]:
-    verdicts = []
+def rolling_bowl() -> Verdicts:
     for degrees in (2, 40):
         angle = math.radians(degrees)
         depth = MASS * GRAVITY * math.cos(angle) / STIFF
         reach = BOWL - RADIUS + depth
-        centre = reach * np.array([math.sin(angle), 0.0, -math.cos(angle)])
-        q0, v0 = state(centre, STILL, STILL)
+        center = reach * np.array([math.sin(angle), 0.0, -math.cos(angle)])
+        q0, v0 = state(center, STILL, STILL)
         b = beta(depth)
         rough = pendulum(angle, depth) * math.sqrt(1 + b)
         shell = surfaces.sphere(BOWL)
@@ -66,36 +65,33 @@ def rolling_bowl() -> list[Verdict]:
         result = sp.Simulation(scene, PRECISE).run(q0, v0, 2.35 * rough, record_dt=1e-3)
         seen = period_along_x(result, velocities(result), 2)
         smooth = scene_of(shell, spring(), model=ball_model())
-        slides = sp.Simulation(smooth, PRECISE).run(centre, None, 2.35 * rough, record_dt=1e-3)
+        slides = sp.Simulation(smooth, PRECISE).run(center, None, 2.35 * rough, record_dt=1e-3)
         without = period_along_x(slides, slides.v, 2)
         tried = f"swing from {degrees} deg, R = 4 r"
-        verdicts += [
-            compare(
-                "period of rolling",
-                tried,
-                "4 sqrt((1 + b) (R - r + depth) / g) K(sin(A / 2)); A -> 0: "
-                "2 pi sqrt(7 (R - r) / (5 g))",
-                rough,
-                seen,
-                1e-5,
-            ),
-            compare(
-                "(rolling / frictionless period)^2",
-                tried,
-                "1 + b, 7/5",
-                1 + b,
-                (seen / without) ** 2,
-                1e-5,
-            ),
-        ]
-    return verdicts
+        yield compare(
+            "period of rolling",
+            tried,
+            "4 sqrt((1 + b) (R - r + depth) / g) K(sin(A / 2)); A -> 0: "
+            "2 pi sqrt(7 (R - r) / (5 g))",
+            rough,
+            seen,
+            1e-5,
+        )
+        yield compare(
+            "(rolling / frictionless period)^2",
+            tried,
+            "1 + b, 7/5",
+            1 + b,
+            (seen / without) ** 2,
+            1e-5,
+        )
 
 
 ORBIT, VERTICAL_PERIODS = 40.0, 3
 
 
 @case("rolls in a vertical cylinder")
-def cylinder() -> list[Verdict]:
+def cylinder() -> Verdicts:
     """The ball does not run down: it bobs at sqrt(2/7) of its orbit.
 
     The spin about the normal is turned by the orbit: r w_r' = orbit z', so that
@@ -118,24 +114,21 @@ def cylinder() -> list[Verdict]:
     orbit = (angle[-1] - angle[0]) / (result.t[-1] - result.t[0])
     around = np.linalg.norm(speed[:, :2], axis=1)
     tried = f"R = 3 r, orbit {ORBIT:g} rad/s, three vertical periods"
-    return [
-        compare(
-            "vertical / orbit frequency",
-            tried,
-            "sqrt(b / (1 + b)), sqrt(2/7)",
-            expected,
-            2 * math.pi / (period * orbit),
-            1e-5,
-        ),
-        at_most("loss of orbit speed", tried, "0", 1 - around[-1] / around[0], 1e-5),
-        compare("lowest point", tried, "-m g / (b orbit^2)", -swing, result.q[:, 2].min(), 1e-4),
-    ]
+    yield compare(
+        "vertical / orbit frequency",
+        tried,
+        "sqrt(b / (1 + b)), sqrt(2/7)",
+        expected,
+        2 * math.pi / (period * orbit),
+        1e-5,
+    )
+    yield at_most("loss of orbit speed", tried, "0", 1 - around[-1] / around[0], 1e-5)
+    yield compare("lowest point", tried, "-m g / (b orbit^2)", -swing, result.q[:, 2].min(), 1e-4)
 
 
 @case("leaves a dome")
-def dome() -> list[Verdict]:
+def dome() -> Verdicts:
     """Energy (1 + b) v^2 / 2 = g L (1 - cos) + (1 + b) v0^2 / 2 and m g cos = m v^2 / L."""
-    verdicts = []
     # Strong damping would let the ball off before its depth is zero.
     law, depth = spring(1e8, ratio=0.02), MASS * GRAVITY / 1e8
     for speed, rolls in ((0.05, True), (0.4, True), (0.05, False)):
@@ -146,28 +139,27 @@ def dome() -> list[Verdict]:
         v0[4] = speed / (RADIUS - depth) if rolls else 0.0
         result = sp.Simulation(scene, PRECISE).run(q0, v0, 1.0, record_dt=1e-4)
         left = event_times(result, "lift_off")[0]
-        centre, _ = centre_at(result, left)
-        seen = float(centre[2] / np.linalg.norm(centre))
+        center, _ = center_at(result, left)
+        seen = float(center[2] / np.linalg.norm(center))
         tried = f"R = 4 r, v0 = {speed:g} m/s, {'rolling' if rolls else 'frictionless'}"
         formula = (
             "cos = (10 + 7 v0^2 / (g (R + r))) / 17"
             if rolls
             else "cos = (2 + v0^2 / (g (R + r))) / 3"
         )
-        verdicts.append(compare("cosine at lift-off", tried, formula, expected, seen, 1e-4))
-    return verdicts
+        yield compare("cosine at lift-off", tried, formula, expected, seen, 1e-4)
 
 
 GENERATOR = 0.050
 
 
 @case("tautochrone")
-def tautochrone() -> list[Verdict]:
-    """The centre of a frictionless ball on a cycloid swings in the same time from any height.
+def tautochrone() -> Verdicts:
+    """The center of a frictionless ball on a cycloid swings in the same time from any height.
 
     The surface is the cycloid's parallel curve at r, drawn out to a trough.
     """
-    verdicts, periods = [], []
+    periods = []
     shell = surfaces.cycloid_trough(GENERATOR, reach=2.9, width=0.02)
     scene = scene_of(shell, spring(), model=ball_model())
     expected = 4 * math.pi * math.sqrt(GENERATOR / GRAVITY)
@@ -181,17 +173,15 @@ def tautochrone() -> list[Verdict]:
         periods.append(period_along_x(result, result.v, 2))
         tried = f"a = 50 mm, from phi = {degrees} deg"
         law = "4 pi sqrt(a / g)"
-        verdicts.append(compare("period", tried, law, expected, periods[-1], 1e-5))
+        yield compare("period", tried, law, expected, periods[-1], 1e-5)
     tried = "from phi = 20, 90 and 150 deg"
     spread = max(periods) / min(periods) - 1
-    verdicts.append(at_most("largest / smallest period - 1", tried, "0", spread, 1e-5))
-    return verdicts
+    yield at_most("largest / smallest period - 1", tried, "0", spread, 1e-5)
 
 
 @case("circles in a cone")
-def cone() -> list[Verdict]:
+def cone() -> Verdicts:
     """Without friction a small push makes the circle breathe at sqrt(3) sin(half angle)."""
-    verdicts = []
     for degrees in (30, 50):
         half = math.radians(degrees)
         sine, cosine = math.sin(half), math.cos(half)
@@ -201,14 +191,14 @@ def cone() -> list[Verdict]:
         height = (out + (RADIUS - depth) * cosine) / math.tan(half) + (RADIUS - depth) * sine
         orbit = math.sqrt(GRAVITY / (math.tan(half) * out))
         push = 2e-3 * orbit * out
-        centre = np.array([out, 0.0, height])
+        center = np.array([out, 0.0, height])
         velocity = np.array([push * sine, orbit * out, push * cosine])
         touch = (out + RADIUS * cosine) / math.tan(half)
         shell = surfaces.cone(half, touch - 0.012, touch + 0.012)
         scene = scene_of(shell, spring(), model=ball_model())
         expected = math.sqrt(3) * sine
         duration = 4.7 * 2 * math.pi / (orbit * expected)
-        result = sp.Simulation(scene, PRECISE).run(centre, velocity, duration, record_dt=1e-3)
+        result = sp.Simulation(scene, PRECISE).run(center, velocity, duration, record_dt=1e-3)
         # Over whole waves, in which the speed of the orbit goes up and down.
         wave = result.q[:, 2] - 0.5 * (result.q[:, 2].max() + result.q[:, 2].min())
         crossings = downward_crossings(result.t, wave, result.v[:, 2])
@@ -216,22 +206,19 @@ def cone() -> list[Verdict]:
         along = np.diff(np.interp(crossings[[0, 4]], result.t, angle))[0]
         turned = along / (crossings[4] - crossings[0])
         tried = f"half angle {degrees} deg, orbit of 35 mm"
-        verdicts += [
-            compare(
-                "orbit [rad/s]",
-                tried,
-                "sqrt(g / (tan(half angle) radius))",
-                orbit,
-                turned,
-                1e-4,
-            ),
-            compare(
-                "radial / orbit frequency",
-                tried,
-                "sqrt(3) sin(half angle)",
-                expected,
-                8 * math.pi / along,
-                1e-4,
-            ),
-        ]
-    return verdicts
+        yield compare(
+            "orbit [rad/s]",
+            tried,
+            "sqrt(g / (tan(half angle) radius))",
+            orbit,
+            turned,
+            1e-4,
+        )
+        yield compare(
+            "radial / orbit frequency",
+            tried,
+            "sqrt(3) sin(half angle)",
+            expected,
+            8 * math.pi / along,
+            1e-4,
+        )

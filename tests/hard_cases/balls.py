@@ -1,7 +1,7 @@
 """The ball of the analytic cases, its contacts, and what is read off its runs.
 
 One point counts for both bodies, the contact point on the shell, so the ball rolls on the lever
-`r - depth` about its centre. Closed forms of rolling hold with it, and with the ball's own
+`r - depth` about its center. Closed forms of rolling hold with it, and with the ball's own
 I = 2/5 m r^2.
 """
 
@@ -69,10 +69,10 @@ def tilted(angle: float) -> pin.SE3:
 
 
 def state(
-    centre: Array | list[float], velocity: Array | list[float], spin: Array | list[float]
+    center: Array | list[float], velocity: Array | list[float], spin: Array | list[float]
 ) -> tuple[Array, Array]:
     """Return q0, v0 of the unturned free ball; all in the world, [m], [m/s], [rad/s]."""
-    return models.free_q(np.asarray(centre)), np.concatenate([velocity, spin]).astype(float)
+    return models.free_q(np.asarray(center)), np.concatenate([velocity, spin]).astype(float)
 
 
 def turned(quaternions: Array, vectors: Array) -> Array:
@@ -84,7 +84,7 @@ def turned(quaternions: Array, vectors: Array) -> Array:
 
 
 def velocities(result: Result) -> Array:
-    """Return the velocity (n, 3) of the free ball's centre in the world [m/s]."""
+    """Return the velocity (n, 3) of the free ball's center in the world [m/s]."""
     return turned(result.q[:, 3:7], result.v[:, :3])
 
 
@@ -93,15 +93,15 @@ def spins(result: Result) -> Array:
     return turned(result.q[:, 3:7], result.v[:, 3:6])
 
 
-def centre_at(result: Result, t: float) -> tuple[Array, Array]:
-    """Return the free ball's centre and velocity at `t` [s], by Hermite's cubic between rows."""
+def center_at(result: Result, t: float) -> tuple[Array, Array]:
+    """Return the free ball's center and velocity at `t` [s], by Hermite's cubic between rows."""
     row = int(np.clip(np.searchsorted(result.t, t) - 1, 0, len(result.t) - 2))
     step = result.t[row + 1] - result.t[row]
     u = (t - result.t[row]) / step
     x, v = result.q[row : row + 2, :3], velocities(result)[row : row + 2] * step
     bend = 3 * (x[1] - x[0]) - 2 * v[0] - v[1], 2 * (x[0] - x[1]) + v[0] + v[1]
-    centre = x[0] + u * (v[0] + u * (bend[0] + u * bend[1]))
-    return centre, (v[0] + u * (2 * bend[0] + 3 * u * bend[1])) / step
+    center = x[0] + u * (v[0] + u * (bend[0] + u * bend[1]))
+    return center, (v[0] + u * (2 * bend[0] + 3 * u * bend[1])) / step
 
 
 def event_times(result: Result, kind: str) -> list[float]:

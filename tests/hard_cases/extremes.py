@@ -14,7 +14,7 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from tests import models
-from tests.hard_cases.verdict import Verdict, at_most, case, compare
+from tests.hard_cases.verdict import Verdict, Verdicts, at_most, case, compare
 
 EPS = float(np.finfo(float).eps)
 GRAVITY = 9.81
@@ -73,9 +73,9 @@ def settle_all(integrator: Any, gravity: float, start: float) -> Verdict:
 
 
 @case("balls of 1 mg to 100 kg on springs of 1e3 to 1e9 N/m")
-def stiffness_and_mass() -> list[Verdict]:
+def stiffness_and_mass() -> Verdicts:
     stiff = (sp.Implicit(), sp.LinearlyImplicitEuler(1e-3))
-    return [
+    yield from [
         settle_all(integrator, gravity, start)
         for integrator in stiff
         for gravity, start in ((GRAVITY, 0.0), (GRAVITY, 0.9), (1e3 * GRAVITY, 0.9))
@@ -116,8 +116,7 @@ def stacked_depths(upper: float, lower: float, integrator: Any) -> tuple[list[fl
 
 
 @case("balls of one kilogram and one milligram on each other")
-def mass_ratio() -> list[Verdict]:
-    verdicts = []
+def mass_ratio() -> Verdicts:
     for integrator, (upper, lower) in product(
         (sp.Implicit(), sp.LinearlyImplicitEuler(1e-3)), ((1.0, 1e-6), (1e-6, 1.0))
     ):
@@ -126,14 +125,12 @@ def mass_ratio() -> list[Verdict]:
         for name, depth, form in zip(("below", "between"), found, expected, strict=True):
             bound = 1e-6 + 4 * EPS * 0.04 / form
             law = f"depth {name} = weight above / k"
-            verdicts.append(compare("stack", tried, law, form, depth, bound))
-    return verdicts
+            yield compare("stack", tried, law, form, depth, bound)
 
 
 @case("at rest without weight")
-def weightless() -> list[Verdict]:
+def weightless() -> Verdicts:
     """Nothing acts, so nothing moves: not by one bit."""
-    verdicts = []
     for integrator in (
         sp.SemiImplicitEuler(1e-3),
         sp.RungeKutta4(1e-3),
@@ -143,8 +140,7 @@ def weightless() -> list[Verdict]:
     ):
         moved = sum(_moves(integrator, gap) for gap in (0.0, 1e-15, 1e-3))
         tried = f"{type(integrator).__name__}, three gaps from 0 to 1 mm"
-        verdicts.append(at_most("no gravity", tried, "moves by no bit", moved, 0))
-    return verdicts
+        yield at_most("no gravity", tried, "moves by no bit", moved, 0)
 
 
 def _moves(integrator: Any, gap: float) -> bool:
@@ -179,8 +175,7 @@ def bounce(radius: float, integrator: Any) -> tuple[float, float]:
 
 
 @case("elastic impact of balls of 10 um to 10 m")
-def radii() -> list[Verdict]:
-    verdicts = []
+def radii() -> Verdicts:
     for what, make, bound in (
         ("Adaptive(1e-8, 1e-10 r)", lambda r: sp.Adaptive(rtol=1e-8, atol=1e-10 * r), 1e-6),
         ("Adaptive()", lambda r: sp.Adaptive(), 1e-4),
@@ -190,5 +185,4 @@ def radii() -> list[Verdict]:
         for k, law in enumerate(("restitution 1", "time of contact 2.9433 depth / speed, ratio")):
             worst = int(np.argmax(np.abs(found[:, k] - 1)))
             tried = f"{what}; worst of {len(RADII)}: r = {RADII[worst]:g} m"
-            verdicts.append(compare("impact", tried, law, 1.0, float(found[worst, k]), bound))
-    return verdicts
+            yield compare("impact", tried, law, 1.0, float(found[worst, k]), bound)

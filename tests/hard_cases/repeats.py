@@ -18,7 +18,7 @@ from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario import build, shipped_scenarios
 from tests import meshes, models
 from tests.hard_cases.targets import Array
-from tests.hard_cases.verdict import Verdict, at_most, case
+from tests.hard_cases.verdict import Verdicts, at_most, case
 
 RADIUS = 0.01
 AUDIT = 1e-4
@@ -71,8 +71,7 @@ def again(integrator: Any) -> str:
 
 
 @case("the same bits again")
-def repeated() -> list[Verdict]:
-    verdicts = []
+def repeated() -> Verdicts:
     for integrator in (
         sp.SemiImplicitEuler(1e-5),
         sp.RungeKutta4(2e-5),
@@ -83,19 +82,17 @@ def repeated() -> list[Verdict]:
         first = once(integrator)
         others = int(again(integrator) != first)
         tried = f"{type(integrator).__name__}, once more after another run"
-        verdicts.append(at_most("repeat", tried, "same bits", others, 0))
+        yield at_most("repeat", tried, "same bits", others, 0)
         for threads in (1, 2, 4):
             with ThreadPoolExecutor(threads) as pool:
                 told = list(pool.map(once, [integrator] * 4))
             others = sum(one != first for one in told)
             tried = f"{type(integrator).__name__}, 4 runs in {threads} threads"
-            verdicts.append(at_most("repeat", tried, "same bits", others, 0))
-    return verdicts
+            yield at_most("repeat", tried, "same bits", others, 0)
 
 
 @case("energy audit of the shipped scenarios", slow=True)
-def audits() -> list[Verdict]:
-    verdicts = []
+def audits() -> Verdicts:
     for name in shipped_scenarios():
         try:
             built = build(name)
@@ -114,5 +111,4 @@ def audits() -> list[Verdict]:
         share = float(np.abs(energy.residual).max() / energy.exchanged)
         tried = f"{name}, {built.simulation.integrator}"
         law = "energy from nowhere, of what is exchanged"
-        verdicts.append(at_most("audit", tried, law, share, AUDIT))
-    return verdicts
+        yield at_most("audit", tried, law, share, AUDIT)

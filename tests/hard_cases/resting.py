@@ -15,14 +15,14 @@ import pinocchio as pin
 import sphshell_pin as sp
 from tests import meshes, models
 from tests.hard_cases.targets import Array
-from tests.hard_cases.verdict import Verdict, at_most, case, compare
+from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
 RADIUS, MASS, GRAVITY = 0.02, 0.3, 9.81
 WEIGHT = MASS * GRAVITY
 
 
 def slides(gravity: Array | None = None) -> pin.Model:
-    """Return a ball that can move but not turn, frame "ball" at its centre."""
+    """Return a ball that can move but not turn, frame "ball" at its center."""
     model = models.empty(GRAVITY)
     if gravity is not None:
         model.gravity.linear = gravity
@@ -47,7 +47,7 @@ def rest(
 
 
 def last_forces(result: sp.Result) -> Array:
-    """Return normal forces [N] of the last row, passes with a minus."""
+    """Return normal forces [N] of the last row, saddles with a minus."""
     log = result.contacts
     return np.asarray(log.normal_force[log.row == len(result.t) - 1])
 
@@ -84,8 +84,7 @@ def wedge(half_angle: float, integrator: Any, method: str) -> tuple[Array, Array
 
 
 @case("ball wedged in a V")
-def wedged() -> list[Verdict]:
-    verdicts = []
+def wedged() -> Verdicts:
     for integrator in (sp.Implicit(), sp.LinearlyImplicitEuler(1e-3)):
         for degrees in (2.0, 10.0, 45.0, 80.0):
             for method in ("smooth", "facets"):
@@ -93,13 +92,10 @@ def wedged() -> list[Verdict]:
                 tried = f"{type(integrator).__name__}, {degrees:g} deg to each side, {method}"
                 laws = ("N = m g / (2 sin a)", "N, other plate", "depth = N / k")
                 if len(found) != 3:
-                    verdicts.append(at_most("wedge", tried, "two contacts", len(found) - 3, 0))
+                    yield at_most("wedge", tried, "two contacts", len(found) - 3, 0)
                     continue
-                verdicts += [
-                    compare("wedge", tried, law, float(b), float(a), 1e-6)
-                    for law, a, b in zip(laws, found, right, strict=True)
-                ]
-    return verdicts
+                for law, a, b in zip(laws, found, right, strict=True):
+                    yield compare("wedge", tried, law, float(b), float(a), 1e-6)
 
 
 def cone(half_angle: float, columns: int, rows: int, flat: bool) -> sp.Shell:
@@ -122,7 +118,7 @@ def ring_depth(half_angle: float, columns: int, flat: bool, stiffness: float) ->
 
     A ring of contact counts once: k depth sin a = m g, but for the sum of what the bent elements'
     minima and the saddles between them differ by. Of n flat facets the ball touches each, and
-    between them n passes, of which the highest n - 1 count:
+    between them n saddles, of which the highest n - 1 count:
     k (n depth_f sin f - (n - 1) depth sin a) = m g, where tan f = tan a cos(pi / n) is the facet's
     own angle.
     """
@@ -161,23 +157,21 @@ def seated(
 
 
 @case("ball in a cone, touched along a ring")
-def coned() -> list[Verdict]:
-    verdicts = []
+def coned() -> Verdicts:
     for integrator in (sp.Implicit(), sp.LinearlyImplicitEuler(1e-3)):
         for columns, flat, bound in ((64, True, 1e-6), (64, False, 5e-3)):
             depth, right, up, _ = seated(integrator, columns, flat, free=False)
             surface = "flat facets" if flat else "columns of bent elements"
             tried = f"{type(integrator).__name__}, {columns} {surface}, on the axis"
-            law = "64 contacts less 63 passes" if flat else "k depth sin a = m g"
-            verdicts.append(compare("cone", tried, law, right, depth, bound))
-            verdicts.append(compare("cone", tried, "forces up = m g", WEIGHT, up, 1e-6))
+            law = "64 contacts less 63 saddles" if flat else "k depth sin a = m g"
+            yield compare("cone", tried, law, right, depth, bound)
+            yield compare("cone", tried, "forces up = m g", WEIGHT, up, 1e-6)
     # Beside the axis the force jumps where links of the ring tie: the steps must resolve that.
     integrator = sp.LinearlyImplicitEuler(1e-4)
     depth, right, _, aside = seated(integrator, 64, False, free=True)
     tried = f"{type(integrator).__name__}, 64 columns, free"
-    verdicts.append(compare("cone", tried, "k depth sin a = m g", right, depth, 5e-3))
-    verdicts.append(at_most("cone", tried, "stays on the axis, of the depth", aside / right, 0.05))
-    return verdicts
+    yield compare("cone", tried, "k depth sin a = m g", right, depth, 5e-3)
+    yield at_most("cone", tried, "stays on the axis, of the depth", aside / right, 0.05)
 
 
 SPIKES = 8
@@ -223,21 +217,19 @@ def on_spikes(integrator: Any, method: str) -> tuple[Array, float, float]:
 
 
 @case("ball on eight spikes")
-def spiked() -> list[Verdict]:
-    verdicts = []
+def spiked() -> Verdicts:
     for integrator in (sp.Implicit(), sp.LinearlyImplicitEuler(1e-3)):
         for method in ("smooth", "facets"):
             forces, form, height = on_spikes(integrator, method)
             tried = f"{type(integrator).__name__}, {method}"
             if len(forces) != SPIKES:
                 count = len(forces) - SPIKES
-                verdicts.append(at_most("spikes", tried, "eight contacts", count, 0))
+                yield at_most("spikes", tried, "eight contacts", count, 0)
                 continue
             worst = float(forces[np.argmax(np.abs(forces - form))])
             law = "N = m g / (8 cos), each"
-            verdicts.append(compare("spikes", tried, law, form, worst, 1e-6))
-            verdicts.append(compare("spikes", tried, "height, of what is right", 1, height, 1e-8))
-    return verdicts
+            yield compare("spikes", tried, law, form, worst, 1e-6)
+            yield compare("spikes", tried, "height, of what is right", 1, height, 1e-8)
 
 
 def drift(integrator: Any, friction: Any, duration: float, settling: float = 1.0) -> Array:
@@ -262,21 +254,19 @@ def drift(integrator: Any, friction: Any, duration: float, settling: float = 1.0
     return np.asarray(np.linalg.norm(result.q[1:] - result.q[1], axis=1))
 
 
-def _slope(duration: float) -> list[Verdict]:
+def _slope(duration: float) -> Verdicts:
     friction = sp.BristleFriction(0.4, 0.3, stiffness=1e5, damping=100.0)
-    verdicts = []
     for integrator in (sp.LinearlyImplicitEuler(1e-3), sp.Implicit()):
         tried = f"{type(integrator).__name__}, {duration:g} s on 10 deg, bristles"
         away = float(np.max(drift(integrator, friction, duration)))
-        verdicts.append(at_most("slope", tried, "stays where it settled [m]", away, 1e-9))
-    return verdicts
+        yield at_most("slope", tried, "stays where it settled [m]", away, 1e-9)
 
 
 @case("at rest on a slope")
-def slope() -> list[Verdict]:
-    return _slope(20.0)
+def slope() -> Verdicts:
+    yield from _slope(20.0)
 
 
 @case("at rest on a slope for 1000 s", slow=True)
-def long_slope() -> list[Verdict]:
-    return _slope(1000.0)
+def long_slope() -> Verdicts:
+    yield from _slope(1000.0)

@@ -15,7 +15,7 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin import robots
 from tests import models
-from tests.hard_cases.verdict import Verdict, at_most, case, compare
+from tests.hard_cases.verdict import Verdict, Verdicts, at_most, case, compare
 
 RADIUS, MASS = 0.01, 0.1
 # Audit of a run: energy from nowhere, of the energy exchanged.
@@ -38,8 +38,7 @@ def leaving_speed(depth: float, exponent: float, integrator: Any) -> tuple[float
 
 
 @case("starts in overlap")
-def overlaps() -> list[Verdict]:
-    verdicts = []
+def overlaps() -> Verdicts:
     law = "leaves with sqrt(2 E / m)"
     for share in (1e-6, 1e-3, 0.1, 0.49):
         depth = share * RADIUS
@@ -53,8 +52,7 @@ def overlaps() -> list[Verdict]:
             pairs = [leaving_speed(depth, e, integrator) for e in (1.0, 1.5, 2.2)]
             found, right = max(pairs, key=lambda pair: abs(pair[0] - pair[1]))
             tried = f"{what}, {share:g} r, worst of e = 1, 1.5, 2.2"
-            verdicts.append(compare("overlap", tried, law, right, found, bound))
-    return verdicts
+            yield compare("overlap", tried, law, right, found, bound)
 
 
 GRAZE = 1e-12
@@ -77,10 +75,9 @@ def graze(integrator: Any, friction: Any) -> tuple[float, float]:
 
 
 @case("flight along a plate, 1e-12 m deep")
-def grazing() -> list[Verdict]:
+def grazing() -> Verdicts:
     """The impulse is that of a quarter of an oscillation, m d sqrt(k / m)."""
     form = GRAZE * math.sqrt(STIFFNESS / MASS)
-    verdicts = []
     for integrator, allowed in (
         (sp.RungeKutta4(1e-5), 0.01),
         (sp.SemiImplicitEuler(1e-5), 0.05),
@@ -94,12 +91,11 @@ def grazing() -> list[Verdict]:
             tried = f"{integrator}, friction {mu:g}"
             law = "leaves with d sqrt(k / m)" if allowed < 1 else "d sqrt(k / m) at most"
             over = abs(away / form - 1) if allowed < 1 else max(away / form - 1, -away / form)
-            verdicts.append(Verdict("graze", tried, law, form, away, over, allowed))
+            yield Verdict("graze", tried, law, form, away, over, allowed)
             # Rounding of a speed of 1 m/s hides what friction takes.
             slowed = abs(1 - along - mu * away)
             law = "slowed by mu of that"
-            verdicts.append(at_most("graze", tried, law, slowed, 0.1 * form + 1e-14))
-    return verdicts
+            yield at_most("graze", tried, law, slowed, 0.1 * form + 1e-14)
 
 
 def finger_scene(press: float, friction: Any = None) -> sp.Scene:
@@ -142,8 +138,7 @@ def stretched(integrator: Any, start: float, friction: Any) -> tuple[float, floa
 
 
 @case("finger that presses along its own length")
-def singular() -> list[Verdict]:
-    verdicts = []
+def singular() -> Verdicts:
     friction = sp.CoulombFriction(0.3, 0.25, 0.005, 0.05)
     for integrator, bound in (
         (sp.Adaptive(), AUDIT),
@@ -155,26 +150,24 @@ def singular() -> list[Verdict]:
             residual, angle = stretched(integrator, start, friction)
             tried = f"{type(integrator).__name__}, joints bent by {start:g} rad"
             law = "energy audit, of what is exchanged and stored"
-            verdicts.append(at_most("singular posture", tried, law, residual, bound))
+            yield at_most("singular posture", tried, law, residual, bound)
             law = "stays within a turn [rad]"
-            verdicts.append(at_most("singular posture", tried, law, angle, math.pi))
-    return verdicts
+            yield at_most("singular posture", tried, law, angle, math.pi)
 
 
 @case("joint driven past its limit")
-def limits() -> list[Verdict]:
-    """Limits are not modelled: that is said, and the joint goes on."""
+def limits() -> Verdicts:
+    """Limits are not modeled: that is said, and the joint goes on."""
     model = robots.load("three_link_finger").model
     scene = sp.Scene(model)
     q = np.array([0.2, 0.6, 0.4])
     beyond = np.array([0.2, -0.3, 0.4])
     said = any("joint limits" in line for line in scene.explain(q).not_modelled)
-    verdicts = [at_most("joint limit", "explain", "says not modelled", float(not said), 0)]
+    yield at_most("joint limit", "explain", "says not modelled", float(not said), 0)
     for integrator in (sp.Adaptive(), sp.Implicit(), sp.SemiImplicitEuler(1e-4)):
         result = sp.Simulation(scene, integrator).run(
             q, duration=2.0, controller=sp.JointPD(0.5, 0.01, beyond), record_dt=2.0
         )
         tried = f"{type(integrator).__name__}, limit {model.lowerPositionLimit[1]:g} rad"
         angle = float(result.q[-1, 1])
-        verdicts.append(compare("joint limit", tried, "goes on [rad]", -0.3, angle, 1e-3))
-    return verdicts
+        yield compare("joint limit", tried, "goes on [rad]", -0.3, angle, 1e-3)

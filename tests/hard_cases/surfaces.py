@@ -1,6 +1,6 @@
 """Shells of analytic surfaces with exact vertex normals, for the ball of `balls.RADIUS`.
 
-Lengths in metres; `side` is that of the elements over the ball's radius (h / r). Vertices are
+Lengths in meters; `side` is that of the elements over the ball's radius (h / r). Vertices are
 moved along the surface and diagonals drawn at random, so that no symmetry of a mesh hides an error.
 """
 
@@ -106,15 +106,15 @@ def cycloid(a: float, phi: Array) -> tuple[Array, Array]:
 
 
 def cycloid_trough(a: float, reach: float, width: float, side: float = SIDE) -> Shell:
-    """Trough along y on which the ball's centre moves on `cycloid`, |phi| < reach.
+    """Trough along y on which the ball's center moves on `cycloid`, |phi| < reach.
 
     That is the parallel curve of the cycloid at the distance of the ball's radius.
     """
     half = 4 * a * math.sin(reach / 2)
 
     def place(arc: Array, y: Array) -> tuple[Array, Array]:
-        centres, normals = cycloid(a, 2 * np.arcsin(arc / (4 * a)))
-        points = centres - RADIUS * normals
+        centers, normals = cycloid(a, 2 * np.arcsin(arc / (4 * a)))
+        points = centers - RADIUS * normals
         points[:, 1] = y
         return points, normals
 

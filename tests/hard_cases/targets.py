@@ -99,7 +99,7 @@ def distance(point: Array, corners: Array) -> float:
 def sweep(start: Array, along: Array, radius: float, corners: Array) -> float:
     """Return how far along the unit vector `along` a sphere first touches triangles (m, 3, 3).
 
-    The boundary of the set of centres that touch consists of two offset planes for each triangle,
+    The boundary of the set of centers that touch consists of two offset planes for each triangle,
     a cylinder for each side and a sphere for each corner.
     """
     if distance(start, corners) <= radius:

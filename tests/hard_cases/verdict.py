@@ -5,14 +5,14 @@ A module of cases:
     \"\"\"Heading of its table.  What the cases share follows as text above the table.\"\"\"
 
     @case("ball on a plate")
-    def at_rest() -> list[Verdict]:
-        return [compare("at rest", "ball of 1 kg", "depth = m g / k", expected, measured, 1e-9)]
+    def at_rest() -> Verdicts:
+        yield compare("at rest", "ball of 1 kg", "depth = m g / k", expected, measured, 1e-9)
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 
@@ -38,17 +38,23 @@ class Verdict:
         return self.error <= self.bound
 
 
+Verdicts = Iterator[Verdict]
+
+
 @dataclass(frozen=True)
 class Case:
     """A function that runs and judges; `slow`: more than a few seconds."""
 
     name: str
-    run: Callable[[], list[Verdict]]
+    judge: Callable[[], Verdicts]
     slow: bool
 
     @property
     def module(self) -> str:
-        return self.run.__module__
+        return self.judge.__module__
+
+    def run(self) -> list[Verdict]:
+        return list(self.judge())
 
 
 CASES: list[Case] = []
@@ -56,14 +62,14 @@ CASES: list[Case] = []
 
 def case(
     name: str, *, slow: bool = False
-) -> Callable[[Callable[[], list[Verdict]]], Callable[[], list[Verdict]]]:
-    """Register a function () -> list[Verdict] as a case, in the order of the module."""
+) -> Callable[[Callable[[], Verdicts]], Callable[[], Verdicts]]:
+    """Register a function that yields verdicts as a case, in the order of the module."""
 
-    def register(run: Callable[[], list[Verdict]]) -> Callable[[], list[Verdict]]:
+    def register(judge: Callable[[], Verdicts]) -> Callable[[], Verdicts]:
         if any(name == known.name for known in CASES):
             raise ValueError(f"two cases are called {name!r}")
-        CASES.append(Case(name, run, slow))
-        return run
+        CASES.append(Case(name, judge, slow))
+        return judge
 
     return register
 

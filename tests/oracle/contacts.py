@@ -1,11 +1,11 @@
 """Contacts of a sphere with a polyhedral surface, by the definition of each method.
 
-`facets`: the distinct local minima, over the surface as a point set, of the distance to the centre.
+`facets`: the distinct local minima, over the surface as a point set, of the distance to the center.
 A triangle is convex, so p is a local minimum iff for every triangle that contains p and every
 corner x of it (c - p) . (x - p) <= 0.
 
 A definition has sharp borders and floating point has not, so the answer is a pair of sets: what
-must be found, and what may be found: what a centre moved by rounding (NUDGE) would have. Away from
+must be found, and what may be found: what a center moved by rounding (NUDGE) would have. Away from
 the borders they are equal.
 """
 
@@ -76,7 +76,7 @@ def _nudges(center: Array, points: Array, corners: Array, size: float) -> list[l
 def _some_nudge_holds(
     center: Array, point: Array, nudges: list[Array], near: Array, size: float
 ) -> bool:
-    """True where a centre within rounding of `center` has a local minimum beside `point`."""
+    """True where a center within rounding of `center` has a local minimum beside `point`."""
     for step in nudges:
         there = point + step
         holders = near[norm(there - closest_on_triangles(there, near)) <= ON_SURFACE * size]
@@ -88,7 +88,7 @@ def _some_nudge_holds(
 
 def _touch(center, point, elements, *, sure, depth, group=0, normal=None) -> Touch:  # type: ignore[no-untyped-def]
     away = center - point
-    if normal is None:  # undefined, here zero, where the centre lies on the surface
+    if normal is None:  # undefined, here zero, where the center lies on the surface
         normal = away / norm(away) if norm(away) > 0 else away
     return Touch(
         np.asarray(point, dtype=float),

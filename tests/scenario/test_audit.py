@@ -83,6 +83,7 @@ def test_audit_agrees_with_formulas(name, tmp_path):
     assert 1e-8 < pair.normal_largest < 1e-2
 
 
+@pytest.mark.slow
 def test_flat_elements_are_off_by_their_chord_error(tmp_path):
     path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
     path.write_text(
@@ -133,6 +134,7 @@ def test_border_of_a_hole_is_a_curve(tmp_path):
         assert found.normal is None
 
 
+@pytest.mark.slow
 def test_files_and_table_have_the_audit(tmp_path):
     path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
     out = tmp_path / "out"
@@ -154,6 +156,7 @@ def test_files_and_table_have_the_audit(tmp_path):
     assert figures["normal_error"]["rms"] == pytest.approx(np.sqrt(np.mean(normal**2)))
 
 
+@pytest.mark.slow
 def test_without_the_option_nothing_is_audited(tmp_path):
     path = scenario(tmp_path, shapes.ball(), [0.001, 0.0005, 0.0243])
     report = run_built(build(path), tmp_path / "out", recording=False)

@@ -119,6 +119,7 @@ def test_a_fault_of_the_users_own_function_ends_the_run_until_it_is_reset(tmp_pa
     assert live.ended is None
 
 
+@pytest.mark.slow
 @pytest.mark.robots
 def test_another_path_speed_goes_on_from_where_the_tip_is() -> None:
     """The target neither jumps nor turns back: the tip slides on, at the new speed."""

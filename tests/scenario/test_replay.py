@@ -17,6 +17,8 @@ from sphshell_pin.scenario.replay import Replay
 from sphshell_pin.view.live.opening import player_of
 from tests.scenario.files import DROP, write
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

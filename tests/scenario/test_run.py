@@ -45,6 +45,7 @@ def test_the_folder_holds_what_was_computed(built, tmp_path):
     assert summary["settings"]["run"]["duration"] == 0.05
 
 
+@pytest.mark.slow
 def test_the_contact_table_is_the_log(built, tmp_path):
     report = run_built(built, tmp_path / "out", recording=False)
     log = report.result.contacts
@@ -68,6 +69,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_run(built, tmp_path,
         run_built(built, "/proc/nothing")
 
 
+@pytest.mark.slow
 def test_a_failing_writer_leaves_the_earlier_files(built, tmp_path, monkeypatch):
     out = tmp_path / "out"
     run_built(built, out, recording=False)
@@ -111,6 +113,7 @@ def stop_early(monkeypatch, fault=SimulationDiverged):
     monkeypatch.setattr(sp.Simulation, "run", stop)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [Interrupted, SimulationDiverged])
 def test_what_was_computed_until_then_is_written(fault, built, tmp_path, monkeypatch):
     stop_early(monkeypatch, fault)
@@ -152,6 +155,7 @@ def test_partial_results_are_replaced_in_place(built, tmp_path, monkeypatch):
     assert not (out / "stopped").exists()
 
 
+@pytest.mark.slow
 def test_results_without_a_summary_count_as_complete(built, tmp_path, monkeypatch):
     out = tmp_path / "out"
     out.mkdir()
@@ -182,6 +186,7 @@ def test_a_figure_that_fails_costs_no_numbers(built, tmp_path, monkeypatch):
     assert any("ZeroDivisionError: no axis" in note for note in report.notes)
 
 
+@pytest.mark.slow
 def test_a_figure_of_ones_own_that_fails_is_told_after_the_writing(tmp_path):
     (tmp_path / "own.py").write_text("def wrong(result, scene):\n    return 1 / 0\n")
     text = DROP + '[figures]\nw = "own.py:wrong"\n[expect]\n"figures.w" = { min = 1 }\n'
@@ -191,6 +196,7 @@ def test_a_figure_of_ones_own_that_fails_is_told_after_the_writing(tmp_path):
     assert (tmp_path / "out" / "run.npz").is_file()
 
 
+@pytest.mark.slow
 def test_a_recording_of_another_run_does_not_stay(built, tmp_path):
     out = tmp_path / "out"
     out.mkdir()
@@ -200,6 +206,7 @@ def test_a_recording_of_another_run_does_not_stay(built, tmp_path):
     assert any("recording.html" in note for note in report.notes)
 
 
+@pytest.mark.slow
 def test_expectations_are_judged(tmp_path):
     text = DROP + (
         '[expect]\n"pairs.ball-plate.peak_force" = { min = 1e9 }\n"stats.steps" = '

@@ -14,6 +14,8 @@ from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, U
 from sphshell_pin.shell.converting import convert
 from tests.shell import cad_shapes as shapes
 
+pytestmark = pytest.mark.slow
+
 SIDES = np.array([20.0, 30.0, 10.0])
 """Of the box in the files, as their numbers have it."""
 
@@ -83,7 +85,6 @@ UNITS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", UNITS)
 def test_step_units_are_taken_by_their_length_not_by_their_name(name, step, tmp_path):
     entities, meters, called = UNITS[name]

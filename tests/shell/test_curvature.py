@@ -2,6 +2,7 @@
 
 import pickle
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,45 +10,19 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.shell.curvature import curvature_report
 from sphshell_pin.shell.curved import curved_mesh
+from tests import meshes
 
 from .surfaces import CUBE, CUBE_QUADS, plate
 
 
 def ball(rows=8, radius=2.0):
     """A sphere of quads and triangles at its poles, with its own normals."""
-    lat = np.linspace(0, np.pi, rows + 1)
-    lon = np.linspace(0, 2 * np.pi, 2 * rows, endpoint=False)
-    points = [(0.0, 0.0, 1.0)]
-    for a in lat[1:-1]:
-        points += [(np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)) for b in lon]
-    points.append((0.0, 0.0, -1.0))
-    n, last = len(lon), len(points) - 1
-    elements = [[0, 1 + j, 1 + (j + 1) % n] for j in range(n)]
-    for i in range(rows - 2):
-        a, b = 1 + i * n, 1 + (i + 1) * n
-        for j in range(n):
-            k = (j + 1) % n
-            elements += [[a + j, b + j, b + k], [a + j, b + k, a + k]]
-    elements += [[last, last - n + (j + 1) % n, last - n + j] for j in range(n)]
-    normals = np.array(points)
-    return sp.Shell(radius * normals, elements, normals)
+    return sp.Shell.from_geometry(coal.Sphere(radius), segments=2 * rows)
 
 
 def icosahedron():
     """A sphere of 20 triangles, with its own normals."""
-    g = (1 + 5**0.5) / 2
-    corners = np.array([[0, a, b * g] for a in (-1, 1) for b in (-1, 1)], float)
-    corners = np.concatenate([np.roll(corners, k, axis=1) for k in range(3)])
-    corners /= np.linalg.norm(corners, axis=1, keepdims=True)
-    away = np.linalg.norm(corners[:, None] - corners, axis=2)
-    next_to = (away > 0) & (away < 1.1)
-    triangles = [
-        (i, j, k)
-        for i in range(12)
-        for j in range(i)
-        for k in range(j)
-        if next_to[i, j] and next_to[j, k] and next_to[i, k]
-    ]
+    corners, triangles = meshes.icosphere(0)
     return sp.Shell(corners, triangles, corners, crease_angle=np.deg2rad(60.0))
 
 
@@ -112,7 +87,7 @@ def test_planes_are_flat():
     creased = sp.Shell(CUBE, CUBE_QUADS).curvature_report()
     assert (creased.curved, creased.largest) == (0, 0.0)
     exact = ball(6).curvature_report()
-    flat = sp.Shell(ball(6).vertices, ball(6).elements, ball(6).normals, crease_angle=0.0)
+    flat = sp.Shell.from_geometry(coal.Sphere(2.0), segments=12, crease_angle=0.0)
     assert exact.largest > 0.0
     assert flat.curvature_report().largest == 0.0
 

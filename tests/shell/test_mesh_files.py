@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from sphshell_pin.errors import InvalidParameter, InvalidShell, ShellFileError
+from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell import Shell
 
 from .surfaces import CUBE, CUBE_QUADS, by_place, plate
@@ -124,12 +124,15 @@ def test_unknown_suffix(tmp_path, write):
         Shell.from_file(write("blade.dae", "x"), unit="m")
 
 
-@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "off"])
+@pytest.mark.parametrize("suffix", SUFFIXES)
 def test_missing_empty_and_damaged(tmp_path, write, suffix):
     with pytest.raises(ShellFileError, match="no such file"):
         Shell.from_file(tmp_path / f"none.{suffix}", unit="m")
     with pytest.raises(ShellFileError, match="is empty"):
         Shell.from_file(write(f"empty.{suffix}", ""), unit="m")
+    (tmp_path / f"folder.{suffix}").mkdir()
+    with pytest.raises(ShellFileError, match="not a file"):
+        Shell.from_file(tmp_path / f"folder.{suffix}", unit="m")
     for damage in (b"\x00\x01\x02 nothing", b"text only\n", bytes(range(256)) * 3):
         with pytest.raises(ShellFileError):
             Shell.from_file(write(f"damaged.{suffix}", damage), unit="m")
@@ -243,8 +246,3 @@ def test_nan_in_a_file_names_the_vertex(write):
     data = b" " * 80 + struct.pack("<I", 1) + bytes(12) + corners.tobytes() + bytes(2)
     with pytest.raises(ShellFileError, match="vertex 2 is not finite"):
         Shell.from_file(write("nan.stl", data), unit="m")
-
-
-def test_all_degenerate(write):
-    with pytest.raises(InvalidShell, match="no element is left"):
-        Shell.from_file(write("flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n"), unit="m")

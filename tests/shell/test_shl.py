@@ -194,14 +194,6 @@ def test_normals_of_another_number_are_ignored_and_said(write):
     assert Shell.from_file(write(lines)).is_closed
 
 
-def test_missing_empty_and_not_a_file(write, tmp_path):
-    assert "no such file" in str(refused(tmp_path / "none.shl"))
-    assert "is empty" in str(refused(write([])))
-    (tmp_path / "folder.shl").mkdir()
-    assert "not a file" in str(refused(tmp_path / "folder.shl"))
-    assert refused(write(["\x00\xff\xfe binary \x80"]))
-
-
 def test_all_degenerate(write):
     lines = version_1("1", ["0 0 0", "1 0 0", "2 0 0"], ["3 1 2 3"])
     with pytest.raises(InvalidShell, match="no element is left"):

@@ -99,7 +99,7 @@ def hard(*, quick, progress):
 
 def peers(*, quick, progress):
     swing = {"period": 1e-4, "energy": 1e-3}
-    ours = PeerRow("bowl", "ours", "sphshell_pin 0", knob={"dt": 1e-3}, errors=swing, cost=0.01)
+    ours = PeerRow("bowl", "ours", "sphshell_pin 0", params={"dt": 1e-3}, errors=swing, cost=0.01)
     other = replace(ours, engine="mujoco", settings={"solver": "<Newton>"}, cost=1.0)
     press = replace(ours, scene="press", errors={"pressed [mm]": 0.1}, unit="us / step")
     absent = PeerRow("bowl", "drake", note="not installed: no module named pydrake")

@@ -12,7 +12,7 @@ import umsgpack
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 
 
 def run(visit):

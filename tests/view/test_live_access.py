@@ -1,5 +1,6 @@
 """Who gets at the live page: nobody without the token, no foreign name, site or frame."""
 
+import contextlib
 import re
 import socket
 
@@ -146,12 +147,10 @@ def test_no_request_leaves_a_complaint(live, caplog):
     for request in HOSTILE.values():
         with socket.create_connection(("127.0.0.1", live.server.port)) as raw:
             raw.sendall(request.replace(b"TOKEN", live.server.access.token.encode()))
-            raw.shutdown(socket.SHUT_WR)
-            try:
+            with contextlib.suppress(OSError):  # it may be refused before all is said
+                raw.shutdown(socket.SHUT_WR)
                 while raw.recv(1 << 16):
                     pass
-            except ConnectionResetError:
-                pass
     assert get(live.url)[0] == 200
     assert not caplog.records
 

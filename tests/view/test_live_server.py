@@ -151,8 +151,7 @@ def test_a_browser_that_never_reads_holds_up_nobody(live):
 
     async def visit():
         async with Client(live.url) as client:
-            # The ball comes to rest: then there is nothing new to send.
-            await client.until(lambda c: len(c.scenes) > 50)
+            await client.until(lambda c: len(c.scenes) > 30)
 
     while not live.server.watched:
         time.sleep(0.01)
@@ -165,7 +164,7 @@ def test_a_browser_that_never_reads_holds_up_nobody(live):
 def test_a_browser_that_answers_late_skips_frames_and_gets_the_newest(live):
     async def visit():
         async with Client(live.url, answers=False) as slow, Client(live.url) as fast:
-            await fast.until(lambda c: len(c.scenes) > 50)
+            await fast.until(lambda c: len(c.scenes) > 40)
             while True:
                 try:
                     await asyncio.wait_for(slow.read(), 0.05)

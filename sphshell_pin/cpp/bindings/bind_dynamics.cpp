@@ -120,7 +120,7 @@ void bind_evaluations(nb::class_<T>& bound) {
   bound
       .def("external_forces",
            [](T& self, const VectorX& q, const VectorX& v) {
-             return self.at(q, v, [&](Scene& scene, auto&& evaluate) {
+             return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
                evaluate();
                const Forces none(scene.touching() ? 0 : scene.external().size(),
                                  pinocchio::Force::Zero());
@@ -129,7 +129,7 @@ void bind_evaluations(nb::class_<T>& bound) {
            })
       .def("contacts",
            [](T& self, const VectorX& q, const VectorX& v) {
-             return self.at(q, v, [&](Scene& scene, auto&& evaluate) {
+             return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
                std::vector<ContactRow> rows;
                evaluate();
                scene.log(q, v, rows);
@@ -137,7 +137,7 @@ void bind_evaluations(nb::class_<T>& bound) {
              });
            })
       .def("contact_derivatives", [](T& self, const VectorX& q, const VectorX& v) {
-        return self.at(q, v, [&](Scene& scene, auto&& evaluate) {
+        return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
           Linearization linearization(scene);
           evaluate();
           MatrixX by_q, by_v;
@@ -174,7 +174,7 @@ void bind_dynamics(nanobind::module_& m) {
       .def("rates",
            [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
               const VectorX& tau) {
-             return self.at(q, v, [&](Scene& scene, auto&&) {
+             return self.at(q, v, [&](SceneData& scene, auto&&) {
                check_count("z", z.size(), scene.bristle_size());
                check_count("tau", tau.size(), v.size());
                scene.restart();
@@ -188,7 +188,7 @@ void bind_dynamics(nanobind::module_& m) {
           "rate_jacobian",
           [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
              const VectorX& tau, int repeat) {
-            return self.at(q, v, [&](Scene& scene, auto&&) {
+            return self.at(q, v, [&](SceneData& scene, auto&&) {
               check_count("z", z.size(), scene.bristle_size());
               check_count("tau", tau.size(), v.size());
               Linearization linearization(scene);
@@ -261,8 +261,11 @@ void bind_dynamics(nanobind::module_& m) {
           "__init__",
           [](RunSettings* self, std::string integrator, double dt, double rtol, double atol,
              double duration, double start_time, double control_dt, double record_dt) {
-            new (self) RunSettings{
-                {std::move(integrator), dt, rtol, atol}, duration, start_time, control_dt, record_dt};
+            new (self) RunSettings{{std::move(integrator), dt, rtol, atol},
+                                   duration,
+                                   start_time,
+                                   control_dt,
+                                   record_dt};
           },
           nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"), nb::arg("atol"),
           nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"));

@@ -10,7 +10,7 @@
 
 #include "bindings/records.hpp"
 #include "dynamics/multibody.hpp"
-#include "dynamics/scene.hpp"
+#include "dynamics/scene_data.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/vector.h>
@@ -43,7 +43,7 @@ double bare_dynamics(nb::handle model, VectorX q, VectorX v, double dt, int step
 // "law" holds the forces of the contacts and what gathers and audits them.
 nb::dict step_parts(nb::handle model, const std::vector<const Pair*>& pairs, const VectorX& q,
                     const VectorX& v, double dt, int repeats) {
-  Scene scene(model_of(model), copies(pairs));
+  SceneData scene(model_of(model), copies(pairs));
   const VectorX z = VectorX::Zero(scene.bristle_size()), tau = VectorX::Zero(v.size());
   const VectorX step = dt * v;
   VectorX next = q;

@@ -68,7 +68,7 @@ PythonController::~PythonController() {
   callable_.reset();
 }
 
-void PythonController::torque(Scene& scene, double t, const VectorX& q, const VectorX& v,
+void PythonController::torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
                               VectorX& tau) {
   std::vector<ContactRow> rows;
   scene.log(q, v, rows);

@@ -36,7 +36,8 @@ class PythonController : public Controller {
   explicit PythonController(nb::object callable) : callable_(std::move(callable)) {}
   ~PythonController() override;
   bool follows_time() const override { return true; }
-  void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override;
+  void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
+              VectorX& tau) override;
   nb::handle callable() const { return callable_; }
 
  private:

@@ -10,7 +10,7 @@
 
 namespace sphshell {
 
-inline void check_state(const Scene& scene, const VectorX& q, const VectorX& v) {
+inline void check_state(const SceneData& scene, const VectorX& q, const VectorX& v) {
   check_count("q", q.size(), scene.body().model().nq);
   check_count("v", v.size(), scene.body().model().nv);
 }

@@ -48,7 +48,8 @@ void differentiate(const NormalLaw& law, const FrictionLaw& friction, double rad
   read<N>(f.bristle_rate, out.rate, out.rate_by);
 }
 
-// The rate of the bristle's turning with the normal, added to `out`; see Scene::turning.
+// The rate of the bristle's turning with the normal, added to `out`; see
+// SceneData::rate_of_turning.
 void add_turning(const ContactSite& site, const Mat3& normal_by_place,
                  const Eigen::RowVector3d& weight_by_place, ContactSlopes& out) {
   const Contact& contact = site.contact;

@@ -8,7 +8,7 @@ namespace sphshell {
 
 GravityCompensation::GravityCompensation(VectorX actuated) : actuated_(std::move(actuated)) {}
 
-void GravityCompensation::torque(Scene& scene, double, const VectorX& q, const VectorX&,
+void GravityCompensation::torque(SceneData& scene, double, const VectorX& q, const VectorX&,
                                  VectorX& tau) {
   tau = scene.body().gravity(q).cwiseProduct(actuated_);
 }
@@ -21,7 +21,7 @@ JointPd::JointPd(VectorX kp, VectorX kd, VectorX q_ref, bool gravity, VectorX ac
       error_(VectorX::Zero(kd_.size())),
       gravity_(gravity) {}
 
-void JointPd::torque(Scene& scene, double, const VectorX& q, const VectorX& v, VectorX& tau) {
+void JointPd::torque(SceneData& scene, double, const VectorX& q, const VectorX& v, VectorX& tau) {
   scene.body().difference(q, q_ref_, error_);
   tau = kp_.cwiseProduct(error_) - kd_.cwiseProduct(v);
   if (gravity_) tau += scene.body().gravity(q);
@@ -33,14 +33,14 @@ CartesianImpedance::CartesianImpedance(ImpedanceSettings settings, int num_joint
       opposed_(static_cast<std::size_t>(num_joints), pinocchio::Force::Zero()),
       error_(VectorX::Zero(s_.actuated.size())) {}
 
-void CartesianImpedance::prepare(Scene& scene) {
+void CartesianImpedance::prepare(SceneData& scene) {
   scene.need_velocity_of(s_.joint);
   scene.need_velocity_of(s_.path_joint);
   segment_ = 0;
   started_ = false;
 }
 
-void CartesianImpedance::torque(Scene& scene, double t, const VectorX& q, const VectorX& v,
+void CartesianImpedance::torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
                                 VectorX& tau) {
   Multibody& body = scene.body();
   const SE3& joint = body.world_from_joint(s_.joint);

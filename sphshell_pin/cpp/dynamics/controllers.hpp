@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "dynamics/scene.hpp"
+#include "dynamics/scene_data.hpp"
 
 namespace sphshell {
 
@@ -13,9 +13,10 @@ class Controller {
  public:
   virtual ~Controller() = default;
   // Called once before a run, to ask for the placements that torque() reads.
-  virtual void prepare(Scene&) {}
+  virtual void prepare(SceneData&) {}
   // Writes the torques; the scene's contacts have been evaluated at (q, v).
-  virtual void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) = 0;
+  virtual void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
+                      VectorX& tau) = 0;
   // Takes the place of `before` at time t, in the middle of a run: goes on from where that is.
   virtual void take_over(const Controller& /*before*/, double /*t*/) {}
   // Implicit integrators difference the torques by the state, and if they follow it, by time.
@@ -28,7 +29,8 @@ class Controller {
 class GravityCompensation : public Controller {
  public:
   explicit GravityCompensation(VectorX actuated);
-  void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override;
+  void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
+              VectorX& tau) override;
 
  private:
   VectorX actuated_;
@@ -38,7 +40,8 @@ class GravityCompensation : public Controller {
 class JointPd : public Controller {
  public:
   JointPd(VectorX kp, VectorX kd, VectorX q_ref, bool gravity, VectorX actuated);
-  void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override;
+  void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
+              VectorX& tau) override;
 
  private:
   VectorX kp_, kd_, q_ref_, actuated_, error_;
@@ -64,8 +67,9 @@ struct ImpedanceSettings {
 class CartesianImpedance : public Controller {
  public:
   explicit CartesianImpedance(ImpedanceSettings settings, int num_joints);
-  void prepare(Scene& scene) override;
-  void torque(Scene& scene, double t, const VectorX& q, const VectorX& v, VectorX& tau) override;
+  void prepare(SceneData& scene) override;
+  void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
+              VectorX& tau) override;
   void take_over(const Controller& before, double t) override;
   bool follows_time() const override { return s_.times.size() > 1; }
   double next_kink(double t) const override;

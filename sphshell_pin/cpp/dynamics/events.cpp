@@ -23,7 +23,7 @@ long count_positive(const std::vector<double>& values) {
 void Events::begin() {
   for (std::size_t k = 0; k < at_begin_.size(); ++k) {
     const PairState& now = scene_.states()[k];
-    at_begin_[k] = {now.pieces, now.clamped, now.centre};
+    at_begin_[k] = {now.pieces, now.clamped, now.center};
   }
 }
 
@@ -51,13 +51,13 @@ void Events::measure(std::size_t k, double margin, Gauges& out) {
   for (std::vector<double>& values : out) values.clear();
   const Pair& pair = scene_.pairs()[k];
   if (pair.shell) {
-    query_.find(*pair.shell, scene_.states()[k].centre, pair.radius + margin, pair.method);
+    query_.find(*pair.shell, scene_.states()[k].center, pair.radius + margin, pair.method);
     for (const Contact& contact : query_.contacts)
       out[contact.weight > 0 ? Minimum : Saddle].push_back(contact.depth - margin);
   }
   for (const ActiveContact& active : scene_.active()) {
     if (active.pair != static_cast<int>(k)) continue;
-    const Meeting<double>& m = active.meeting;
+    const ContactKinematics<double>& m = active.kinematics;
     // Laws are linear in the rate: the force against the opposite rate is 2 elastic - unclamped.
     const auto opposed = pair.law.force(m.depth, -m.normal.dot(m.relative));
     out[Clamp].push_back(active.force.normal > 0 ? -active.force.normal
@@ -73,11 +73,11 @@ double Events::locate(double before, double after, double tolerance, const Chart
   std::size_t k = 0;
   while (k + 1 < at_begin_.size() && !changed(k)) ++k;
   const double radius = scene_.pairs()[k].radius;
-  const Vec3 end = scene_.states()[k].centre;
-  const double margin = std::min(1.1 * (end - at_begin_[k].centre).norm(), kMargin * radius);
+  const Vec3 end = scene_.states()[k].center;
+  const double margin = std::min(1.1 * (end - at_begin_[k].center).norm(), kMargin * radius);
   measure(k, margin, after_);
   met_at(before, chart, stepper);
-  const Vec3 start = scene_.states()[k].centre;
+  const Vec3 start = scene_.states()[k].center;
   measure(k, margin, before_);
 
   // The quantity that changes its sign, and where it stands at both ends.
@@ -94,14 +94,14 @@ double Events::locate(double before, double after, double tolerance, const Chart
     if (!comes) from = start;
   }
   // Its sign is that of met(), whatever else happens in the step.
-  const auto value = [&](const Gauges& gauges, const Vec3& centre, bool is_met) {
+  const auto value = [&](const Gauges& gauges, const Vec3& center, bool is_met) {
     double size = 1;
     if (kind < kKinds) {
       // Out of sight, a contact is farther than the margin; a depth changes no faster than the
-      // centre moves.
+      // center moves.
       size = gauges[kind].size() > index ? std::abs(gauges[kind][index])
              : kind == Clamp             ? known
-                             : std::max(margin, (centre - from).norm() - known);
+                             : std::max(margin, (center - from).norm() - known);
       size = std::max(size, std::numeric_limits<double>::min());
     }
     return is_met ? size : -size;
@@ -111,7 +111,7 @@ double Events::locate(double before, double after, double tolerance, const Chart
       [&](double theta) {
         const bool is_met = met_at(theta, chart, stepper);
         if (kind < kKinds) measure(k, margin, between_);
-        return value(between_, scene_.states()[k].centre, is_met);
+        return value(between_, scene_.states()[k].center, is_met);
       },
       before, after, value(before_, start, false), value(after_, end, true),
       [&](double a, double b) { return b - a <= tolerance; }, looks);

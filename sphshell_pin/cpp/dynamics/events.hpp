@@ -13,7 +13,7 @@ namespace sphshell {
 // look costs a query of the contacts and no evaluation of the dynamics.
 class Events {
  public:
-  explicit Events(Scene& scene) : scene_(scene), at_begin_(scene.pairs().size()) {}
+  explicit Events(SceneData& scene) : scene_(scene), at_begin_(scene.pairs().size()) {}
 
   // A step begins where the scene was last evaluated.
   void begin();
@@ -32,7 +32,7 @@ class Events {
  private:
   struct Start {
     int pieces = 0, clamped = 0;
-    Vec3 centre = Vec3::Zero();  // of the sphere, in the shell's frame
+    Vec3 center = Vec3::Zero();  // of the sphere, in the shell's frame
   };
   // Quantities of one pair that change sign at its events, positive ones first in each list.
   enum Kind { Minimum, Saddle, Clamp, kKinds };
@@ -41,7 +41,7 @@ class Events {
   bool changed(std::size_t k) const;
   void measure(std::size_t k, double margin, Gauges& out);
 
-  Scene& scene_;
+  SceneData& scene_;
   std::vector<Start> at_begin_;
   Query query_;
   Gauges before_, after_, between_;

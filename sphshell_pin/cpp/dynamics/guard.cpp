@@ -18,14 +18,14 @@ constexpr double kMostTurned = 16;
 
 }  // namespace
 
-void Guard::begin(const Scene& scene) {
+void Guard::begin(const SceneData& scene) {
   for (std::size_t k = 0; k < known_.size(); ++k) {
     known_[k].center = scene.states()[k].center;
     known_[k].touching = scene.states()[k].count > 0;
   }
 }
 
-double Guard::allowed(Scene& scene, const State& from, const State& to) {
+double Guard::allowed(SceneData& scene, const State& from, const State& to) {
   double share = std::numeric_limits<double>::infinity();
   const double h = to.t - from.t;
   const double turned =
@@ -66,7 +66,7 @@ double Guard::gap(const Pair& pair, Known& known) const {
 }
 
 // Length of the center's path in the shell's frame, by chords.
-double Guard::path(Scene& scene, std::size_t k, const State& from, const State& to) {
+double Guard::path(SceneData& scene, std::size_t k, const State& from, const State& to) {
   const Pair& pair = scene.pairs()[k];
   Multibody& body = scene.body();
   const double h = to.t - from.t;

@@ -13,13 +13,13 @@ namespace sphshell {
 // evaluations is a touch of at most r / 2000.
 class Guard {
  public:
-  explicit Guard(const Scene& scene) : known_(scene.pairs().size()) {}
+  explicit Guard(const SceneData& scene) : known_(scene.pairs().size()) {}
 
   // The scene's last evaluate() was at the state where the next step begins.
-  void begin(const Scene& scene);
+  void begin(const SceneData& scene);
   // The share of the step from `from` to `to` that is allowed; 1 or more: all of it. The scene's
   // last evaluate() was at `to`.
-  double allowed(Scene& scene, const State& from, const State& to);
+  double allowed(SceneData& scene, const State& from, const State& to);
 
  private:
   struct Known {
@@ -31,7 +31,7 @@ class Guard {
   };
 
   double gap(const Pair& pair, Known& known) const;
-  double path(Scene& scene, std::size_t k, const State& from, const State& to);
+  double path(SceneData& scene, std::size_t k, const State& from, const State& to);
 
   std::vector<Known> known_;
   VectorX u_, q_;

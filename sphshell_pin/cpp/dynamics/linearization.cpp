@@ -14,7 +14,7 @@ Matrix36 displacement_at(const Vec3& place) {
 
 }  // namespace
 
-Linearization::Linearization(Scene& scene) : scene_(scene) {
+Linearization::Linearization(SceneData& scene) : scene_(scene) {
   scene.want_dn_dc();
   scene.body().want_derivatives();
   const pinocchio::Model& model = scene.body().model();

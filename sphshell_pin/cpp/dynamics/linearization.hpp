@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "dynamics/chain.hpp"
-#include "dynamics/scene.hpp"
+#include "dynamics/scene_data.hpp"
 
 namespace sphshell {
 
@@ -16,7 +16,7 @@ namespace sphshell {
 //   with the shell's curvature.
 class Linearization {
  public:
-  explicit Linearization(Scene& scene);
+  explicit Linearization(SceneData& scene);
 
   // Derivatives (nv, nv) of the generalized contact forces (sum of J^T F).
   void forces(const VectorX& q, const VectorX& v, MatrixX& by_q, MatrixX& by_v);
@@ -39,7 +39,7 @@ class Linearization {
                    MatrixX& jacobian);
   ContactSite site_of(const ActiveContact& active, const Vector6& twist) const;
 
-  Scene& scene_;
+  SceneData& scene_;
   std::vector<Chain> chains_;  // one per pair
   VectorX force_;              // generalized
   MatrixX by_q_, by_v_, inverse_mass_;

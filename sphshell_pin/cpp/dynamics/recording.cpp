@@ -9,7 +9,7 @@ Recorder::Recorder(std::size_t pairs, double start, double end, double record_dt
 
 Record Recorder::take() { return std::exchange(record_, {}); }
 
-Record Recorder::snapshot(Scene& scene, const State& state) {
+Record Recorder::snapshot(SceneData& scene, const State& state) {
   Record recorded = std::exchange(record_, {});
   const long rows = std::exchange(rows_, 0);
   add_row(scene, state);
@@ -17,8 +17,8 @@ Record Recorder::snapshot(Scene& scene, const State& state) {
   return std::exchange(record_, std::move(recorded));
 }
 
-void Recorder::add_rows(Scene& scene, const Chart& chart, const Stepper& stepper, const State& from,
-                        const State& to) {
+void Recorder::add_rows(SceneData& scene, const Chart& chart, const Stepper& stepper,
+                        const State& from, const State& to) {
   if (record_dt_ > 0) {
     // The end is a row, and none stands a round-off before it.
     const double last = end_ - 1e-9 * record_dt_;
@@ -41,7 +41,7 @@ void Recorder::add_rows(Scene& scene, const Chart& chart, const Stepper& stepper
   add_row(scene, to);
 }
 
-void Recorder::add_row(Scene& scene, const State& state) {
+void Recorder::add_row(SceneData& scene, const State& state) {
   scene.log(state.q, state.v, record_.contacts);
   record_.contact_row.resize(record_.contacts.size(), double(rows_));
   record_.t.push_back(state.t);
@@ -57,7 +57,7 @@ void Recorder::add_row(Scene& scene, const State& state) {
   ++rows_;
 }
 
-void Recorder::add_step(const Scene& scene, double t, double h) {
+void Recorder::add_step(const SceneData& scene, double t, double h) {
   for (std::size_t k = 0; k < summaries_.size(); ++k) {
     const PairState& now = scene.states()[k];
     PairSummary& summary = summaries_[k];

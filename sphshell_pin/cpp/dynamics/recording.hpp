@@ -40,18 +40,18 @@ class Recorder {
   Recorder(std::size_t pairs, double start, double end, double record_dt);
 
   // The scene's last evaluate() was at the state.
-  void add_row(Scene& scene, const State& state);
+  void add_row(SceneData& scene, const State& state);
   // The rows due in the last step of `stepper`, which is from `from` to `to`, and at its end.
   // Leaves the forces evaluated at `to`.
-  void add_rows(Scene& scene, const Chart& chart, const Stepper& stepper, const State& from,
+  void add_rows(SceneData& scene, const Chart& chart, const Stepper& stepper, const State& from,
                 const State& to);
   // Events and figures of a step of h [s] that ends at t; the scene has accepted its end.
-  void add_step(const Scene& scene, double t, double h);
+  void add_step(const SceneData& scene, double t, double h);
 
   // Hands over what was recorded since the last call.
   Record take();
   // The state as the only row of a record; the scene's last evaluate() was there.
-  Record snapshot(Scene& scene, const State& state);
+  Record snapshot(SceneData& scene, const State& state);
   const std::vector<PairSummary>& summaries() const { return summaries_; }
 
  private:

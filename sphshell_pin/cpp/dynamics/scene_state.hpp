@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "dynamics/scene.hpp"
+#include "dynamics/scene_data.hpp"
 
 namespace sphshell {
 
@@ -35,12 +35,12 @@ class SceneState {
     begun_ = true;
   }
 
-  Scene& scene() { return scene_; }
-  const Scene& scene() const { return scene_; }
+  SceneData& scene() { return scene_; }
+  const SceneData& scene() const { return scene_; }
   const VectorX& bristles() const { return z_; }
 
  private:
-  Scene scene_;
+  SceneData scene_;
   VectorX q_, z_;
   bool begun_ = false;
 };

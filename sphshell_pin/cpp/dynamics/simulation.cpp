@@ -54,7 +54,7 @@ std::optional<DeepStart> Simulation::deep_start() {
     if (!pair.shell) continue;
     double depth = scene_.states()[k].depth;
     if (pair.shell->side() != Side::Both && depth == 0) {
-      const double distance = pair.shell->closest_point(scene_.states()[k].centre).distance;
+      const double distance = pair.shell->closest_point(scene_.states()[k].center).distance;
       const double outside = pair.shell->side() == Side::Outside ? distance : -distance;
       if (outside < 0 && is_closed(*pair.shell)) depth = pair.radius - outside;
     }

@@ -81,7 +81,7 @@ class Simulation : private Torques {
             stepping_.event_queries()};
   }
   double last_step() const { return stepping_.proposal(); }  // [s]
-  double wall_time() const { return wall_time_; }  // spent in advance() [s]
+  double wall_time() const { return wall_time_; }            // spent in advance() [s]
   const std::vector<PairSummary>& summaries() const { return recorder_.summaries(); }
   const pinocchio::Model& model() const { return scene_.body().model(); }
   const std::vector<Pair>& pairs() const { return scene_.pairs(); }
@@ -104,14 +104,15 @@ class Simulation : private Torques {
   bool at_end() const { return time() >= end(); }
 
   RunSettings settings_;
-  Scene scene_;
+  SceneData scene_;
   std::shared_ptr<Controller> controller_;
   Stepping stepping_;
   Recorder recorder_;
   Push push_;
   VectorX tau_;
-  long grid_ = 0, grid_steps_ = 0, steps_ = 0;  // of the fixed step: which it is, how many there are
-  int fine_steps_ = 0;                          // made of the fixed step under way
+  long grid_ = 0, grid_steps_ = 0,
+       steps_ = 0;      // of the fixed step: which it is, how many there are
+  int fine_steps_ = 0;  // made of the fixed step under way
   double wall_time_ = 0;
   double until_ = std::numeric_limits<double>::infinity();  // where advance() stops [s]
   double next_control_;                                     // when held torques change next [s]

@@ -25,7 +25,7 @@ double spacing(double t) { return std::numeric_limits<double>::epsilon() * std::
 
 }  // namespace
 
-Stepping::Stepping(Scene& scene, Torques& torques, const StepSettings& settings, State start)
+Stepping::Stepping(SceneData& scene, Torques& torques, const StepSettings& settings, State start)
     : settings_(settings),
       scene_(scene),
       chart_(scene, torques),

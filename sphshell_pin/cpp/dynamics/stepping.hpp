@@ -21,7 +21,7 @@ class Stepping {
  public:
   enum class Made { Step, Nothing, Stuck };
 
-  Stepping(Scene& scene, Torques& torques, const StepSettings& settings, State start);
+  Stepping(SceneData& scene, Torques& torques, const StepSettings& settings, State start);
 
   // Evaluates the scene at the state, where a run begins or its scene has changed.
   void restart();
@@ -56,7 +56,7 @@ class Stepping {
   double to_event(double h, double left, double shortest, bool is_met);
 
   const StepSettings settings_;
-  Scene& scene_;
+  SceneData& scene_;
   Chart chart_;
   // The second one is for what a fixed step cannot resolve.
   std::unique_ptr<Stepper> stepper_, fine_stepper_;

@@ -117,26 +117,23 @@ class FaceMesh:
         """
         if self.surface.flat:
             return self, float(np.linalg.norm(self.points - self.exact, axis=1).max(initial=0.0))
-        mesh, largest, known = self, 0.0, 0
+        mesh, largest = self, 0.0
         for turn in range(rounds + 1):
             sides, of_triangle = mesh.sides()
-            at_sides, middles = mesh._errors(sides, of_triangle, known, tolerance)
+            at_sides, middles = mesh._errors(sides, tolerance)
+            largest = max(at_sides.max(initial=0.0), middles.max(initial=0.0))
             inner = np.bincount(of_triangle.ravel(), minlength=len(sides)) == 2
-            marked: Mask = (at_sides > tolerance) & (turn < rounds)
-            if turn < rounds:
-                # A triangle too far in its middle alone: its longest side inside the face.
-                length = np.linalg.norm(mesh.points[sides[:, 0]] - mesh.points[sides[:, 1]], axis=1)
-                longest = np.argmax(np.where(inner, length, -1.0)[of_triangle], axis=1)
-                wanted = (middles > tolerance) & ~(marked & inner)[of_triangle].any(axis=1)
-                marked[of_triangle[wanted, longest[wanted]]] = True
-                marked &= inner
-            whole = ~marked[of_triangle].any(axis=1)
-            kept = (at_sides[~marked].max(initial=0.0), middles[whole].max(initial=0.0))
-            largest = max(largest, float(max(kept)))
-            if not marked.any():
+            marked: Mask = inner & (at_sides > tolerance)
+            # A triangle too far in its middle alone: its longest side inside the face.
+            length = np.linalg.norm(mesh.points[sides[:, 0]] - mesh.points[sides[:, 1]], axis=1)
+            longest = np.argmax(np.where(inner, length, -1.0)[of_triangle], axis=1)
+            wanted = (middles > tolerance) & ~marked[of_triangle].any(axis=1)
+            marked[of_triangle[wanted, longest[wanted]]] = True
+            marked &= inner
+            if turn == rounds or not marked.any():
                 break
-            mesh, known = mesh._split(sides, of_triangle, marked), int(whole.sum())
-        return mesh, largest
+            mesh = mesh._split(sides, of_triangle, marked)
+        return mesh, float(largest)
 
     def corner_normals(self) -> Floats:
         """Exact unit normals (t, 3, 3) at the corners, on the face's outer side.
@@ -162,26 +159,17 @@ class FaceMesh:
         mean = np.where(free, 0.0, uv).sum(axis=1, keepdims=True) / np.maximum(count, 1)
         return np.where(free & (count > 0), mean, uv)
 
-    def _errors(
-        self, sides: Longs, of_triangle: Longs, known: int, tolerance: float
-    ) -> tuple[Floats, Floats]:
-        """Largest distance to the surface along each side and at each middle; 0 where `known`.
-
-        known : number of triangles, the first ones, that were measured before
-        """
-        at_sides, middles = np.zeros(len(sides)), np.zeros(len(self.triangles))
-        fresh = np.unique(of_triangle[known:])
-        ends = sides[fresh]
-        between = self.parameters(ends)
+    def _errors(self, sides: Longs, tolerance: float) -> tuple[Floats, Floats]:
+        """Largest distance to the surface along each side, and at the middle of each triangle."""
+        at_sides = np.zeros(len(sides))
+        between = self.parameters(sides)
         for share in ALONG:
-            points = (1.0 - share) * self.points[ends[:, 0]] + share * self.points[ends[:, 1]]
+            points = (1.0 - share) * self.points[sides[:, 0]] + share * self.points[sides[:, 1]]
             uv = (1.0 - share) * between[:, 0] + share * between[:, 1]
-            off = self.surface.distances(points, uv, tolerance)
-            at_sides[fresh] = np.maximum(at_sides[fresh], off)
-        new = self.triangles[known:]
-        points, uv = self.points[new].mean(axis=1), self.parameters(new).mean(axis=1)
-        middles[known:] = self.surface.distances(points, uv, tolerance)
-        return at_sides, middles
+            at_sides = np.maximum(at_sides, self.surface.distances(points, uv, tolerance))
+        points = self.points[self.triangles].mean(axis=1)
+        uv = self.parameters(self.triangles).mean(axis=1)
+        return at_sides, self.surface.distances(points, uv, tolerance)
 
     def _split(self, sides: Longs, of_triangle: Longs, marked: Mask) -> FaceMesh:
         """Halve the sides where `marked` (s,) holds, with new nodes on the surface."""

@@ -85,7 +85,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: name in the file, heading on the page, how a cell is shown."""
+    """A column of a table: name in the file, heading on the page, how a cell is shown.
+
+    Without `show`, a key that ends in "_s" is of times [s], which are shown in microseconds.
+    """
 
     key: str
     heading: str
@@ -95,7 +98,16 @@ class Column:
         """Return what the page shows."""
         if self.show is not None:
             return self.show(value)
-        return value if isinstance(value, str) else number(value)
+        if isinstance(value, str):
+            return value
+        times = self.key.endswith("_s") and not self.key.endswith("_per_s")
+        return microseconds(value) if times else number(value)
+
+
+def columns(*names: str) -> tuple[Column, ...]:
+    """Return columns of keys, or of texts "key: heading"; else the heading is the key."""
+    parts = (name.partition(": ") for name in names)
+    return tuple(Column(key, heading or key.replace("_", " ")) for key, _, heading in parts)
 
 
 @dataclass(frozen=True)
@@ -173,7 +185,7 @@ def findings_table(findings: Sequence[Finding]) -> Table:
     return Table(
         "findings",
         "Findings.",
-        [Column(key, key) for key in ("finding", "figure", "quartiles", "aim", "verdict")],
+        columns("finding", "figure", "quartiles", "aim", "verdict"),
         [(f.what, f.text, f.spread_text, f.aim_text, words[f.met]) for f in findings],
     )
 
@@ -184,14 +196,8 @@ def quartiles(figures: np.ndarray) -> tuple[float, float, float]:
     return median, low, high
 
 
-def times_columns(*first: Column) -> tuple[Column, ...]:
-    """Return columns for `quartiles` of times [s] after the columns `first`."""
-    return (
-        *first,
-        Column("median_s", "median [us]", microseconds),
-        Column("low_s", "lower quartile", microseconds),
-        Column("high_s", "upper quartile", microseconds),
-    )
+TIME_COLUMNS = ("median_s: median [us]", "low_s: lower quartile", "high_s: upper quartile")
+"""Columns for `quartiles` of times [s]."""
 
 
 def number(value: float | None) -> str:
@@ -225,6 +231,6 @@ def with_unit(value: float, unit: str) -> str:
     return f"{number(value)} {unit}".strip() if math.isfinite(value) else "not measured"
 
 
-def microseconds(seconds: float) -> str:
+def microseconds(seconds: float | None) -> str:
     """Return a time in microseconds; below a nanosecond it is shown as 0."""
-    return number(seconds * 1e6 if abs(seconds) >= 1e-9 else 0.0)
+    return "" if seconds is None else number(seconds * 1e6 if abs(seconds) >= 1e-9 else 0.0)

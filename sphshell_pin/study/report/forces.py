@@ -7,13 +7,12 @@ import numpy as np
 from sphshell_pin.benchmarks import convergence, timing
 from sphshell_pin.benchmarks.convergence import Row
 from sphshell_pin.study.report.contents import (
-    Column,
     Finding,
     Picture,
     Progress,
     Section,
     Table,
-    microseconds,
+    columns,
     number,
 )
 from sphshell_pin.study.report.drawing import (
@@ -142,15 +141,15 @@ def orders_table(names: tuple[str, ...], rows: list[Row]) -> Table:
     return Table(
         "forces_orders",
         "Orders by a fit over all meshes; none where the force is exact at any size.",
-        (
-            Column("surface", "surface"),
-            Column("method", "method"),
-            Column("order", "order"),
-            Column("mean_error_at_0.3", "error at h/r = 0.3"),
-            Column("largest_error_at_0.3", "largest"),
-            Column("finest_triangles", "triangles of the finest mesh"),
-            Column("finest_mean_error", "error there"),
-            Column("query_s", "query [us]", microseconds),
+        columns(
+            "surface",
+            "method",
+            "order",
+            "mean_error_at_0.3: error at h/r = 0.3",
+            "largest_error_at_0.3: largest",
+            "finest_triangles: triangles of the finest mesh",
+            "finest_mean_error: error there",
+            "query_s: query [us]",
         ),
         cells,
     )
@@ -161,18 +160,18 @@ def errors_table(rows: list[Row]) -> Table:
     return Table(
         "forces",
         "All meshes: errors of the force over the force, and time of a query.",
-        (
-            Column("surface", "surface"),
-            Column("method", "method"),
-            Column("triangles", "triangles"),
-            Column("side_over_radius", "h/r"),
-            Column("mean_error", "mean error"),
-            Column("largest_error", "largest"),
-            Column("mean_magnitude_error", "of the magnitude"),
-            Column("mean_direction_error_deg", "of the direction [deg]"),
-            Column("query_s", "query [us]", microseconds),
-            Column("query_low_s", "lower quartile", microseconds),
-            Column("query_high_s", "upper quartile", microseconds),
+        columns(
+            "surface",
+            "method",
+            "triangles",
+            "side_over_radius: h/r",
+            "mean_error",
+            "largest_error: largest",
+            "mean_magnitude_error: of the magnitude",
+            "mean_direction_error_deg: of the direction [deg]",
+            "query_s: query [us]",
+            "query_low_s: lower quartile",
+            "query_high_s: upper quartile",
         ),
         [
             (row.surface, row.rule, row.triangles, row.side, row.mean, row.largest)

@@ -13,6 +13,7 @@ from sphshell_pin.study.report.contents import (
     Progress,
     Section,
     Table,
+    columns,
 )
 from sphshell_pin.study.report.drawing import (
     BLUE,
@@ -78,14 +79,10 @@ def table(rows: list[Row]) -> Table:
         "hard_cases",
         "All verdicts.",
         (
-            Column("group", "group"),
-            Column("case", "case"),
-            Column("tried", "what is tried"),
-            Column("law", "law"),
+            *columns("group", "case", "tried: what is tried", "law"),
             Column("expected", "expected", seven_digits),
             Column("measured", "measured", seven_digits),
-            Column("error", "error"),
-            Column("bound", "bound"),
+            *columns("error", "bound"),
             Column("ok", "verdict", lambda ok: "ok" if ok else "FAILS"),
         ),
         [

@@ -15,12 +15,12 @@ from sphshell_pin.benchmarks.work_precision import Row
 from sphshell_pin.benchmarks.work_precision_cases import Case
 from sphshell_pin.study.report.contents import (
     TIMES,
-    Column,
     Finding,
     Picture,
     Progress,
     Section,
     Table,
+    columns,
 )
 from sphshell_pin.study.report.drawing import (
     BLUE,
@@ -149,12 +149,12 @@ def costs_table(cases: list[Case], rows: list[Row]) -> Table:
         for case in cases
         for name in COLORS
     ]
-    columns = [Column(f"cpu_at_{error:.0e}", f"error {power_of_ten(error)}") for error in ERRORS]
+    errors = (f"cpu_at_{error:.0e}: error {power_of_ten(error)}" for error in ERRORS)
     return Table(
         "integrators_costs",
         "CPU seconds per simulated second of the cheapest setting with at most this error; a "
         "dash where no setting that was tried gets there.",
-        (Column("case", "case"), Column("integrator", "integrator"), *columns),
+        columns("case", "integrator", *errors),
         cells,
     )
 
@@ -164,15 +164,15 @@ def rows_table(rows: list[Row]) -> Table:
     return Table(
         "integrators",
         "All settings.",
-        (
-            Column("case", "case"),
-            Column("integrator", "integrator"),
-            Column("setting", "setting"),
-            Column("error", "error"),
-            Column("cpu_s_per_s", "CPU s/s"),
-            Column("evaluations_per_s", "evaluations / s"),
-            Column("steps", "steps"),
-            Column("rejected", "rejected"),
+        columns(
+            "case",
+            "integrator",
+            "setting",
+            "error",
+            "cpu_s_per_s: CPU s/s",
+            "evaluations_per_s: evaluations / s",
+            "steps",
+            "rejected",
         ),
         [
             (r.case, r.integrator, r.setting, r.error, r.cpu, r.evaluations, r.steps, r.rejected)

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 
 from sphshell_pin.benchmarks.peers import measuring, scenes
-from sphshell_pin.benchmarks.peers.engine import Knob
+from sphshell_pin.benchmarks.peers.engine import Params
 from sphshell_pin.benchmarks.peers.measuring import Ratio, Row
 from sphshell_pin.study.report.contents import (
     TIMES,
-    Column,
     Finding,
     Picture,
     Progress,
     Section,
     Table,
+    columns,
     number,
 )
 from sphshell_pin.study.report.drawing import (
@@ -31,7 +31,7 @@ from sphshell_pin.study.report.drawing import (
 )
 
 KEY, TITLE = "peers", "Other engines"
-# Name on the page, colour, marker; of an engine that is not here, its own name in grey.
+# Name on the page, color, marker; of an engine that is not here, its own name in gray.
 LOOKS = {
     "ours": ("sphshell_pin", BLUE, "o"),
     "mujoco": ("MuJoCo", RED, "v"),
@@ -142,11 +142,11 @@ def _finding(key: str, what: str, ratio: Ratio, aim: float) -> Finding:
     )
 
 
-def knob_text(knob: Knob) -> str:
+def params_text(params: Params) -> str:
     """Return a setting in a few words."""
     return ", ".join(
         f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {value}"
-        for name, value in knob.items()
+        for name, value in params.items()
     )
 
 
@@ -160,21 +160,21 @@ def ratios_table(ratios: list[Ratio]) -> Table:
     return Table(
         "peers_ratios",
         "Cost of a peer over ours, in turns.",
-        (
-            Column("scene", "scene"),
-            Column("peer", "peer"),
-            Column("ratio", f"peer / ours [{TIMES}]"),
-            Column("low", "lower quartile"),
-            Column("high", "upper quartile"),
-            Column("peer_errors", "its errors"),
-            Column("our_errors", "ours"),
-            Column("peer_setting", "its setting"),
-            Column("our_setting", "ours"),
+        columns(
+            "scene",
+            "peer",
+            f"ratio: peer / ours [{TIMES}]",
+            "low: lower quartile",
+            "high: upper quartile",
+            "peer_errors: its errors",
+            "our_errors: ours",
+            "peer_setting: its setting",
+            "our_setting: ours",
         ),
         [
             (r.what, name_of(r.peer.engine), r.median, r.low, r.high)
             + (errors_text(r.peer.errors), errors_text(r.ours.errors))
-            + (knob_text(r.peer.knob), knob_text(r.ours.knob))
+            + (params_text(r.peer.params), params_text(r.ours.params))
             for r in ratios
         ],
     )
@@ -188,17 +188,17 @@ def scene_table(rows: list[Row], scene: str, title: str) -> Table:
     return Table(
         f"peers_{scene.replace(' ', '_')}",
         f"{title}.",
-        (
-            Column("engine", "engine"),
-            Column("setting", "setting"),
-            *(Column(name.replace(" ", "_"), name) for name in names),
-            Column("cost", unit),
-            Column("low", "lower quartile"),
-            Column("high", "upper quartile"),
-            Column("note", "note"),
+        columns(
+            "engine",
+            "setting",
+            *(f"{name.replace(' ', '_')}: {name}" for name in names),
+            f"cost: {unit}",
+            "low: lower quartile",
+            "high: upper quartile",
+            "note",
         ),
         [
-            (name_of(row.engine), knob_text(row.knob))
+            (name_of(row.engine), params_text(row.params))
             + tuple(row.errors.get(name, math.nan) for name in names)
             + (row.cost, row.low, row.high, row.note)
             for row in found
@@ -217,12 +217,7 @@ def settings_table(rows: list[Row]) -> Table:
     return Table(
         "peers_settings",
         "Settings, and where they are recommended.",
-        (
-            Column("engine", "engine"),
-            Column("scene", "scene"),
-            Column("setting", "setting"),
-            Column("text", "value and source"),
-        ),
+        columns("engine", "scene", "setting", "text: value and source"),
         list(settings),
         folded=True,
     )

@@ -9,6 +9,7 @@ import numpy as np
 from sphshell_pin.benchmarks import convergence, query, sizes, timing
 from sphshell_pin.benchmarks.sizes import Row
 from sphshell_pin.study.report.contents import (
+    TIME_COLUMNS,
     TIMES,
     Column,
     Finding,
@@ -16,9 +17,9 @@ from sphshell_pin.study.report.contents import (
     Progress,
     Section,
     Table,
+    columns,
     number,
     quartiles,
-    times_columns,
 )
 from sphshell_pin.study.report.drawing import (
     BLUE,
@@ -131,22 +132,25 @@ def findings_of(
 def peers_table(peers: Times) -> Table:
     """Return the times on 200 k triangles."""
     this = peers[query.THIS]
-    columns = times_columns(Column("code", "200 k triangles"))
     return Table(
         "queries_peers",
         "A query on 200 k triangles, in turn in one process; ours is the method facets.",
-        (*columns, Column("over_ours", f"over ours [{TIMES}]")),
+        columns("code: 200 k triangles", *TIME_COLUMNS, f"over_ours: over ours [{TIMES}]"),
         [(name, *quartiles(t), float(np.median(t / this))) for name, t in peers.items()],
     )
 
 
 def cost_table(cost: dict[str, Times]) -> Table:
     """Return the times of our methods."""
-    columns = times_columns(Column("surface", "200 k triangles"), Column("method", "method"))
     return Table(
         "queries_methods",
         "What a method costs.",
-        (*columns, Column("over_facets", f"over facets [{TIMES}]")),
+        columns(
+            "surface: 200 k triangles",
+            "method",
+            *TIME_COLUMNS,
+            f"over_facets: over facets [{TIMES}]",
+        ),
         [
             (surface, method, *quartiles(t), float(np.median(t / times["facets"])))
             for surface, times in cost.items()
@@ -158,28 +162,24 @@ def cost_table(cost: dict[str, Times]) -> Table:
 def growth_table(growth: dict[int, np.ndarray]) -> Table:
     """Return our time at equal contact patch."""
     few = growth[min(growth)]
-    columns = times_columns(Column("triangles", "triangles"))
     return Table(
         "queries_growth",
         "Our query (facets) at equal contact patch, in turn in one process.",
-        (*columns, Column("over_smallest", f"over the smallest [{TIMES}]")),
+        columns("triangles", *TIME_COLUMNS, f"over_smallest: over the smallest [{TIMES}]"),
         [(count, *quartiles(t), float(np.median(t / few))) for count, t in growth.items()],
     )
 
 
 def sizes_table(rows: list[Row]) -> Table:
     """Return times and memory of all contestants at all sizes."""
-    columns = times_columns(
-        Column("code", "code"), Column("question", "answers"), Column("triangles", "triangles")
-    )
     return Table(
         "queries_sizes",
         "Every contestant in a process of its own: query, building, memory held.",
         (
-            *columns,
-            Column("build_s", "build [s]"),
+            *columns("code", "question: answers", "triangles", *TIME_COLUMNS),
+            Column("build_s", "build [s]", number),
             Column("memory_bytes", "memory [MB]", lambda m: number(m / 1e6)),
-            Column("bytes_per_triangle", "bytes / triangle"),
+            *columns("bytes_per_triangle: bytes / triangle"),
         ),
         [
             (row.name, row.question, row.triangles, row.query.median, row.query.low)

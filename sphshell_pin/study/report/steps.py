@@ -6,16 +6,15 @@ import numpy as np
 
 from sphshell_pin.benchmarks import step, timing
 from sphshell_pin.study.report.contents import (
+    TIME_COLUMNS,
     TIMES,
-    Column,
     Finding,
     Picture,
     Progress,
     Section,
     Table,
-    microseconds,
+    columns,
     quartiles,
-    times_columns,
 )
 from sphshell_pin.study.report.drawing import (
     BLUE,
@@ -95,11 +94,10 @@ def assemble(steps: Times, added: Times, imports: Times) -> Section:
 def steps_table(steps: Times) -> Table:
     """Return the times of whole steps."""
     bare = steps[step.BARE]
-    columns = times_columns(Column("scene", "scene"))
     return Table(
         "steps",
         "Whole steps, in turn in one process.",
-        (*columns, Column("over_bare", f"over ABA + integrate [{TIMES}]")),
+        columns("scene", *TIME_COLUMNS, f"over_bare: over ABA + integrate [{TIMES}]"),
         [(name, *quartiles(t), float(np.median(t / bare))) for name, t in steps.items()],
     )
 
@@ -109,10 +107,10 @@ def parts_table(parts: dict[str, Times]) -> Table:
     return Table(
         "steps_parts",
         "Parts of a step, medians.",
-        (
-            Column("scene", "scene"),
-            *(Column(f"{key}_s", f"{name} [us]", microseconds) for key, (name, _) in PARTS.items()),
-            Column("whole_s", "whole [us]", microseconds),
+        columns(
+            "scene",
+            *(f"{key}_s: {name} [us]" for key, (name, _) in PARTS.items()),
+            "whole_s: whole [us]",
         ),
         [
             (
@@ -131,7 +129,7 @@ def ingredients_table(added: Times) -> Table:
     return Table(
         "steps_ingredients",
         "What an ingredient adds to the step; a scene without it does not pay.",
-        (*times_columns(Column("scene", "scene")), Column("added_s", "added [us]", microseconds)),
+        columns("scene", *TIME_COLUMNS, "added_s: added [us]"),
         [(name, *quartiles(t), float(np.median(t - base))) for name, t in added.items()],
     )
 

@@ -1,4 +1,4 @@
-"""Is contact right on this robot? Seven checks against ways apart from the compiled core.
+"""Seven checks of contact on a robot, by computations independent of the compiled core.
 
 `check_robot` takes a name that sphshell_pin.robots knows or a URDF file, and returns a RobotReport.
 """
@@ -23,9 +23,8 @@ from sphshell_pin.study.robot_check.report import (
     RobotReport,
     as_json,
     as_markdown,
+    as_table,
     remarks,
-    told,
-    write,
 )
 from sphshell_pin.study.robot_check.setting import Touch, fixed_touch, free_touch, setting_of
 
@@ -42,12 +41,11 @@ __all__ = [
     "all_names",
     "as_json",
     "as_markdown",
+    "as_table",
     "check_known",
     "check_robot",
     "contact_scene",
     "remarks",
-    "told",
-    "write",
 ]
 
 

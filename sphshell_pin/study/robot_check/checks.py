@@ -38,7 +38,7 @@ _RTOL = 1e-9
 # Of a run [s]: to come, to touch (three times depth / speed, as the law is made) and to leave.
 _DURATION = 1.2 * (0.05 + 3.0 * 0.2) / SPEED
 
-_SHOTS = 8
+_IMPACTS = 8
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ CHECKS: dict[str, Check] = {
     ),
     "energy": Check(
         "energy",
-        f"energy that appears from nowhere in two runs under gravity, `Adaptive({_RTOL:g})`: one "
+        f"energy that is not accounted for in two runs under gravity, `Adaptive({_RTOL:g})`: one "
         "with damping and friction, by the run's audit, one without, by closed forms; relative to "
         "what changes form",
         1e-6,
@@ -91,7 +91,7 @@ CHECKS: dict[str, Check] = {
     "fast": Check(
         "fast",
         "a sphere that crosses the shell by two radii within one step, were it not stopped: "
-        "how often its centre passes through (`Adaptive`, and `SemiImplicitEuler` with that step)",
+        "how often its center passes through (`Adaptive`, and `SemiImplicitEuler` with that step)",
         0.0,
     ),
 }
@@ -169,25 +169,25 @@ def _energies(setting: Setting, rng: np.random.Generator) -> list[Finding]:
 
 
 def _fast(setting: Setting, rng: np.random.Generator) -> list[Finding]:
-    """Shoot the sphere at the patch: without contact a step would end two radii behind it."""
-    for _ in range(_SHOTS):
+    """Let the sphere hit the patch: without contact a step would end two radii behind it."""
+    for _ in range(_IMPACTS):
         try:
-            results = _shot(setting, rng)
+            results = _impact(setting, rng)
         except SimulationDiverged:
             # Euler's method with so long a step: light joints spun up by those that were stopped.
             continue
         findings = [passage(result) for result in results]
         met = all(any(event.kind == "touch" for event in result.events) for result in results)
-        # A limb may turn away before it meets the patch: that shot says nothing.
+        # A limb may turn away before it meets the patch: that impact test says nothing.
         if met or any(finding.error > 0.0 for finding in findings):
             return findings
-    return [Finding(math.inf, f"none of {_SHOTS} shots met the shell")]
+    return [Finding(math.inf, f"none of {_IMPACTS} impact tests met the shell")]
 
 
-def _shot(setting: Setting, rng: np.random.Generator) -> list[Result]:
-    """Return a shot by each of two integrators."""
+def _impact(setting: Setting, rng: np.random.Generator) -> list[Result]:
+    """Return an impact test by each of two integrators."""
     radius, step, gap = setting.radius, 1e-2, 2.0
-    # From gap + 1 radii before the surface to 2 behind it, for the centre.
+    # From gap + 1 radii before the surface to 2 behind it, for the center.
     speed = (gap + 3.0) * radius / step
     touch = fixed_touch(setting, rng, gap, speed, least=True)
     pair = touch.scene.pairs[0]
@@ -196,8 +196,8 @@ def _shot(setting: Setting, rng: np.random.Generator) -> list[Result]:
     heavy = 2.0 * pin.computeKineticEnergy(scene.model, data, touch.q, touch.v) / speed**2
     law = stopping_law(heavy, speed, 0.3 * radius)
     scene.add_contact(setting.sphere, setting.shell, pair.frame_j, pair.placement, law)
-    shot = replace(touch, scene=scene)
-    return [_run(shot, how, step) for how in (Adaptive(), SemiImplicitEuler(step))]
+    start = replace(touch, scene=scene)
+    return [_run(start, how, step) for how in (Adaptive(), SemiImplicitEuler(step))]
 
 
 def _contacts(setting: Setting, rng: np.random.Generator, poses: int) -> list[Finding]:

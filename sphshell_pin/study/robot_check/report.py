@@ -6,12 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from os import PathLike
-from pathlib import Path
-from typing import Any
 
-from sphshell_pin.atomic import atomic_file
-from sphshell_pin.errors import ResultError
 from sphshell_pin.study.robot_check.checks import CHECKS, Sizes
 from sphshell_pin.testing.finding import Finding
 
@@ -52,7 +47,7 @@ class RobotReport:
         """Sentences on what failed, what was not checked, and what was done differently."""
         failed = [
             f"{CHECKS[key].title} failed: {self.findings[key].where} "
-            f"({told(self.findings[key].error)}, allowed {CHECKS[key].tolerance:g})"
+            f"({error_text(self.findings[key].error)}, allowed {CHECKS[key].tolerance:g})"
             for key in self.findings
             if not self.met(key)
         ]
@@ -65,37 +60,61 @@ class RobotReport:
         return self
 
 
-def told(error: float) -> str:
+def error_text(error: float) -> str:
     """Return an error as the tables show it."""
     return "0" if error == 0.0 else f"{error:.0e}" if math.isfinite(error) else "no figure"
+
+
+def as_table(reports: Sequence[RobotReport]) -> list[list[str]]:
+    """Return a row of texts for each robot: name, frame, size, an error for each check, verdict."""
+    return [
+        [
+            one.name,
+            one.frame,
+            f"{one.nq}/{one.nv}" if one.nv else "",
+            *(error_text(one.findings[key].error) if key in one.findings else "" for key in CHECKS),
+            one.verdict,
+        ]
+        for one in reports
+    ]
 
 
 def as_markdown(reports: Sequence[RobotReport], command: str) -> str:
     """Return a page with the table of all robots; `command` is what writes it."""
     passed = sum(one.verdict == PASS for one in reports)
-    lines = [
-        "# Every robot",
-        "",
-        f"{passed} of {len(reports)} robots pass; written by `{command}`. A sphere is attached to "
-        "the frame told, a curved shell of 800 elements is put under it at random legal postures, "
-        "and each check compares the result to a way apart from the compiled core "
-        "([testing](testing.md)). Figures are the worst over all postures.",
-        "",
-        "| check | what is compared | allowed |",
-        "|---|---|---|",
-        *(f"| {one.title} | {one.compares} | {one.tolerance:g} |" for one in CHECKS.values()),
-        "",
-        f"| robot | frame | nq/nv | {' | '.join(one.title for one in CHECKS.values())} | verdict |",
-        f"|---|---|---{'|---' * len(CHECKS)}|---|",
+    rows = [
+        [name, f"`{frame}`" if frame else "", *rest] for name, frame, *rest in as_table(reports)
     ]
-    for one in reports:
-        figures = [told(one.findings[key].error) if key in one.findings else "" for key in CHECKS]
-        size = f"{one.nq}/{one.nv}" if one.nv else ""
-        frame = f"`{one.frame}`" if one.frame else ""
-        lines.append(f"| {one.name} | {frame} | {size} | {' | '.join(figures)} | {one.verdict} |")
-    lines += ["", "## Remarks", ""]
-    lines += [f"- {sentence}" for sentence in remarks(reports)] or ["None."]
-    return "\n".join(lines) + "\n"
+    return "\n".join(
+        [
+            "# Every robot",
+            "",
+            f"{passed} of {len(reports)} robots pass; written by `{command}`. A sphere is attached "
+            "to the frame listed, a curved shell of 800 elements is put under it at random legal "
+            "postures, and each check compares the result with computations independent of the "
+            "compiled core ([testing](testing.md)). Figures are the worst over all postures.",
+            "",
+            *_lines(
+                ["check", "what is compared", "allowed"],
+                [[one.title, one.compares, f"{one.tolerance:g}"] for one in CHECKS.values()],
+            ),
+            "",
+            *_lines(
+                ["robot", "frame", "nq/nv", *(one.title for one in CHECKS.values()), "verdict"],
+                rows,
+            ),
+            "",
+            "## Remarks",
+            "",
+            *([f"- {sentence}" for sentence in remarks(reports)] or ["None."]),
+            "",
+        ]
+    )
+
+
+def _lines(headings: list[str], rows: list[list[str]]) -> list[str]:
+    table = [headings, ["---"] * len(headings), *rows]
+    return [f"| {' | '.join(cells)} |" for cells in table]
 
 
 def remarks(reports: Sequence[RobotReport]) -> list[str]:
@@ -109,43 +128,22 @@ def remarks(reports: Sequence[RobotReport]) -> list[str]:
 
 def as_json(reports: Sequence[RobotReport], seed: int, sizes: Sizes) -> str:
     """Return all figures as JSON; what is no finite number is null."""
-    data: dict[str, Any] = {
+    robots: list[dict[str, object]] = []
+    for one in reports:
+        checks = {
+            key: {"error": _number(found.error), "met": one.met(key), "where": found.where}
+            for key, found in one.findings.items()
+        }
+        figures = {name: getattr(one, name) for name in ("name", "nq", "nv", "verdict", "reason")}
+        others = {"frame": one.frame or None, "radius": _number(one.radius), "notes": one.notes}
+        robots.append(figures | others | {"checks": checks})
+    data = {
         "seed": seed,
         "sizes": vars(sizes),
         "checks": {key: vars(check) for key, check in CHECKS.items()},
-        "robots": [
-            {
-                "name": one.name,
-                "frame": one.frame or None,
-                "radius": _number(one.radius),
-                "nq": one.nq,
-                "nv": one.nv,
-                "verdict": one.verdict,
-                "reason": one.reason,
-                "notes": list(one.notes),
-                "checks": {
-                    key: {
-                        "error": _number(finding.error),
-                        "met": one.met(key),
-                        "where": finding.where,
-                    }
-                    for key, finding in one.findings.items()
-                },
-            }
-            for one in reports
-        ],
+        "robots": robots,
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
-
-
-def write(path: str | PathLike[str], text: str) -> Path:
-    """Write a text file, whole or not at all; ResultError if that cannot be done."""
-    try:
-        with atomic_file(path) as stream:
-            stream.write(text.encode())
-    except OSError as error:
-        raise ResultError(path, f"cannot be written: {error.strerror}") from error
-    return Path(path)
 
 
 def _number(value: float) -> float | None:

@@ -53,7 +53,7 @@ class Touch:
     q: Array
     v: Array
     speed: float
-    """Of the sphere's centre against the patch [m/s]."""
+    """Of the sphere's center against the patch [m/s]."""
     mass: float
     """That the contact feels along its normal [kg]."""
 
@@ -174,7 +174,7 @@ def stopping_law(mass: float, speed: float, depth: float) -> ImpactLaw:
 
 @dataclass(frozen=True)
 class _Contact:
-    """Where on the patch, and from where, the sphere meets it: all lengths in metres."""
+    """Where on the patch, and from where, the sphere meets it: all lengths in meters."""
 
     normal: Array
     """In the world, from the patch to the sphere (3,)."""
@@ -220,7 +220,7 @@ class _Contact:
 def _motion(
     model: pin.Model, sphere: Sphere, rng: np.random.Generator, speed: float
 ) -> tuple[Array, Array, Array]:
-    """Return q, v and the direction (3,) in which the sphere's centre moves with `speed` [m/s]."""
+    """Return q, v and the direction (3,) in which the sphere's center moves with `speed` [m/s]."""
     data = model.createData()
     # A posture where two axes are nearly one is legal, but its accelerations run away: a last way.
     for wanted in (1e-3, 1e-4, 1e-9):

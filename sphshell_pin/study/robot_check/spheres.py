@@ -62,7 +62,7 @@ def _sphere(tip: Tip, shift: Array | float = 0.0) -> Sphere:
 
 
 def _lever(model: pin.Model, sphere: Sphere, rng: np.random.Generator) -> float:
-    """Return the farthest that a joint moves the sphere's centre [m/rad or m/m], of some postures.
+    """Return the farthest that a joint moves the sphere's center [m/rad or m/m], of some postures.
 
     Of a joint that slides, which moves it as far as one likes, it is 1.
     """
@@ -115,7 +115,7 @@ def moved_sphere(model: pin.Model, tip: Tip, rng: np.random.Generator) -> tuple[
 
 
 def center_of(model: pin.Model, data: pin.Data, sphere: Sphere) -> tuple[int, Array]:
-    """Return the joint that carries the sphere, and its centre (3,) in the world; `data` is set."""
+    """Return the joint that carries the sphere, and its center (3,) in the world; `data` is set."""
     frame = find_frame(model, sphere.frame)
     return int(model.frames[frame].parentJoint), np.array(
         data.oMf[frame].act(np.array(sphere.offset))

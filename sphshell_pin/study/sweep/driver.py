@@ -249,7 +249,7 @@ def run_plan(
         raise SweepError('a script must call sweep below if __name__ == "__main__":')
     notes: list[str] = []
 
-    def tell(sentence: str) -> None:
+    def report_note(sentence: str) -> None:
         notes.append(sentence)
         if note is not None:
             note(sentence)
@@ -259,7 +259,7 @@ def run_plan(
         _make_folder(out.parent)
         journal = Journal(out.with_name(out.name + SUFFIX), plan.head, len(plan.runs))
         for sentence in journal.notes:
-            tell(sentence)
+            report_note(sentence)
     outcomes = {} if journal is None else dict(journal.outcomes)
     if retry_failed:
         outcomes = {i: one for i, one in outcomes.items() if one.status != FAILED}
@@ -268,7 +268,7 @@ def run_plan(
     missing = [run for run in plan.runs if run.number not in outcomes]
     deaths: list[int] = []
     if scheduler is not None and missing:
-        done = run_on_cluster(plan.job, missing, scheduler, tell, deaths.append)
+        done = run_on_cluster(plan.job, missing, scheduler, report_note, deaths.append)
     elif workers:
         done = run_locally(plan.job, missing, workers, deaths.append)
     else:

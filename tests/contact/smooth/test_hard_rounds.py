@@ -92,6 +92,7 @@ def test_force_on_a_ring() -> None:
         assert np.linalg.norm(force[:2]) <= 1.01 * FLANK / NEAREST
 
 
+@pytest.mark.slow
 def test_centre_near_the_centre_of_curvature() -> None:
     """Centre near that of the curvature of a bowl, all about equally near; the nearest is found."""
     for cells in (4, 8):
@@ -161,6 +162,7 @@ def tube() -> Shell:
     return Shell(vertices / 3, elements, normals=normals)
 
 
+@pytest.mark.slow
 def test_tube_of_the_radius_of_the_sphere() -> None:
     """Tube of radius r, sphere off its axis; one contact, exact to 1 %."""
     for depth in (0.2, 0.05, 0.01):

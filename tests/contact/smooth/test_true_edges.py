@@ -146,6 +146,7 @@ def cone(facets: int, slope: float, rings: int = 1):
     return np.concatenate(vertices), np.array(triangles, dtype=np.int32)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rings", [1, 4])
 @pytest.mark.parametrize("slope", [0.4, 0.6, 1.0])
 def test_cone_tip(slope: float, rings: int) -> None:

@@ -24,7 +24,7 @@ Vec3 angle_rate(const Vec3& u, const Vec3& w) {
 
 }  // namespace
 
-Chart::Chart(Scene& scene, Torques& torques)
+Chart::Chart(SceneData& scene, Torques& torques)
     : scene_(scene),
       torques_(torques),
       nv_(scene.body().model().nv),

@@ -1,7 +1,7 @@
 // The equations of motion in coordinates round the state at which a step begins.
 #pragma once
 
-#include "dynamics/scene.hpp"
+#include "dynamics/scene_data.hpp"
 
 namespace sphshell {
 
@@ -42,7 +42,7 @@ class Chart {
  public:
   static constexpr int kWork = 3;
 
-  Chart(Scene& scene, Torques& torques);
+  Chart(SceneData& scene, Torques& torques);
 
   // The forces have been evaluated at `origin`.
   void begin(const State& origin);
@@ -59,7 +59,7 @@ class Chart {
   void finish(double t, const VectorX& y, State& out) const;
 
   const State& origin() const { return *origin_; }
-  Scene& scene() { return scene_; }
+  SceneData& scene() { return scene_; }
   Torques& torques() { return torques_; }
   int nv() const { return nv_; }
   int nz() const { return static_cast<int>(origin_->z.size()); }
@@ -69,7 +69,7 @@ class Chart {
   void place(const VectorX& y, VectorX& q, VectorX& v) const;
   const VectorX& fill(double t, const VectorX& q, const VectorX& v, VectorX& out);
 
-  Scene& scene_;
+  SceneData& scene_;
   Torques& torques_;
   const State* origin_ = nullptr;
   int nv_;

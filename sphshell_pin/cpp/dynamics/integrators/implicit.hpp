@@ -11,7 +11,7 @@ namespace sphshell {
 // The rates of a chart at its origin, their Jacobian, and systems with I / (gamma h) - Jacobian.
 class ImplicitStepper : public Stepper {
  public:
-  explicit ImplicitStepper(Scene& scene) : linearization_(scene) {}
+  explicit ImplicitStepper(SceneData& scene) : linearization_(scene) {}
   void begin(Chart& chart) override;
   bool is_implicit() const override { return true; }
 

@@ -11,8 +11,8 @@ namespace sphshell {
 namespace {
 
 template <class Method>
-std::unique_ptr<Stepper> make(Scene& scene) {
-  if constexpr (std::is_constructible_v<Method, Scene&>)
+std::unique_ptr<Stepper> make(SceneData& scene) {
+  if constexpr (std::is_constructible_v<Method, SceneData&>)
     return std::make_unique<Method>(scene);
   else
     return std::make_unique<Method>();
@@ -20,7 +20,7 @@ std::unique_ptr<Stepper> make(Scene& scene) {
 
 struct Entry {
   std::string_view name;
-  std::unique_ptr<Stepper> (*make)(Scene&);
+  std::unique_ptr<Stepper> (*make)(SceneData&);
 };
 
 // A new method is one line here, and the class of that name in dynamics/integrators.py.
@@ -34,7 +34,7 @@ constexpr Entry kIntegrators[] = {
 
 }  // namespace
 
-std::unique_ptr<Stepper> make_stepper(std::string_view integrator, Scene& scene) {
+std::unique_ptr<Stepper> make_stepper(std::string_view integrator, SceneData& scene) {
   std::string names;
   for (const Entry& entry : kIntegrators) {
     if (entry.name == integrator) return entry.make(scene);

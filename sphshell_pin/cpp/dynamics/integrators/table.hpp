@@ -9,6 +9,6 @@
 namespace sphshell {
 
 // Throws std::invalid_argument, which lists the names, for any other.
-std::unique_ptr<Stepper> make_stepper(std::string_view integrator, Scene& scene);
+std::unique_ptr<Stepper> make_stepper(std::string_view integrator, SceneData& scene);
 
 }  // namespace sphshell

@@ -1,48 +1,17 @@
-// The contact pairs of a multibody model, and the forces they exert at a state.
+// The contacts of a multibody model at one state, and their forces.
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <functional>
-#include <memory>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include "contact/friction.hpp"
-#include "contact/query.hpp"
 #include "contact/tracker.hpp"
 #include "dynamics/bristles.hpp"
+#include "dynamics/contact_row.hpp"
 #include "dynamics/multibody.hpp"
+#include "dynamics/pair.hpp"
 
 namespace sphshell {
-
-using SE3 = pinocchio::SE3;
-
-// A user's own contact points: poses of both frames in, contacts (points and normals in the world,
-// normals from j to i) out.
-using ContactSource =
-    std::function<void(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& contacts)>;
-
-// Body i carries the sphere, body j the shell. With a source, both placements are those of its
-// frames; else `placement_i` holds the sphere's center and `placement_j` the shell.
-struct Pair {
-  std::string name;
-  int joint_i = 0, joint_j = 0;
-  SE3 placement_i = SE3::Identity(), placement_j = SE3::Identity();
-  double radius = 0;
-  std::shared_ptr<const Shell> shell;
-  ContactSource source;
-  Method method = Method::Facets;
-  NormalLaw law;
-  FrictionLaw friction;
-  double relaxation = 2e-5;  // time in which bristles give way beyond their limit [s]
-
-  bool needs_velocity() const { return law.needs_rate() || friction.active(); }
-  // Whether the derivative of a contact's normal is known.
-  bool has_dn_dc() const { return !source && method != Method::Elements; }
-};
 
 // One pair at one state.
 struct PairState {
@@ -72,33 +41,6 @@ struct ActiveContact {
   ContactForce<double> force;
 };
 
-// A contact as it is recorded; points and vectors in the world.
-struct ContactRow {
-  double point[3], normal[3], depth, normal_force, friction_force[3], slip_velocity[3];
-  std::int32_t pair, element, contact_id;
-  Feature feature;
-};
-
-// The fields of a ContactRow; Python's structured type is made of them.
-struct RowField {
-  const char* name;
-  const char* type;  // NumPy's
-  int size;
-  std::size_t offset;
-};
-inline constexpr RowField kContactRowFields[] = {
-    {"pair", "i4", 1, offsetof(ContactRow, pair)},
-    {"point_world", "f8", 3, offsetof(ContactRow, point)},
-    {"normal_world", "f8", 3, offsetof(ContactRow, normal)},
-    {"depth", "f8", 1, offsetof(ContactRow, depth)},
-    {"normal_force", "f8", 1, offsetof(ContactRow, normal_force)},
-    {"friction_force_world", "f8", 3, offsetof(ContactRow, friction_force)},
-    {"slip_velocity_world", "f8", 3, offsetof(ContactRow, slip_velocity)},
-    {"element", "i4", 1, offsetof(ContactRow, element)},
-    {"feature", "u1", 1, offsetof(ContactRow, feature)},
-    {"contact_id", "i4", 1, offsetof(ContactRow, contact_id)},
-};
-
 // How far a sphere came from where a step began, in all evaluations since, and whether it touched.
 struct Excursion {
   Vec3 from = Vec3::Zero();  // center in the shell's frame
@@ -106,10 +48,11 @@ struct Excursion {
   bool touched = false;
 };
 
-// A scene at one state: kinematics, contacts and forces. One per thread.
-class Scene {
+// A scene at one state: kinematics, contacts and forces, as pinocchio::Data is a model at one
+// state. Model and pairs are its own copies. One per thread.
+class SceneData {
  public:
-  Scene(const pinocchio::Model& model, std::vector<Pair> pairs);
+  SceneData(const pinocchio::Model& model, std::vector<Pair> pairs);
 
   // The same pairs with other laws, friction of the same kind, radii and relaxation.
   void change(std::vector<Pair> pairs);

@@ -1,11 +1,11 @@
-#include "dynamics/scene.hpp"
+#include "dynamics/scene_data.hpp"
 
 #include <algorithm>
 #include <utility>
 
 namespace sphshell {
 
-Scene::Scene(const pinocchio::Model& model, std::vector<Pair> pairs)
+SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs)
     : body_(model),
       pairs_(std::move(pairs)),
       queries_(pairs_.size(), Query(true)),
@@ -31,27 +31,27 @@ Scene::Scene(const pinocchio::Model& model, std::vector<Pair> pairs)
   active_.reserve(64);
 }
 
-void Scene::change(std::vector<Pair> pairs) {
+void SceneData::change(std::vector<Pair> pairs) {
   pairs_ = std::move(pairs);
   for (const Pair& pair : pairs_) needs_velocity_ = needs_velocity_ || pair.needs_velocity();
 }
 
-void Scene::need_velocity_of(int joint) {
+void SceneData::need_velocity_of(int joint) {
   body_.need(joint);
   needs_velocity_ = true;
 }
 
-void Scene::restart() {
+void SceneData::restart() {
   for (ContactTracker& tracker : trackers_) tracker.restart();
   for (Excursion& excursion : excursions_) excursion.moved = 0, excursion.touched = false;
 }
 
-void Scene::want_dn_dc() {
+void SceneData::want_dn_dc() {
   for (std::size_t k = 0; k < pairs_.size(); ++k)
     if (pairs_[k].has_dn_dc()) queries_[k].want_dn_dc();
 }
 
-void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool identify) {
+void SceneData::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool identify) {
   active_.clear();
   if (needs_velocity_)
     body_.kinematics(q, v);
@@ -80,13 +80,13 @@ void Scene::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool 
   compute_forces(z);
 }
 
-void Scene::revisit(const VectorX& q, const VectorX& v, const VectorX& z) {
+void SceneData::revisit(const VectorX& q, const VectorX& v, const VectorX& z) {
   if (active_.empty()) return;
   if (needs_velocity_) body_.kinematics(q, v);
   compute_forces(z);
 }
 
-void Scene::accept(VectorX& z) {
+void SceneData::accept(VectorX& z) {
   bristles_.begin();
   std::size_t next = 0;
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
@@ -119,7 +119,7 @@ void Scene::accept(VectorX& z) {
   compute_forces(z);
 }
 
-std::vector<Contact>& Scene::find_contacts(std::size_t k) {
+std::vector<Contact>& SceneData::find_contacts(std::size_t k) {
   const Pair& pair = pairs_[k];
   PairState& state = states_[k];
   Query& query = queries_[k];
@@ -149,7 +149,7 @@ std::vector<Contact>& Scene::find_contacts(std::size_t k) {
   return query.contacts;
 }
 
-void Scene::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {
+void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {
   ActiveContact& active = active_.emplace_back();
   active.pair = static_cast<int>(k);
   active.slot = slot;
@@ -157,7 +157,7 @@ void Scene::add_contact(std::size_t k, const Contact& contact, int slot, int con
   active.contact = contact;
 }
 
-void Scene::compute_forces(const VectorX& z) {
+void SceneData::compute_forces(const VectorX& z) {
   powers_ = Powers();
   bristle_rates_.setZero(bristle_size());
   touching_ = !active_.empty();
@@ -171,7 +171,7 @@ void Scene::compute_forces(const VectorX& z) {
   }
 }
 
-void Scene::compute_kinematics(ActiveContact& active, const VectorX& z) {
+void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
   const SE3& world_from_j = states_[active.pair].world_from_j;
   ContactKinematics<double>& m = active.kinematics;
@@ -186,7 +186,7 @@ void Scene::compute_kinematics(ActiveContact& active, const VectorX& z) {
   if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
 }
 
-void Scene::compute_force(ActiveContact& active, const VectorX& z) {
+void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
   active.force =
       contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), active.kinematics);
@@ -198,7 +198,7 @@ void Scene::compute_force(ActiveContact& active, const VectorX& z) {
 }
 
 // How fast a stretch turns with the normal, in the shell's frame.
-Vec3 Scene::rate_of_turning(const ActiveContact& active, const Vec3& stretch) const {
+Vec3 SceneData::rate_of_turning(const ActiveContact& active, const Vec3& stretch) const {
   const Pair& pair = pairs_[active.pair];
   if (!pair.has_dn_dc()) return Vec3::Zero();
   const PairState& state = states_[active.pair];
@@ -210,7 +210,7 @@ Vec3 Scene::rate_of_turning(const ActiveContact& active, const Vec3& stretch) co
 }
 
 // Adds a contact to the forces on the joints and to the sums of its pair.
-void Scene::add_force(const ActiveContact& active) {
+void SceneData::add_force(const ActiveContact& active) {
   const Pair& pair = pairs_[active.pair];
   const ContactForce<double>& f = active.force;
   const ContactKinematics<double>& m = active.kinematics;
@@ -234,8 +234,8 @@ void Scene::add_force(const ActiveContact& active) {
     powers_.bristles += 0.5 * share * pair.friction.bristle()->stiffness * f.bristle.squaredNorm();
 }
 
-void Scene::apply(int joint, const Vec3& point_world, const Vec3& force_world,
-                  const Vec3& moment_world) {
+void SceneData::apply(int joint, const Vec3& point_world, const Vec3& force_world,
+                      const Vec3& moment_world) {
   if (joint == 0) return;  // the world does not move
   const SE3& pose = body_.world_from_joint(joint);
   const Vec3 force = pose.rotation().transpose() * force_world;
@@ -244,13 +244,13 @@ void Scene::apply(int joint, const Vec3& point_world, const Vec3& force_world,
       pose.actInv(point_world).cross(force) + pose.rotation().transpose() * moment_world;
 }
 
-Vec3 Scene::relative_velocity(const Pair& pair, const Vec3& point_world) const {
+Vec3 SceneData::relative_velocity(const Pair& pair, const Vec3& point_world) const {
   return body_.velocity_at(pair.joint_i, point_world) -
          body_.velocity_at(pair.joint_j, point_world);
 }
 
 // Contacts of one place as one, with the sum of their forces.
-void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows) {
+void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows) {
   if (active_.empty()) return;
   if (!needs_velocity_) body_.kinematics(q, v);
   const auto write = [](double* to, const Vec3& x) { std::copy_n(x.data(), 3, to); };
@@ -288,7 +288,7 @@ void Scene::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& row
   }
 }
 
-const VectorX& Scene::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
+const VectorX& SceneData::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
   return touching_ ? body_.acceleration(q, v, tau, external_) : body_.acceleration(q, v, tau);
 }
 
