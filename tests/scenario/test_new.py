@@ -252,6 +252,8 @@ def test_its_knobs_turn(tmp_path):
         (("ball", "blub.stl"), {}, SphshellError, "no such surface file: blub.stl"),
         (("ball", BLADE), {}, UnitMissing, "must be stated"),
         (("ball", "plane"), {"unit": "mm"}, SphshellError, "sized in meters"),
+        (("ball", "plane"), {"faces": [3]}, SphshellError, "not to the plane"),
+        ((BLADE,), {}, SphshellError, "is not a URDF file"),
         (("ball",), {"frame": "bal"}, FrameNotFound, "no frame 'bal'"),
         (("ball",), {"radius": -1.0}, InvalidParameter, "must be positive"),
         (("ball",), {"press": 3.0}, SphshellError, "leave out --press"),
