@@ -134,10 +134,10 @@ def plan_press(
         )
     gap = TIP_GAP * tip.radius
     touch, turned, points, even = _place_to_press(shell, tip, stance, gap, toward, inside=inside)
-    placement = pin.SE3(turned, stance.centre - turned @ touch.centre)
+    placement = pin.SE3(turned, stance.center - turned @ touch.center)
     force = _round(_suitable_force(stance, tip.radius, materials) if press is None else press)
     rate = _round(PATH_RATE * tip.radius)
-    aside = turned.T @ (stance.origin - stance.centre)
+    aside = turned.T @ (stance.origin - stance.center)
     # The tip's frame, which follows the path, need not be at the sphere's center.
     path = points + aside - touch.normal * (touch.normal @ aside)
     contact = _contact(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
@@ -208,7 +208,7 @@ def plan_fall(
     beside = FALL_BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
     touch = find_touch_point(shell, tip.radius, gap, toward=UP, inside=inside, beside=beside)
     start = root.copy()
-    start[:3] += touch.centre - center
+    start[:3] += touch.center - center
     speed = math.sqrt(2 * GRAVITY * gap)
     why = (
         f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
@@ -324,7 +324,7 @@ def _under(shell: Shell, centers: Array, radii: Array, gap: float) -> pin.SE3:
         for center, radius in zip(centers, radii, strict=True):
             above = center - aside
             above[2] = shell.box[1, 2] + 2 * (radius + gap)
-            down = come_down(shell, above, -UP, float(radius), gap).centre[2]
+            down = come_down(shell, above, -UP, float(radius), gap).center[2]
             if down > shell.box[0, 2] - radius:
                 heights.append(center[2] - down)
         if heights:
