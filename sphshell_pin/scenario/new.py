@@ -34,18 +34,9 @@ from sphshell_pin.scenario.plan import (
     plan_stand,
 )
 from sphshell_pin.scenario.poses import take_stance
+from sphshell_pin.scenario.primitives import Ball, Box, Cylinder, HalfSpace, Primitive
 from sphshell_pin.scenario.reading import parse_scenario
-from sphshell_pin.scenario.schema import (
-    Box,
-    HalfSpace,
-    Primitive,
-    RobotSection,
-    RoundSolid,
-    RunSection,
-    Scenario,
-    ShellSection,
-    SphereSurface,
-)
+from sphshell_pin.scenario.schema import RobotSection, RunSection, Scenario, ShellSection
 from sphshell_pin.scenario.tips import Tip, find_tips, floats
 
 if TYPE_CHECKING:
@@ -303,13 +294,13 @@ def _shell_section(
     centers = _centers(built, tips)
     spread = float(np.linalg.norm(np.ptp(centers, axis=0)))
     size = _round_up(max(_SIZE * max(tip.radius for tip in tips), spread))
-    ball = SphereSurface(type="sphere", radius=size)
+    ball = Ball(size)
     primitives: dict[str, Primitive] = {
-        "plane": HalfSpace(type="half-space", extent=2 * size),
-        "box": Box(type="box", size=[2 * size, 2 * size, 0.4 * size]),
+        "plane": HalfSpace(2 * size),
+        "box": Box([2 * size, 2 * size, 0.4 * size]),
         "sphere": ball,
         "bowl": ball,
-        "cylinder": RoundSolid(type="cylinder", radius=size, length=2 * size),
+        "cylinder": Cylinder(radius=size, length=2 * size),
     }
     return ShellSection(name=word, primitive=primitives[word]), word
 

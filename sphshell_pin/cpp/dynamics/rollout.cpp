@@ -83,8 +83,7 @@ Outcome Rollout::run(Task task, Lent& lent) const {
                    std::move(task.q0), std::move(task.v0));
     try {
       out.deep_start = run.deep_start();
-      if (!out.deep_start)
-        out.status = run.advance(kInfinity, kInfinity, &stopped_);
+      if (!out.deep_start) out.status = run.advance(kInfinity, kInfinity, &stopped_);
     } catch (const std::exception& error) {
       out.fault = error.what();
     }
