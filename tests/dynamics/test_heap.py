@@ -101,6 +101,7 @@ def test_steps_do_not_touch_the_heap(counter: Path, controller: str, integrator:
     assert done.returncode == 0, done.stderr
     first, short, long, steps, contact_time = done.stdout.split()
     assert int(first) > 0, "the counter counted nothing"
-    assert int(steps) >= INTEGRATORS[integrator]
+    # An arm that gravity compensation holds still is one long step where the error decides.
+    assert int(steps) >= (1 if controller == "gravity" else INTEGRATORS[integrator])
     assert int(long) - int(short) <= 100, done.stdout
     assert controller == "gravity" or float(contact_time) > 0.0

@@ -64,7 +64,7 @@ void ImplicitStepper::add_time(Chart& chart) {
   column_ += 2 * chart.torques().torque(from.t + change, from.q, from.v);
   column_ -= 0.5 * chart.torques().torque(from.t + 2 * change, from.q, from.v);
   column_ /= change;
-  rate_of_time_.segment(nv_, nv_) = linearization_.inverse_mass() * column_;
+  rate_of_time_.segment(nv_, nv_).noalias() = linearization_.inverse_mass() * column_;
 }
 
 // What was found for v and the tangent of q, for the coordinates of the chart.
