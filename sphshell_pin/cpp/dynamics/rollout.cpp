@@ -2,16 +2,9 @@
 
 #include <chrono>
 #include <exception>
-#include <limits>
 #include <system_error>
 
 namespace sphshell {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
-
 Rollout::Rollout(const pinocchio::Model& model, int threads) : model_(model) {
   try {
     while (static_cast<int>(threads_.size()) < threads) threads_.emplace_back([this] { work(); });
@@ -83,8 +76,7 @@ Outcome Rollout::run(Task task, Lent& lent) const {
                    std::move(task.q0), std::move(task.v0));
     try {
       out.deep_start = run.deep_start();
-      if (!out.deep_start)
-        out.status = run.advance(kInfinity, kInfinity, &stopped_);
+      if (!out.deep_start) out.status = run.advance(kInfinity, kInfinity, &stopped_);
     } catch (const std::exception& error) {
       out.fault = error.what();
     }

@@ -9,7 +9,6 @@ namespace sphshell {
 namespace {
 
 constexpr int kMostFineSteps = 1000000;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A start deeper than this share of the radius is refused.
 constexpr double kDeepStart = 0.5;
 

@@ -11,7 +11,6 @@ namespace sphshell {
 namespace {
 
 constexpr double kFineTolerance = 1e-6;  // of the steps that replace a fixed one
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A step ends behind its event by this share of its length at most, and of rtol.
 constexpr double kEventShare = 1e-3;
 // How far beyond the end of a step, as a share of it, its dense output still locates an event.
