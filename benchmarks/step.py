@@ -29,6 +29,11 @@ def panda(lock: tuple[str, ...] = FINGERS) -> sp.Scene:
     return sp.Scene(robots.load("panda").model, lock=lock)
 
 
+def start_of(scene: sp.Scene) -> Array:
+    """Return the start (nq,) of the arm, with open fingers if they are not locked."""
+    return START if scene.model.nq == len(START) else np.r_[START, 0.02, 0.02]
+
+
 def tip_position(scene: sp.Scene, q: Array) -> Array:
     data = scene.model.createData()
     pin.framesForwardKinematics(scene.model, data, q)
@@ -38,7 +43,7 @@ def tip_position(scene: sp.Scene, q: Array) -> Array:
 
 def with_sheet(scene: sp.Scene, shell: sp.Shell, rise: float, **settings: Any) -> sp.Scene:
     """Put the sheet under the fingertip, `rise` [m] above the height at which it just touches."""
-    q = START if scene.model.nq == len(START) else np.r_[START, 0.02, 0.02]
+    q = start_of(scene)
     place = tip_position(scene, q) + [0, 0, rise - RADIUS]
     settings = {"law": LAW, "friction": FRICTION, **settings}
     scene.add_contact(
@@ -53,7 +58,7 @@ def with_sheet(scene: sp.Scene, shell: sp.Shell, rise: float, **settings: Any) -
 def runner(scene: sp.Scene, controller: Any = None) -> Callable[[], float]:
     """Seconds per step of a run that records two rows."""
     simulation = sp.Simulation(scene, sp.SemiImplicitEuler(DT))
-    q = START if scene.model.nq == len(START) else np.r_[START, 0.02, 0.02]
+    q = start_of(scene)
 
     def run() -> float:
         result = simulation.run(q, None, STEPS * DT, controller, record_dt=STEPS * DT)
@@ -69,7 +74,7 @@ def bare(scene: sp.Scene) -> Callable[[], float]:
     """
     model = scene.model
     pool = pin.ModelPool(model, 1)
-    q = START if model.nq == len(START) else np.r_[START, 0.02, 0.02]
+    q = start_of(scene)
     start = np.asfortranarray(np.tile(q[:, None], STEPS))
     torque, acceleration = np.zeros((2, STEPS, model.nv))
 

@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +20,9 @@ from sphshell_pin import ImpactLaw, RungeKutta4, Scene, Shell, Simulation, Spher
 from sphshell_pin.benchmarks.surfaces import Mesh, icosphere
 from sphshell_pin.benchmarks.timing import machine, one_core
 from sphshell_pin.dynamics import Result
+
+if TYPE_CHECKING:
+    from sphshell_pin.study.report.contents import Table
 
 Array = NDArray[np.float64]
 RADIUS, BOWL = 0.010, 0.040  # of the ball and of the bowl [m]
@@ -270,83 +273,61 @@ def ellipsoid_energy(scene: Scene, azimuth: float, swings: int) -> float:
     return float(np.abs(changes).max())
 
 
-def line(name: str, triangles: str, dt: float, runs: int, row: Row, bars: tuple[str, str]) -> str:
-    return (
-        f"{name:32s} {triangles:>9s} {dt * 1e3:4.1f} {runs:4d}   {row.rms:7.1e} {bars[0]:>7s}  "
-        f"{row.mean:+8.1e} {row.largest:7.1e}   {row.energy:7.1e} {bars[1]:>7s}  {row.cpu:7.4f}"
-    )
+def table(period: float) -> Table:
+    """Return errors of period and energy for meshes, normals and methods."""
+    from sphshell_pin.study.report.contents import Table, columns  # the report measures swings
 
+    rows = []
 
-def print_reference() -> float:
-    """Print the exact period from three sources; return it [s]."""
-    period, coarser = reference_period(), reference_period(4e-5)
-    with_sink, first_order = closed_forms()
-    print(
-        f"Ball of {RADIUS * 1e3:g} mm and {MASS * 1e3:g} g in a bowl of {BOWL * 1e3:g} mm, "
-        f"k = {STIFFNESS:g} N/m, {math.degrees(ANGLE):g} degrees, {PERIODS} periods\n"
-        f"  exact bowl, integrated         {period:.9f} s (twice the step: "
-        f"{coarser / period - 1:+.0e})\n"
-        f"  pendulum, length and sink      {with_sink:.9f} s ({with_sink / period - 1:+.1e})\n"
-        f"  with all of the first order    {first_order:.9f} s ({first_order / period - 1:+.1e})"
-    )
-    return period
+    def add(name: str, scene: Scene, count: int, dt: float, runs: int, periods: int = PERIODS):
+        row = measure(scene, period, AZIMUTHS[:runs], dt, periods)
+        rows.append(
+            (name, count, dt * 1e3, runs, row.rms, row.mean, row.largest, row.energy, row.cpu)
+        )
 
-
-def print_table(period: float) -> None:
-    """Print errors of period and energy for meshes, normals and methods."""
-    print(
-        f"{'':32s} {'':9s} {'dt':>4s} {'':4s}   period error            {'':8s}  energy error\n"
-        f"{'':32s} triangles   ms runs       rms     bar      mean largest   largest     bar  "
-        "CPU s/s"
-    )
-    none = ("", "")
     for dt in (DT, LONG_DT):
-        row = measure(exact_scene(), period, AZIMUTHS[:1], dt)
-        print(line("exact surface, the stepper alone", "", dt, 1, row, none))
+        add("exact surface, the stepper alone", exact_scene(), 0, dt, 1)
     for side in LEVELS:
         mesh = bowl(side)
-        count = str(len(mesh.triangles))
+        count = len(mesh.triangles)
         for exact, normals in ((True, "exact"), (False, "estimated")):
             scene = mesh_scene(mesh, exact_normals=exact)
-            bars = BARS.get(side)
-            shown = (f"{bars[0]:.0e}", f"{bars[1]:.0e}") if bars and exact else none
             name = f"smooth, h / r = {side:g}, {normals}"
-            row = measure(scene, period)
-            print(line(name, count, DT, len(AZIMUTHS), row, shown))
+            add(name, scene, count, DT, len(AZIMUTHS))
             if side == 0.3 and exact:
-                row = measure(scene, period, dt=LONG_DT)
-                print(line(name, count, LONG_DT, len(AZIMUTHS), row, none))
+                add(name, scene, count, LONG_DT, len(AZIMUTHS))
     mesh = bowl(0.3)
-    row = measure(mesh_scene(mesh, "facets"), period, AZIMUTHS[:2], periods=1)
-    print(line("facets, h / r = 0.3, one period", str(len(mesh.triangles)), DT, 2, row, none))
+    flat = mesh_scene(mesh, "facets")
+    add("facets, h / r = 0.3, one period", flat, len(mesh.triangles), DT, 2, periods=1)
+    caption = f"Errors of period and energy; aims {BARS} of both, by h / r, with exact normals."
+    return Table(
+        "swing",
+        caption,
+        columns(
+            "surface, normals", "triangles", "dt [ms]", "runs", "period, rms", "period, mean",
+            "period, largest", "energy, largest", "CPU s/s",
+        ),
+        rows,
+    )  # fmt: skip
 
 
-def print_long() -> None:
-    """Print the energy of 200 swings, and of 20 in an ellipsoid of uneven elements."""
-    swings, block = 200, 20
-    result = long_run(mesh_scene(bowl(0.3)), start(float(AZIMUTHS[0])), swings)
-    changes = energy_changes(result)
-    print(f"{swings} swings, h / r = 0.3, exact normals: energy error within {block} swings each")
-    bounds = np.linspace(0, len(changes), swings // block + 1).astype(int)
-    for k, (first, last) in enumerate(pairwise(bounds)):
-        part = changes[first:last]
-        print(
-            f"  to {block * (k + 1):3d}   largest {np.abs(part).max():7.1e}   "
-            f"mean {part.mean():+8.1e}   last {part[-1]:+8.1e}"
-        )
-    print(
-        "Ellipsoid of 4, 4.6, 3.6 r, vertices moved by up to a fifth of a side along it, "
-        "20 swings, 2 directions; bar 1e-05"
-    )
+def long_table() -> Table:
+    """Return the largest energy errors of 200 swings, and of 20 in an uneven ellipsoid."""
+    from sphshell_pin.study.report.contents import Table, columns
+
+    changes = energy_changes(long_run(mesh_scene(bowl(0.3)), start(float(AZIMUTHS[0])), 200))
+    rows = [
+        (f"bowl, swings {20 * k + 1} to {20 * (k + 1)}", float(np.abs(part).max()))
+        for k, part in enumerate(np.array_split(changes, 10))
+    ]
     for level in (4, 5):
         mesh = ellipsoid(level)
         for exact, normals in ((True, "exact"), (False, "estimated")):
             scene = mesh_scene(mesh, exact_normals=exact)
             worst = max(ellipsoid_energy(scene, azimuth, 20) for azimuth in (0.1, 0.9))
-            print(
-                f"  h / r = {mesh.mean_side / RADIUS:4.2f}, {normals:9s} normals   "
-                f"energy error, largest {worst:7.1e}"
-            )
+            name = f"ellipsoid, h / r = {mesh.mean_side / RADIUS:.2f}, {normals} normals"
+            rows.append((name, worst))
+    return Table("long", "Energy errors, largest.", columns("run", "energy error"), rows)
 
 
 def main() -> None:
@@ -358,9 +339,13 @@ def main() -> None:
     long = parser.parse_args().long
     one_core()
     print(machine().partition(";")[0])
-    print_table(print_reference())
-    if long:
-        print_long()
+    period = reference_period()
+    print(f"Period of the exact bowl {period:.9f} s; relative to it: twice the step "
+          f"{reference_period(4e-5) / period - 1:+.0e}, pendulum with length and sink "
+          f"{closed_forms()[0] / period - 1:+.1e}, with all of the first order "
+          f"{closed_forms()[1] / period - 1:+.1e}")  # fmt: skip
+    for one in [table(period), *([long_table()] if long else [])]:
+        print(f"{one.caption}\n\n{one.markdown()}")
 
 
 if __name__ == "__main__":

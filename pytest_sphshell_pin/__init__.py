@@ -70,7 +70,7 @@ def robot_check() -> Callable[..., RobotReport]:
     """
     from sphshell_pin.study.robot_check import check_robot
 
-    def check(robot: Any, **options: Any) -> RobotReport:
+    def check(robot: str, **options: Any) -> RobotReport:
         return check_robot(robot, **options).require()
 
     return check

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from os import PathLike
 from pathlib import Path
-from typing import Any
 from xml.parsers import expat
 
 import pinocchio as pin
@@ -23,8 +22,8 @@ MOST_MEMORY = 2e9
 """[B] of a pinocchio.Data, which holds eight arrays of one number per three velocities."""
 
 
-def read_model(path: str | PathLike[str], *, free_flyer: bool) -> Any:
-    """Return the pinocchio.Model of a URDF file; with `free_flyer` its root link floats.
+def read_model(path: str | PathLike[str], *, free_flyer: bool) -> pin.Model:
+    """Return the model of a URDF file; with `free_flyer` its root link floats.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Argument checks shared by the package's public face."""
+"""Argument checks of the public functions and classes."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def check_configuration(name: str, model: pin.Model, value: object, what: str = 
 
 
 def off_unit_length(model: pin.Model, q: Array, called: str = "q") -> InvalidParameter:
-    """Return the fault of a `q` (nq,) of `model` that is not normalised.
+    """Return the error for a `q` (nq,) of `model` that is not normalized.
 
     It names the joint whose quaternion or (cos, sin) pair is farthest from unit length.
     """

@@ -75,7 +75,7 @@ class Parameter:
 
 
 def parameter(
-    default: Any = MISSING,
+    default: object = MISSING,
     *,
     unit: str = "",
     help: str,
@@ -84,7 +84,7 @@ def parameter(
     at_least: float | None = None,
     at_most: float | None = None,
     log: bool | None = None,
-    **more: Any,
+    **more: object,
 ) -> Any:
     """Return the field of a dataclass that is a parameter.
 
@@ -119,7 +119,7 @@ class Ingredient:
     kinds: ClassVar[dict[str, type[Ingredient]]] = {}
     """What files may state of this family, by type name."""
     # Pydantic's settings for these dataclasses.
-    __pydantic_config__: ClassVar[Mapping[str, Any]] = {
+    __pydantic_config__: ClassVar[Mapping[str, object]] = {
         "extra": "forbid",
         "allow_inf_nan": False,
         "arbitrary_types_allowed": True,
@@ -162,7 +162,7 @@ class Ingredient:
         """Return what this states; `folder` is where its files are. By default itself."""
         return self
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         """Everything but the C++ binding, which is made again: what pickle and copy take."""
         return {k: v for k, v in self.__dict__.items() if k != "core"}
 

@@ -1,6 +1,6 @@
 """Length units of surface files, and ADAMS contact parameters in SI.
 
-The package works in metres, kilograms, seconds, newtons and radians. A file's unit is stated by
+The package uses meters, kilograms, seconds, newtons and radians. A file's unit is stated by
 its user, never guessed.
 """
 
@@ -55,7 +55,7 @@ ADAMS_UNITS: dict[str, tuple[float, float]] = {
 """Metres per length unit and newtons per force unit of ADAMS's unit systems."""
 
 SUSPICIOUS_RATIO = 1000.0
-"""A surface this many times larger than what touches it was probably not given in metres."""
+"""A surface this many times larger than what touches it was probably not given in meters."""
 
 
 def metres_per_unit(unit: str) -> float:
@@ -73,14 +73,14 @@ def metres_per_unit(unit: str) -> float:
 
 
 def length_to_metres(value: float, unit: str) -> float:
-    """Convert a length from `unit` to metres."""
+    """Convert a length from `unit` to meters."""
     return value * metres_per_unit(unit)
 
 
 def adams_stiffness_to_si(stiffness: float, exponent: float, units: str = "mm-N-s") -> float:
     """ADAMS stiffness K [force/length^exponent] in [N/m^exponent].
 
-    K converts by (1 / metres per unit)^exponent, which is 1000^2.2 = 3.98e6 for ADAMS's default
+    K converts by (1 / meters per unit)^exponent, which is 1000^2.2 = 3.98e6 for ADAMS's default
     exponent in millimetres, not by 1000.
     """
     length, force = adams_units(units)
@@ -105,7 +105,7 @@ def adams_length_to_si(value: float, units: str = "mm-N-s") -> float:
 
 
 def adams_units(units: str) -> tuple[float, float]:
-    """Return metres per length unit and newtons per force unit of an ADAMS unit system.
+    """Return meters per length unit and newtons per force unit of an ADAMS unit system.
 
     InvalidParameter for an unknown one lists the valid ones.
     """

@@ -26,7 +26,10 @@ def call(*arguments):
     return CliRunner().invoke(app, [str(one) for one in arguments])
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["explain"], ["check"], ["list"]])
+COMMANDS = [one.name or one.callback.__name__ for one in app.registered_commands]
+
+
+@pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS)])
 def test_every_help_has_an_example(command):
     told = call(*command, "--help")
     assert told.exit_code == 0

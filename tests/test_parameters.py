@@ -14,8 +14,15 @@ from sphshell_pin.dynamics.controllers import Controller
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient, parameter, parameters_of, table, table_row
+from sphshell_pin.scenario.primitives import Primitive
 
-FAMILIES = {"law": NormalLaw, "friction": Friction, "controller": Controller, "run": Integrator}
+FAMILIES = {
+    "law": NormalLaw,
+    "friction": Friction,
+    "controller": Controller,
+    "run": Integrator,
+    "primitive": Primitive,
+}
 
 
 def concrete(family: type[Ingredient]) -> list[type[Ingredient]]:
@@ -90,6 +97,56 @@ def test_every_parameter_is_described(kind):
             assert about.bounds, f"{one.name} has no bounds"
 
 
+# Valid values of what has no default.
+VALUES = {
+    "stiffness": 1e5,
+    "radius": 0.01,
+    "length": 0.02,
+    "size": [0.1, 0.2, 0.3],
+    "radii": [0.1, 0.2, 0.3],
+    "young_1": 1e9,
+    "poisson_1": 0.3,
+    "young_2": 1e9,
+    "poisson_2": 0.3,
+    "mu_static": 0.3,
+    "mu_dynamic": 0.1,
+    "kp": 1.0,
+    "kd": 1.0,
+    "frame": "tip",
+    "path": [[0.0, 0.0, 0.0]],
+    "damping": 1.0,
+    "function": "a.py:b",
+    "file": "a.csv",
+}
+BOUNDS = [
+    pytest.param(kind, one, wrong, id=f"{kind.__name__}-{one}-{wrong}")
+    for kind in KINDS
+    for one, about in parameters_of(kind).items()
+    if about.bounds
+    for wrong in (
+        *([about.above] if about.above is not None else []),
+        *([about.at_least - 1.0] if about.at_least is not None else []),
+        *([about.at_most + 1.0] if about.at_most is not None else []),
+        float("nan"),
+        float("inf"),
+        "1",
+        True,
+        [1.0],
+    )
+]
+
+
+@pytest.mark.parametrize(("kind", "name", "wrong"), BOUNDS)
+def test_a_value_out_of_bounds_is_named(kind, name, wrong):
+    needed = [one.name for one in fields(kind) if one.default is MISSING]
+    good = {one: VALUES[one] for one in needed}
+    kind(**good)
+    with pytest.raises(InvalidParameter) as caught:
+        kind(**{**good, name: wrong})
+    assert caught.value.name == name
+    assert str(caught.value).startswith(name)
+
+
 @pytest.mark.parametrize(
     ("family", "core"), [(NormalLaw, _core.NormalLaw), (Friction, _core.FrictionLaw)]
 )
@@ -107,7 +164,7 @@ def test_the_documents_have_the_tables_of_the_descriptions(family):
         assert table(kind) in page, f"docs/laws.md: a table is now\n{table(kind)}"
 
 
-@pytest.mark.parametrize("family", ["law", "friction", "controller"])
+@pytest.mark.parametrize("family", ["law", "friction", "controller", "primitive"])
 def test_the_reference_of_scenario_files_has_the_keys_of_the_descriptions(family):
     page = (DOCS / "scenarios.md").read_text(encoding="utf-8")
     for kind in FAMILIES[family].kinds.values():

@@ -7,13 +7,15 @@ import re
 import sys
 import warnings
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
 from sphshell_pin._interrupts import interrupts_heard
 
 if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, ProgressColumn
     from rich.table import Table
 
 app = typer.Typer(
@@ -89,15 +91,22 @@ def _plain_warnings() -> Iterator[None]:
 
     shown: set[str] = set()
 
-    def show(message: Warning | str, *rest: Any, **named: Any) -> None:
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
         if getattr(errors, type(message).__name__, None) is not type(message):
-            usual(message, *rest, **named)
+            usual(message, category, filename, lineno, file, line)
         elif str(message) not in shown:
             shown.add(str(message))
             typer.echo(f"warning: {message}", err=True)
 
     with warnings.catch_warnings():
-        usual: Any = warnings.showwarning
+        usual = warnings.showwarning
         warnings.showwarning = show
         yield
 
@@ -141,7 +150,7 @@ def make_table(*columns: str) -> Table:
     return table
 
 
-def terminal(*, err: bool = False) -> Any:
+def terminal(*, err: bool = False) -> Console:
     """Return the console of stdout, or of stderr."""
     from rich.console import Console
 
@@ -150,7 +159,7 @@ def terminal(*, err: bool = False) -> Any:
     return Console(stderr=err, soft_wrap=not err, width=None if stream.isatty() else 120)
 
 
-def progress_bar(*columns: Any) -> Any:
+def progress_bar(*columns: ProgressColumn) -> Progress:
     """Return a bar on stderr of the description, a bar and `columns`; on a pipe it is silent."""
     from rich.progress import BarColumn, Progress, TextColumn
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Literal, cast, get_args
 
 import typer
 
 from sphshell_pin.cli.app import app, faults, make_table, plain, terminal
 
+Side = Literal["both", "outside", "inside"]
 FORMATS = ".stl .obj .ply .off .shl, .step .iges .brep"
 
 ChordErrorOption = Annotated[
@@ -156,9 +157,9 @@ def _number_or_word(text: str | None) -> str | float | None:
         return text
 
 
-def _side(side: str) -> Any:
+def _side(side: str) -> Side:
     from sphshell_pin.errors import InvalidParameter
 
-    if side not in ("both", "outside", "inside"):
+    if side not in get_args(Side):
         raise InvalidParameter("--side", side, "must be both, outside or inside")
-    return side
+    return cast(Side, side)

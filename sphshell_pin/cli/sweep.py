@@ -7,7 +7,7 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,6 +26,8 @@ from sphshell_pin.cli.app import (
 )
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from sphshell_pin.study.sweep import Plan, SweepReport
 
 # So many failed runs are listed one by one.
@@ -151,7 +153,7 @@ def _drawn(plan: Plan, plot: list[str], *, wanted: bool) -> list[str]:
     return plot or own + peaks
 
 
-def _draw(table: Any, figures: list[str], file: Path, *, all_: bool) -> list[Path]:
+def _draw(table: pd.DataFrame, figures: list[str], file: Path, *, all_: bool) -> list[Path]:
     """Write pictures of the figures beside the table's `file`; return their paths.
 
     Unless `all_` are wanted, only the first that any run has is drawn.
@@ -198,8 +200,8 @@ def _print_report(plan: Plan, report: SweepReport, files: list[Path]) -> None:
         console.print(ranges)
     failed = report.table[report.table["status"] == "failed"]
     for _, row in failed.head(_MOST_FAILURES).iterrows():
-        values = ", ".join(f"{axis.key} = {row[axis.key]}" for axis in plan.axes)
-        typer.echo(f"run {row['run']} failed ({values}): {row['error']}", err=True)
+        values = [f"{axis.key} = {row[axis.key]} {axis.unit}".rstrip() for axis in plan.axes]
+        typer.echo(f"run {row['run']} failed ({', '.join(values)}): {row['error']}", err=True)
     if len(failed) > _MOST_FAILURES:
         typer.echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)
     names = ", ".join(str(file) for file in files)

@@ -1,4 +1,4 @@
-"""The normal laws: one class a law, and one a way to state it."""
+"""The normal laws: a class for each law, and for each other form in which it may be stated."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class ImpactLaw(_PowerLaw, kind="impact"):
     ) -> ImpactLaw:
         """Build from ADAMS's numbers, by default its defaults, in the system `units`.
 
-        The stiffness is per length^e, so it converts by (metres per length)^-e: 1000^e from mm.
+        The stiffness is per length^e, so it converts by (meters per length)^-e: 1000^e from mm.
         """
         return AdamsImpact(k, e, c, d, units).made()
 

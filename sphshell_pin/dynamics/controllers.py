@@ -178,7 +178,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     pushed against the shell's normal, on the side where the frame is at the start. The target waits
     `lead_in` [s] at the first point, then moves at `speed` [m/s], then waits at the last.
     `rotational_stiffness` [N m/rad] and `rotational_damping` [N m s/rad] hold the orientation of
-    the start. `posture_stiffness` [N m/rad] draws the joints to `q_ref` (default: the start) and
+    the start. `posture_stiffness` [N m/rad] pulls the joints to `q_ref` (default: the start) and
     `joint_damping` [N m s/rad] damps the motion of the joints; gains and `q_ref` as in JointPD.
 
     The shell is at `placement` in `shell_frame`; if neither is given, where the contacts of the

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Speed of approach to judge by, where neither v nor a fall tells one [m/s].
+# Speed of approach where neither v nor a fall gives one [m/s].
 DEFAULT_SPEED = 0.1
 # Steps in the shortest time scale: enough for a few percent with fixed steps.
 STEPS_PER_SCALE = 30
@@ -128,7 +128,7 @@ def _with_curvature(pair: ContactPair, figures: PairExplanation) -> PairExplanat
 
 
 def relaxation_time(pair: ContactPair, figures: PairExplanation) -> float:
-    """Return in what time [s] the bristles of a pair give way beyond their limit.
+    """Return the time [s] in which the bristles of a pair relax beyond their limit.
 
     A fiftieth of the shortest impact that the pair's law can stop (its depth would reach the
     radius): friction then follows a slip that turns round within an impact.
@@ -180,12 +180,12 @@ def _touch_of(pair: ContactPair, data: pin.Data) -> _Touch | None:
         return _Touch(-float(depths[deepest]), points[deepest], normals[deepest])
     if pair.sphere is None or pair.shell is None:
         return None
-    centre = pose_i.translation
-    at = pair.shell.closest_points(pose_j.actInv(centre)[None], method=pair.method)
+    center = pose_i.translation
+    at = pair.shell.closest_points(pose_j.actInv(center)[None], method=pair.method)
     distance = float(at.distances[0])
     signed = {"both": abs(distance), "outside": distance, "inside": -distance}[pair.shell.side]
     point = pose_j.act(at.points[0])
-    away = centre - point
+    away = center - point
     length = float(np.linalg.norm(away))
     normal = away / length if length > 0 else pose_j.rotation @ at.normals[0]
     return _Touch(signed - pair.sphere.radius, point, normal)
@@ -256,7 +256,7 @@ def _ingredients(pair: ContactPair) -> tuple[str, ...]:
             f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}' against "
             f"shell '{shell.name}' on frame '{pair.frame_j}'"
         )
-        moving = "moves with its frame" if pair.joint_j else "stands still: no wrench on its side"
+        moving = "moves with its frame" if pair.joint_j else "does not move: no wrench on its side"
         lines.append(
             f"{len(shell.elements)} elements, box diagonal {shell.size * 1e3:.4g} mm, "
             f"side '{shell.side}', method '{pair.method}'; the shell {moving}"

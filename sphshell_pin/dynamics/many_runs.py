@@ -225,7 +225,7 @@ def _states(
         raise InvalidParameter("q0s", q0s, f"must be numbers, (n, {model.nq})")
     counts = {name: len(table) for name, table in tables.items() if table.ndim == 2}
     lengths = {f"vary['{name}']": len(v) for name, v in vary.items() if has_length(v)}
-    if isinstance(controller, list | tuple):
+    if isinstance(controller, Sequence):
         lengths["controller"] = len(controller)
     count = next(iter({**counts, **lengths}.values()), 1)
     if len(set(counts.values())) > 1:

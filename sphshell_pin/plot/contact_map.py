@@ -30,7 +30,7 @@ QUANTITIES = {
     "time": ("time in contact of each element", "s", ""),
     "peak": ("peak normal force on each element", "N", ""),
 }
-"""What an element can be coloured by: its name, base unit, and what follows the unit."""
+"""What an element can be colored by: its name, base unit, and what follows the unit."""
 COLORS = "plasma"
 BEHIND = -0.1  # cosine between normal and line of sight of a contact that has a picture of its own
 MOST_VIEWS = 6

@@ -71,7 +71,7 @@ def eye_direction(normal: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Picture:
-    """One axis with a shell on it, seen from `toward` (3,); `factor` converts metres to its unit.
+    """One axis with a shell on it, seen from `toward` (3,); `factor` converts meters to its unit.
 
     The picture reaches from `low` to `high` (3,) [m].
     """

@@ -22,7 +22,7 @@ class PairSeries:
     """Forces [N] and depth [m] of one pair at every recorded row, zero where nothing touches.
 
     Where a row has several contacts (`count`), the forces are their sums, the depth the largest:
-    neighbours that take over a share of the load let the depth dip while the force stays.
+    neighbors that take over a share of the load let the depth dip while the force stays.
     """
 
     name: str

@@ -97,7 +97,7 @@ def audit_cad(built: Built, result: Result) -> CadAudit:
     """Project every recorded contact with a CAD surface on the trimmed faces of its file.
 
     The same place of the surface is meant: the stationary point of the distance from the sphere's
-    centre that is next to the contact, on a face inside its trimming, on an edge or a vertex.
+    center that is next to the contact, on a face inside its trimming, on an edge or a vertex.
 
     Raises
     ------

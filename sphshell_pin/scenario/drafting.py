@@ -163,7 +163,7 @@ def draft_text(
     elif robot.start:
         text += _POSTURE
         text += "".join(f"{_key(joint)} = {_toml(q)}\n" for joint, q in robot.start.items())
-    primitive = None if shell.primitive is None else shell.primitive.model_dump()
+    primitive = shell.model_dump()["primitive"]
     text += _fill(_SHELL, shell=shell, primitive=primitive)
     if plan.root is None:
         angles = np.rad2deg(pin.rpy.matrixToRpy(plan.placement.rotation))
@@ -181,7 +181,7 @@ def draft_text(
         text += _fill(template, contact=plan.contact, **friction)
     control, mean_force = plan.control, None
     if isinstance(control, Press):
-        path = _rounded(control.way, digits)
+        path = _rounded(control.path, digits)
         text += _fill(_PRESS, tip=plan.tips[0], shell=shell, path=path, press=control)
         if control.even:
             mean_force = {"value": control.force, "rtol": 0.15, "atol": 0.03}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # A knob without a range goes from a tenth of its value to ten times as much.
 DECADE = 10.0
 
-# Keys whose new value holds from the start only: a run under way keeps its state and its clock.
+# Keys whose new value holds from the start only: a run in progress keeps its state and its time.
 _FROM_THE_START = ("robot", "shell", "run")
 
 
@@ -39,7 +39,7 @@ class Knob:
     """Whether equal turns multiply (else they add)."""
     value: float
     restart: bool
-    """Whether a new value holds only in a run that starts anew: start states, places, clocks."""
+    """Whether a new value holds only from the next start: start states, placements, times."""
 
 
 def knobs_of(built: Built) -> tuple[Knob, ...]:

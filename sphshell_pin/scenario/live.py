@@ -155,16 +155,7 @@ class LiveRun:
             return Rows.empty(pairs)
         self._exchanged += _exchanged(self._row, rows, now)
         self._row = now
-        log = rows.contacts
-        return Rows.of(
-            rows.t,
-            pairs,
-            log.row,
-            log.pair,
-            log.normal_force,
-            log.friction_force_world,
-            log.depth,
-        )
+        return Rows.of(rows.t, pairs, rows.contacts, rows.contacts.row)
 
     @one_at_a_time
     def reset(self) -> None:

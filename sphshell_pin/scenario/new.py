@@ -34,18 +34,9 @@ from sphshell_pin.scenario.plan import (
     plan_stand,
 )
 from sphshell_pin.scenario.poses import take_stance
+from sphshell_pin.scenario.primitives import Ball, Box, Cylinder, HalfSpace, Primitive
 from sphshell_pin.scenario.reading import parse_scenario
-from sphshell_pin.scenario.schema import (
-    Box,
-    HalfSpace,
-    Primitive,
-    RobotSection,
-    RoundSolid,
-    RunSection,
-    Scenario,
-    ShellSection,
-    SphereSurface,
-)
+from sphshell_pin.scenario.schema import RobotSection, RunSection, Scenario, ShellSection
 from sphshell_pin.scenario.tips import Tip, find_tips, floats
 
 if TYPE_CHECKING:
@@ -297,19 +288,19 @@ def _shell_section(
             raise SphshellError(f"no such surface file: {file}")
         raise NameNotFound("surface", word, "the command (beside files)", WORDS)
     if unit is not None:
-        raise SphshellError(f"a unit belongs to a surface file; the {word} is sized in metres")
+        raise SphshellError(f"a unit belongs to a surface file; the {word} is sized in meters")
     if parts != (None, None):
         raise SphshellError(f"bodies and faces belong to a CAD file, not to the {word}")
-    centres = _centres(built, tips)
-    spread = float(np.linalg.norm(np.ptp(centres, axis=0)))
+    centers = _centers(built, tips)
+    spread = float(np.linalg.norm(np.ptp(centers, axis=0)))
     size = _round_up(max(_SIZE * max(tip.radius for tip in tips), spread))
-    ball = SphereSurface(type="sphere", radius=size)
+    ball = Ball(size)
     primitives: dict[str, Primitive] = {
-        "plane": HalfSpace(type="half-space", extent=2 * size),
-        "box": Box(type="box", size=[2 * size, 2 * size, 0.4 * size]),
+        "plane": HalfSpace(2 * size),
+        "box": Box([2 * size, 2 * size, 0.4 * size]),
         "sphere": ball,
         "bowl": ball,
-        "cylinder": RoundSolid(type="cylinder", radius=size, length=2 * size),
+        "cylinder": Cylinder(radius=size, length=2 * size),
     }
     return ShellSection(name=word, primitive=primitives[word]), word
 
@@ -329,8 +320,8 @@ def _round_up(x: float) -> float:
     return rounded if rounded >= x else float(f"{1.05 * x:.2g}")
 
 
-def _centres(built: Built, tips: Sequence[Tip]) -> Array:
-    """Return the spheres' centres (k, 3) [m] in the world at the start."""
+def _centers(built: Built, tips: Sequence[Tip]) -> Array:
+    """Return the spheres' centers (k, 3) [m] in the world at the start."""
     model = built.assembly.model
     data = model.createData()
     pin.framesForwardKinematics(model, data, built.assembly.q0)
@@ -353,19 +344,19 @@ def _plan(
                 "a robot that floats comes down on the surface by its weight: leave out --press "
                 "and --place"
             )
-        centres = _centres(built, tips)
+        centers = _centers(built, tips)
         root = q0[:7]
         if model.njoints == 2:
             pair = request.materials(tips, 0.0)
-            return section, plan_fall(shell, tips[0], centres[0], root, pair, inside=inside)
+            return section, plan_fall(shell, tips[0], centers[0], root, pair, inside=inside)
         data = model.createData()
         inertia = np.diag(pin.crba(model, data, q0))[6:]
         mass = float(pin.computeTotalMass(model))
-        leg = float(np.linalg.norm(root[:3] - centres, axis=1).max())
+        leg = float(np.linalg.norm(root[:3] - centers, axis=1).max())
         if inside:
             raise SphshellError("a robot cannot stand in a bowl: take another --surface")
         pair = request.materials(tips, mass / len(tips))
-        return section, plan_stand(shell, tuple(tips), centres, mass, inertia, leg, pair)
+        return section, plan_stand(shell, tuple(tips), centers, mass, inertia, leg, pair)
     tip = tips[0]
     if int(model.frames[find_frame(model, tip.frame)].parentJoint) == 0:
         raise SphshellError(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +21,7 @@ from sphshell_pin.scenario.touch_points import (
     touch_points,
     touches_once,
 )
+from sphshell_pin.shell import Shell
 
 Array = npt.NDArray[np.float64]
 
@@ -36,10 +36,10 @@ FALL_BESIDE = 0.1
 TIP_TURN = 0.02
 # Largest normal force by default [N], and in weights of the tip's effective mass.
 MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
-# The way across a surface: radii long at most, radii a second.
-WAY_RADII, WAY_RATE = 10.0, 3.0
+# The path across a surface: radii long at most, radii a second.
+PATH_RADII, PATH_RATE = 10.0, 3.0
 LEAD_IN = 0.5
-# How fast a drawn tip comes back to its way [rad/s], and how far friction may hold it behind, in
+# How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
 # radii.
 TIP_RATE, TIP_LAG = 20.0, 0.2
 # Sag of a standing robot's joints under its weight [rad].
@@ -65,10 +65,10 @@ class Contact:
 
 @dataclass(frozen=True)
 class Press:
-    """A tip that is drawn along a way and pressed on the surface."""
+    """A tip that is moved along a path and pressed on the surface."""
 
     force: float
-    way: Array
+    path: Array
     """Points (k, 3) in the shell's frame [m]."""
     speed: float
     lead_in: float
@@ -77,7 +77,7 @@ class Press:
     rotational_stiffness: float
     rotational_damping: float
     even: bool
-    """Whether the sphere touches one face all along the way, so that the surface bears `force`."""
+    """Whether the sphere touches one face along the whole path: all of `force` acts there."""
     posture_stiffness: tuple[float, ...]
     joint_damping: tuple[float, ...]
 
@@ -99,8 +99,8 @@ class Plan:
     control: Press | Hold | None
     duration: float
     gap: float
-    placement: Any
-    """pinocchio.SE3 of the shell in the world."""
+    placement: pin.SE3
+    """Of the shell in the world."""
     root: Array | None
     """Where the free root starts: x y z and quaternion x y z w."""
     why: tuple[str, ...] = field(default=())
@@ -108,7 +108,7 @@ class Plan:
 
 
 def plan_press(
-    shell: Any,
+    shell: Shell,
     tip: Tip,
     stance: Stance,
     materials: tuple[Material, Material],
@@ -133,28 +133,28 @@ def plan_press(
             f"{_axis(stance.approach)}, not {press:g} N"
         )
     gap = TIP_GAP * tip.radius
-    spot, turned, points, even = _place_to_press(shell, tip, stance, gap, toward, inside=inside)
-    placement = pin.SE3(turned, stance.centre - turned @ spot.centre)
+    touch, turned, points, even = _place_to_press(shell, tip, stance, gap, toward, inside=inside)
+    placement = pin.SE3(turned, stance.center - turned @ touch.center)
     force = _round(_suitable_force(stance, tip.radius, materials) if press is None else press)
-    rate = _round(WAY_RATE * tip.radius)
-    aside = turned.T @ (stance.origin - stance.centre)
-    # The tip's frame, which follows the way, need not stand in the sphere's centre.
-    way = points + aside - spot.normal * (spot.normal @ aside)
+    rate = _round(PATH_RATE * tip.radius)
+    aside = turned.T @ (stance.origin - stance.center)
+    # The tip's frame, which follows the path, need not be at the sphere's center.
+    path = points + aside - touch.normal * (touch.normal @ aside)
     contact = _contact(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
     softest = contact.mu_static * force / (TIP_LAG * tip.radius)
     stiffness = max(stance.slide_mass * TIP_RATE**2, softest)
     mass = math.sqrt(stance.mass * stance.slide_mass)
-    length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
     turning = 0.0
     if stance.inertia:
         moment = contact.mu_static * force * tip.radius
         turning = max(stance.inertia * TIP_RATE**2, moment / TIP_TURN)
     spare = stance.model.nv > (6 if turning else 3)
-    # The posture's pull may take a fiftieth of the normal force at the end of the way.
+    # The posture's pull may take a fiftieth of the normal force at the end of the path.
     pull = min(0.02 * force / (stance.mass * max(length, tip.radius)), 100.0) if spare else 0.0
     control = Press(
         force=force,
-        way=way,
+        path=path,
         even=even,
         speed=rate,
         lead_in=LEAD_IN,
@@ -167,7 +167,7 @@ def plan_press(
     )
     why = [f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}"]
     why.append(
-        f"the surface's middle stands {_mm(gap)} before the sphere, which presses along "
+        f"the surface's center is {_mm(gap)} in front of the sphere, which presses along "
         f"{_axis(stance.approach)}"
     )
     if stance.bent:
@@ -183,7 +183,7 @@ def plan_press(
             "the sphere touches edges or several sides at once, wherever it was tried: the force "
             "on the surface will not be the one that presses"
         )
-    if len(way) < 2:
+    if len(path) < 2:
         reason = "it has no room" if stance.inertia else "its joints cannot keep it from rolling"
         why.append(f"the tip presses in one place and does not slide: {reason}")
     duration = math.ceil(10 * (LEAD_IN + length / rate + 0.5)) / 10
@@ -191,24 +191,24 @@ def plan_press(
 
 
 def plan_fall(
-    shell: Any,
+    shell: Shell,
     tip: Tip,
-    centre: Array,
+    center: Array,
     root: Array,
     materials: tuple[Material, Material],
     *,
     inside: bool = False,
 ) -> Plan:
-    """Plan a scenario in which a free body falls on the surface, which stands as its file says.
+    """Plan a scenario in which a free body falls on the surface, which is placed as in its file.
 
-    `centre` (3,) [m] is the sphere's in the world when the root is at `root` (7,).
+    `center` (3,) [m] is the sphere's in the world when the root is at `root` (7,).
     """
     gap = FALL_GAP * tip.radius
     # Beside the middle: a ball in a bowl rolls then.
     beside = FALL_BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
-    spot = find_touch_point(shell, tip.radius, gap, toward=UP, inside=inside, beside=beside)
+    touch = find_touch_point(shell, tip.radius, gap, toward=UP, inside=inside, beside=beside)
     start = root.copy()
-    start[:3] += spot.centre - centre
+    start[:3] += touch.center - center
     speed = math.sqrt(2 * GRAVITY * gap)
     why = (
         f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
@@ -219,9 +219,9 @@ def plan_fall(
 
 
 def plan_stand(
-    shell: Any,
+    shell: Shell,
     tips: tuple[Tip, ...],
-    centres: Array,
+    centers: Array,
     mass: float,
     joint_inertia: Array,
     leg: float,
@@ -229,11 +229,11 @@ def plan_stand(
 ) -> Plan:
     """Plan a scenario in which a floating robot of `mass` [kg] stands on spheres.
 
-    `centres` (k, 3) [m] are those of the `tips` in the world, `joint_inertia` [kg m^2] the
+    `centers` (k, 3) [m] are those of the `tips` in the world, `joint_inertia` [kg m^2] the
     diagonal of the mass matrix of its motors, `leg` [m] the distance of its root from the tips.
     """
     gap = FOOT_GAP * min(tip.radius for tip in tips)
-    place = _under(shell, centres, np.array([tip.radius for tip in tips]), gap)
+    place = _under(shell, centers, np.array([tip.radius for tip in tips]), gap)
     load = mass * GRAVITY / len(tips)
     kp = load * 0.5 * leg / SAG
     # A leg turns the body above it as much as itself.
@@ -285,49 +285,51 @@ def _suitable_force(stance: Stance, radius: float, materials: tuple[Material, Ma
 
 
 def _place_to_press(
-    shell: Any, tip: Tip, stance: Stance, gap: float, toward: Array | None, *, inside: bool
+    shell: Shell, tip: Tip, stance: Stance, gap: float, toward: Array | None, *, inside: bool
 ) -> tuple[TouchPoint, Array, Array, bool]:
-    """Return a spot, how the shell is turned to face the tip, a way (k, 3) across; if it is even.
+    """Return a touch point, the rotation of the shell, a path (k, 3), and whether it is even.
 
-    The first spot from the middle on where the sphere touches once all along the way; where there
-    is none, the middle.
+    The touch point nearest to the center where the sphere touches once along the whole path; where
+    there is none, the center.
     """
     first: tuple[TouchPoint, Array, Array, bool] | None = None
-    for spot in touch_points(shell, tip.radius, gap, toward=toward, inside=inside):
-        turned = _turn(spot.normal, -stance.approach)
-        points = spot.point[None]
+    for touch in touch_points(shell, tip.radius, gap, toward=toward, inside=inside):
+        turned = _turn(touch.normal, -stance.approach)
+        points = touch.point[None]
         if stance.slide is not None and stance.inertia:
-            length = min(WAY_RADII * tip.radius, 0.8 * stance.room)
-            points = path_on_surface(shell, spot, turned.T @ stance.slide, length, 0.5 * tip.radius)
-        first = first or (spot, turned, points, False)
-        # Beside an edge a way may be short, but not on a whole surface.
+            length = min(PATH_RADII * tip.radius, 0.8 * stance.room)
+            points = path_on_surface(
+                shell, touch, turned.T @ stance.slide, length, 0.5 * tip.radius
+            )
+        first = first or (touch, turned, points, False)
+        # Beside an edge a path may be short, but not on a whole surface.
         roomy = len(points) > 4 or len(first[2]) <= 4
-        if roomy and touches_once(shell, spot, points, tip.radius, 2 * gap):
-            return spot, turned, points, True
+        if roomy and touches_once(shell, touch, points, tip.radius, 2 * gap):
+            return touch, turned, points, True
     if first is None:
-        raise SphshellError("the surface has no spot to touch")
+        raise SphshellError("the surface has no point to touch")
     return first
 
 
-def _under(shell: Any, centres: Array, radii: Array, gap: float) -> Any:
-    """Return where the shell stands so that the nearest of the spheres has the `gap` [m] to it.
+def _under(shell: Shell, centers: Array, radii: Array, gap: float) -> pin.SE3:
+    """Return the placement of the shell so that the nearest of the spheres has the `gap` [m] to it.
 
-    Its middle stands under the middle of the spheres; where none of them would then come down on
-    it, under the first one.
+    Its center is under the center of the spheres; if none of them would then land on it, under the
+    first one.
     """
-    spot = find_touch_point(shell, float(radii[0]), gap, toward=UP)
-    for anchor in (centres.mean(axis=0), centres[0]):
-        aside = anchor - spot.point
+    touch = find_touch_point(shell, float(radii[0]), gap, toward=UP)
+    for anchor in (centers.mean(axis=0), centers[0]):
+        aside = anchor - touch.point
         heights = []
-        for centre, radius in zip(centres, radii, strict=True):
-            above = centre - aside
+        for center, radius in zip(centers, radii, strict=True):
+            above = center - aside
             above[2] = shell.box[1, 2] + 2 * (radius + gap)
-            down = come_down(shell, above, -UP, float(radius), gap).centre[2]
+            down = come_down(shell, above, -UP, float(radius), gap).center[2]
             if down > shell.box[0, 2] - radius:
-                heights.append(centre[2] - down)
+                heights.append(center[2] - down)
         if heights:
             return pin.SE3(np.eye(3), np.array([aside[0], aside[1], min(heights)]))
-    raise SphshellError("no foot comes down on the surface: it is too small")
+    raise SphshellError("no sphere lands on the surface: it is too small")
 
 
 def _turn(source: Array, target: Array) -> Array:

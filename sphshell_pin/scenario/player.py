@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.scene import SceneContacts
 
 Array = NDArray[np.float64]
 
@@ -39,23 +43,16 @@ class Rows:
         cls,
         t: Array,
         pairs: int,
-        row: NDArray[np.int64],
-        pair: NDArray[np.integer],
-        normal_force: Array,
-        friction_force_world: Array,
-        depth: Array,
+        contacts: SceneContacts,
+        row: NDArray[np.int64] | int,
     ) -> Rows:
-        """Sum contacts into rows.
-
-        `t` (n,) are the rows' instants [s]; contact k belongs to `row[k]` and `pair[k]`, with
-        `normal_force[k]` [N], `friction_force_world[k]` (3,) [N] and `depth[k]` [m].
-        """
+        """Sum `contacts` into rows at the instants `t` (n,) [s]; contact k belongs to `row[k]`."""
         shape = (len(t), pairs)
         normal, friction, deepest = np.zeros(shape), np.zeros((*shape, 3)), np.zeros(shape)
-        place = (row, pair)
-        np.add.at(normal, place, normal_force)
-        np.add.at(friction, place, friction_force_world)
-        np.maximum.at(deepest, place, depth)
+        place = (np.broadcast_to(row, contacts.pair.shape), contacts.pair)
+        np.add.at(normal, place, contacts.normal_force)
+        np.add.at(friction, place, contacts.friction_force_world)
+        np.maximum.at(deepest, place, contacts.depth)
         return cls(np.asarray(t, dtype=float), normal, np.linalg.norm(friction, axis=2), deepest)
 
     def select(self, chosen: slice) -> Rows:

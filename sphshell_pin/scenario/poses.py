@@ -47,7 +47,7 @@ class Stance:
     """Joints that do not move the tip."""
     origin: Array
     """Of the tip's frame (3,) [m]."""
-    centre: Array
+    center: Array
     """Of the tip's sphere (3,) [m]."""
     approach: Array
     """Unit (3,): where the tip presses."""
@@ -160,9 +160,9 @@ def _stance(
     mass_matrix = np.triu(data.M) + np.triu(data.M, 1).T
     frame = find_frame(reduced, tip.frame)
     pose = data.oMf[frame]
-    centre = pose.act(tip.offset)
+    center = pose.act(tip.offset)
     local = pin.getFrameJacobian(reduced, data, frame, pin.LOCAL_WORLD_ALIGNED)
-    linear = local[:3] - pin.skew(centre - pose.translation) @ local[3:]
+    linear = local[:3] - pin.skew(center - pose.translation) @ local[3:]
     mobility = linear @ np.linalg.solve(mass_matrix, linear.T)
     values, axes = np.linalg.eigh(mobility)
     top = max(float(values[-1]), 1e-300)
@@ -190,7 +190,7 @@ def _stance(
         coordinates=short,
         lock=lock,
         origin=np.array(pose.translation),
-        centre=centre,
+        center=center,
         approach=approach,
         slide=slide,
         room=0.0,
@@ -199,7 +199,7 @@ def _stance(
         inertia=inertia,
         joint_inertia=np.diag(mass_matrix).copy(),
         force=float(np.min(limits[limited] / pushes[limited])) if limited.any() else np.inf,
-        reach=max((float(np.linalg.norm(centre - one)) for one in joints), default=0.0),
+        reach=max((float(np.linalg.norm(center - one)) for one in joints), default=0.0),
         bent=False,
     )
     # Where the tip can slide, both ways count: a stretched arm slides sideways at best.

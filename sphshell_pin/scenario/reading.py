@@ -1,4 +1,4 @@
-"""A scenario file on its way to a Scenario: find it, read it, change values, say what is wrong."""
+"""From a scenario file to a Scenario: find it, read it, change values, report what is wrong."""
 
 from __future__ import annotations
 
@@ -7,26 +7,24 @@ import importlib
 import os
 import re
 import tomllib
-import types
 import typing
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.errors import NameNotFound, ScenarioError
-from sphshell_pin.parameters import Ingredient, parameters_of
-from sphshell_pin.scenario.schema import LISTS, STEPPING, OneOf, RunSection, Scenario
+from sphshell_pin.parameters import parameters_of
+from sphshell_pin.scenario.schema import LISTS, STEPPING, RunSection, Scenario
 
-# Pydantic's names of this fault in a model and in a dataclass.
-UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 TOO_DEEP = "is not valid TOML: its tables or lists are nested too deeply"
 # A key of a hundred parts: the time and memory of tomllib grow with their square.
 _LONG_KEY = re.compile(r"""(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}""")
+# What tomllib gives: tables, lists and values in each other.
+Toml: TypeAlias = Any
 
 
 def shipped_scenarios() -> dict[str, Path]:
@@ -122,7 +120,7 @@ def change_scenario(
     return _validated(data, path)
 
 
-def _with_table(key: str, data: Mapping[str, Any]) -> str:
+def _with_table(key: str, data: Mapping[str, Toml]) -> str:
     """Return `key` with the table that was left out before it, if that is run or controller."""
     if key.partition(".")[0] not in Scenario.model_fields:
         for table, known in (
@@ -137,7 +135,7 @@ def _with_table(key: str, data: Mapping[str, Any]) -> str:
 class Found(NamedTuple):
     """What is at a dotted key of a scenario."""
 
-    value: Any
+    value: Toml
     key: str
     """The key with all names spelled out."""
     parts: list[str]
@@ -167,14 +165,14 @@ def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> Found:
     return Found(value, ".".join([*trail, last]), [*trail, last])
 
 
-def _validated(data: dict[str, Any], path: str | PathLike[str]) -> Scenario:
+def _validated(data: dict[str, Toml], path: str | PathLike[str]) -> Scenario:
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
         raise _explain(error, path, data) from None
 
 
-def item_key(table: str, items: Sequence[Any], index: int) -> str:
+def item_key(table: str, items: Sequence[Toml], index: int) -> str:
     """Return the dotted key of an item of a list: by its label or name, else by its index."""
     entries = [dict(one) if isinstance(one, BaseModel | Mapping) else {} for one in items]
     names = [str(one.get("label") or one.get("name") or "") for one in entries]
@@ -191,7 +189,7 @@ def _read_text(path: str | PathLike[str]) -> str:
         raise ScenarioError(path, "", "is not a text file in UTF-8") from None
 
 
-def _parse_value(text: str) -> Any:
+def _parse_value(text: str) -> Toml:
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError):
@@ -199,7 +197,7 @@ def _parse_value(text: str) -> Any:
 
 
 def _change(
-    data: dict[str, Any], key: str, value: Any, path: str | PathLike[str], scenario: Scenario
+    data: dict[str, Toml], key: str, value: Toml, path: str | PathLike[str], scenario: Scenario
 ) -> None:
     """Put `value` in place of the one at the dotted `key`; names of list items may hold dots.
 
@@ -230,11 +228,11 @@ def _change(
 
 
 def _descend(
-    data: dict[str, Any], key: str, path: str | PathLike[str]
-) -> tuple[Any, str, list[str]]:
-    """Follow the dotted `key` as far as `data` goes: the table or list, the rest, the way there."""
+    data: dict[str, Toml], key: str, path: str | PathLike[str]
+) -> tuple[Toml, str, list[str]]:
+    """Follow the dotted `key` as far as `data` goes: table or list, the rest, the names so far."""
     rest, trail = key, list[str]()
-    node: Any = data
+    node: Toml = data
     while True:
         if isinstance(node, list):
             heads = {_item_name(item): item for item in node if isinstance(item, dict)}
@@ -247,19 +245,19 @@ def _descend(
             if not alone or rest.split(".")[0] not in _keys_of(trail[-1]):
                 return node, rest, trail
             # The name of a table alone may be left out of the key.
-            node, trail = node[0], [*trail, _spelt_out(node, "0")]
+            node, trail = node[0], [*trail, _spelled_out(node, "0")]
             continue
         if not isinstance(heads[head], dict | list):
             raise ScenarioError(path, key, f"'{head}' is a value, it holds no further keys")
         single = node is data and head in LISTS and isinstance(heads[head], dict)
-        trail = [*trail, _spelt_out(node, head)]
+        trail = [*trail, _spelled_out(node, head)]
         rest, node = rest[len(head) + 1 :], heads[head]
         # A table alone is a list of one: its name may stand in the key as in a list's.
         if single and (name := _item_name(node)) not in node:
             rest = rest.removeprefix(f"{name}.")
 
 
-def _spelt_out(node: Any, head: str) -> str:
+def _spelled_out(node: Toml, head: str) -> str:
     """Return the name of the item that `head` is the index of, where that name tells it."""
     if not isinstance(node, list) or not head.isdecimal() or not isinstance(node[0], dict):
         return head
@@ -270,7 +268,7 @@ def _spelt_out(node: Any, head: str) -> str:
 
 def _keys_of(table: str) -> Iterable[str]:
     """Return the keys that a table of a list of LISTS may have."""
-    (section,) = _arguments(Scenario.model_fields[table].annotation)
+    (section,) = typing.get_args(Scenario.model_fields[table].annotation)
     return section.model_fields  # type: ignore[no-any-return]
 
 
@@ -279,129 +277,44 @@ def _item_name(item: Mapping[str, object]) -> str:
 
 
 def _explain(
-    error: ValidationError, path: str | PathLike[str], data: Mapping[str, Any]
+    error: ValidationError, path: str | PathLike[str], data: Mapping[str, Toml]
 ) -> ScenarioError:
     """Turn the first of pydantic's complaints into one sentence with the valid choices."""
-    # An unknown key often hides a missing one ("stifness" for "stiffness"): it is told first.
-    details = sorted(error.errors(), key=lambda one: one["type"] not in UNKNOWN_KEY)
+    details = sorted(error.errors(), key=lambda one: one["type"] != "unknown_key")
     first = details[0]
-    key, section = _locate(first["loc"], data)
-    reason, value = _reason(first, section)
+    kind, context, value = first["type"], first.get("ctx", {}), first["input"]
+    loc = first["loc"]
+    if kind == "unknown_key":
+        loc, value = (*loc, context["key"]), context["value"]
+    reason = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    reason = reason[:1].lower() + reason[1:]
+    if kind == "missing":
+        reason, value = "is missing", None
+    elif kind in ("model_type", "dataclass_type"):
+        reason = "must be a table { key = value, ... }"
     if len(details) > 1:
         reason += f" (and {len(details) - 1} more: first repair this one)"
-    return ScenarioError(path, key, reason, value)
+    if kind not in ("model_type", "dataclass_type", "unknown_key"):
+        value = value if isinstance(value, str | int | float | bool) else None
+    return ScenarioError(path, _key_at(loc, data, ends=kind == "missing"), reason, value)
 
 
-def _reason(detail: ErrorDetails, section: type[BaseModel] | None) -> tuple[str, object]:
-    kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
-    if kind in UNKNOWN_KEY and section is not None:
-        valid = list(_types_of(section))
-        near = difflib.get_close_matches(str(detail["loc"][-1]), valid, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        return f"unknown key; {hint}valid keys: {_listed(valid)}", value
-    if kind == "union_tag_invalid":
-        return f"unknown type '{context['tag']}'; valid types: {context['expected_tags']}", None
-    if kind == "union_tag_not_found":
-        return f"type is missing; valid types: {_listed(_tags(detail['loc']))}", None
-    if kind == "missing":
-        return "is missing", None
-    if kind in ("model_type", "dataclass_type"):
-        return "must be a table { key = value, ... }", value
-    message = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
-    plain = value if isinstance(value, str | int | float | bool) else None
-    return message[:1].lower() + message[1:], plain
+def _key_at(loc: Sequence[int | str], data: object, *, ends: bool) -> str:
+    """Return the dotted key of a pydantic location in `data`; `ends`: its last part is missing.
 
-
-def _locate(
-    loc: Iterable[int | str], data: Mapping[str, Any]
-) -> tuple[str, type[BaseModel] | None]:
-    """Return the dotted key of a pydantic location in `data`, and the section of its last part."""
-    key, section, annotation = "", None, Scenario
-    here: Any = annotation
-    for part in loc:
-        tagged = _by_tag(here)
-        if isinstance(part, str) and part in tagged:
-            here = tagged[part]
-            continue
+    Other names that `data` does not have are those of the branches of a union.
+    """
+    key, node = "", data
+    for k, part in enumerate(loc):
         if isinstance(part, int):
-            items = data[key] if key in LISTS else ()
-            items = [items] if isinstance(items, Mapping) else items
+            items = node if isinstance(node, list) else [node]
             key = item_key(key, items, part) if part < len(items) else f"{key}[{part}]"
-            here = next(iter(_arguments(here)), None)
-            continue
-        models = [one for one in _members(here) if _is_section(one)]
-        if models:
-            section = models[0]
-            key += f".{part}" if key else part
-            here = _types_of(section).get(part)
-            continue
-        members = [one for one in _members(here) if one is not type(None)]
-        if len(members) > 1:
-            # Pydantic's own name for a branch of a union is no key of the file.
-            branch = str(part).split("[", maxsplit=1)[0]
-            here = next((m for m in members if m.__name__ == branch), None)
-            continue
-        tables = [one for one in _members(here) if typing.get_origin(one) is dict]
-        if tables:
-            key += f'."{part}"' if "." in part else f".{part}"
-            here = typing.get_args(tables[0])[1]
-            section = None
-    return key, section
-
-
-def _tags(loc: Iterable[int | str]) -> list[str]:
-    """Return the valid types at a location that gave none."""
-    here: Any = Scenario
-    for part in loc:
-        if isinstance(part, int):
-            here = next(iter(_arguments(here)), None)
-        elif _by_tag(here).get(str(part)) is not None:
-            here = _by_tag(here)[str(part)]
-        else:
-            section = next((one for one in _members(here) if _is_section(one)), None)
-            here = None if section is None else _types_of(section).get(str(part))
-    return list(_by_tag(here))
-
-
-def _by_tag(annotation: object) -> dict[str, type]:
-    """Return what a table may be, by its key `type`."""
-    found: dict[str, type] = {}
-    for one in _members(annotation):
-        if _is_section(one) and issubclass(one, Ingredient):
-            found[one.kind] = one
-        elif _is_section(one) and "type" in one.model_fields:
-            for tag in typing.get_args(one.model_fields["type"].annotation):
-                found[str(tag)] = one
-    return found
-
-
-def _is_section(annotation: object) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel | Ingredient)
-
-
-def _types_of(section: type) -> dict[str, object]:
-    """Return the types of the keys of a table."""
-    if issubclass(section, BaseModel):
-        return {k: field.rebuild_annotation() for k, field in section.model_fields.items()}
-    types = typing.get_type_hints(section)
-    return {name: types[name] for name in parameters_of(section)}
-
-
-def _members(annotation: Any) -> list[Any]:
-    """Return what a union may be, whatever it is wrapped in."""
-    origin = typing.get_origin(annotation)
-    if origin is typing.Annotated:
-        whole, *notes = typing.get_args(annotation)
-        families = [note.family for note in notes if isinstance(note, OneOf)]
-        return list(families[0].kinds.values()) if families else _members(whole)
-    if origin in (typing.Union, types.UnionType):
-        return [inner for one in typing.get_args(annotation) for inner in _members(one)]
-    return [annotation]
-
-
-def _arguments(annotation: Any) -> list[Any]:
-    lists = [one for one in _members(annotation) if typing.get_origin(one) is list]
-    return [typing.get_args(one)[0] for one in lists]
+            node = items[part] if part < len(items) else None
+        elif isinstance(node, Mapping) and (part in node or (ends and k == len(loc) - 1)):
+            name = f'"{part}"' if "." in part else part
+            key = f"{key}.{name}" if key else name
+            node = node.get(part)
+    return key
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -174,16 +174,8 @@ class Replay:
 
     def _all_rows(self) -> Rows:
         log = self.result.contacts
-        own = log.row < self._count
-        return Rows.of(
-            self.result.t[: self._count],
-            len(self.result.pairs),
-            log.row[own],
-            log.pair[own],
-            log.normal_force[own],
-            log.friction_force_world[own],
-            log.depth[own],
-        )
+        rows = Rows.of(self.result.t, len(self.result.pairs), log, log.row)
+        return rows.select(slice(0, self._count))
 
     def _build(self, scenario: str | PathLike[str] | None, *, trust_code: bool) -> Built | None:
         function = load_function if trust_code else unloaded

@@ -7,30 +7,17 @@ them when it stands alone, `robot/name` as soon as there are several robots.
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-import operator
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypedDict, Unpack
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-import coal
-import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
-    BeforeValidator,
     ConfigDict,
-    Discriminator,
     Field,
-    GetCoreSchemaHandler,
-    PlainSerializer,
-    SerializationInfo,
-    Tag,
     create_model,
     model_validator,
 )
-from pydantic_core import CoreSchema
 
 from sphshell_pin.contact import Friction as FrictionLaw
 from sphshell_pin.contact import NormalLaw
@@ -39,11 +26,9 @@ from sphshell_pin.dynamics import controllers
 from sphshell_pin.dynamics.controllers import NoController
 from sphshell_pin.dynamics.integrators import Adaptive, Integrator, SemiImplicitEuler
 from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
-from sphshell_pin.shell import Shell
+from sphshell_pin.scenario.primitives import Primitive
+from sphshell_pin.scenario.tables import OneOf, Positive, Vector3, refuse_unknown_keys
 
-Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Lengths3 = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 LISTS = ("robot", "shell", "contact", "source", "knob")
 """Tables of which there may be several."""
 
@@ -52,76 +37,28 @@ Count = Annotated[int, Field(ge=3)]
 
 
 class Section(BaseModel):
-    """A table of the file: frozen, and without room for keys nobody reads."""
+    """A table of the file: frozen; unknown keys are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-
-@dataclass(frozen=True)
-class OneOf:
-    """Annotation of a table that states one of a `family`; its key `type` says which."""
-
-    family: type[Ingredient]
-
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Build what reads and writes such tables."""
-        members = [
-            Annotated[kind, BeforeValidator(_without_type(kind)), Tag(name)]
-            for name, kind in self.family.kinds.items()
-        ]
-        either = functools.reduce(operator.or_, members)
-        return handler.generate_schema(
-            Annotated[either, Discriminator(_kind_of), PlainSerializer(_to_table)]
-        )
-
-
-def _kind_of(value: object) -> str | None:
-    kind = value.get("type") if isinstance(value, Mapping) else getattr(value, "kind", None)
-    return kind if isinstance(kind, str) else None
-
-
-def _without_type(kind: type[Ingredient]) -> Callable[[object], object]:
-    """Return what takes the key `type` off a table, and refuses fields that no file may state."""
-
-    def check(value: object) -> object:
-        if not isinstance(value, Mapping):
-            return value
-        known = parameters_of(kind)
-        for key in value:
-            if key in kind.__dataclass_fields__ and key not in known:
-                raise ValueError(f"unknown key '{key}'; valid keys: {', '.join(known)}")
-        return {k: v for k, v in value.items() if k != "type"}
-
-    return check
-
-
-def _to_table(value: Ingredient, info: SerializationInfo) -> dict[str, object]:
-    """Return the table that states `value`, without defaults where these may be left out."""
-    table: dict[str, object] = {"type": value.kind}
-    for one in dataclasses.fields(value):
-        given = getattr(value, one.name)
-        if one.name in parameters_of(value) and not (info.exclude_unset and given == one.default):
-            table[one.name] = _plain(given)
-    return table
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    return dict(value) if isinstance(value, Mapping) else value
+    @model_validator(mode="before")
+    @classmethod
+    def check_keys(cls, data: object) -> object:
+        """Refuse an unknown key first: it often hides a missing one ("stifness")."""
+        if isinstance(data, Mapping):
+            refuse_unknown_keys(data, list(cls.model_fields))
+        return data
 
 
 class Placement(Section):
-    """Where something stands in its reference frame: first rolled, pitched, yawed, then moved."""
+    """A placement in a reference frame: first rolled, pitched, yawed, then moved."""
 
     xyz: Annotated[Vector3, Parameter("m")] = [0.0, 0.0, 0.0]
     rpy_deg: Annotated[Vector3, Parameter("deg")] = [0.0, 0.0, 0.0]
 
 
 class RobotSection(Section):
-    """A robot or a single body: shipped (`name`) or one's own (`urdf`)."""
+    """A robot or a single body: shipped (`name`) or your own (`urdf`)."""
 
     name: str | None = None
     urdf: str | None = None
@@ -144,79 +81,6 @@ class RobotSection(Section):
         return self
 
 
-class ShellOptions(TypedDict):
-    """What a shell of a primitive takes besides its sizes."""
-
-    chord_error: float | None
-    segments: int | None
-    side: str
-    crease_angle: float
-    name: str
-
-
-class Box(Section):
-    """A box of edge lengths `size` [m], centered."""
-
-    type: Literal["box"]
-    size: Lengths3
-
-    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
-        """Return its surface."""
-        return Shell.from_geometry(coal.Box(*self.size), **options)
-
-
-class SphereSurface(Section):
-    """A ball's surface [m], centered."""
-
-    type: Literal["sphere"]
-    radius: Positive
-
-    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
-        """Return its surface."""
-        return Shell.from_geometry(coal.Sphere(self.radius), **options)
-
-
-class RoundSolid(Section):
-    """A cylinder, a cone, or a capsule (`length` without its caps) along z [m], centered."""
-
-    type: Literal["cylinder", "capsule", "cone"]
-    radius: Positive
-    length: Positive
-
-    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
-        """Return its surface."""
-        kinds = {"cylinder": coal.Cylinder, "capsule": coal.Capsule, "cone": coal.Cone}
-        return Shell.from_geometry(kinds[self.type](self.radius, self.length), **options)
-
-
-class Ellipsoid(Section):
-    """An ellipsoid of the three half axes `radii` [m], centered."""
-
-    type: Literal["ellipsoid"]
-    radii: Lengths3
-
-    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
-        """Return its surface."""
-        return Shell.from_geometry(coal.Ellipsoid(*self.radii), **options)
-
-
-class HalfSpace(Section):
-    """A square of edge length `extent` [m] in the plane z = 0, facing +z."""
-
-    type: Literal["half-space"]
-    extent: Positive = 10.0
-
-    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
-        """Return its surface."""
-        plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-        return Shell.from_geometry(plane, extent=self.extent, **options)
-
-
-Primitive = Annotated[
-    Box | SphereSurface | RoundSolid | Ellipsoid | HalfSpace, Field(discriminator="type")
-]
-
-
 class ShellSection(Section):
     """A surface: a file beside the scenario, or a primitive."""
 
@@ -224,7 +88,7 @@ class ShellSection(Section):
     file: str | None = None
     unit: str | None = None
     scale: Literal["apply", "ignore"] | Positive | None = None
-    primitive: Primitive | None = None
+    primitive: Annotated[Primitive, OneOf(Primitive)] | None = None
     chord_error: Positive | None = None
     bodies: Annotated[list[str], Field(min_length=1)] | None = None
     faces: Annotated[list[str | int], Field(min_length=1)] | None = None
@@ -243,7 +107,7 @@ class ShellSection(Section):
         if (self.file is None) == (self.primitive is None):
             raise ValueError("give either file or primitive, not both")
         if self.file is None and (self.unit is not None or self.scale is not None):
-            raise ValueError("unit and scale belong to a file; a primitive's sizes are in metres")
+            raise ValueError("unit and scale belong to a file; a primitive's sizes are in meters")
         if self.file is None and (self.bodies is not None or self.faces is not None):
             raise ValueError("bodies and faces belong to a CAD file, not to a primitive")
         if self.file is None and (self.time_limit is not None or self.memory_limit is not None):
@@ -258,7 +122,7 @@ Friction = Annotated[Ingredient, OneOf(FrictionLaw)]
 
 
 class SphereSection(Section):
-    """The sphere of a contact: `radius` [m], centre `offset` [m] in the robot's `frame`."""
+    """The sphere of a contact: `radius` [m], center `offset` [m] in the robot's `frame`."""
 
     frame: str
     radius: Annotated[Positive, Parameter("m", "sphere radius")]
@@ -415,7 +279,7 @@ class Scenario(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def take_single_tables(cls, data: Any) -> Any:
+    def take_single_tables(cls, data: object) -> object:
         """Read `[robot]` as the list of one that `[[robot]]` would have been."""
         if not isinstance(data, dict):
             return data

@@ -20,7 +20,7 @@ _END_WORDS = ("tcp", "tip", "tool", "ee_link", "eef", "end_effector", "foot", "f
 
 @dataclass(frozen=True)
 class Tip:
-    """A sphere on a robot: `radius` [m], centre `offset` (3,) [m] in `frame`; how it is known."""
+    """A sphere on a robot: `radius` [m], center `offset` (3,) [m] in `frame`; how it is known."""
 
     frame: str
     radius: float
@@ -76,13 +76,13 @@ def _known(robot: LoadedRobot, shipped: str | None) -> list[Tip]:
 
 def _sized(tip: Tip, radius: float | None) -> Tip:
     if radius is not None:
-        # A centre that stands one radius before the frame goes on touching it.
+        # A center that stands one radius before the frame goes on touching it.
         touching = tip.radius and abs(np.linalg.norm(tip.offset) - tip.radius) < 1e-9
         offset = tip.offset * (radius / tip.radius) if touching else tip.offset
         return Tip(tip.frame, radius, offset, tip.source)
     if not tip.radius:
         raise SphshellError(
-            f"frame '{tip.frame}' carries no sphere that is known: state its radius in metres, for "
+            f"frame '{tip.frame}' carries no sphere that is known: state its radius in meters, for "
             "a fingertip --radius 0.012"
         )
     return tip

@@ -35,7 +35,7 @@ class TouchPoint:
     """On the surface (3,) [m]."""
     normal: Array
     """Unit (3,), from the surface to the sphere."""
-    centre: Array
+    center: Array
     """Of the sphere (3,) [m], whose gap to the surface is the one asked for."""
 
 
@@ -201,9 +201,9 @@ def come_down(
 
     It stops at the `gap` [m] to the surface; `direction` is a unit vector (3,).
     """
-    centre, point, _ = _advance(shell, start, direction, radius + gap, 1e-3 * gap)
-    away = centre - point
-    return TouchPoint(point, away / np.linalg.norm(away), centre)
+    center, point, _ = _advance(shell, start, direction, radius + gap, 1e-3 * gap)
+    away = center - point
+    return TouchPoint(point, away / np.linalg.norm(away), center)
 
 
 def _advance(

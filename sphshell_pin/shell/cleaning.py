@@ -19,7 +19,7 @@ from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.corner_normals import Found, settle_normals, unit_normals
 from sphshell_pin.shell.health import Place, ShellHealth
 from sphshell_pin.shell.joints import settle_joints
-from sphshell_pin.shell.orientation import Borders, Oriented, find_borders, orient, split_elements
+from sphshell_pin.shell.orientation import Borders, Oriented, as_triangles, find_borders, orient
 from sphshell_pin.shell.polygons import Polygons, examine_quads, without_area
 from sphshell_pin.shell.raw import Floats, Ints, Mask, RawSurface, raw_surface
 
@@ -290,14 +290,16 @@ def _assemble(
     turn_normals: bool = True,
 ) -> CleanedSurface:
     polygons = oriented.polygons
-    slots, triangle_element = split_elements(polygons, vertices)
-    triangles = polygons.corners[slots]
+    triangles, triangle_element = as_triangles(polygons, vertices)
     normals = None
     if table is not None and polygons.normal_row is not None:
         normals = settle_normals(table, polygons, vertices, found, turn_normals)
     elements = np.full((len(polygons), 4), -1, np.int32)
-    place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
-    elements[polygons.polygon_of_slot, place] = polygons.corners
+    if polygons.only_triangles:
+        elements[:, :3] = triangles
+    else:
+        place = np.arange(len(polygons.corners)) - np.repeat(polygons.offsets[:-1], polygons.counts)
+        elements[polygons.polygon_of_slot, place] = polygons.corners
     in_use = _in_use(triangles, len(vertices))
     borders = find_borders(oriented, vertices)
     starts = np.arange(0, triangles.size + 1, 3)

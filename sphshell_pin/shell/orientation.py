@@ -31,6 +31,14 @@ def split_elements(polygons: Polygons, vertices: Floats) -> tuple[Longs, Ints]:
     return slots, np.repeat(np.arange(len(polygons), dtype=np.int32), counts - 2)
 
 
+def as_triangles(polygons: Polygons, vertices: Floats) -> tuple[Ints, Ints]:
+    """Vertices (t, 3) of the triangles of `split_elements`, and the polygon (t,) of each."""
+    if polygons.only_triangles:
+        return polygons.corners.reshape(-1, 3), np.arange(len(polygons), dtype=np.int32)
+    slots, element = split_elements(polygons, vertices)
+    return polygons.corners[slots], element
+
+
 @dataclass(frozen=True)
 class Oriented:
     """The outcome of `orient`.
@@ -77,8 +85,7 @@ def orient(polygons: Polygons, vertices: Floats, keep_winding: bool = False) -> 
     if keep_winding:
         odd_ones = np.bincount(component, flip, number)
         closed &= (odd_ones == 0) | (odd_ones == np.bincount(component, minlength=number))
-    slots, element = split_elements(polygons, vertices)
-    triangles = polygons.corners[slots]
+    triangles, element = as_triangles(polygons, vertices)
     # The volume about a point near the surface loses the least to rounding.
     volume, total_area, turned_area, largest = _core.mend_sums(
         vertices, triangles, element, component, flipped, number, vertices.mean(axis=0)

@@ -136,6 +136,9 @@ def _polygons(elements: object) -> tuple[Longs, Ints]:
     if rows.min() < -1 or rows.max() > LARGEST_COUNT:
         element, place = np.argwhere((rows < -1) | (rows > LARGEST_COUNT))[0]
         raise InvalidShell(f"element {element} uses vertex {rows[element, place]}: no such vertex")
+    if rows.min() >= 0:
+        starts = np.arange(len(rows) + 1, dtype=np.int64) * rows.shape[1]
+        return starts, np.array(rows, np.int32, order="C").reshape(-1)
     used = rows >= 0
     counts = used.sum(axis=1)
     ragged = np.flatnonzero((counts < 3) | (used[:, 1:] & ~used[:, :-1]).any(axis=1))

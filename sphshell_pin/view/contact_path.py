@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,19 +36,7 @@ class ContactRows:
         The end of a run that diverged may hold numbers no picture can show: they are left out.
         """
         order = np.argsort(np.asarray(log.row), kind="stable")
-        rows = cls(
-            np.asarray(log.row, dtype=np.int64)[order],
-            np.asarray(log.pair, dtype=np.int64)[order],
-            *(
-                np.asarray(column, dtype=float)[order]
-                for column in (
-                    log.point_world,
-                    log.normal_world,
-                    log.normal_force,
-                    log.friction_force_world,
-                )
-            ),
-        )
+        rows = cls(*(np.asarray(getattr(log, column.name))[order] for column in fields(cls)))
         vectors = (rows.point_world, rows.normal_world, rows.friction_force_world)
         sound = np.abs(rows.normal_force) < LARGEST
         for vector in vectors:
@@ -57,14 +45,7 @@ class ContactRows:
 
     def select(self, chosen: slice | IndexArray | NDArray[np.bool_]) -> ContactRows:
         """Return the entries that `chosen`, a slice, mask or indices, picks."""
-        return ContactRows(
-            self.row[chosen],
-            self.pair[chosen],
-            self.point_world[chosen],
-            self.normal_world[chosen],
-            self.normal_force[chosen],
-            self.friction_force_world[chosen],
-        )
+        return ContactRows(*(getattr(self, column.name)[chosen] for column in fields(self)))
 
     def at(self, row: int) -> ContactRows:
         """Return the contacts of the recorded `row`."""

@@ -261,7 +261,7 @@ def choose_view(
         check_geometry_model(model, visual_model)
         boxes += _geometry_boxes(visual_model)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    centres: list[FloatArray] = []
+    centers: list[FloatArray] = []
     around: list[FloatArray] = []
     radii = [pair.sphere.radius for pair in scene.pairs if pair.sphere is not None]
     for row in np.unique(np.linspace(0, len(configurations) - 1, 60).astype(int)):
@@ -270,15 +270,15 @@ def choose_view(
             around.append(np.array(data.oMi[joint].translation))
         for pair in scene.pairs:
             if pair.sphere is not None:
-                centres.append(data.oMi[pair.joint_i].act(pair.placement_i.translation))
+                centers.append(data.oMi[pair.joint_i].act(pair.placement_i.translation))
         if row == 0:
             for joint, placement, low, high in boxes:
                 where = data.oMi[joint] * placement
                 around.extend(where.act(low + corner * (high - low)) for corner in corners)
     touched = points_world is not None and len(points_world)
-    action = np.array(centres) if centres else np.array(around or [np.zeros(3)])
+    action = np.array(centers) if centers else np.array(around or [np.zeros(3)])
     if touched and points_world is not None:
-        action = points_world if not centres else np.vstack((action, points_world))
+        action = points_world if not centers else np.vstack((action, points_world))
     normal = np.zeros(3)
     if touched and normals_world is not None:
         mean = normals_world.mean(axis=0)

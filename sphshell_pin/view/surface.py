@@ -146,7 +146,7 @@ def great_circles(radius: float, points: int = 48) -> tuple[FloatArray, IntArray
 def tube(points: FloatArray, radius: float, sides: int = 6) -> tuple[FloatArray, IntArray]:
     """Return vertices (n, 3) and triangles (t, 3) of a tube of `radius` [m] along `points` (k, 3).
 
-    Needs two points or more, no two neighbours equal. A line would be one pixel wide anywhere.
+    Needs two points or more, no two neighbors equal. A line would be one pixel wide anywhere.
     """
     steps = np.diff(points, axis=0)
     tangents = np.vstack((steps[:1], steps[:-1] + steps[1:], steps[-1:]))

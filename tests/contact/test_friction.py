@@ -51,22 +51,9 @@ def test_creep_speed(share: float, creep: float) -> None:
 
 @pytest.mark.parametrize(
     ("values", "name"),
-    [
-        ((-0.1, 0.1, 0.1, 1.0), "mu_static"),
-        ((float("nan"), 0.1, 0.1, 1.0), "mu_static"),
-        ((0.3, -0.1, 0.1, 1.0), "mu_dynamic"),
-        ((0.3, 0.1, 0.0, 1.0), "v_static"),
-        ((0.3, 0.1, -0.1, 1.0), "v_static"),
-        ((0.3, 0.1, 0.1, 0.1), "v_dynamic"),
-        ((0.3, 0.1, 0.1, float("inf")), "v_dynamic"),
-    ],
+    [((0.1, 0.3, 0.1, 1.0), "mu_dynamic"), ((0.3, 0.1, 0.1, 0.1), "v_dynamic")],
 )
-def test_bad_values_are_named(values, name: str) -> None:
+def test_values_that_do_not_fit_together_are_refused(values, name: str) -> None:
     with pytest.raises(InvalidParameter) as caught:
         CoulombFriction(*values)
     assert caught.value.name == name
-
-
-def test_dynamic_above_static_is_refused() -> None:
-    with pytest.raises(InvalidParameter, match="mu_"):
-        CoulombFriction(0.1, 0.3, 0.1, 1.0)

@@ -116,37 +116,8 @@ def test_hertz_with_restitution(restitution: float, speed: float) -> None:
 
 def test_hertz_asks_for_both_restitution_and_speed() -> None:
     for half in ({"restitution": 0.5}, {"speed": 1.0}):
-        with pytest.raises(InvalidParameter):
+        with pytest.raises(InvalidParameter, match="given together"):
             ImpactLaw.hertz(0.01, 207e9, 0.29, 207e9, 0.29, **half)
-
-
-BAD_LAWS = [
-    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 0, -1.0, "stiffness"),
-    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 0, float("nan"), "stiffness"),
-    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 1, 0.0, "exponent"),
-    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 1, float("inf"), "exponent"),
-    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 2, -1.0, "damping"),
-    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 3, 0.0, "full_damping_depth"),
-    (ImpactLaw, (1e5, 1.5, 10.0, 1e-4), 3, float("nan"), "full_damping_depth"),
-    (HuntCrossleyLaw, (1e5, 1.5, 0.1), 0, -1.0, "stiffness"),
-    (HuntCrossleyLaw, (1e5, 1.5, 0.1), 1, -1.0, "exponent"),
-    (HuntCrossleyLaw, (1e5, 1.5, 0.1), 2, -1e-9, "dissipation"),
-    (ImpactLaw.hertz, (0.01, 2e11, 0.3, 2e11, 0.3, 0.5, 1.0), 0, 0.0, "radius"),
-    (ImpactLaw.hertz, (0.01, 2e11, 0.3, 2e11, 0.3, 0.5, 1.0), 1, -1.0, "young_1"),
-    (ImpactLaw.hertz, (0.01, 2e11, 0.3, 2e11, 0.3, 0.5, 1.0), 4, 0.6, "poisson_2"),
-    (ImpactLaw.hertz, (0.01, 2e11, 0.3, 2e11, 0.3, 0.5, 1.0), 5, 1.5, "restitution"),
-    (ImpactLaw.hertz, (0.01, 2e11, 0.3, 2e11, 0.3, 0.5, 1.0), 6, -1.0, "speed"),
-]
-
-
-@pytest.mark.parametrize(("make", "good", "place", "value", "name"), BAD_LAWS)
-def test_bad_values_are_named(make, good, place: int, value: float, name: str) -> None:
-    make(*good)
-    bad = [*good[:place], value, *good[place + 1 :]]
-    with pytest.raises(InvalidParameter) as caught:
-        make(*bad)
-    assert caught.value.name == name
-    assert name in str(caught.value)
 
 
 def test_laws_are_values() -> None:

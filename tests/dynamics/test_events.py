@@ -36,13 +36,16 @@ def touches(result: sp.Result) -> list[float]:
 @tolerances
 @pytest.mark.parametrize("law", LAWS)
 def test_a_bounce_costs_few_evaluations(kind, rtol: float, law: str) -> None:
-    """All evaluations but those of accepted steps: tried again for their error, or for events."""
+    """All evaluations but those of accepted steps: tried again for their error, or for events.
+
+    A bounce has two events; with a damped law three, as its clamp is one.
+    """
     result = bounce(kind(rtol), LAWS[law])
     count = len(touches(result))
     assert count >= 8
     stats = result.stats
     beyond = stats.evaluations - STEP[kind] * stats.steps
-    assert beyond / count <= 60
+    assert beyond / count <= (60 if law in ("linear", "hertz") else 90)
     # No dynamics in these: contacts alone, on the dense output.
     assert stats.event_queries / count <= 120
 

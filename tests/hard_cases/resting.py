@@ -135,13 +135,13 @@ def ring_depth(half_angle: float, columns: int, flat: bool, stiffness: float) ->
 
 
 def seated(
-    integrator: Any, columns: int, flat: bool, free: bool, share: float = 0.05
+    integrator: Any, columns: int, flat: bool, free: bool
 ) -> tuple[float, float, float, float]:
     """Let a ball settle in a cone; return its depth, what is right, the force up, and how far
-    from the axis it is [m]. `free`: it may leave the axis; `share`: depth in radii.
+    from the axis it is [m]. `free`: it may leave the axis.
     """
     a = math.radians(40.0)
-    depth = share * RADIUS
+    depth = 0.05 * RADIUS
     stiffness = WEIGHT / (depth * math.sin(a))
     right = ring_depth(a, columns, flat, stiffness)
     law = damped(stiffness, 2 * math.sqrt(stiffness * MASS))
@@ -149,7 +149,9 @@ def seated(
     height = (RADIUS - 0.9 * right) / math.sin(a)
     q = np.array([1e-5 * RADIUS, 0.0, height]) if free else np.array([height])
     shell = cone(a, columns, max(columns // 8, 2), flat)
-    result = rest(model, shell, law, q, integrator, 50 * math.sqrt(depth / GRAVITY))
+    # Times of decay: as many as the error of the forces asks for.
+    duration = (20 if free else 50) * math.sqrt(depth / GRAVITY)
+    result = rest(model, shell, law, q, integrator, duration)
     last = result.contacts.row == len(result.t) - 1
     up = float(result.contacts.force_world[last, 2].sum())
     aside = float(np.hypot(*result.q[-1, :2])) if free else 0.0

@@ -26,7 +26,7 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial import cKDTree
 
 from sphshell_pin import Shell
-from sphshell_pin.shell.curved import curved_mesh
+from sphshell_pin.shell.curved import curved_mesh, points_at
 
 Array = NDArray[np.float64]
 
@@ -249,26 +249,20 @@ def curved_places(shell: Shell, count: int, seed: int = 0) -> dict[str, Array]:
     keys = np.column_stack([np.sort(ends.reshape(-1, 2), axis=1), np.repeat(face, 3)])
     _, number, owners = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     border = (owners[number.ravel()] == 1).reshape(-1, 3)
-    points = curved_mesh(shell, 24)[0].reshape(len(corners), -1, 3)
-    grid = [(i, j) for i in range(25) for j in range(25 - i)]
-    at = {place: k for k, place in enumerate(grid)}
-    along = (5, 12, 19)
-    sides = [
-        [at[i, 0] for i in along],
-        [at[24 - i, i] for i in along],
-        [at[0, 24 - i] for i in along],
-    ]
-    inside = [at[8, 8], at[4, 4], at[16, 4], at[4, 16]]
-    weights = np.array([[24 - i - j, i, j] for i, j in grid]) / 24
+    along = np.array([[1 - k, k, 0] for k in (5 / 24, 1 / 2, 19 / 24)])
+    inside = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / [[3], [6], [6], [6]]
+    weights = np.concatenate([*(np.roll(along, k, axis=1) for k in range(3)), inside])
+    points = points_at(shell, np.arange(len(corners)), weights)
     off = np.linalg.norm(points - np.einsum("kc,tcx->tkx", weights, corners), axis=2)
     rng, found = np.random.default_rng(seed), {}
     for name in ("border", "sides", "inside"):
         if name == "inside":
-            rows, columns = np.indices((len(corners), len(inside))).reshape(2, -1)
-            columns = np.array(inside)[columns]
+            rows, columns = np.indices((len(corners), 4)).reshape(2, -1)
+            columns = columns + 9
         else:
             triangle, side = np.nonzero(border if name == "border" else ~border)
-            rows, columns = triangle.repeat(3), np.array(sides)[side].ravel()
+            rows = triangle.repeat(3)
+            columns = (3 * side[:, None] + np.arange(3)).ravel()
         some = rng.choice(len(rows), min(count - count // 2, len(rows)), replace=False)
         most = np.argsort(-off[rows, columns], kind="stable")[: count // 2]
         pick = np.concatenate([most, some])

@@ -60,20 +60,6 @@ def test_a_new_scenario_takes_one_body_of_a_cad_file(tmp_path):
     np.testing.assert_allclose(np.ptp(shell.box, axis=0), 0.04, atol=1e-9)
 
 
-def test_body_and_face_belong_to_a_file(tmp_path):
-    code, output = told("new", "--robot", "ball", "--face", "3", "--out", tmp_path / "a.toml")
-    assert code == 2
-    assert "not to the plane" in output
-
-
-def test_a_cad_file_is_no_robot(tmp_path):
-    part = tmp_path / "part.step"
-    part.write_text("ISO-10303-21;", encoding="utf-8")
-    code, output = told("new", "--robot", part)
-    assert code == 2
-    assert "is not a URDF file" in output
-
-
 def test_a_scenario_is_found_by_its_whole_name(tmp_path):
     path = write(tmp_path, DROP)
     code, output = told("explain", path.with_suffix(""))

@@ -251,7 +251,9 @@ def test_its_knobs_turn(tmp_path):
         (("ball", "blub"), {}, NameNotFound, "plane, box, sphere, cylinder, bowl"),
         (("ball", "blub.stl"), {}, SphshellError, "no such surface file: blub.stl"),
         (("ball", BLADE), {}, UnitMissing, "must be stated"),
-        (("ball", "plane"), {"unit": "mm"}, SphshellError, "sized in metres"),
+        (("ball", "plane"), {"unit": "mm"}, SphshellError, "sized in meters"),
+        (("ball", "plane"), {"faces": [3]}, SphshellError, "not to the plane"),
+        ((BLADE,), {}, SphshellError, "is not a URDF file"),
         (("ball",), {"frame": "bal"}, FrameNotFound, "no frame 'bal'"),
         (("ball",), {"radius": -1.0}, InvalidParameter, "must be positive"),
         (("ball",), {"press": 3.0}, SphshellError, "leave out --press"),
@@ -388,11 +390,11 @@ def test_a_surface_is_touched_in_the_middle_of_its_broad_side(
     spot = find_touch_point(shell_of(geometry), 0.01, 1e-3, toward=toward, inside=inside)
     np.testing.assert_allclose(spot.point, point, atol=1e-4)
     np.testing.assert_allclose(spot.normal, normal, atol=1e-3)
-    np.testing.assert_allclose(spot.centre, spot.point + 0.011 * spot.normal, atol=2e-6)
+    np.testing.assert_allclose(spot.center, spot.point + 0.011 * spot.normal, atol=2e-6)
 
 
 def test_a_sphere_has_room_in_a_groove():
-    """A V of 60 degrees: the sphere rests on both sides, its centre at twice the distance."""
+    """A V of 60 degrees: the sphere rests on both sides, its center at twice the distance."""
     from sphshell_pin.scenario.touch_points import find_touch_point
 
     slope = np.tan(np.deg2rad(60))
@@ -400,10 +402,10 @@ def test_a_sphere_has_room_in_a_groove():
     vertices += [[0.0, y, 0.0] for y in (-0.1, 0.1)] + [[0.1, y, 0.1 * slope] for y in (-0.1, 0.1)]
     shell = sp.Shell(vertices, [[0, 2, 3, 1], [2, 4, 5, 3]])
     spot = find_touch_point(shell, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))
-    distance = abs(shell.closest_points(spot.centre[None]).distances[0])
+    distance = abs(shell.closest_points(spot.center[None]).distances[0])
     assert distance == pytest.approx(0.011, rel=1e-3)
-    # From the bottom of the groove the centre stands 1 / cos 60 degrees as high.
-    assert spot.centre[2] == pytest.approx(0.022, rel=1e-3)
+    # From the bottom of the groove the center stands 1 / cos 60 degrees as high.
+    assert spot.center[2] == pytest.approx(0.022, rel=1e-3)
 
 
 def test_a_way_across_stays_on_the_surface_and_ends_at_the_rim():

@@ -140,8 +140,6 @@ def test_a_sweep_of_failures_is_an_error(scenario):
 
 
 FAULTS = {
-    "key": (["--vary", "contact.law.stifness=1,2"], "did you mean 'stiffness'"),
-    "value": (["--vary", "contact.law.stiffness=1:2"], "lo:hi:n"),
     "figure": (["--vary", "contact.law.stiffness=1,2", "--plot", "peak"], "no figure 'peak'"),
     "file": (["--vary", "contact.law.stiffness=1,2", "--out", "x.csv"], ".parquet or .h5"),
     "picture": (
@@ -160,6 +158,3 @@ def test_faults_are_one_sentence(scenario, fault):
     assert words in told.output
     assert told.output.count("\n") == 1
 
-
-def test_help_has_an_example():
-    assert "Example: sphshell-pin sweep" in call("sweep", "--help").output

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin.errors import InvalidParameter, MissingExtra
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view import ArrowScale, Display
 from sphshell_pin.view.page import FilmWindow
 from tests.view.stand_ins import (
@@ -158,12 +158,6 @@ def test_a_stock_meshcat_page_takes_the_scene():
     finally:
         page.window.server_proc.terminate()
         page.window.server_proc.wait()
-
-
-def test_without_meshcat_one_sentence_says_how_to_get_it(monkeypatch):
-    monkeypatch.setitem(sys.modules, "meshcat", None)
-    with pytest.raises(MissingExtra, match=r"pip install 'sphshell-pin\[view\]'"):
-        Display(turntable_scene())
 
 
 def test_importing_the_folder_loads_no_picture_library():

@@ -52,9 +52,9 @@ def test_the_help_has_an_example():
     assert "Example: sphshell-pin view" in told.output
 
 
-@pytest.mark.parametrize("kind", ["scenario", "folder", "file"])
+@pytest.mark.parametrize("kind", ["scenario", "folder"])
 def test_it_serves_a_page_and_ctrl_c_ends_it(kind, tmp_path, finished):
-    what = {"scenario": write(tmp_path), "folder": finished, "file": finished / "run.npz"}[kind]
+    what = {"scenario": write(tmp_path), "folder": finished}[kind]
     process, url = started(what)
     try:
         assert get(url)[0] == 200

@@ -39,11 +39,10 @@ struct ContactKinematics {
   Vector3<S> bristle = Vector3<S>::Zero();  // [m]
 };
 
-// The friction laws. Each has its name, its parameters, and:
-//   add  writes friction, torsion and the bristle's rates to the force at a contact; `radius` [m]
-//   is
-//        the sphere's, `relaxation` [s] that of the bristles;
-//   coefficient  of steady sliding at a slip speed [m/s].
+// The friction laws. Each has its name, its parameters, and
+// - coefficient: of steady sliding at a slip speed [m/s];
+// - add: writes friction, torsion and the bristle's rates to the force at a contact. `radius` [m]
+//   is that of the sphere, `relaxation` [s] that of the bristles.
 
 struct NoFriction {
   static constexpr const char* kind = "none";

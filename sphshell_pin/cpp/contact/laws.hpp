@@ -48,10 +48,10 @@ NormalForce<S> push(const S& total, const S& elastic) {
   return {total < 0 ? S(0) : total, elastic};
 }
 
-// The laws. Each has its name, its parameters, and:
-//   force   at depth > 0 [m] and gap_rate = n . v_rel [m/s], negative while closing;
-//   energy  potential of the elastic part [J];
-//   needs_rate  whether the force depends on gap_rate.
+// The laws. Each has its name, its parameters, and
+// - force: at depth > 0 [m] and gap_rate = n . v_rel [m/s], negative while closing;
+// - energy: the potential of the elastic part [J];
+// - needs_rate: whether the force depends on gap_rate.
 
 // max(0, k depth^e - STEP(depth, 0, 0, d, c) gap_rate)
 struct ImpactLaw {

@@ -38,9 +38,9 @@ bool Events::met() const {
   return false;
 }
 
-bool Events::met_at(double theta, const Chart& chart, const Stepper& stepper) {
+bool Events::met_at(double theta, const Motion& motion, const Chart& chart) {
   ++queries_;
-  stepper.interpolate(theta, y_);
+  motion(theta, y_);
   chart.finish(chart.origin().t, y_, state_);
   scene_.evaluate(state_.q, state_.v, state_.z);
   return met();
@@ -67,16 +67,16 @@ void Events::measure(std::size_t k, double margin, Gauges& out) {
     std::sort(values.begin(), values.end(), std::greater<double>());
 }
 
-double Events::locate(double before, double after, double tolerance, const Chart& chart,
-                      const Stepper& stepper) {
-  met_at(after, chart, stepper);
+double Events::locate(double before, double after, double tolerance, const Motion& motion,
+                      const Chart& chart) {
+  met_at(after, motion, chart);
   std::size_t k = 0;
   while (k + 1 < at_begin_.size() && !changed(k)) ++k;
   const double radius = scene_.pairs()[k].radius;
   const Vec3 end = scene_.states()[k].center;
   const double margin = std::min(1.1 * (end - at_begin_[k].center).norm(), kMargin * radius);
   measure(k, margin, after_);
-  met_at(before, chart, stepper);
+  met_at(before, motion, chart);
   const Vec3 start = scene_.states()[k].center;
   measure(k, margin, before_);
 
@@ -101,7 +101,7 @@ double Events::locate(double before, double after, double tolerance, const Chart
       // center moves.
       size = gauges[kind].size() > index ? std::abs(gauges[kind][index])
              : kind == Clamp             ? known
-                             : std::max(margin, (center - from).norm() - known);
+                                         : std::max(margin, (center - from).norm() - known);
       size = std::max(size, std::numeric_limits<double>::min());
     }
     return is_met ? size : -size;
@@ -109,7 +109,7 @@ double Events::locate(double before, double after, double tolerance, const Chart
   std::uintmax_t looks = kMostLooks;
   const auto bracket = boost::math::tools::toms748_solve(
       [&](double theta) {
-        const bool is_met = met_at(theta, chart, stepper);
+        const bool is_met = met_at(theta, motion, chart);
         if (kind < kKinds) measure(k, margin, between_);
         return value(between_, scene_.states()[k].center, is_met);
       },

@@ -2,14 +2,18 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <vector>
 
-#include "dynamics/integrators/stepper.hpp"
+#include "dynamics/integrators/chart.hpp"
 
 namespace sphshell {
 
+// The state of a chart at a share of a step, as its dense output or a prediction has it.
+using Motion = std::function<void(double share, VectorX& y)>;
+
 // An event is a change of sign: of a contact's depth (touch, lift-off), of a saddle's depth, or of
-// the force that a law clamps at zero. Events are located on the dense output of a step, where a
+// the force that a law clamps at zero. Events are located on an interpolated motion, where a
 // look costs a query of the contacts and no evaluation of the dynamics.
 class Events {
  public:
@@ -19,13 +23,12 @@ class Events {
   void begin();
   // Whether an event lies between there and where the scene was last evaluated.
   bool met() const;
-  // Whether one lies between there and the share theta of the stepper's last step; evaluates the
-  // scene there.
-  bool met_at(double theta, const Chart& chart, const Stepper& stepper);
-  // The share of the stepper's last step where the first event has just been met, to within
-  // `tolerance`. None has been met at `before`, one has at `after`.
-  double locate(double before, double after, double tolerance, const Chart& chart,
-                const Stepper& stepper);
+  // Whether one lies between there and the share theta of a motion; evaluates the scene there.
+  bool met_at(double theta, const Motion& motion, const Chart& chart);
+  // The share of a motion where the first event has just been met, to within `tolerance`. None has
+  // been met at the share `before`, one has at `after`.
+  double locate(double before, double after, double tolerance, const Motion& motion,
+                const Chart& chart);
 
   long queries() const { return queries_; }  // states looked at
 

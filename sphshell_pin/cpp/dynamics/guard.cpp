@@ -25,7 +25,7 @@ void Guard::begin(const SceneData& scene) {
   }
 }
 
-double Guard::allowed(SceneData& scene, const State& from, const State& to) {
+double Guard::allowed(SceneData& scene, const State& from, const State& to, bool gap_at_end) {
   double share = std::numeric_limits<double>::infinity();
   const double h = to.t - from.t;
   const double turned =
@@ -44,11 +44,20 @@ double Guard::allowed(SceneData& scene, const State& from, const State& to) {
     if (turned > kMostTurned) share = std::min(share, kMostTurned / turned);
     if (turned > kTurn) moved = std::max(moved, path(scene, k, from, to));
     if (moved <= slack) continue;
-    const double limit = slack + (known.touching ? 0 : gap(pair, known));
+    double limit = slack + (known.touching ? 0 : gap(pair, known));
+    if (gap_at_end && moved > limit && !known.touching)
+      limit += std::max(0.0, distance(pair, scene.states()[k].center) - pair.radius);
     share = std::min(share, limit / moved);
   }
   if (turned > kTurn) scene.body().kinematics(to.q, to.v);
   return share;
+}
+
+// A lower bound of the distance to the shell.
+double Guard::distance(const Pair& pair, const Vec3& center) {
+  const double distance = std::abs(pair.shell->closest_point(center).distance);
+  const bool is_curved = pair.method == Method::Smooth && pair.shell->curved() != nullptr;
+  return is_curved ? distance - pair.shell->curved()->bulge() : distance;
 }
 
 // A lower bound of the gap at the begin of the step; the distance is looked up where the one known
@@ -57,10 +66,7 @@ double Guard::gap(const Pair& pair, Known& known) const {
   double distance = known.distance - (known.center - known.anchor).norm();
   if (known.distance < 0 || distance < std::max(2 * pair.radius, 0.5 * known.distance)) {
     known.anchor = known.center;
-    known.distance = std::abs(pair.shell->closest_point(known.center).distance);
-    if (pair.method == Method::Smooth && pair.shell->curved() != nullptr)
-      known.distance -= pair.shell->curved()->bulge();
-    distance = known.distance;
+    distance = known.distance = Guard::distance(pair, known.center);
   }
   return std::max(0.0, distance - pair.radius);
 }

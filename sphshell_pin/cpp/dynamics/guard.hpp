@@ -18,8 +18,9 @@ class Guard {
   // The scene's last evaluate() was at the state where the next step begins.
   void begin(const SceneData& scene);
   // The share of the step from `from` to `to` that is allowed; 1 or more: all of it. The scene's
-  // last evaluate() was at `to`.
-  double allowed(SceneData& scene, const State& from, const State& to);
+  // last evaluate() was at `to`. With `gap_at_end`, a sphere that is apart may also move by the gap
+  // at the end: it cannot have touched on a way of that length either.
+  double allowed(SceneData& scene, const State& from, const State& to, bool gap_at_end = false);
 
  private:
   struct Known {
@@ -30,6 +31,7 @@ class Guard {
     double distance = -1;
   };
 
+  static double distance(const Pair& pair, const Vec3& center);
   double gap(const Pair& pair, Known& known) const;
   double path(SceneData& scene, std::size_t k, const State& from, const State& to);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -11,13 +12,18 @@ namespace sphshell {
 namespace {
 
 constexpr double kFineTolerance = 1e-6;  // of the steps that replace a fixed one
-// A step ends behind its event by this share of its length at most, and of rtol.
-constexpr double kEventShare = 1e-3;
+// A step ends behind its event by this share of its length at most, and of rtol; where it is aimed
+// at, as a share of that.
+constexpr double kEventShare = 1e-3, kBehind = 0.02;
 // How far beyond the end of a step, as a share of it, its dense output still locates an event.
 constexpr double kBeyond = 0.05;
 constexpr int kMostEventSteps = 8;  // in one step
 // Up to this error the dense output of a rejected step shows where the event is.
 constexpr double kUsableError = 1e6;
+// A derivative of the force is not bounded at an event (depth^1.5): there the estimate of the error
+// is too small, and the error falls with a lower order.
+constexpr double kErrorAtKink = 0.05, kOrderAtKink = 2.5, kFirstShare = 0.15;
+constexpr int kMostKinkRejections = 3;  // in one step; then the error is taken as it is
 
 // Of the numbers near t.
 double spacing(double t) { return std::numeric_limits<double>::epsilon() * std::abs(t); }
@@ -48,6 +54,7 @@ void Stepping::restart() {
   scene_.evaluate(state_.q, state_.v, state_.z, true);
   last_ = scene_.powers();
   scene_.accept(state_.z);
+  free_ = !scene_.touching();
   guard_.begin(scene_);
   events_.begin();
   proposal_ = kInfinity;
@@ -55,9 +62,9 @@ void Stepping::restart() {
   last_error_ = 1;
 }
 
-void Stepping::attempt(double h) {
-  scene_.restart();
-  active_->step(chart_, h, next_);
+Stepping::Tolerances Stepping::tolerances() const {
+  if (settings_.dt > 0) return {kFineTolerance, 1e-2 * kFineTolerance};
+  return {settings_.rtol, settings_.atol};
 }
 
 bool Stepping::make_fixed(double end) {
@@ -85,36 +92,44 @@ Stepping::Made Stepping::make_controlled(double end) {
   }
   chart_.begin(state_);
   active_->begin(chart_);
-  if (std::exchange(new_motion_, false)) proposal_ = first_step();
+  const bool after_event = std::exchange(new_motion_, false);
+  if (after_event) proposal_ = first_step();
   // No short step is left over at the end.
   double h = proposal_ > 0.95 * left ? left : std::min(proposal_, 0.5 * left);
+  if (free_) h = predicted_step(h);
   h = std::min(std::max(h, 4 * shortest), left);
   const double order = active_->order_of_error();
   bool rejected = false;
-  int event_steps = 0;
+  int event_steps = 0, kink_rejections = 0;
   double error = 0;
   for (;;) {
     if (h < shortest && h < left) {
       proposal_ = h;
       return Made::Stuck;
     }
-    attempt(h);
+    scene_.restart();
+    active_->step(chart_, h, next_);
     next_.t = h == left ? end : state_.t + h;
     error = error_norm();
     // At the resolution of time an error is round-off.
-    const bool too_large = !(error <= 1) && !(h <= 4 * shortest && std::isfinite(error));
-    if (!too_large || (error < kUsableError && event_steps < kMostEventSteps)) {
+    const bool shortest_yet = h <= 4 * shortest && std::isfinite(error);
+    const double kink_limit = kink_rejections < kMostKinkRejections ? kErrorAtKink : 1;
+    double limit = after_event ? kink_limit : 1;
+    const bool small = error <= limit || shortest_yet;
+    bool is_met = false;
+    if (small || (error < kUsableError && event_steps < kMostEventSteps)) {
       scene_.evaluate(next_.q, next_.v, next_.z);
-      const double allowed = guard_.allowed(scene_, state_, next_);
-      if (!too_large && allowed < 1) {
+      const double allowed = guard_.allowed(scene_, state_, next_, true);
+      if (allowed < 1 && small) {
         ++rejected_;
         h *= std::clamp(0.95 * allowed, 0.01, 0.9);
         continue;
       }
-      const bool is_met = events_.met();
-      if (allowed >= 1 && (is_met || (event_steps > 0 && !too_large)) &&
-          event_steps < kMostEventSteps) {
-        const double wanted = to_event(h, left, shortest, is_met);
+      is_met = allowed >= 1 && events_.met();
+      const bool to_locate = event_steps == 0 ? is_met : error <= kink_limit;
+      if (to_locate && event_steps < kMostEventSteps) {
+        const double wanted =
+            std::min(std::max(step_to_event(h, left, is_met), 4 * shortest), left);
         if (wanted != h) {
           ++event_steps_;
           ++event_steps;
@@ -122,14 +137,17 @@ Stepping::Made Stepping::make_controlled(double end) {
           continue;
         }
       }
-      if (!too_large) {
-        new_motion_ = is_met;
-        break;
-      }
+      if (is_met) limit = kink_limit;
+    }
+    if (error <= limit || shortest_yet) {
+      new_motion_ = is_met;
+      break;
     }
     ++rejected_;
     rejected = true;
-    h *= error < 1e300 ? std::clamp(0.9 * std::pow(error, -1 / order), 0.1, 0.9) : 0.1;
+    const double power = -1 / (limit < 1 ? kOrderAtKink : order);
+    if (limit < 1) ++kink_rejections;
+    h *= error < 1e300 ? std::clamp(0.9 * std::pow(error / limit, power), 0.1, 0.9) : 0.1;
   }
   active_->complete(chart_, next_);
   // PI control (Gustafsson 1991).
@@ -144,20 +162,43 @@ Stepping::Made Stepping::make_controlled(double end) {
 
 // The length of the step that ends just behind the event, seen from one of length h; h where that
 // will do, or where there is no event.
-double Stepping::to_event(double h, double left, double shortest, bool is_met) {
-  const double rtol = settings_.dt > 0 ? kFineTolerance : settings_.rtol;
-  const double resolution = std::max(kEventShare * rtol, shortest / h);
-  const double near = 1 - resolution;
+double Stepping::step_to_event(double h, double left, bool is_met) {
+  const Motion path = [this](double share, VectorX& y) { active_->interpolate(share, y); };
+  const double resolution = std::max(kEventShare * tolerances().rtol, 8 * spacing(state_.t) / h);
   double before = 0, after = 1;
   if (is_met) {
-    if (!events_.met_at(near, chart_, *active_)) return h;
+    if (!events_.met_at(1 - resolution, path, chart_)) return h;
   } else {
-    after = std::min(1 + kBeyond, left / h);
-    if (after <= 1 || !events_.met_at(after, chart_, *active_)) return h;
     before = 1;
+    after = std::min(1 + kBeyond, left / h);
+    if (after <= 1 || !events_.met_at(after, path, chart_)) return h;
   }
-  const double share = events_.locate(before, after, 0.1 * resolution, chart_, *active_);
-  return std::min(std::max(share * (1 + 0.5 * resolution) * h, 4 * shortest), left);
+  const double share = events_.locate(before, after, 0.01 * resolution, path, chart_);
+  return share * (1 + kBehind * resolution) * h;
+}
+
+// At most h, and no longer than to the event or the place where the guard would stop a motion that
+// keeps its acceleration: most steps of free bodies then end there at the first try.
+double Stepping::predicted_step(double h) {
+  const VectorX &start = active_->start(), &rate = active_->rate();
+  const int nv = chart_.nv();
+  const auto parabola = [&](double share, VectorX& y) {
+    y = start + share * h * rate;
+    y.head(nv) += 0.5 * share * share * h * h * rate.segment(nv, nv);
+  };
+  const Motion path = std::cref(parabola);  // no copy on the heap
+  const double resolution = kEventShare * tolerances().rtol;
+  for (int i = 0; i < kMostEventSteps; ++i) {
+    path(1, probe_);
+    chart_.finish(state_.t + h, probe_, next_);
+    scene_.restart();
+    scene_.evaluate(next_.q, next_.v, next_.z);
+    const double allowed = guard_.allowed(scene_, state_, next_, true);
+    if (allowed >= 1) break;
+    h *= std::clamp(0.95 * allowed, 0.01, 0.9);
+  }
+  if (!events_.met()) return h;
+  return events_.locate(0, 1, 0.01 * resolution, path, chart_) * (1 + kBehind * resolution) * h;
 }
 
 // The largest error of the state, against the tolerance of each part.
@@ -167,9 +208,7 @@ double Stepping::error_norm() const {
   const int nv = chart_.nv();
   if (!y.allFinite() || !error.allFinite()) return kInfinity;
   double worst = weighted(error, y);
-  const bool replaced = settings_.dt > 0;
-  const double rtol = replaced ? kFineTolerance : settings_.rtol;
-  const double atol = replaced ? 1e-2 * kFineTolerance : settings_.atol;
+  const auto [rtol, atol] = tolerances();
   for (const ActiveContact& active : scene_.active()) {
     if (active.slot < 0) continue;
     const BristleFriction& friction = *scene_.pairs()[active.pair].friction.bristle();
@@ -183,9 +222,7 @@ double Stepping::error_norm() const {
 
 // The largest part of a change of positions and velocities, against its tolerance at y.
 double Stepping::weighted(const VectorX& change, const VectorX& y) const {
-  const bool replaced = settings_.dt > 0;
-  const double rtol = replaced ? kFineTolerance : settings_.rtol;
-  const double atol = replaced ? 1e-2 * kFineTolerance : settings_.atol;
+  const auto [rtol, atol] = tolerances();
   const int nv = chart_.nv();
   double worst = 0;
   scene_.body().sizes(state_.q, sizes_);
@@ -200,7 +237,7 @@ double Stepping::weighted(const VectorX& change, const VectorX& y) const {
 // The first step of a motion of which nothing is known: Hairer, Norsett, Wanner, Solving Ordinary
 // Differential Equations I, II.4.
 double Stepping::first_step() {
-  const double rtol = settings_.dt > 0 ? kFineTolerance : settings_.rtol;
+  const double rtol = tolerances().rtol;
   const VectorX &start = active_->start(), &rate = active_->rate();
   const double speed = weighted(rate, start);
   const double h = speed > 0 ? 0.01 / (rtol * speed) : 1e-6;
@@ -210,7 +247,7 @@ double Stepping::first_step() {
   rate_ -= rate;
   const double change = weighted(rate_, start) / h, most = std::max(speed, change);
   if (!(most > 0) || !std::isfinite(most)) return h;
-  return std::min(100 * h, std::pow(0.01 / most, 1.0 / active_->order_of_error()));
+  return kFirstShare * std::min(100 * h, std::pow(0.01 / most, 1.0 / active_->order_of_error()));
 }
 
 void Stepping::accept() {
@@ -223,6 +260,7 @@ void Stepping::accept() {
   last_ = now;
   scene_.accept(next_.z);
   std::swap(state_, next_);
+  free_ = !scene_.touching();
   guard_.begin(scene_);
   events_.begin();
 }

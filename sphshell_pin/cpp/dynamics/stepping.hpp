@@ -49,11 +49,16 @@ class Stepping {
   long event_queries() const { return events_.queries(); }
 
  private:
-  void attempt(double h);
+  struct Tolerances {
+    double rtol, atol;
+  };
+
+  Tolerances tolerances() const;
   double error_norm() const;
   double weighted(const VectorX& change, const VectorX& y) const;
   double first_step();
-  double to_event(double h, double left, double shortest, bool is_met);
+  double predicted_step(double h);
+  double step_to_event(double h, double left, bool is_met);
 
   const StepSettings settings_;
   SceneData& scene_;
@@ -69,6 +74,7 @@ class Stepping {
   mutable VectorX sizes_;
   double proposal_ = 0, last_error_ = 1;  // of the next step [s]; of the last one
   bool new_motion_ = true;                // nothing is known yet of the next step's length
+  bool free_ = false;                     // nothing touches at the state
   long rejected_ = 0, event_steps_ = 0;
 };
 

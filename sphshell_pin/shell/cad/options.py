@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from sphshell_pin.checks import check_positive
+from sphshell_pin.checks import check_not_negative, check_positive
 from sphshell_pin.errors import InvalidParameter, MissingExtra, UnusableExtra
 
 Occ: TypeAlias = Any
@@ -48,34 +47,23 @@ class CadOptions:
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter if an option is out of range."""
-        if self.chord_error is not None:
-            check_positive("chord_error", self.chord_error, "m")
-        if self.time_limit is not None:
-            check_positive("time_limit", self.time_limit, "s")
-        if self.memory_limit is not None:
-            check_positive("memory_limit", self.memory_limit, "bytes")
+        for name, unit in (("chord_error", "m"), ("time_limit", "s"), ("memory_limit", "bytes")):
+            if getattr(self, name) is not None:
+                check_positive(name, getattr(self, name), unit)
         if self.sew is not None:
-            try:
-                fits = 0.0 <= float(self.sew) < math.inf
-            except (TypeError, ValueError):
-                fits = False
-            if not fits:
-                raise InvalidParameter("sew", self.sew, "must be 0 or a tolerance [m]")
+            check_not_negative("sew", self.sew, "m")
         for name, kinds in (("bodies", (str,)), ("faces", (str, int))):
             given = getattr(self, name)
-            if given is None:
-                continue
             listed = isinstance(given, (list, tuple)) and len(given) > 0
-            if not listed or not all(
-                isinstance(one, kinds) and not isinstance(one, bool) for one in given
+            if given is not None and not (
+                listed and all(isinstance(k, kinds) and not isinstance(k, bool) for k in given)
             ):
                 what = "names" if name == "bodies" else "names or numbers"
                 raise InvalidParameter(name, given, f"must be a list of {what}, or left out")
 
     def check_unused(self, suffix: str) -> None:
-        """Raise InvalidParameter if anything was asked for, as `suffix` is of a mesh file."""
-        for name in ("chord_error", "bodies", "faces", "sew", "time_limit", "memory_limit"):
-            given = getattr(self, name)
+        """Raise InvalidParameter if an option is given, as `suffix` is that of a mesh file."""
+        for name, given in vars(self).items():
             if given is not None:
                 raise InvalidParameter(
                     name,

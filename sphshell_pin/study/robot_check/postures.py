@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -90,7 +88,7 @@ def _pivots(model: pin.Model, data: pin.Data, q: Array) -> Array:
         return np.asarray(np.array(data.D) / held)
 
 
-def _kept(model: pin.Model, rest: Any, q: Array) -> Array:
+def _kept(model: pin.Model, rest: pin.Model, q: Array) -> Array:
     """Return of q (nq,) of `model` what the joints of its part `rest` have."""
     parts = [
         q[joint.idx_q : joint.idx_q + joint.nq]

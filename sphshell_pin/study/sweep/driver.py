@@ -8,7 +8,7 @@ import os
 import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +29,7 @@ from sphshell_pin.scenario import (
 )
 from sphshell_pin.scenario.build import build_scenario
 from sphshell_pin.scenario.figures import check_expectations
+from sphshell_pin.scenario.knobs import meaning
 from sphshell_pin.scenario.reading import look_up
 from sphshell_pin.study.sweep.cluster import run_on_cluster
 from sphshell_pin.study.sweep.grid import Axis, Value, Vary, axes_of, points_of, text_of
@@ -175,11 +176,12 @@ def plan_sweep(
     verdicts: bool = False,
 ) -> Plan:
     """Check all runs of a sweep, see `sweep`, and return what it will do."""
-    axes = axes_of(vary)
+    given = axes_of(vary)
     path = find_scenario(scenario)
-    _check_keys(axes, changes or {}, path)
-    points = points_of(axes, together)
+    _check_keys(given, changes or {}, path)
+    points = points_of(given, together)
     fixed = read_scenario(path, changes)
+    axes = tuple(replace(axis, unit=_unit(fixed, axis.key, path)) for axis in given)
     runs = [
         Run(i, {axis.key: text_of(value) for axis, value in zip(axes, point, strict=True)})
         for i, point in enumerate(points)
@@ -332,6 +334,13 @@ def _check_keys(axes: Iterable[Axis], changes: Mapping[str, str], path: Path) ->
             raise InvalidParameter("vary", key, "is given twice: put all its values together")
         if whole in map(full_name, changes):
             raise InvalidParameter("vary", key, "is set as well: leave one of the two out")
+
+
+def _unit(scenario: Scenario, key: str, path: Path) -> str:
+    try:
+        return meaning(scenario, look_up(scenario, key, path)).unit
+    except ScenarioError:
+        return ""  # not in the file; read_scenario raises if no file may have it
 
 
 def _build_one(runs: list[Run], scenario: Scenario, path: Path) -> tuple[Run, Built]:

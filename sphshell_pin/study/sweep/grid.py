@@ -32,6 +32,8 @@ class Axis:
 
     key: str
     values: tuple[Value, ...]
+    unit: str = ""
+    """Unit of the values, once the scenario is known."""
 
     @property
     def is_numeric(self) -> bool:

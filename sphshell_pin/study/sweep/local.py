@@ -11,11 +11,14 @@ from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from typing import TypeVar
 from unittest.mock import patch
 
 from sphshell_pin.errors import SweepError
 from sphshell_pin.study.sweep.job import FAILED, Job, Outcome, Run
 from sphshell_pin.study.sweep.worker import prepare, run_one
+
+T = TypeVar("T")
 
 MOST_DEATHS = 3
 """A run whose worker dies so often is given up."""
@@ -79,42 +82,46 @@ def _pool(job: Job, runs: deque[Run], count: int) -> Iterator[tuple[Run, Outcome
     ended = queue.SimpleQueue[Future[Outcome]]()
     under_way: dict[Future[Outcome], Run] = {}
     broken = False
-    # The libraries read it when a process loads them.
-    with patch.dict(os.environ, _ONE_THREAD):
-        try:
-            pool.submit(prepare, job).result()
-            while True:
-                while runs and len(under_way) < count and not broken:
-                    run = runs.popleft()
-                    try:
-                        future = pool.submit(run_one, job, run)
-                    except BrokenProcessPool:  # a process died that had nothing to do
-                        runs.appendleft(run)
-                        broken = True
-                        break
-                    under_way[future] = run
-                    future.add_done_callback(ended.put)
-                if not under_way:
-                    return
-                future = ended.get()
-                run = under_way.pop(future)
+    try:
+        _submit(pool, prepare, job).result()
+        while True:
+            while runs and len(under_way) < count and not broken:
+                run = runs.popleft()
                 try:
-                    outcome = future.result()
-                except BrokenProcessPool:
+                    future = _submit(pool, run_one, job, run)
+                except BrokenProcessPool:  # a process died that had nothing to do
+                    runs.appendleft(run)
                     broken = True
-                    yield run, None
-                else:
-                    yield run, outcome
-        except BrokenProcessPool:
-            raise SweepError(
-                "a worker process ended before it was ready; a script must call sweep below "
-                'if __name__ == "__main__":'
-            ) from None
-        finally:
-            # Before Python 3.14 no public method ends a process that is in a run.
-            for process in list((pool._processes or {}).values()):
-                process.kill()
-            pool.shutdown(wait=True, cancel_futures=True)
+                    break
+                under_way[future] = run
+                future.add_done_callback(ended.put)
+            if not under_way:
+                return
+            future = ended.get()
+            run = under_way.pop(future)
+            try:
+                outcome = future.result()
+            except BrokenProcessPool:
+                broken = True
+                yield run, None
+            else:
+                yield run, outcome
+    except BrokenProcessPool:
+        raise SweepError(
+            "a worker process ended before it was ready; a script must call sweep below "
+            'if __name__ == "__main__":'
+        ) from None
+    finally:
+        # Before Python 3.14 no public method ends a process that is in a run.
+        for process in list((pool._processes or {}).values()):
+            process.kill()
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _submit(pool: ProcessPoolExecutor, call: Callable[..., T], *arguments: object) -> Future[T]:
+    # This may start a process, whose libraries read the environment when they are loaded.
+    with patch.dict(os.environ, _ONE_THREAD):
+        return pool.submit(call, *arguments)
 
 
 def _begin() -> None:

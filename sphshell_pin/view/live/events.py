@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
 
 from sphshell_pin.errors import SphshellError
-
-if TYPE_CHECKING:
-    from sphshell_pin.view.live.server import Client
 
 LARGEST_MESSAGE = 16_384  # bytes
 LONGEST_TEXT = 200
 LARGEST_NUMBER = 1e12
 
 Event = dict[str, Any]
+
+
+class Client(Protocol):
+    """A browser."""
+
+    wake: asyncio.Event
+
+    def send(self, data: Mapping[str, object]) -> None:
+        """Send one text, without waiting."""
+
+    def close(self, code: int, reason: str) -> None:
+        """End the connection."""
 
 
 class BadMessage(SphshellError, ValueError):

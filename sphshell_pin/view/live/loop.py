@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin.errors import NameNotFound, SphshellError
-from sphshell_pin.view.live.events import BadMessage, Event, newest
+from sphshell_pin.view.live.events import BadMessage, Client, Event, newest
 from sphshell_pin.view.live.foreign import ForeignWindow, window_of
 from sphshell_pin.view.live.greeting import (
     FASTEST,
@@ -23,7 +23,7 @@ from sphshell_pin.view.live.greeting import (
 )
 from sphshell_pin.view.live.panel import Panel, Strip, StripRow, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown, frame_point
-from sphshell_pin.view.live.server import Client, Server
+from sphshell_pin.view.live.server import Server
 from sphshell_pin.view.live.window import LiveWindow
 from sphshell_pin.view.nodes import FloatArray, Json, new_visualizer
 

@@ -62,7 +62,7 @@ def preview(
     open
         Open the page in the web browser, where there is a screen.
     color
-        What the colours of the shells show: nothing ("surface"), the patches ("patches"), or how
+        What the colors of the shells show: nothing ("surface"), the patches ("patches"), or how
         far curved elements are from the flat ones ("distance"). The page can change it.
     told
         Called with the page's address, which ends with a token and gives access.

@@ -132,16 +132,7 @@ def rows_now(player: Player) -> Rows:
     """Return the state of now as one row."""
     from sphshell_pin.scenario.player import Rows
 
-    now = player.contacts
-    return Rows.of(
-        np.array([player.time]),
-        len(player.scene.pairs),
-        np.zeros(len(now), dtype=np.int64),
-        now.pair,
-        now.normal_force,
-        now.friction_force_world,
-        now.depth,
-    )
+    return Rows.of(np.array([player.time]), len(player.scene.pairs), player.contacts, 0)
 
 
 def sticks(pair: ContactPair, slip: float) -> bool | None:

@@ -16,7 +16,13 @@ from typing import TYPE_CHECKING, Protocol
 
 from sphshell_pin.errors import InvalidParameter, MissingExtra, SphshellError
 from sphshell_pin.view.live.access import Access
-from sphshell_pin.view.live.events import LARGEST_MESSAGE, BadMessage, Event, read_event
+from sphshell_pin.view.live.events import (
+    LARGEST_MESSAGE,
+    BadMessage,
+    Client,
+    Event,
+    read_event,
+)
 from sphshell_pin.view.nodes import viewer_script
 
 if TYPE_CHECKING:
@@ -49,18 +55,6 @@ class Source(Protocol):
 
     def panel_news(self, since: int) -> tuple[int, list[str]]:
         """Return the last panel's number, and the texts that lead there from panel `since`."""
-
-
-class Client(Protocol):
-    """A browser."""
-
-    wake: asyncio.Event
-
-    def send(self, data: Mapping[str, object]) -> None:
-        """Send one text, without waiting."""
-
-    def close(self, code: int, reason: str) -> None:
-        """End the connection."""
 
 
 class Server:

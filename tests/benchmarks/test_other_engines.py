@@ -1,0 +1,199 @@
+"""The adapters of Drake and PyBullet against closed forms and Pinocchio."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin.benchmarks import swing
+from sphshell_pin.benchmarks.peers import drake, scenes
+from sphshell_pin.benchmarks.peers.merged import merged_urdf
+from sphshell_pin.benchmarks.peers.workers import engine_called
+
+SAP = {"contact": "kSap", "dt": 1e-3, "edge": 1e-3}
+EXPLICIT = {"integrator": "runge_kutta3", "max_step": 0.01, "accuracy": 1e-4, "edge": 1e-3}
+BULLET = {"dt": 1e-3, "breaking": 1e-4}
+
+
+def engine_of(name):
+    pytest.importorskip({"drake": "pydrake"}.get(name, name))
+    return engine_called(name)
+
+
+def coarse(scene, **changes):
+    """Return the scene on a small plate of large triangles: quick to load."""
+    return replace(scene, surface=scenes.shapes.plate(0.06, 0.02), **changes)
+
+
+@pytest.mark.parametrize(
+    ("engine", "params", "rolls"),
+    [
+        ("drake", EXPLICIT, True),
+        ("drake", EXPLICIT, False),
+        ("drake", SAP, True),
+        ("drake", SAP, False),
+        ("pybullet", BULLET, True),
+    ],
+)
+def test_free_flight_is_a_parabola(engine, params, rolls):
+    velocity, spin = np.array([0.3, -0.2, 0.5]), np.array([4.0, 5.0, -6.0]) * rolls
+    scene = coarse(
+        scenes.plate(),
+        rolls=rolls,
+        position=(0.0, 0.0, 0.2),
+        velocity=tuple(velocity),
+        angular_velocity=tuple(spin),
+        duration=0.1,
+    )
+    found = engine_of(engine).run(scene, params)
+    np.testing.assert_allclose(found.t[-1], 0.1)
+    # Semi-implicit Euler falls by dt * t / 2 * g further than the parabola.
+    exact = [0, 0, 0.2] + np.outer(found.t, velocity)
+    exact[:, 2] -= 0.5 * 9.81 * found.t * (found.t + params.get("dt", 0.0))
+    np.testing.assert_allclose(found.position, exact, atol=1e-9)
+    np.testing.assert_allclose(found.velocity[-1], velocity + [0, 0, -0.981], atol=1e-9)
+    np.testing.assert_allclose(found.angular_velocity, np.tile(spin, (len(found.t), 1)), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("engine", "params", "rel"),
+    [("drake", SAP | {"edge": 2.5e-4}, 0.1), ("pybullet", BULLET, 0.05)],
+)
+def test_the_weight_is_carried_as_deep_as_by_the_spring(engine, params, rel):
+    scene = coarse(scenes.plate())
+    # Over the middle of a triangle: in PyBullet both neighbors of an edge push.
+    corners = scene.surface.vertices[scene.surface.triangles]
+    middles = corners[np.ptp(corners[:, :, 2], axis=1) == 0].mean(axis=1)
+    x, y, _ = middles[np.argmin(np.linalg.norm(middles, axis=1))]
+    found = engine_of(engine).run(replace(scene, position=(x, y, scene.position[2])), params)
+    np.testing.assert_allclose(found.force[-50:].mean(axis=0), [0, 0, scene.weight], atol=2e-3)
+    depth = scene.radius - found.position[-1, 2]
+    assert depth == pytest.approx(scene.weight / scene.stiffness, rel=rel)
+
+
+@pytest.mark.parametrize(("engine", "name"), [("drake", "edge"), ("pybullet", "dt")])
+def test_every_scene_has_settings_and_a_first_set_of_params(engine, name):
+    engine = engine_of(engine)
+    for build in scenes.SCENES.values():
+        scene = build()
+        assert all(engine.settings(scene).values())
+        assert engine.param_sets(scene)[0][name] > 0
+
+
+@pytest.mark.parametrize(
+    ("engine", "params", "tolerance"),
+    # Drake takes the gains implicitly: the motion differs by about a step's share of it.
+    [("drake", {"contact": "kSap", "edge": 0.012}, 2e-4), ("pybullet", {"breaking": 2e-3}, 2e-5)],
+)
+def test_the_free_arm_follows_its_control(engine, params, tolerance):
+    scene = scenes.press()
+    scene = coarse(scene, q_ref=tuple(np.array(scene.q0) + 0.1), steps=500)
+    model = pin.buildModelFromXML(scene.urdf)
+    model.gravity.linear = np.zeros(3)
+    data, q, v = model.createData(), np.array(scene.q0), np.zeros(model.nv)
+    for _ in range(scene.steps):
+        torque = scene.kp * (scene.q_ref - q) - scene.kd * v
+        v = v + scene.dt * pin.aba(model, data, q, v, torque)
+        q = q + scene.dt * v
+    pin.framesForwardKinematics(model, data, q)
+    tip = data.oMf[model.getFrameId("panda_hand_tcp")].translation
+    for _ in range(2):  # Drake's arm is kept; a second run starts from the same state
+        found = engine_of(engine).run(scene, {"dt": scene.dt, **params})
+        np.testing.assert_allclose(found.position[-1], tip, atol=tolerance)
+        assert found.steps == scene.steps
+
+
+def test_drake_shares_the_force_among_both_walls_of_the_groove():
+    scene = scenes.groove()
+    scene = replace(scene, surface=scenes.shapes.groove(scene.opening, 0.04, 0.02))
+    found = engine_of("drake").run(scene, SAP)
+    left = found.contact_forces[:, 0] < 0
+    for wall in (left, ~left):
+        total = np.linalg.norm(found.contact_forces[wall].sum(axis=0))
+        assert total == pytest.approx(scene.load, rel=1e-3)
+    np.testing.assert_allclose(found.contact_forces.sum(axis=0), [0, 0, scene.weight], atol=2e-3)
+
+
+@pytest.mark.parametrize("name", ["plate", "bowl"])
+def test_the_modulus_gives_the_load_at_the_depth_of_the_spring(name):
+    scene = scenes.SCENES[name]()
+    depth = drake.load(scene) / scene.stiffness
+    # The patch by quadrature, from the exact shapes: pressure modulus * (r - s) / r, s the distance
+    # from the ball's center.
+    across = np.linspace(0, 2.0 * np.sqrt(scene.radius * depth), 20001)
+    if isinstance(scene, scenes.Bowl):
+        out = swing.ARM + depth  # from the middle of the bowl to the center of the ball
+        height = np.sqrt(swing.BOWL**2 - across**2) - out
+    else:
+        height = scene.radius - depth
+    inside = np.maximum(scene.radius - np.hypot(across, height), 0.0)
+    pressure = drake.modulus(scene) * inside / scene.radius
+    force = np.trapezoid(2 * np.pi * across * pressure, across)
+    assert force == pytest.approx(drake.load(scene), rel=0.01)
+
+
+def test_the_law_of_the_bowl_has_the_period_of_the_spring():
+    scene = scenes.SCENES["bowl"]()
+    pull = scene.stiffness**2 / drake.load(scene) / scene.mass
+    dt, reach = 1e-4, swing.ARM
+
+    def slope(state):
+        place, velocity = state
+        out = np.linalg.norm(place)
+        back = pull * max(0.0, out - reach) ** 2 / out
+        return np.array([velocity, -back * place - [0, 9.81]])
+
+    x, _, z = swing.start(0.0)
+    state, rows = np.array([[x, z], [0.0, 0.0]]), []
+    for _ in range(round(1.35 * swing.reference_period() / dt)):
+        a = slope(state)
+        b = slope(state + dt / 2 * a)
+        c = slope(state + dt / 2 * b)
+        d = slope(state + dt * c)
+        rows.append(state[:, 0])
+        state = state + dt / 6 * (a + 2 * b + 2 * c + d)
+    x, v = np.array(rows).T
+    period = swing.mean_period(dt * np.arange(len(x)), x, v, 1)
+    assert period == pytest.approx(swing.reference_period(), rel=1e-5)
+
+
+def test_a_long_step_of_drake_passes_through_the_sheet():
+    scene = scenes.impact()
+    found = engine_of("drake").run(scene, SAP | {"edge": 5e-4})
+    assert scene.errors(found) == {"passed": 1.0}
+
+
+def test_friction_of_bullet_holds_a_body_that_cannot_turn():
+    scene = replace(scenes.slope(), rolls=False)
+    found = engine_of("pybullet").run(scene, BULLET)
+    # The whole force of the plate, friction included, balances the tilted gravity.
+    carried = found.force[-100:].mean(axis=0)
+    np.testing.assert_allclose(carried, -scene.mass * np.array(scene.gravity), atol=5e-3)
+    assert np.abs(found.angular_velocity).max() < 1e-6
+
+
+def test_continuous_collision_detection_of_bullet_stops_the_ball():
+    scene, engine = scenes.impact().variants()[3], engine_of("pybullet")
+    passed = [
+        engine.run(scene, {"dt": 1e-3, "breaking": 2e-3, "ccd": on}).position[-1, 2] < 0
+        for on in (False, True)
+    ]
+    assert passed == [True, False]
+
+
+@pytest.mark.parametrize("scale", [1.0, 10.0])
+def test_the_merged_arm_moves_as_the_whole_one(scale):
+    scene = scenes.press()
+    whole, merged = (pin.buildModelFromXML(t) for t in (scene.urdf, merged_urdf(scene, scale)))
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        q, v, a = rng.uniform(-1, 1, (3, whole.nv))
+        # Continuous joints have two coordinates in Pinocchio.
+        circle = np.c_[np.cos(q), np.sin(q)].ravel()
+        torque = pin.rnea(whole, whole.createData(), q, v, a)
+        merged.gravity.linear = scale * whole.gravity.linear
+        scaled = pin.rnea(merged, merged.createData(), circle, v, a)
+        np.testing.assert_allclose(scaled, scale**2 * torque, rtol=1e-9, atol=1e-9)
