@@ -76,7 +76,7 @@ def plot_contact_map(
         reason = "No shell was touched." if len(result.contacts.t) else NO_CONTACT
         return only_say("Contact map", reason)
     columns = min(len(views), 2)
-    figure = new_figure(2.4 + 5.2 * columns, 0.8 + 5.4 * -(-len(views) // columns), "compressed")
+    figure = new_figure(2.4 + 5.2 * columns, 0.8 + 5.4 * -(-len(views) // columns))
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

@@ -7,7 +7,7 @@ import io
 import math
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from sphshell_pin.atomic import write_whole
 from sphshell_pin.errors import MissingExtra
@@ -22,9 +22,7 @@ INK = "#101418"
 _PREFIXES = {3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 
 
-def new_figure(
-    width: float, height: float, layout: Literal["constrained", "compressed"] = "constrained"
-) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
     """Return an empty Figure of `width` by `height` inches, made without pyplot.
 
     Raises MissingExtra without matplotlib.
@@ -33,7 +31,7 @@ def new_figure(
         from matplotlib.figure import Figure
     except ImportError as missing:
         raise MissingExtra("matplotlib", "view", "a figure") from missing
-    figure = Figure(figsize=(width, height), layout=layout)
+    figure = Figure(figsize=(width, height), layout="constrained")
     # A notebook shows it where it is the value of a cell, whatever backend it has.
     figure._repr_png_ = functools.partial(png, figure, 100)  # type: ignore[attr-defined]
     return figure

@@ -115,7 +115,7 @@ class Picture:
             axis.locator_params(name, nbins=ticks)
             getattr(axis, f"{name}axis").set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis.tick_params(labelsize=7)
-        axis.set_box_aspect(high - low, zoom=0.82)
+        axis.set_box_aspect(high - low, zoom=0.84)  # leaves room for the labels
         return cls(axis, toward, low, high, factor)
 
     @property

@@ -5,6 +5,7 @@
 #include <system_error>
 
 namespace sphshell {
+
 Rollout::Rollout(const pinocchio::Model& model, int threads) : model_(model) {
   try {
     while (static_cast<int>(threads_.size()) < threads) threads_.emplace_back([this] { work(); });

@@ -12,6 +12,7 @@ namespace sphshell {
 namespace {
 
 constexpr double kFineTolerance = 1e-6;  // of the steps that replace a fixed one
+constexpr double kFirstStep = 1e-5;      // of a run, and after a change [s]
 // A step ends behind its event by this share of its length at most, and of rtol; where it is aimed
 // at, as a share of that.
 constexpr double kEventShare = 1e-3, kBehind = 0.02;
@@ -57,8 +58,8 @@ void Stepping::restart() {
   free_ = !scene_.touching();
   guard_.begin(scene_);
   events_.begin();
-  proposal_ = kInfinity;
-  new_motion_ = true;
+  proposal_ = kFirstStep;
+  after_event_ = false;
   last_error_ = 1;
 }
 
@@ -78,7 +79,7 @@ bool Stepping::make_fixed(double end) {
   scene_.restart();
   scene_.evaluate(state_.q, state_.v, state_.z);
   proposal_ = std::min(proposal_, 0.1 * (end - state_.t));
-  new_motion_ = false;
+  after_event_ = false;
   last_error_ = 1;
   return false;
 }
@@ -92,7 +93,7 @@ Stepping::Made Stepping::make_controlled(double end) {
   }
   chart_.begin(state_);
   active_->begin(chart_);
-  const bool after_event = std::exchange(new_motion_, false);
+  const bool after_event = std::exchange(after_event_, false);
   if (after_event) proposal_ = first_step();
   // No short step is left over at the end.
   double h = proposal_ > 0.95 * left ? left : std::min(proposal_, 0.5 * left);
@@ -140,7 +141,7 @@ Stepping::Made Stepping::make_controlled(double end) {
       if (is_met) limit = kink_limit;
     }
     if (error <= limit || shortest_yet) {
-      new_motion_ = is_met;
+      after_event_ = is_met;
       break;
     }
     ++rejected_;
@@ -154,7 +155,7 @@ Stepping::Made Stepping::make_controlled(double end) {
   double factor = 0.9 * std::pow(std::max(error, 1e-10), -0.7 / order) *
                   std::pow(std::max(last_error_, 1e-10), 0.4 / order);
   factor = std::clamp(factor, 0.2, rejected ? 1.0 : 5.0);
-  last_error_ = new_motion_ ? 1 : std::max(error, 1e-4);
+  last_error_ = after_event_ ? 1 : std::max(error, 1e-4);
   // A step cut short by `end` says nothing against the one proposed.
   if (h < left || factor * h >= proposal_ || error >= 0.5) proposal_ = factor * h;
   return Made::Step;
@@ -234,8 +235,8 @@ double Stepping::weighted(const VectorX& change, const VectorX& y) const {
   return worst;
 }
 
-// The first step of a motion of which nothing is known: Hairer, Norsett, Wanner, Solving Ordinary
-// Differential Equations I, II.4.
+// The first step after an event, from one evaluation more: Hairer, Norsett, Wanner, Solving
+// Ordinary Differential Equations I, II.4.
 double Stepping::first_step() {
   const double rtol = tolerances().rtol;
   const VectorX &start = active_->start(), &rate = active_->rate();

@@ -73,7 +73,7 @@ class Stepping {
   VectorX probe_, rate_;
   mutable VectorX sizes_;
   double proposal_ = 0, last_error_ = 1;  // of the next step [s]; of the last one
-  bool new_motion_ = true;                // nothing is known yet of the next step's length
+  bool after_event_ = false;              // the last step ended at one
   bool free_ = false;                     // nothing touches at the state
   long rejected_ = 0, event_steps_ = 0;
 };

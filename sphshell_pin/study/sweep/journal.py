@@ -75,7 +75,7 @@ class Journal:
         except sqlite3.OperationalError as fault:
             self.close()
             raise self._broken(fault) from None
-        except (sqlite3.DatabaseError, ValueError, TypeError):
+        except (sqlite3.DatabaseError, ValueError, TypeError, AttributeError, RecursionError):
             self.close()
             raise SweepError(
                 f"{path}: is no journal of this version of the package, or is damaged; delete the "

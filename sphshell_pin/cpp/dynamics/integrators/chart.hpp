@@ -1,9 +1,13 @@
 // The equations of motion in coordinates round the state at which a step begins.
 #pragma once
 
+#include <limits>
+
 #include "dynamics/scene_data.hpp"
 
 namespace sphshell {
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Work done since the start [J].
 struct Ledger {
