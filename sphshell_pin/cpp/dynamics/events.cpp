@@ -101,7 +101,7 @@ double Events::locate(double before, double after, double tolerance, const Chart
       // center moves.
       size = gauges[kind].size() > index ? std::abs(gauges[kind][index])
              : kind == Clamp             ? known
-                             : std::max(margin, (center - from).norm() - known);
+                                         : std::max(margin, (center - from).norm() - known);
       size = std::max(size, std::numeric_limits<double>::min());
     }
     return is_met ? size : -size;
