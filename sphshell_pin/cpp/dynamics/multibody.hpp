@@ -3,12 +3,9 @@
 
 #include <pinocchio/multibody.hpp>
 
-#include <limits>
 #include <vector>
 
 namespace sphshell {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 using VectorX = Eigen::VectorXd;
 using MatrixX = Eigen::MatrixXd;
