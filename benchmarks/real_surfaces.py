@@ -72,9 +72,11 @@ def place(shell: Shell, rng: np.random.Generator) -> tuple[Array, Array]:
     if rng.random() < 0.5:
         chosen = int(rng.integers(len(areas)))
     w, u, v = weights = rng.dirichlet([1.0, 1.0, 1.0])
-    # Bernstein's polynomials of the control points, as `core.lifts` has them.
+    # Bernstein's polynomials of the control points, as `core.control_point_offsets` has them.
     sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
-    bend = np.array([*sides, 6 * u * v * w]) @ shell.core_for("smooth").lifts[chosen]
+    bend = (
+        np.array([*sides, 6 * u * v * w]) @ shell.core_for("smooth").control_point_offsets[chosen]
+    )
     normal = shell.triangle_normals[chosen] * rng.choice([-1.0, 1.0])
     return weights @ corners[chosen] + bend, normal
 

@@ -36,7 +36,7 @@ def curvature_report(shell: ShellBase) -> CurvatureReport:
     """Measure the curved elements of `shell`; it makes them if no query has yet."""
     core = shell.core_for("smooth")
     # A point is a mean of the control points: none is farther off than the farthest of them.
-    bound = np.linalg.norm(core.lifts, axis=2).max(axis=1)
+    bound = np.linalg.norm(core.control_point_offsets, axis=2).max(axis=1)
     corners = shell.vertices[shell.triangles]
     sides = np.roll(corners, -1, axis=1) - corners
     longest = np.linalg.norm(sides, axis=2).max(axis=1)

@@ -96,7 +96,9 @@ def test_long_elements_beside_nearly_tangent_joints(turns, scale, tmp_path):
     assert sum(count for _, count in report.flat_because) == report.flat > 0
     # What was kept straight stays so in a copy.
     again = pickle.loads(pickle.dumps(shell)).transformed(scale=2.0)
-    assert again.core_for("smooth").lifts == pytest.approx(2 * shell.core_for("smooth").lifts)
+    assert again.core_for("smooth").control_point_offsets == pytest.approx(
+        2 * shell.core_for("smooth").control_point_offsets
+    )
 
 
 def test_curved_elements_do_not_overshoot_at_narrow_bends():

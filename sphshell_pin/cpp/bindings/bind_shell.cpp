@@ -73,12 +73,12 @@ Method checked_method(const Shell& shell, int number) {
 }
 
 // The contacts as shown, and those that are summed, where these are more.
-nb::tuple contacts(const Shell& shell, const Vec3& centre, double radius, int method, bool dn_dc) {
+nb::tuple contacts(const Shell& shell, const Vec3& center, double radius, int method, bool dn_dc) {
   const Method how = checked_method(shell, method);
   Query query;
   if (dn_dc) query.want_dn_dc();
   std::vector<Contact> shown;
-  merge_places(query.find(shell, centre, radius, how), centre, radius, shown);
+  merge_groups(query.find(shell, center, radius, how), center, radius, shown);
   const bool same = shown.size() == query.contacts.size();
   return nb::make_tuple(columns(shown, dn_dc),
                         same ? nb::object(nb::none()) : columns(query.contacts, dn_dc));
@@ -86,9 +86,9 @@ nb::tuple contacts(const Shell& shell, const Vec3& centre, double radius, int me
 
 constexpr std::size_t kGrain = 64;  // fewer queries are not worth a thread
 
-auto contacts_batch(const Shell& shell, const Points& centres, const Doubles& radii, int method,
+auto contacts_batch(const Shell& shell, const Points& centers, const Doubles& radii, int method,
                     int threads) {
-  const std::size_t n = centres.shape(0);
+  const std::size_t n = centers.shape(0);
   check_count("radii", radii.shape(0), n);
   const Method how = checked_method(shell, method);
   std::vector<double> depth(n, 0.0);
@@ -99,8 +99,8 @@ auto contacts_batch(const Shell& shell, const Points& centres, const Doubles& ra
       Query query;
       std::vector<Contact> shown;
       for (std::size_t i = begin; i < end; ++i) {
-        const Vec3 centre = row(centres, i);
-        merge_places(query.find(shell, centre, radii(i), how), centre, radii(i), shown);
+        const Vec3 center = row(centers, i);
+        merge_groups(query.find(shell, center, radii(i), how), center, radii(i), shown);
         for (const Contact& c : shown)
           depth[i] = std::max(depth[i], c.depth), count[i] += c.weight > 0;
       }
@@ -148,21 +148,72 @@ auto closest_points(const Shell& shell, const Points& points, bool smooth, int t
 }
 
 // An array over the shell's own memory, which lives as long as the array.
-template <class T>
-auto view(nb::handle shell, const T* data, std::initializer_list<std::size_t> shape) {
-  return nb::ndarray<nb::numpy, const T>(data, shape, shell);
+template <class T, class Row>
+auto view(nb::handle shell, const std::vector<Row>& rows) {
+  const auto* first = reinterpret_cast<const T*>(rows.data());
+  if constexpr (sizeof(Row) == sizeof(T))
+    return nb::ndarray<nb::numpy, const T>(first, {rows.size()}, shell);
+  else
+    return nb::ndarray<nb::numpy, const T>(first, {rows.size(), sizeof(Row) / sizeof(T)}, shell);
 }
 
+// get(edge) for every edge between elements.
 template <class T, class Get>
-auto per_edge(const Shell& shell, std::size_t columns, Get&& get) {
+std::vector<T> per_edge(const Shell& shell, Get&& get) {
   std::vector<T> out;
-  std::size_t n = 0;
-  for (const Edge& edge : shell.topology().edges) {
-    if (edge.inner) continue;
-    get(edge, out);
-    ++n;
+  for (const Edge& edge : shell.topology().edges)
+    if (!edge.inner) out.push_back(get(edge));
+  return out;
+}
+
+Array<int> edge_vertices(const Shell& shell) {
+  std::vector<int> out;
+  for (const Edge& edge : shell.topology().edges)
+    if (!edge.inner) out.insert(out.end(), {edge.first_vertex, edge.last_vertex});
+  const std::size_t n = out.size() / 2;
+  return to_array(std::move(out), {n, 2});
+}
+
+// Per triangle: offsets of the two control points of each side, and of the center.
+Array<double> control_point_offsets(const Shell& shell) {
+  const std::size_t n = shell.curved() ? shell.triangles().size() : 0;
+  std::vector<double> out(21 * n);
+  for (std::size_t f = 0; f < n; ++f) {
+    const CurvedFacet& curved = shell.curved()->facets()[f];
+    double* to = &out[21 * std::size_t(shell.triangle_of_facet(int(f)))];
+    for (int k = 0; k < 6; ++k)
+      std::copy_n(curved.control_offset(k / 2, k % 2).data(), 3, to + 3 * k);
+    std::copy_n(curved.middle(shell.facets()[f]).data(), 3, to + 18);
   }
-  return columns == 1 ? to_array(std::move(out)) : to_array(std::move(out), {n, columns});
+  return to_array(std::move(out), {n, 7, 3});
+}
+
+// The normals of the curved elements at their corners.
+Array<double> corner_normals(const Shell& shell) {
+  std::vector<double> out;
+  const std::size_t n = shell.curved() ? shell.triangles().size() : 0;
+  for (std::size_t t = 0; t < n; ++t) {
+    const int f = triangle_of(shell.facet_half_edge(static_cast<int>(3 * t)));
+    const CubicPatch patch = shell.curved()->facets()[f].patch(shell.facets()[f]);
+    for (const auto& [u, v] : {std::pair(0, 0), {1, 0}, {0, 1}})
+      append(out, patch.along_u(u, v).cross(patch.along_v(u, v)).normalized());
+  }
+  return to_array(std::move(out), {n, 3, 3});
+}
+
+Array<std::uint8_t> bending(const Shell& shell) {
+  std::vector<std::uint8_t> out(shell.curved() ? shell.triangles().size() : 0);
+  for (std::size_t t = 0; t < out.size(); ++t)
+    out[t] = static_cast<std::uint8_t>(shell.curved()->bending(shell, static_cast<int>(t)));
+  return to_array(std::move(out));
+}
+
+Array<std::uint8_t> normals_set_aside(const Shell& shell) {
+  std::vector<std::uint8_t> out;
+  if (shell.curved())
+    out.assign(shell.curved()->divided().begin(), shell.curved()->divided().end());
+  const std::size_t n = out.size() / 3;
+  return to_array(std::move(out), {n, 3});
 }
 
 }  // namespace
@@ -170,7 +221,8 @@ auto per_edge(const Shell& shell, std::size_t columns, Get&& get) {
 
 void bind_shell(nanobind::module_& m) {
   using namespace sphshell;
-  nb::class_<Shell>(m, "Shell")
+  nb::class_<Shell> shell(m, "Shell");
+  shell
       .def(nb::new_(&make_shell), nb::arg("vertices"), nb::arg("triangles"),
            nb::arg("triangle_element"), nb::arg("crease_angle"), nb::arg("side"),
            nb::arg("face").none() = nb::none(), nb::arg("normals").none() = nb::none())
@@ -196,118 +248,42 @@ void bind_shell(nanobind::module_& m) {
            nb::arg("method"), nb::arg("threads"))
       .def("closest_points", &closest_points, nb::arg("points"), nb::arg("smooth"),
            nb::arg("threads") = 1)
-      .def_prop_ro(
-          "vertices",
-          [](nb::handle self) {
-            const auto& vertices = nb::cast<const Shell&>(self).vertices();
-            return view(self, vertices.data()->data(), {vertices.size(), 3});
-          },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "triangles",
-          [](nb::handle self) {
-            const auto& triangles = nb::cast<const Shell&>(self).triangles();
-            return view(self, triangles.data()->data(), {triangles.size(), 3});
-          },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "triangle_element",
-          [](nb::handle self) {
-            const auto& element = nb::cast<const Shell&>(self).element();
-            return view(self, element.data(), {element.size()});
-          },
-          nb::rv_policy::automatic)
       .def_prop_ro("num_elements", &Shell::num_elements)
       .def_prop_ro("num_patches", [](const Shell& s) { return s.topology().num_patches; })
-      .def_prop_ro(
-          "lifts",
-          [](const Shell& s) {
-            const std::size_t n = s.curved() ? s.triangles().size() : 0;
-            std::vector<double> out(21 * n);
-            for (std::size_t f = 0; f < n; ++f) {
-              const CurvedFacet& curved = s.curved()->facets()[f];
-              double* to = &out[21 * std::size_t(s.triangle_of_facet(int(f)))];
-              for (int k = 0; k < 6; ++k)
-                std::copy_n(curved.lift(k / 2, k % 2).data(), 3, to + 3 * k);
-              std::copy_n(curved.middle(s.facets()[f]).data(), 3, to + 18);
-            }
-            return to_array(std::move(out), {n, 7, 3});
-          },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "corner_normals",
-          [](const Shell& s) {
-            std::vector<double> out;
-            const std::size_t n = s.curved() ? s.triangles().size() : 0;
-            for (std::size_t t = 0; t < n; ++t) {
-              const int f = triangle_of(s.facet_half_edge(static_cast<int>(3 * t)));
-              const CubicPatch patch = s.curved()->facets()[f].patch(s.facets()[f]);
-              for (const auto& [u, v] : {std::pair(0, 0), {1, 0}, {0, 1}})
-                append(out, patch.along_u(u, v).cross(patch.along_v(u, v)).normalized());
-            }
-            return to_array(std::move(out), {n, 3, 3});
-          },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "bending",
-          [](const Shell& s) {
-            std::vector<std::uint8_t> out(s.curved() ? s.triangles().size() : 0);
-            for (std::size_t t = 0; t < out.size(); ++t)
-              out[t] = static_cast<std::uint8_t>(s.curved()->bending(s, static_cast<int>(t)));
-            return to_array(std::move(out));
-          },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "normals_set_aside",
-          [](const Shell& s) {
-            std::vector<std::uint8_t> out;
-            if (s.curved()) out.assign(s.curved()->divided().begin(), s.curved()->divided().end());
-            const std::size_t n = out.size() / 3;
-            return to_array(std::move(out), {n, 3});
-          },
-          nb::rv_policy::automatic)
-      .def_prop_ro("creases", [](const Shell& s) { return s.curved() ? s.curved()->creases() : 0; })
-      .def_prop_ro("bytes", &Shell::bytes)
-      .def_prop_ro(
-          "element_patch", [](const Shell& s) { return to_array(s.topology().patch); },
-          nb::rv_policy::automatic)
       .def_prop_ro("num_edges",
                    [](const Shell& s) {
-                     return std::count_if(s.topology().edges.begin(), s.topology().edges.end(),
+                     const std::vector<Edge>& edges = s.topology().edges;
+                     return std::count_if(edges.begin(), edges.end(),
                                           [](const Edge& e) { return !e.inner; });
                    })
-      .def_prop_ro(
-          "edge_vertices",
-          [](const Shell& s) {
-            return per_edge<int>(s, 2, [](const Edge& e, std::vector<int>& out) {
-              out.push_back(e.first_vertex);
-              out.push_back(e.last_vertex);
-            });
-          },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "edge_class",
-          [](const Shell& s) {
-            return per_edge<std::uint8_t>(s, 1, [](const Edge& e, std::vector<std::uint8_t>& out) {
-              out.push_back(static_cast<std::uint8_t>(e.kind));
-            });
-          },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "edge_angle",
-          [](const Shell& s) {
-            return per_edge<double>(s, 1, [&](const Edge& e, std::vector<double>& out) {
-              out.push_back(s.topology().angle(s.vertices(), s.triangles(), e));
-            });
-          },
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "triangle_normals",
-          [](const Shell& s) {
-            std::vector<double> out;
-            for (const Vec3& n : s.topology().face_normal) append(out, n);
-            const std::size_t t = s.topology().face_normal.size();
-            return to_array(std::move(out), {t, 3});
-          },
-          nb::rv_policy::automatic);
+      .def_prop_ro("creases", [](const Shell& s) { return s.curved() ? s.curved()->creases() : 0; })
+      .def_prop_ro("bytes", &Shell::bytes);
+  // Arrays own their memory, or keep the shell alive: no policy of nanobind's own applies.
+  const auto array = [&](const char* name, auto get) {
+    shell.def_prop_ro(name, get, nb::rv_policy::automatic);
+  };
+  array("vertices", [](nb::handle self) {
+    return view<double>(self, nb::cast<const Shell&>(self).vertices());
+  });
+  array("triangles",
+        [](nb::handle self) { return view<int>(self, nb::cast<const Shell&>(self).triangles()); });
+  array("triangle_element",
+        [](nb::handle self) { return view<int>(self, nb::cast<const Shell&>(self).element()); });
+  array("triangle_normals", [](nb::handle self) {
+    return view<double>(self, nb::cast<const Shell&>(self).topology().face_normal);
+  });
+  array("control_point_offsets", &control_point_offsets);
+  array("corner_normals", &corner_normals);
+  array("bending", &bending);
+  array("normals_set_aside", &normals_set_aside);
+  array("element_patch", [](const Shell& s) { return to_array(s.topology().patch); });
+  array("edge_vertices", &edge_vertices);
+  array("edge_class", [](const Shell& s) {
+    return to_array(
+        per_edge<std::uint8_t>(s, [](const Edge& e) { return static_cast<std::uint8_t>(e.kind); }));
+  });
+  array("edge_angle", [](const Shell& s) {
+    return to_array(per_edge<double>(
+        s, [&](const Edge& e) { return s.topology().angle(s.vertices(), s.triangles(), e); }));
+  });
 }

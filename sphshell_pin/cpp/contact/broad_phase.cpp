@@ -6,7 +6,7 @@
 namespace sphshell {
 
 BroadPhase::BroadPhase(bool follow) : follow_(follow) {
-  near.reserve(1024);
+  overlapping.reserve(1024);
   candidates.reserve(256);
 }
 
@@ -15,39 +15,40 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, d
   double margin = 0;
   if (follow_) {
     const bool same = followed_ == &shell && followed_radius_ == sphere.radius;
-    const double moved = same ? (sphere.centre - last_).norm() : sphere.radius;
-    last_ = sphere.centre;
-    if (same && (sphere.centre - anchor_).squaredNorm() <= margin_ * margin_) return;
+    const double moved = same ? (sphere.center - last_).norm() : sphere.radius;
+    last_ = sphere.center;
+    if (same && (sphere.center - anchor_).squaredNorm() <= margin_ * margin_) return;
     // A slow sphere stays near for many calls; for a fast one a wider ball does not pay.
     if (moved < 0.01 * sphere.radius)
       margin = std::clamp(16 * moved, 1e-3 * sphere.radius, 0.1 * sphere.radius);
     followed_ = &shell;
     followed_radius_ = sphere.radius;
-    anchor_ = sphere.centre;
+    anchor_ = sphere.center;
     margin_ = margin;
   }
-  near.clear();
+  overlapping.clear();
   const NormalCone* all = cones.data();
-  shell.bvh().near(sphere.centre, sphere.radius + margin + bulge, near, [all](int first) {
-    prefetch(all + first);
-    prefetch(all + first + 3);
-  });
+  shell.bvh().find_overlapping(sphere.center, sphere.radius + margin + bulge, overlapping,
+                               [all](int first) {
+                                 prefetch(all + first);
+                                 prefetch(all + first + 3);
+                               });
   keep_in_cone(shell, cones, bulge, sphere, margin, cells);
 }
 
-// The centre may stand inside the cone of normals of the features that a facet decides about
+// The center may be inside the cone of normals of the features that a facet owns
 // (Johnson and Cohen, I3D 2001), wherever it is within the margin and however far within it the
 // element bulges from its triangle.
 void BroadPhase::keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
                               const Sphere& sphere, double margin, const CellBounds* cells) {
   const Facet* facets = shell.facets().data();
-  const Vec3 local = sphere.centre - shell.origin();
+  const Vec3 local = sphere.center - shell.origin();
   const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
   const float radius = float(sphere.radius);
   const float wide = 1e-6f * (float(shell.size()) + radius) + 1.000001f * float(margin);
   const float slack = wide + 1.000001f * float(bulge);
   candidates.clear();
-  for (int f : near) {
+  for (int f : overlapping) {
     const NormalCone& cone = cones[f];
     const float x = c[0] - cone.middle[0], y = c[1] - cone.middle[1], z = c[2] - cone.middle[2];
     const float height = std::abs(x * cone.axis[0] + y * cone.axis[1] + z * cone.axis[2]);

@@ -12,7 +12,7 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-// |x(u, v) - c|^2 / 2 at a place of a patch: half the square of the distance, with its first
+// |x(u, v) - c|^2 / 2 at a point of a patch: half the square of the distance, with its first
 // derivatives and the second ones, those of a plane first.
 struct Expansion {
   Vec3 from;  // x - c
@@ -43,7 +43,7 @@ struct Expansion {
 
 double outside(double u, double v) { return std::max({-u, -v, u + v - 1}); }
 
-// The polar form of a patch at three places.
+// The polar form (blossom) of a patch at three points.
 Vec3 polar(const CubicPatch& c, const Vec2& p, const Vec2& q, const Vec2& r) {
   const double u = p.x(), v = p.y(), a = q.x(), b = q.y(), x = r.x(), y = r.y();
   return c.c00 + ((u + a + x) * c.c10 + (v + b + y) * c.c01) / 3 +
@@ -171,7 +171,7 @@ class CellSearch {
     return bound2 >= least_ - 2 * kLevel * distance * depth;
   }
 
-  // Downhill at every step, and never out of the cell.
+  // Downhill at every step, and never leaving the cell.
   void descend(const Vec2& start) {
     double u = start.x(), v = start.y(), now = patch_.point(u, v).squaredNorm();
     for (int i = 0; i < 3 * kMostIterations; ++i) {

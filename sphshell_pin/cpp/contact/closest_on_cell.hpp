@@ -8,13 +8,13 @@
 
 namespace sphshell {
 
-// A place of a cell by its parameters.
+// A point of a cell by its parameters.
 struct CellPoint {
   double u, v;
   Vec3 point;
 };
 
-// The nearest place of a cell: within it, on a side or in a corner.
+// The closest point of a cell: within it, on a side or in a corner.
 struct Nearest {
   Feature feature;
   int index;  // of the side or corner
@@ -33,8 +33,8 @@ std::pair<double, double> closest_on_facet(const Facet& facet, const Vec3& x);
 bool find_minimum(const CubicPatch& patch, const Vec3& x, std::pair<double, double> start,
                   CellPoint& out);
 
-// The nearest place of a cell whatever its shape: least on its sides, for certain, and within it,
-// where it is divided until the distance is convex on a part, or no place of a part can be nearest.
+// The closest point of a cell whatever its shape: least on its sides, for certain, and within it,
+// where it is divided until the distance is convex on a part, or no point of a part can be closest.
 // False where none is nearer than `radius`.
 bool find_nearest(const Facet& facet, const CurvedFacet& curved, const CellBounds& bounds,
                   const Vec3& x, double radius, Nearest& out);

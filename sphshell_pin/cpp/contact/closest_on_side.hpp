@@ -26,7 +26,7 @@ struct Quintic {
     q[3] = (3 * b1.dot(d2) + 6 * b2.dot(d1) + b3.dot(d0)) / 10;
     q[4] = (3 * b2.dot(d2) + 2 * b3.dot(d1)) / 5;
     q[5] = b3.dot(d2);
-    // What is round-off has no sign: a side whose end is as near as its neighbourhood has many.
+    // What is round-off has no sign: a side whose end is as near as its neighborhood has many.
     const double from2 = std::max(b0.squaredNorm(), b3.squaredNorm());
     const double along2 = std::max({d0.squaredNorm(), d1.squaredNorm(), d2.squaredNorm()});
     for (double& value : q)

@@ -18,7 +18,7 @@ Minimum on_side(const Shell& shell, int f, int k, double t, const Sphere& sphere
                                vertex ? Feature::Vertex : Feature::Edge);
   if (want_dn_dc)
     contact.dn_dc = dn_dc_of(contact, sphere.radius,
-                             vertex ? Mat3(Mat3::Zero()) : dx_dc_of(side, t, sphere.centre));
+                             vertex ? Mat3(Mat3::Zero()) : dx_dc_of(side, t, sphere.center));
   return {contact, f, t == 1 ? next_corner(k) : k, false};
 }
 
@@ -63,7 +63,7 @@ void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc
            : a.element != b.element ? a.element < b.element
                                     : x.facet < y.facet;
   });
-  // Of what was found on one cell the deepest is its nearest place.
+  // Of what was found on one cell the deepest is its closest point.
   cells_.clear();
   std::size_t kept = 0;
   for (std::size_t i = 0; i < minima.size(); ++i) {
@@ -74,14 +74,15 @@ void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc
   minima.erase(minima.begin() + kept, minima.end());
   if (minima.size() < 2) return;
   tree_.clear();
-  start_pieces(minima.size());
-  if (pieces_.size() < minima.size()) pieces_.resize(minima.size());
-  for (std::size_t i = 0; i < minima.size(); ++i) pieces_[i].cells = 1, pieces_[i].open.clear();
-  link_equal_places(sphere, minima);
+  reset_components(minima.size());
+  if (components_.size() < minima.size()) components_.resize(minima.size());
+  for (std::size_t i = 0; i < minima.size(); ++i)
+    components_[i].cells = 1, components_[i].open.clear();
+  connect_equal_points(sphere, minima);
   for (int i = 0; i < static_cast<int>(minima.size()); ++i)
-    add_links(shell, sphere, minima[i].facet, i, i);
-  flood(shell, sphere, minima.size());
-  pair_minima(shell, sphere, want_dn_dc, minima);
+    add_candidates(shell, sphere, minima[i].facet, i, i);
+  grow_components(shell, sphere, minima.size());
+  find_saddles(shell, sphere, want_dn_dc, minima);
 }
 
 int Components::root(int cell) {
@@ -89,12 +90,12 @@ int Components::root(int cell) {
   return cell;
 }
 
-bool Components::is_in(int facet, int piece) {
+bool Components::belongs_to(int facet, int component) {
   const int cell = cells_.find(facet);
-  return cell != FacetTable::kNone && root(cell) == piece;
+  return cell != FacetTable::kNone && root(cell) == component;
 }
 
-void Components::start_pieces(std::size_t minima) {
+void Components::reset_components(std::size_t minima) {
   parent_.resize(std::size_t(cells_.size()));
   std::iota(parent_.begin(), parent_.end(), 0);
   deepest_.assign(parent_.size(), -1);
@@ -102,8 +103,8 @@ void Components::start_pieces(std::size_t minima) {
 }
 
 // Sheets that lie on each other, and fans that share no more than a corner, are one where they have
-// one nearest place.
-void Components::link_equal_places(const Sphere& sphere, const std::vector<Minimum>& minima) {
+// one closest point.
+void Components::connect_equal_points(const Sphere& sphere, const std::vector<Minimum>& minima) {
   const double same = kSamePlace * sphere.radius;
   const auto point = [&](int i) -> const Vec3& { return minima[i].contact.point; };
   by_x_.resize(minima.size());
@@ -115,40 +116,43 @@ void Components::link_equal_places(const Sphere& sphere, const std::vector<Minim
       if ((point(by_x_[a]) - point(by_x_[b])).squaredNorm() > same * same) continue;
       const auto [deeper, other] = std::minmax(by_x_[a], by_x_[b]);
       const int facet = minima[other].facet;
-      pieces_[deeper].open.push_back(
-          {minima[other].contact.depth, LinkKind::Place, deeper, facet, facet, 0, 0, other});
+      components_[deeper].open.push_back({minima[other].contact.depth,
+                                          SaddleCandidate::Kind::CommonPoint, deeper, facet, facet,
+                                          0, 0, other});
     }
 }
 
-bool Components::lower(const Link& a, const Link& b) {
+bool Components::lower(const SaddleCandidate& a, const SaddleCandidate& b) {
   return a.depth != b.depth   ? a.depth < b.depth
          : a.facet != b.facet ? a.facet > b.facet
                               : a.side > b.side;
 }
 
-void Components::add_links(const Shell& shell, const Sphere& sphere, int f, int cell, int piece) {
+void Components::add_candidates(const Shell& shell, const Sphere& sphere, int f, int cell,
+                                int component) {
   const Facet& facet = shell.facets()[f];
   const CellBounds& bounds = shell.curved()->cells()[f];
   const double reach = sphere.radius + bounds.bulge;
-  std::vector<Link>& open = pieces_[piece].open;
+  std::vector<SaddleCandidate>& open = components_[component].open;
   for (int k = 0; k < 3; ++k) {
     const int beyond = bounds.beyond[k];
-    if (beyond == kBoundary || (beyond >= 0 && is_in(triangle_of(beyond), piece))) continue;
+    if (beyond == kBoundary || (beyond >= 0 && belongs_to(triangle_of(beyond), component)))
+      continue;
     const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
     const double t =
-        std::clamp((sphere.centre - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
-    const double distance = (facet.corner[k] + t * d - sphere.centre).norm();
+        std::clamp((sphere.center - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
+    const double distance = (facet.corner[k] + t * d - sphere.center).norm();
     if (distance >= reach) continue;
-    // A side is seen from the first of its triangles, so that a place has one name.
-    const auto link_to = [&](int h, int name) {
-      open.push_back({reach - distance, LinkKind::Bound, cell, triangle_of(h), triangle_of(name),
-                      side_of(name), 0, 0});
+    // A side is seen from the first of its triangles, so that a point has one name.
+    const auto add_candidate = [&](int h, int name) {
+      open.push_back({reach - distance, SaddleCandidate::Kind::Bound, cell, triangle_of(h),
+                      triangle_of(name), side_of(name), 0, 0});
       std::push_heap(open.begin(), open.end(), lower);
     };
     const int here = 3 * f + k;
     if (beyond >= 0) {
       const bool first = shell.triangle_of_facet(f) < shell.triangle_of_facet(triangle_of(beyond));
-      link_to(beyond, first ? here : beyond);
+      add_candidate(beyond, first ? here : beyond);
       continue;
     }
     const Topology& topology = shell.topology();
@@ -156,119 +160,125 @@ void Components::add_links(const Shell& shell, const Sphere& sphere, int f, int 
     const Edge& edge = topology.edges[topology.edge_of[h]];
     const int name = shell.facet_half_edge(topology.incidence[edge.begin]);
     for (int i = edge.begin; i < edge.begin + edge.count; ++i)
-      if (topology.incidence[i] != h) link_to(shell.facet_half_edge(topology.incidence[i]), name);
+      if (topology.incidence[i] != h)
+        add_candidate(shell.facet_half_edge(topology.incidence[i]), name);
   }
 }
 
-// The highest link that leads out of a piece belongs to some largest spanning forest (Prim). The
-// smaller pieces go first, and all in turn: what remains when one piece is left, or those that are
-// left lead nowhere inside the sphere, is not looked at.
-void Components::flood(const Shell& shell, const Sphere& sphere, std::size_t minima) {
+// The highest candidate that leads out of a component belongs to some largest spanning forest
+// (Prim). The smaller components go first, and all in turn: what remains when one component is
+// left, or those that are left lead nowhere inside the sphere, is not looked at.
+void Components::grow_components(const Shell& shell, const Sphere& sphere, std::size_t minima) {
   active_.resize(minima);
   std::iota(active_.begin(), active_.end(), 0);
   for (int size = 16; active_.size() > 1; size *= 2) {
     for (std::size_t i = 0; i < active_.size(); ++i) {
-      int piece = active_[i];
-      if (root(piece) != piece) continue;
-      while (piece >= 0 && pieces_[piece].cells < size) piece = advance(shell, sphere, piece);
+      int component = active_[i];
+      if (root(component) != component) continue;
+      while (component >= 0 && components_[component].cells < size)
+        component = expand(shell, sphere, component);
     }
-    active_.erase(std::remove_if(active_.begin(), active_.end(),
-                                 [&](int p) { return root(p) != p || pieces_[p].open.empty(); }),
-                  active_.end());
+    active_.erase(
+        std::remove_if(active_.begin(), active_.end(),
+                       [&](int p) { return root(p) != p || components_[p].open.empty(); }),
+        active_.end());
   }
 }
 
-// Takes one more link into account; returns the piece then, -1 once it leads nowhere. Bounds are
-// made exact where they come up first.
-int Components::advance(const Shell& shell, const Sphere& sphere, int piece) {
-  std::vector<Link>& open = pieces_[piece].open;
+// Takes one more candidate into account; returns the component then, -1 once it leads nowhere.
+// Bounds are made exact where they come up first.
+int Components::expand(const Shell& shell, const Sphere& sphere, int component) {
+  std::vector<SaddleCandidate>& open = components_[component].open;
   if (open.empty()) return -1;
   std::pop_heap(open.begin(), open.end(), lower);
-  Link link = open.back();
+  SaddleCandidate candidate = open.back();
   open.pop_back();
-  if (link.depth <= 0) {
+  if (candidate.depth <= 0) {
     open.clear();
     return -1;
   }
-  if (is_in(link.to, piece)) return piece;
-  if (link.kind == LinkKind::Bound) {
-    const Facet& facet = shell.facets()[link.facet];
-    const CubicCurve side = shell.curved()->facets()[link.facet].side(facet, link.side);
-    link.t = nearest_on_side(side, sphere.centre);
-    link.depth = sphere.radius - (side.point(link.t) - sphere.centre).norm();
-    link.kind = LinkKind::Side;
-    open.push_back(link);
+  if (belongs_to(candidate.to, component)) return component;
+  if (candidate.kind == SaddleCandidate::Kind::Bound) {
+    const Facet& facet = shell.facets()[candidate.facet];
+    const CubicCurve side = shell.curved()->facets()[candidate.facet].side(facet, candidate.side);
+    candidate.t = nearest_on_side(side, sphere.center);
+    candidate.depth = sphere.radius - (side.point(candidate.t) - sphere.center).norm();
+    candidate.kind = SaddleCandidate::Kind::Side;
+    open.push_back(candidate);
     std::push_heap(open.begin(), open.end(), lower);
-    return piece;
+    return component;
   }
   bool added = false;
-  const int facet = link.to;
-  link.to = cells_.number(facet, added);
+  const int facet = candidate.to;
+  candidate.to = cells_.number(facet, added);
   if (added) {
-    parent_.push_back(piece);
-    ++pieces_[piece].cells;
-    tree_.push_back(link);
-    add_links(shell, sphere, facet, link.to, piece);
-    return piece;
+    parent_.push_back(component);
+    ++components_[component].cells;
+    tree_.push_back(candidate);
+    add_candidates(shell, sphere, facet, candidate.to, component);
+    return component;
   }
-  const int other = root(link.to);
-  if (other == piece) return piece;
-  tree_.push_back(link);
-  const int kept = pieces_[piece].open.size() < pieces_[other].open.size() ? other : piece;
-  const int gone = kept == piece ? other : piece;
-  for (const Link& more : pieces_[gone].open) {
-    pieces_[kept].open.push_back(more);
-    std::push_heap(pieces_[kept].open.begin(), pieces_[kept].open.end(), lower);
+  const int other = root(candidate.to);
+  if (other == component) return component;
+  tree_.push_back(candidate);
+  const int kept =
+      components_[component].open.size() < components_[other].open.size() ? other : component;
+  const int gone = kept == component ? other : component;
+  for (const SaddleCandidate& more : components_[gone].open) {
+    components_[kept].open.push_back(more);
+    std::push_heap(components_[kept].open.begin(), components_[kept].open.end(), lower);
   }
-  pieces_[kept].cells += pieces_[gone].cells;
-  pieces_[gone].open.clear();
+  components_[kept].cells += components_[gone].cells;
+  components_[gone].open.clear();
   parent_[gone] = kept;
   return kept;
 }
 
-// The shallower of two minima ends at the saddle that merges their pieces (Kruskal).
-void Components::pair_minima(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
-                             std::vector<Minimum>& minima) {
-  std::sort(tree_.begin(), tree_.end(), [](const Link& a, const Link& b) { return lower(b, a); });
-  start_pieces(minima.size());
+// The shallower of two minima ends at the saddle that merges their components (Kruskal).
+void Components::find_saddles(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+                              std::vector<Minimum>& minima) {
+  std::sort(tree_.begin(), tree_.end(),
+            [](const SaddleCandidate& a, const SaddleCandidate& b) { return lower(b, a); });
+  reset_components(minima.size());
   absorbed_.assign(minima.size(), 0);
   leader_.resize(minima.size());
   std::iota(leader_.begin(), leader_.end(), 0);
-  for (const Link& link : tree_) {
-    const int a = root(link.from), b = root(link.to);
+  for (const SaddleCandidate& candidate : tree_) {
+    const int a = root(candidate.from), b = root(candidate.to);
     const int i = deepest_[a], j = deepest_[b];
     parent_[b] = a;
     deepest_[a] = i < 0 ? j : j < 0 ? i : std::min(i, j);
     if (i < 0 || j < 0) continue;
     const int deeper = std::min(i, j), shallower = std::max(i, j);
-    if (link.depth >= minima[shallower].contact.depth - kNoSaddle * sphere.radius) {
+    if (candidate.depth >= minima[shallower].contact.depth - kNoSaddle * sphere.radius) {
       absorbed_[shallower] = 1;
       continue;
     }
-    Minimum saddle = link.kind == LinkKind::Side
-                         ? on_side(shell, link.facet, link.side, link.t, sphere, want_dn_dc)
-                         : minima[link.minimum];
+    Minimum saddle =
+        candidate.kind == SaddleCandidate::Kind::Side
+            ? on_side(shell, candidate.facet, candidate.side, candidate.t, sphere, want_dn_dc)
+            : minima[candidate.minimum];
     saddle.contact.weight = -1;
     saddle.contact.dn_dc *= -1;
-    saddle.contact.place = -1;
-    show_as_one(minima, deeper, shallower, shell.curved()->facets()[link.facet].flat,
-                saddle.contact);
+    saddle.contact.group = -1;
+    group_if_nearly_one(minima, deeper, shallower, shell.curved()->facets()[candidate.facet].flat,
+                        saddle.contact);
     minima.push_back(saddle);
     absorbed_.push_back(0);
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < minima.size(); ++i) {
     if (absorbed_[i]) continue;
-    int& place = minima[i].contact.place;
-    if (place >= 0) place = leader_of(place);
+    int& group = minima[i].contact.group;
+    if (group >= 0) group = leader_of(group);
     minima[kept++] = minima[i];
   }
   minima.erase(minima.begin() + kept, minima.end());
 }
 
 // Minima of nearly one depth and normal, the saddle between them as well, are shown as one contact.
-void Components::show_as_one(std::vector<Minimum>& minima, int deeper, int shallower, bool flat,
-                             Contact& saddle) {
+void Components::group_if_nearly_one(std::vector<Minimum>& minima, int deeper, int shallower,
+                                     bool flat, Contact& saddle) {
   const double share = flat ? kShallowFlat : kShallow;
   const auto near = [&](const Contact& c) {
     return c.depth - saddle.depth < share * saddle.depth &&
@@ -276,8 +286,8 @@ void Components::show_as_one(std::vector<Minimum>& minima, int deeper, int shall
   };
   Contact &a = minima[deeper].contact, &b = minima[shallower].contact;
   if (!near(a) || !near(b)) return;
-  a.place = saddle.place = deeper;
-  b.place = shallower;
+  a.group = saddle.group = deeper;
+  b.group = shallower;
   leader_[leader_of(shallower)] = leader_of(deeper);
 }
 

@@ -32,12 +32,12 @@ class FacetTable {
 };
 
 // The theorem of fixed cells (docs/contact.md, "Components and saddles"): with a_i the depth at the
-// nearest place of cell i and p_ij that at the nearest place of a side that cells i and j share,
+// closest point of cell i and p_ij that at the closest point of a side that cells i and j share,
 //
-//   V = sum_i U(a_i) - largest total of U(p_ij) over a spanning forest of the links
+//   V = sum_i U(a_i) - largest total of U(p_ij) over a spanning forest of the shared sides
 //
-// cannot jump. A cell whose nearest place is on a shared side adds as much as that link takes: only
-// the others are minima, and the links between their pieces saddles.
+// cannot jump. A cell whose closest point is on a shared side adds as much as that side takes: only
+// the others are minima, and the sides where their components merge are saddles.
 class Components {
  public:
   // Leaves one minimum a cell, deepest first, and adds the saddles, of weight -1.
@@ -45,45 +45,45 @@ class Components {
              std::vector<Minimum>& minima);
 
  private:
-  // Where two cells meet: over a side, at its nearest place, first only bounded from above; or at
-  // the nearest place of both.
-  enum class LinkKind { Bound, Side, Place };
-  struct Link {
+  // Where two cells meet: over a side, at its closest point, first only bounded from above; or at
+  // the closest point of both.
+  struct SaddleCandidate {
+    enum class Kind { Bound, Side, CommonPoint };
     double depth;
-    LinkKind kind;
-    int from, to;  // cells; `to` is a facet until the link is used
+    Kind kind;
+    int from, to;  // cells; `to` is a facet until the candidate is used
     int facet, side;
     double t;     // along the side
-    int minimum;  // of a place
+    int minimum;  // of a common point
   };
 
-  // The cells found so far from one minimum, and the links that lead on, as a heap.
-  struct Piece {
+  // The cells found so far from one minimum, and the candidates on its border, as a heap.
+  struct Component {
     int cells;
-    std::vector<Link> open;
+    std::vector<SaddleCandidate> open;
   };
 
-  static bool lower(const Link& a, const Link& b);
+  static bool lower(const SaddleCandidate& a, const SaddleCandidate& b);
   int root(int cell);
-  bool is_in(int facet, int piece);
-  void start_pieces(std::size_t minima);
-  void add_links(const Shell& shell, const Sphere& sphere, int facet, int cell, int piece);
-  void link_equal_places(const Sphere& sphere, const std::vector<Minimum>& minima);
-  void flood(const Shell& shell, const Sphere& sphere, std::size_t minima);
-  int advance(const Shell& shell, const Sphere& sphere, int piece);
-  void pair_minima(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
-                   std::vector<Minimum>& minima);
-  void show_as_one(std::vector<Minimum>& minima, int deeper, int shallower, bool flat,
-                   Contact& saddle);
+  bool belongs_to(int facet, int component);
+  void reset_components(std::size_t minima);
+  void add_candidates(const Shell& shell, const Sphere& sphere, int facet, int cell, int component);
+  void connect_equal_points(const Sphere& sphere, const std::vector<Minimum>& minima);
+  void grow_components(const Shell& shell, const Sphere& sphere, std::size_t minima);
+  int expand(const Shell& shell, const Sphere& sphere, int component);
+  void find_saddles(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+                    std::vector<Minimum>& minima);
+  void group_if_nearly_one(std::vector<Minimum>& minima, int deeper, int shallower, bool flat,
+                           Contact& saddle);
   int leader_of(int minimum);
 
   FacetTable cells_;                   // the first of them hold the minima, in their order
-  std::vector<int> parent_, deepest_;  // per cell; deepest_: minimum of its piece, or -1
-  std::vector<Piece> pieces_;          // beside the minima, and as many more as were ever needed
+  std::vector<int> parent_, deepest_;  // per cell; deepest_: minimum of its component, or -1
+  std::vector<Component> components_;  // beside the minima, and as many more as were ever needed
   std::vector<int> by_x_, active_;
-  std::vector<Link> tree_;
+  std::vector<SaddleCandidate> tree_;
   std::vector<char> absorbed_;  // beside the minima and saddles
-  std::vector<int> leader_;     // beside the minima: towards the one that it is shown with
+  std::vector<int> leader_;     // beside the minima: towards the one that it is grouped with
 };
 
 }  // namespace sphshell

@@ -1,4 +1,4 @@
-// One place where a sphere touches a shell.
+// One contact of a sphere with a shell.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,29 +12,29 @@ using Mat3 = Eigen::Matrix3d;
 enum class Method : int { Facets = 0, Elements = 1, Smooth = 2 };
 enum class Feature : std::uint8_t { Face = 0, Edge = 1, Vertex = 2 };
 
-// A minimum of the distance from the sphere's centre to the shell, or a saddle between two. The
+// A minimum of the distance from the sphere's center to the shell, or a saddle between two. The
 // elastic energy is the sum of weight * U(depth), the force that of weight * F(depth) * normal.
 struct Contact {
   Vec3 point;    // on the shell
-  Vec3 normal;   // unit, from the shell to the sphere's centre: a push along it
+  Vec3 normal;   // unit, from the shell to the sphere's center: a push along it
   double depth;  // radius - distance > 0 [m]
   int element;
   Feature feature;
   double weight = 1;  // -1 of a saddle, where two components of the surface in the sphere merge
-  // Where asked for: derivative of weight * normal with respect to the sphere's centre [1/m].
+  // Where asked for: derivative of weight * normal with respect to the sphere's center [1/m].
   Mat3 dn_dc = Mat3::Zero();
   bool rim = false;  // on the border of an open sheet: there it has no sides
-  // Contacts of one number >= 0 are nearly one, and are shown as one; the first of them leads.
-  int place = -1;
+  // Contacts of one group >= 0 are nearly one and are shown as one, in place of the first of them.
+  int group = -1;
 };
 
 // The ball that a query looks at, in the shell's frame.
 struct Sphere {
-  Vec3 centre;
+  Vec3 center;
   double radius;     // [m]
   double tolerance;  // round-off of a coordinate [m]
 
-  bool reaches(const Vec3& point) const { return (centre - point).squaredNorm() < radius * radius; }
+  bool reaches(const Vec3& point) const { return (center - point).squaredNorm() < radius * radius; }
 };
 
 }  // namespace sphshell

@@ -35,7 +35,7 @@ void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& bro
         add_bent(task, outlook);
     }
     for (int k = 0; k < 3; ++k) {
-      if (outlook.side[k] && owned.twin[k] != kNotMine) add_edge(task, outlook.facet, k);
+      if (outlook.side[k] && owned.twin[k] != kNotOwned) add_edge(task, outlook.facet, k);
       if (outlook.corner[k] && owned.vertex[k] >= 0) add_vertex(task, outlook.facet, k);
     }
   }
@@ -45,24 +45,24 @@ void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& bro
 CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
                               const CellBounds& bounds, const Sphere& sphere)
     : facet(f),
-      height(at.normal.dot(sphere.centre - at.corner[0])),
+      height(at.normal.dot(sphere.center - at.corner[0])),
       within(false),
       side{false, false, false},
       corner{false, false, false},
       convex(false) {
   const double bulge = bounds.bulge;
-  // The centre stands over a minimum along a normal that leans at most by the opening, so its
+  // The center stands over a minimum along a normal that leans at most by the opening, so its
   // projection falls within `lean` of the feature that holds the minimum.
   const double lean =
       cone.tan_opening >= kAnyOpening
           ? std::numeric_limits<double>::infinity()
           : bulge + sphere.tolerance + (std::abs(height) + bulge) * cone.tan_opening;
   Vec3 edge[3];
-  double length2[3], across[3];  // across: of the centre, from side k inward, times its length
+  double length2[3], across[3];  // across: of the center, from side k inward, times its length
   bool near_side[3];
   for (int k = 0; k < 3; ++k) {
     edge[k] = at.corner[next_corner(k)] - at.corner[k];
-    across[k] = at.normal.dot(edge[k].cross(sphere.centre - at.corner[k]));
+    across[k] = at.normal.dot(edge[k].cross(sphere.center - at.corner[k]));
     length2[k] = edge[k].squaredNorm();
     const bool far = across[k] * across[k] > lean * lean * length2[k];
     if (far && across[k] < 0) return;
@@ -71,7 +71,7 @@ CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
   // Half the square of the distance falls towards `descent` in the middle, and elsewhere by what
   // differs from it no more than its second derivative makes of the way there.
   const Vec3 middle = (at.corner[0] + at.corner[1] + at.corner[2]) / 3;
-  const Vec3 aside = sphere.centre - middle - height * at.normal;
+  const Vec3 aside = sphere.center - middle - height * at.normal;
   const Vec3 offset(bounds.offset[0], bounds.offset[1], bounds.offset[2]);
   const double raised = offset.dot(at.normal), size = aside.norm(), reach = cone.reach;
   const Vec3 descent = aside - (offset - raised * at.normal) +
@@ -97,7 +97,7 @@ CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
 }
 
 // Where the distance is convex all over the cell, Newton's method finds what is within it, and the
-// facets that decide about its sides and corners what is there. Else its nearest place is found for
+// facets that own its sides and corners what is there. Else its closest point is found for
 // certain, and counts on a side too: what others find beside it is no deeper, and what it would
 // count too much is absorbed by the link over that side, which is as deep.
 void CurvedQuery::add_bent(const Task& task, const Outlook& outlook) {
@@ -108,9 +108,9 @@ void CurvedQuery::add_bent(const Task& task, const Outlook& outlook) {
   const CubicPatch patch = curved.patch(facet);
   Nearest found{Feature::Face, 0, 0.0, {}};
   if (outlook.convex) {
-    if (!find_minimum(patch, sphere.centre, closest_on_facet(facet, sphere.centre), found.at))
+    if (!find_minimum(patch, sphere.center, closest_on_facet(facet, sphere.center), found.at))
       return;
-  } else if (!find_nearest(facet, curved, shell.curved()->cells()[f], sphere.centre, sphere.radius,
+  } else if (!find_nearest(facet, curved, shell.curved()->cells()[f], sphere.center, sphere.radius,
                            found)) {
     return;
   }
@@ -120,12 +120,12 @@ void CurvedQuery::add_bent(const Task& task, const Outlook& outlook) {
   Contact contact = contact_at(point, outward, sphere, facet.element, found.feature);
   if (want_dn_dc) {
     Mat3 dx_dc = Mat3::Zero();
-    if (found.feature == Feature::Face) dx_dc = dx_dc_of(patch, u, v, sphere.centre);
+    if (found.feature == Feature::Face) dx_dc = dx_dc_of(patch, u, v, sphere.center);
     if (found.feature == Feature::Edge)
-      dx_dc = dx_dc_of(curved.side(facet, found.index), found.t, sphere.centre);
+      dx_dc = dx_dc_of(curved.side(facet, found.index), found.t, sphere.center);
     contact.dn_dc = dn_dc_of(contact, sphere.radius, dx_dc);
   }
-  minima.push_back({contact, f, found.index, (sphere.centre - point).dot(outward) < 0});
+  minima.push_back({contact, f, found.index, (sphere.center - point).dot(outward) < 0});
 }
 
 void CurvedQuery::add_flat(const Task& task, const Outlook& outlook) {
@@ -134,22 +134,22 @@ void CurvedQuery::add_flat(const Task& task, const Outlook& outlook) {
   const double height = outlook.height;
   if (std::abs(height) >= sphere.radius) return;
   for (int k = 0; k < 3; ++k)
-    if (test_side(facet, k, sphere.centre, sphere.tolerance * sphere.tolerance).beyond) return;
+    if (test_side(facet, k, sphere.center, sphere.tolerance * sphere.tolerance).beyond) return;
   minima.push_back(
-      {{sphere.centre - height * facet.normal, height < 0 ? Vec3(-facet.normal) : facet.normal,
+      {{sphere.center - height * facet.normal, height < 0 ? Vec3(-facet.normal) : facet.normal,
         sphere.radius - std::abs(height), facet.element, Feature::Face},
        outlook.facet,
        0,
        height < 0});
 }
 
-// The nearest place of a side between its ends, if the distance falls into none of the elements
+// The closest point of a side between its ends, if the distance falls into none of the elements
 // that meet there.
 void CurvedQuery::add_edge(const Task& task, int f, int k) {
   const auto& [shell, sphere, want_dn_dc, minima] = task;
   const Facet& facet = shell.facets()[f];
   const CubicCurve side = shell.curved()->facets()[f].side(facet, k);
-  const double t = nearest_on_side(side, sphere.centre);
+  const double t = nearest_on_side(side, sphere.center);
   if (t <= 0 || t >= 1) return;
   const Vec3 point = side.point(t), along = side.tangent(t).normalized();
   if (!sphere.reaches(point)) return;
@@ -158,7 +158,7 @@ void CurvedQuery::add_edge(const Task& task, int f, int k) {
     const double s = other.corner[side_of(h)] == facet.corner[k] ? t : 1 - t;
     const CubicPatch patch = shell.curved()->facets()[triangle_of(h)].patch(other);
     const Vec3 in = patch.inward(side_of(h), s);
-    return (sphere.centre - point).dot((in - in.dot(along) * along).normalized()) <=
+    return (sphere.center - point).dot((in - in.dot(along) * along).normalized()) <=
            sphere.tolerance;
   };
   const int code = shell.curved()->facets()[f].owned.twin[k];
@@ -169,7 +169,7 @@ void CurvedQuery::add_edge(const Task& task, int f, int k) {
   }
   Contact contact = contact_at(point, facet.normal, sphere, facet.element, Feature::Edge);
   if (want_dn_dc)
-    contact.dn_dc = dn_dc_of(contact, sphere.radius, dx_dc_of(side, t, sphere.centre));
+    contact.dn_dc = dn_dc_of(contact, sphere.radius, dx_dc_of(side, t, sphere.center));
   minima.push_back({contact, f, k, false});
 }
 
@@ -182,8 +182,8 @@ void CurvedQuery::add_vertex(const Task& task, int f, int k) {
   const Topology& topology = shell.topology();
   const Tangents& tangents = shell.curved()->tangents();
   const int vertex = shell.curved()->facets()[f].owned.vertex[k];
-  const Vec3 from = sphere.centre - facet.corner[k];
-  for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i)
+  const Vec3 from = sphere.center - facet.corner[k];
+  for (int i = topology.neighbor_begin[vertex]; i < topology.neighbor_begin[vertex + 1]; ++i)
     if (from.dot(tangents[i]) > sphere.tolerance * tangents[i].norm()) return;
   Contact contact =
       contact_at(facet.corner[k], facet.normal, sphere, facet.element, Feature::Vertex);

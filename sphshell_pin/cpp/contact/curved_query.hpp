@@ -16,11 +16,11 @@ class CurvedQuery {
             std::vector<Minimum>& minima);
 
  private:
-  // What the place of the centre over a facet, and the slope of the distance in the middle of its
-  // cell, say of where the cell may hold a minimum.
+  // Where a cell may hold a minimum, by the center's position over its facet and the slope of the
+  // distance in its middle.
   struct Outlook {
     int facet;
-    double height;   // of the centre above the facet's plane [m]
+    double height;   // of the center above the facet's plane [m]
     bool within;     // the distance may be stationary within the cell,
     bool side[3];    // ... least on side k,
     bool corner[3];  // ... or in corner k

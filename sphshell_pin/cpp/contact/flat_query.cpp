@@ -18,48 +18,48 @@ FlatQuery::FlatQuery() {
 void FlatQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& broad, bool want_dn_dc,
                      std::vector<Minimum>& minima) {
   broad.find(shell, shell.cones(), 0, sphere);
-  decide(shell, sphere, broad.candidates);
+  find_features(shell, sphere, broad.candidates);
   if (faces_.empty() && edges_.empty() && vertices_.empty()) return;
-  drop_neighbours(shell);
-  list(shell, sphere, want_dn_dc, minima);
+  drop_neighbors(shell);
+  add_minima(shell, sphere, want_dn_dc, minima);
   if (minima.size() < 2) return;
   const double same = kSamePoint * sphere.radius + 16 * sphere.tolerance;
   merge_equal_points(same, minima);
-  drop_crossed(shell, sphere, broad.near, same, minima);
+  drop_crossed(shell, sphere, broad.overlapping, same, minima);
 }
 
-// A face, an edge or a vertex holds a minimum where the centre lies in its normal cone with respect
+// A face, an edge or a vertex holds a minimum where the center lies in its normal cone with respect
 // to every triangle that meets there: triangles are convex, so this is exact.
-void FlatQuery::decide(const Shell& shell, const Sphere& sphere,
-                       const std::vector<int>& candidates) {
+void FlatQuery::find_features(const Shell& shell, const Sphere& sphere,
+                              const std::vector<int>& candidates) {
   faces_.clear(), edges_.clear(), vertices_.clear();
-  const Vec3& centre = sphere.centre;
+  const Vec3& center = sphere.center;
   const double tolerance2 = sphere.tolerance * sphere.tolerance;
   const double wide_reach2 = sphere.radius * sphere.radius * (1 + 1e-12);
   for (int f : candidates) {
     const Facet& facet = shell.facets()[f];
-    const double height = facet.normal.dot(centre - facet.corner[0]);
+    const double height = facet.normal.dot(center - facet.corner[0]);
     if (height * height >= wide_reach2) continue;
     SideTest side[3];
     bool inside = true;
     for (int k = 0; k < 3; ++k) {
-      side[k] = test_side(facet, k, centre, tolerance2);
+      side[k] = test_side(facet, k, center, tolerance2);
       inside = inside && !side[k].beyond;
     }
-    if (inside) faces_.push_back({f});
+    if (inside) faces_.push_back(f);
     for (int k = 0; k < 3; ++k) {
-      if (facet.owned.twin[k] != kNotMine && side[k].not_within && !side[k].past_first &&
+      if (facet.owned.twin[k] != kNotOwned && side[k].not_within && !side[k].past_first &&
           !side[k].past_second) {
         const Vec3& a = facet.corner[k];
         if (sphere.reaches(a + side[k].t * (facet.corner[next_corner(k)] - a)) &&
-            edge_is_minimum(shell, facet.owned.twin[k], centre, tolerance2)) {
+            edge_is_minimum(shell, facet.owned.twin[k], center, tolerance2)) {
           const Triangle& t = shell.triangles()[shell.triangle_of_facet(f)];
           edges_.push_back({f, k, t[k], t[next_corner(k)]});
         }
       }
       if (facet.owned.vertex[k] >= 0 && side[k].before && side[previous_corner(k)].after &&
           sphere.reaches(facet.corner[k]) &&
-          vertex_is_minimum(shell, facet.owned.vertex[k], centre, sphere.tolerance))
+          vertex_is_minimum(shell, facet.owned.vertex[k], center, sphere.tolerance))
         vertices_.push_back({f, k, facet.owned.vertex[k]});
     }
   }
@@ -67,12 +67,12 @@ void FlatQuery::decide(const Shell& shell, const Sphere& sphere,
 
 // A facet is convex: where its face holds the nearest point, its own edges and corners cannot, and
 // likewise an edge and its ends. Both are found only within round-off of their common border.
-void FlatQuery::drop_neighbours(const Shell& shell) {
+void FlatQuery::drop_neighbors(const Shell& shell) {
   if (edges_.empty() && vertices_.empty()) return;
   taken_edges_.clear();
   taken_vertices_.clear();
-  for (const OnFace& face : faces_) {
-    const Triangle& t = shell.triangles()[shell.triangle_of_facet(face.facet)];
+  for (int face : faces_) {
+    const Triangle& t = shell.triangles()[shell.triangle_of_facet(face)];
     for (int k = 0; k < 3; ++k) {
       taken_edges_.push_back(std::minmax(t[k], t[next_corner(k)]));
       taken_vertices_.push_back(t[k]);
@@ -96,9 +96,9 @@ void FlatQuery::drop_neighbours(const Shell& shell) {
                   vertices_.end());
 }
 
-void FlatQuery::list(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
-                     std::vector<Minimum>& minima) {
-  const Vec3& centre = sphere.centre;
+void FlatQuery::add_minima(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+                           std::vector<Minimum>& minima) {
+  const Vec3& center = sphere.center;
   const LargeArray<Facet>& facets = shell.facets();
   const auto add = [&](int f, int index, const Contact& contact, bool behind, const Mat3& dx_dc) {
     minima.push_back({contact, f, index, behind});
@@ -107,18 +107,18 @@ void FlatQuery::list(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
       added.dn_dc = dn_dc_of(added, sphere.radius, dx_dc);
   };
   // A planar face has one nearest point, whichever of its facets hold it.
-  std::sort(faces_.begin(), faces_.end(), [&](const OnFace& x, const OnFace& y) {
-    const Facet &a = facets[x.facet], &b = facets[y.facet];
+  std::sort(faces_.begin(), faces_.end(), [&](int x, int y) {
+    const Facet &a = facets[x], &b = facets[y];
     return a.planar_face != b.planar_face ? a.planar_face < b.planar_face : a.element < b.element;
   });
   for (std::size_t i = 0; i < faces_.size(); ++i) {
-    const Facet& facet = facets[faces_[i].facet];
-    if (i > 0 && facets[faces_[i - 1].facet].planar_face == facet.planar_face) continue;
-    const double height = facet.normal.dot(centre - facet.corner[0]);
+    const Facet& facet = facets[faces_[i]];
+    if (i > 0 && facets[faces_[i - 1]].planar_face == facet.planar_face) continue;
+    const double height = facet.normal.dot(center - facet.corner[0]);
     if (std::abs(height) >= sphere.radius) continue;
     const Vec3 normal = height < 0 ? Vec3(-facet.normal) : facet.normal;
-    add(faces_[i].facet, 0,
-        {centre - height * facet.normal, normal, sphere.radius - std::abs(height), facet.element,
+    add(faces_[i], 0,
+        {center - height * facet.normal, normal, sphere.radius - std::abs(height), facet.element,
          Feature::Face},
         height < 0, Mat3::Zero());
   }
@@ -126,7 +126,7 @@ void FlatQuery::list(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
     const Facet& facet = facets[on.facet];
     const Vec3& a = facet.corner[on.side];
     const Vec3 along = facet.corner[next_corner(on.side)] - a;
-    const double t = std::clamp((centre - a).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    const double t = std::clamp((center - a).dot(along) / along.squaredNorm(), 0.0, 1.0);
     add(on.facet, on.side,
         contact_at(a + t * along, facet.normal, sphere, facet.element, Feature::Edge), false,
         along * along.transpose() / along.squaredNorm());
@@ -167,33 +167,34 @@ void FlatQuery::merge_equal_points(double tolerance, std::vector<Minimum>& minim
 }
 
 // Elements may overlap or cross without sharing an edge. Where another one passes through a contact
-// point and comes nearer to the centre, the distance has no minimum there. The deepest contact is
+// point and comes nearer to the center, the distance has no minimum there. The deepest contact is
 // the nearest point of all, so a single one needs no such test.
-void FlatQuery::drop_crossed(const Shell& shell, const Sphere& sphere, const std::vector<int>& near,
-                             double tolerance, std::vector<Minimum>& minima) {
+void FlatQuery::drop_crossed(const Shell& shell, const Sphere& sphere,
+                             const std::vector<int>& overlapping, double tolerance,
+                             std::vector<Minimum>& minima) {
   if (minima.size() < 2) return;
-  const Vec3& centre = sphere.centre;
+  const Vec3& center = sphere.center;
   const auto crossed = [&](const Vec3& point, const std::vector<int>& facets) {
-    const double nearer = std::max(0.0, (centre - point).norm() - tolerance);
+    const double nearer = std::max(0.0, (center - point).norm() - tolerance);
     return std::any_of(facets.begin(), facets.end(), [&](int f) {
       const Facet& facet = shell.facets()[f];
       if (std::abs(facet.normal.dot(point - facet.corner[0])) > tolerance) return false;
       const Vec3 here = closest_on_triangle(point, facet.corner, facet.normal).point;
       if ((point - here).squaredNorm() > tolerance * tolerance) return false;
-      const Vec3 best = closest_on_triangle(centre, facet.corner, facet.normal).point;
-      return (centre - best).squaredNorm() < nearer * nearer;
+      const Vec3 best = closest_on_triangle(center, facet.corner, facet.normal).point;
+      return (center - best).squaredNorm() < nearer * nearer;
     });
   };
-  // With many facets at hand it is cheaper to ask the tree for those at each point.
-  const bool ask = near.size() > 256;
+  // With many facets at hand it is cheaper to use_tree the tree for those at each point.
+  const bool use_tree = overlapping.size() > 256;
   dropped_.assign(minima.size(), 0);
   for (std::size_t i = 0; i < minima.size(); ++i) {
     const Vec3& point = minima[i].contact.point;
-    if (ask) {
+    if (use_tree) {
       at_point_.clear();
-      shell.bvh().near(point, 2 * tolerance, at_point_, [](int) {});
+      shell.bvh().find_overlapping(point, 2 * tolerance, at_point_, [](int) {});
     }
-    dropped_[i] = crossed(point, ask ? at_point_ : near);
+    dropped_[i] = crossed(point, use_tree ? at_point_ : overlapping);
   }
   remove_dropped(minima);
 }

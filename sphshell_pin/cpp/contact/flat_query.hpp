@@ -17,10 +17,7 @@ class FlatQuery {
             std::vector<Minimum>& minima);
 
  private:
-  // A facet whose plane the centre projects into, and an edge or a vertex that it stands over.
-  struct OnFace {
-    int facet;
-  };
+  // An edge or a vertex that may hold the closest point.
   struct OnEdge {
     int facet, side, from, to;  // from, to: its vertices
   };
@@ -28,16 +25,16 @@ class FlatQuery {
     int facet, corner, vertex;
   };
 
-  void decide(const Shell& shell, const Sphere& sphere, const std::vector<int>& candidates);
-  void drop_neighbours(const Shell& shell);
-  void list(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
-            std::vector<Minimum>& minima);
+  void find_features(const Shell& shell, const Sphere& sphere, const std::vector<int>& candidates);
+  void drop_neighbors(const Shell& shell);
+  void add_minima(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+                  std::vector<Minimum>& minima);
   void merge_equal_points(double tolerance, std::vector<Minimum>& minima);
-  void drop_crossed(const Shell& shell, const Sphere& sphere, const std::vector<int>& near,
+  void drop_crossed(const Shell& shell, const Sphere& sphere, const std::vector<int>& overlapping,
                     double tolerance, std::vector<Minimum>& minima);
   void remove_dropped(std::vector<Minimum>& minima) const;
 
-  std::vector<OnFace> faces_;
+  std::vector<int> faces_;  // facets that the center projects into
   std::vector<OnEdge> edges_;
   std::vector<OnVertex> vertices_;
   std::vector<std::pair<int, int>> taken_edges_;

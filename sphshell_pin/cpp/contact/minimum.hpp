@@ -13,19 +13,19 @@ struct Minimum {
   Contact contact;
   int facet;    // that holds it
   int index;    // its side or corner, of an edge or a vertex
-  bool behind;  // of a face: the centre is on its inner side
+  bool behind;  // of a face: the center is on its inner side
 };
 
-inline Vec3 direction(const Vec3& point, const Vec3& centre, const Vec3& if_equal) {
-  const Vec3 d = centre - point;
+inline Vec3 direction(const Vec3& point, const Vec3& center, const Vec3& if_equal) {
+  const Vec3 d = center - point;
   const double length = d.norm();
   return length > 0 ? Vec3(d / length) : if_equal;
 }
 
-// The contact at a point of the shell; `outward`: there, where the centre is as good as at it.
+// The contact at a point of the shell; `outward`: there, where the center is as good as at it.
 inline Contact contact_at(const Vec3& point, const Vec3& outward, const Sphere& sphere, int element,
                           Feature feature) {
-  const Vec3 from = sphere.centre - point;
+  const Vec3 from = sphere.center - point;
   const double distance = from.norm();
   const Vec3 normal = distance > kAtSurface * sphere.radius ? Vec3(from / distance)
                       : from.dot(outward) < 0               ? Vec3(-outward)
@@ -33,7 +33,7 @@ inline Contact contact_at(const Vec3& point, const Vec3& outward, const Sphere& 
   return {point, normal, sphere.radius - distance, element, feature};
 }
 
-// How the normal changes with the centre, where the contact point follows it by dx_dc (3, 3).
+// How the normal changes with the center, where the contact point follows it by dx_dc (3, 3).
 inline Mat3 dn_dc_of(const Contact& contact, double radius, const Mat3& dx_dc) {
   const double distance = radius - contact.depth;
   if (!(distance > 0)) return Mat3::Zero();

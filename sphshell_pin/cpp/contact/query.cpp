@@ -10,7 +10,7 @@
 namespace sphshell {
 namespace {
 
-// What tells outside from inside where a contact is held.
+// The pseudo-normal of the feature that a contact is on: it separates outside from inside.
 struct FeatureNormal {
   Vec3 outward;
   bool rim;  // on the border of an open sheet: no inside there
@@ -30,30 +30,30 @@ FeatureNormal feature_normal(const Shell& shell, const Minimum& at) {
   return {at.behind ? Vec3(-at.contact.normal) : at.contact.normal, false};
 }
 
-// side = outside | inside: the nearest contact tells on which side the centre is. On the right side
-// count the contacts whose feature faces the centre; on the wrong side the sphere is pushed back
+// side = outside | inside: the nearest contact tells on which side the center is. On the right side
+// count the contacts whose feature faces the center; on the wrong side the sphere is pushed back
 // out through the nearest point.
 void keep_one_side(const Shell& shell, const Sphere& sphere, std::vector<Minimum>& minima) {
   const double sign = shell.side() == Side::Outside ? 1.0 : -1.0;
-  const auto faces_centre = [&](const Minimum& at) {
+  const auto faces_center = [&](const Minimum& at) {
     if (at.contact.feature == Feature::Face) return at.behind == (sign < 0);
     const FeatureNormal n = feature_normal(shell, at);
-    return n.rim || sign * n.outward.dot(sphere.centre - at.contact.point) >= 0;
+    return n.rim || sign * n.outward.dot(sphere.center - at.contact.point) >= 0;
   };
   const auto nearest = std::max_element(
       minima.begin(), minima.end(),
       [](const Minimum& a, const Minimum& b) { return a.contact.depth < b.contact.depth; });
-  if (!faces_centre(*nearest)) {
+  if (!faces_center(*nearest)) {
     Minimum out = *nearest;
     out.contact.normal = -out.contact.normal;
     out.contact.dn_dc = -out.contact.dn_dc;
     out.contact.depth = 2 * sphere.radius - out.contact.depth;
-    out.contact.place = -1;
+    out.contact.group = -1;
     minima.assign(1, out);
     return;
   }
   minima.erase(std::remove_if(minima.begin(), minima.end(),
-                              [&](const Minimum& at) { return !faces_centre(at); }),
+                              [&](const Minimum& at) { return !faces_center(at); }),
                minima.end());
   for (Minimum& at : minima)
     if (at.contact.depth == sphere.radius)
@@ -63,62 +63,45 @@ void keep_one_side(const Shell& shell, const Sphere& sphere, std::vector<Minimum
 // The paper's sum: every element within reach counts, at its closest point.
 void find_elements(const Shell& shell, const Sphere& sphere, BroadPhase& broad,
                    std::vector<Contact>& contacts) {
-  const Vec3& centre = sphere.centre;
+  const Vec3& center = sphere.center;
   const Topology& topology = shell.topology();
   const std::vector<int>& element = shell.element();
   const auto closest = [&](int t) {
     const Vec3 corner[3] = {shell.vertices()[shell.triangles()[t][0]],
                             shell.vertices()[shell.triangles()[t][1]],
                             shell.vertices()[shell.triangles()[t][2]]};
-    return closest_on_triangle(centre, corner, topology.face_normal[t]);
+    return closest_on_triangle(center, corner, topology.face_normal[t]);
   };
   const int last = static_cast<int>(element.size()) - 1;
-  const auto speaks = [&](int t, double d2) {
-    // The other triangle of a quad speaks for the element where it is nearer.
+  const auto is_nearest_of_element = [&](int t, double d2) {
+    // Of the two triangles of a quad the nearer one counts.
     for (int u : {t - 1, t + 1}) {
       if (u < 0 || u > last || element[u] != element[t]) continue;
-      const double other2 = (centre - closest(u).point).squaredNorm();
+      const double other2 = (center - closest(u).point).squaredNorm();
       if (other2 < d2 || (other2 == d2 && u < t)) return false;
     }
     return true;
   };
   broad.find(shell, shell.cones(), 0, sphere);
-  for (int f : broad.near) {
+  for (int f : broad.overlapping) {
     const int t = shell.triangle_of_facet(f);
     const ClosestPoint at = closest(t);
-    const double d2 = (centre - at.point).squaredNorm();
-    if (!sphere.reaches(at.point) || !speaks(t, d2)) continue;
+    const double d2 = (center - at.point).squaredNorm();
+    if (!sphere.reaches(at.point) || !is_nearest_of_element(t, d2)) continue;
     Feature feature = at.feature >= 4   ? Feature::Vertex
                       : at.feature >= 1 ? Feature::Edge
                                         : Feature::Face;
     if (feature == Feature::Edge && topology.edges[topology.edge_of[3 * t + at.feature - 1]].inner)
       feature = Feature::Face;
     const Vec3& normal = topology.face_normal[t];
-    const double height = normal.dot(centre - at.point);
+    const double height = normal.dot(center - at.point);
     if (shell.side() == Side::Outside && height < 0) continue;
     if (shell.side() == Side::Inside && height > 0) continue;
-    contacts.push_back({at.point, direction(at.point, centre, normal),
+    contacts.push_back({at.point, direction(at.point, center, normal),
                         sphere.radius - std::sqrt(d2), element[t], feature});
   }
   std::sort(contacts.begin(), contacts.end(),
             [](const Contact& a, const Contact& b) { return a.element < b.element; });
-}
-
-Contact nothing_at(Contact first) {
-  first.normal.setZero(), first.dn_dc.setZero();
-  first.depth = 0;
-  return first;
-}
-
-void add_to(Contact& whole, const Contact& c) {
-  whole.depth += c.weight * c.depth;
-  whole.normal += c.weight * c.normal;
-  whole.dn_dc += c.dn_dc;
-}
-
-void finish(Contact& whole, const Vec3& centre, double radius) {
-  whole.normal.normalize();
-  whole.point = centre - (radius - whole.depth) * whole.normal;
 }
 
 }  // namespace
@@ -151,10 +134,10 @@ Query::~Query() = default;
 
 void Query::want_dn_dc() { parts_->want_dn_dc = true; }
 
-const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& centre, double radius,
+const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& center, double radius,
                                         Method method) {
   contacts.clear();
-  const Sphere sphere{centre, radius, kRoundOff * (shell.size() + radius)};
+  const Sphere sphere{center, radius, kRoundOff * (shell.size() + radius)};
   if (method == Method::Elements) {
     find_elements(shell, sphere, parts_->broad, contacts);
     return contacts;
@@ -183,41 +166,34 @@ const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& centre, 
 }
 
 bool leads(const std::vector<Contact>& contacts, std::size_t i) {
-  if (contacts[i].place < 0) return true;
+  if (contacts[i].group < 0) return true;
   for (std::size_t j = 0; j < i; ++j)
-    if (contacts[j].place == contacts[i].place) return false;
+    if (contacts[j].group == contacts[i].group) return false;
   return true;
 }
 
-Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3& centre,
+Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3& center,
                  double radius) {
-  if (contacts[i].place < 0) return contacts[i];
-  Contact whole = nothing_at(contacts[i]);
-  for (const Contact& c : contacts)
-    if (c.place == whole.place) add_to(whole, c);
-  finish(whole, centre, radius);
+  Contact whole = contacts[i];
+  if (whole.group < 0) return whole;
+  whole.normal.setZero(), whole.dn_dc.setZero();
+  whole.depth = 0;
+  for (const Contact& c : contacts) {
+    if (c.group != whole.group) continue;
+    whole.depth += c.weight * c.depth;
+    whole.normal += c.weight * c.normal;
+    whole.dn_dc += c.dn_dc;
+  }
+  whole.normal.normalize();
+  whole.point = center - (radius - whole.depth) * whole.normal;
   return whole;
 }
 
-void merge_places(const std::vector<Contact>& contacts, const Vec3& centre, double radius,
+void merge_groups(const std::vector<Contact>& contacts, const Vec3& center, double radius,
                   std::vector<Contact>& shown) {
   shown.clear();
-  int places = 0;
-  for (const Contact& c : contacts) places = std::max(places, c.place + 1);
-  std::vector<int> at(places, -1);
-  for (const Contact& c : contacts) {
-    if (c.place < 0) {
-      shown.push_back(c);
-      continue;
-    }
-    if (at[c.place] < 0) {
-      at[c.place] = static_cast<int>(shown.size());
-      shown.push_back(nothing_at(c));
-    }
-    add_to(shown[at[c.place]], c);
-  }
-  for (int i : at)
-    if (i >= 0) finish(shown[i], centre, radius);
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    if (leads(contacts, i)) shown.push_back(whole_of(contacts, i, center, radius));
 }
 
 }  // namespace sphshell

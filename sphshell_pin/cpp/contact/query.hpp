@@ -19,9 +19,9 @@ class Query {
   Query& operator=(const Query& other);
   ~Query();
 
-  // The contacts of the sphere (centre in the shell's frame [m]); valid until the next call.
+  // The contacts of the sphere (center in the shell's frame [m]); valid until the next call.
   // Minima come deepest first, then saddles.
-  const std::vector<Contact>& find(const Shell& shell, const Vec3& centre, double radius,
+  const std::vector<Contact>& find(const Shell& shell, const Vec3& center, double radius,
                                    Method method);
 
   // Also find dn_dc; not for the method "elements".
@@ -37,12 +37,12 @@ class Query {
 // Whether contact i leads those that are shown as one with it.
 bool leads(const std::vector<Contact>& contacts, std::size_t i);
 
-// The contact that i leads: those of its place as one, with their resultant.
-Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3& centre,
+// The contact that i leads: those of its group as one, with their resultant.
+Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3& center,
                  double radius);
 
-// The contacts as shown: those of one place as one, with their resultant.
-void merge_places(const std::vector<Contact>& contacts, const Vec3& centre, double radius,
+// The contacts as shown: those of one group as one, with their resultant.
+void merge_groups(const std::vector<Contact>& contacts, const Vec3& center, double radius,
                   std::vector<Contact>& shown);
 
 }  // namespace sphshell

@@ -1,4 +1,4 @@
-// Over which feature of a triangle a sphere's centre stands.
+// Over which feature of a triangle a sphere's center stands.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace sphshell {
 
-// Position of the sphere's centre against side k of a facet, in the facet's plane.
+// Position of the sphere's center against side k of a facet, in the facet's plane.
 struct SideTest {
   bool beyond;                   // outside the side by more than round-off
   bool not_within;               // outside it, round-off included
@@ -16,9 +16,9 @@ struct SideTest {
   double t;                      // closest point along the side, 0 to 1
 };
 
-inline SideTest test_side(const Facet& facet, int k, const Vec3& centre, double tolerance2) {
+inline SideTest test_side(const Facet& facet, int k, const Vec3& center, double tolerance2) {
   const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
-  const Vec3 from = centre - facet.corner[k];
+  const Vec3 from = center - facet.corner[k];
   const double length2 = edge.squaredNorm();
   const double slack2 = tolerance2 * length2;
   const double inward = facet.normal.dot(edge.cross(from));
@@ -36,29 +36,29 @@ inline SideTest test_side(const Facet& facet, int k, const Vec3& centre, double 
 }
 
 // True where the distance to the facet does not fall when one leaves its side k inward.
-inline bool side_holds(const Facet& facet, int k, const Vec3& centre, double tolerance2) {
+inline bool side_holds(const Facet& facet, int k, const Vec3& center, double tolerance2) {
   const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
-  const double inward = facet.normal.dot(edge.cross(centre - facet.corner[k]));
+  const double inward = facet.normal.dot(edge.cross(center - facet.corner[k]));
   return inward <= 0 || inward * inward <= tolerance2 * edge.squaredNorm();
 }
 
-inline bool edge_is_minimum(const Shell& shell, int code, const Vec3& centre, double tolerance2) {
+inline bool edge_is_minimum(const Shell& shell, int code, const Vec3& center, double tolerance2) {
   if (code == kBoundary) return true;
   const auto holds = [&](int h) {
-    return side_holds(shell.facets()[triangle_of(h)], side_of(h), centre, tolerance2);
+    return side_holds(shell.facets()[triangle_of(h)], side_of(h), center, tolerance2);
   };
   if (code >= 0) return holds(code);
   const std::vector<int>& all = shell.half_edges_of(kManifold - code);
   return std::all_of(all.begin(), all.end(), holds);
 }
 
-inline bool vertex_is_minimum(const Shell& shell, int vertex, const Vec3& centre,
+inline bool vertex_is_minimum(const Shell& shell, int vertex, const Vec3& center,
                               double tolerance) {
   const std::vector<Vec3>& p = shell.vertices();
   const Topology& topology = shell.topology();
-  const Vec3 from = centre - p[vertex];
-  for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i) {
-    const Vec3 edge = p[topology.neighbours[i]] - p[vertex];
+  const Vec3 from = center - p[vertex];
+  for (int i = topology.neighbor_begin[vertex]; i < topology.neighbor_begin[vertex + 1]; ++i) {
+    const Vec3 edge = p[topology.neighbors[i]] - p[vertex];
     const double along = from.dot(edge);
     if (along > 0 && along * along > tolerance * tolerance * edge.squaredNorm()) return false;
   }

@@ -21,7 +21,7 @@ inline Mat3 cross_matrix(const Vec3& x) {
 // and wrenches about its origin.
 struct ContactSite {
   Contact contact;
-  // What the contact follows: the sphere's centre. Of a contact source, which does not say how its
+  // What the contact follows: the sphere's center. Of a contact source, which does not say how its
   // contacts follow, the contact point, and the contact itself stays where it is.
   Vec3 place;
   bool follows;

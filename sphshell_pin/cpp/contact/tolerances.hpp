@@ -5,16 +5,16 @@
 namespace sphshell {
 
 // Round-off of a coordinate, as a share of shell size + radius. Regions of features overlap by this
-// much, so that no position falls between two of them; what is found twice is then told apart.
+// much, so that no position falls between two of them; what is found twice is then merged.
 constexpr double kRoundOff = 1e-14;
 
 // "facets": two minima of the distance closer than this share of the radius are one.
 constexpr double kSamePoint = 1e-10;
-// "smooth": nearest places of two cells closer than this share of the radius are one.
+// "smooth": closest points of two cells nearer than this share of the radius are one.
 constexpr double kSamePlace = 1e-8;
 
 // A contact's normal is taken from the surface where the distance is below this share of the
-// radius: the direction to the centre is round-off there.
+// radius: the direction to the center is round-off there.
 constexpr double kAtSurface = 1e-9;
 
 // Newton's iterations on a cell end with the step after one below this, in its parameters: errors
@@ -23,7 +23,7 @@ constexpr double kLastStep = 1e-7;
 constexpr int kMostIterations = 20;
 
 // A stationary point counts this far outside its cell, in its parameters, so that none falls
-// between two cells; the one found twice is absorbed by their link, which is as deep.
+// between two cells; the one found twice is absorbed by the saddle between them, which is as deep.
 constexpr double kOverlap = 1e-9;
 
 // A cell is searched by one run of Newton's method where the second derivative of |x - c|^2 / 2 is
@@ -42,7 +42,7 @@ constexpr double kLevelSide = 1e-14;
 // Round-off of the derivative's coefficients, as a share of distance times length.
 constexpr double kQuinticRoundOff = 4e-16;
 
-// A saddle no shallower than the shallower minimum, to this share of the radius, parts nothing.
+// A saddle no shallower than the shallower minimum, to this share of the radius, separates nothing.
 constexpr double kNoSaddle = 1e-13;
 
 // Shown as one contact, not summed as one: two minima where the saddle between them is no more

@@ -7,7 +7,7 @@
 namespace sphshell {
 namespace {
 
-// The centre can pass a sheet within a step only from deeper than this share of the radius: a step
+// The center can pass a sheet within a step only from deeper than this share of the radius: a step
 // moves it by a quarter of the radius at most.
 constexpr double kDeep = 0.5;
 
@@ -19,7 +19,7 @@ constexpr std::size_t kLongest = 1000;
 
 ContactTracker::ContactTracker() {
   for (auto* list : {&places_, &next_}) list->reserve(64);
-  links_.reserve(256);
+  pairings_.reserve(256);
   at_.reserve(64);
 }
 
@@ -29,18 +29,18 @@ double ContactTracker::disc(const Contact& contact, double radius) {
   return std::sqrt(std::max(0.0, radius * radius - distance * distance));
 }
 
-const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, const Vec3& centre,
+const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, const Vec3& center,
                                               double radius) {
   at_.assign(contacts.size(), -1);
   pushed_through_ = false;
-  // On a concave surface a contact moves farther than the centre.
-  const double moved = 4 * (centre - centre_).norm();
-  links_.clear();
+  // On a concave surface a contact moves farther than the center.
+  const double moved = 4 * (center - center_).norm();
+  pairings_.clear();
   const bool by_order = radius == 0 && std::max(places_.size(), contacts.size()) > kLongest;
   for (std::size_t i = 0; i < places_.size(); ++i) {
     places_[i].taken = false;
     if (by_order) {
-      if (i < contacts.size()) links_.push_back({0, static_cast<int>(i), static_cast<int>(i)});
+      if (i < contacts.size()) pairings_.push_back({0, static_cast<int>(i), static_cast<int>(i)});
       continue;
     }
     for (std::size_t j = 0; j < contacts.size(); ++j) {
@@ -48,22 +48,22 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
       if (places_[i].saddle != (c.weight < 0)) continue;
       const double apart = (places_[i].point - c.point).norm();
       if (apart < std::max({places_[i].reach, disc(c, radius), moved}))
-        links_.push_back({apart, static_cast<int>(i), static_cast<int>(j)});
+        pairings_.push_back({apart, static_cast<int>(i), static_cast<int>(j)});
     }
   }
   // Nearest first, each once.
-  std::sort(links_.begin(), links_.end(), [](const Link& a, const Link& b) {
+  std::sort(pairings_.begin(), pairings_.end(), [](const Pairing& a, const Pairing& b) {
     return a.apart != b.apart ? a.apart < b.apart
            : a.from != b.from ? a.from < b.from
                               : a.to < b.to;
   });
-  for (const Link& link : links_) {
-    Place& place = places_[link.from];
-    if (place.taken || at_[link.to] >= 0) continue;
+  for (const Pairing& pairing : pairings_) {
+    Place& place = places_[pairing.from];
+    if (place.taken || at_[pairing.to] >= 0) continue;
     place.taken = true;
-    at_[link.to] = link.from;
+    at_[pairing.to] = pairing.from;
     // What a stage met on its way says nothing of the side.
-    if (link.from < static_cast<int>(known_)) keep_side(contacts[link.to], place, radius);
+    if (pairing.from < static_cast<int>(known_)) keep_side(contacts[pairing.to], place, radius);
   }
   for (std::size_t j = 0; j < contacts.size(); ++j) {
     if (at_[j] >= 0) continue;
@@ -87,7 +87,7 @@ void ContactTracker::keep_side(Contact& c, const Place& place, double radius) {
   pushed_through_ = true;
 }
 
-void ContactTracker::accept(const std::vector<Contact>& contacts, const Vec3& centre,
+void ContactTracker::accept(const std::vector<Contact>& contacts, const Vec3& center,
                             double radius) {
   next_.clear();
   deep_ = false;
@@ -100,7 +100,7 @@ void ContactTracker::accept(const std::vector<Contact>& contacts, const Vec3& ce
   places_.swap(next_);
   known_ = places_.size();
   next_number_ = count_;
-  centre_ = centre;
+  center_ = center;
 }
 
 }  // namespace sphshell

@@ -42,6 +42,10 @@ Multibody::Multibody(const pinocchio::Model& model)
   for (int j = 1; j < model_.njoints; ++j) find_curved(model_.joints[j], curved_);
 }
 
+Multibody::Multibody(const Multibody& other) = default;
+
+Multibody::~Multibody() = default;
+
 void Multibody::need(int joint) {
   for (; joint > 0; joint = static_cast<int>(model_.parents[joint])) {
     const auto at = std::lower_bound(needed_.begin(), needed_.end(), joint);

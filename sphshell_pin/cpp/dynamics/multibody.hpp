@@ -30,6 +30,9 @@ struct TurningAxes {
 class Multibody {
  public:
   explicit Multibody(const pinocchio::Model& model);
+  // Pinocchio's own take seconds to compile: here, and not in every file.
+  Multibody(const Multibody& other);
+  ~Multibody();
 
   // Placements and, with v, velocities of the joints that were asked for by `need`, no others.
   void kinematics(const VectorX& q);

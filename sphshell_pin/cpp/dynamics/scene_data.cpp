@@ -143,7 +143,7 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k) {
   // between elements: contacts that are nearly one are one. The elastic energy is that of their
   // depths' sum, off by the square of the depths' difference, 1e-4 at most.
   if (pair.friction.active() && query.contacts.size() > 1) {
-    merge_places(query.contacts, state.center, pair.radius, merged_);
+    merge_groups(query.contacts, state.center, pair.radius, merged_);
     query.contacts.swap(merged_);
   }
   return query.contacts;
@@ -266,9 +266,9 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     const Vec3 normal = state.world_from_j.rotation() * whole.normal;
     Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
     // One without a place stands alone.
-    const std::size_t first = i - begin, last = whole.place < 0 ? first + 1 : contacts.size();
+    const std::size_t first = i - begin, last = whole.group < 0 ? first + 1 : contacts.size();
     for (std::size_t k = first; k < last; ++k) {
-      if (k != first && contacts[k].place != whole.place) continue;
+      if (k != first && contacts[k].group != whole.group) continue;
       const ActiveContact& other = active_[begin + k];
       push += other.contact.weight * other.force.normal * other.kinematics.normal;
       friction += other.contact.weight * other.force.friction;

@@ -24,7 +24,7 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
 
   const auto& all = tree.getBV(0).bv;
   origin_ = 0.5 * (all.min_ + all.max_);
-  // Rounding a box to single precision, and the sphere's centre when it is near the box, each err
+  // Rounding a box to single precision, and the sphere's center when it is near the box, each err
   // by less than this.
   const double reach = (all.max_ - all.min_).cwiseAbs().maxCoeff();
   const float widen = static_cast<float>(4e-7 * reach);

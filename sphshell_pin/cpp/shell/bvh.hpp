@@ -33,8 +33,9 @@ class Bvh {
   // misses one that meets it itself; adds its companions in the leaf. touch(first position) is
   // called as soon as a leaf is known, so that its memory can be on its way while the walk goes on.
   template <class Touch>
-  void near(const Vec3& centre, double radius, std::vector<int>& out, Touch&& touch) const {
-    const Vec3 local = centre - origin_;
+  void find_overlapping(const Vec3& center, double radius, std::vector<int>& out,
+                        Touch&& touch) const {
+    const Vec3 local = center - origin_;
     const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
     const float reach = float(radius) * 1.000001f;
     const float limit = reach * reach;

@@ -62,10 +62,10 @@ struct alignas(64) CellBounds {
   float offset[3], lean[3];
 
   // Across side k: the half-edge (3 facet + side) of the one facet there, or a code of Owned, with
-  // kNotMine where there are several.
+  // kNotOwned where there are several.
   int beyond[3];
 
-  // Of the second derivative of |x - c|^2 / 2, seen from a centre at `height` above the plane and
+  // Of the second derivative of |x - c|^2 / 2, seen from a center at `height` above the plane and
   // at most `aside` from the flat facet along it.
   Eigenvalues curvature(double height, double aside) const {
     const double above = height + bulge, below = height - bulge;

@@ -1,4 +1,4 @@
-// What the elements say about the edges between them, and what that is worth as evidence.
+// Estimates of the surface by single elements, and the evidence that an edge is smooth.
 #include <algorithm>
 #include <cmath>
 
@@ -27,9 +27,9 @@ constexpr double kAveraged = 0.1;
 
 }  // namespace
 
-// Normals that are no mean of the elements' say something that the elements do not.
-void CreaseSearch::find_witnesses(const Fans& fans) {
-  witness_.assign(original_.size(), 0);
+// Given normals that are no mean of the elements' are independent evidence.
+void CreaseSearch::find_independent_normals(const Fans& fans) {
+  independent_.assign(original_.size(), 0);
   const std::vector<Vec3>& facet_normal = shell_.topology().face_normal;
   for (int f = 0; f < fans.size(); ++f) {
     if (fans.count(f) == 0) continue;
@@ -49,13 +49,13 @@ void CreaseSearch::find_witnesses(const Fans& fans) {
     for (const Vec3& mean :
          {alike, by_area, by_angle, max_normal(shell_, fans.begin(f), fans.end(f))})
       is_mean = is_mean || (mean.normalized() - normal).norm() <= kAveraged * lean;
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) witness_[*c] = !is_mean;
+    for (const int* c = fans.begin(f); c != fans.end(f); ++c) independent_[*c] = !is_mean;
   }
 }
 
 // The surface at a side, from the normal at the opposite corner, if each of the two chords from
 // there leans alike at both ends: exact where it is quadratic.
-Claim CreaseSearch::claim(const Fans& fans, int h) const {
+SideEstimate CreaseSearch::estimate_side(const Fans& fans, int h) const {
   const int i = h, j = Fans::after(h), o = opposite(h);
   const Vec3 &p = points()[vertex(i)], &q = points()[vertex(j)], &r = points()[vertex(o)];
   const Vec3 a = p - r, b = q - r;
@@ -66,14 +66,14 @@ Claim CreaseSearch::claim(const Fans& fans, int h) const {
   const double at_first = -normals_[o].dot(a), at_last = -normals_[o].dot(b);
   const double far_first = a.dot(along), far_last = b.dot(along);
   const double bend_first = normals_[i].dot(along), bend_last = normals_[j].dot(along);
-  // The nearer end tells more: the other lies where a cone has become narrower, say.
+  // The nearer end is more accurate: at the other a cone has become narrower, say.
   const double weight_first = std::sqrt(b.norm()), weight_last = std::sqrt(a.norm());
   const double rise = (weight_first * (at_first - bend_first * far_first) +
                        weight_last * (at_last - bend_last * far_last)) /
                       (weight_first + weight_last);
   const double along_side = (bend_last - bend_first) / length;
   const double across = 2 * (far_last * at_first - far_first * at_last) / length;
-  Claim out;
+  SideEstimate out;
   out.turn = static_cast<float>(std::asin(std::clamp(rise / height, -1.0, 1.0)));
   out.curvature =
       static_cast<float>((across + far_first * far_last * along_side) / (height * height));
@@ -97,20 +97,21 @@ bool CreaseSearch::reaches_beyond(const Fans& fans, int h) const {
   return false;
 }
 
-// Which joints the claims of their two sides explain, and what that is worth as evidence.
-void CreaseSearch::judge() {
+// Which joints the estimates of their two sides explain, and what that is worth as evidence.
+void CreaseSearch::classify_joints() {
   const Fans now = fans();
   normals_of(now);
   const std::size_t count = joints_.size();
   for (auto* list : {&explained_, &alike_, &core_, &smooth_}) list->assign(count, 0);
   off_.assign(count, 0);
   evidence_.assign(count, 0);
-  claims_.resize(count);
+  estimates_.resize(count);
   for_each_in_parallel(count, [&](std::size_t e) {
     const Joint& joint = joints_[e];
     if (crease_[e] || joint.angle == 0) return;  // planar: nothing turns
-    const Claim a = claim(now, joint.half_edge[0]), b = claim(now, joint.half_edge[1]);
-    claims_[e] = {a, b};
+    const SideEstimate a = estimate_side(now, joint.half_edge[0]),
+                       b = estimate_side(now, joint.half_edge[1]);
+    estimates_[e] = {a, b};
     const float most = std::max({std::abs(joint.angle), std::abs(a.turn), std::abs(b.turn)});
     float rest = joint.angle - (a.known ? a.turn : 0) - (b.known ? b.turn : 0);
     // A side of which nothing is known may be anything from flat to as curved as the other.
@@ -130,13 +131,13 @@ void CreaseSearch::judge() {
         -std::log(std::clamp(kChance * (off_[e] + noise) / most, kLeastProbability, 1.0)));
   });
   weigh_runs();
-  // At the end of a run one side alone tells.
+  // At the end of a run only one side is known.
   for (std::size_t e = 0; e < count; ++e) {
     if (crease_[e]) continue;
     smooth_[e] = core_[e];
     if (core_[e] || !explained_[e]) continue;
-    const int far = vertex(opposite(joints_[e].half_edge[curved_side(claims_[e])]));
-    smooth_[e] = held(far, joints_[e].direction, core_) >= 0.5;
+    const int far = vertex(opposite(joints_[e].half_edge[curved_side(estimates_[e])]));
+    smooth_[e] = count_along(far, joints_[e].direction, core_) >= 0.5;
   }
 }
 
@@ -177,17 +178,17 @@ void CreaseSearch::weigh_runs() {
                               [&](std::size_t e) { return total(e) >= kEnough; }),
                open.end());
   }
-  const auto is_borne_out = [&](std::size_t e) {
+  const auto has_independent_normals = [&](std::size_t e) {
     const auto [h, g] = joints_[e].half_edge;
-    return given_ && witness_[opposite(h)] && witness_[opposite(g)];
+    return given_ && independent_[opposite(h)] && independent_[opposite(g)];
   };
   for (std::size_t e = 0; e < count; ++e)
-    core_[e] = core_[e] && (total(e) >= kEnough || is_borne_out(e));
+    core_[e] = core_[e] && (total(e) >= kEnough || has_independent_normals(e));
 }
 
 // How many of the joints at a vertex lie along a direction: the sum of their squared cosines.
-float CreaseSearch::held(int vertex, const Eigen::Vector3f& direction,
-                         const std::vector<char>& joints) const {
+float CreaseSearch::count_along(int vertex, const Eigen::Vector3f& direction,
+                                const std::vector<char>& joints) const {
   float sum = 0;
   at_vertex(vertex, [&](int e) {
     if (!joints[e]) return;

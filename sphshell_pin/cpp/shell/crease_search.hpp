@@ -12,12 +12,12 @@
 
 namespace sphshell {
 
-// What an element says by itself about the surface where it reaches one of its sides.
-struct Claim {
+// The surface at one side of an element, estimated from that element alone.
+struct SideEstimate {
   float turn;       // from its plane to the side [rad], > 0 convex
   float curvature;  // across the side [1/m]
   float height;     // of the opposite corner over the side [m]
-  bool known;       // there are elements beyond the opposite corner to tell
+  bool known;       // there are elements beyond the opposite corner
 };
 
 // An edge. Single precision: there is one for every edge of the surface at a time.
@@ -29,8 +29,8 @@ struct Joint {
 };
 
 // The side of a joint that bends more, of those that are known.
-inline int curved_side(const std::array<Claim, 2>& claims) {
-  const auto& [a, b] = claims;
+inline int curved_side(const std::array<SideEstimate, 2>& estimates) {
+  const auto& [a, b] = estimates;
   return a.known && (!b.known || std::abs(a.curvature) >= std::abs(b.curvature)) ? 0 : 1;
 }
 
@@ -51,25 +51,26 @@ class CreaseSearch {
   static int opposite(int h) { return Fans::before(h); }
 
   void list_joints();
-  void find_witnesses(const Fans& fans);
+  void find_independent_normals(const Fans& fans);
   void start();
   Fans fans() const;
   void normals_of(const Fans& fans);
-  Claim claim(const Fans& fans, int h) const;
+  SideEstimate estimate_side(const Fans& fans, int h) const;
   bool reaches_beyond(const Fans& fans, int h) const;
-  void judge();
+  void classify_joints();
   void weigh_runs();
-  float held(int vertex, const Eigen::Vector3f& direction, const std::vector<char>& joints) const;
+  float count_along(int vertex, const Eigen::Vector3f& direction,
+                    const std::vector<char>& joints) const;
   bool add_creases();
   template <class May>
   void extend_lines(std::vector<int> ends, May&& may);
-  bool separate_walls();
+  void separate_straight_walls();
   void lean_as_other_ends(const Fans& fans);
 
   template <class Visit>
   void at_vertex(int vertex, Visit&& visit) const {
     const Topology& topology = shell_.topology();
-    for (int i = topology.neighbour_begin[vertex]; i < topology.neighbour_begin[vertex + 1]; ++i)
+    for (int i = topology.neighbor_begin[vertex]; i < topology.neighbor_begin[vertex + 1]; ++i)
       visit(edge_at_[i]);
   }
 
@@ -78,14 +79,14 @@ class CreaseSearch {
   std::vector<Vec3> original_, normals_;
   std::vector<int> original_count_;  // per corner: of its fan before it was divided
   std::vector<char> divided_;        // per corner
-  std::vector<char> witness_;        // per corner: its given normal is no mean of its elements'
+  std::vector<char> independent_;    // per corner: its given normal is no mean of its elements'
   std::vector<Joint> joints_;        // per edge
-  std::vector<int> edge_at_;         // beside Topology::neighbours
+  std::vector<int> edge_at_;         // beside Topology::neighbors
   std::vector<char> crease_;         // per edge, as all that follows
   std::vector<char> explained_, alike_, core_, smooth_;
   std::vector<float> off_, evidence_;
   std::vector<std::array<float, 2>> run_;  // evidence beyond either side
-  std::vector<std::array<Claim, 2>> claims_;
+  std::vector<std::array<SideEstimate, 2>> estimates_;
 };
 
 }  // namespace sphshell

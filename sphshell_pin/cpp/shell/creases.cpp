@@ -25,8 +25,8 @@ void CreaseSearch::list_joints() {
   const Topology& topology = shell_.topology();
   const std::size_t count = topology.edges.size();
   joints_.resize(count);
-  edge_at_.resize(topology.neighbours.size());
-  std::vector<int> fill(topology.neighbour_begin.begin(), topology.neighbour_begin.end() - 1);
+  edge_at_.resize(topology.neighbors.size());
+  std::vector<int> fill(topology.neighbor_begin.begin(), topology.neighbor_begin.end() - 1);
   for (std::size_t e = 0; e < count; ++e) {
     const Edge& edge = topology.edges[e];
     edge_at_[fill[edge.first_vertex]++] = static_cast<int>(e);
@@ -60,7 +60,7 @@ void CreaseSearch::start() {
   for (std::size_t c = 0; c < original_.size(); ++c)
     original_count_[c] = before.count(before.of(static_cast<int>(c)));
   if (!given_) return;
-  find_witnesses(before);
+  find_independent_normals(before);
   // Averaged normals of a cube are those of a sphere: only the angle can tell. Where it is moderate
   // the normals stand, unless they were averaged over a sharper edge beside it.
   const auto sharpen = [&](double angle, auto&& also) {
@@ -116,7 +116,7 @@ void CreaseSearch::normals_of(const Fans& fans) {
   }
 }
 
-// The joints of one line are decided about together: a crease that ended inside a fan would not
+// The joints of one line are classified together: a crease that ended inside a fan would not
 // divide it.
 template <class May>
 void CreaseSearch::extend_lines(std::vector<int> ends, May&& may) {
@@ -148,7 +148,7 @@ void CreaseSearch::extend_lines(std::vector<int> ends, May&& may) {
 }
 
 // What is not smooth becomes a crease, unless its elements would bulge there by less than those
-// around do: the worst first, since it spoils what its neighbours claim. False where nothing is
+// around do: the worst first, since it spoils the estimates beside it. False where nothing is
 // left.
 bool CreaseSearch::add_creases() {
   const std::size_t count = joints_.size();
@@ -158,10 +158,10 @@ bool CreaseSearch::add_creases() {
                               vertex(opposite(g))};
   };
   const auto height = [&](std::size_t e) {
-    return double(std::max(claims_[e][0].height, claims_[e][1].height));
+    return double(std::max(estimates_[e][0].height, estimates_[e][1].height));
   };
   std::vector<double> around(points().size(), 0);
-  const auto spread = [&](std::size_t e, double value) {
+  const auto raise_around = [&](std::size_t e, double value) {
     for (int v : vertices_of(e)) around[v] = std::max(around[v], value);
   };
   const auto largest = [&](std::size_t e) {
@@ -170,7 +170,7 @@ bool CreaseSearch::add_creases() {
     return most;
   };
   for (std::size_t e = 0; e < count; ++e)
-    if (smooth_[e]) spread(e, std::abs(joints_[e].angle) * height(e));
+    if (smooth_[e]) raise_around(e, std::abs(joints_[e].angle) * height(e));
   std::vector<std::pair<std::size_t, double>> doubtful;
   for (std::size_t e = 0; e < count; ++e) {
     const float angle = std::abs(joints_[e].angle);
@@ -181,7 +181,7 @@ bool CreaseSearch::add_creases() {
   }
   if (doubtful.empty()) return false;
   std::fill(around.begin(), around.end(), 0.0);
-  for (const auto& [e, harm] : doubtful) spread(e, harm);
+  for (const auto& [e, harm] : doubtful) raise_around(e, harm);
   std::vector<int> added;
   for (const auto& [e, harm] : doubtful)
     if (harm >= largest(e) / 2) added.push_back(static_cast<int>(e));
@@ -191,20 +191,18 @@ bool CreaseSearch::add_creases() {
 }
 
 // Where a wall ends in a fillet each takes its own normal: they agree, and the wall stays straight.
-bool CreaseSearch::separate_walls() {
+void CreaseSearch::separate_straight_walls() {
   std::vector<int> added;
   for (std::size_t e = 0; e < joints_.size(); ++e) {
     if (crease_[e] || !smooth_[e] || core_[e] || alike_[e]) continue;
-    const int side = curved_side(claims_[e]);
-    const Claim &curved = claims_[e][side], &wall = claims_[e][1 - side];
+    const int side = curved_side(estimates_[e]);
+    const SideEstimate &curved = estimates_[e][side], &wall = estimates_[e][1 - side];
     const double left = 2 * std::abs(joints_[e].angle - curved.turn) / wall.height;
     if (wall.height > kLongWall * curved.height && left <= kWall * std::abs(curved.curvature))
       added.push_back(static_cast<int>(e));
   }
   for (int e : added) crease_[e] = 1;
-  if (added.empty()) return false;
   extend_lines(std::move(added), [&](int e) { return explained_[e] && !alike_[e]; });
-  return true;
 }
 
 // Divided fans lean along each side that leads across smooth joints as the side's other end does;
@@ -237,10 +235,10 @@ void CreaseSearch::lean_as_other_ends(const Fans& fans) {
 CornerNormals CreaseSearch::divide() {
   const auto before = std::count(crease_.begin(), crease_.end(), 1);
   for (int round = 0; round < kMostRounds; ++round) {
-    judge();
+    classify_joints();
     if (!add_creases()) break;
   }
-  if (!given_) separate_walls();
+  if (!given_) separate_straight_walls();
   const Fans now = fans();
   normals_of(now);
   lean_as_other_ends(now);

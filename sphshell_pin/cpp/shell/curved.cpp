@@ -29,7 +29,7 @@ void add_distinct(std::vector<Vec3>& normals, const Vec3& n) {
 struct EdgeEnd {
   const std::vector<Vec3>& normals;
   Vec3 direction;
-  bool limited;  // a fan there was divided: no more lean than the other end bears out
+  bool limited;  // a fan there was divided: no more lean than at the other end
 };
 
 // The angle [rad] between a tangent and a chord.
@@ -50,7 +50,7 @@ bool tangent_of(const Vec3& d, const EdgeEnd& end, Vec3& out) {
   if (out.dot(d) < 0) out = -out;
   if (normals.size() == 2 && end.limited) {
     // Normals that differ by little do not determine their common line: where it leans more than
-    // twice as much as their mean says, that does.
+    // twice as much as for their mean, that is used.
     const Vec3 mean = (normals[0] + normals[1]).normalized();
     const Vec3 level = (d - d.dot(mean) * mean).normalized();
     if (!(lean_of(out, d) <= 2 * lean_of(level, d))) out = level;
@@ -68,10 +68,10 @@ Vec3 limited_lean(const Vec3& tangent, const Vec3& other, const Vec3& forward) {
   return (along * along - off * off) * forward + 2 * along * off * aside;  // twice the angle
 }
 
-// Lifts of the two control points of an edge with chord d, tangent to the planes of all normals at
-// its ends. The handles are those that make a circular arc of a circle's tangents (Goldapp, CAGD 8
-// (1991) 227): order 4 on any curve.
-std::array<Vec3, 2> lifts_of(const Vec3& d, const EdgeEnd& first, const EdgeEnd& last) {
+// Offsets of the two control points of an edge with chord d from the chord, tangent to the planes
+// of all normals at its ends. The handles are those that make a circular arc of a circle's tangents
+// (Goldapp, CAGD 8 (1991) 227): order 4 on any curve.
+std::array<Vec3, 2> control_offsets(const Vec3& d, const EdgeEnd& first, const EdgeEnd& last) {
   const std::array<Vec3, 2> straight = {Vec3::Zero(), Vec3::Zero()};
   const double length = d.norm();
   const auto steepest = [&](const std::vector<Vec3>& normals) {
@@ -130,10 +130,10 @@ Net control_points(const Facet& f, const CurvedFacet& curved) {
   for (int i = 0; i < 4; ++i)
     for (int j = 0; i + j < 4; ++j)
       net[i][j] = ((3 - i - j) * f.corner[0] + i * f.corner[1] + j * f.corner[2]) / 3;
-  const auto lift = [&](int k, int i) { return curved.lift(k, i); };
-  net[1][0] += lift(0, 0), net[2][0] += lift(0, 1);
-  net[2][1] += lift(1, 0), net[1][2] += lift(1, 1);
-  net[0][2] += lift(2, 0), net[0][1] += lift(2, 1);
+  const auto offset = [&](int k, int i) { return curved.control_offset(k, i); };
+  net[1][0] += offset(0, 0), net[2][0] += offset(0, 1);
+  net[2][1] += offset(1, 0), net[1][2] += offset(1, 1);
+  net[0][2] += offset(2, 0), net[0][1] += offset(2, 1);
   net[1][1] += curved.middle(f);
   return net;
 }
@@ -177,7 +177,7 @@ class Continuation {
   void add(int k, const Vec3& q, const Vec3& n, double& along, double& square) const {
     const double upright = n.dot(up_);
     if (upright < 0.5) return;
-    // The parameters over which the vertex stands; the lift does not change them.
+    // The parameters of the vertex's projection; raising the center does not change them.
     static constexpr double kU[3] = {1, -1, 1}, kV[3] = {-1, 1, 1};
     Eigen::Vector2d at(kU[k], kV[k]);
     for (int i = 0; i < 6; ++i) {
@@ -240,7 +240,7 @@ CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exa
   std::vector<Vec3>().swap(normals);
   give_back_freed_memory(shell.triangles().size());
   bend_edges(shell, straight);
-  lift_middles(shell);
+  raise_centers(shell);
   normals_ = {};
   build_cones(shell);
   bound_cells(shell);
@@ -260,8 +260,8 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
   facets_.resize(triangles.size());
   tangents_.flat_ = &shell.facets();
   tangents_.curved_ = &facets_;
-  tangents_.spoke_.resize(topology.neighbours.size());
-  LargeArray<int> fill(topology.neighbour_begin.begin(), topology.neighbour_begin.end() - 1);
+  tangents_.spoke_.resize(topology.neighbors.size());
+  LargeArray<int> fill(topology.neighbor_begin.begin(), topology.neighbor_begin.end() - 1);
   const std::vector<Vec3> borders = border_directions(shell);
   std::vector<Vec3> first, last;
   for (const Edge& edge : topology.edges) {
@@ -281,17 +281,17 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
     }
     const Vec3 d = p[edge.last_vertex] - p[edge.first_vertex];
     const bool border = edge.kind == EdgeClass::Boundary;
-    std::array<Vec3, 2> lift =
-        lifts_of(d, {first, border ? borders[edge.first_vertex] : d, limited},
-                 {last, border ? borders[edge.last_vertex] : d, limited});
+    std::array<Vec3, 2> offset =
+        control_offsets(d, {first, border ? borders[edge.first_vertex] : d, limited},
+                        {last, border ? borders[edge.last_vertex] : d, limited});
     for (int i = 0; i < edge.count && !straight.empty(); ++i)
-      if (straight[topology.incidence[edge.begin + i]]) lift = {Vec3::Zero(), Vec3::Zero()};
+      if (straight[topology.incidence[edge.begin + i]]) offset = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 0; i < edge.count; ++i) {
       const int h = topology.incidence[edge.begin + i], g = shell.facet_half_edge(h);
-      facets_[triangle_of(g)].set_side(side_of(g), lift[forward(h) ? 0 : 1],
-                                       lift[forward(h) ? 1 : 0]);
+      facets_[triangle_of(g)].set_side(side_of(g), offset[forward(h) ? 0 : 1],
+                                       offset[forward(h) ? 1 : 0]);
     }
-    // Beside Topology::neighbours, which was filled in the same order.
+    // Beside Topology::neighbors, which was filled in the same order.
     const int h = topology.incidence[edge.begin], spoke = 2 * shell.facet_half_edge(h);
     tangents_.spoke_[fill[edge.first_vertex]++] = spoke + (forward(h) ? 0 : 1);
     tangents_.spoke_[fill[edge.last_vertex]++] = spoke + (forward(h) ? 1 : 0);
@@ -300,12 +300,11 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
 
 // The inner control point: that of a PN triangle (Vlachos et al., I3D 2001), moved along the normal
 // so that the patch, continued beyond its sides, comes nearest to the positions and normals of the
-// vertices opposite. Corners alone do not say how the curvature changes across an element.
-void CurvedShell::lift_middles(const Shell& shell) {
+// vertices opposite. Corners alone do not determine how the curvature changes across an element.
+void CurvedShell::raise_centers(const Shell& shell) {
   for (CurvedFacet& curved : facets_) {
     curved.rise = 0;
-    curved.flat = true;
-    for (int k = 0; k < 6; ++k) curved.flat = curved.flat && curved.lift(k / 2, k % 2).isZero(0);
+    curved.flat = curved.largest_offset() == 0;
   }
   for_each_in_parallel(facets_.size(), [&](std::size_t f) {
     if (facets_[f].flat) return;
@@ -319,9 +318,8 @@ void CurvedShell::lift_middles(const Shell& shell) {
       const Vec3& q = shell.vertices()[shell.triangles()[c / 3][c % 3]];
       continuation.add(k, q, normals_[c], along, square);
     }
-    // Neighbours whose normals contradict it must not pull an element away from its own sides.
-    double most = 0;
-    for (int i = 0; i < 6; ++i) most = std::max(most, facets_[f].lift(i / 2, i % 2).norm());
+    // Neighbors whose normals contradict it must not pull an element away from its own sides.
+    const double most = facets_[f].largest_offset();
     if (square > 0) facets_[f].rise = std::clamp(along / square, -most, most);
   });
 }
@@ -332,8 +330,7 @@ int CurvedShell::corner_beyond(const Shell& shell, int h) const {
   const Topology& topology = shell.topology();
   const Edge& edge = topology.edges[topology.edge_of[h]];
   if (edge.count != 2) return -1;
-  const int g = topology.incidence[edge.begin] == h ? topology.incidence[edge.begin + 1]
-                                                    : topology.incidence[edge.begin];
+  const int g = topology.other_half_edge(edge, h);
   const int t = triangle_of(h), u = triangle_of(g), k = side_of(h), l = side_of(g);
   if (shell.triangles()[t][k] != shell.triangles()[u][next_corner(l)]) return -1;  // ill-wound
   if (facets_[triangle_of(shell.facet_half_edge(g))].flat) return -1;
@@ -368,7 +365,7 @@ void CurvedShell::build_cones(const Shell& shell) {
         tangent = std::max(tangent, facet.normal.dot(flat[g].normal) > 0.05
                                         ? tan_opening_of(control_points(flat[g], facets_[g]), axis)
                                         : kAny);
-      } else if (mine.twin[k] != kNotMine) {
+      } else if (mine.twin[k] != kNotOwned) {
         tangent = kAny;
       }
       if (mine.vertex[k] >= 0)
@@ -382,9 +379,8 @@ void CurvedShell::build_cones(const Shell& shell) {
         reach = std::max(reach, (net[i][j] - middle).norm() + 1e-6 * shell.size());
     cone.reach = static_cast<float>(reach);
     cone.tan_opening = widened_opening(tangent);
-    // The lifted points weigh 1 - b0^3 - b1^3 - b2^3 <= 8/9 in all.
-    double largest = facets_[f].middle(facet).norm();
-    for (int i = 0; i < 6; ++i) largest = std::max(largest, facets_[f].lift(i / 2, i % 2).norm());
+    // The offset points weigh 1 - b0^3 - b1^3 - b2^3 <= 8/9 in all.
+    const double largest = std::max(facets_[f].middle(facet).norm(), facets_[f].largest_offset());
     facets_[f].bulge = static_cast<float>(largest * (8.0 / 9 + 1e-6));
   });
   for (const CurvedFacet& curved : facets_) bulge_ = std::max<double>(bulge_, curved.bulge);
@@ -399,10 +395,10 @@ void CurvedShell::bound_cells(const Shell& shell) {
     for (int k = 0; k < 3; ++k) {
       const int h = 3 * shell.triangle_of_facet(static_cast<int>(f)) + k;
       const Edge& edge = topology.edges[topology.edge_of[h]];
-      const int* all = &topology.incidence[edge.begin];
-      cells_[f].beyond[k] = edge.count == 1  ? kBoundary
-                            : edge.count > 2 ? kNotMine
-                                             : shell.facet_half_edge(all[all[0] == h ? 1 : 0]);
+      cells_[f].beyond[k] = edge.count == 1 ? kBoundary
+                            : edge.count > 2
+                                ? kNotOwned
+                                : shell.facet_half_edge(topology.other_half_edge(edge, h));
     }
   });
 }

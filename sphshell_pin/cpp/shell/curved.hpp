@@ -39,20 +39,23 @@ struct CubicPatch {
   Vec3 inward(int k, double t) const;
 };
 
-// A cubic Bezier triangle, by what lifts its control points off those of the flat facet. The six of
-// the sides are kept as integers of 48 bits with a common exponent for each side: to 1e-14 of the
-// longest, which is round-off beside the facet. Both neighbours of a side keep the same numbers, so
-// the surface has no gaps.
+// A cubic Bezier triangle, by the offsets of its control points from those of the flat facet. The
+// six of the sides are kept as integers of 48 bits with a common exponent for each side: to 1e-14
+// of the longest, which is round-off beside the facet. Both neighbors of a side keep the same
+// numbers, so the surface has no gaps.
 class CurvedFacet {
  public:
   double rise;  // of the middle along the facet's normal, above that of a PN triangle [m]
-  Owned owned;  // as Facet::owned, where coplanar neighbours may still be curved
+  Owned owned;  // as Facet::owned, where coplanar neighbors may still be curved
   float bulge;  // at most this far from the flat facet [m]
-  bool flat;    // no lift: the exact flat facet
+  bool flat;    // all offsets are zero: the exact flat facet
 
-  // At a third (i = 0) and two thirds (1) of side k; and at the centre.
-  Vec3 lift(int k, int i) const;
+  // Offsets of the control points at a third (i = 0) and two thirds (1) of side k; and of the
+  // center.
+  Vec3 control_offset(int k, int i) const;
   Vec3 middle(const Facet& f) const;
+  // The length of the largest offset on the sides [m].
+  double largest_offset() const;
   void set_side(int k, const Vec3& first, const Vec3& last);
 
   CubicPatch patch(const Facet& f) const;
@@ -65,7 +68,7 @@ class CurvedFacet {
   std::uint32_t low_[3][6];
 };
 
-// Tangents of the edges that leave a vertex, beside Topology::neighbours.
+// Tangents of the edges that leave a vertex, beside Topology::neighbors.
 class Tangents {
  public:
   Vec3 operator[](int i) const;
@@ -82,7 +85,7 @@ class Tangents {
 enum class Bending : int {
   Curved = 0,
   Planar = 1,  // no normal at its corners leans
-  Crease = 2,  // the elements around do not bear witness to the bend that its normals had
+  Crease = 2,  // the elements around contradict the bend of its normals
 };
 
 // Normals at triangle corners (3 triangle + k). Most corners of a vertex share one.
@@ -125,7 +128,7 @@ class CurvedShell {
 
  private:
   void bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight);
-  void lift_middles(const Shell& shell);
+  void raise_centers(const Shell& shell);
   int corner_beyond(const Shell& shell, int half_edge) const;
   void build_cones(const Shell& shell);
   void bound_cells(const Shell& shell);

@@ -20,7 +20,7 @@ Vec3 CubicPatch::inward(int k, double t) const {
   }
 }
 
-Vec3 CurvedFacet::lift(int k, int i) const {
+Vec3 CurvedFacet::control_offset(int k, int i) const {
   // 2^exponent, by its bits: it is far from the ends of the range.
   const std::uint64_t bits = static_cast<std::uint64_t>(exponent_[k] + 1023) << 52;
   double unit;
@@ -43,25 +43,32 @@ void CurvedFacet::set_side(int k, const Vec3& first, const Vec3& last) {
   constexpr std::int64_t kMost = (std::int64_t(1) << 47) - 1;
   const double units = std::ldexp(1.0, -exponent);  // of one metre
   for (int at = 0; at < 6; ++at) {
-    const double lift = units * (at < 3 ? first[at] : last[at - 3]);
-    const auto nearest = static_cast<std::int64_t>(lift + std::copysign(0.5, lift));
+    const double units_off = units * (at < 3 ? first[at] : last[at - 3]);
+    const auto nearest = static_cast<std::int64_t>(units_off + std::copysign(0.5, units_off));
     const std::int64_t number = std::clamp(nearest, -kMost, kMost);
     high_[k][at] = static_cast<std::int16_t>(number >> 32);
     low_[k][at] = static_cast<std::uint32_t>(number);
   }
 }
 
+double CurvedFacet::largest_offset() const {
+  double largest = 0;
+  for (int i = 0; i < 6; ++i) largest = std::max(largest, control_offset(i / 2, i % 2).norm());
+  return largest;
+}
+
 Vec3 CurvedFacet::middle(const Facet& f) const {
   Vec3 sum = Vec3::Zero();
-  for (int i = 0; i < 6; ++i) sum += 0.25 * lift(i / 2, i % 2);
+  for (int i = 0; i < 6; ++i) sum += 0.25 * control_offset(i / 2, i % 2);
   return sum + rise * f.normal;
 }
 
 // From Bernstein's polynomials to powers.
 CubicPatch CurvedFacet::patch(const Facet& f) const {
-  const Vec3 a = lift(0, 0), b = lift(0, 1);  // side 0, from corner 0 to 1
-  const Vec3 c = lift(1, 0), d = lift(1, 1);
-  const Vec3 e = lift(2, 1), g = lift(2, 0);  // side 2, seen from corner 0 as well
+  const Vec3 a = control_offset(0, 0), b = control_offset(0, 1);  // side 0, from corner 0 to 1
+  const Vec3 c = control_offset(1, 0), d = control_offset(1, 1);
+  const Vec3 e = control_offset(2, 1),
+             g = control_offset(2, 0);  // side 2, seen from corner 0 as well
   const Vec3 middle =
       0.25 * a + 0.25 * b + 0.25 * c + 0.25 * d + 0.25 * g + 0.25 * e + rise * f.normal;
   CubicPatch out;
@@ -79,7 +86,7 @@ CubicPatch CurvedFacet::patch(const Facet& f) const {
 }
 
 CubicCurve CurvedFacet::side(const Facet& f, int k) const {
-  const Vec3 a = lift(k, 0), b = lift(k, 1);
+  const Vec3 a = control_offset(k, 0), b = control_offset(k, 1);
   return {f.corner[k], f.corner[next_corner(k)] - f.corner[k] + 3 * a, 3 * b - 6 * a, 3 * (a - b)};
 }
 
@@ -88,8 +95,8 @@ Vec3 Tangents::operator[](int i) const {
   const Facet& facet = (*flat_)[f];
   const CurvedFacet& curved = (*curved_)[f];
   const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
-  if (spoke_[i] % 2 == 0) return d + 3 * curved.lift(k, 0);
-  return 3 * curved.lift(k, 1) - d;
+  if (spoke_[i] % 2 == 0) return d + 3 * curved.control_offset(k, 0);
+  return 3 * curved.control_offset(k, 1) - d;
 }
 
 }  // namespace sphshell

@@ -23,15 +23,29 @@ class DisjointSets {
     return i;
   }
 
-  void join(std::int32_t a, std::int32_t b) {
+  void merge(std::int32_t a, std::int32_t b) {
     a = find(a);
     b = find(b);
     if (a > b) std::swap(a, b);
     parent_[b] = a;
   }
 
+  // Per member the number of its set: consecutive, in the order of first appearance.
+  std::vector<std::int32_t> labels() {
+    std::vector<std::int32_t> label(parent_.size());
+    count_ = 0;
+    for (std::size_t i = 0; i < parent_.size(); ++i) {
+      const std::int32_t root = find(static_cast<std::int32_t>(i));
+      label[i] = root == static_cast<std::int32_t>(i) ? count_++ : label[root];
+    }
+    return label;
+  }
+  // How many sets labels() found.
+  std::int32_t count() const { return count_; }
+
  private:
   std::vector<std::int32_t> parent_;
+  std::int32_t count_ = 0;
 };
 
 }  // namespace sphshell

@@ -76,7 +76,7 @@ class Clipper {
     project(polygon);
     const auto n = static_cast<int>(flat_.size());
     prepare(n);
-    for (int i = 0; i < n; ++i) judge(i);
+    for (int i = 0; i < n; ++i) evaluate_ear(i);
     bool proper = true;
     int start = 0;
     for (int left = n; left > 3; --left) {
@@ -103,7 +103,7 @@ class Clipper {
     score_.resize(n);
     rank_.resize(n);
     order_.resize(n);
-    holder_.resize(n);
+    first_copy_.resize(n);
     copies_.assign(n, 0);
     blocker_.assign(n, -1);
     if (waiting_.size() < flat_.size()) waiting_.resize(n);
@@ -117,8 +117,8 @@ class Clipper {
               [&](int i, int j) { return vertex(i) != vertex(j) ? vertex(i) < vertex(j) : i < j; });
     for (int k = 0; k < n; ++k) {
       const int i = order_[k];
-      holder_[i] = k > 0 && vertex(order_[k - 1]) == vertex(i) ? holder_[order_[k - 1]] : i;
-      ++copies_[holder_[i]];
+      first_copy_[i] = k > 0 && vertex(order_[k - 1]) == vertex(i) ? first_copy_[order_[k - 1]] : i;
+      ++copies_[first_copy_[i]];
     }
     many_ = n > kFew;
     if (!many_) return;
@@ -143,8 +143,8 @@ class Clipper {
     tree_ = PointTree<2>(flat_.front().data(), std::move(left));
   }
 
-  // Finds the score of corner i, after its neighbours changed or what blocked it is gone.
-  void judge(int i) {
+  // Finds the score of corner i, after its neighbors changed or what blocked it is gone.
+  void evaluate_ear(int i) {
     score_[i] = ear_shape(i);
     if (blocker_[i] >= 0) waiting_[blocker_[i]].push_back(i);
     if (!many_) return;
@@ -153,7 +153,7 @@ class Clipper {
   }
 
   void remove(int i) {
-    const int before = previous_[i], after = next_[i], held = holder_[i];
+    const int before = previous_[i], after = next_[i], copy = first_copy_[i];
     next_[before] = after;
     previous_[after] = before;
     blocker_[i] = -1;
@@ -161,14 +161,14 @@ class Clipper {
       ears_.drop(rank_[i]);
       shapes_.drop(rank_[i]);
     }
-    const bool gone = --copies_[held] == 0;
+    const bool gone = --copies_[copy] == 0;
     if (gone && many_ && 2 * --left_ < planted_) plant();
-    judge(before);
-    judge(after);
+    evaluate_ear(before);
+    evaluate_ear(after);
     if (!gone) return;
     // An ear that was blocked by this vertex may be free now; all others stay as they are.
-    for (const int k : waiting_[held]) {
-      if (blocker_[k] == held) judge(k);
+    for (const int k : waiting_[copy]) {
+      if (blocker_[k] == copy) evaluate_ear(k);
     }
   }
 
@@ -244,7 +244,7 @@ class Clipper {
       if (vertex(k) == vertex(h) || vertex(k) == vertex(i) || vertex(k) == vertex(j)) return false;
       const Vec2& p = flat_[k];
       if (cross(a, b, p) >= -slack && cross(b, c, p) >= -slack && cross(c, a, p) >= -slack) {
-        blocker_[i] = holder_[k];
+        blocker_[i] = first_copy_[k];
         return true;
       }
       const double beyond = -cross(c, a, p);
@@ -329,15 +329,16 @@ class Clipper {
   std::vector<Vec2> flat_;
   std::vector<int> next_, previous_;
   std::vector<double> score_;
-  std::vector<int> holder_;   // of each corner: the first one that is the same vertex
-  std::vector<int> copies_;   // of each holder: how many corners of its vertex are left
-  std::vector<int> blocker_;  // of each blocked ear: the holder of a vertex in it, else -1
-  std::vector<std::vector<int>> waiting_;  // of each holder: ears that it blocks or once blocked
-  bool many_ = false;                      // corners; what follows is used only then
-  PointTree<2> tree_;                      // of the holders
-  std::size_t planted_ = 0, left_ = 0;     // holders when the tree was built, and now
-  std::vector<int> order_, rank_;          // corners by x, y, z of their points
-  Tournament ears_, shapes_;               // by rank: scores, and shapes as they stand
+  std::vector<int> first_copy_;  // of each corner: the first one that is the same vertex
+  std::vector<int> copies_;      // of each first copy: how many corners of its vertex are left
+  std::vector<int> blocker_;     // of each blocked ear: the first copy of a vertex in it, else -1
+  std::vector<std::vector<int>>
+      waiting_;                         // of each first copy: ears that it blocks or once blocked
+  bool many_ = false;                   // corners; what follows is used only then
+  PointTree<2> tree_;                   // of the first copies
+  std::size_t planted_ = 0, left_ = 0;  // points when the tree was built, and now
+  std::vector<int> order_, rank_;       // corners by x, y, z of their points
+  Tournament ears_, shapes_;            // by rank: scores, and shapes as they stand
 };
 
 }  // namespace

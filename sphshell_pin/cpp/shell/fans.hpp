@@ -25,8 +25,8 @@ class Fans {
       const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
       const int h1 = after(h), g1 = after(g);
       const bool opposed = vertex(h) == vertex(g1);
-      sets.join(h, opposed ? g1 : g);
-      sets.join(h1, opposed ? g : g1);
+      sets.merge(h, opposed ? g1 : g);
+      sets.merge(h1, opposed ? g : g1);
     }
     begin_.assign(corners + 1, 0);
     fan_of_.resize(corners);

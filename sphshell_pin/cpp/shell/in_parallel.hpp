@@ -22,8 +22,8 @@ void in_parallel(std::size_t n, int threads, std::size_t grain, Work&& work) {
   const std::size_t workers = std::clamp<std::size_t>(wanted, 1, n / grain + 1);
   std::vector<std::future<void>> pool;
   for (std::size_t w = 1; w < workers; ++w)
-    pool.push_back(std::async(std::launch::async,
-                              [&, w] { work(n * w / workers, n * (w + 1) / workers); }));
+    pool.push_back(
+        std::async(std::launch::async, [&, w] { work(n * w / workers, n * (w + 1) / workers); }));
   work(0, n / workers);
   for (std::future<void>& worker : pool) worker.get();
 }

@@ -97,7 +97,7 @@ Weld weld(const double* points, std::size_t count, double tolerance) {
             const double dx = p[0] - other[0], dy = p[1] - other[1], dz = p[2] - other[2];
             const double squared = dx * dx + dy * dy + dz * dz;
             if (squared > tolerance * tolerance) continue;
-            groups.join(static_cast<std::int32_t>(i), j);
+            groups.merge(static_cast<std::int32_t>(i), j);
             same_place = same_place || squared == 0.0;
           }
         }
@@ -161,7 +161,7 @@ Duplicates duplicate_polygons(const PolygonView& polygons, const std::int32_t* s
       if (e >= 0 && (edge < 0 || std::pair(users[e], e) < std::pair(users[edge], edge))) edge = e;
     }
     if (edge < 0 || users[edge] < 2) continue;
-    // Canonical cycle: from the lowest corner towards its lower neighbour.
+    // Canonical cycle: from the lowest corner towards its lower neighbor.
     const auto canonical = [&](std::size_t q, bool& back) {
       const std::int32_t* c = polygons.corners + polygons.offsets[q];
       const std::int64_t lowest = std::min_element(c, c + n) - c;
@@ -223,13 +223,13 @@ std::vector<double> triangle_shapes(const PolygonView& polygons, const double* p
 ComponentSums component_sums(const double* points, const std::int32_t* triangles,
                              const std::int32_t* triangle_polygon, std::size_t triangle_count,
                              const std::int32_t* component, const std::uint8_t* flip,
-                             std::size_t component_count, const double* centre) {
+                             std::size_t component_count, const double* center) {
   ComponentSums out;
   out.volume.assign(component_count, 0.0);
   out.area = out.turned_area = out.volume;
   out.largest.assign(component_count, 0);
   std::vector<double> most(component_count, -1.0);
-  const Vec3 middle(centre[0], centre[1], centre[2]);
+  const Vec3 middle(center[0], center[1], center[2]);
   for (std::size_t t = 0; t < triangle_count; ++t) {
     const std::size_t p = triangle_polygon == nullptr ? t : triangle_polygon[t];
     const auto [a, b, c] = corners_of(points, triangles + 3 * t);
@@ -295,15 +295,8 @@ Orientation flood_fill(const PolygonView& polygons, const std::int32_t* slot_edg
 std::vector<std::int32_t> connected_components(std::size_t nodes, const std::int32_t* pairs,
                                                std::size_t pair_count) {
   DisjointSets sets(nodes);
-  for (std::size_t k = 0; k < pair_count; ++k) sets.join(pairs[2 * k], pairs[2 * k + 1]);
-  std::vector<std::int32_t> label(nodes, -1);
-  std::int32_t used = 0;
-  for (std::size_t i = 0; i < nodes; ++i) {
-    const std::int32_t root = sets.find(static_cast<std::int32_t>(i));
-    if (label[root] < 0) label[root] = used++;
-    label[i] = label[root];
-  }
-  return label;
+  for (std::size_t k = 0; k < pair_count; ++k) sets.merge(pairs[2 * k], pairs[2 * k + 1]);
+  return sets.labels();
 }
 
 }  // namespace sphshell

@@ -64,11 +64,11 @@ struct ComponentSums {
 };
 
 // Sums over the triangles (t, 3) of each component, polygons turned where `flip` says so; volumes
-// about `centre`. triangle_polygon: (t,) polygon of each, or null where each is its own.
+// about `center`. triangle_polygon: (t,) polygon of each, or null where each is its own.
 ComponentSums component_sums(const double* points, const std::int32_t* triangles,
                              const std::int32_t* triangle_polygon, std::size_t triangle_count,
                              const std::int32_t* component, const std::uint8_t* flip,
-                             std::size_t component_count, const double* centre);
+                             std::size_t component_count, const double* center);
 
 struct EarClips {
   std::vector<std::int64_t> triangle_slots;  // (t, 3) slots, not vertices: normals can follow

@@ -51,12 +51,12 @@ void Shell::build_facets(const std::vector<int>& order) {
   });
 }
 
-// The first triangle that has an edge or a vertex decides about it.
+// The first triangle that has an edge or a vertex owns it.
 std::vector<Owned> Shell::assign_owners(const std::function<bool(int t, int u)>& flat) const {
-  constexpr Owned kNothing = {{kNotMine, kNotMine, kNotMine}, {kNotMine, kNotMine, kNotMine}};
+  constexpr Owned kNothing = {{kNotOwned, kNotOwned, kNotOwned}, {kNotOwned, kNotOwned, kNotOwned}};
   std::vector<Owned> owned(triangles_.size(), kNothing);
   std::vector<char> taken(vertices_.size(), 0);
-  const auto claim_vertex = [&](int h, int corner) {
+  const auto own_vertex = [&](int h, int corner) {
     const int t = triangle_of(h), v = triangles_[t][corner];
     if (taken[v]) return;
     taken[v] = 1;
@@ -65,24 +65,24 @@ std::vector<Owned> Shell::assign_owners(const std::function<bool(int t, int u)>&
   int many_sided = 0;
   for (const Edge& edge : topology_.edges) {
     const int h = topology_.incidence[edge.begin];
-    int& mine = owned[facet_of_[triangle_of(h)]].twin[side_of(h)];
+    int& twin = owned[facet_of_[triangle_of(h)]].twin[side_of(h)];
     if (edge.count == 2 && edge.kind != EdgeClass::NonManifold) {
       const int g = topology_.incidence[edge.begin + 1];
       if (flat(triangle_of(h), triangle_of(g))) continue;
-      mine = facet_half_edge(g);
+      twin = facet_half_edge(g);
     } else {
-      mine = edge.count == 1 ? kBoundary : kManifold - many_sided++;
+      twin = edge.count == 1 ? kBoundary : kManifold - many_sided++;
     }
-    // A vertex inside a flat region has no edge that reaches this line, and needs no decision.
-    claim_vertex(h, side_of(h));
-    claim_vertex(h, next_corner(side_of(h)));
+    // A vertex inside a flat region has no edge that reaches this line, and needs no test.
+    own_vertex(h, side_of(h));
+    own_vertex(h, next_corner(side_of(h)));
   }
   return owned;
 }
 
 // Bound on the angle between `axis` and any direction u that points away from all edges at the
 // vertex. Seen along the axis the edges leave no gap wider than g, so one of them is within g/2 of
-// u's shadow; it rises by at most phi, hence tan(angle) <= tan(phi) / cos(g/2).
+// u's projection; it rises by at most phi, hence tan(angle) <= tan(phi) / cos(g/2).
 double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tangents) const {
   constexpr double kAny = std::numeric_limits<double>::infinity();
   if (topology_.vertex_on_rim[vertex]) return kAny;
@@ -96,7 +96,7 @@ double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tang
   constexpr std::size_t kUsual = 16;
   std::array<Bearing, kUsual> usual;
   std::vector<Bearing> many;
-  const int begin = topology_.neighbour_begin[vertex], end = topology_.neighbour_begin[vertex + 1];
+  const int begin = topology_.neighbor_begin[vertex], end = topology_.neighbor_begin[vertex + 1];
   const auto count = static_cast<std::size_t>(end - begin);
   if (count > kUsual) many.resize(count);
   Bearing* const bearing = count > kUsual ? many.data() : usual.data();
@@ -104,7 +104,7 @@ double Shell::tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tang
   for (std::size_t i = 0; i < count; ++i) {
     const int at = begin + static_cast<int>(i);
     const Vec3 edge =
-        tangents ? (*tangents)[at] : Vec3(vertices_[topology_.neighbours[at]] - vertices_[vertex]);
+        tangents ? (*tangents)[at] : Vec3(vertices_[topology_.neighbors[at]] - vertices_[vertex]);
     double x = edge.dot(first), y = edge.dot(second);
     const double flat = std::sqrt(x * x + y * y);
     if (!(flat > 0)) return kAny;
@@ -136,7 +136,7 @@ void Shell::build_cones() {
         const double cosine = facet.normal.dot(other);
         tangent = std::max(tangent, cosine > 0.05 ? facet.normal.cross(other).norm() / cosine
                                                   : std::numeric_limits<double>::infinity());
-      } else if (facet.owned.twin[k] != kNotMine) {
+      } else if (facet.owned.twin[k] != kNotOwned) {
         tangent = std::numeric_limits<double>::infinity();
       }
       if (facet.owned.vertex[k] >= 0)

@@ -1,4 +1,4 @@
-// A clean surface, ready to be asked for contacts: geometry in the order of its tree.
+// A clean surface, ready for queries: geometry in the order of its tree.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +14,14 @@ namespace sphshell {
 
 enum class Side : int { Both = 0, Outside = 1, Inside = 2 };
 
-// The edges and vertices about which one facet decides, so that each is decided about once.
+// The edges and vertices that one facet owns, so that each is tested once.
 struct Owned {
   int twin[3];    // across side k: a half-edge (3 facet + side) to test, or one of the codes below
-  int vertex[3];  // the vertex at corner k where this facet decides about it, else kNotMine
+  int vertex[3];  // the vertex at corner k where this facet owns it, else kNotOwned
 };
 
 // Codes in Owned.
-constexpr int kNotMine = -1;   // another facet decides about this edge or vertex, or it is flat
+constexpr int kNotOwned = -1;  // another facet owns this edge or vertex, or it is flat
 constexpr int kBoundary = -2;  // an edge with no other facet
 constexpr int kManifold = -3;  // kManifold - i: many-sided edge i (or ill-wound)
 
@@ -35,8 +35,8 @@ struct alignas(64) Facet {
 };
 static_assert(sizeof(Facet) == 128);
 
-// What a query reads of most triangles: enough to see that the sphere's centre stands over no
-// feature that the facet decides about. Single precision, widened by its round-off.
+// What a query reads of most triangles: enough to see that the sphere's center stands over no
+// feature that the facet owns. Single precision, widened by its round-off.
 struct alignas(32) NormalCone {
   float middle[3], reach;      // ball round the triangle [m], relative to Shell::origin()
   float axis[3], tan_opening;  // all normals of those features lie this close to +axis or -axis
@@ -52,7 +52,7 @@ inline float widened_opening(double tangent) {
 
 struct SurfacePoint {
   Vec3 point;
-  Vec3 normal;      // unit pseudo-normal of the feature that carries the point
+  Vec3 normal;      // unit pseudo-normal of the feature that the point is on
   double distance;  // signed by that normal [m]
   int element;
 };
@@ -80,14 +80,14 @@ class Shell {
   int num_elements() const { return element_.empty() ? 0 : element_.back() + 1; }
   double crease_angle() const { return crease_angle_; }  // [rad]
 
-  // Who decides about which edge and vertex, per facet; edges between two triangles for which
-  // flat(t, u) holds need no decision.
+  // Which edges and vertices each facet owns; edges between two triangles for which flat(t, u)
+  // holds are not tested.
   std::vector<Owned> assign_owners(const std::function<bool(int t, int u)>& flat) const;
   // Bound on the tangent of the angle between `axis` and any direction that points away from all
-  // edges at the vertex; `tangents` (beside Topology::neighbours) replace the straight edges.
+  // edges at the vertex; `tangents` (beside Topology::neighbors) replace the straight edges.
   double tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tangents = nullptr) const;
 
-  // Curved elements, made when first asked for: unit normals per triangle corner, or none; exact:
+  // Curved elements, made at first use: unit normals per triangle corner, or none; exact:
   // they are the surface's own; `straight` as of CurvedShell.
   void curve(std::vector<Vec3> normals, bool exact, const std::vector<std::uint8_t>& straight = {});
   const CurvedShell* curved() const { return curved_.get(); }

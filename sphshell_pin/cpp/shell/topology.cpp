@@ -21,18 +21,6 @@ constexpr double kPlanarTolerance = 16 * std::numeric_limits<double>::epsilon();
 // Normals of two CAD faces that were made equal where they join may have been rounded since [rad].
 constexpr double kEqualNormals = 1e-6;
 
-// Consecutive labels of the sets, in the order of first appearance.
-std::vector<int> labels(DisjointSets& sets, std::size_t size, int& count) {
-  std::vector<int> label(size, -1), out(size);
-  count = 0;
-  for (std::size_t i = 0; i < size; ++i) {
-    int& l = label[sets.find(static_cast<int>(i))];
-    if (l < 0) l = count++;
-    out[i] = l;
-  }
-  return out;
-}
-
 // What coordinates are rounded in proportion to [m].
 double coordinate_scale(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles) {
   const Eigen::AlignedBox3d box = bounds(vertices, triangles);
@@ -79,7 +67,7 @@ void build_edges(std::size_t vertices, const std::vector<Triangle>& triangles, T
   out.edges.assign(edges.begin(), edges.end());
 }
 
-// Coplanar neighbours become one face with one normal: that of their summed areas, so that a
+// Coplanar neighbors become one face with one normal: that of their summed areas, so that a
 // sliver's own, ill-defined normal does no harm. A union that drifts off its plane (a long chain of
 // nearly flat steps) is taken apart again.
 void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
@@ -105,10 +93,10 @@ void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Tri
     const Vec3& b = vertices[triangles[u][previous_corner(side_of(g))]];
     const auto off = [&](const Vec3& x) { return std::abs((x - p).dot(normal)) / length; };
     const bool flat = std::max({off(a), off(b), off(q)}) <= tolerance;
-    if (edge.inner || (flat && !same_direction)) sets.join(t, u);
+    if (edge.inner || (flat && !same_direction)) sets.merge(t, u);
   }
-  int count = 0;
-  std::vector<int> label = labels(sets, triangles.size(), count);
+  const std::vector<int> label = sets.labels();
+  int count = sets.count();
   std::vector<Vec3> normal(count, Vec3::Zero()), origin(count);
   std::vector<char> seen(count, 0), warped(count, 0);
   for (int t = 0; t < n; ++t) {
@@ -160,31 +148,32 @@ void build_patches(const std::vector<int>& element, Topology& out) {
   DisjointSets sets(count);
   for (const Edge& edge : out.edges)
     if (edge.inner || edge.kind == EdgeClass::Smooth)
-      sets.join(element[triangle_of(out.incidence[edge.begin])],
-                element[triangle_of(out.incidence[edge.begin + 1])]);
-  out.patch = labels(sets, count, out.num_patches);
+      sets.merge(element[triangle_of(out.incidence[edge.begin])],
+                 element[triangle_of(out.incidence[edge.begin + 1])]);
+  out.patch = sets.labels();
+  out.num_patches = sets.count();
 }
 
 void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
                     Topology& out) {
   const std::size_t n = vertices.size();
-  out.neighbour_begin.assign(n + 1, 0);
+  out.neighbor_begin.assign(n + 1, 0);
   out.vertex_on_rim.assign(n, 0);
   out.vertex_sharp.assign(n, 0);
   for (const Edge& e : out.edges) {
-    ++out.neighbour_begin[e.first_vertex + 1];
-    ++out.neighbour_begin[e.last_vertex + 1];
+    ++out.neighbor_begin[e.first_vertex + 1];
+    ++out.neighbor_begin[e.last_vertex + 1];
     if (!e.inner && e.kind != EdgeClass::Smooth)
       out.vertex_sharp[e.first_vertex] = out.vertex_sharp[e.last_vertex] = 1;
     if (e.on_rim()) out.vertex_on_rim[e.first_vertex] = out.vertex_on_rim[e.last_vertex] = 1;
   }
-  std::partial_sum(out.neighbour_begin.begin(), out.neighbour_begin.end(),
-                   out.neighbour_begin.begin());
-  out.neighbours.resize(out.neighbour_begin.back());
-  std::vector<int> fill(out.neighbour_begin.begin(), out.neighbour_begin.end() - 1);
+  std::partial_sum(out.neighbor_begin.begin(), out.neighbor_begin.end(),
+                   out.neighbor_begin.begin());
+  out.neighbors.resize(out.neighbor_begin.back());
+  std::vector<int> fill(out.neighbor_begin.begin(), out.neighbor_begin.end() - 1);
   for (const Edge& e : out.edges) {
-    out.neighbours[fill[e.first_vertex]++] = e.last_vertex;
-    out.neighbours[fill[e.last_vertex]++] = e.first_vertex;
+    out.neighbors[fill[e.first_vertex]++] = e.last_vertex;
+    out.neighbors[fill[e.last_vertex]++] = e.first_vertex;
   }
   out.vertex_normal.assign(n, Vec3::Zero());
   for (std::size_t t = 0; t < triangles.size(); ++t)

@@ -47,17 +47,22 @@ struct CadFaces {
 // faces where they are known: those say what is smooth, whatever the angle.
 struct Topology {
   std::vector<Edge> edges;
-  std::vector<int> incidence;        // half-edges, grouped by edge
-  std::vector<int> edge_of;          // half-edge -> edge
-  std::vector<Vec3> face_normal;     // unit, per triangle: that of its whole planar face
-  std::vector<int> planar_face;      // per triangle: coplanar, edge-connected triangles share one
-  std::vector<int> patch;            // per element: connected through smooth edges
-  std::vector<int> neighbour_begin;  // per vertex, into `neighbours` (size: vertices + 1)
-  std::vector<int> neighbours;       // vertices joined to a vertex by an edge
-  std::vector<Vec3> vertex_normal;   // angle-weighted pseudo-normal (Baerentzen and Aanaes 2005)
-  std::vector<char> vertex_on_rim;   // touches a boundary or non-manifold edge
-  std::vector<char> vertex_sharp;    // touches an edge that is not smooth
+  std::vector<int> incidence;       // half-edges, grouped by edge
+  std::vector<int> edge_of;         // half-edge -> edge
+  std::vector<Vec3> face_normal;    // unit, per triangle: that of its whole planar face
+  std::vector<int> planar_face;     // per triangle: coplanar, edge-connected triangles share one
+  std::vector<int> patch;           // per element: connected through smooth edges
+  std::vector<int> neighbor_begin;  // per vertex, into `neighbors` (size: vertices + 1)
+  std::vector<int> neighbors;       // vertices joined to a vertex by an edge
+  std::vector<Vec3> vertex_normal;  // angle-weighted pseudo-normal (Baerentzen and Aanaes 2005)
+  std::vector<char> vertex_on_rim;  // touches a boundary or non-manifold edge
+  std::vector<char> vertex_sharp;   // touches an edge that is not smooth
   int num_patches = 0;
+
+  // Of an edge with two half-edges, the one that is not h.
+  int other_half_edge(const Edge& edge, int h) const {
+    return incidence[edge.begin + (incidence[edge.begin] == h ? 1 : 0)];
+  }
 
   // Pseudo-normal of an edge, not of unit length: the sum of its triangles' normals.
   Vec3 edge_normal(const Edge& edge) const {

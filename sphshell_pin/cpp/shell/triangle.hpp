@@ -1,4 +1,4 @@
-// Closest point on a triangle, with the feature that carries it.
+// Closest point on a triangle, with the feature that it is on.
 #pragma once
 
 #include <Eigen/Core>

@@ -27,8 +27,8 @@ constexpr double kFarLonger = 4, kLonger = 2.5;
 // Where a long edge of a fan bends that goes on in short ones only, the normal is turned upright on
 // it. Max's would make a wall bulge that ends in a fillet; but a tessellation has long edges where
 // its surface is flat along them. False where there is none.
-bool turn_upright(const Shell& shell, const int* begin, const int* end, double longer,
-                  Vec3& normal) {
+bool straighten_wall(const Shell& shell, const int* begin, const int* end, double longer,
+                     Vec3& normal) {
   std::vector<Vec3> edges;
   for (const int* c = begin; c != end; ++c) {
     const Triangle& t = shell.triangles()[*c / 3];
@@ -57,8 +57,8 @@ bool turn_upright(const Shell& shell, const int* begin, const int* end, double l
 
 // True where the surface falls away from a fan's vertex along straight lines, as from the tip of a
 // cone: seen from the vertices around it does not bend that much.
-bool is_tip(const Shell& shell, const std::vector<Vec3>& normals, const int* begin,
-            const int* end) {
+bool is_cone_apex(const Shell& shell, const std::vector<Vec3>& normals, const int* begin,
+                  const int* end) {
   double uneven = 0, bent = 0;
   for (const int* c = begin; c != end; ++c) {
     const int t = *c / 3, k = *c % 3;
@@ -166,14 +166,14 @@ std::vector<Vec3> estimate_normals(const Shell& shell) {
   for (int fan = 0; fan < count; ++fan) {
     const int *begin = fans.begin(fan), *end = fans.end(fan);
     const double angle = spread(fan, false), limit = shell.crease_angle();
-    sharp[fan] = angle > limit || (angle > limit / 2 && is_tip(shell, normals, begin, end));
+    sharp[fan] = angle > limit || (angle > limit / 2 && is_cone_apex(shell, normals, begin, end));
     settled[fan] = sharp[fan] || std::all_of(begin, end, [&](int c) {
                      return topology.planar_face[c / 3] == topology.planar_face[*begin / 3];
                    });
     if (settled[fan])
       for (const int* c = begin; c != end; ++c) out[*c] = topology.face_normal[*c / 3];
     Vec3 normal = normals[fan];
-    if (!settled[fan] && turn_upright(shell, begin, end, kFarLonger, normal)) {
+    if (!settled[fan] && straighten_wall(shell, begin, end, kFarLonger, normal)) {
       set(out, fan, normal);
       settled[fan] = 1;
     }
@@ -202,7 +202,7 @@ std::vector<Vec3> estimate_normals(const Shell& shell) {
              agree(quadratic, plain, open ? 1.1 * spread(fan, true) : kLikely * spread(fan, false)))
       normal = quadratic;
     else
-      turn_upright(shell, fans.begin(fan), fans.end(fan), kLonger, normal);
+      straighten_wall(shell, fans.begin(fan), fans.end(fan), kLonger, normal);
     set(out, fan, normal);
   };
   in_parallel(static_cast<std::size_t>(count), kAllCores, kGrain,

@@ -63,7 +63,7 @@ def test_wall_that_ends_in_fillets(rows: int) -> None:
     fillet = np.stack([1 - 0.2 * (1 - np.cos(bend)), 3 + 0.2 * np.sin(bend)], 1)
     profile = np.concatenate([fillet[::-1] * [1, -1], fillet])
     shell = Shell(*turned(profile, 48))
-    lifted = np.linalg.norm(shell.core_for("smooth").lifts, axis=2).max(axis=1)
+    lifted = np.linalg.norm(shell.core_for("smooth").control_point_offsets, axis=2).max(axis=1)
     wall = np.ptp(shell.vertices[shell.triangles][:, :, 2], axis=1) > 5
     assert wall.sum() == 2 * 48
     # Their own sagitta is 0.0021.
@@ -78,4 +78,4 @@ def test_wall_that_ends_in_fillets(rows: int) -> None:
 
 def test_cube_stays_flat() -> None:
     shell = Shell(*meshes.cube())
-    assert np.abs(shell.core_for("smooth").lifts).max() == 0
+    assert np.abs(shell.core_for("smooth").control_point_offsets).max() == 0

@@ -86,9 +86,9 @@ def places(shell: Shell, rng: np.random.Generator, count: int) -> tuple[Array, A
     weights[(kind > 0.1) & (kind < 0.2), rng.integers(3)] = 0.0
     weights /= weights.sum(axis=1, keepdims=True)
     w, u, v = weights.T
-    # Bernstein's polynomials of the control points, as `core.lifts` has them.
+    # Bernstein's polynomials of the control points, as `core.control_point_offsets` has them.
     sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
-    lifts = shell.core_for("smooth").lifts[chosen]
+    lifts = shell.core_for("smooth").control_point_offsets[chosen]
     point = np.einsum("nk,nkx->nx", weights, corners[chosen])
     point += np.einsum("bn,nbx->nx", np.stack([*sides, 6 * u * v * w]), lifts)
     return point, shell.triangle_normals[chosen]
