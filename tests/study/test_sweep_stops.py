@@ -157,4 +157,3 @@ def test_faults_are_one_sentence(scenario, fault):
     assert told.exit_code == 2
     assert words in told.output
     assert told.output.count("\n") == 1
-
