@@ -17,7 +17,6 @@ import pytest
 
 import sphshell_pin
 from sphshell_pin import errors
-from tests.view.conftest import browser  # noqa: F401
 
 pytestmark = pytest.mark.slow
 

@@ -30,8 +30,8 @@ def test_same_set_as_the_definition(name: str, side: str) -> None:
             if np.abs(center - shell.closest_points(center[None]).points[0]).max() < 1e-9:
                 continue  # on the surface the side is undecided
             expected = oracle.facets(center, radius, corners, owner, side)
-            if name == "cube" and len(expected) == 1 and expected[0].depth > radius:
-                # Deep inside, several sides may be equally near: any of them is the nearest.
+            if len(expected) == 1 and expected[0].depth > radius:
+                # Behind the surface, several faces may be equally near: any of them is the nearest.
                 distance = expected[0].depth - radius
                 found = shell.contacts(center, radius, method="facets")
                 assert len(found) == 1

@@ -311,7 +311,7 @@ def damaged_journal(rng: random.Random) -> bytes:
             name, row = rng.choice(names), rng.randrange(1, 5)
             (old,) = journal.execute(f"SELECT {name} FROM {table}").fetchall()[0]
             new = rng.choice((None, 1, 0.5, "", "[]", b"\xff", old, f"{old}0", "[" * 100_000))
-            journal.execute(f"UPDATE {table} SET {name} = ? WHERE rowid = ?", (new, row))
+            journal.execute(f"UPDATE OR IGNORE {table} SET {name} = ? WHERE rowid = ?", (new, row))
         journal.commit()
         journal.close()
         return path.read_bytes()

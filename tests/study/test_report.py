@@ -34,7 +34,6 @@ from sphshell_pin.study.report import queries as queries_section
 from sphshell_pin.study.report import steps as steps_section
 from sphshell_pin.study.report.contents import Column, Finding, Section, Table, number
 from sphshell_pin.study.report.drawing import spread_apart
-from tests.view.conftest import browser  # noqa: F401
 
 pytest.importorskip("matplotlib")
 KEYS = ["forces", "queries", "integrators", "steps", "hard_cases", "peers"]

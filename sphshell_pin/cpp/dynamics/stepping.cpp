@@ -137,6 +137,9 @@ Stepping::Made Stepping::make_controlled(double end) {
           h = wanted;
           continue;
         }
+        // The search has looked elsewhere; the step ends here.
+        scene_.restart();
+        scene_.evaluate(next_.q, next_.v, next_.z);
       }
       if (is_met) limit = kink_limit;
     }
