@@ -6,8 +6,6 @@
 namespace sphshell {
 namespace {
 
-constexpr int kSpare = 4;
-
 // Index of the one whose point is nearest, of those that `fits`, or -1.
 template <class Item, class Fits>
 int nearest(const Vec3& point, const Item* items, std::size_t count, Fits fits) {

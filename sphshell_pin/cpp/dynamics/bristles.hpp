@@ -25,6 +25,7 @@ class Bristles {
     const int slot = first_[k] + place;
     return slot < first_[k + 1] ? slot : -1;
   }
+  bool is_spare(std::size_t k, int slot) const { return slot >= first_[k + 1] - kSpare; }
 
   // At an accepted state all slots are assigned anew: begin(), then each pair in its order, then
   // end(), which puts the stretches z in that order.
@@ -36,6 +37,8 @@ class Bristles {
   void end(VectorX& z);
 
  private:
+  static constexpr int kSpare = 4;
+
   Vec3 stretch(std::size_t k, int place, const VectorX& z) const;
 
   std::vector<int> first_, next_;  // of each pair, and behind the last

@@ -90,6 +90,10 @@ class SceneData {
 
   bool touching() const { return touching_; }
   const std::vector<ActiveContact>& active() const { return active_; }
+  // Whether a contact with a bristle has begun since the last accepted state.
+  bool is_new(const ActiveContact& active) const {
+    return bristles_.is_spare(active.pair, active.slot);
+  }
   // Per joint, in its frame and about its origin; holds old values unless touching().
   const Forces& external() const { return external_; }
   const std::vector<PairState>& states() const { return states_; }

@@ -154,6 +154,9 @@ Stepping::Made Stepping::make_controlled(double end) {
     h *= error < 1e300 ? std::clamp(0.9 * std::pow(error / limit, power), 0.1, 0.9) : 0.1;
   }
   active_->complete(chart_, next_);
+  if (after_event_)
+    for (const ActiveContact& active : scene_.active())
+      if (active.slot >= 0 && scene_.is_new(active)) next_.z.segment<3>(3 * active.slot).setZero();
   // PI control (Gustafsson 1991).
   double factor = 0.9 * std::pow(std::max(error, 1e-10), -0.7 / order) *
                   std::pow(std::max(last_error_, 1e-10), 0.4 / order);
@@ -214,7 +217,8 @@ double Stepping::error_norm() const {
   double worst = weighted(error, y);
   const auto [rtol, atol] = tolerances();
   for (const ActiveContact& active : scene_.active()) {
-    if (active.slot < 0) continue;
+    // A contact that begins at the end of the step is not stretched yet.
+    if (active.slot < 0 || scene_.is_new(active)) continue;
     const BristleFriction& friction = *scene_.pairs()[active.pair].friction.bristle();
     const Vec3 z = y.segment<3>(2 * nv + 3 * active.slot);
     const double limit = friction.mu_static * active.force.normal / friction.stiffness;
