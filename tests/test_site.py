@@ -175,7 +175,7 @@ def address(built, monkeypatch):
 
 
 @pytest.mark.browser
-def test_it_fits_a_telephone_and_its_search_finds(browser, address, pages):  # noqa: F811
+def test_it_fits_a_telephone_and_its_search_finds(browser, address, pages):
     context = browser.new_context(viewport={"width": 400, "height": 800})
     page = context.new_page()
     complaints: list[str] = []

@@ -224,7 +224,7 @@ def test_whole_report(small, tmp_path):
 
 
 @pytest.mark.browser
-def test_the_page_in_a_browser(small, tmp_path, browser):  # noqa: F811
+def test_the_page_in_a_browser(small, tmp_path, browser):
     making.make_report(tmp_path, with_peers=True)
     address = (tmp_path / PAGE).as_uri()
     asked, complaints, looks = [], [], []

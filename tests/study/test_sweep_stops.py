@@ -128,7 +128,9 @@ def test_pictures_and_failed_runs_are_told(scenario):
     told = call("sweep", scenario, *radii, "--plot", "figures.depth", "--plot", "energy.residual")
     assert told.exit_code == 0
     assert "2 runs, 1 done, 1 failed" in told.output
-    assert "run 1 failed (contact.sphere.radius = 0.03 m): contact 'ball-plate' starts" in told.output
+    assert (
+        "run 1 failed (contact.sphere.radius = 0.03 m): contact 'ball-plate' starts" in told.output
+    )
     for name in ("figures.depth", "energy.residual"):
         assert (scenario.parent / f"failed.{name}.png").read_bytes().startswith(b"\x89PNG")
 
