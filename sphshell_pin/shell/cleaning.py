@@ -345,7 +345,11 @@ def _with_faces(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
 
 def _holes(borders: Borders) -> Found:
     """Boundary loops that look like a lost element rather than the rim of a sheet."""
-    share = borders.loop_area / borders.loop_surface
+    # A loop without any surface, below what numbers hold, is no hole: it has no share.
+    some = borders.loop_surface > 0
+    share = np.divide(
+        borders.loop_area, borders.loop_surface, where=some, out=np.full(some.shape, np.nan)
+    )
     few = borders.loop_edges <= SMALL_HOLE_EDGES
     small = (few & (share < SMALL_HOLE_AREA)) | (share < TINY_HOLE_AREA)
     # One or two open edges enclose nothing: they bound a fin between non-manifold edges.

@@ -1,4 +1,6 @@
+#include <coal/config.hh>
 #include <nanobind/nanobind.h>
+#include <pinocchio/config.hpp>
 
 namespace nb = nanobind;
 
@@ -7,16 +9,16 @@ void bind_shell(nb::module_& m);
 void bind_contact(nb::module_& m);
 void bind_dynamics(nb::module_& m);
 void bind_rollout(nb::module_& m);
-void bind_reference(nb::module_& m);
 
 NB_MODULE(_core, m) {
   // Interpreters that end with objects alive are no leak of ours.
   nb::set_leak_warnings(false);
   m.doc() = "C++ core of sphshell_pin; its Python face checks and converts, this trusts and runs.";
+  m.attr("pinocchio_version") = PINOCCHIO_VERSION;
+  m.attr("coal_version") = COAL_VERSION;
   bind_mending(m);
   bind_shell(m);
   bind_contact(m);
   bind_dynamics(m);
   bind_rollout(m);
-  bind_reference(m);
 }
