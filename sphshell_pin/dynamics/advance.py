@@ -56,7 +56,7 @@ def start_run(
 ) -> _core.Simulation:
     """Check the arguments of Simulation.run and return the compiled run at its start.
 
-    With `warn`, a law that cannot stop its sphere earns a WeakLawWarning.
+    With `warn`, a law that cannot stop its sphere causes a WeakLawWarning.
     """
     q, v = scene.check_state(q0, v0)
     duration = check_not_negative("duration", duration, "s")
