@@ -151,12 +151,12 @@ def test_the_scenarios_of_a_page_are_valid(page, tmp_path):
 )
 def test_the_commands_of_a_page_exist_with_their_options(page):
     group = typer.main.get_command(app)
-    for told in COMMAND.findall(page.read_text(encoding="utf-8")):
-        line = told.replace("\\\n", " ").split(" > ")[0]
+    for written in COMMAND.findall(page.read_text(encoding="utf-8")):
+        line = written.replace("\\\n", " ").split(" > ")[0]
         name, *arguments = shlex.split(line, comments=True)[1:]
         if name == "--help":
             continue
-        assert name in group.commands, f"{told}: no such command"
+        assert name in group.commands, f"{written}: no such command"
         command = group.commands[name]
         parser = command.make_parser(command.context_class(command, info_name=name))
         parser.parse_args(arguments)  # raises for an option that is not there

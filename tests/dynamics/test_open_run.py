@@ -167,7 +167,7 @@ def test_a_push_that_cannot_be(frame: str, force: list[float], fault: type, says
 
 
 def test_a_fixed_step_of_many_fine_ones_can_be_left_half_way() -> None:
-    """Whoever waits for a frame gets the clock back, and the motion is that of the run in one."""
+    """A caller with a time limit gets control back, and the motion is that of one whole run."""
     dt = 1e-2
     q, v = models.free_q([0.0, 0.0, R + 0.1]), np.array([0.0, 0.0, -200.0, 0.0, 0.0, 0.0])
     law = sp.ImpactLaw(1e9, 1.5)

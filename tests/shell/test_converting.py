@@ -101,8 +101,8 @@ def test_a_failed_conversion_leaves_the_old_file_and_nothing_else(plate, tmp_pat
 
 
 def test_what_cannot_be_is_refused(plate, tmp_path):
-    for target, told in (("out.xyz", "must end in one of"), ("plate.step", "another file")):
-        with pytest.raises(InvalidParameter, match=told):
+    for target, message in (("out.xyz", "must end in one of"), ("plate.step", "another file")):
+        with pytest.raises(InvalidParameter, match=message):
             convert(plate, tmp_path / target)
     with pytest.raises(ShellFileError, match="no such folder"):
         convert(plate, tmp_path / "nowhere" / "out.stl")

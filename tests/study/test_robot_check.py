@@ -299,7 +299,7 @@ def test_the_command(tmp_path: Path) -> None:
 
 
 def test_exit_codes_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for wrong, told in (
+    for wrong, message in (
         (["ball", "--all"], "not both"),
         ([], "say which robots"),
         (["bal"], "no robot 'bal'"),
@@ -313,7 +313,7 @@ def test_exit_codes_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     ):
         result = run(*wrong)
         assert result.exit_code == 2, result.output
-        assert told in result.output
+        assert message in result.output
         assert "Traceback" not in result.output
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot")

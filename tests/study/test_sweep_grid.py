@@ -1,4 +1,4 @@
-"""What a sweep varies: texts to values, values to runs; wrong ones are told in one sentence."""
+"""What a sweep varies: texts to values, values to runs; wrong ones are reported in one sentence."""
 
 from __future__ import annotations
 

@@ -35,11 +35,6 @@ class Axis:
     unit: str = ""
     """Unit of the values, once the scenario is known."""
 
-    @property
-    def is_numeric(self) -> bool:
-        """Whether all values are numbers."""
-        return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.values)
-
 
 def axes_of(vary: Vary | Iterable[str]) -> tuple[Axis, ...]:
     """Return the axes of a mapping from keys to values, or of texts such as "run.dt=1e-5,1e-4".
