@@ -57,9 +57,7 @@ def mimics(model: pin.Model) -> dict[str, Mimic]:
     for name, joint in zip(model.names, model.joints, strict=True):
         if is_mimic(joint):
             rule = joint.extract()
-            found[name] = Mimic(
-                name, leaders[joint.idx_v], float(rule.scaling), float(rule.offset)
-            )
+            found[name] = Mimic(name, leaders[joint.idx_v], float(rule.scaling), float(rule.offset))
     return found
 
 
@@ -200,9 +198,7 @@ def _grouped(
             "lets none mimic the other; give all the same type, or load with mimic = false"
         )
     # q = a * q_leader + b, seen from the first joint.
-    seen = {
-        name: (a / ratio, b - a / ratio * offset) for name, (a, b) in members.items()
-    }
+    seen = {name: (a / ratio, b - a / ratio * offset) for name, (a, b) in members.items()}
     for name in order[1:]:
         made = pin.transformJointIntoMimic(
             made, made.getJointId(leader), made.getJointId(name), *map(float, seen[name])

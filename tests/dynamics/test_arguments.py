@@ -155,9 +155,9 @@ def mimicking() -> pin.Model:
 def test_mimic_joints_are_refused_unless_locked() -> None:
     with pytest.raises(InvalidParameter, match=r"two_joint.*mimic=False, or lock"):
         Scene(mimicking())
-    assert Scene(mimicking(), lock=["two_joint"]).model.nv == 2
-    with pytest.raises(InvalidParameter, match=r"one_joint.*mimic"):
-        Scene(mimicking(), lock=["one_joint"])
+    free = mimicking().nv - 1
+    assert Scene(mimicking(), lock=["two_joint"]).model.nv == free
+    assert Scene(mimicking(), lock=["one_joint"]).model.nv == free
 
 
 def twins() -> pin.Model:
