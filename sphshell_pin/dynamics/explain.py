@@ -11,6 +11,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_moved_mass
+from sphshell_pin.contact.laws import HuntCrossleyLaw
+from sphshell_pin.dynamics.joints import WHICH, JointIngredients
 from sphshell_pin.dynamics.models import unit_warning
 from sphshell_pin.dynamics.sources import checked_source
 
@@ -22,6 +24,8 @@ Array = NDArray[np.float64]
 
 # Speed of approach where neither v nor a fall gives one [m/s].
 DEFAULT_SPEED = 0.1
+# Stands for the law of stops that are only listed.
+_ANY_LAW = HuntCrossleyLaw(1.0, 1.0)
 # Steps in the shortest time scale: enough for a few percent with fixed steps.
 STEPS_PER_SCALE = 30
 # Of the bristles' relaxation time [s].
@@ -94,6 +98,7 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     for pair, figures in zip(scene.pairs, pairs, strict=True):
         warnings += _warnings_of(scene, pair, figures)
     scales = [p.shortest_time for p in pairs if math.isfinite(p.shortest_time)]
+    scales += scene.joints.time_scales(model).values()
     recommended = _round_down(min(scales) / STEPS_PER_SCALE) if scales else 1e-3
     if dt is not None and dt > 1.0001 * recommended:
         warnings.append(
@@ -106,10 +111,52 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
         f"gravity {gravity:.4g} m/s^2" if gravity else "no gravity",
         _count(len(pairs), "contact pair"),
     ]
-    absent = ["joint limits, joint friction and contact between other pairs of bodies"]
+    modelled += _joints_modelled(scene)
+    absent = ["contact between other pairs of bodies", *_joints_stated(scene)]
     if scene.lock:
         absent.append(f"motion of the locked joints {', '.join(scene.lock)}")
     return Explanation(tuple(modelled), tuple(absent), pairs, recommended, tuple(warnings))
+
+
+# What a model may state of its joints, as a reader calls it.
+_JOINT_KINDS = {
+    "limits": "position limits",
+    "damping": "damping",
+    "friction": "dry friction",
+    "armature": "armature",
+    "effort": "effort limits",
+    "speed": "speed limits, which are only reported",
+}
+
+
+def _joints_modelled(scene: Scene) -> list[str]:
+    out = []
+    for kind in scene.joints.kinds():
+        names = list(getattr(scene.joints, kind))
+        out.append(f"{_JOINT_KINDS[kind]} of {_names(names)}")
+    model = scene.model
+    mimics = [str(model.names[j]) for j in model.mimicking_joints]
+    if mimics:
+        out.append(f"joints that mimic others, exactly: {_names(mimics)}")
+    return out
+
+
+def _joints_stated(scene: Scene) -> list[str]:
+    """List what the model states of its joints and the scene leaves out."""
+    out = []
+    # In ABA the model's armature acts anyhow.
+    for kind in (one for one in WHICH if one != "armature"):
+        stated = getattr(JointIngredients.from_model(scene.model, [kind], _ANY_LAW), kind)
+        left_out = [name for name in stated if name not in getattr(scene.joints, kind)]
+        if left_out:
+            what = _JOINT_KINDS[kind].partition(",")[0]
+            out.append(f"{what} that the robot's file states, of {_names(left_out)}")
+    return out
+
+
+def _names(names: list[str]) -> str:
+    shown = ", ".join(f"'{name}'" for name in names[:4])
+    return shown if len(names) <= 4 else f"{shown}, ... ({len(names)} joints)"
 
 
 def explain_pairs(scene: Scene, q: Array, v: Array) -> tuple[PairExplanation, ...]:

@@ -101,26 +101,6 @@ def check_model(model: pin.Model) -> None:
             )
 
 
-def check_no_mimic(model: pin.Model) -> None:
-    """Raise InvalidParameter if a joint of `model` mimics another: forward dynamics has none."""
-    joints = list(zip(model.names, model.joints, strict=True))[1:]
-    found = [name for name, joint in joints if _mimics(joint)]
-    if found:
-        raise InvalidParameter(
-            "model",
-            found,
-            "forward dynamics knows none: load the model with mimic=False, or lock them",
-            f"has joints that mimic others ({', '.join(found)}), but",
-        )
-
-
-def _mimics(joint: pin.JointModel) -> bool:
-    kind = joint.shortname()
-    if kind == "JointModelComposite":
-        return any(_mimics(part) for part in joint.extract().joints)
-    return bool(kind == "JointModelMimic")
-
-
 def _check_joint_frame(model: pin.Model, name: str, joint: int) -> None:
     """Pinocchio reads the frame of a joint it locks, unchecked, before the frames on the joint."""
     on_joint = [frame for frame in model.frames if frame.parentJoint == joint]

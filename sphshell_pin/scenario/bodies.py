@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,11 +92,12 @@ def assemble(
                 joint_spans(model, joint)
         prefix = ""
         if several:
-            label = section.label or robot.name
-            if label in labels:
-                raise ScenarioError(path, f"{key}.label", "two robots share this label", label)
-            labels.add(label)
-            prefix = f"{label}/"
+            prefix = _prefix(section, robot)
+            if prefix in labels:
+                raise ScenarioError(
+                    path, f"{key}.label", "two robots share this label", prefix.rstrip("/")
+                )
+            labels.add(prefix)
             _rename(model, geometry, prefix)
         lock += [prefix + joint for joint in section.lock]
         for name in list(model.names)[1:]:
@@ -113,6 +114,19 @@ def assemble(
         in_q, in_v = joint_spans(base, name)
         q0[in_q], v0[in_v] = q_joint, v_joint
     return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken))
+
+
+def prefixes(scenario: Scenario, loaded: Sequence[LoadedRobot]) -> list[str]:
+    """Return what stands before the names of each robot in the assembled model."""
+    several = len(scenario.robot) > 1
+    return [
+        _prefix(section, robot) if several else ""
+        for section, robot in zip(scenario.robot, loaded, strict=True)
+    ]
+
+
+def _prefix(section: RobotSection, robot: LoadedRobot) -> str:
+    return f"{section.label or robot.name}/"
 
 
 def origin(section: RobotSection) -> tuple[object, ...]:

@@ -36,6 +36,7 @@ from sphshell_pin.scenario.bodies import (
     to_se3,
 )
 from sphshell_pin.scenario.functions import load_function
+from sphshell_pin.scenario.joints import joint_ingredients
 from sphshell_pin.scenario.knobs import check_knobs
 from sphshell_pin.scenario.reading import (
     change_scenario,
@@ -140,7 +141,8 @@ def build_scenario(
 
     with blamed_on(path, "robot"):
         q_lock = assembly.q0 if assembly.lock else None
-        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock)
+        joints = joint_ingredients(scenario, assembly, path)
+        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock, joints=joints)
     shells = {
         section.name: (
             _kept_shell(section, reuse)
