@@ -58,12 +58,17 @@ class Placement(Section):
 
 
 class RobotSection(Section):
-    """A robot or a single body: shipped (`name`) or your own (`urdf`)."""
+    """A robot or a single body: shipped (`name`) or your own (`file`; `urdf` is the same key)."""
 
     name: str | None = None
+    file: str | None = None
     urdf: str | None = None
     package_dirs: list[str] = []
+    xacro_args: dict[str, bool | int | float | str] = {}
+    srdf: str | None = None
+    pose: str | None = None
     free_flyer: bool = False
+    mimic: bool = True
     label: str | None = None
     placement: Placement = Placement()
     lock: list[str] = []
@@ -75,11 +80,21 @@ class RobotSection(Section):
     @model_validator(mode="after")
     def check_one_source(self) -> RobotSection:
         """Refuse a robot with no description, or with two."""
-        if (self.name is None) == (self.urdf is None):
-            raise ValueError("give either name (a shipped robot) or urdf (a file), not both")
-        if self.name is not None and (self.package_dirs or self.free_flyer):
-            raise ValueError("package_dirs and free_flyer belong to urdf; drop them beside name")
+        if sum(one is not None for one in (self.name, self.file, self.urdf)) != 1:
+            raise ValueError(
+                "give either name (a shipped robot) or file (a URDF, xacro or MJCF; urdf is the "
+                "same key), not both"
+            )
+        of_files = ("package_dirs", "xacro_args", "srdf", "free_flyer")
+        beside = [key for key in of_files if getattr(self, key)]
+        if self.name is not None and beside:
+            raise ValueError(f"{' and '.join(beside)} belong to a file; drop them beside name")
         return self
+
+    @property
+    def path(self) -> str | None:
+        """The robot's file, or None for a shipped robot."""
+        return self.file if self.file is not None else self.urdf
 
 
 class ShellSection(Section):

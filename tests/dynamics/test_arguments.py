@@ -152,8 +152,10 @@ def mimicking() -> pin.Model:
     return pin.transformJointIntoMimic(arm(), 1, 2, 2.0, 0.0)
 
 
-def test_a_mimic_joint_has_no_coordinate() -> None:
-    assert Scene(mimicking()).model.nv == 2
+def test_locking_one_of_a_mimic_group_holds_all_of_it() -> None:
+    free = Scene(mimicking()).model.nv - 1
+    assert Scene(mimicking(), lock=["two_joint"]).model.nv == free
+    assert Scene(mimicking(), lock=["one_joint"]).model.nv == free
 
 
 def twins() -> pin.Model:
