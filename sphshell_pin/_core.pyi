@@ -116,6 +116,7 @@ class Pair:
         joint_j: int,
         placement_j: _Doubles,
         radius: float,
+        ball: float,
         shell: Shell | None,
         source: Callable[[pin.SE3, pin.SE3], tuple[_Doubles, _Doubles, _Doubles]] | None,
         method: int,

@@ -58,6 +58,7 @@ class _Parts(TypedDict, total=False):
     sphere: Sphere
     shell: Shell
     find: Find
+    other_sphere: Sphere
 
 
 class Scene:
@@ -119,7 +120,7 @@ class Scene:
     def add_contact(
         self,
         sphere: Sphere,
-        shell: Shell,
+        shell: Shell | Sphere,
         frame: str = "universe",
         placement: pin.SE3 | None = None,
         law: NormalLaw | None = None,
@@ -129,13 +130,21 @@ class Scene:
     ) -> ContactPair:
         """Let `sphere` touch `shell`, which is placed at `placement` in `frame`.
 
+        In place of the shell there may be another Sphere, which is a solid ball in a frame of its
+        own: `frame`, `placement` and `method` are then not to be given. Contact is symmetric, but
+        that forces act at the point of this other sphere that is closest to the first one's center.
+
         Without `friction` the contact has none; `method` is "smooth" (default), "facets" or
         "elements". Returns the pair. Warns with UnitWarning of a shell a thousand times larger than
         the sphere or the robot, and with FutureWarning where no `law` is stated: it is then ADAMS's
         default, ImpactLaw.from_adams().
         """
         check_type("sphere", sphere, Sphere, "must be a Sphere(radius, frame)")
-        check_type("shell", shell, Shell, "must be a Shell (of a file: Shell.from_file)")
+        if isinstance(shell, Sphere):
+            return self._add_two_spheres(
+                sphere, shell, frame, placement, method, law=law, friction=friction, name=name
+            )
+        check_type("shell", shell, Shell, "must be a Shell (of a file: Shell.from_file) or Sphere")
         method = "smooth" if method is None else method
         Method.from_name(method)
         placement = check_placement("placement", placement)
@@ -155,6 +164,37 @@ class Scene:
         if suspicion:
             warnings.warn(f"shell '{shell.name}': {suspicion}", UnitWarning, stacklevel=2)
         return pair
+
+    def _add_two_spheres(
+        self,
+        sphere: Sphere,
+        other: Sphere,
+        frame: str,
+        placement: pin.SE3 | None,
+        method: str | None,
+        *,
+        law: NormalLaw | None,
+        friction: Friction | None,
+        name: str | None,
+    ) -> ContactPair:
+        why = "must not be given where shell is a Sphere"
+        if frame != "universe":
+            raise InvalidParameter("frame", frame, f"{why}: that names its own frame")
+        if placement is not None:
+            raise InvalidParameter("placement", placement, f"{why}: that has its own offset")
+        if method is not None:
+            raise InvalidParameter("method", method, f"{why}: their contact has a closed form")
+        return self._add(
+            name,
+            f"{sphere.frame}-{other.frame}",
+            (sphere.frame, "frame"),
+            (other.frame, "frame"),
+            placement=pin.SE3.Identity(),
+            law=law,
+            friction=friction,
+            sphere=sphere,
+            other_sphere=other,
+        )
 
     def add_contact_source(
         self,
@@ -195,9 +235,9 @@ class Scene:
     ) -> Scene:
         """Build a scene from the active collision pairs of a geometry model.
 
-        Of each pair one side must be a sphere; the other becomes a shell (meshes as they are,
-        primitives tessellated with their exact normals). Pairs of other kinds are left out; a
-        geometry model without any sphere pair raises InvalidParameter.
+        Of each pair one side must be a sphere; the other may be one, too, else it becomes a shell
+        (meshes as they are, primitives tessellated with their exact normals). Other pairs are left
+        out; a geometry model without any sphere pair raises InvalidParameter.
         """
         scene = cls(model)
         add_pairs(scene, geometry_model, law, friction)

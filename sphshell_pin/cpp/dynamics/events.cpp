@@ -50,6 +50,8 @@ bool Events::met_at(double theta, const Motion& motion, const Chart& chart) {
 void Events::measure(std::size_t k, double margin, Gauges& out) {
   for (std::vector<double>& values : out) values.clear();
   const Pair& pair = scene_.pairs()[k];
+  if (pair.ball > 0)
+    out[Minimum].push_back(pair.radius + pair.ball - scene_.states()[k].center.norm());
   if (pair.shell) {
     query_.find(*pair.shell, scene_.states()[k].center, pair.radius + margin, pair.method);
     for (const Contact& contact : query_.contacts)

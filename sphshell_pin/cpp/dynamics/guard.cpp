@@ -32,15 +32,16 @@ double Guard::allowed(SceneData& scene, const State& from, const State& to, bool
       h * std::max(from.v.lpNorm<Eigen::Infinity>(), to.v.lpNorm<Eigen::Infinity>());
   for (std::size_t k = 0; k < known_.size(); ++k) {
     const Pair& pair = scene.pairs()[k];
-    if (!pair.shell) continue;
+    if (pair.source) continue;
+    const double radius = pair.least_radius();
     Known& known = known_[k];
     const Excursion& excursion = scene.excursions()[k];
     // In and out again within a step: what the stages saw of it is not the motion.
     const bool skipped = excursion.touched && !known.touching && scene.states()[k].count == 0 &&
-                         excursion.moved > kSeen * pair.radius;
+                         excursion.moved > kSeen * radius;
     if (skipped) share = std::min(share, 0.5);
     double moved = excursion.moved;
-    const double slack = pair.radius * (known.touching ? kTouching : kApart);
+    const double slack = radius * (known.touching ? kTouching : kApart);
     if (turned > kMostTurned) share = std::min(share, kMostTurned / turned);
     if (turned > kTurn) moved = std::max(moved, path(scene, k, from, to));
     if (moved <= slack) continue;
@@ -53,8 +54,9 @@ double Guard::allowed(SceneData& scene, const State& from, const State& to, bool
   return share;
 }
 
-// A lower bound of the distance to the shell.
+// A lower bound of the distance to the shell, or to the ball.
 double Guard::distance(const Pair& pair, const Vec3& center) {
+  if (pair.ball > 0) return center.norm() - pair.ball;
   const double distance = std::abs(pair.shell->closest_point(center).distance);
   const bool is_curved = pair.method == Method::Smooth && pair.shell->curved() != nullptr;
   return is_curved ? distance - pair.shell->curved()->bulge() : distance;

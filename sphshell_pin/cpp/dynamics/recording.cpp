@@ -75,7 +75,7 @@ void Recorder::add_step(const SceneData& scene, double t, double h) {
       status.deep = false;
       if (touching) ++summary.touches;
     }
-    const double radius = scene.pairs()[k].radius;
+    const double radius = scene.pairs()[k].least_radius();
     const bool through = now.pushed_through || (radius > 0 && now.depth > radius);
     if (through && !status.through) add_event(Event::Kind::Through);
     status.through = through;

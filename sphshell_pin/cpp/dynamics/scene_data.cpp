@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "contact/ball.hpp"
+
 namespace sphshell {
 
 SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs)
@@ -138,6 +140,10 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k) {
   const Vec3& center = pair.placement_i.translation();
   state.center = state.world_from_j.actInv(
       pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
+  if (pair.ball > 0) {
+    find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
+    return query.contacts;
+  }
   query.find(*pair.shell, state.center, pair.radius, pair.method);
   // Friction belongs to a place, and its spring should not be split and merged at every border
   // between elements: contacts that are nearly one are one. The elastic energy is that of their
@@ -188,8 +194,8 @@ void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
 
 void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
-  active.force =
-      contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), active.kinematics);
+  active.force = contact_force(pair.law, pair.friction, pair.disc_radius(), relaxation(pair),
+                               active.kinematics);
   if (active.slot < 0) return;
   const auto& rotation = states_[active.pair].world_from_j.rotation();
   const int at = 3 * active.slot;
