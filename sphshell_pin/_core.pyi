@@ -108,6 +108,7 @@ def contact_row_type() -> Any: ...
 
 class Pair:
     relaxation: float
+    group: str
     def __init__(
         self,
         name: str,

@@ -32,7 +32,7 @@ class ContactPair:
     `frame_i`, `frame_j` name their frames, `joint_i`, `joint_j` the joints, `pose_i`, `pose_j` the
     frames' placements in the joints. The shell is at `placement` in frame_j; a pair of two spheres
     has `other_sphere`, on body j, instead of it, and a pair of a contact source has `find` instead
-    of `sphere` and `shell`.
+    of `sphere` and `shell`. `group` names the entry of which there are several pairs.
     """
 
     name: str
@@ -50,6 +50,7 @@ class ContactPair:
     shell: Shell | None = None
     find: Find | None = None
     other_sphere: Sphere | None = None
+    group: str = ""
 
     frame = renamed("frame", "frame_j")
     sphere_placement = renamed("sphere_placement", "placement_i")
@@ -95,7 +96,7 @@ class ContactPair:
         if self.find is not None:
             has_state = self.friction is not None and self.friction.has_state
             source = checked_source(self.find, self.name, has_state)
-        return _core.Pair(
+        core = _core.Pair(
             name=self.name,
             joint_i=self.joint_i,
             placement_i=self.placement_i.homogeneous,
@@ -109,6 +110,8 @@ class ContactPair:
             law=self.law.core,
             friction=None if self.friction is None else self.friction.core,
         )
+        core.group = self.group
+        return core
 
 
 def _center(frame: pin.SE3, sphere: Sphere) -> pin.SE3:

@@ -36,6 +36,8 @@ class Assembly:
     """Joints to lock at their place in q0."""
     loaded: tuple[LoadedRobot, ...] = ()
     """The robots as they were loaded, one for each table."""
+    prefixes: tuple[str, ...] = ()
+    """What stands before the names of each robot."""
 
 
 @contextmanager
@@ -80,6 +82,7 @@ def assemble(
     lock: list[str] = []
     labels: set[str] = set()
     taken: list[LoadedRobot] = []
+    prefixes: list[str] = []
     for i, section in enumerate(scenario.robot):
         key = item_key("robot", scenario.robot, i)
         with blamed_on(path, key):
@@ -98,6 +101,7 @@ def assemble(
             labels.add(label)
             prefix = f"{label}/"
             _rename(model, geometry, prefix)
+        prefixes.append(prefix)
         lock += [prefix + joint for joint in section.lock]
         for name in list(model.names)[1:]:
             in_q, in_v = joint_spans(model, name)
@@ -112,7 +116,7 @@ def assemble(
     for name, q_joint, v_joint in starts:
         in_q, in_v = joint_spans(base, name)
         q0[in_q], v0[in_v] = q_joint, v_joint
-    return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken))
+    return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken), tuple(prefixes))
 
 
 def origin(section: RobotSection) -> tuple[object, ...]:

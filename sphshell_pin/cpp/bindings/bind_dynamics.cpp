@@ -155,6 +155,7 @@ void bind_dynamics(nanobind::module_& m) {
   using namespace sphshell;
   nb::class_<Pair>(m, "Pair", nb::type_slots(slots<Pair, visit_pair>()))
       .def_rw("relaxation", &Pair::relaxation)
+      .def_rw("group", &Pair::group)
       .def(nb::new_(&make_pair), nb::arg("name"), nb::arg("joint_i"), nb::arg("placement_i"),
            nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("ball"),
            nb::arg("shell").none(), nb::arg("source").none(), nb::arg("method"), nb::arg("law"),

@@ -24,7 +24,7 @@ using ContactSource =
 // placements are those of its frames; else `placement_i` holds the sphere's center and
 // `placement_j` the shell or the ball's center.
 struct Pair {
-  std::string name;
+  std::string name, group;  // group: of the pairs that were stated together, or empty
   int joint_i = 0, joint_j = 0;
   SE3 placement_i = SE3::Identity(), placement_j = SE3::Identity();
   double radius = 0;
@@ -45,5 +45,15 @@ struct Pair {
   // Whether the derivative of a contact's normal is known.
   bool has_dn_dc() const { return !source && method != Method::Elements; }
 };
+
+// A number for each pair, the same for neighbors of one group.
+inline std::vector<int> group_numbers(const std::vector<Pair>& pairs) {
+  std::vector<int> out;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const bool same = k > 0 && !pairs[k].group.empty() && pairs[k].group == pairs[k - 1].group;
+    out.push_back(k == 0 ? 0 : out.back() + (same ? 0 : 1));
+  }
+  return out;
+}
 
 }  // namespace sphshell

@@ -15,7 +15,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs)
       states_(pairs_.size()),
       excursions_(pairs_.size()),
       external_(static_cast<std::size_t>(model.njoints), pinocchio::Force::Zero()),
-      bristles_(pairs_.size()) {
+      bristles_(group_numbers(pairs_)) {
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
@@ -45,6 +45,7 @@ void SceneData::need_velocity_of(int joint) {
 
 void SceneData::restart() {
   for (ContactTracker& tracker : trackers_) tracker.restart();
+  bristles_.restart();
   for (Excursion& excursion : excursions_) excursion.moved = 0, excursion.touched = false;
 }
 
