@@ -108,6 +108,7 @@ def contact_row_type() -> Any: ...
 
 class Pair:
     relaxation: float
+    group: str
     def __init__(
         self,
         name: str,
@@ -116,6 +117,7 @@ class Pair:
         joint_j: int,
         placement_j: _Doubles,
         radius: float,
+        ball: float,
         shell: Shell | None,
         source: Callable[[pin.SE3, pin.SE3], tuple[_Doubles, _Doubles, _Doubles]] | None,
         method: int,

@@ -163,7 +163,10 @@ class UnusableExtra(MissingExtra):
 
 
 class DeepStart(SphshellError, ValueError):
-    """A sphere that starts deep inside its shell: `pair`, `depth` and `radius` [m]."""
+    """A sphere that starts deep inside its shell: `pair`, `depth` and `radius` [m].
+
+    Of two spheres `radius` is that of the smaller one.
+    """
 
     def __init__(self, pair: str, depth: float, radius: float) -> None:
         """Say how deep the sphere of `pair` starts."""

@@ -156,8 +156,7 @@ def core_pairs(scene: Scene, q0: Array, v0: Array, *, warn: bool) -> list[_core.
 
 def deep_start(scene: Scene, pair: int, depth: float) -> DeepStart:
     """Return the error of a sphere that starts too deep [m] in the shell of its pair."""
-    sphere = scene.pairs[pair].sphere
-    return DeepStart(scene.pairs[pair].name, depth, sphere.radius if sphere else math.nan)
+    return DeepStart(scene.pairs[pair].name, depth, scene.pairs[pair].least_radius)
 
 
 def advance(

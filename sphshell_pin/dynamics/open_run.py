@@ -198,6 +198,7 @@ def _same_place(a: ContactPair, b: ContactPair) -> bool:
         (a.joint_i, a.joint_j, a.method, a.name) == (b.joint_i, b.joint_j, b.method, b.name)
         and a.shell is b.shell
         and a.find is b.find
+        and a.kind == b.kind
         and type(a.friction) is type(b.friction)
         and _equal(a.placement_i, b.placement_i)
         and _equal(a.placement_j, b.placement_j)

@@ -37,6 +37,8 @@ class Assembly:
     """Joints to lock at their place in q0."""
     loaded: tuple[LoadedRobot, ...] = ()
     """The robots as they were loaded, one for each table."""
+    prefixes: tuple[str, ...] = ()
+    """What stands before the names of each robot."""
 
 
 @contextmanager
@@ -81,6 +83,7 @@ def assemble(
     lock: list[str] = []
     labels: set[str] = set()
     taken: list[LoadedRobot] = []
+    prefixes: list[str] = []
     for i, section in enumerate(scenario.robot):
         key = item_key("robot", scenario.robot, i)
         with blamed_on(path, key):
@@ -100,6 +103,7 @@ def assemble(
                 )
             labels.add(prefix)
             _rename(model, geometry, prefix)
+        prefixes.append(prefix)
         lock += [prefix + joint for joint in section.lock]
         for name in list(model.names)[1:]:
             in_q, in_v = joint_spans(model, name)
@@ -116,16 +120,7 @@ def assemble(
         q0[in_q], v0[in_v], armature[in_v] = q_joint, v_joint, inertia
     if armature.any():
         base.armature = armature  # which pinocchio.appendModel (4.1) drops
-    return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken))
-
-
-def prefixes(scenario: Scenario, loaded: Sequence[LoadedRobot]) -> list[str]:
-    """Return what stands before the names of each robot in the assembled model."""
-    several = len(scenario.robot) > 1
-    return [
-        _prefix(section, robot) if several else ""
-        for section, robot in zip(scenario.robot, loaded, strict=True)
-    ]
+    return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken), tuple(prefixes))
 
 
 def _prefix(section: RobotSection, robot: LoadedRobot) -> str:

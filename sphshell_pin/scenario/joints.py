@@ -10,7 +10,7 @@ from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.joints import JointFriction, JointIngredients, JointLimits
 from sphshell_pin.dynamics.models import find_joint
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.bodies import Assembly, blamed_on, prefixes
+from sphshell_pin.scenario.bodies import Assembly, blamed_on
 from sphshell_pin.scenario.reading import item_key
 from sphshell_pin.scenario.schema import JointSection, Scenario
 
@@ -29,7 +29,7 @@ def joint_ingredients(
         return None
     joints = JointIngredients()
     for robot, loaded, prefix in zip(
-        scenario.robot, assembly.loaded, prefixes(scenario, assembly.loaded), strict=True
+        scenario.robot, assembly.loaded, assembly.prefixes, strict=True
     ):
         own = JointIngredients.from_model(loaded.model, robot.joints)
         for kind in own.kinds():

@@ -171,15 +171,31 @@ class SphereSection(Section):
     offset: Annotated[Vector3, Parameter("m", "sphere offset")] = [0.0, 0.0, 0.0]
 
 
+Spheres = Annotated[list[SphereSection | str], Field(min_length=1)]
+
+
 class ContactSection(Section):
-    """A sphere that may touch a shell."""
+    """A sphere, or several, that may touch a shell or another sphere."""
 
     name: str
-    sphere: SphereSection
-    shell: str
+    sphere: SphereSection | None = None
+    spheres: Literal["collision"] | Spheres | None = None
+    shell: str | None = None
+    other_sphere: SphereSection | None = None
     method: Literal["facets", "smooth", "elements"] | None = None
     law: Law
     friction: Friction = NoFriction()
+
+    @model_validator(mode="after")
+    def check_ends(self) -> ContactSection:
+        """Refuse a contact that lacks one of its two bodies, or has too many."""
+        if (self.sphere is None) == (self.spheres is None):
+            raise ValueError("give either sphere (one) or spheres (several), not both")
+        if (self.shell is None) == (self.other_sphere is None):
+            raise ValueError("give either shell (its name) or other_sphere, not both")
+        if self.other_sphere is not None and self.method is not None:
+            raise ValueError("method belongs to a shell; drop it beside other_sphere")
+        return self
 
 
 class SourceSection(Section):

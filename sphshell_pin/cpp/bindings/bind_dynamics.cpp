@@ -28,8 +28,8 @@ SE3 to_se3(const Eigen::Matrix4d& m) {
 
 std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matrix4d& placement_i,
                                 int joint_j, const Eigen::Matrix4d& placement_j, double radius,
-                                std::shared_ptr<Shell> shell, nb::object source, int method,
-                                const NormalLaw& law, const FrictionLaw* friction) {
+                                double ball, std::shared_ptr<Shell> shell, nb::object source,
+                                int method, const NormalLaw& law, const FrictionLaw* friction) {
   auto pair = std::make_unique<Pair>();
   pair->name = std::move(name);
   pair->joint_i = joint_i;
@@ -37,6 +37,7 @@ std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matr
   pair->placement_i = to_se3(placement_i);
   pair->placement_j = to_se3(placement_j);
   pair->radius = radius;
+  pair->ball = ball;
   pair->shell = std::move(shell);
   if (!source.is_none()) pair->source = PythonSource(std::move(source));
   pair->method = static_cast<Method>(method);
@@ -162,9 +163,11 @@ void bind_dynamics(nanobind::module_& m) {
   using namespace sphshell;
   nb::class_<Pair>(m, "Pair", nb::type_slots(slots<Pair, visit_pair>()))
       .def_rw("relaxation", &Pair::relaxation)
+      .def_rw("group", &Pair::group)
       .def(nb::new_(&make_pair), nb::arg("name"), nb::arg("joint_i"), nb::arg("placement_i"),
-           nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("shell").none(),
-           nb::arg("source").none(), nb::arg("method"), nb::arg("law"), nb::arg("friction").none());
+           nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("ball"),
+           nb::arg("shell").none(), nb::arg("source").none(), nb::arg("method"), nb::arg("law"),
+           nb::arg("friction").none());
 
   m.def("contact_row_type", &contact_row_type);
 

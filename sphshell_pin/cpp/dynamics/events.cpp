@@ -75,6 +75,8 @@ void Events::measure(std::size_t k, double margin, Gauges& out) {
     return;
   }
   const Pair& pair = scene_.pairs()[k];
+  if (pair.ball > 0)
+    out[Minimum].push_back(pair.radius + pair.ball - scene_.states()[k].center.norm());
   if (pair.shell) {
     query_.find(*pair.shell, scene_.states()[k].center, pair.radius + margin, pair.method);
     for (const Contact& contact : query_.contacts)

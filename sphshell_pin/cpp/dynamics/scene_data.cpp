@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "contact/ball.hpp"
+
 namespace sphshell {
 
 SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
@@ -15,7 +17,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
       states_(pairs_.size()),
       excursions_(pairs_.size()),
       external_(static_cast<std::size_t>(model.njoints), pinocchio::Force::Zero()),
-      bristles_(pairs_.size()) {
+      bristles_(group_numbers(pairs_)) {
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
@@ -46,6 +48,7 @@ void SceneData::need_velocity_of(int joint) {
 
 void SceneData::restart() {
   for (ContactTracker& tracker : trackers_) tracker.restart();
+  bristles_.restart();
   for (Excursion& excursion : excursions_) excursion.moved = 0, excursion.touched = false;
 }
 
@@ -150,6 +153,10 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k) {
   const Vec3& center = pair.placement_i.translation();
   state.center = state.world_from_j.actInv(
       pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
+  if (pair.ball > 0) {
+    find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
+    return query.contacts;
+  }
   query.find(*pair.shell, state.center, pair.radius, pair.method);
   // Friction belongs to a place, and its spring should not be split and merged at every border
   // between elements: contacts that are nearly one are one. The elastic energy is that of their
@@ -201,8 +208,8 @@ void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
 
 void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
-  active.force =
-      contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), active.kinematics);
+  active.force = contact_force(pair.law, pair.friction, pair.disc_radius(), relaxation(pair),
+                               active.kinematics);
   if (active.slot < 0) return;
   const auto& rotation = states_[active.pair].world_from_j.rotation();
   const int at = 3 * active.slot;

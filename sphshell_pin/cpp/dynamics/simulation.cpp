@@ -52,14 +52,14 @@ std::optional<DeepStart> Simulation::deep_start() {
   if (!started_) start();
   for (std::size_t k = 0; k < scene_.pairs().size(); ++k) {
     const Pair& pair = scene_.pairs()[k];
-    if (!pair.shell) continue;
+    if (pair.source) continue;
     double depth = scene_.states()[k].depth;
-    if (pair.shell->side() != Side::Both && depth == 0) {
+    if (pair.shell && pair.shell->side() != Side::Both && depth == 0) {
       const double distance = pair.shell->closest_point(scene_.states()[k].center).distance;
       const double outside = pair.shell->side() == Side::Outside ? distance : -distance;
       if (outside < 0 && is_closed(*pair.shell)) depth = pair.radius - outside;
     }
-    if (depth > kDeepStart * pair.radius) return DeepStart{static_cast<int>(k), depth};
+    if (depth > kDeepStart * pair.least_radius()) return DeepStart{static_cast<int>(k), depth};
   }
   return {};
 }

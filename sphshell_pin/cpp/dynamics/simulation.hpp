@@ -48,8 +48,8 @@ class Simulation : private Torques {
   Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
              RunSettings settings, std::shared_ptr<Controller> controller, VectorX q0, VectorX v0);
 
-  // The first pair whose sphere is deeper than half its radius at the start, or inside a closed
-  // one-sided shell on the wrong side, however far.
+  // The first pair whose sphere is deeper than half its radius (of two spheres, the smaller) at the
+  // start, or inside a closed one-sided shell on the wrong side, however far.
   std::optional<DeepStart> deep_start();
   // Runs for about `wall_seconds` of wall-clock time, to the first step that ends at the time
   // `until` or later, or until `stop` is set.
