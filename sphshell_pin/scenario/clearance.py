@@ -35,8 +35,8 @@ class Links:
     """The collision geometry of a robot, to be held against the surface of a part.
 
     `model` is the whole robot, `lock` names the joints that do not move. What a sphere of `tips`
-    stands for is left out: a geometry that is this sphere, and of its own link (with all that is
-    fixed to it) what is near the sphere.
+    stands for is left out: a sphere with the same center, whatever its radius, and of the tip's own
+    link (with all that is fixed to it) what is near the sphere.
     """
 
     def __init__(
@@ -114,7 +114,9 @@ class Links:
         return None
 
     def _inside(self, one: pin.GeometryObject, pose: pin.SE3, placement: pin.SE3) -> bool:
-        """Whether a point of a geometry is behind the closed surface."""
+        """Whether a point of a geometry is behind the surface, where that is closed."""
+        if not self._shell.is_closed:
+            return False
         mesh = isinstance(one.geometry, coal.BVHModelBase)
         point = np.array(one.geometry.vertices()[0]) if mesh else np.zeros(3)
         at = placement.actInv(pose.act(point))
@@ -133,7 +135,7 @@ def _tree(shell: Shell) -> coal.BVHModelOBBRSS:
 
 
 def _fixed_to(model: pin.Model, joint: int, held: set[int]) -> set[int]:
-    """Return the joints whose links do not move against that of `joint`, as `held` joints do not."""
+    """Return the joints whose links do not move against that of `joint`; `held` ones are locked."""
     top = joint
     while top in held:
         top = int(model.parents[top])
@@ -148,9 +150,7 @@ def _is_sphere(one: pin.GeometryObject, model: pin.Model, frame: pin.Frame, tip:
     if not isinstance(one.geometry, coal.Sphere) or one.parentJoint != frame.parentJoint:
         return False
     away = one.placement.translation - frame.placement.act(tip.offset)
-    return bool(
-        np.linalg.norm(away) < 1e-3 * tip.radius and one.geometry.radius <= 1.001 * tip.radius
-    )
+    return bool(np.linalg.norm(away) < 1e-3 * tip.radius)
 
 
 def _link_of(model: pin.Model, one: pin.GeometryObject) -> str:

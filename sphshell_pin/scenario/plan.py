@@ -39,8 +39,8 @@ MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
 # The path across a surface: radii long at most, radii a second.
 PATH_RADII, PATH_RATE = 10.0, 3.0
 LEAD_IN = 0.5
-# Turns of the part about the approach, tried in this order [rad], and how many places are kept where
-# the sphere touches no single face.
+# Turns of the part about the approach, tried in this order [rad], and how many places are kept
+# where the sphere touches no single face.
 _YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
 _MOST_UNEVEN = 3
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in

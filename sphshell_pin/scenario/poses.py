@@ -30,8 +30,8 @@ _DOWNWARD = 0.5
 # How far joints are bent out of a singular posture [rad or m], in turn, and how often it is tried.
 _BENDS = (0.3, 0.6, 0.9)
 _TRIES = 40
-# Other postures: seeds tried, steps to turn the limb along the approach, when it is so (cosine), how
-# far from it [rad or m] another one has to be, and how many are taken.
+# Other postures: seeds tried, steps to turn the limb along the approach, when it is so (cosine),
+# how far from each other [rad or m] they have to be, and how many are taken.
 _SEEDS, _TURNS, _ALONG, _APART, _MOST_STANCES = 24, 40, 0.99, 0.3, 5
 # Cosine between limb and approach below which the limb is beside the tip or before it.
 _BESIDE = 0.3

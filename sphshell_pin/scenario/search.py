@@ -1,4 +1,4 @@
-"""The search for a draft that works: postures, places on the part and turns of it, tried in turn."""
+"""The search for a draft that works: postures, and places and turns of the part."""
 
 from __future__ import annotations
 
@@ -266,12 +266,13 @@ def _refusal(tip: Tip, request: Request, tried: _Tried) -> SphshellError:
         fault = tried.faults[0]
         when = f" at t = {fault.t:.2g} s" if fault.link else ""
         return SphshellError(
-            f"no draft works ({_count(tried.runs, 'run')}): {fault.text}{when}; {_ADVICE[fault.kind]}"
+            f"no draft works ({_count(tried.runs, 'run')}): {fault.text}{when}; "
+            f"{_ADVICE[fault.kind]}"
         )
     if tried.errors:
         return tried.errors[0]
     if tried.blocked:
-        link, times = tried.blocked.most_common(1)[0]
+        ((link, _),) = tried.blocked.most_common(1)
         return SphshellError(
             f"link '{link}' would be in the part, or another one: in each of "
             f"{_count(tried.postures, 'posture')} and {_count(tried.places, 'place')} on the part "

@@ -1,4 +1,4 @@
-"""A draft of a scenario, tried: whether it touches, holds its force, and keeps links off the part."""
+"""A draft of a scenario, tried: it touches, holds its force, and keeps links off the part."""
 
 from __future__ import annotations
 
