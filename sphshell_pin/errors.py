@@ -88,6 +88,10 @@ class RobotWarning(UserWarning):
     """A robot's file states what is not modelled, or names a visual mesh that is missing."""
 
 
+class SetupWarning(UserWarning):
+    """Input that is allowed and probably a mistake: a path off its shell, a press on nothing."""
+
+
 class InvalidShell(SphshellError, ValueError):
     """Vertices or elements from which no surface can be made."""
 

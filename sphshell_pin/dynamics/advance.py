@@ -27,7 +27,7 @@ from sphshell_pin.dynamics.models import find_joint
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.scene import Scene
-from sphshell_pin.errors import DeepStart, InvalidParameter, WeakLawWarning
+from sphshell_pin.errors import DeepStart, InvalidParameter, SetupWarning, WeakLawWarning
 
 Array = NDArray[np.float64]
 AnyController = Controller | Callback | None
@@ -57,11 +57,15 @@ def start_run(
 ) -> _core.Simulation:
     """Check the arguments of Simulation.run and return the compiled run at its start.
 
-    With `warn`, a law that cannot stop its sphere causes a WeakLawWarning.
+    With `warn`, a law that cannot stop its sphere causes a WeakLawWarning, and a controller whose
+    parameters are probably a mistake a SetupWarning.
     """
     q, v = scene.check_state(q0, v0)
     duration = check_not_negative("duration", duration, "s")
     core_controller, hold = bind_controller(scene, integrator, controller, control_dt, q)
+    if warn and isinstance(controller, Controller):
+        for doubt in controller.doubts(scene, q):
+            warnings.warn(doubt, SetupWarning, stacklevel=3)
     settings = run_settings(scene, integrator, duration, hold, record_dt=record_dt, t0=t0)
     pairs = core_pairs(scene, q, v, warn=warn)
     joints = scene.joints.to_core(scene.model)

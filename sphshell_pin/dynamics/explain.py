@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sphshell_pin.checks import check_moved_mass
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.joints import WHICH, JointIngredients
-from sphshell_pin.dynamics.models import unit_warning
+from sphshell_pin.dynamics.models import beyond_limits, unit_warning
 from sphshell_pin.dynamics.sources import checked_source
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     check_moved_mass(model)
     gravity = float(np.linalg.norm(model.gravity.linear))
     pairs = tuple(map(_with_curvature, scene.pairs, explain_pairs(scene, q, v)))
-    warnings: list[str] = []
+    warnings = beyond_limits(model, q)
     for pair, figures in zip(scene.pairs, pairs, strict=True):
         warnings += _warnings_of(scene, pair, figures)
     scales = [p.shortest_time for p in pairs if math.isfinite(p.shortest_time)]

@@ -15,6 +15,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.dynamics.callables import check_callable
 from sphshell_pin.dynamics.controllers import Callback, Controller, PythonFunction, ShellPlace
 from sphshell_pin.dynamics.explain import Explanation
 from sphshell_pin.errors import (
@@ -223,7 +224,11 @@ def _kept_shell(section: schema.ShellSection, reuse: Built | None) -> sp.Shell |
 
 def explain_built(built: Built) -> Explanation:
     """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
-    return built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
+    said = built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
+    if not isinstance(built.controller, Controller):
+        return said
+    doubts = built.controller.doubts(built.scene, built.q0)
+    return replace(said, warnings=(*said.warnings, *doubts))
 
 
 def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
@@ -317,7 +322,9 @@ def _build_controller(
 
     with blamed_on(path, "controller"):
         if isinstance(stated, PythonFunction):
-            return load(stated.function, "controller.function")
+            function = load(stated.function, "controller.function")
+            check_callable(function)
+            return function
         controller: Controller | None = stated.made(path.parent)
         if controller is None:
             return None
