@@ -49,7 +49,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from sphshell_pin.dynamics.mimic import Mimic
 
@@ -296,15 +296,25 @@ def fingertips(name: str) -> list[Sphere]:
 
 def end_spheres(robot: LoadedRobot) -> list[Sphere]:
     """Return the sphere collision geometries of the links of `robot` without a further joint."""
-    parents = {int(parent) for parent in robot.model.parents}
-    tips = []
+    parents = {int(parent) for parent in robot.model.parents} - {0}
+    return [sphere for joint, sphere in _spheres(robot) if joint not in parents]
+
+
+def collision_spheres(robot: LoadedRobot) -> list[Sphere]:
+    """Return all spheres of the collision geometry of `robot`, in the frames of their links."""
+    return [sphere for _, sphere in _spheres(robot)]
+
+
+def _spheres(robot: LoadedRobot) -> Iterator[tuple[int, Sphere]]:
+    """Yield each sphere of the collision geometry with the joint that carries it."""
     for geometry in robot.collision_model.geometryObjects:
-        if type(geometry.geometry).__name__ != "Sphere" or geometry.parentJoint in parents - {0}:
-            continue
-        frame = robot.model.frames[geometry.parentFrame]
-        offset = frame.placement.actInv(geometry.placement).translation
-        tips.append(Sphere(float(geometry.geometry.radius), frame.name, offset))
-    return tips
+        if type(geometry.geometry).__name__ == "Sphere":
+            frame = robot.model.frames[geometry.parentFrame]
+            x, y, z = frame.placement.actInv(geometry.placement).translation.tolist()
+            yield (
+                int(geometry.parentJoint),
+                Sphere(float(geometry.geometry.radius), frame.name, (x, y, z)),
+            )
 
 
 def _library() -> list[str]:

@@ -15,6 +15,9 @@ from sphshell_pin.units import size_warning
 
 Array = NDArray[np.float64]
 
+# How far beyond a limit a joint may be for having been rounded [rad or m].
+_BEYOND = 1e-6
+
 
 def find_frame(model: pin.Model, name: str, called: str = "frame") -> int:
     """Return the index of the frame called `name`.
@@ -106,26 +109,6 @@ def check_model(model: pin.Model) -> None:
             )
 
 
-def check_no_mimic(model: pin.Model) -> None:
-    """Raise InvalidParameter if a joint of `model` mimics another: forward dynamics has none."""
-    joints = list(zip(model.names, model.joints, strict=True))[1:]
-    found = [name for name, joint in joints if _mimics(joint)]
-    if found:
-        raise InvalidParameter(
-            "model",
-            found,
-            "forward dynamics knows none: load the model with mimic=False, or lock them",
-            f"has joints that mimic others ({', '.join(found)}), but",
-        )
-
-
-def _mimics(joint: pin.JointModel) -> bool:
-    kind = joint.shortname()
-    if kind == "JointModelComposite":
-        return any(_mimics(part) for part in joint.extract().joints)
-    return bool(kind == "JointModelMimic")
-
-
 def _check_joint_frame(model: pin.Model, name: str, joint: int) -> None:
     """Pinocchio reads the frame of a joint it locks, unchecked, before the frames on the joint."""
     on_joint = [frame for frame in model.frames if frame.parentJoint == joint]
@@ -144,14 +127,14 @@ def unit_warning(model: pin.Model, radius: float, shell_size: float) -> str | No
 
     `radius` [m] of the sphere, `shell_size` [m] the shell's box diagonal; None if all is well.
     """
-    for reference, what in ((radius, "sphere's radius"), (_reach(model), "robot's reach")):
+    for reference, what in ((radius, "sphere's radius"), (model_reach(model), "robot's reach")):
         sentence = size_warning(shell_size, reference, what)
         if sentence:
             return sentence
     return None
 
 
-def _reach(model: pin.Model) -> float:
+def model_reach(model: pin.Model) -> float:
     """Length [m] of the longest chain of joint placements: the robot's size."""
     reach = np.zeros(model.njoints)
     for j in range(1, model.njoints):
@@ -198,3 +181,21 @@ def set_joint(model: pin.Model, q: Array, name: str, value: float | Sequence[flo
     if len(value) != joint.nq:
         raise SphshellError(f"joint '{name}' takes {joint.nq} numbers, not {len(value)}")
     q[span] = value
+
+
+def beyond_limits(model: pin.Model, q: Array) -> list[str]:
+    """Say which joints of one coordinate are beyond their limits at q (nq,)."""
+    said = []
+    for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
+        if joint.nq != 1:
+            continue
+        at = float(q[joint.idx_q])
+        low = float(model.lowerPositionLimit[joint.idx_q])
+        high = float(model.upperPositionLimit[joint.idx_q])
+        # A model that states none has infinite ones, or the same for both.
+        if low < high and not low - _BEYOND <= at <= high + _BEYOND:
+            said.append(
+                f"joint '{name}' starts at {at:.6g}, beyond its limits {low:.6g} to {high:.6g} "
+                "[rad or m]: change the start"
+            )
+    return said

@@ -37,6 +37,8 @@ class Assembly:
     """Joints to lock at their place in q0."""
     loaded: tuple[LoadedRobot, ...] = ()
     """The robots as they were loaded, one for each table."""
+    prefixes: tuple[str, ...] = ()
+    """What stands before the names of each robot."""
 
 
 @contextmanager
@@ -81,6 +83,7 @@ def assemble(
     lock: list[str] = []
     labels: set[str] = set()
     taken: list[LoadedRobot] = []
+    prefixes: list[str] = []
     for i, section in enumerate(scenario.robot):
         key = item_key("robot", scenario.robot, i)
         with blamed_on(path, key):
@@ -93,12 +96,14 @@ def assemble(
                 joint_spans(model, joint)
         prefix = ""
         if several:
-            label = section.label or robot.name
-            if label in labels:
-                raise ScenarioError(path, f"{key}.label", "two robots share this label", label)
-            labels.add(label)
-            prefix = f"{label}/"
+            prefix = _prefix(section, robot)
+            if prefix in labels:
+                raise ScenarioError(
+                    path, f"{key}.label", "two robots share this label", prefix.rstrip("/")
+                )
+            labels.add(prefix)
             _rename(model, geometry, prefix)
+        prefixes.append(prefix)
         lock += [prefix + joint for joint in section.lock]
         for name in list(model.names)[1:]:
             in_q, in_v = joint_spans(model, name)
@@ -115,7 +120,11 @@ def assemble(
         q0[in_q], v0[in_v], armature[in_v] = q_joint, v_joint, inertia
     if armature.any():
         base.armature = armature  # which pinocchio.appendModel (4.1) drops
-    return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken))
+    return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken), tuple(prefixes))
+
+
+def _prefix(section: RobotSection, robot: LoadedRobot) -> str:
+    return f"{section.label or robot.name}/"
 
 
 def origin(section: RobotSection) -> tuple[object, ...]:

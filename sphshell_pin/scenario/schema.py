@@ -29,7 +29,7 @@ from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
 from sphshell_pin.scenario.primitives import Primitive
 from sphshell_pin.scenario.tables import OneOf, Positive, Vector3, refuse_unknown_keys
 
-LISTS = ("robot", "shell", "contact", "source", "knob")
+LISTS = ("robot", "joint", "shell", "contact", "source", "knob")
 """Tables of which there may be several."""
 
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -72,6 +72,7 @@ class RobotSection(Section):
     label: str | None = None
     placement: Placement = Placement()
     lock: list[str] = []
+    joints: list[Literal["limits", "damping", "friction", "armature", "effort", "speed"]] = []
     q: list[float] | None = None
     start: dict[str, float | list[float]] = {}
     speed: dict[str, float | list[float]] = {}
@@ -136,6 +137,32 @@ Law = Annotated[Ingredient, OneOf(NormalLaw)]
 Friction = Annotated[Ingredient, OneOf(FrictionLaw)]
 
 
+class JointSection(Section):
+    """What acts in one joint, in place of what the robot's file states: see JointIngredients."""
+
+    name: str
+    lower: Annotated[float | None, Parameter("rad or m", "lower end")] = None
+    upper: Annotated[float | None, Parameter("rad or m", "upper end")] = None
+    stop: Law | None = None
+    damping: Annotated[NotNegative | None, Parameter("N m s/rad", "joint damping")] = None
+    friction: Annotated[Positive | None, Parameter("N m", "dry friction")] = None
+    friction_stiffness: Annotated[Positive | None, Parameter("N m/rad", "sticking stiffness")] = (
+        None
+    )
+    friction_damping: Annotated[NotNegative | None, Parameter("N m s/rad")] = None
+    armature: Annotated[NotNegative | None, Parameter("kg m^2", "armature")] = None
+    effort: Annotated[NotNegative | None, Parameter("N m", "effort limit")] = None
+    speed: Annotated[Positive | None, Parameter("rad/s", "speed limit")] = None
+
+    @model_validator(mode="after")
+    def check_friction(self) -> JointSection:
+        """Refuse a spring of dry friction without the friction."""
+        alone = self.friction_stiffness is not None or self.friction_damping is not None
+        if self.friction is None and alone:
+            raise ValueError("friction_stiffness and friction_damping belong to friction: give it")
+        return self
+
+
 class SphereSection(Section):
     """The sphere of a contact: `radius` [m], center `offset` [m] in the robot's `frame`."""
 
@@ -144,15 +171,31 @@ class SphereSection(Section):
     offset: Annotated[Vector3, Parameter("m", "sphere offset")] = [0.0, 0.0, 0.0]
 
 
+Spheres = Annotated[list[SphereSection | str], Field(min_length=1)]
+
+
 class ContactSection(Section):
-    """A sphere that may touch a shell."""
+    """A sphere, or several, that may touch a shell or another sphere."""
 
     name: str
-    sphere: SphereSection
-    shell: str
+    sphere: SphereSection | None = None
+    spheres: Literal["collision"] | Spheres | None = None
+    shell: str | None = None
+    other_sphere: SphereSection | None = None
     method: Literal["facets", "smooth", "elements"] | None = None
     law: Law
     friction: Friction = NoFriction()
+
+    @model_validator(mode="after")
+    def check_ends(self) -> ContactSection:
+        """Refuse a contact that lacks one of its two bodies, or has too many."""
+        if (self.sphere is None) == (self.spheres is None):
+            raise ValueError("give either sphere (one) or spheres (several), not both")
+        if (self.shell is None) == (self.other_sphere is None):
+            raise ValueError("give either shell (its name) or other_sphere, not both")
+        if self.other_sphere is not None and self.method is not None:
+            raise ValueError("method belongs to a shell; drop it beside other_sphere")
+        return self
 
 
 class SourceSection(Section):
@@ -283,6 +326,7 @@ class Scenario(Section):
     description: str = ""
     gravity: Annotated[Vector3, Parameter("m/s^2", "gravity")] = [0.0, 0.0, -9.81]
     robot: Annotated[list[RobotSection], Field(min_length=1)]
+    joint: list[JointSection] = []
     shell: list[ShellSection] = []
     contact: list[ContactSection] = []
     source: list[SourceSection] = []
