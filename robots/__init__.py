@@ -22,6 +22,7 @@ from sphshell_pin.robots.files import (
     RobotError,
     build_geometry,
     build_model,
+    is_path,
     keep_spheres,
     read,
 )
@@ -39,6 +40,7 @@ __all__ = [
     "end_spheres",
     "exactly",
     "fingertips",
+    "is_path",
     "keep_spheres",
     "load",
     "load_file",

@@ -137,6 +137,12 @@ def read(
         raise RobotError(f"{file}: not a {what} that can be read: {_line(error)}") from None
 
 
+def is_path(robot: str | PathLike[str]) -> bool:
+    """Whether `robot` is meant as a file, not as a name."""
+    known = (".urdf", ".xacro", ".xml", ".mjcf", *(one for ends in _REFUSED for one in ends))
+    return Path(robot).suffix.lower() in known or "/" in str(robot) or os.path.isfile(robot)
+
+
 def check_readable(file: Path) -> None:
     """Raise RobotError for what is no file, or a file that holds no robot, with what to do."""
     if not os.path.isfile(file):
