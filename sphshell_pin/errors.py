@@ -84,6 +84,14 @@ class WeakLawWarning(UserWarning):
     """A law is so compliant that the sphere's center is expected to pass through the shell."""
 
 
+class RobotWarning(UserWarning):
+    """A robot's file states what is not modelled, or names a visual mesh that is missing."""
+
+
+class SetupWarning(UserWarning):
+    """Input that is allowed and probably a mistake: a path off its shell, a press on nothing."""
+
+
 class InvalidShell(SphshellError, ValueError):
     """Vertices or elements from which no surface can be made."""
 

@@ -157,6 +157,16 @@ class HuntCrossleyLaw(_PowerLaw, kind="hunt-crossley"):
         "`ImpactLaw.hertz(..., restitution=, speed=)` computes it",
     )
 
+    @classmethod
+    def with_restitution(
+        cls, stiffness: float, exponent: float, restitution: float, speed: float
+    ) -> HuntCrossleyLaw:
+        """Build the law that throws back at `restitution` times an impact speed of `speed` [m/s].
+
+        The mass does not matter (Hunt and Crossley 1975).
+        """
+        return cls(stiffness, exponent, _dissipation_for(restitution, speed))
+
     @property
     def text(self) -> str:
         """Name and parameters in one line."""
@@ -363,7 +373,7 @@ class Hertz(Ingredient, kind="hertz", of=NormalLaw):
         stiffness = 4 / 3 / softness * math.sqrt(radius)
         if self.restitution is None or self.speed is None:
             return ImpactLaw(stiffness, 1.5)
-        return HuntCrossleyLaw(stiffness, 1.5, _dissipation_for(self.restitution, self.speed))
+        return HuntCrossleyLaw.with_restitution(stiffness, 1.5, self.restitution, self.speed)
 
 
 def _dissipation_for(restitution: float, speed: float) -> float:

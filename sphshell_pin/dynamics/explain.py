@@ -14,7 +14,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_moved_mass
-from sphshell_pin.dynamics.models import unit_warning
+from sphshell_pin.contact.laws import HuntCrossleyLaw
+from sphshell_pin.dynamics.joints import WHICH, JointIngredients
+from sphshell_pin.dynamics.models import beyond_limits, unit_warning
 from sphshell_pin.dynamics.sources import checked_source
 
 if TYPE_CHECKING:
@@ -25,6 +27,8 @@ Array = NDArray[np.float64]
 
 # Speed of approach where neither v nor a fall gives one [m/s].
 DEFAULT_SPEED = 0.1
+# Stands for the law of stops that are only listed.
+_ANY_LAW = HuntCrossleyLaw(1.0, 1.0)
 # Steps in the shortest time scale: enough for a few percent with fixed steps.
 STEPS_PER_SCALE = 30
 # Of the bristles' relaxation time [s].
@@ -106,7 +110,7 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     check_moved_mass(model)
     gravity = float(np.linalg.norm(model.gravity.linear))
     pairs = tuple(map(_with_curvature, scene.pairs, explain_pairs(scene, q, v)))
-    warnings: list[str] = []
+    warnings = beyond_limits(model, q)
     # Of the pairs that were stated together the first speaks for those with the same warning.
     seen: dict[tuple[str, str], list[str]] = {}
     for pair, figures in zip(scene.pairs, pairs, strict=True):
@@ -116,9 +120,12 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
             )
             seen.setdefault((pair.group, kind), []).append(warning)
     for (group, _), alike in seen.items():
-        more = f" (and {_count(len(alike) - 1, 'other')} of '{group}')" if alike[1:] else ""
+        more = (
+            f" (and {_count(len(alike) - 1, 'other')} of '{group}')" if group and alike[1:] else ""
+        )
         warnings.append(f"{alike[0]}{more}")
     scales = [p.shortest_time for p in pairs if math.isfinite(p.shortest_time)]
+    scales += scene.joints.time_scales(model).values()
     recommended = _round_down(min(scales) / STEPS_PER_SCALE) if scales else 1e-3
     if dt is not None and dt > 1.0001 * recommended:
         warnings.append(
@@ -131,10 +138,52 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
         f"gravity {gravity:.4g} m/s^2" if gravity else "no gravity",
         _count(len(pairs), "contact pair"),
     ]
-    absent = ["joint limits, joint friction and contact between other pairs of bodies"]
+    modelled += _joints_modelled(scene)
+    absent = ["contact between other pairs of bodies", *_joints_stated(scene)]
     if scene.lock:
         absent.append(f"motion of the locked joints {', '.join(scene.lock)}")
     return Explanation(tuple(modelled), tuple(absent), pairs, recommended, tuple(warnings))
+
+
+# What a model may state of its joints, as a reader calls it.
+_JOINT_KINDS = {
+    "limits": "position limits",
+    "damping": "damping",
+    "friction": "dry friction",
+    "armature": "armature",
+    "effort": "effort limits",
+    "speed": "speed limits, which are only reported",
+}
+
+
+def _joints_modelled(scene: Scene) -> list[str]:
+    out = []
+    for kind in scene.joints.kinds():
+        names = list(getattr(scene.joints, kind))
+        out.append(f"{_JOINT_KINDS[kind]} of {_names(names)}")
+    model = scene.model
+    mimics = [str(model.names[j]) for j in model.mimicking_joints]
+    if mimics:
+        out.append(f"joints that mimic others, exactly: {_names(mimics)}")
+    return out
+
+
+def _joints_stated(scene: Scene) -> list[str]:
+    """List what the model states of its joints and the scene leaves out."""
+    out = []
+    # In ABA the model's armature acts anyhow.
+    for kind in (one for one in WHICH if one != "armature"):
+        stated = getattr(JointIngredients.from_model(scene.model, [kind], _ANY_LAW), kind)
+        left_out = [name for name in stated if name not in getattr(scene.joints, kind)]
+        if left_out:
+            what = _JOINT_KINDS[kind].partition(",")[0]
+            out.append(f"{what} that the robot's file states, of {_names(left_out)}")
+    return out
+
+
+def _names(names: list[str]) -> str:
+    shown = ", ".join(f"'{name}'" for name in names[:4])
+    return shown if len(names) <= 4 else f"{shown}, ... ({len(names)} joints)"
 
 
 def explain_pairs(scene: Scene, q: Array, v: Array) -> tuple[PairExplanation, ...]:

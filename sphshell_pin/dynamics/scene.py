@@ -26,9 +26,9 @@ from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.explain import Explanation, explain_scene
 from sphshell_pin.dynamics.from_geometry import add_pairs
+from sphshell_pin.dynamics.joints import JointIngredients, check_joints
 from sphshell_pin.dynamics.models import (
     check_model,
-    check_no_mimic,
     find_frame,
     reduced_model,
 )
@@ -55,12 +55,18 @@ class Scene:
     """A copy of a Pinocchio model with the contact pairs that act on it.
 
     `lock` names joints to hold at their values in `q_lock` (nq of the given model, default
-    neutral): they drop out of the scene's model and cost nothing. FrameNotFound and NameNotFound
-    list what the model has; InvalidParameter names mimic joints that are left.
+    neutral): they drop out of the scene's model and cost nothing. `joints` says what else acts in
+    the joints, for instance JointIngredients.from_model(model): by default nothing, as in
+    Pinocchio. Joints that mimic others (pinocchio's mimic=True) move exactly so: nq and nv count
+    independent coordinates. FrameNotFound and NameNotFound list what the model has.
     """
 
     def __init__(
-        self, model: pin.Model, lock: Iterable[str] = (), q_lock: ArrayLike | None = None
+        self,
+        model: pin.Model,
+        lock: Iterable[str] = (),
+        q_lock: ArrayLike | None = None,
+        joints: JointIngredients | None = None,
     ) -> None:
         if not isinstance(model, pin.Model):
             raise InvalidParameter("model", type(model).__name__, "must be a pinocchio.Model")
@@ -75,7 +81,10 @@ class Scene:
                 "q_lock", q_lock, "must come with lock, the joints to hold there"
             )
         self._model = reduced_model(model, self.lock, q) if self.lock else pin.Model(model)
-        check_no_mimic(self._model)
+        # Of joints that are held nothing is left to model.
+        held = () if joints is None else tuple(n for n in model.names if n not in self._model.names)
+        self._joints = check_joints(joints, self._model, held)
+        self._model = self._joints.with_armature(self._model)
         # What users get, made when they first ask; `_model` is never handed out.
         self._shown: pin.Model | None = None
         self._pairs: tuple[ContactPair, ...] = ()
@@ -106,6 +115,11 @@ class Scene:
     def pairs(self) -> tuple[ContactPair, ...]:
         """The contact pairs, in the order in which they were added."""
         return self._pairs
+
+    @property
+    def joints(self) -> JointIngredients:
+        """What is modelled in the joints, without the locked ones."""
+        return self._joints
 
     def add_contact(
         self,
@@ -237,6 +251,16 @@ class Scene:
         """
         return self._at(state).external_forces(*self.check_state(q, v))
 
+    def joint_forces(
+        self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
+    ) -> Array:
+        """Return the torques (nv,) of stops, damping and dry friction in the joints [N m or N].
+
+        They are to be added to those of the motors: pin.aba(model, data, q, v, tau + these, fext).
+        `state` as in `external_forces`: without one, springs of dry friction are unstretched.
+        """
+        return np.asarray(self._at(state).joint_forces(*self.check_state(q, v)))
+
     def contact_derivatives(
         self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
     ) -> tuple[Array, Array]:
@@ -322,7 +346,8 @@ class Scene:
     def core(self) -> _core.Scene:
         """The C++ binding, built when first needed."""
         if self._core is None:
-            self._core = _core.Scene(self._model, [p.to_core() for p in self._pairs])
+            joints = self._joints.to_core(self._model)
+            self._core = _core.Scene(self._model, [p.to_core() for p in self._pairs], joints)
         return self._core
 
     def _check_unchanged(self) -> None:

@@ -61,7 +61,8 @@ class Simulation:
         (default: every step); `progress` is called a few times a second with the share done. The
         same input gives the same bits.
 
-        A law that cannot stop its sphere earns a WeakLawWarning.
+        A law that cannot stop its sphere earns a WeakLawWarning, a path off its shell a
+        SetupWarning.
 
         Raises InvalidParameter for wrong sizes and values, DeepStart for a sphere that starts
         deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.

@@ -15,6 +15,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.dynamics.callables import check_callable
 from sphshell_pin.dynamics.controllers import Callback, Controller, PythonFunction, ShellPlace
 from sphshell_pin.dynamics.explain import Explanation
 from sphshell_pin.errors import (
@@ -36,6 +37,7 @@ from sphshell_pin.scenario.bodies import (
     to_se3,
 )
 from sphshell_pin.scenario.functions import load_function
+from sphshell_pin.scenario.joints import joint_ingredients
 from sphshell_pin.scenario.knobs import check_knobs
 from sphshell_pin.scenario.reading import (
     change_scenario,
@@ -141,7 +143,8 @@ def build_scenario(
 
     with blamed_on(path, "robot"):
         q_lock = assembly.q0 if assembly.lock else None
-        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock)
+        joints = joint_ingredients(scenario, assembly, path)
+        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock, joints=joints)
     shells = {
         section.name: (
             _kept_shell(section, reuse)
@@ -221,7 +224,11 @@ def _kept_shell(section: schema.ShellSection, reuse: Built | None) -> sp.Shell |
 
 def explain_built(built: Built) -> Explanation:
     """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
-    return built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
+    said = built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
+    if not isinstance(built.controller, Controller):
+        return said
+    doubts = built.controller.doubts(built.scene, built.q0)
+    return replace(said, warnings=(*said.warnings, *doubts))
 
 
 def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
@@ -315,7 +322,9 @@ def _build_controller(
 
     with blamed_on(path, "controller"):
         if isinstance(stated, PythonFunction):
-            return load(stated.function, "controller.function")
+            function = load(stated.function, "controller.function")
+            check_callable(function)
+            return function
         controller: Controller | None = stated.made(path.parent)
         if controller is None:
             return None

@@ -7,8 +7,10 @@
 
 namespace sphshell {
 
-SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs)
+SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
+                     JointForces::Effects joints)
     : body_(model),
+      joints_(std::move(joints), model.nv),
       pairs_(std::move(pairs)),
       queries_(pairs_.size(), Query(true)),
       trackers_(pairs_.size()),
@@ -33,8 +35,9 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs)
   active_.reserve(64);
 }
 
-void SceneData::change(std::vector<Pair> pairs) {
+void SceneData::change(std::vector<Pair> pairs, JointForces::Effects joints) {
   pairs_ = std::move(pairs);
+  joints_.change(std::move(joints));
   for (const Pair& pair : pairs_) needs_velocity_ = needs_velocity_ || pair.needs_velocity();
 }
 
@@ -80,12 +83,18 @@ void SceneData::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, b
         add_contact(k, contacts[i], -1, static_cast<int>(i));
     }
   }
+  evaluate_joints(q, v, z);
   compute_forces(z);
 }
 
+void SceneData::evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z) {
+  if (joints_.act()) joints_.evaluate(q, v, z.tail(joints_.size()), relaxation_);
+}
+
 void SceneData::revisit(const VectorX& q, const VectorX& v, const VectorX& z) {
-  if (active_.empty()) return;
+  if (active_.empty() && !joints_.act()) return;
   if (needs_velocity_) body_.kinematics(q, v);
+  evaluate_joints(q, v, z);
   compute_forces(z);
 }
 
@@ -113,7 +122,10 @@ void SceneData::accept(VectorX& z) {
       active_[next++].contact_id = tracker.places()[i].number;
   }
   if (!bristles_.any()) return;
+  joint_stretches_ = z.tail(joints_.size());
   bristles_.end(z);
+  z.conservativeResize(bristle_size());
+  z.tail(joints_.size()) = joint_stretches_;
   // From now on, the place of a contact is its place in the list.
   for (std::size_t i = 0, place = 0; i < active_.size(); ++i) {
     place = i > 0 && active_[i].pair == active_[i - 1].pair ? place + 1 : 0;
@@ -165,8 +177,9 @@ void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int
 }
 
 void SceneData::compute_forces(const VectorX& z) {
-  powers_ = Powers();
+  powers_ = joints_.powers();
   bristle_rates_.setZero(bristle_size());
+  bristle_rates_.tail(joints_.size()) = joints_.rates();
   touching_ = !active_.empty();
   if (!touching_) return;
   for (int j : loaded_) external_[j].setZero();
@@ -296,7 +309,8 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
 }
 
 const VectorX& SceneData::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
-  return touching_ ? body_.acceleration(q, v, tau, external_) : body_.acceleration(q, v, tau);
+  const VectorX& all = joints_.act() ? joints_.added(tau) : tau;
+  return touching_ ? body_.acceleration(q, v, all, external_) : body_.acceleration(q, v, all);
 }
 
 }  // namespace sphshell
