@@ -108,6 +108,10 @@ def ask(robot: str, part: Path, place: str) -> Case:
         return Case(robot, part.stem, place, "", failure(built), seconds)
 
 
+def _asked(question: tuple[str, Path, str]) -> Case:
+    return ask(*question)
+
+
 def failure(built: Built) -> str:
     """Run a scenario as `run` does; say what it misses, "" if nothing."""
     result, stopped = simulate(built)
@@ -182,11 +186,11 @@ def main() -> int:
         questions = cases_of(asked.robots, parts)
         with multiprocessing.get_context("spawn").Pool(asked.processes) as pool:
             cases = []
-            for case in pool.starmap(ask, questions, chunksize=1):
+            for case in pool.imap(_asked, questions):
                 cases.append(case)
-    for case in cases:
-        said = (case.refused and f"refused: {case.refused}") or case.failed or "works"
-        print(f"{case.robot}  {case.part}  {case.place}  {case.seconds:.1f} s  {said}")
+                said = f"refused: {case.refused}" if case.refused else case.failed or "works"
+                where = f"{case.robot}  {case.part}  {case.place}  {case.seconds:.1f} s"
+                print(f"{where}  {said}", flush=True)
     text = report(cases)
     print(text)
     if asked.write:
