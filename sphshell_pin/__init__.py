@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics import CartesianImpedance as CartesianImpedance
     from sphshell_pin.dynamics import GravityCompensation as GravityCompensation
     from sphshell_pin.dynamics import Implicit as Implicit
+    from sphshell_pin.dynamics import JointFriction as JointFriction
+    from sphshell_pin.dynamics import JointIngredients as JointIngredients
+    from sphshell_pin.dynamics import JointLimits as JointLimits
     from sphshell_pin.dynamics import JointPD as JointPD
     from sphshell_pin.dynamics import LinearlyImplicitEuler as LinearlyImplicitEuler
     from sphshell_pin.dynamics import Result as Result
@@ -54,6 +57,9 @@ _HOME = {
     "ImpactLaw": "contact",
     "Implicit": "dynamics",
     "JointPD": "dynamics",
+    "JointLimits": "dynamics",
+    "JointIngredients": "dynamics",
+    "JointFriction": "dynamics",
     "LinearlyImplicitEuler": "dynamics",
     "Result": "dynamics",
     "RungeKutta4": "dynamics",

@@ -3,9 +3,10 @@
 from sphshell_pin.dynamics import controllers, integrators
 from sphshell_pin.dynamics.controllers import *  # noqa: F403
 from sphshell_pin.dynamics.integrators import *  # noqa: F403
+from sphshell_pin.dynamics.joints import JointFriction, JointIngredients, JointLimits
 from sphshell_pin.dynamics.result import ContactLog, EnergyAudit, Event, Result
 from sphshell_pin.dynamics.rollout import Rollout
-from sphshell_pin.dynamics.run_stats import PairFigures, RunStats
+from sphshell_pin.dynamics.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts, SceneState
 from sphshell_pin.dynamics.simulation import Simulation
 
@@ -14,6 +15,10 @@ __all__ = [
     "ContactPair",
     "EnergyAudit",
     "Event",
+    "JointFigures",
+    "JointFriction",
+    "JointIngredients",
+    "JointLimits",
     "PairFigures",
     "Result",
     "Rollout",

@@ -70,12 +70,14 @@ def roll_out(
         if hold not in settings:
             settings[hold] = run_settings(varied, integrator, duration, hold, record_dt=rows, t0=t0)
         # The rollout warns of a weak law when a sphere has gone through.
-        core.add(core_pairs(varied, q0, v0, warn=False), bound, q0, v0, settings[hold])
+        pairs = core_pairs(varied, q0, v0, warn=False)
+        core.add(pairs, joints, bound, q0, v0, settings[hold])
 
     def rollout() -> Rollout:
         return Rollout(scene, integrator, core, plan, workers, time.perf_counter() - began)
 
     workers = max(min(workers, len(starts)), 1)
+    joints = scene.joints.to_core(scene.model)
     core = _core.Rollout(scene.model, workers)
     tasks = _Tasks(core, workers, progress, len(starts), plan.failures)
     try:

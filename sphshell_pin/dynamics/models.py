@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_name
+from sphshell_pin.dynamics.mimic import group_of, mimics
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.units import size_warning
 
@@ -47,24 +48,28 @@ def frame_on_joint(model: pin.Model, joint: int) -> str | None:
 def reduced_model(model: pin.Model, lock: tuple[str, ...], q: Array) -> pin.Model:
     """Return a copy of `model` in which the joints named by `lock` are held at q (nq,).
 
-    NameNotFound lists the joints; InvalidParameter says why Pinocchio cannot hold one.
+    Of joints that mimic one another, one that is held holds all. NameNotFound lists the joints;
+    InvalidParameter says why Pinocchio cannot hold one.
     """
-    known = list(model.names)[1:]
-    for name in lock:
-        if name not in known:
-            raise NameNotFound("joint", name, "the model", known)
-    held = [int(model.getJointId(name)) for name in lock]
-    for name, joint in zip(lock, held, strict=True):
-        _check_joint_frame(model, name, joint)
+    held = held_joints(model, lock)
+    for joint in held:
+        _check_joint_frame(model, model.names[joint], joint)
     try:
         return pin.buildReducedModel(model, held, q)
     except (ValueError, RuntimeError, IndexError) as error:
-        reason = str(error).strip()
-        what = f"cannot be held ({reason}): name other joints to lock"
-        if "imic" in reason:
-            what = f"cannot be held ({reason}): lock the joints that mimic them too, or load the "
-            what += "model with mimic=False"
+        what = f"cannot be held ({str(error).strip()}): name other joints to lock"
         raise InvalidParameter("lock", list(lock), what) from None
+
+
+def held_joints(model: pin.Model, lock: tuple[str, ...]) -> list[int]:
+    """Return the joints that are held with those named by `lock`: the groups of mimic joints too.
+
+    NameNotFound lists the joints.
+    """
+    for name in lock:
+        find_joint(model, name)
+    names = dict.fromkeys(one for name in lock for one in group_of(model, name))
+    return [int(model.getJointId(name)) for name in names]
 
 
 def check_model(model: pin.Model) -> None:
@@ -102,26 +107,6 @@ def check_model(model: pin.Model) -> None:
             raise InvalidParameter(
                 f"model's frame '{frame.name}'", int(frame.parentJoint), "must be on a joint of it"
             )
-
-
-def check_no_mimic(model: pin.Model) -> None:
-    """Raise InvalidParameter if a joint of `model` mimics another: forward dynamics has none."""
-    joints = list(zip(model.names, model.joints, strict=True))[1:]
-    found = [name for name, joint in joints if _mimics(joint)]
-    if found:
-        raise InvalidParameter(
-            "model",
-            found,
-            "forward dynamics knows none: load the model with mimic=False, or lock them",
-            f"has joints that mimic others ({', '.join(found)}), but",
-        )
-
-
-def _mimics(joint: pin.JointModel) -> bool:
-    kind = joint.shortname()
-    if kind == "JointModelComposite":
-        return any(_mimics(part) for part in joint.extract().joints)
-    return bool(kind == "JointModelMimic")
 
 
 def _check_joint_frame(model: pin.Model, name: str, joint: int) -> None:
@@ -169,6 +154,8 @@ def find_joint(model: pin.Model, name: str) -> pin.JointModel:
 def set_joint(model: pin.Model, q: Array, name: str, value: float | Sequence[float]) -> None:
     """Write the position of one joint into `q` [m, rad; a free-flyer's x y z and quaternion].
 
+    That of a mimic joint moves the joint that it mimics.
+
     Raises
     ------
     NameNotFound
@@ -177,6 +164,13 @@ def set_joint(model: pin.Model, q: Array, name: str, value: float | Sequence[flo
         `value` has not as many numbers as the joint.
     """
     joint = find_joint(model, name)
+    rule = mimics(model).get(name)
+    if rule is not None:
+        number = value[0] if isinstance(value, Sequence) and len(value) == 1 else value
+        if isinstance(number, Sequence) or rule.ratio == 0.0:
+            raise SphshellError(f"joint '{name}' mimics '{rule.of}': give that joint's position")
+        set_joint(model, q, rule.of, (number - rule.offset) / rule.ratio)
+        return
     span = slice(joint.idx_q, joint.idx_q + joint.nq)
     if not isinstance(value, Sequence):
         if joint.nv != 1:

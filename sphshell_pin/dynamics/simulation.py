@@ -124,7 +124,8 @@ class Simulation:
         vary : parameters that differ from run to run: names to n values each. Names are
             "PAIR.law" and "PAIR.friction" (n laws, n frictions or None), "PAIR.law.FIELD" and
             "PAIR.friction.FIELD" (n numbers; the fields of the law or friction that the pair has),
-            "PAIR.sphere.radius" (n) [m], "PAIR.sphere.offset" (n, 3) [m], "PAIR.placement" of
+            "PAIR.sphere.radius" (n) [m], "PAIR.sphere.offset" (n, 3) [m], the same of
+            "PAIR.other_sphere", "PAIR.placement" of
             the shell in its frame (n pinocchio.SE3)
         record_dt : between recorded rows [s]; unless given only start and end are recorded
         progress : called a few times a second with the share of the runs that are done

@@ -120,7 +120,7 @@ def new_scenario(
     path = _free_path(out, robot, surface, force=force)
     section = _robot_section(robot, path, free_flyer=free_flyer, package_dirs=package_dirs)
     bare = _build_bare(section, path)
-    if not bare.assembly.model.nv and section.urdf is not None:
+    if not bare.assembly.model.nv and section.path is not None:
         # A single body without a joint would be fixed to the world.
         section = section.model_copy(update={"free_flyer": True})
         bare = _build_bare(section, path)

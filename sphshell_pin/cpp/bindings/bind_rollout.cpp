@@ -48,6 +48,7 @@ void bind_rollout(nanobind::module_& m) {
       .def_prop_ro("q", [](const Outcome& self) { return self.q; })
       .def_prop_ro("v", [](const Outcome& self) { return self.v; })
       .def_prop_ro("summaries", [](const Outcome& self) { return to_list(self.summaries); })
+      .def_prop_ro("limits", [](const Outcome& self) { return to_list(self.limits); })
       .def_prop_ro("residual", [](const Outcome& self) { return residual(self.record.energy); })
       .def_prop_ro("through", &through);
 
@@ -61,15 +62,15 @@ void bind_rollout(nanobind::module_& m) {
       .def(
           "add",
           [](Rollout& self, const std::vector<const Pair*>& pairs,
-             std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
-             const RunSettings& settings) {
+             std::shared_ptr<JointEffects> joints, std::shared_ptr<Controller> controller,
+             VectorX q0, VectorX v0, const RunSettings& settings) {
             check_count("q0", q0.size(), self.model().nq);
             check_count("v0", v0.size(), self.model().nv);
-            self.add(
-                {copies(pairs), settings, std::move(controller), std::move(q0), std::move(v0)});
+            self.add({copies(pairs), std::move(joints), settings, std::move(controller),
+                      std::move(q0), std::move(v0)});
           },
-          nb::arg("pairs"), nb::arg("controller").none(), nb::arg("q0"), nb::arg("v0"),
-          nb::arg("settings"))
+          nb::arg("pairs"), nb::arg("joints").none(), nb::arg("controller").none(), nb::arg("q0"),
+          nb::arg("v0"), nb::arg("settings"))
       // Threads may want the interpreter for a user's routine.
       .def(
           "wait",
