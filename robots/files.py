@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -17,9 +18,11 @@ from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.mimic import Mimic
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots import mjcf
 from sphshell_pin.robots.description import check_memory, check_size
 from sphshell_pin.robots.packages import Folders
+
+if TYPE_CHECKING:
+    from sphshell_pin.robots.mjcf import Extras
 
 Array = NDArray[np.float64]
 
@@ -55,7 +58,7 @@ _NEXT = "robots are read from URDF (.urdf), xacro (.xacro) and MJCF (.xml) files
 
 @dataclass(frozen=True)
 class Description:
-    """A robot's file, read: `root` is a URDF, or MJCF in the plain form of `mjcf.plain`."""
+    """A robot's file, read: `root` is a URDF, or MJCF in the plain form of mjcf.py."""
 
     file: Path
     folders: Folders
@@ -67,7 +70,7 @@ class Description:
     """What else the file states that is not modelled, one sentence each."""
     start: Mapping[str, Array] = field(default_factory=dict)
     """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
-    extras: Mapping[str, mjcf.Extras] = field(default_factory=dict)
+    extras: Mapping[str, Extras] = field(default_factory=dict)
     """Of ball joints of MJCF, which pinocchio reads without damping and dry friction."""
 
     def q0(self, model: pin.Model) -> Array:
@@ -117,8 +120,10 @@ def read(
             raise ValueError(f"its root element is <{tag}>; {_NEXT}")
         root = ET.fromstring(text)
         if tag == "mujoco":
+            from sphshell_pin.robots.mjcf import plain as in_plain_form
+
             what = "MJCF"
-            plain = mjcf.plain(root, file)
+            plain = in_plain_form(root, file)
             return Description(
                 file,
                 folders,
@@ -229,7 +234,8 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
                 mesh = assets.get(geom.get("mesh"))
                 if mesh is None or os.path.isfile(mesh.get("file", "")):
                     continue
-                if mjcf.is_visual(geom):
+                # MuJoCo lets it touch nothing.
+                if geom.get("contype") == "0" and geom.get("conaffinity") == "0":
                     missing[mesh.get("file", "")] = None
                     body.remove(geom)
                 else:

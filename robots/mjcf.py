@@ -68,11 +68,6 @@ def plain(root: ET.Element, file: Path) -> Plain:
     return _Reader(root, file).read()
 
 
-def is_visual(geom: ET.Element) -> bool:
-    """Whether a geom is only seen: MuJoCo lets it touch nothing."""
-    return geom.get("contype") == "0" and geom.get("conaffinity") == "0"
-
-
 class _Reader:
     """What one MJCF says, gathered body by body."""
 
@@ -119,7 +114,7 @@ class _Reader:
                     self._body(held, element, pose, childclass, "world")
                 elif element.tag == "geom":
                     geom = self._with_defaults(element, childclass)
-                    if not is_visual(ET.Element("geom", geom)):
+                    if (geom.get("contype"), geom.get("conaffinity")) != ("0", "0"):
                         scenery.append(geom.get("name", geom.get("type", "sphere")))
             bodies += list(held)
         if len(bodies) == 1:
