@@ -22,7 +22,7 @@ from sphshell_pin.robots.description import check_memory, check_size
 from sphshell_pin.robots.packages import Folders
 
 if TYPE_CHECKING:
-    from sphshell_pin.robots.mjcf import Extras
+    from sphshell_pin.robots.mjcf import Extras, Site
 
 Array = NDArray[np.float64]
 
@@ -72,6 +72,8 @@ class Description:
     """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
     extras: Mapping[str, Extras] = field(default_factory=dict)
     """Of ball joints of MJCF, which pinocchio reads without damping and dry friction."""
+    sites: tuple[Site, ...] = ()
+    """Of MJCF."""
 
     def q0(self, model: pin.Model) -> Array:
         """Return the configuration (nq,) that the file draws, of the model of `build_model`."""
@@ -133,6 +135,7 @@ def read(
                 plain.notes,
                 plain.start,
                 plain.extras,
+                tuple(plain.sites),
             )
         _check_tree(root)
         return Description(file, folders, root, tuple(_mimics(root)))
@@ -180,6 +183,8 @@ def build_model(description: Description, *, free_flyer: bool = False) -> pin.Mo
                 model = check_memory(pin.buildModelFromMJCF(path))
             for name, extras in description.extras.items():
                 extras.give(model, model.joints[model.getJointId(name)])
+            for site in description.sites:
+                site.give(model)
     except (ValueError, RuntimeError, OSError) as error:
         what = "MJCF" if description.is_mjcf else "URDF"
         raise RobotError(f"{file}: not a {what} that pinocchio can read: {_line(error)}") from None
