@@ -118,6 +118,23 @@ def _exit_code(report: RunReport, *, changed: bool) -> int:
     return MISSED
 
 
+def _print_joints(report: RunReport) -> None:
+    """Print the joints that came to a stop, or beyond a limit; nothing where none did."""
+    table = make_table("joint", "stops", "stop time", "torque cut", "peak speed")
+    for name, joint in report.result.stats.joints.items():
+        cut = fast = ""
+        if joint.first_cut is not None:
+            cut = f"{joint.cut_time:.4g} s, first at {joint.first_cut:.4g} s"
+        if joint.first_too_fast is not None:
+            fast = f"{joint.peak_speed:.4g}, too fast at {joint.first_too_fast:.4g} s"
+        if joint.stops or cut or fast:
+            table.add_row(
+                plain(name), f"{joint.stops}", f"{joint.stop_time:.4g} s", cut or "-", fast or "-"
+            )
+    if table.row_count:
+        terminal().print(table)
+
+
 def _print_report(report: RunReport) -> None:
     from sphshell_pin.scenario.figures import measure_energy
 
@@ -139,7 +156,8 @@ def _print_report(report: RunReport) -> None:
             f"{pair.mean_force:.4g} N",
             f"{pair.max_depth * 1e3:.4g} mm",
         )
-    console.print(table)
+    if stats.pairs:
+        console.print(table)
     others = [pair for name, pair in stats.pairs.items() if name not in shown]
     if others:
         touched = sum(1 for pair in others if pair.touches)
@@ -148,6 +166,7 @@ def _print_report(report: RunReport) -> None:
             f"all are in summary.json",
             highlight=False,
         )
+    _print_joints(report)
     energy = measure_energy(report.result)
     console.print(
         f"energy residual   {energy['residual']:.3g} J, {energy['relative_residual']:.2g} of the "

@@ -152,7 +152,7 @@ _JOINT_KINDS = {
     "friction": "dry friction",
     "armature": "armature",
     "effort": "effort limits",
-    "speed": "speed limits, which are only reported",
+    "speed": "speed limits",
 }
 
 
@@ -160,7 +160,8 @@ def _joints_modelled(scene: Scene) -> list[str]:
     out = []
     for kind in scene.joints.kinds():
         names = list(getattr(scene.joints, kind))
-        out.append(f"{_JOINT_KINDS[kind]} of {_names(names)}")
+        only = " (reported where they are exceeded)" if kind == "speed" else ""
+        out.append(f"{_JOINT_KINDS[kind]} of {_names(names)}{only}")
     model = scene.model
     mimics = [str(model.names[j]) for j in model.mimicking_joints]
     if mimics:
@@ -176,8 +177,7 @@ def _joints_stated(scene: Scene) -> list[str]:
         stated = getattr(JointIngredients.from_model(scene.model, [kind], _ANY_LAW), kind)
         left_out = [name for name in stated if name not in getattr(scene.joints, kind)]
         if left_out:
-            what = _JOINT_KINDS[kind].partition(",")[0]
-            out.append(f"{what} that the robot's file states, of {_names(left_out)}")
+            out.append(f"{_JOINT_KINDS[kind]} that the robot's file states, of {_names(left_out)}")
     return out
 
 
