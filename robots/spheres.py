@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from sphshell_pin.checks import check_placement, check_type
 from sphshell_pin.contact.sphere import Sphere
+from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
 
@@ -18,7 +19,7 @@ Array = npt.NDArray[np.float64]
 _PLACES = 800  # of the mesh, at each of which a sphere may touch it
 _COVERED = 4000  # places whose distances from the spheres are made small
 _MEASURED = 20_000  # places where the distance is measured in the end
-_AROUND = 400  # places of each sphere
+_AROUND = 1000  # places of each sphere
 _SMALLEST = 2e-3  # radius, as a share of the largest one
 _BEND = 2e-3  # share of the mesh's size by which a ball may miss the place that it is made for
 _MOST_SHRINKS = 60
@@ -33,7 +34,7 @@ class MeshSpheres:
     that much too late, and never begins too early, as no sphere reaches beyond the mesh.
     `spheres_to_mesh` is that of the surface of their union from the mesh [m]: the depth of the
     grooves between them, and of hollows inside. They are measured at 20000 places of the mesh and
-    its vertices, and at 400 of each sphere.
+    its vertices, and at 1000 of each sphere.
     """
 
     spheres: tuple[Sphere, ...]
@@ -78,6 +79,41 @@ def spheres_of_mesh(
         for center, radius in zip(centers, radii.tolist(), strict=True)
     ]
     return MeshSpheres(tuple(spheres), *_distances(shell, centers, radii, rng))
+
+
+def spheres_of_link(
+    model: pin.Model, geometry_model: pin.GeometryModel, link: str, *, count: int = 16
+) -> MeshSpheres:
+    """Approximate the geometry of a link by spheres in its frame, at most `count` for each part.
+
+    Spheres among it are taken as they are. The distances are the largest of all parts; see
+    `spheres_of_mesh`, whose errors are raised as well.
+
+    Raises
+    ------
+    FrameNotFound
+        The model has no such frame.
+    InvalidParameter
+        The link has no geometry.
+    """
+    frame = find_frame(model, link)
+    spheres: list[Sphere] = []
+    distances = np.zeros(2)
+    for part in geometry_model.geometryObjects:
+        if part.parentFrame != frame:
+            continue
+        placement = model.frames[frame].placement.actInv(part.placement)
+        if type(part.geometry).__name__ == "Sphere":
+            x, y, z = placement.translation.tolist()
+            spheres.append(Sphere(float(part.geometry.radius), link, (x, y, z)))
+            continue
+        shell = Shell.from_geometry(part)
+        found = spheres_of_mesh(shell, link, placement=placement, count=count)
+        spheres += found.spheres
+        distances = np.maximum(distances, [found.mesh_to_spheres, found.spheres_to_mesh])
+    if not spheres:
+        raise InvalidParameter("link", link, "must have geometry in this geometry model")
+    return MeshSpheres(tuple(spheres), *distances.tolist())
 
 
 def _places(shell: Shell, count: int, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -62,9 +62,10 @@ def check_robot(
     """Check contact on a robot: a name that sphshell_pin.robots knows, a URDF file, or a model.
 
     A sphere of `radius` [m] sits at `frame`; without them it is a fingertip or foot that is known,
-    else the end of the longest limb. `free_flyer` frees the root link of a URDF file. Meshes are
-    not loaded. The same `seed` gives the same postures; `sizes` says how many; `progress` is called
-    with the title of each check before it starts. A model is a pinocchio.Model.
+    else the outermost of the spheres inside the collision mesh at the end of the longest limb, or
+    that end. `free_flyer` frees the root link of a URDF file. Other meshes are not loaded. The same
+    `seed` gives the same postures; `sizes` says how many; `progress` is called with the title of
+    each check before it starts. A model is a pinocchio.Model.
 
     A robot that cannot be loaded on this machine, or whose sphere nothing can move, is reported as
     not checked, with the reason.
