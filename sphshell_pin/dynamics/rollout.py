@@ -19,6 +19,7 @@ from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.run_stats import PairFigures
 from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.dynamics.sensors import SensorSet
 from sphshell_pin.dynamics.variations import Variations
 from sphshell_pin.errors import (
     Interrupted,
@@ -80,8 +81,10 @@ class Rollout(Sequence[Result]):
         plan: Plan,
         threads: int,
         wall_time: float,
+        sensors: SensorSet,
     ) -> None:
         self._integrator, self._core, self._plan = integrator, core, plan
+        self._sensors = sensors
         self.threads, self.wall_time = threads, wall_time
         self.varied = plan.variations.columns
         self.failures = dict(plan.failures)
@@ -181,7 +184,8 @@ class Rollout(Sequence[Result]):
         number = self._plan.numbers[run]
         assert number is not None
         scene = self._plan.variations.scene(run)
-        return result_of(scene, self._integrator, outcome, self._core.record(number))
+        record = self._core.record(number)
+        return result_of(scene, self._integrator, outcome, record, self._sensors)
 
     def _why_not_begun(self, run: int, outcome: _core.Outcome) -> SphshellError | None:
         if outcome.deep_start is not None:

@@ -62,14 +62,14 @@ void bind_rollout(nanobind::module_& m) {
           "add",
           [](Rollout& self, const std::vector<const Pair*>& pairs,
              std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
-             const RunSettings& settings) {
+             const RunSettings& settings, const std::vector<const Sensor*>& sensors) {
             check_count("q0", q0.size(), self.model().nq);
             check_count("v0", v0.size(), self.model().nv);
-            self.add(
-                {copies(pairs), settings, std::move(controller), std::move(q0), std::move(v0)});
+            self.add({copies(pairs), settings, std::move(controller), std::move(q0), std::move(v0),
+                      copies(sensors)});
           },
           nb::arg("pairs"), nb::arg("controller").none(), nb::arg("q0"), nb::arg("v0"),
-          nb::arg("settings"))
+          nb::arg("settings"), nb::arg("sensors"))
       // Threads may want the interpreter for a user's routine.
       .def(
           "wait",
