@@ -202,4 +202,4 @@ def _shown(default: object) -> str:
         return ""
     if isinstance(default, bool):
         return str(default).lower()
-    return f"{default:g}" if isinstance(default, float) else f'"{default}"'
+    return f"{default:g}" if isinstance(default, int | float) else f'"{default}"'

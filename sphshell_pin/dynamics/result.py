@@ -296,8 +296,8 @@ class Result:
         """Return a figure, which a notebook shows.
 
         `kind` is "overview" (forces, depth and energy over time), "force" (force and depth of each
-        pair), "energy" (the audit), "path" (of the contacts on their shells) or "map" (the impulse
-        that each element took). The last two need a scene: `scene`, or the one that ran, or that of
+        pair), "energy" (the audit), "sensors" (their readings), "path" (of the contacts on their
+        shells) or "map" (the impulse that each element took). The last two need a scene: `scene`, or the one that ran, or that of
         the scenario the result came from; without any, the path is drawn in the world.
 
         Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where

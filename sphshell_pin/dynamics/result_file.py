@@ -63,9 +63,8 @@ SENSOR_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
 }
 """The same of a run with sensors; other files have none of them."""
 
-_IN_FILE = {name: name for name in ARRAYS | SENSOR_ARRAYS} | {
-    "contacts.contact_id": "contacts.number"
-}
+_IN_FILE = {name: name for name in ARRAYS | SENSOR_ARRAYS}
+_IN_FILE["contacts.contact_id"] = "contacts.number"
 
 
 class _Part(BaseModel):

@@ -296,16 +296,19 @@ def check_sensors(sensors: Iterable[object]) -> tuple[Sensor, ...]:
     if isinstance(sensors, Sensor):
         raise InvalidParameter("sensors", sensors, "must be a list of sensors: write [...]")
     try:
-        given = tuple(sensors)
+        given = list(sensors)
     except TypeError:
         raise InvalidParameter("sensors", sensors, "must be a list of sensors") from None
-    names = set[str]()
-    for k, sensor in enumerate(given):
-        check_type(f"sensors[{k}]", sensor, Sensor, "must be a sensor, as ForceTorqueSensor(...)")
-        if sensor.name in names:
-            raise InvalidParameter(f"sensors[{k}].name", sensor.name, "is taken by another sensor")
-        names.add(sensor.name)
-    return given
+    found: dict[str, Sensor] = {}
+    for k, one in enumerate(given):
+        if not isinstance(one, Sensor):
+            raise InvalidParameter(
+                f"sensors[{k}]", one, "must be a sensor, as ForceTorqueSensor(name, frame)"
+            )
+        if one.name in found:
+            raise InvalidParameter(f"sensors[{k}].name", one.name, "is taken by another sensor")
+        found[one.name] = one
+    return tuple(found.values())
 
 
 def reads_sensors(callback: object) -> bool:

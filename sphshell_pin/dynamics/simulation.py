@@ -64,13 +64,13 @@ class Simulation:
         """Run from q0 (nq,), v0 (nv,) for `duration` [s] and return the Result.
 
         `controller`: None, a controller of this package, or a callable
-        tau(t, q, v, contacts) -> (nv,); with a fifth argument `sensors` it gets the latest readings
-        by name, and needs `control_dt` where the integrator has no fixed step. Torques are held for `control_dt` [s]; by default a
+        tau(t, q, v, contacts) -> (nv,). Torques are held for `control_dt` [s]; by default a
         callable is asked once a fixed step, a controller of this package at every stage of it.
         Adaptive and Implicit ask at every stage, and Implicit 2 nv + 2 times more a step, at states
-        nearby: a callable with a memory needs control_dt. Rows are recorded every `record_dt` [s]
-        (default: every step); `progress` is called a few times a second with the share done. The
-        same input gives the same bits.
+        nearby: a callable with a memory needs control_dt. So does one with a fifth argument
+        `sensors`: it gets the latest reading of each sensor by name. Rows are recorded every
+        `record_dt` [s] (default: every step); `progress` is called a few times a second with the
+        share done. The same input gives the same bits.
 
         A law that cannot stop its sphere earns a WeakLawWarning.
 

@@ -6,6 +6,7 @@ import contextlib
 import csv
 import hashlib
 import json
+import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -45,6 +46,7 @@ RESULTS = (
     "energy.png",
     "contact_path.png",
     "contact_map.png",
+    "sensors.png",
     RECORDING,
 )
 
@@ -267,7 +269,8 @@ def write_sensors(path: str | PathLike[str], result: Result) -> None:
         writer = csv.writer(file)
         writer.writerow(columns)
         for row in zip(*(one.tolist() for one in columns.values()), strict=True):
-            writer.writerow(["" if one != one else one for one in row])  # nan: no reading
+            # nan: no reading
+            writer.writerow(["" if math.isnan(one) else one for one in row])
 
 
 def _write_summary(
