@@ -1,9 +1,10 @@
-"""Robots by name: own small URDFs beside this file, and example-robot-data's; their fingertips."""
+"""Robots by name (own small URDFs, example-robot-data's) and by file, and their fingertips."""
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,11 +14,44 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.contact.sphere import Sphere
-from sphshell_pin.errors import MissingExtra, NameNotFound, SphshellError
-from sphshell_pin.robots.description import read_model
+from sphshell_pin.dynamics.mimic import shortened, with_mimics
+from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
+from sphshell_pin.robots.description import check_size
+from sphshell_pin.robots.files import (
+    Description,
+    RobotError,
+    build_geometry,
+    build_model,
+    keep_spheres,
+    read,
+)
+
+__all__ = [
+    "OWN",
+    "TIPS",
+    "URDF_FOLDER",
+    "WORKING",
+    "Description",
+    "LoadedRobot",
+    "RobotError",
+    "build_geometry",
+    "build_model",
+    "end_spheres",
+    "exactly",
+    "fingertips",
+    "keep_spheres",
+    "load",
+    "load_file",
+    "load_urdf",
+    "mimics_of_library",
+    "names",
+    "read",
+]
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from sphshell_pin.dynamics.mimic import Mimic
 
 URDF_FOLDER = Path(__file__).parent / "urdf"
 
@@ -48,10 +82,6 @@ WORKING: dict[str, tuple[float, ...]] = {
 }
 
 
-class RobotError(SphshellError, ValueError):
-    """A robot description that cannot be loaded."""
-
-
 @dataclass(frozen=True)
 class LoadedRobot:
     """A robot ready for a Scene: its model, its geometry, a posture to start from."""
@@ -62,6 +92,8 @@ class LoadedRobot:
     visual_model: pin.GeometryModel
     q0: npt.NDArray[np.float64]
     """A posture (nq,): the robot's reference posture where it has one, else neutral."""
+    notes: tuple[str, ...] = ()
+    """What its file states that is not modelled, one sentence each."""
 
 
 def names() -> list[str]:
@@ -69,20 +101,23 @@ def names() -> list[str]:
     return [*OWN, *(name for name in _library() if name not in OWN)]
 
 
-def load(name: str) -> LoadedRobot:
-    """Return the robot called `name`.
+def load(name: str, *, mimic: bool = False, pose: str | None = None) -> LoadedRobot:
+    """Return the robot called `name`, its mimic joints free unless `mimic` is set.
+
+    `mimic` and `pose` are those of `load_file`.
 
     Raises
     ------
     MissingExtra
         No own robot has that name, and example-robot-data is not installed.
     NameNotFound
-        Nobody has that name.
+        Nobody has that name, or the robot has no pose called `pose`.
     RobotError
         Its description cannot be read on this machine (an SDF file, for one).
     """
     if name in OWN:
-        return load_urdf(URDF_FOLDER / f"{name}.urdf", free_flyer=OWN[name], name=name)
+        file = URDF_FOLDER / f"{name}.urdf"
+        return load_file(file, free_flyer=OWN[name], name=name, mimic=mimic, pose=pose)
     try:
         import example_robot_data
     except ImportError:
@@ -93,12 +128,75 @@ def load(name: str) -> LoadedRobot:
         robot = example_robot_data.load(name)
     except Exception as error:
         reason = str(error)
-        if "SDF" in reason and not hasattr(pin, "buildModelFromSdf"):
+        if "SDF" in reason or "Sdf" in reason:
             reason = "it is an SDF file, and the wheel of pinocchio has no SDF reader"
         raise RobotError(f"the robot '{name}' cannot be loaded: {reason}") from error
     # A reference posture may state a free-flyer's quaternion with a few digits only.
     q0 = pin.normalize(robot.model, np.asarray(robot.q0, dtype=float))
-    return LoadedRobot(name, robot.model, robot.collision_model, robot.visual_model, q0)
+    loaded = LoadedRobot(name, robot.model, robot.collision_model, robot.visual_model, q0)
+    if mimic:
+        rules, note = mimics_of_library(name, read(robot.urdf).mimics)
+        loaded = replace(_mimicking(loaded, rules, name), notes=note)
+    return _posed(loaded, pose, name)
+
+
+def load_file(
+    path: str | PathLike[str],
+    package_dirs: Iterable[str | PathLike[str]] = (),
+    *,
+    free_flyer: bool = False,
+    mimic: bool = False,
+    name: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
+    srdf: str | PathLike[str] | None = None,
+    pose: str | None = None,
+) -> LoadedRobot:
+    """Return the robot of one's own file: URDF, xacro (`xacro_args` are its arguments) or MJCF.
+
+    `package_dirs` are the folders that hold the packages of `package://` names; the file's own
+    folder and those above it, ROS_PACKAGE_PATH and AMENT_PREFIX_PATH are searched too. With
+    `free_flyer` the root link floats (nq 7, nv 6).
+
+    With `mimic`, joints that mimic others (URDF `<mimic>`, MJCF `<equality><joint>`) do so exactly:
+    the model's nq and nv are those of the other joints (`sphshell_pin.dynamics.mimic`). Without it
+    they move freely, as Pinocchio reads them.
+
+    `srdf` is a file with poses (its `<group_state>`). `pose` names the one that becomes `q0`; in
+    MJCF it may be a `<key>`.
+
+    Limits, damping, dry friction and armature are in the model's attributes of those names. Warns
+    with RobotWarning of visual meshes that are missing, and of what the file states that is not
+    modelled.
+
+    Raises
+    ------
+    RobotError
+        The file or one of its collision meshes is missing or cannot be read, or the robot is too
+        large: a chain of more than 1000 links, or more degrees of freedom than 2 GB of memory hold
+        (315). The floating root link has no mass. With `mimic`: a kinematic loop, or a joint that
+        mimics none that is there.
+    NameNotFound
+        There is no pose of that name.
+    MissingExtra
+        A xacro file without the package xacro.
+    """
+    description = read(path, package_dirs, xacro_args)
+    model = build_model(description, free_flyer=free_flyer)
+    _load_poses(model, srdf)
+    geometry, missing = [], []
+    for kind in (pin.GeometryType.COLLISION, pin.GeometryType.VISUAL):
+        one, without = build_geometry(description, model, kind)
+        geometry.append(one)
+        missing += without
+    robot = LoadedRobot(name or model.name, model, *geometry, pin.neutral(model))
+    if missing:
+        warnings.warn(
+            f"{path}: without these visual meshes, which are missing: {', '.join(missing)}; "
+            f"searched in {description.folders.searched()} (see --package-dir)",
+            RobotWarning,
+            stacklevel=2,
+        )
+    return _posed(exactly(robot, description, mimic=mimic), pose, str(path))
 
 
 def load_urdf(
@@ -107,41 +205,82 @@ def load_urdf(
     *,
     free_flyer: bool = False,
     name: str | None = None,
+    mimic: bool = False,
 ) -> LoadedRobot:
-    """Return the robot of one's own URDF file.
+    """Return the robot of one's own URDF file: `load_file` with the options that a URDF has."""
+    return load_file(path, package_dirs, free_flyer=free_flyer, name=name, mimic=mimic)
 
-    `package_dirs` are the folders that hold the packages of `package://` mesh names; the file's own
-    folder is always searched. With `free_flyer` the root link floats (nq 7, nv 6).
 
-    Raises
-    ------
-    RobotError
-        The file or one of its meshes is missing or cannot be read, or the robot is too large: a
-        chain of more than 1000 links, or more degrees of freedom than 2 GB of memory hold (315).
+def exactly(
+    robot: LoadedRobot, description: Description, *, mimic: bool, warn: bool = True
+) -> LoadedRobot:
+    """Return `robot` with mimic joints exact if `mimic`; note what its file states beyond that.
+
+    RobotError names kinematic loops and couplings, which without `mimic` are only warned of.
     """
-    file = Path(path)
-    if not os.path.isfile(file):
-        raise RobotError(f"{file}: no such URDF file")
-    dirs = [str(one) for one in package_dirs] + [str(file.parent)]
-    for folder in dirs:
-        if not os.path.isdir(folder):
-            raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
+    file, loops = description.file, description.loops
+    if loops and mimic:
+        raise RobotError(
+            f"{file}: not supported: {'; '.join(loops)}; leave them out of the file, or load it "
+            "with mimic = false, which lets these joints move freely"
+        )
+    if loops:
+        loops = (f"joints move freely that the file couples: {'; '.join(loops)}",)
+    for note in (*loops, *description.notes) if warn else ():
+        warnings.warn(f"{file}: {note}", RobotWarning, stacklevel=3)
+    robot = replace(robot, notes=(*loops, *description.notes))
+    return _mimicking(robot, description.mimics, str(file)) if mimic else robot
+
+
+def mimics_of_library(
+    name: str, rules: Iterable[Mimic]
+) -> tuple[tuple[Mimic, ...], tuple[str, ...]]:
+    """Return the rules of a robot of example-robot-data, corrected, and what was corrected."""
+    if name != "alex_psyonic_hands":
+        return tuple(rules), ()
+    # Its file leaves out of the mimicked joints' names which hand they are of.
+    corrected = tuple(
+        replace(rule, of=f"{rule.joint.partition('_')[0]}_{rule.of}") for rule in rules
+    )
+    first = corrected[0]
+    return corrected, (
+        "its file names mimicked joints without the hand, "
+        f"'{first.of.partition('_')[2]}' for '{first.of}': read with it",
+    )
+
+
+def _mimicking(robot: LoadedRobot, rules: Iterable[Mimic], what: str) -> LoadedRobot:
+    """Return `robot` with `rules` in its model; joints, frames and so the geometry stay."""
+    rules = tuple(rules)
+    if not rules:
+        return robot
     try:
-        model = read_model(file, free_flyer=free_flyer)
+        model = with_mimics(robot.model, rules)
+    except SphshellError as error:
+        raise RobotError(f"{what}: {error}") from None
+    return replace(robot, model=model, q0=shortened(model, robot.q0))
+
+
+def _load_poses(model: pin.Model, srdf: str | PathLike[str] | None) -> None:
+    if srdf is None:
+        return
+    if not os.path.isfile(srdf):
+        raise RobotError(f"{srdf}: no such SRDF file")
+    try:
+        check_size(Path(srdf).read_bytes())
+        pin.loadReferenceConfigurations(model, str(srdf), False)
     except (ValueError, RuntimeError, OSError) as error:
-        raise RobotError(f"{file}: not a URDF that pinocchio can read: {error}") from None
-    geometry = []
-    for kind in (pin.GeometryType.COLLISION, pin.GeometryType.VISUAL):
-        try:
-            geometry.append(pin.buildGeomFromUrdf(model, str(file), kind, package_dirs=dirs))
-        except (ValueError, RuntimeError) as error:
-            searched = ", ".join(dict.fromkeys(str(Path(one)) for one in dirs))
-            raise RobotError(
-                f"{file}: a mesh cannot be loaded ({str(error).strip().rstrip('.')}); searched in "
-                f"{searched}: give the folder above the package with --package-dir, package_dirs "
-                "in a scenario or in Python"
-            ) from None
-    return LoadedRobot(name or model.name, model, *geometry, pin.neutral(model))
+        raise RobotError(f"{srdf}: not an SRDF that pinocchio can read: {error}") from None
+
+
+def _posed(robot: LoadedRobot, pose: str | None, what: str) -> LoadedRobot:
+    """Return `robot` with q0 in one of its reference poses."""
+    if pose is None:
+        return robot
+    poses = {one.key(): one.data() for one in robot.model.referenceConfigurations}
+    if pose not in poses:
+        raise NameNotFound("pose", pose, what, poses)
+    return replace(robot, q0=pin.normalize(robot.model, np.asarray(poses[pose], dtype=float)))
 
 
 def fingertips(name: str) -> list[Sphere]:
@@ -157,15 +296,25 @@ def fingertips(name: str) -> list[Sphere]:
 
 def end_spheres(robot: LoadedRobot) -> list[Sphere]:
     """Return the sphere collision geometries of the links of `robot` without a further joint."""
-    parents = {int(parent) for parent in robot.model.parents}
-    tips = []
+    parents = {int(parent) for parent in robot.model.parents} - {0}
+    return [sphere for joint, sphere in _spheres(robot) if joint not in parents]
+
+
+def collision_spheres(robot: LoadedRobot) -> list[Sphere]:
+    """Return all spheres of the collision geometry of `robot`, in the frames of their links."""
+    return [sphere for _, sphere in _spheres(robot)]
+
+
+def _spheres(robot: LoadedRobot) -> Iterator[tuple[int, Sphere]]:
+    """Yield each sphere of the collision geometry with the joint that carries it."""
     for geometry in robot.collision_model.geometryObjects:
-        if type(geometry.geometry).__name__ != "Sphere" or geometry.parentJoint in parents - {0}:
-            continue
-        frame = robot.model.frames[geometry.parentFrame]
-        offset = frame.placement.actInv(geometry.placement).translation
-        tips.append(Sphere(float(geometry.geometry.radius), frame.name, offset))
-    return tips
+        if type(geometry.geometry).__name__ == "Sphere":
+            frame = robot.model.frames[geometry.parentFrame]
+            x, y, z = frame.placement.actInv(geometry.placement).translation.tolist()
+            yield (
+                int(geometry.parentJoint),
+                Sphere(float(geometry.geometry.radius), frame.name, (x, y, z)),
+            )
 
 
 def _library() -> list[str]:

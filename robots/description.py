@@ -1,10 +1,8 @@
-"""URDF files that pinocchio may read: its parser calls itself for every link of a chain."""
+"""Descriptions of robots that pinocchio may read: its parser calls itself for every link."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from os import PathLike
-from pathlib import Path
 from xml.parsers import expat
 
 import pinocchio as pin
@@ -22,19 +20,8 @@ MOST_MEMORY = 2e9
 """[B] of a pinocchio.Data, which holds eight arrays of one number per three velocities."""
 
 
-def read_model(path: str | PathLike[str], *, free_flyer: bool) -> pin.Model:
-    """Return the model of a URDF file; with `free_flyer` its root link floats.
-
-    Raises
-    ------
-    ValueError
-        The file is no URDF, or too large a one; the text says why.
-    OSError, RuntimeError
-        It cannot be opened, or pinocchio cannot make a model of it.
-    """
-    _check_size(path)
-    root = [pin.JointModelFreeFlyer()] if free_flyer else []
-    model = pin.buildModelFromUrdf(str(path), *root)
+def check_memory(model: pin.Model) -> pin.Model:
+    """Return `model`; ValueError if its pinocchio.Data would need too much memory."""
     memory = 8 * 8.0 * model.nv**3
     if memory > MOST_MEMORY:
         raise ValueError(
@@ -44,19 +31,25 @@ def read_model(path: str | PathLike[str], *, free_flyer: bool) -> pin.Model:
     return model
 
 
-def _check_size(path: str | PathLike[str]) -> None:
-    """Raise ValueError for XML that no robot needs; nothing is kept but the names of links."""
+def check_size(text: bytes) -> str:
+    """Return the name of the root element of a file; ValueError for XML that no robot needs.
+
+    Nothing is kept but the names of links.
+    """
     parser = expat.ParserCreate()
     opened: list[str] = []
+    root: list[str] = []
     joints: list[dict[str, str]] = []
     links = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal links
         opened.append(tag)
+        if len(opened) == 1:
+            root.append(tag)
         if len(opened) > DEEPEST:
             raise ValueError(f"its elements are nested more than {DEEPEST} deep")
-        links += opened[1:] == ["link"]
+        links += opened[1:] == ["link"] or tag == "body"
         if opened[1:] == ["joint"]:
             joints.append({})
         elif opened[1:-1] == ["joint"] and "link" in attributes:
@@ -69,8 +62,7 @@ def _check_size(path: str | PathLike[str]) -> None:
     parser.EndElementHandler = lambda _: opened.pop()
     parser.EntityDeclHandler = entity
     try:
-        with Path(path).open("rb") as file:
-            parser.ParseFile(file)
+        parser.Parse(text, True)
     except (expat.ExpatError, LookupError) as error:  # LookupError: an unknown encoding
         raise ValueError(f"it is not well-formed XML: {error}") from None
     if links > MOST_LINKS:
@@ -89,3 +81,4 @@ def _check_size(path: str | PathLike[str]) -> None:
             f"it has a chain of {length} links; at most {LONGEST_CHAIN} one behind another can be "
             "read"
         )
+    return root[0]

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics import ForceTorqueSensor as ForceTorqueSensor
     from sphshell_pin.dynamics import GravityCompensation as GravityCompensation
     from sphshell_pin.dynamics import Implicit as Implicit
+    from sphshell_pin.dynamics import JointFriction as JointFriction
+    from sphshell_pin.dynamics import JointIngredients as JointIngredients
+    from sphshell_pin.dynamics import JointLimits as JointLimits
     from sphshell_pin.dynamics import JointPD as JointPD
     from sphshell_pin.dynamics import JointTorqueSensor as JointTorqueSensor
     from sphshell_pin.dynamics import LinearlyImplicitEuler as LinearlyImplicitEuler
@@ -60,6 +63,9 @@ _HOME = {
     "Implicit": "dynamics",
     "JointPD": "dynamics",
     "JointTorqueSensor": "dynamics",
+    "JointLimits": "dynamics",
+    "JointIngredients": "dynamics",
+    "JointFriction": "dynamics",
     "LinearlyImplicitEuler": "dynamics",
     "Result": "dynamics",
     "RungeKutta4": "dynamics",

@@ -108,6 +108,7 @@ def contact_row_type() -> Any: ...
 
 class Pair:
     relaxation: float
+    group: str
     def __init__(
         self,
         name: str,
@@ -116,6 +117,7 @@ class Pair:
         joint_j: int,
         placement_j: _Doubles,
         radius: float,
+        ball: float,
         shell: Shell | None,
         source: Callable[[pin.SE3, pin.SE3], tuple[_Doubles, _Doubles, _Doubles]] | None,
         method: int,
@@ -123,8 +125,20 @@ class Pair:
         friction: FrictionLaw | None,
     ) -> None: ...
 
+class JointEffects:
+    def __init__(
+        self, damping: _Doubles, least_effort: _Doubles, most_effort: _Doubles, speed: _Doubles
+    ) -> None: ...
+    def add_stop(self, q: int, v: int, end: float, sign: float, law: NormalLaw) -> None: ...
+    def add_friction(
+        self, v: int, limit: float, stiffness: float, damping: float, relaxation: float
+    ) -> None: ...
+
 class _Evaluations:
-    def __init__(self, model: pin.Model, pairs: Sequence[Pair]) -> None: ...
+    def __init__(
+        self, model: pin.Model, pairs: Sequence[Pair], joints: JointEffects | None = None
+    ) -> None: ...
+    def joint_forces(self, q: _Doubles, v: _Doubles) -> _Doubles: ...
     def external_forces(self, q: _Doubles, v: _Doubles) -> pin.StdVec_Force: ...
     def contacts(self, q: _Doubles, v: _Doubles) -> NDArray[np.uint8]: ...
     def contact_derivatives(self, q: _Doubles, v: _Doubles) -> tuple[_Doubles, _Doubles]: ...
@@ -230,6 +244,7 @@ class Simulation:
         self,
         model: pin.Model,
         pairs: Sequence[Pair],
+        joints: JointEffects | None,
         controller: Controller | None,
         q0: _Doubles,
         v0: _Doubles,
@@ -238,7 +253,9 @@ class Simulation:
     ) -> None: ...
     def advance(self, wall_seconds: float, until: float = ...) -> int: ...
     def deep_start(self) -> tuple[int, float] | None: ...
-    def change(self, pairs: list[Pair], controller: Controller | None) -> None: ...
+    def change(
+        self, pairs: list[Pair], joints: JointEffects | None, controller: Controller | None
+    ) -> None: ...
     def push(self, joint: int, point: _Doubles, force_world: _Doubles, frame: int) -> None: ...
     def take(self) -> dict[str, NDArray[Any]]: ...
     def snapshot(self) -> dict[str, NDArray[Any]]: ...
@@ -258,6 +275,8 @@ class Simulation:
     def wall_time(self) -> float: ...
     @property
     def summaries(self) -> list[dict[str, float]]: ...
+    @property
+    def limits(self) -> list[dict[str, float]]: ...
 
 class Outcome:
     status: int
@@ -270,6 +289,8 @@ class Outcome:
     q: _Doubles
     v: _Doubles
     summaries: list[dict[str, float]]
+    @property
+    def limits(self) -> list[dict[str, float]]: ...
     residual: float
     through: list[int]
 
@@ -278,6 +299,7 @@ class Rollout:
     def add(
         self,
         pairs: Sequence[Pair],
+        joints: JointEffects | None,
         controller: Controller | None,
         q0: _Doubles,
         v0: _Doubles,

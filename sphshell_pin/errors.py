@@ -84,6 +84,14 @@ class WeakLawWarning(UserWarning):
     """A law is so compliant that the sphere's center is expected to pass through the shell."""
 
 
+class RobotWarning(UserWarning):
+    """A robot's file states what is not modelled, or names a visual mesh that is missing."""
+
+
+class SetupWarning(UserWarning):
+    """Input that is allowed and probably a mistake: a path off its shell, a press on nothing."""
+
+
 class InvalidShell(SphshellError, ValueError):
     """Vertices or elements from which no surface can be made."""
 
@@ -159,7 +167,10 @@ class UnusableExtra(MissingExtra):
 
 
 class DeepStart(SphshellError, ValueError):
-    """A sphere that starts deep inside its shell: `pair`, `depth` and `radius` [m]."""
+    """A sphere that starts deep inside its shell: `pair`, `depth` and `radius` [m].
+
+    Of two spheres `radius` is that of the smaller one.
+    """
 
     def __init__(self, pair: str, depth: float, radius: float) -> None:
         """Say how deep the sphere of `pair` starts."""

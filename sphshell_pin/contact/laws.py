@@ -108,15 +108,21 @@ class ImpactLaw(_PowerLaw, kind="impact"):
         poisson_2: float,
         restitution: float | None = None,
         speed: float | None = None,
+        *,
+        radius_2: float | None = None,
     ) -> ImpactLaw | HuntCrossleyLaw:
         """Build Hertz's law of a sphere of `radius` [m] on a plane: k = 4/3 E* sqrt(r), e = 3/2.
+
+        Of two spheres `radius_2` [m] is that of the second, and 1/r = 1/radius + 1/radius_2.
 
         1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2 (Johnson, Contact Mechanics, 4.22); Young's
         moduli in Pa. Without `restitution` the law is undamped. With `restitution` at the impact
         `speed` [m/s] it is a HuntCrossleyLaw: there restitution does not depend on the mass, in
         IMPACT it does.
         """
-        return Hertz(radius, young_1, poisson_1, young_2, poisson_2, restitution, speed).made()
+        return Hertz(
+            radius, young_1, poisson_1, young_2, poisson_2, restitution, speed, radius_2
+        ).made()
 
     @property
     def text(self) -> str:
@@ -150,6 +156,16 @@ class HuntCrossleyLaw(_PowerLaw, kind="hunt-crossley"):
         help="b, from the restitution wanted at an impact speed: "
         "`ImpactLaw.hertz(..., restitution=, speed=)` computes it",
     )
+
+    @classmethod
+    def with_restitution(
+        cls, stiffness: float, exponent: float, restitution: float, speed: float
+    ) -> HuntCrossleyLaw:
+        """Build the law that throws back at `restitution` times an impact speed of `speed` [m/s].
+
+        The mass does not matter (Hunt and Crossley 1975).
+        """
+        return cls(stiffness, exponent, _dissipation_for(restitution, speed))
 
     @property
     def text(self) -> str:
@@ -306,7 +322,7 @@ class AdamsImpact(Ingredient, kind="adams", of=NormalLaw):
 
 @dataclass(frozen=True)
 class Hertz(Ingredient, kind="hertz", of=NormalLaw):
-    """A ball on an elastic half-space, see ImpactLaw.hertz."""
+    """A ball on an elastic half-space or on another ball, see ImpactLaw.hertz."""
 
     radius: float = parameter(
         above=0, unit="m", label="Hertz radius", help="radius of the ball, or the effective one"
@@ -333,6 +349,13 @@ class Hertz(Ingredient, kind="hertz", of=NormalLaw):
         label="speed of the restitution",
         help="impact speed at which the restitution holds",
     )
+    radius_2: float | None = parameter(
+        None,
+        above=0,
+        unit="m",
+        label="Hertz radius 2",
+        help="radius of the second body where it is a ball, too; without it a half-space",
+    )
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a value outside its bounds, and for one of a pair."""
@@ -344,10 +367,13 @@ class Hertz(Ingredient, kind="hertz", of=NormalLaw):
     def made(self, folder: Path = Path()) -> ImpactLaw | HuntCrossleyLaw:
         """Return the law of this stiffness, of Hunt and Crossley where a restitution is given."""
         softness = (1 - self.poisson_1**2) / self.young_1 + (1 - self.poisson_2**2) / self.young_2
-        stiffness = 4 / 3 / softness * math.sqrt(self.radius)
+        radius = self.radius
+        if self.radius_2 is not None:
+            radius *= self.radius_2 / (radius + self.radius_2)
+        stiffness = 4 / 3 / softness * math.sqrt(radius)
         if self.restitution is None or self.speed is None:
             return ImpactLaw(stiffness, 1.5)
-        return HuntCrossleyLaw(stiffness, 1.5, _dissipation_for(self.restitution, self.speed))
+        return HuntCrossleyLaw.with_restitution(stiffness, 1.5, self.restitution, self.speed)
 
 
 def _dissipation_for(restitution: float, speed: float) -> float:

@@ -3,9 +3,10 @@
 from sphshell_pin.dynamics import controllers, integrators, sensors
 from sphshell_pin.dynamics.controllers import *  # noqa: F403
 from sphshell_pin.dynamics.integrators import *  # noqa: F403
+from sphshell_pin.dynamics.joints import JointFriction, JointIngredients, JointLimits
 from sphshell_pin.dynamics.result import ContactLog, EnergyAudit, Event, Result
 from sphshell_pin.dynamics.rollout import Rollout
-from sphshell_pin.dynamics.run_stats import PairFigures, RunStats
+from sphshell_pin.dynamics.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts, SceneState
 from sphshell_pin.dynamics.sensor_log import Readings, SensorLog
 from sphshell_pin.dynamics.sensors import *  # noqa: F403
@@ -16,6 +17,10 @@ __all__ = [
     "ContactPair",
     "EnergyAudit",
     "Event",
+    "JointFigures",
+    "JointFriction",
+    "JointIngredients",
+    "JointLimits",
     "PairFigures",
     "Readings",
     "Result",

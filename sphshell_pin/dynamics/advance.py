@@ -20,14 +20,16 @@ from sphshell_pin.checks import (
     check_not_negative,
     check_positive,
 )
+from sphshell_pin.dynamics.callables import reads_sensors
 from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callable
 from sphshell_pin.dynamics.explain import DEFAULT_SPEED, explain_pairs, relaxation_time, weakness
 from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.dynamics.models import find_joint
 from sphshell_pin.dynamics.result import Result
-from sphshell_pin.dynamics.run_stats import PairFigures, RunStats
+from sphshell_pin.dynamics.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.scene import Scene
-from sphshell_pin.dynamics.sensors import SensorSet, reads_sensors
-from sphshell_pin.errors import DeepStart, InvalidParameter, WeakLawWarning
+from sphshell_pin.dynamics.sensors import SensorSet
+from sphshell_pin.errors import DeepStart, InvalidParameter, SetupWarning, WeakLawWarning
 
 Array = NDArray[np.float64]
 AnyController = Controller | Callback | None
@@ -58,14 +60,21 @@ def start_run(
 ) -> _core.Simulation:
     """Check the arguments of Simulation.run and return the compiled run at its start.
 
-    With `warn`, a law that cannot stop its sphere causes a WeakLawWarning.
+    With `warn`, a law that cannot stop its sphere causes a WeakLawWarning, and a controller whose
+    parameters are probably a mistake a SetupWarning.
     """
     q, v = scene.check_state(q0, v0)
     duration = check_not_negative("duration", duration, "s")
     core_controller, hold = bind_controller(scene, integrator, controller, control_dt, q, sensors)
+    if warn and isinstance(controller, Controller):
+        for doubt in controller.doubts(scene, q):
+            warnings.warn(doubt, SetupWarning, stacklevel=3)
     settings = run_settings(scene, integrator, duration, hold, record_dt=record_dt, t0=t0)
     pairs = core_pairs(scene, q, v, warn=warn)
-    core = _core.Simulation(scene.model, pairs, core_controller, q, v, settings, sensors.core)
+    joints = scene.joints.to_core(scene.model)
+    core = _core.Simulation(
+        scene.model, pairs, joints, core_controller, q, v, settings, sensors.core
+    )
     deep = core.deep_start()
     if deep is not None:
         raise deep_start(scene, *deep)
@@ -166,8 +175,7 @@ def core_pairs(scene: Scene, q0: Array, v0: Array, *, warn: bool) -> list[_core.
 
 def deep_start(scene: Scene, pair: int, depth: float) -> DeepStart:
     """Return the error of a sphere that starts too deep [m] in the shell of its pair."""
-    sphere = scene.pairs[pair].sphere
-    return DeepStart(scene.pairs[pair].name, depth, sphere.radius if sphere else math.nan)
+    return DeepStart(scene.pairs[pair].name, depth, scene.pairs[pair].least_radius)
 
 
 def advance(
@@ -199,9 +207,10 @@ def result_of(
 ) -> Result:
     """Make the result of a compiled run, or of what is left of one, and its record."""
     names = tuple(pair.name for pair in scene.pairs)
+    summaries = core.summaries
     counts, wall_time = core.counts, core.wall_time
     simulated = core.time - float(record["t"][0] if len(record["t"]) else core.time)
-    figures = map(PairFigures.from_core, core.summaries)
+    figures = map(PairFigures.from_core, summaries[: len(names)])
     stats = RunStats(
         **counts,
         wall_time=wall_time,
@@ -210,8 +219,25 @@ def result_of(
         dt=step_of(integrator) or (simulated / counts["steps"] if counts["steps"] else 0.0),
         integrator=type(integrator).__name__,
         pairs=dict(zip(names, figures, strict=True)),
+        joints=joint_figures(scene, summaries[len(names) :], core.limits),
     )
     return Result.from_blocks([record], names, stats, scene, sensors)
+
+
+def joint_figures(
+    scene: Scene, stops: list[dict[str, float]], limits: list[dict[str, float]]
+) -> dict[str, JointFigures]:
+    """Return the figures of the joints that have stops or limits, from what the core adds up."""
+    model, joints = scene.model, scene.joints
+    found: dict[str, JointFigures] = {}
+    for name, sums in zip(joints.stopped_joints(model), stops, strict=True):
+        found[name] = found.get(name, JointFigures()).with_stop(sums)
+    if limits:
+        for name in dict.fromkeys((*joints.effort, *joints.speed)):
+            joint = find_joint(model, name)
+            for sums in limits[joint.idx_v : joint.idx_v + joint.nv]:
+                found[name] = found.get(name, JointFigures()).with_limit(sums)
+    return found
 
 
 class CtrlC:

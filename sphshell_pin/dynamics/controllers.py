@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -23,17 +24,27 @@ from sphshell_pin.checks import (
     check_type,
     check_vector,
 )
-from sphshell_pin.dynamics.models import find_frame, find_joint, set_joint
+from sphshell_pin.dynamics.callables import check_callable
+from sphshell_pin.dynamics.models import find_frame, find_joint, model_reach, set_joint
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
 from sphshell_pin.dynamics.sensor_log import Readings
 from sphshell_pin.errors import InvalidParameter, SphshellError, add_origin
 from sphshell_pin.parameters import Ingredient, parameter
 from sphshell_pin.shell import Shell
 
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.result import Result
+
 __all__ = ["CartesianImpedance", "GravityCompensation", "JointPD"]
 
 Array = NDArray[np.float64]
 
+
+# Of a path's points from their shell, as a part of its size, and of the path from the moved point,
+# as a part of the robot's reach: what is farther is probably a mistake.
+OFF_PATH, OUT_OF_REACH = 0.1, 0.05
+# Of the rows of a run, how many are looked at.
+_MOST_ROWS = 200
 
 # One number for all driven joints, one each (nv,), or by joint, 0 for the others.
 Gain = float | Sequence[float] | Array | Mapping[str, float]
@@ -111,6 +122,14 @@ class Controller(Ingredient):
         """Return this controller with the shells that it names."""
         return self
 
+    def doubts(self, scene: Scene, q0: Array) -> list[str]:
+        """Say what of the parameters is probably a mistake, for a start at q0 (nq,)."""
+        return []
+
+    def doubts_after(self, result: Result) -> list[str]:
+        """Say what in a finished run shows that the parameters are probably a mistake."""
+        return []
+
 
 @dataclass(frozen=True)
 class NoController(Ingredient, kind="none", of=Controller):
@@ -172,12 +191,13 @@ class JointPD(Controller, kind="joint-pd"):
 
 @dataclass(frozen=True)
 class CartesianImpedance(Controller, kind="cartesian-impedance"):
-    """Follow a path with a frame's origin and press on the surface: J^T F plus the bias torques.
+    """Follow a path with a point of a frame and press on the surface: J^T F plus the bias torques.
 
-    F = stiffness (x_d - x) + damping (x_d' - x') [N/m], [N s/m] (Hogan 1985). `path` (k, 3) [m] are
+    F = stiffness (x_d - x) + damping (x_d' - x') [N/m], [N s/m] (Hogan 1985), at the point x with
+    the coordinates `offset` (3,) [m] in the frame: its origin by default. `path` (k, 3) [m] are
     its corners: with `shell` in the shell's frame and projected on it, else in the world. With
-    `normal_force` [N] (needs a shell) the spring acts in the tangent plane only, and the frame is
-    pushed against the shell's normal, on the side where the frame is at the start. The target waits
+    `normal_force` [N] (needs a shell) the spring acts in the tangent plane only, and the point is
+    pushed against the shell's normal, on the side where it is at the start. The target waits
     `lead_in` [s] at the first point, then moves at `speed` [m/s], then waits at the last.
     `rotational_stiffness` [N m/rad] and `rotational_damping` [N m s/rad] hold the orientation of
     the start. `posture_stiffness` [N m/rad] pulls the joints to `q_ref` (default: the start) and
@@ -220,6 +240,13 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     joint_damping: Gain = parameter(0.0, unit="N m s/rad", help="damping of the joints")
     q_ref: Posture | None = parameter(None, help="posture; by default that of the start")
     joints: Iterable[str] | None = None
+    offset: Sequence[float] | Array = parameter(
+        (0.0, 0.0, 0.0),
+        unit="m",
+        help="of the point that is moved, in the frame",
+        min_length=3,
+        max_length=3,
+    )
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for wrong types, and for a shell's place without a shell."""
@@ -233,6 +260,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         if self.shell_frame is not None:
             check_name("shell_frame", self.shell_frame)
         check_placement("placement", self.placement)
+        check_vector("offset", self.offset, 3, " [m]")
 
     def in_scenario(self, find_shell: Callable[[str], ShellPlace]) -> CartesianImpedance:
         """Return this controller with the shell that it names."""
@@ -258,13 +286,13 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
             data = model.createData()
             pin.framesForwardKinematics(model, data, q0)
             shell_pose = data.oMf[carrier_index] * placement
-            at = shell_pose.actInv(data.oMf[frame_index].translation)
+            at = shell_pose.actInv(data.oMf[frame_index].act(np.asarray(self.offset)))
             above = float((at - points[0]) @ normals[0])
             normals = normals if above >= 0 else -normals
         return _core.CartesianImpedance(
             num_joints=model.njoints,
             joint=int(frame.parentJoint),
-            frame=frame.placement.homogeneous,
+            frame=(frame.placement * self._moved_point()).homogeneous,
             path_joint=int(carrier.parentJoint),
             path_placement=(carrier.placement * placement).homogeneous,
             times=self._times(points).tolist(),
@@ -280,6 +308,9 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
             q_ref=self.posture(model, q0),
             actuated=self.actuated(model),
         )
+
+    def _moved_point(self) -> pin.SE3:
+        return pin.SE3(np.eye(3), np.array(self.offset, dtype=float))
 
     def _shell_place(self, scene: Scene) -> tuple[str, pin.SE3]:
         """Return the frame that carries the path, and where the path's own frame is in it."""
@@ -317,6 +348,61 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         at = shell.closest_points(np.concatenate(pieces))
         return at.points, at.normals
 
+    def doubts(self, scene: Scene, q0: Array) -> list[str]:
+        """Say where the path is off the shell, or out of the robot's reach."""
+        said = []
+        if isinstance(self.shell, Shell):
+            corners = check_points("path", self.path)
+            off = np.abs(self.shell.closest_points(corners).distances)
+            k, size = int(np.argmax(off)), self.shell.size
+            if off[k] > OFF_PATH * size:
+                said.append(
+                    f"the controller's path is off the shell: path[{k}] is {off[k]:.3g} m from "
+                    f"'{self.shell.name}', which measures {size:.3g} m; its nearest point is "
+                    "taken: give points on the surface, in the shell's own coordinates [m]"
+                )
+        return said
+
+    def doubts_after(self, result: Result) -> list[str]:
+        """Say so if a controller that presses has touched nothing, or never came to its path."""
+        scene, said = result.scene, []
+        if scene is None or len(result.t) == 0:
+            return said
+        touched = any(one.contact_time > 0 for one in result.stats.pairs.values())
+        if self.normal_force and scene.pairs and not touched:
+            said.append(
+                f"nothing was touched, though the controller presses with {self.normal_force:g} N: "
+                "is the start near the shell, and on the side that the contact allows?"
+            )
+        nearest, reach = self._nearest_to_target(scene, result), model_reach(scene.model)
+        if nearest > OUT_OF_REACH * reach:
+            said.append(
+                f"the controller's target was never in reach: frame '{self.frame}' came no nearer "
+                f"than {nearest:.3g} m: move the path or the start, or raise the stiffness"
+            )
+        return said
+
+    def _nearest_to_target(self, scene: Scene, result: Result) -> float:
+        """Return the smallest distance [m] of the moved point from the target over the rows."""
+        model, data = scene.model, scene.model.createData()
+        name, placement = self._shell_place(scene)
+        carrier, frame = find_frame(model, name), find_frame(model, self.frame)
+        points, normals = self._projected_path()
+        times, nearest = self._times(points), np.inf
+        some = slice(None, None, -(-len(result.t) // _MOST_ROWS))
+        for t, q in zip(result.t[some], result.q[some], strict=True):
+            pin.framesForwardKinematics(model, data, q)
+            at = [np.interp(t, times, column) for column in points.T]
+            place = (data.oMf[carrier] * placement).actInv(
+                data.oMf[frame].act(np.array(self.offset, dtype=float))
+            )
+            away = place - np.array(at)
+            if self.normal_force:
+                normal = normals[min(int(np.searchsorted(times, t)), len(normals) - 1)]
+                away = away - normal * (normal @ away)
+            nearest = min(nearest, float(np.linalg.norm(away)))
+        return nearest
+
     def _times(self, points: Array) -> Array:
         lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
         return self.lead_in + np.concatenate([[0.0], np.cumsum(lengths)]) / self.speed
@@ -335,6 +421,7 @@ def wrap_callable(
 
     With `readings`, which reads the core's memory, it gets them as `sensors`.
     """
+    check_callable(callback)
 
     def torque(
         t: float, q: bytearray, v: bytearray, rows: bytearray, latest: bytes | bytearray = b""

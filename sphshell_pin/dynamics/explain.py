@@ -11,7 +11,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_moved_mass
-from sphshell_pin.dynamics.models import unit_warning
+from sphshell_pin.contact.laws import HuntCrossleyLaw
+from sphshell_pin.dynamics.joints import WHICH, JointIngredients
+from sphshell_pin.dynamics.models import beyond_limits, unit_warning
 from sphshell_pin.dynamics.sources import checked_source
 
 if TYPE_CHECKING:
@@ -22,6 +24,8 @@ Array = NDArray[np.float64]
 
 # Speed of approach where neither v nor a fall gives one [m/s].
 DEFAULT_SPEED = 0.1
+# Stands for the law of stops that are only listed.
+_ANY_LAW = HuntCrossleyLaw(1.0, 1.0)
 # Steps in the shortest time scale: enough for a few percent with fixed steps.
 STEPS_PER_SCALE = 30
 # Of the bristles' relaxation time [s].
@@ -90,10 +94,11 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     check_moved_mass(model)
     gravity = float(np.linalg.norm(model.gravity.linear))
     pairs = tuple(map(_with_curvature, scene.pairs, explain_pairs(scene, q, v)))
-    warnings: list[str] = []
+    warnings = beyond_limits(model, q)
     for pair, figures in zip(scene.pairs, pairs, strict=True):
         warnings += _warnings_of(scene, pair, figures)
     scales = [p.shortest_time for p in pairs if math.isfinite(p.shortest_time)]
+    scales += scene.joints.time_scales(model).values()
     recommended = _round_down(min(scales) / STEPS_PER_SCALE) if scales else 1e-3
     if dt is not None and dt > 1.0001 * recommended:
         warnings.append(
@@ -106,10 +111,52 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
         f"gravity {gravity:.4g} m/s^2" if gravity else "no gravity",
         _count(len(pairs), "contact pair"),
     ]
-    absent = ["joint limits, joint friction and contact between other pairs of bodies"]
+    modelled += _joints_modelled(scene)
+    absent = ["contact between other pairs of bodies", *_joints_stated(scene)]
     if scene.lock:
         absent.append(f"motion of the locked joints {', '.join(scene.lock)}")
     return Explanation(tuple(modelled), tuple(absent), pairs, recommended, tuple(warnings))
+
+
+# What a model may state of its joints, as a reader calls it.
+_JOINT_KINDS = {
+    "limits": "position limits",
+    "damping": "damping",
+    "friction": "dry friction",
+    "armature": "armature",
+    "effort": "effort limits",
+    "speed": "speed limits, which are only reported",
+}
+
+
+def _joints_modelled(scene: Scene) -> list[str]:
+    out = []
+    for kind in scene.joints.kinds():
+        names = list(getattr(scene.joints, kind))
+        out.append(f"{_JOINT_KINDS[kind]} of {_names(names)}")
+    model = scene.model
+    mimics = [str(model.names[j]) for j in model.mimicking_joints]
+    if mimics:
+        out.append(f"joints that mimic others, exactly: {_names(mimics)}")
+    return out
+
+
+def _joints_stated(scene: Scene) -> list[str]:
+    """List what the model states of its joints and the scene leaves out."""
+    out = []
+    # In ABA the model's armature acts anyhow.
+    for kind in (one for one in WHICH if one != "armature"):
+        stated = getattr(JointIngredients.from_model(scene.model, [kind], _ANY_LAW), kind)
+        left_out = [name for name in stated if name not in getattr(scene.joints, kind)]
+        if left_out:
+            what = _JOINT_KINDS[kind].partition(",")[0]
+            out.append(f"{what} that the robot's file states, of {_names(left_out)}")
+    return out
+
+
+def _names(names: list[str]) -> str:
+    shown = ", ".join(f"'{name}'" for name in names[:4])
+    return shown if len(names) <= 4 else f"{shown}, ... ({len(names)} joints)"
 
 
 def explain_pairs(scene: Scene, q: Array, v: Array) -> tuple[PairExplanation, ...]:
@@ -134,15 +181,15 @@ def relaxation_time(pair: ContactPair, figures: PairExplanation) -> float:
     radius): friction then follows a slip that turns round within an impact.
     """
     limit = figures.depth_limit_speed
-    if pair.sphere is None or not math.isfinite(limit):
+    if not pair.spheres or not math.isfinite(limit):
         return LONGEST_RELAXATION
-    shortest = pair.law.contact_time(pair.sphere.radius, limit)
+    shortest = pair.law.contact_time(pair.least_radius, limit)
     return min(0.02 * shortest, LONGEST_RELAXATION)
 
 
 def weakness(pair: ContactPair, figures: PairExplanation) -> str | None:
     """Say so where the law of a pair cannot stop the sphere."""
-    if pair.sphere is None or not figures.impact_depth >= pair.sphere.radius:
+    if not figures.impact_depth >= pair.least_radius:
         return None
     return (
         f"contact '{pair.name}': at {figures.approach_speed:.3g} m/s the depth would reach the "
@@ -178,9 +225,15 @@ def _touch_of(pair: ContactPair, data: pin.Data) -> _Touch | None:
             return None
         deepest = int(np.argmax(depths))
         return _Touch(-float(depths[deepest]), points[deepest], normals[deepest])
+    center = pose_i.translation
+    if pair.other_sphere is not None and pair.sphere is not None:
+        away = center - pose_j.translation
+        length = float(np.linalg.norm(away))
+        normal = away / length if length > 0 else np.array([0.0, 0.0, 1.0])
+        point = pose_j.translation + pair.other_sphere.radius * normal
+        return _Touch(length - pair.other_sphere.radius - pair.sphere.radius, point, normal)
     if pair.sphere is None or pair.shell is None:
         return None
-    center = pose_i.translation
     at = pair.shell.closest_points(pose_j.actInv(center)[None], method=pair.method)
     distance = float(at.distances[0])
     signed = {"both": abs(distance), "outside": distance, "inside": -distance}[pair.shell.side]
@@ -217,8 +270,8 @@ def _explain_pair(
         contact_time = law.contact_time(depth, speed)
         resting_depth = law.depth_at(weight)
         times.append(law.shortest_time(mass, speed, load))
-        if pair.sphere is not None:
-            limit = math.sqrt(2 * law.energy(pair.sphere.radius) / mass)
+        if pair.spheres:
+            limit = math.sqrt(2 * law.energy(pair.least_radius) / mass)
     if pair.friction is not None and math.isfinite(slip_mass):
         times.append(pair.friction.slip_time(slip_mass, load))
     return PairExplanation(
@@ -261,6 +314,11 @@ def _ingredients(pair: ContactPair) -> tuple[str, ...]:
             f"{len(shell.elements)} elements, box diagonal {shell.size * 1e3:.4g} mm, "
             f"side '{shell.side}', method '{pair.method}'; the shell {moving}"
         )
+    elif pair.sphere is not None and pair.other_sphere is not None:
+        lines.append(
+            f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}' against "
+            f"sphere of radius {pair.other_sphere.radius * 1e3:.4g} mm on frame '{pair.frame_j}'"
+        )
     else:
         lines.append(
             f"contact points of the user's own routine between frames '{pair.frame_i}' and "
@@ -278,13 +336,14 @@ def _ingredients(pair: ContactPair) -> tuple[str, ...]:
 def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> list[str]:
     out: list[str] = []
     where = f"contact '{pair.name}'"
-    if pair.sphere is None or pair.shell is None:
+    if not pair.spheres:
         return out
-    radius, shell = pair.sphere.radius, pair.shell
-    sentence = unit_warning(scene.model, radius, shell.size)
-    if sentence:
-        out.append(f"{where}: {sentence}")
-    out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
+    radius, shell = pair.least_radius, pair.shell
+    if shell is not None:
+        sentence = unit_warning(scene.model, radius, shell.size)
+        if sentence:
+            out.append(f"{where}: {sentence}")
+        out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
     weak = weakness(pair, figures)
     if weak is not None:
         out.append(weak)
@@ -297,7 +356,7 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
         out.append(f"{where}: starts at depth {-figures.gap * 1e3:.4g} mm, deep inside")
     if not math.isfinite(figures.effective_mass):
         out.append(f"{where}: neither body can move along the normal at this q")
-    if shell.side != "both" and not shell.is_closed:
+    if shell is not None and shell.side != "both" and not shell.is_closed:
         out.append(
             f"{where}: shell '{shell.name}' is open and one-sided: a sphere that goes round its "
             "rim is thrown out on the other side and gains energy"

@@ -34,22 +34,25 @@ def add_pairs(
         if not isinstance(objects[first].geometry, coal.Sphere):
             first, second = second, first
         ball, other = objects[first], objects[second]
-        if not isinstance(ball.geometry, coal.Sphere) or isinstance(other.geometry, coal.Sphere):
+        if not isinstance(ball.geometry, coal.Sphere):
+            continue
+        sphere, name = _sphere_of(scene.model, ball), f"{ball.name}-{other.name}"
+        if isinstance(other.geometry, coal.Sphere):
+            scene.add_contact(
+                sphere, _sphere_of(scene.model, other), law=law, friction=friction, name=name
+            )
             continue
         if second not in shells:
             shells[second] = Shell.from_geometry(other)
-        frame_i, on_i = _frame_of(scene.model, ball.parentJoint)
         frame_j, on_j = _frame_of(scene.model, other.parentJoint)
         scene.add_contact(
-            sphere=Sphere(
-                ball.geometry.radius, frame_i, tuple(on_i.actInv(ball.placement.translation))
-            ),
+            sphere=sphere,
             shell=shells[second],
             frame=frame_j,
             placement=on_j.actInv(other.placement),
             law=law,
             friction=friction,
-            name=f"{ball.name}-{other.name}",
+            name=name,
         )
     if not scene.pairs:
         raise InvalidParameter(
@@ -57,6 +60,12 @@ def add_pairs(
             f"{len(geometry_model.collisionPairs)} collision pairs",
             "must have at least one pair of a sphere and another shape (addCollisionPair)",
         )
+
+
+def _sphere_of(model: pin.Model, ball: pin.GeometryObject) -> Sphere:
+    frame, on_joint = _frame_of(model, ball.parentJoint)
+    x, y, z = on_joint.actInv(ball.placement.translation).tolist()
+    return Sphere(ball.geometry.radius, frame, (x, y, z))
 
 
 def _frame_of(model: pin.Model, joint: int) -> tuple[str, pin.SE3]:

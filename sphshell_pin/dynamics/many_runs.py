@@ -73,12 +73,13 @@ def roll_out(
             settings[hold] = run_settings(varied, integrator, duration, hold, record_dt=rows, t0=t0)
         # The rollout warns of a weak law when a sphere has gone through.
         pairs = core_pairs(varied, q0, v0, warn=False)
-        core.add(pairs, bound, q0, v0, settings[hold], sensors.core)
+        core.add(pairs, joints, bound, q0, v0, settings[hold], sensors.core)
 
     def rollout() -> Rollout:
         return Rollout(scene, integrator, core, plan, workers, time.perf_counter() - began, sensors)
 
     workers = max(min(workers, len(starts)), 1)
+    joints = scene.joints.to_core(scene.model)
     core = _core.Rollout(scene.model, workers)
     tasks = _Tasks(core, workers, progress, len(starts), plan.failures)
     try:

@@ -9,10 +9,14 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_name
+from sphshell_pin.dynamics.mimic import group_of, mimics
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.units import size_warning
 
 Array = NDArray[np.float64]
+
+# How far beyond a limit a joint may be for having been rounded [rad or m].
+_BEYOND = 1e-6
 
 
 def find_frame(model: pin.Model, name: str, called: str = "frame") -> int:
@@ -44,24 +48,28 @@ def frame_on_joint(model: pin.Model, joint: int) -> str | None:
 def reduced_model(model: pin.Model, lock: tuple[str, ...], q: Array) -> pin.Model:
     """Return a copy of `model` in which the joints named by `lock` are held at q (nq,).
 
-    NameNotFound lists the joints; InvalidParameter says why Pinocchio cannot hold one.
+    Of joints that mimic one another, one that is held holds all. NameNotFound lists the joints;
+    InvalidParameter says why Pinocchio cannot hold one.
     """
-    known = list(model.names)[1:]
-    for name in lock:
-        if name not in known:
-            raise NameNotFound("joint", name, "the model", known)
-    held = [int(model.getJointId(name)) for name in lock]
-    for name, joint in zip(lock, held, strict=True):
-        _check_joint_frame(model, name, joint)
+    held = held_joints(model, lock)
+    for joint in held:
+        _check_joint_frame(model, model.names[joint], joint)
     try:
         return pin.buildReducedModel(model, held, q)
     except (ValueError, RuntimeError, IndexError) as error:
-        reason = str(error).strip()
-        what = f"cannot be held ({reason}): name other joints to lock"
-        if "imic" in reason:
-            what = f"cannot be held ({reason}): lock the joints that mimic them too, or load the "
-            what += "model with mimic=False"
+        what = f"cannot be held ({str(error).strip()}): name other joints to lock"
         raise InvalidParameter("lock", list(lock), what) from None
+
+
+def held_joints(model: pin.Model, lock: tuple[str, ...]) -> list[int]:
+    """Return the joints that are held with those named by `lock`: the groups of mimic joints too.
+
+    NameNotFound lists the joints.
+    """
+    for name in lock:
+        find_joint(model, name)
+    names = dict.fromkeys(one for name in lock for one in group_of(model, name))
+    return [int(model.getJointId(name)) for name in names]
 
 
 def check_model(model: pin.Model) -> None:
@@ -101,26 +109,6 @@ def check_model(model: pin.Model) -> None:
             )
 
 
-def check_no_mimic(model: pin.Model) -> None:
-    """Raise InvalidParameter if a joint of `model` mimics another: forward dynamics has none."""
-    joints = list(zip(model.names, model.joints, strict=True))[1:]
-    found = [name for name, joint in joints if _mimics(joint)]
-    if found:
-        raise InvalidParameter(
-            "model",
-            found,
-            "forward dynamics knows none: load the model with mimic=False, or lock them",
-            f"has joints that mimic others ({', '.join(found)}), but",
-        )
-
-
-def _mimics(joint: pin.JointModel) -> bool:
-    kind = joint.shortname()
-    if kind == "JointModelComposite":
-        return any(_mimics(part) for part in joint.extract().joints)
-    return bool(kind == "JointModelMimic")
-
-
 def _check_joint_frame(model: pin.Model, name: str, joint: int) -> None:
     """Pinocchio reads the frame of a joint it locks, unchecked, before the frames on the joint."""
     on_joint = [frame for frame in model.frames if frame.parentJoint == joint]
@@ -139,14 +127,14 @@ def unit_warning(model: pin.Model, radius: float, shell_size: float) -> str | No
 
     `radius` [m] of the sphere, `shell_size` [m] the shell's box diagonal; None if all is well.
     """
-    for reference, what in ((radius, "sphere's radius"), (_reach(model), "robot's reach")):
+    for reference, what in ((radius, "sphere's radius"), (model_reach(model), "robot's reach")):
         sentence = size_warning(shell_size, reference, what)
         if sentence:
             return sentence
     return None
 
 
-def _reach(model: pin.Model) -> float:
+def model_reach(model: pin.Model) -> float:
     """Length [m] of the longest chain of joint placements: the robot's size."""
     reach = np.zeros(model.njoints)
     for j in range(1, model.njoints):
@@ -166,6 +154,8 @@ def find_joint(model: pin.Model, name: str) -> pin.JointModel:
 def set_joint(model: pin.Model, q: Array, name: str, value: float | Sequence[float]) -> None:
     """Write the position of one joint into `q` [m, rad; a free-flyer's x y z and quaternion].
 
+    That of a mimic joint moves the joint that it mimics.
+
     Raises
     ------
     NameNotFound
@@ -174,6 +164,13 @@ def set_joint(model: pin.Model, q: Array, name: str, value: float | Sequence[flo
         `value` has not as many numbers as the joint.
     """
     joint = find_joint(model, name)
+    rule = mimics(model).get(name)
+    if rule is not None:
+        number = value[0] if isinstance(value, Sequence) and len(value) == 1 else value
+        if isinstance(number, Sequence) or rule.ratio == 0.0:
+            raise SphshellError(f"joint '{name}' mimics '{rule.of}': give that joint's position")
+        set_joint(model, q, rule.of, (number - rule.offset) / rule.ratio)
+        return
     span = slice(joint.idx_q, joint.idx_q + joint.nq)
     if not isinstance(value, Sequence):
         if joint.nv != 1:
@@ -184,3 +181,21 @@ def set_joint(model: pin.Model, q: Array, name: str, value: float | Sequence[flo
     if len(value) != joint.nq:
         raise SphshellError(f"joint '{name}' takes {joint.nq} numbers, not {len(value)}")
     q[span] = value
+
+
+def beyond_limits(model: pin.Model, q: Array) -> list[str]:
+    """Say which joints of one coordinate are beyond their limits at q (nq,)."""
+    said = []
+    for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
+        if joint.nq != 1:
+            continue
+        at = float(q[joint.idx_q])
+        low = float(model.lowerPositionLimit[joint.idx_q])
+        high = float(model.upperPositionLimit[joint.idx_q])
+        # A model that states none has infinite ones, or the same for both.
+        if low < high and not low - _BEYOND <= at <= high + _BEYOND:
+            said.append(
+                f"joint '{name}' starts at {at:.6g}, beyond its limits {low:.6g} to {high:.6g} "
+                "[rad or m]: change the start"
+            )
+    return said

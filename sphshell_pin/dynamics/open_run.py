@@ -146,7 +146,7 @@ class OpenRun:
                 scene, simulation.integrator, controller, self._control_dt, q, self._sensors
             )
         pairs = core_pairs(scene, q, v, warn=False)
-        self._core.change(pairs, core_controller)
+        self._core.change(pairs, scene.joints.to_core(scene.model), core_controller)
         if core_controller is not None:
             self._controller = controller
         self.simulation = simulation
@@ -189,8 +189,10 @@ def contacts_of(row: Result) -> SceneContacts:
 
 
 def _alike(before: Scene, after: Scene) -> bool:
-    """Whether two scenes differ in laws, friction of one kind and radii alone."""
+    """Whether two scenes differ in laws, friction of a kind, radii and values of joints alone."""
     same_model = before.model is after.model or before.model == after.model
+    if not before.joints.alike(after.joints, before.model):
+        return False
     pairs = list(zip(before.pairs, after.pairs, strict=False))
     return (
         same_model and len(before.pairs) == len(after.pairs) and all(_same_place(*p) for p in pairs)
@@ -202,6 +204,7 @@ def _same_place(a: ContactPair, b: ContactPair) -> bool:
         (a.joint_i, a.joint_j, a.method, a.name) == (b.joint_i, b.joint_j, b.method, b.name)
         and a.shell is b.shell
         and a.find is b.find
+        and a.kind == b.kind
         and type(a.friction) is type(b.friction)
         and _equal(a.placement_i, b.placement_i)
         and _equal(a.placement_j, b.placement_j)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -15,13 +17,22 @@ from sphshell_pin.dynamics.sources import Find, checked_source
 from sphshell_pin.shell import Shell
 
 
+class PlacedSphere(NamedTuple):
+    """A sphere of `radius` [m] whose center is the origin of `placement` in a joint."""
+
+    joint: int
+    placement: pin.SE3
+    radius: float
+
+
 @dataclass(frozen=True)
 class ContactPair:
     """One pair of bodies that may touch; body i carries the sphere, body j the shell.
 
     `frame_i`, `frame_j` name their frames, `joint_i`, `joint_j` the joints, `pose_i`, `pose_j` the
-    frames' placements in the joints. The shell is at `placement` in frame_j. A pair of a contact
-    source has `find` instead of `sphere` and `shell`.
+    frames' placements in the joints. The shell is at `placement` in frame_j; a pair of two spheres
+    has `other_sphere`, on body j, instead of it, and a pair of a contact source has `find` instead
+    of `sphere` and `shell`. `group` names the entry of which there are several pairs.
     """
 
     name: str
@@ -38,6 +49,8 @@ class ContactPair:
     sphere: Sphere | None = None
     shell: Shell | None = None
     find: Find | None = None
+    other_sphere: Sphere | None = None
+    group: str = ""
 
     frame = renamed("frame", "frame_j")
     sphere_placement = renamed("sphere_placement", "placement_i")
@@ -45,19 +58,36 @@ class ContactPair:
 
     @property
     def kind(self) -> str:
-        """Return "sphere-shell" or "source"."""
-        return "sphere-shell" if self.find is None else "source"
+        """Return "sphere-shell", "sphere-sphere" or "source"."""
+        if self.find is not None:
+            return "source"
+        return "sphere-shell" if self.other_sphere is None else "sphere-sphere"
+
+    @property
+    def spheres(self) -> tuple[PlacedSphere, ...]:
+        """The spheres of this pair: one, two, or none of a source."""
+        out = []
+        if self.sphere is not None:
+            out.append(PlacedSphere(self.joint_i, self.placement_i, self.sphere.radius))
+        if self.other_sphere is not None:
+            out.append(PlacedSphere(self.joint_j, self.placement_j, self.other_sphere.radius))
+        return tuple(out)
+
+    @property
+    def least_radius(self) -> float:
+        """The radius of the smallest of `spheres` [m], nan without any."""
+        return min((one.radius for one in self.spheres), default=math.nan)
 
     @cached_property
     def placement_i(self) -> pin.SE3:
         """The sphere's center in joint_i; of a source, frame_i."""
-        if self.sphere is None:
-            return self.pose_i
-        return self.pose_i * pin.SE3(np.eye(3), np.array(self.sphere.offset))
+        return self.pose_i if self.sphere is None else _center(self.pose_i, self.sphere)
 
     @cached_property
     def placement_j(self) -> pin.SE3:
-        """The shell in joint_j; of a source, frame_j."""
+        """The shell, or the other sphere's center, in joint_j; of a source, frame_j."""
+        if self.other_sphere is not None:
+            return _center(self.pose_j, self.other_sphere)
         return self.pose_j * self.placement
 
     def to_core(self) -> _core.Pair:
@@ -66,16 +96,23 @@ class ContactPair:
         if self.find is not None:
             has_state = self.friction is not None and self.friction.has_state
             source = checked_source(self.find, self.name, has_state)
-        return _core.Pair(
+        core = _core.Pair(
             name=self.name,
             joint_i=self.joint_i,
             placement_i=self.placement_i.homogeneous,
             joint_j=self.joint_j,
             placement_j=self.placement_j.homogeneous,
             radius=0.0 if self.sphere is None else self.sphere.radius,
+            ball=0.0 if self.other_sphere is None else self.other_sphere.radius,
             shell=None if self.shell is None else self.shell.core_for(self.method),
             source=source,
             method=int(Method.from_name(self.method)),
             law=self.law.core,
             friction=None if self.friction is None else self.friction.core,
         )
+        core.group = self.group
+        return core
+
+
+def _center(frame: pin.SE3, sphere: Sphere) -> pin.SE3:
+    return frame * pin.SE3(np.eye(3), np.array(sphere.offset))

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import read_only
-from sphshell_pin.dynamics.run_stats import RunStats
+from sphshell_pin.dynamics.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.dynamics.scene_contacts import Columns, SceneContacts, columns
 from sphshell_pin.dynamics.sensor_log import SensorLog, joined_logs, sensor_columns, split_logs
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-EVENT_KINDS = ("touch", "lift_off", "deep", "through")
+EVENT_KINDS = get_args(EventKind)
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,12 @@ class ContactLog(SceneContacts):
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at time `t` [s] to the pair called `pair`.
+    """Something that happened at time `t` [s] to the pair, or the joint, called `pair`.
 
-    `kind`: "touch", "lift_off", "deep" (the depth passed half the sphere's radius) or "through"
-    (the sphere's centre was pushed through the shell; it is pushed back).
+    `kind` of a pair: "touch", "lift_off", "deep" (the depth passed half the sphere's radius) or
+    "through" (the sphere's center was pushed through the shell; it is pushed back). Of a joint:
+    "stop" (it reached the end of its range), "effort_limit" (the controller's torque is cut),
+    "speed_limit" (it is too fast), and "stop_left", "effort_limit_left", "speed_limit_left".
     """
 
     t: float
@@ -71,9 +73,9 @@ class Event:
 class EnergyAudit:
     """Where the energy is and where it went, (n,) [J] at the result's rows.
 
-    `kinetic` and `potential` (gravity) of the model, `elastic` of the contacts, stretched bristles
-    included; since the start: `damping_loss` and `friction_loss` of the contacts, `control_work` of
-    the controller.
+    `kinetic` and `potential` (gravity) of the model, `elastic` of the contacts and stops of joints,
+    stretched bristles included; since the start: `damping_loss` and `friction_loss` of the contacts
+    and joints, `control_work` of the controller.
     """
 
     kinetic: Array
@@ -168,9 +170,10 @@ class Result:
         energy = {
             f.name: read_only(whole["energy"][:, i]) for i, f in enumerate(fields(EnergyAudit))
         }
+        owners = _owners(pairs, scene)
         events = tuple(
-            Event(float(t), pairs[pair], EVENT_KINDS[kind])
-            for t, pair, kind in zip(
+            Event(float(t), owners[EVENT_KINDS[kind]][number], EVENT_KINDS[kind])
+            for t, number, kind in zip(
                 whole["event_t"], whole["event_pair"], whole["event_kind"], strict=True
             )
         )
@@ -297,8 +300,9 @@ class Result:
 
         `kind` is "overview" (forces, depth and energy over time), "force" (force and depth of each
         pair), "energy" (the audit), "sensors" (their readings), "path" (of the contacts on their
-        shells) or "map" (the impulse that each element took). The last two need a scene: `scene`, or the one that ran, or that of
-        the scenario the result came from; without any, the path is drawn in the world.
+        shells) or "map" (the impulse that each element took). The last two need a scene: `scene`,
+        or the one that ran, or that of the scenario the result came from; without any, the path is
+        drawn in the world.
 
         Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where
         there is no scene for the map or the scenario cannot be built again.
@@ -334,3 +338,16 @@ class Result:
         from sphshell_pin.view.recording import view_result
 
         return view_result(self, scene, visual_model, speed=speed, height=height, title=title)
+
+
+def _owners(pairs: tuple[str, ...], scene: Scene) -> dict[str, tuple[str, ...]]:
+    """Return the names that the numbers of events stand for, by the kind of the event."""
+    if not scene.joints.kinds():
+        return dict.fromkeys(EVENT_KINDS, pairs)
+    model = scene.model
+    stops = scene.joints.stopped_joints(model)
+    velocities = tuple(
+        name for name, joint in zip(model.names, model.joints, strict=True) for _ in range(joint.nv)
+    )
+    owners = [pairs] * 4 + [stops] * 2 + [velocities] * 4
+    return dict(zip(EVENT_KINDS, owners, strict=True))

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from sphshell_pin.atomic import atomic_file
-from sphshell_pin.dynamics.run_stats import RunStats
+from sphshell_pin.dynamics.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene_contacts import Columns
 from sphshell_pin.errors import ResultError
 
@@ -92,7 +92,7 @@ class Header(_Part):
     format: Literal[1]
     pairs: list[str]
     stats: RunStats
-    events: list[tuple[float, str, Literal["touch", "lift_off", "deep", "through"]]]
+    events: list[tuple[float, str, EventKind]]
     origin: _Origin | None = None
     sensors: dict[str, list[str]] = {}
 
@@ -228,8 +228,8 @@ def _header(path: str | PathLike[str], text: str) -> Header:
         first = error.errors(include_url=False)[0]
         where = ".".join(["header", *map(str, first["loc"])])
         raise _refused(path, f"{where}: {first['msg']}") from None
-    known = set(header.pairs)
-    unknown = {pair for _, pair, _ in header.events} | set(header.stats.pairs)
+    known, joints = set(header.pairs), set(header.stats.joints)
+    unknown = {name for _, name, _ in header.events} - joints | set(header.stats.pairs)
     if len(known) < len(header.pairs) or unknown - known:
         raise _refused(path, f"header.pairs does not list each pair once: {header.pairs}")
     return header

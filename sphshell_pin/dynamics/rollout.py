@@ -108,7 +108,8 @@ class Rollout(Sequence[Result]):
             self.t[run], self.steps[run] = outcome.time, outcome.counts["steps"]
             self.q[run], self.v[run] = outcome.q, outcome.v
             self.residual[run] = outcome.residual
-            for pair, summary in zip(scene.pairs, outcome.summaries, strict=True):
+            # Behind the pairs are the stops of joints.
+            for pair, summary in zip(scene.pairs, outcome.summaries, strict=False):
                 for name, value in asdict(PairFigures.from_core(summary)).items():
                     column = self.figures.setdefault(
                         f"{pair.name}.{name}", np.full(count, math.nan)

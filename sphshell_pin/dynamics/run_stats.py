@@ -3,10 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import ClassVar
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Literal
 
 from sphshell_pin.deprecation import FormerDict
+
+# Kinds of events in the order of the compiled core; from the fifth on, of joints.
+EventKind = Literal[
+    "touch",
+    "lift_off",
+    "deep",
+    "through",
+    "stop",
+    "stop_left",
+    "effort_limit",
+    "effort_limit_left",
+    "speed_limit",
+    "speed_limit_left",
+]
 
 
 @dataclass(frozen=True)
@@ -40,6 +54,57 @@ class PairFigures(FormerDict):
 
 
 @dataclass(frozen=True)
+class JointFigures:
+    """Figures of one joint that has stops or limits, over all steps of a run, recorded or not.
+
+    `stop_time` [s] beyond the range; `stops` how often it came to an end of it; `stop_impulse` of
+    the stops' force [N m s or N s], `peak_stop_force` [N m or N] and `max_stop_depth` [rad or m]
+    the largest; `cut_time` [s] with the controller's torque cut to the effort limit, since
+    `first_cut` [s]; `peak_speed` [rad/s or m/s], beyond its limit first at `first_too_fast` [s].
+    Times are None where that never happened.
+    """
+
+    __pydantic_config__: ClassVar[Mapping[str, bool]] = {"strict": True}
+
+    stop_time: float = 0.0
+    stops: int = 0
+    stop_impulse: float = 0.0
+    peak_stop_force: float = 0.0
+    max_stop_depth: float = 0.0
+    cut_time: float = 0.0
+    first_cut: float | None = None
+    peak_speed: float = 0.0
+    first_too_fast: float | None = None
+
+    def with_stop(self, sums: Mapping[str, float]) -> JointFigures:
+        """Return these with what the core adds up at one more stop."""
+        return replace(
+            self,
+            stop_time=self.stop_time + sums["contact_time"],
+            stops=self.stops + int(sums["touches"]),
+            stop_impulse=self.stop_impulse + sums["impulse"],
+            peak_stop_force=max(self.peak_stop_force, sums["peak_force"]),
+            max_stop_depth=max(self.max_stop_depth, sums["max_depth"]),
+        )
+
+    def with_limit(self, sums: Mapping[str, float]) -> JointFigures:
+        """Return these with what the core adds up of one more velocity."""
+        return replace(
+            self,
+            cut_time=max(self.cut_time, sums["cut_time"]),
+            first_cut=_earlier(self.first_cut, sums["first_cut"]),
+            peak_speed=max(self.peak_speed, sums["peak_speed"]),
+            first_too_fast=_earlier(self.first_too_fast, sums["first_too_fast"]),
+        )
+
+
+def _earlier(known: float | None, new: float) -> float | None:
+    if new < 0:
+        return known
+    return new if known is None else min(known, new)
+
+
+@dataclass(frozen=True)
 class RunStats(FormerDict):
     """Cost and figures of a run; zeros for the rows of a run that goes on.
 
@@ -47,7 +112,8 @@ class RunStats(FormerDict):
     an event and made again, as they missed it; `evaluations` of forces and forward dynamics in all
     of these; `event_queries` of the contacts alone, to locate events within a step; `duration` [s]
     simulated in `wall_time` [s], their ratio `real_time_factor`; `dt` [s] the fixed or the mean
-    step; `integrator` the name of its class; `pairs` the figures by the pairs' names.
+    step; `integrator` the name of its class; `pairs` the figures by the pairs' names, `joints`
+    those of joints with stops or limits.
     """
 
     __pydantic_config__: ClassVar[Mapping[str, bool]] = {"strict": True}
@@ -63,3 +129,4 @@ class RunStats(FormerDict):
     dt: float = 0.0
     integrator: str = ""
     pairs: dict[str, PairFigures] = field(default_factory=dict)
+    joints: dict[str, JointFigures] = field(default_factory=dict)

@@ -17,7 +17,6 @@ from sphshell_pin.checks import (
     check_configuration,
     check_name,
     check_names,
-    check_placement,
     check_positive,
     check_type,
     check_vector,
@@ -27,18 +26,18 @@ from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.explain import Explanation, explain_scene
 from sphshell_pin.dynamics.from_geometry import add_pairs
+from sphshell_pin.dynamics.joints import JointIngredients, check_joints
 from sphshell_pin.dynamics.models import (
     check_model,
-    check_no_mimic,
     find_frame,
     reduced_model,
-    unit_warning,
 )
 from sphshell_pin.dynamics.pairs import ContactPair
 from sphshell_pin.dynamics.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.scene_state import SceneState
 from sphshell_pin.dynamics.sources import Find
-from sphshell_pin.errors import InvalidParameter, NameNotFound, UnitWarning
+from sphshell_pin.dynamics.spheres import Parts, default_group, named, parts_of, warn_of_size
+from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.shell import Shell
 
 __all__ = ["ContactPair", "Scene", "SceneContacts", "SceneState"]
@@ -52,24 +51,22 @@ class _Settings(TypedDict, total=False):
     method: str
 
 
-class _Parts(TypedDict, total=False):
-    placement: pin.SE3
-    method: str
-    sphere: Sphere
-    shell: Shell
-    find: Find
-
-
 class Scene:
     """A copy of a Pinocchio model with the contact pairs that act on it.
 
     `lock` names joints to hold at their values in `q_lock` (nq of the given model, default
-    neutral): they drop out of the scene's model and cost nothing. FrameNotFound and NameNotFound
-    list what the model has; InvalidParameter names mimic joints that are left.
+    neutral): they drop out of the scene's model and cost nothing. `joints` says what else acts in
+    the joints, for instance JointIngredients.from_model(model): by default nothing, as in
+    Pinocchio. Joints that mimic others (pinocchio's mimic=True) move exactly so: nq and nv count
+    independent coordinates. FrameNotFound and NameNotFound list what the model has.
     """
 
     def __init__(
-        self, model: pin.Model, lock: Iterable[str] = (), q_lock: ArrayLike | None = None
+        self,
+        model: pin.Model,
+        lock: Iterable[str] = (),
+        q_lock: ArrayLike | None = None,
+        joints: JointIngredients | None = None,
     ) -> None:
         if not isinstance(model, pin.Model):
             raise InvalidParameter("model", type(model).__name__, "must be a pinocchio.Model")
@@ -86,7 +83,10 @@ class Scene:
         self._model = reduced_model(model, self.lock, q) if self.lock else pin.Model(model)
         # What a locked joint holds, its frames do not say any more.
         self._whole = (pin.Model(model), q) if self.lock else (self._model, q)
-        check_no_mimic(self._model)
+        # Of joints that are held nothing is left to model.
+        held = () if joints is None else tuple(n for n in model.names if n not in self._model.names)
+        self._joints = check_joints(joints, self._model, held)
+        self._model = self._joints.with_armature(self._model)
         # What users get, made when they first ask; `_model` is never handed out.
         self._shown: pin.Model | None = None
         self._pairs: tuple[ContactPair, ...] = ()
@@ -123,10 +123,15 @@ class Scene:
         """The contact pairs, in the order in which they were added."""
         return self._pairs
 
+    @property
+    def joints(self) -> JointIngredients:
+        """What is modelled in the joints, without the locked ones."""
+        return self._joints
+
     def add_contact(
         self,
         sphere: Sphere,
-        shell: Shell,
+        shell: Shell | Sphere,
         frame: str = "universe",
         placement: pin.SE3 | None = None,
         law: NormalLaw | None = None,
@@ -136,32 +141,56 @@ class Scene:
     ) -> ContactPair:
         """Let `sphere` touch `shell`, which is placed at `placement` in `frame`.
 
+        In place of the shell there may be another Sphere, which is a solid ball in a frame of its
+        own: `frame`, `placement` and `method` are then not to be given. Contact is symmetric, but
+        that forces act at the point of this other sphere that is closest to the first one's center.
+
         Without `friction` the contact has none; `method` is "smooth" (default), "facets" or
         "elements". Returns the pair. Warns with UnitWarning of a shell a thousand times larger than
         the sphere or the robot, and with FutureWarning where no `law` is stated: it is then ADAMS's
         default, ImpactLaw.from_adams().
         """
-        check_type("sphere", sphere, Sphere, "must be a Sphere(radius, frame)")
-        check_type("shell", shell, Shell, "must be a Shell (of a file: Shell.from_file)")
-        method = "smooth" if method is None else method
-        Method.from_name(method)
-        placement = check_placement("placement", placement)
-        pair = self._add(
-            name,
-            f"{sphere.frame}-{shell.name}",
-            (sphere.frame, "frame"),
-            (frame, "frame"),
-            placement=placement,
-            law=law,
-            friction=friction,
-            method=method,
-            sphere=sphere,
-            shell=shell,
-        )
-        suspicion = unit_warning(self._model, sphere.radius, shell.size)
-        if suspicion:
-            warnings.warn(f"shell '{shell.name}': {suspicion}", UnitWarning, stacklevel=2)
+        frame_j, parts = parts_of(sphere, shell, frame, placement, method)
+        default = f"{sphere.frame}-{parts['shell'].name if 'shell' in parts else frame_j}"
+        ends = (sphere.frame, "frame"), (frame_j, "frame")
+        pair = self._add(name, default, *ends, law=law, friction=friction, **parts)
+        warn_of_size(self._model, pair)
         return pair
+
+    def add_contacts(
+        self,
+        spheres: Iterable[Sphere],
+        shell: Shell | Sphere,
+        frame: str = "universe",
+        placement: pin.SE3 | None = None,
+        *,
+        law: NormalLaw,
+        friction: Friction | None = None,
+        method: str | None = None,
+        name: str | None = None,
+    ) -> tuple[ContactPair, ...]:
+        """Let each of `spheres` touch `shell`: all contacts of a hand, a foot or a robot at once.
+
+        The other arguments are those of `add_contact`, and hold for all. Returns the pairs, called
+        "name/frame", with several spheres in one frame "name/frame-0" and so on; `name` is that of
+        the shell by default. They share what they can: while they are all far from the shell, one
+        distance keeps them from passing through it, and contacts with bristles that begin in one
+        step share the room for them (more than 16 at once begin with the next step).
+        """
+        known = self._pairs
+        group = default_group(shell) if name is None else name
+        try:
+            for sphere, called in named(spheres, group):
+                frame_j, parts = parts_of(sphere, shell, frame, placement, method)
+                ends = (sphere.frame, "frame"), (frame_j, "frame")
+                parts["group"] = group
+                self._add(called, called, *ends, law=law, friction=friction, **parts)
+        except SphshellError:
+            self._pairs = known
+            raise
+        made = self._pairs[len(known) :]
+        warn_of_size(self._model, min(made, key=lambda pair: pair.least_radius))
+        return made
 
     def add_contact_source(
         self,
@@ -202,9 +231,9 @@ class Scene:
     ) -> Scene:
         """Build a scene from the active collision pairs of a geometry model.
 
-        Of each pair one side must be a sphere; the other becomes a shell (meshes as they are,
-        primitives tessellated with their exact normals). Pairs of other kinds are left out; a
-        geometry model without any sphere pair raises InvalidParameter.
+        Of each pair one side must be a sphere; the other may be one, too, else it becomes a shell
+        (meshes as they are, primitives tessellated with their exact normals). Other pairs are left
+        out; a geometry model without any sphere pair raises InvalidParameter.
         """
         scene = cls(model)
         add_pairs(scene, geometry_model, law, friction)
@@ -228,6 +257,16 @@ class Scene:
         unstretched: friction then creeps as if it had no spring.
         """
         return self._at(state).external_forces(*self.check_state(q, v))
+
+    def joint_forces(
+        self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
+    ) -> Array:
+        """Return the torques (nv,) of stops, damping and dry friction in the joints [N m or N].
+
+        They are to be added to those of the motors: pin.aba(model, data, q, v, tau + these, fext).
+        `state` as in `external_forces`: without one, springs of dry friction are unstretched.
+        """
+        return np.asarray(self._at(state).joint_forces(*self.check_state(q, v)))
 
     def contact_derivatives(
         self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
@@ -314,7 +353,8 @@ class Scene:
     def core(self) -> _core.Scene:
         """The C++ binding, built when first needed."""
         if self._core is None:
-            self._core = _core.Scene(self._model, [p.to_core() for p in self._pairs])
+            joints = self._joints.to_core(self._model)
+            self._core = _core.Scene(self._model, [p.to_core() for p in self._pairs], joints)
         return self._core
 
     def _check_unchanged(self) -> None:
@@ -339,7 +379,7 @@ class Scene:
         *,
         law: NormalLaw | None,
         friction: Friction | None,
-        **parts: Unpack[_Parts],
+        **parts: Unpack[Parts],
     ) -> ContactPair:
         """Add a pair of the frames `i` and `j`, each with the name of its argument."""
         if law is None:

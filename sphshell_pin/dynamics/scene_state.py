@@ -19,9 +19,9 @@ class SceneState:
     """The memory of a scene in your own loop, as `pinocchio.Data` is that of a model.
 
     It holds the contacts with their ids, on which side of its shell each sphere is, and the
-    stretch of each bristle. `Scene.state` makes one; `Scene.external_forces`, `contacts` and
-    `contact_derivatives` take it and do not change it. `advance` moves it on, once for each
-    accepted step:
+    stretch of each bristle, those of joints included. `Scene.state` makes one;
+    `Scene.external_forces`, `joint_forces`, `contacts` and `contact_derivatives` take it and do not
+    change it. `advance` moves it on, once for each accepted step:
 
         state = scene.state(q, v)
         for _ in range(steps):
@@ -30,7 +30,8 @@ class SceneState:
             q = pin.integrate(model, q, dt * v)
             state.advance(q, v, dt)
 
-    This loop makes the motion of `Simulation(scene, SemiImplicitEuler(dt))`. `copy` gives a second
+    This loop makes the motion of `Simulation(scene, SemiImplicitEuler(dt))`; where the scene has
+    joint ingredients, add `scene.joint_forces(q, v, state=state)` to tau. `copy` gives a second
     state, to try a step. A state is for one user at a time (else Busy), and cannot be pickled.
     """
 
@@ -44,7 +45,7 @@ class SceneState:
             figures = explain_pairs(scene, *scene.check_state(scene.neutral if q is None else q, v))
             for pair, core, figure in zip(scene.pairs, cores, figures, strict=True):
                 core.relaxation = relaxation_time(pair, figure)
-        self._core = _core.SceneState(scene.model, cores)
+        self._core = _core.SceneState(scene.model, cores, scene.joints.to_core(scene.model))
         if q is not None:
             self._core.advance(*scene.check_state(q, v), 0.0)
 

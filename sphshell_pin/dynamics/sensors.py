@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -232,7 +231,11 @@ class ContactSwitch(Sensor, kind="contact-switch"):
 
     def _measured(self, scene: Scene) -> _core.Sensor:
         if self.contact is not None:
-            pairs = [scene.pairs.index(scene.pair(self.contact))]
+            # A name may be that of several pairs that were stated together.
+            names = [{pair.name, pair.group} for pair in scene.pairs]
+            pairs = [k for k, known in enumerate(names) if self.contact in known]
+            if not pairs:
+                scene.pair(self.contact)
         else:
             assert self.frame is not None
             check_name("frame", self.frame)
@@ -309,11 +312,3 @@ def check_sensors(sensors: Iterable[object]) -> tuple[Sensor, ...]:
             raise InvalidParameter(f"sensors[{k}].name", one.name, "is taken by another sensor")
         found[one.name] = one
     return tuple(found.values())
-
-
-def reads_sensors(callback: object) -> bool:
-    """Whether a controller callable has an argument called `sensors`."""
-    try:
-        return "sensors" in inspect.signature(callback).parameters  # type: ignore[arg-type]
-    except (TypeError, ValueError):  # of a compiled function, which says nothing
-        return False

@@ -72,7 +72,8 @@ class Simulation:
         `record_dt` [s] (default: every step); `progress` is called a few times a second with the
         share done. The same input gives the same bits.
 
-        A law that cannot stop its sphere earns a WeakLawWarning.
+        A law that cannot stop its sphere earns a WeakLawWarning, a path off its shell a
+        SetupWarning.
 
         Raises InvalidParameter for wrong sizes and values, DeepStart for a sphere that starts
         deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.
@@ -136,7 +137,8 @@ class Simulation:
         vary : parameters that differ from run to run: names to n values each. Names are
             "PAIR.law" and "PAIR.friction" (n laws, n frictions or None), "PAIR.law.FIELD" and
             "PAIR.friction.FIELD" (n numbers; the fields of the law or friction that the pair has),
-            "PAIR.sphere.radius" (n) [m], "PAIR.sphere.offset" (n, 3) [m], "PAIR.placement" of
+            "PAIR.sphere.radius" (n) [m], "PAIR.sphere.offset" (n, 3) [m], the same of
+            "PAIR.other_sphere", "PAIR.placement" of
             the shell in its frame (n pinocchio.SE3)
         record_dt : between recorded rows [s]; unless given only start and end are recorded
         progress : called a few times a second with the share of the runs that are done

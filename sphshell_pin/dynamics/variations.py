@@ -9,6 +9,7 @@ from typing import TypeGuard
 import pinocchio as pin
 
 from sphshell_pin.checks import as_floats, check_finite, check_placement, check_type, check_vector
+from sphshell_pin.contact import Sphere
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.scene import ContactPair, Scene
@@ -94,9 +95,12 @@ def _names_of(scene: Scene) -> dict[str, tuple[int, _Change, tuple[int, ...] | N
                     out[f"{pair.name}.{part}.{name}"] = k, _field(part, name), ()
         if pair.sphere is None:
             continue
-        out[f"{pair.name}.sphere.radius"] = k, _set_radius, ()
-        out[f"{pair.name}.sphere.offset"] = k, _set_offset, (3,)
-        out[f"{pair.name}.placement"] = k, _set_placement, None
+        ends = ("sphere",) if pair.other_sphere is None else ("sphere", "other_sphere")
+        for end in ends:
+            out[f"{pair.name}.{end}.radius"] = k, _radius(end), ()
+            out[f"{pair.name}.{end}.offset"] = k, _offset(end), (3,)
+        if pair.shell is not None:
+            out[f"{pair.name}.placement"] = k, _set_placement, None
     return out
 
 
@@ -144,15 +148,26 @@ def _field(part: str, name: str) -> _Change:
     return change
 
 
-def _set_radius(pair: ContactPair, radius: object) -> ContactPair:
-    assert pair.sphere is not None
-    return replace(pair, sphere=replace(pair.sphere, radius=check_finite("radius", radius)))
+def _radius(end: str) -> _Change:
+    def change(pair: ContactPair, radius: object) -> ContactPair:
+        sphere = replace(getattr(pair, end), radius=check_finite("radius", radius))
+        return _with_sphere(pair, end, sphere)
+
+    return change
 
 
-def _set_offset(pair: ContactPair, offset: object) -> ContactPair:
-    assert pair.sphere is not None
-    x, y, z = check_vector("offset", offset, 3).tolist()
-    return replace(pair, sphere=replace(pair.sphere, offset=(x, y, z)))
+def _offset(end: str) -> _Change:
+    def change(pair: ContactPair, offset: object) -> ContactPair:
+        x, y, z = check_vector("offset", offset, 3).tolist()
+        return _with_sphere(pair, end, replace(getattr(pair, end), offset=(x, y, z)))
+
+    return change
+
+
+def _with_sphere(pair: ContactPair, end: str, sphere: Sphere) -> ContactPair:
+    if end == "sphere":
+        return replace(pair, sphere=sphere)
+    return replace(pair, other_sphere=sphere)
 
 
 def _set_placement(pair: ContactPair, placement: object) -> ContactPair:

@@ -94,10 +94,10 @@ def save_figures(
 ) -> list[Path]:
     """Write the figures of `result` as .png files into `folder`; return their paths.
 
-    They are force_and_depth, energy, contact_path and, of a result that touched a shell,
-    contact_map, and of one with sensors, sensors. Paths and map are drawn on the shells of `scene` (default: the scene that ran; a
-    loaded result has none: then the path is drawn in the world, and there is no map). Raises
-    MissingExtra without matplotlib, ResultError if a file cannot be written.
+    They are force_and_depth, energy, contact_path, of a result that touched a shell contact_map,
+    and of one with sensors sensors. Paths and map are drawn on the shells of `scene` (default: the
+    scene that ran; a loaded result has none: then the path is drawn in the world, and there is no
+    map). Raises MissingExtra without matplotlib, ResultError if a file cannot be written.
     """
     scene = result.scene if scene is None else scene
     figures = {

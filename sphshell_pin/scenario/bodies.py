@@ -12,9 +12,10 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.checks import off_unit_length
-from sphshell_pin.dynamics.models import find_joint, set_joint
+from sphshell_pin.dynamics.mimic import check_follows, count_of_all, mimics, shortened
+from sphshell_pin.dynamics.models import find_joint, held_joints, set_joint
 from sphshell_pin.errors import MissingExtra, ScenarioError, SphshellError
-from sphshell_pin.robots import LoadedRobot, load, load_urdf
+from sphshell_pin.robots import LoadedRobot, load, load_file
 from sphshell_pin.scenario.reading import item_key
 from sphshell_pin.scenario.schema import Placement, RobotSection, Scenario
 
@@ -36,6 +37,8 @@ class Assembly:
     """Joints to lock at their place in q0."""
     loaded: tuple[LoadedRobot, ...] = ()
     """The robots as they were loaded, one for each table."""
+    prefixes: tuple[str, ...] = ()
+    """What stands before the names of each robot."""
 
 
 @contextmanager
@@ -76,10 +79,11 @@ def assemble(
     """
     several = len(scenario.robot) > 1
     base, visual = pin.Model(), pin.GeometryModel()
-    starts: list[tuple[str, Array, Array]] = []
+    starts: list[tuple[str, Array, Array, Array]] = []
     lock: list[str] = []
     labels: set[str] = set()
     taken: list[LoadedRobot] = []
+    prefixes: list[str] = []
     for i, section in enumerate(scenario.robot):
         key = item_key("robot", scenario.robot, i)
         with blamed_on(path, key):
@@ -92,39 +96,56 @@ def assemble(
                 joint_spans(model, joint)
         prefix = ""
         if several:
-            label = section.label or robot.name
-            if label in labels:
-                raise ScenarioError(path, f"{key}.label", "two robots share this label", label)
-            labels.add(label)
-            prefix = f"{label}/"
+            prefix = _prefix(section, robot)
+            if prefix in labels:
+                raise ScenarioError(
+                    path, f"{key}.label", "two robots share this label", prefix.rstrip("/")
+                )
+            labels.add(prefix)
             _rename(model, geometry, prefix)
+        prefixes.append(prefix)
         lock += [prefix + joint for joint in section.lock]
         for name in list(model.names)[1:]:
             in_q, in_v = joint_spans(model, name)
-            starts.append((name, q[in_q], v[in_v]))
+            starts.append((name, q[in_q], v[in_v], np.array(model.armature[in_v])))
         stand = to_se3(section.placement)
         if not several and stand.isIdentity():
             base, visual = model, geometry
         else:
             base, visual = pin.appendModel(base, model, visual, geometry, 0, stand)
     base.gravity.linear = np.array(scenario.gravity)
-    q0, v0 = pin.neutral(base), np.zeros(base.nv)
-    for name, q_joint, v_joint in starts:
+    q0, v0, armature = pin.neutral(base), np.zeros(base.nv), np.zeros(base.nv)
+    for name, q_joint, v_joint, inertia in starts:
         in_q, in_v = joint_spans(base, name)
-        q0[in_q], v0[in_v] = q_joint, v_joint
-    return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken))
+        q0[in_q], v0[in_v], armature[in_v] = q_joint, v_joint, inertia
+    if armature.any():
+        base.armature = armature  # which pinocchio.appendModel (4.1) drops
+    return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken), tuple(prefixes))
+
+
+def _prefix(section: RobotSection, robot: LoadedRobot) -> str:
+    return f"{section.label or robot.name}/"
 
 
 def origin(section: RobotSection) -> tuple[object, ...]:
     """Return what tells robots of one scenario's folder apart before they start and are placed."""
-    return section.name, section.urdf, tuple(section.package_dirs), section.free_flyer
+    return (
+        section.name,
+        section.path,
+        tuple(section.package_dirs),
+        tuple(section.xacro_args.items()),
+        section.srdf,
+        section.pose,
+        section.free_flyer,
+        section.mimic,
+    )
 
 
 def reduce_visual(assembly: Assembly) -> pin.GeometryModel:
     """Return the visual geometry for the model with `assembly.lock` locked."""
     if not assembly.lock:
         return assembly.visual_model
-    ids = [assembly.model.getJointId(name) for name in assembly.lock]
+    ids = held_joints(assembly.model, assembly.lock)
     _, geometry = pin.buildReducedModel(assembly.model, assembly.visual_model, ids, assembly.q0)
     return geometry
 
@@ -147,13 +168,17 @@ def joint_spans(model: pin.Model, name: str) -> tuple[slice, slice]:
 
 def _load(section: RobotSection, path: Path) -> LoadedRobot:
     if section.name is not None:
-        return load(section.name)
-    folder = path.parent
-    return load_urdf(
-        folder / (section.urdf or ""),
+        return load(section.name, mimic=section.mimic, pose=section.pose)
+    folder, file = path.parent, section.path or ""
+    return load_file(
+        folder / file,
         [folder / one for one in section.package_dirs],
         free_flyer=section.free_flyer,
-        name=Path(section.urdf or "").stem,
+        mimic=section.mimic,
+        name=Path(file).name.partition(".")[0],
+        xacro_args=section.xacro_args,
+        srdf=None if section.srdf is None else folder / section.srdf,
+        pose=section.pose,
     )
 
 
@@ -162,18 +187,36 @@ def _start(
 ) -> tuple[Array, Array]:
     q, v = np.array(q_default, dtype=float), np.zeros(model.nv)
     if section.q is not None:
-        if len(section.q) != model.nq:
-            raise ScenarioError(
-                path, f"{key}.q", f"the robot has {model.nq} coordinates, not {len(section.q)}"
-            )
+        every = count_of_all(model)
+        if len(section.q) not in (model.nq, every):
+            count = f"{model.nq} coordinates"
+            if every != model.nq:
+                count += f" ({every} with those of mimic joints)"
+            raise ScenarioError(path, f"{key}.q", f"the robot has {count}, not {len(section.q)}")
         q = np.array(section.q)
+        if len(q) != model.nq:
+            with blamed_on(path, f"{key}.q"):
+                q = shortened(model, q, check=True)
+    rules = mimics(model)
     for name, value in section.start.items():
         with blamed_on(path, f'{key}.start."{name}"'):
             set_joint(model, q, name, value)
+    for name in (one for one in section.start if one in rules):
+        # What it mimics may be stated too, or another joint that mimics the same.
+        rule, value = rules[name], section.start[name]
+        joint = find_joint(model, rule.of)
+        if joint.nq == 1:
+            with blamed_on(path, f'{key}.start."{name}"'):
+                stated = value[0] if isinstance(value, list) else value
+                check_follows(rule, stated, q[joint.idx_q])
     for name, value in section.speed.items():
         where = f'{key}.speed."{name}"'
         with blamed_on(path, where):
             _, span = joint_spans(model, name)
+        if name in rules:
+            raise ScenarioError(
+                path, where, f"the joint mimics '{rules[name].of}': state the speed of that one"
+            )
         values = np.atleast_1d(np.array(value, dtype=float))
         count = span.stop - span.start
         if len(values) != count:

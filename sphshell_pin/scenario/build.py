@@ -15,6 +15,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.dynamics.callables import check_callable
 from sphshell_pin.dynamics.controllers import Callback, Controller, PythonFunction, ShellPlace
 from sphshell_pin.dynamics.explain import Explanation
 from sphshell_pin.dynamics.sensors import Sensor, check_sensors
@@ -37,6 +38,7 @@ from sphshell_pin.scenario.bodies import (
     to_se3,
 )
 from sphshell_pin.scenario.functions import load_function
+from sphshell_pin.scenario.joints import joint_ingredients
 from sphshell_pin.scenario.knobs import check_knobs
 from sphshell_pin.scenario.reading import (
     change_scenario,
@@ -44,6 +46,7 @@ from sphshell_pin.scenario.reading import (
     item_key,
     read_scenario,
 )
+from sphshell_pin.scenario.spheres import spheres_of, to_sphere
 
 Array = npt.NDArray[np.float64]
 # A user's own; what it takes depends on where the scenario names it.
@@ -141,7 +144,8 @@ def build_scenario(
 
     with blamed_on(path, "robot"):
         q_lock = assembly.q0 if assembly.lock else None
-        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock)
+        joints = joint_ingredients(scenario, assembly, path)
+        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock, joints=joints)
     shells = {
         section.name: (
             _kept_shell(section, reuse)
@@ -154,7 +158,7 @@ def build_scenario(
         raise ScenarioError(path, "shell", "two shells share a name")
     for i, contact in enumerate(scenario.contact):
         key = item_key("contact", scenario.contact, i)
-        _add_contact(scene, contact, shells, path, key)
+        _add_contact(scene, contact, shells, assembly, path, key)
     for i, source in enumerate(scenario.source):
         key = item_key("source", scenario.source, i)
         find = load(source.find, f"{key}.find")
@@ -222,7 +226,11 @@ def _kept_shell(section: schema.ShellSection, reuse: Built | None) -> sp.Shell |
 
 def explain_built(built: Built) -> Explanation:
     """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
-    return built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
+    said = built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
+    if not isinstance(built.controller, Controller):
+        return said
+    doubts = built.controller.doubts(built.scene, built.q0)
+    return replace(said, warnings=(*said.warnings, *doubts))
 
 
 def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
@@ -260,27 +268,43 @@ def _add_contact(
     scene: sp.Scene,
     contact: schema.ContactSection,
     shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
+    assembly: Assembly,
     path: Path,
     key: str,
 ) -> None:
-    with blamed_on(path, f"{key}.shell"):
-        if contact.shell not in shells:
-            raise NameNotFound("shell", contact.shell, "the scenario", shells)
-    shell, section = shells[contact.shell]
+    shell: sp.Shell | sp.Sphere
+    if contact.other_sphere is not None:
+        shell, frame, placement = to_sphere(contact.other_sphere), "universe", None
+        carrier = shell.frame
+    else:
+        with blamed_on(path, f"{key}.shell"):
+            name = contact.shell or ""
+            if name not in shells:
+                raise NameNotFound("shell", name, "the scenario", shells)
+        shell, section = shells[name]
+        frame, placement = section.frame, to_se3(section.placement)
+        carrier = frame
+    with blamed_on(path, f"{key}.spheres"):
+        several = spheres_of(contact, assembly, carrier)
     with blamed_on(path, key), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
-        sphere = contact.sphere
-        x, y, z = sphere.offset
-        scene.add_contact(
-            sphere=sp.Sphere(sphere.radius, frame=sphere.frame, offset=(x, y, z)),
-            shell=shell,
-            frame=section.frame,
-            placement=to_se3(section.placement),
-            law=contact.law.made(path.parent),
-            friction=contact.friction.made(path.parent),
-            method=contact.method,
-            name=contact.name,
-        )
+        law, friction = contact.law.made(path.parent), contact.friction.made(path.parent)
+        if contact.sphere is not None:
+            sphere = to_sphere(contact.sphere)
+            scene.add_contact(
+                sphere, shell, frame, placement, law, friction, contact.method, contact.name
+            )
+        else:
+            scene.add_contacts(
+                several,
+                shell,
+                frame,
+                placement,
+                law=law,
+                friction=friction,
+                method=contact.method,
+                name=contact.name,
+            )
 
 
 def _build_sensors(stated: Sequence[Ingredient], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
@@ -310,7 +334,9 @@ def _build_controller(
 
     with blamed_on(path, "controller"):
         if isinstance(stated, PythonFunction):
-            return load(stated.function, "controller.function")
+            function = load(stated.function, "controller.function")
+            check_callable(function)
+            return function
         controller: Controller | None = stated.made(path.parent)
         if controller is None:
             return None

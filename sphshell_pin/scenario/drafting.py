@@ -16,6 +16,14 @@ from sphshell_pin.scenario.plan import Hold, Plan, Press
 from sphshell_pin.scenario.schema import RobotSection, RunSection, ShellSection
 from sphshell_pin.scenario.tips import Tip
 
+HELD = 0.05
+"""How well a scenario holds its normal force, as a part of it."""
+
+_SIDES = {
+    "both": "spheres may touch it from both sides",
+    "outside": "a closed body: spheres touch it from outside",
+    "inside": "a hollow: spheres touch it from inside",
+}
 # Column of the comments beside values.
 _COLUMN = 34
 
@@ -56,11 +64,11 @@ unit = {shell.unit!o} # length unit of the file's numbers
 bodies = {shell.bodies!o} # of the CAD file
 faces = {shell.faces!o} # of the CAD file
 primitive = {primitive!o}
-side = "both" # spheres may touch it from both sides
+side = {shell.side} # {side}
 frame = "universe" # fixed to the world; any frame of the robot may do
 """
 _PLACEMENT = """\
-# Its middle stands {gap:.3g} mm before the sphere.
+# It stands {gap:.3g} mm before the sphere.
 [shell.placement]
 xyz = {xyz}
 rpy_deg = {rpy_deg!o}
@@ -105,6 +113,7 @@ _PRESS = """
 [controller]
 type = "cartesian-impedance"
 frame = {tip.frame}
+offset = {offset!o} # of the sphere's center in this frame [m]
 shell = {shell.name}
 # Points in the shell's own coordinates [m], projected on it.
 path = {path}
@@ -164,7 +173,7 @@ def draft_text(
         text += _POSTURE
         text += "".join(f"{_key(joint)} = {_toml(q)}\n" for joint, q in robot.start.items())
     primitive = shell.model_dump()["primitive"]
-    text += _fill(_SHELL, shell=shell, primitive=primitive)
+    text += _fill(_SHELL, shell=shell, primitive=primitive, side=_SIDES[shell.side])
     if plan.root is None:
         angles = np.rad2deg(pin.rpy.matrixToRpy(plan.placement.rotation))
         angles[np.abs(angles) < 1e-6] = 0.0
@@ -182,9 +191,12 @@ def draft_text(
     control, mean_force = plan.control, None
     if isinstance(control, Press):
         path = _rounded(control.path, digits)
-        text += _fill(_PRESS, tip=plan.tips[0], shell=shell, path=path, press=control)
+        offset = _rounded(plan.tips[0].offset, digits)
+        text += _fill(
+            _PRESS, tip=plan.tips[0], offset=offset, shell=shell, path=path, press=control
+        )
         if control.even:
-            mean_force = {"value": control.force, "rtol": 0.15, "atol": 0.03}
+            mean_force = {"value": control.force, "rtol": HELD}
     elif isinstance(control, Hold):
         text += _fill(_HOLD, hold=control)
     slow = None if run.recording_speed == 1.0 else run.recording_speed

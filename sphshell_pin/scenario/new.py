@@ -4,40 +4,27 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive
-from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
-from sphshell_pin.robots import WORKING
-from sphshell_pin.scenario.bodies import joint_spans
 from sphshell_pin.scenario.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.drafting import draft_text
 from sphshell_pin.scenario.knobs import check_knobs
-from sphshell_pin.scenario.materials import Material, find_material
-from sphshell_pin.scenario.plan import (
-    GRAVITY,
-    Hold,
-    Plan,
-    Press,
-    bearable,
-    plan_fall,
-    plan_press,
-    plan_stand,
-)
-from sphshell_pin.scenario.poses import take_stance
+from sphshell_pin.scenario.materials import find_material
+from sphshell_pin.scenario.plan import Hold, Plan, Press
 from sphshell_pin.scenario.primitives import Ball, Box, Cylinder, HalfSpace, Primitive
 from sphshell_pin.scenario.reading import parse_scenario
 from sphshell_pin.scenario.schema import RobotSection, RunSection, Scenario, ShellSection
-from sphshell_pin.scenario.tips import Tip, find_tips, floats
+from sphshell_pin.scenario.search import PLACES, Request, find_working, sphere_centers
+from sphshell_pin.scenario.tips import Tip, find_tips
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.explain import Explanation
@@ -47,16 +34,6 @@ Array = npt.NDArray[np.float64]
 
 WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 """Surfaces that need no file."""
-
-PLACES: dict[str, tuple[float, float, float]] = {
-    "below": (0.0, 0.0, -1.0),
-    "above": (0.0, 0.0, 1.0),
-    "+x": (1.0, 0.0, 0.0),
-    "-x": (-1.0, 0.0, 0.0),
-    "+y": (0.0, 1.0, 0.0),
-    "-y": (0.0, -1.0, 0.0),
-}
-"""Where the surface is placed, seen from the tip."""
 
 # Half the size of a surface that needs no file, in radii of the sphere.
 _SIZE = 15.0
@@ -139,7 +116,7 @@ def new_scenario(
     path = _free_path(out, robot, surface, force=force)
     section = _robot_section(robot, path, free_flyer=free_flyer, package_dirs=package_dirs)
     bare = _build_bare(section, path)
-    if not bare.assembly.model.nv and section.urdf is not None:
+    if not bare.assembly.model.nv and section.path is not None:
         # A single body without a joint would be fixed to the world.
         section = section.model_copy(update={"free_flyer": True})
         bare = _build_bare(section, path)
@@ -148,15 +125,35 @@ def new_scenario(
     shell_section, word = _shell_section(surface, unit, (bodies, faces), path, bare, tips)
     with_shell = _build_bare(section, path, shell_section, reuse=bare)
     _check_size(with_shell.shells[shell_section.name], tips)
-    request = _Request(material, against, press, place, word)
-    section, plan = _plan(section, with_shell, tips, request)
-    title = f"{loaded.name} {_DOES[type(plan.control)]} {shell_section.name}"
-    text = draft_text(path.stem, title, section, shell_section, plan, _run(plan))
-    # What is written is what was built.
-    built = _build_text(text, path, with_shell)
+    shell_section, with_shell = _sided(shell_section, with_shell, word)
+    request = Request(material, against, press, place, word)
+    title = f"{loaded.name} {{}} {shell_section.name}"
+
+    def draft(section: RobotSection, plan: Plan) -> tuple[str, Built]:
+        does = title.format(_DOES[type(plan.control)])
+        text = draft_text(path.stem, does, section, shell_section, plan, _run(plan))
+        return text, _build_text(text, path, with_shell)
+
+    # What is written is what was built, and tried.
+    text, built, plan = find_working(section, with_shell, tips, request, draft)
     _write(path, text)
     why = (*plan.why, _materials_note(plan))
     return NewScenario(path, text, built, explain_built(built), why)
+
+
+def _sided(shell: ShellSection, built: Built, word: str | None) -> tuple[ShellSection, Built]:
+    """Return the surface's table with the side that spheres may touch, and what is built of it."""
+    made = built.shells[shell.name]
+    if not made.is_closed:
+        return shell, built
+    side: Literal["inside", "outside"] = "inside" if word == "bowl" else "outside"
+    section = shell.model_copy(update={"side": side})
+    # The surface is not read again.
+    turned = type(made).from_surface(
+        made.surface(), made.crease_angle, side, made.name, made.source, made.unit
+    )
+    scenario = built.scenario.model_copy(update={"shell": [section]})
+    return section, replace(built, scenario=scenario, shells={shell.name: turned})
 
 
 def _materials_note(plan: Plan) -> str:
@@ -168,29 +165,6 @@ def _build_text(text: str, path: Path, reuse: Built) -> Built:
     scenario = parse_scenario(text, path)
     check_knobs(scenario, path, ranges=True)
     return build_scenario(scenario, path, reuse)
-
-
-@dataclass(frozen=True)
-class _Request:
-    """What the user asked for; `word` names a surface that needs no file."""
-
-    material: str | None
-    against: str
-    press: float | None
-    place: str | None
-    word: str | None
-
-    def materials(self, tips: Sequence[Tip], load: float) -> tuple[Material, Material]:
-        """Return what sphere and surface are made of; `load` [kg] rests on each, 0: it falls."""
-        other = find_material(self.against)
-        if self.material is not None:
-            return find_material(self.material), other
-        if not load:
-            return find_material("steel"), other
-        # A tip is of rubber, unless the mass behind it would press rubber in too far.
-        rubber, radius = find_material("rubber"), min(tip.radius for tip in tips)
-        bears = bearable(radius, rubber, other) >= load * GRAVITY
-        return rubber if bears else find_material("plastic"), other
 
 
 def _free_path(
@@ -291,7 +265,7 @@ def _shell_section(
         raise SphshellError(f"a unit belongs to a surface file; the {word} is sized in meters")
     if parts != (None, None):
         raise SphshellError(f"bodies and faces belong to a CAD file, not to the {word}")
-    centers = _centers(built, tips)
+    centers = sphere_centers(built, tips)
     spread = float(np.linalg.norm(np.ptp(centers, axis=0)))
     size = _round_up(max(_SIZE * max(tip.radius for tip in tips), spread))
     ball = Ball(size)
@@ -318,75 +292,6 @@ def _round_up(x: float) -> float:
     """Round to the next higher number of two digits."""
     rounded = float(f"{x:.2g}")
     return rounded if rounded >= x else float(f"{1.05 * x:.2g}")
-
-
-def _centers(built: Built, tips: Sequence[Tip]) -> Array:
-    """Return the spheres' centers (k, 3) [m] in the world at the start."""
-    model = built.assembly.model
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, built.assembly.q0)
-    return np.array([data.oMf[find_frame(model, tip.frame)].act(tip.offset) for tip in tips])
-
-
-def _plan(
-    section: RobotSection,
-    built: Built,
-    tips: Sequence[Tip],
-    request: _Request,
-) -> tuple[RobotSection, Plan]:
-    """Return the plan, and the robot's table with what the plan asks of it."""
-    press, place, inside = request.press, request.place, request.word == "bowl"
-    model, q0 = built.assembly.model, built.assembly.q0
-    (shell,) = built.shells.values()
-    if floats(model):
-        if press is not None or place is not None:
-            raise SphshellError(
-                "a robot that floats comes down on the surface by its weight: leave out --press "
-                "and --place"
-            )
-        centers = _centers(built, tips)
-        root = q0[:7]
-        if model.njoints == 2:
-            pair = request.materials(tips, 0.0)
-            return section, plan_fall(shell, tips[0], centers[0], root, pair, inside=inside)
-        data = model.createData()
-        inertia = np.diag(pin.crba(model, data, q0))[6:]
-        mass = float(pin.computeTotalMass(model))
-        leg = float(np.linalg.norm(root[:3] - centers, axis=1).max())
-        if inside:
-            raise SphshellError("a robot cannot stand in a bowl: take another --surface")
-        pair = request.materials(tips, mass / len(tips))
-        return section, plan_stand(shell, tuple(tips), centers, mass, inertia, leg, pair)
-    tip = tips[0]
-    if int(model.frames[find_frame(model, tip.frame)].parentJoint) == 0:
-        raise SphshellError(
-            f"no joint moves frame '{tip.frame}': name another with --frame, or let the root "
-            "float with --free-flyer"
-        )
-    approach = None if place is None else np.array(PLACES[place])
-    stance = take_stance(model, _working_posture(section, model, q0), tip, approach)
-    side = {"cylinder": (1.0, 0.0, 0.0), "bowl": (0.0, 0.0, 1.0)}.get(request.word or "")
-    toward = None if side is None else np.array(side)
-    pair = request.materials(tips, stance.mass)
-    plan = plan_press(shell, tip, stance, pair, press, toward=toward, inside=inside)
-    start = _changed_joints(model, q0, stance.q)
-    return section.model_copy(update={"lock": list(stance.lock), "start": start}), plan
-
-
-def _working_posture(section: RobotSection, model: pin.Model, q0: Array) -> Array:
-    """Return the posture in which the robot is known to work, else its reference posture."""
-    known = WORKING.get(section.name or "", ())
-    return np.array(known) if len(known) == model.nq else q0
-
-
-def _changed_joints(model: pin.Model, q0: Array, q: Array) -> dict[str, float | list[float]]:
-    start: dict[str, float | list[float]] = {}
-    for name in list(model.names)[1:]:
-        span, _ = joint_spans(model, name)
-        if not np.array_equal(q[span], q0[span]):
-            values = [round(float(one), 9) for one in q[span]]
-            start[name] = values[0] if len(values) == 1 else values
-    return start
 
 
 def _run(plan: Plan) -> RunSection:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,7 +15,6 @@ from sphshell_pin.scenario.materials import Material, friction_between, restitut
 from sphshell_pin.scenario.poses import Stance
 from sphshell_pin.scenario.tips import Tip
 from sphshell_pin.scenario.touch_points import (
-    TouchPoint,
     come_down,
     find_touch_point,
     path_on_surface,
@@ -39,6 +39,10 @@ MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
 # The path across a surface: radii long at most, radii a second.
 PATH_RADII, PATH_RATE = 10.0, 3.0
 LEAD_IN = 0.5
+# Turns of the part about the approach, tried in this order [rad], and how many places are kept
+# where the sphere touches no single face.
+_YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
+_MOST_UNEVEN = 3
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
 # radii.
 TIP_RATE, TIP_LAG = 20.0, 0.2
@@ -107,39 +111,108 @@ class Plan:
     """One sentence for each choice that was made for the user."""
 
 
-def plan_press(
+def press_plans(
     shell: Shell,
     tip: Tip,
     stance: Stance,
     materials: tuple[Material, Material],
     press: float | None,
+    blocked: Callable[[pin.SE3], bool],
     *,
     toward: Array | None = None,
     inside: bool = False,
-) -> Plan:
-    """Plan a scenario in which a tip of a robot with a fixed base presses and slides.
+) -> Iterator[Plan]:
+    """Yield plans in which a tip of a robot with a fixed base presses and slides.
 
     `press` [N] is the normal force asked for; `toward` (3,) the side of the surface to touch, with
-    `inside` from its middle.
+    `inside` from its middle; `blocked` says whether links of the robot are in the part at a
+    placement. One plan for each place on the part and turn of it where they are not; first those
+    where the sphere touches one face along the whole path, in each the nearest to the center first.
 
     Raises
     ------
     SphshellError
         The joints cannot push as hard as `press`.
     """
-    if press is not None and press > stance.force:
+    force = _force(stance, tip, materials, press)
+    gap = _gap(tip.radius, force, materials)
+    uneven: list[Plan] = []
+    for touch in touch_points(shell, tip.radius, gap, toward=toward, inside=inside):
+        on_face = touches_once(shell, touch, touch.point[None], tip.radius, 2 * gap)
+        if not on_face and len(uneven) >= _MOST_UNEVEN:
+            continue
+        facing = _turn(touch.normal, -stance.approach)
+        for angle in _YAWS:
+            turned = pin.AngleAxis(angle, stance.approach).toRotationMatrix() @ facing
+            placement = pin.SE3(turned, stance.center - turned @ touch.center)
+            if blocked(placement):
+                continue
+            path = touch.point[None]
+            if on_face and stance.slide is not None and stance.inertia:
+                length = min(PATH_RADII * tip.radius, 0.8 * stance.room)
+                path = path_on_surface(
+                    shell, touch, turned.T @ stance.slide, length, 0.5 * tip.radius
+                )
+            even = on_face and touches_once(shell, touch, path, tip.radius, 2 * gap)
+            if on_face and not even:
+                path, even = touch.point[None], True
+            plan = _press_plan(tip, stance, materials, press, force, gap, placement, path, even)
+            if even:
+                yield plan
+            else:
+                uneven.append(plan)
+            break
+    yield from uneven
+
+
+def _force(
+    stance: Stance, tip: Tip, materials: tuple[Material, Material], press: float | None
+) -> float:
+    """Return the normal force [N]; SphshellError where the joints cannot push as hard."""
+    if press is None:
+        force = _suitable_force(stance, tip.radius, materials)
+        if force <= 0:
+            raise SphshellError(
+                "the joints' effort limits do not carry the robot's own weight in this posture: "
+                "correct them in its file"
+            )
+        return _round(force)
+    if press > stance.force:
         raise SphshellError(
             f"the joints' effort limits allow a push of {_round(stance.force, 3):g} N along "
             f"{_axis(stance.approach)}, not {press:g} N"
         )
-    gap = TIP_GAP * tip.radius
-    touch, turned, points, even = _place_to_press(shell, tip, stance, gap, toward, inside=inside)
-    placement = pin.SE3(turned, stance.center - turned @ touch.center)
-    force = _round(_suitable_force(stance, tip.radius, materials) if press is None else press)
+    deepest = hertz_stiffness(tip.radius, *materials) * (0.5 * tip.radius) ** 1.5
+    if press > deepest:
+        raise SphshellError(
+            f"{press:g} N would press a {materials[0].name} sphere of radius {_mm(tip.radius)} in "
+            "by more than half of it: a smaller --press, a larger --radius, or a harder --law"
+        )
+    return press
+
+
+def _gap(radius: float, force: float, materials: tuple[Material, Material]) -> float:
+    """Return the gap at the start [m] from which the first touch peaks at four times `force` [N].
+
+    Fallen through g, Hertz's sphere stops at 4^(2/3) times the depth d under `force` at rest, where
+    2/5 k (4^(2/3) d)^(5/2) = force (g + 4^(2/3) d): g = 1.51 d.
+    """
+    rest = (force / hertz_stiffness(radius, *materials)) ** (2 / 3)
+    return min(TIP_GAP * radius, 1.5 * rest)
+
+
+def _press_plan(
+    tip: Tip,
+    stance: Stance,
+    materials: tuple[Material, Material],
+    press: float | None,
+    force: float,
+    gap: float,
+    placement: pin.SE3,
+    path: Array,
+    even: bool,
+) -> Plan:
     rate = _round(PATH_RATE * tip.radius)
-    aside = turned.T @ (stance.origin - stance.center)
-    # The tip's frame, which follows the path, need not be at the sphere's center.
-    path = points + aside - touch.normal * (touch.normal @ aside)
     contact = _contact(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
     softest = contact.mu_static * force / (TIP_LAG * tip.radius)
     stiffness = max(stance.slide_mass * TIP_RATE**2, softest)
@@ -167,11 +240,11 @@ def plan_press(
     )
     why = [f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}"]
     why.append(
-        f"the surface's center is {_mm(gap)} in front of the sphere, which presses along "
+        f"the surface is {_mm(gap)} in front of the sphere, which presses along "
         f"{_axis(stance.approach)}"
     )
     if stance.bent:
-        why.append("the joints were bent a little, as the tip could not move freely where it was")
+        why.append("the joints were bent to a posture in which the tip can move and press")
     if stance.lock:
         why.append(f"{_count(len(stance.lock), 'joint')} that do not move the tip are locked")
     if press is None:
@@ -181,7 +254,7 @@ def plan_press(
     if not even:
         why.append(
             "the sphere touches edges or several sides at once, wherever it was tried: the force "
-            "on the surface will not be the one that presses"
+            "on the surface is the resultant of several"
         )
     if len(path) < 2:
         reason = "it has no room" if stance.inertia else "its joints cannot keep it from rolling"
@@ -282,33 +355,6 @@ def _contact(materials: tuple[Material, Material], speed: float, slip: float) ->
 def _suitable_force(stance: Stance, radius: float, materials: tuple[Material, Material]) -> float:
     weights = MOST_WEIGHTS * stance.mass * GRAVITY
     return min(MOST_FORCE, 0.1 * stance.force, weights, bearable(radius, *materials))
-
-
-def _place_to_press(
-    shell: Shell, tip: Tip, stance: Stance, gap: float, toward: Array | None, *, inside: bool
-) -> tuple[TouchPoint, Array, Array, bool]:
-    """Return a touch point, the rotation of the shell, a path (k, 3), and whether it is even.
-
-    The touch point nearest to the center where the sphere touches once along the whole path; where
-    there is none, the center.
-    """
-    first: tuple[TouchPoint, Array, Array, bool] | None = None
-    for touch in touch_points(shell, tip.radius, gap, toward=toward, inside=inside):
-        turned = _turn(touch.normal, -stance.approach)
-        points = touch.point[None]
-        if stance.slide is not None and stance.inertia:
-            length = min(PATH_RADII * tip.radius, 0.8 * stance.room)
-            points = path_on_surface(
-                shell, touch, turned.T @ stance.slide, length, 0.5 * tip.radius
-            )
-        first = first or (touch, turned, points, False)
-        # Beside an edge a path may be short, but not on a whole surface.
-        roomy = len(points) > 4 or len(first[2]) <= 4
-        if roomy and touches_once(shell, touch, points, tip.radius, 2 * gap):
-            return touch, turned, points, True
-    if first is None:
-        raise SphshellError("the surface has no point to touch")
-    return first
 
 
 def _under(shell: Shell, centers: Array, radii: Array, gap: float) -> pin.SE3:

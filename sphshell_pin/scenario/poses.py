@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +30,13 @@ _DOWNWARD = 0.5
 # How far joints are bent out of a singular posture [rad or m], in turn, and how often it is tried.
 _BENDS = (0.3, 0.6, 0.9)
 _TRIES = 40
+# Other postures: seeds tried, steps to turn the limb along the approach, when it is so (cosine),
+# how far from each other [rad or m] they have to be, and how many are taken.
+_SEEDS, _TURNS, _ALONG, _APART, _MOST_STANCES = 24, 40, 0.99, 0.3, 5
+# Cosine between limb and approach below which the limb is beside the tip or before it.
+_BESIDE = 0.3
+# Effort limits beyond this stand for none.
+_NO_LIMIT = 1e9
 # Of the smallest joint coordinate to the limit that it leaves, as a part of its range.
 _MARGIN = 0.02
 
@@ -69,6 +77,101 @@ class Stance:
     """From the tip to the farthest joint that moves it [m]."""
     bent: bool
     """Whether the posture had to be bent out of a singular one, or into its limits."""
+    mobility: float = 1.0
+    """Along the approach, and across it where the tip slides, as a part of the best one."""
+    ahead: float = 1.0
+    """Cosine between the approach and the limb that carries the tip; below 0 it is in the way."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether the tip can move along the approach."""
+        return self.mobility >= _MOBILE
+
+
+def stances(
+    model: pin.Model,
+    q: Array,
+    tip: Tip,
+    approach: Array | None,
+    touching: Callable[[Array], bool],
+) -> Iterator[Stance]:
+    """Yield postures from which the tip can press, the one nearest to q (nq,) first.
+
+    Where the limb would be between tip and surface, postures in which it points along the approach
+    come first. They are found from q and from seeds within the joints' limits, always the same;
+    `touching(q)` says whether links of the robot touch each other. `approach` as of `take_stance`.
+    """
+    first = take_stance(model, q, tip, approach)
+    if first.moves and first.ahead > _BESIDE:
+        yield first
+    others = _turned(model, first, tip, touching)
+    yield from (one for one in others if one.ahead > _BESIDE)
+    if first.moves and first.ahead <= _BESIDE:
+        yield first
+
+
+def _turned(
+    model: pin.Model, first: Stance, tip: Tip, touching: Callable[[Array], bool]
+) -> list[Stance]:
+    """Return some postures whose limb points along the approach of `first`, the nearest first."""
+    rng = np.random.default_rng(0)
+    moving = [j for j in range(1, model.njoints) if model.names[j] not in first.lock]
+    found: list[tuple[float, Stance]] = []
+    start = _into_limits(model, first.q)
+    for k in range(_SEEDS):
+        seed = start if k == 0 else _seed(model, start, moving, rng)
+        q = _point_limb(model, seed, moving, tip, first.approach)
+        stance, mobility = _stance(model, q, first.lock, tip, first.approach, best_way=False)
+        if mobility < _EASY or stance.ahead <= _BESIDE or touching(q):
+            continue
+        away = float(np.linalg.norm(pin.difference(model, start, q)))
+        if all(np.linalg.norm(pin.difference(model, one.q, q)) > _APART for _, one in found):
+            found.append((away, replace(stance, bent=True)))
+    found.sort(key=lambda one: one[0])
+    return [_with_room(one, tip) for _, one in found[:_MOST_STANCES]]
+
+
+def _seed(model: pin.Model, q: Array, moving: Sequence[int], rng: np.random.Generator) -> Array:
+    """Return q with the joints of one coordinate anywhere within their limits."""
+    seed = q.copy()
+    for j in moving:
+        joint = model.joints[j]
+        if joint.nq != 1:
+            continue
+        low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+        low, high = max(low, q[joint.idx_q] - np.pi), min(high, q[joint.idx_q] + np.pi)
+        if low < high:
+            seed[joint.idx_q] = rng.uniform(low, high)
+    return seed
+
+
+def _point_limb(
+    model: pin.Model, q: Array, moving: Sequence[int], tip: Tip, approach: Array
+) -> Array:
+    """Return a configuration near q in which the limb points along `approach`, as far as it can."""
+    data, frame = model.createData(), find_frame(model, tip.frame)
+    columns = np.concatenate(
+        [
+            np.arange(model.joints[j].idx_v, model.joints[j].idx_v + model.joints[j].nv)
+            for j in moving
+        ]
+    )
+    for _ in range(_TURNS):
+        jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
+        pin.framesForwardKinematics(model, data, q)
+        limb = _limb(data, data.oMf[frame], tip)
+        turn = np.cross(limb, approach)
+        if limb @ approach < 0:  # the longer way round is no shorter turn
+            turn = turn / max(float(np.linalg.norm(turn)), 1e-9)
+            turn = turn if turn.any() else np.eye(3)[int(np.argmin(np.abs(approach)))]
+        if limb @ approach > _ALONG:
+            break
+        angular = jacobian[3:, columns]
+        square = angular @ angular.T + 1e-2 * np.eye(3)
+        step = np.zeros(model.nv)
+        step[columns] = np.clip(0.5 * angular.T @ np.linalg.solve(square, turn), -0.2, 0.2)
+        q = _into_limits(model, pin.integrate(model, q, step))
+    return q
 
 
 def take_stance(model: pin.Model, q: Array, tip: Tip, approach: Array | None) -> Stance:
@@ -176,14 +279,20 @@ def _stance(
     slide = None
     if sideways[-1] > _MOBILE * top:
         slide = _upright(slides[:, -1])
-    pushes = np.abs(linear.T @ approach)
+    pushes = linear.T @ approach
     limits = np.array(reduced.upperEffortLimit)
-    limited = (pushes > 1e-9) & np.isfinite(limits) & (limits > 0)
+    limited = (np.abs(pushes) > 1e-9) & (limits < _NO_LIMIT) & (limits > 0)
+    # What the weight of the links leaves of the efforts.
+    weight = pin.computeGeneralizedGravity(reduced, reduced.createData(), short)
+    room = (limits - np.sign(pushes) * weight)[limited]
     joints = [np.asarray(one.translation) for one in list(data.oMi)[1:]]
     inertia = 0.0
     if reduced.nv >= 6:
         turning = local[3:] @ np.linalg.solve(mass_matrix, local[3:].T)
         inertia = 3.0 / float(np.trace(turning))
+    limb = _limb(data, pose, tip)
+    # Where the tip can slide, both ways count: a stretched arm slides sideways at best.
+    usable = min(along, float(sideways[-1])) if reduced.nv > 1 else along
     stance = Stance(
         model=reduced,
         q=q,
@@ -198,13 +307,13 @@ def _stance(
         slide_mass=1 / max(float(sideways[-1]) if slide is not None else along, 1e-9),
         inertia=inertia,
         joint_inertia=np.diag(mass_matrix).copy(),
-        force=float(np.min(limits[limited] / pushes[limited])) if limited.any() else np.inf,
+        force=float(np.clip(room / np.abs(pushes[limited]), 0, None).min(initial=np.inf)),
         reach=max((float(np.linalg.norm(center - one)) for one in joints), default=0.0),
         bent=False,
+        mobility=usable / top,
+        ahead=float(limb @ approach),
     )
-    # Where the tip can slide, both ways count: a stretched arm slides sideways at best.
-    usable = min(along, float(sideways[-1])) if reduced.nv > 1 else along
-    return stance, usable / top
+    return stance, stance.mobility
 
 
 def _forward(data: pin.Data, pose: pin.SE3, tip: Tip) -> Array:
@@ -214,16 +323,23 @@ def _forward(data: pin.Data, pose: pin.SE3, tip: Tip) -> Array:
     it; any other along the line to it from the last joint that is not inside it. On a surface
     beside that line or behind it the limb would pass through the surface.
     """
+    limb, down = _limb(data, pose, tip), np.array([0.0, 0.0, -1.0])
+    if tip.offset.any():
+        return limb
+    return down if limb @ down > _DOWNWARD else _upright(limb, free=False)
+
+
+def _limb(data: pin.Data, pose: pin.SE3, tip: Tip) -> Array:
+    """Return the unit vector (3,) along the limb to the tip: see `_forward`."""
     if tip.offset.any():
         ahead: Array = pose.rotation @ tip.offset
         return ahead / np.linalg.norm(ahead)
-    down = np.array([0.0, 0.0, -1.0])
     for joint in reversed(list(data.oMi)[1:]):
-        limb = pose.translation - joint.translation
+        limb: Array = pose.translation - joint.translation
         length = float(np.linalg.norm(limb))
         if length > tip.radius:
-            return down if limb @ down > _DOWNWARD * length else _upright(limb / length, free=False)
-    return down
+            return limb / length
+    return np.array([0.0, 0.0, -1.0])
 
 
 def _with_room(stance: Stance, tip: Tip) -> Stance:

@@ -16,11 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.dynamics.controllers import Controller
 from sphshell_pin.dynamics.result import Origin, Result
 from sphshell_pin.errors import (
     Interrupted,
     MissingExtra,
     ResultError,
+    SetupWarning,
     SimulationDiverged,
     SphshellError,
     WeakLawWarning,
@@ -67,6 +69,8 @@ class RunReport:
     """Why the run ended early: Interrupted or SimulationDiverged."""
     audit: CadAudit | None = None
     """Differences of the contacts from those on the exact CAD faces, if that was asked for."""
+    doubts: tuple[str, ...] = ()
+    """What in the run shows that the scenario is probably a mistake; one sentence each."""
 
 
 def run_scenario(
@@ -143,7 +147,10 @@ def run_built(
         raise fault
     if interrupted:
         raise KeyboardInterrupt(f"the results are in {folder}, but not all pictures of them")
-    return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit)
+    doubts = ()
+    if stopped is None and isinstance(built.controller, Controller):
+        doubts = tuple(built.controller.doubts_after(result))
+    return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit, doubts)
 
 
 def _judge(built: Built, result: Result) -> tuple[tuple[Verdict, ...], Exception | None]:
@@ -161,7 +168,8 @@ def simulate(
     run = built.scenario.run
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", WeakLawWarning)  # explain_built reports it
+            for kind in (WeakLawWarning, SetupWarning):  # explain_built and doubts report them
+                warnings.simplefilter("ignore", kind)
             result = built.simulation.run(
                 built.q0,
                 built.v0,

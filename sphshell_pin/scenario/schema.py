@@ -29,7 +29,7 @@ from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
 from sphshell_pin.scenario.primitives import Primitive
 from sphshell_pin.scenario.tables import OneOf, Positive, Vector3, refuse_unknown_keys
 
-LISTS = ("robot", "shell", "contact", "source", "sensor", "knob")
+LISTS = ("robot", "joint", "shell", "contact", "source", "sensor", "knob")
 """Tables of which there may be several."""
 
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -58,15 +58,21 @@ class Placement(Section):
 
 
 class RobotSection(Section):
-    """A robot or a single body: shipped (`name`) or your own (`urdf`)."""
+    """A robot or a single body: shipped (`name`) or your own (`file`; `urdf` is the same key)."""
 
     name: str | None = None
+    file: str | None = None
     urdf: str | None = None
     package_dirs: list[str] = []
+    xacro_args: dict[str, bool | int | float | str] = {}
+    srdf: str | None = None
+    pose: str | None = None
     free_flyer: bool = False
+    mimic: bool = True
     label: str | None = None
     placement: Placement = Placement()
     lock: list[str] = []
+    joints: list[Literal["limits", "damping", "friction", "armature", "effort", "speed"]] = []
     q: list[float] | None = None
     start: dict[str, float | list[float]] = {}
     speed: dict[str, float | list[float]] = {}
@@ -74,11 +80,21 @@ class RobotSection(Section):
     @model_validator(mode="after")
     def check_one_source(self) -> RobotSection:
         """Refuse a robot with no description, or with two."""
-        if (self.name is None) == (self.urdf is None):
-            raise ValueError("give either name (a shipped robot) or urdf (a file), not both")
-        if self.name is not None and (self.package_dirs or self.free_flyer):
-            raise ValueError("package_dirs and free_flyer belong to urdf; drop them beside name")
+        if sum(one is not None for one in (self.name, self.file, self.urdf)) != 1:
+            raise ValueError(
+                "give either name (a shipped robot) or file (a URDF, xacro or MJCF; urdf is the "
+                "same key), not both"
+            )
+        of_files = ("package_dirs", "xacro_args", "srdf", "free_flyer")
+        beside = [key for key in of_files if getattr(self, key)]
+        if self.name is not None and beside:
+            raise ValueError(f"{' and '.join(beside)} belong to a file; drop them beside name")
         return self
+
+    @property
+    def path(self) -> str | None:
+        """The robot's file, or None for a shipped robot."""
+        return self.file if self.file is not None else self.urdf
 
 
 class ShellSection(Section):
@@ -121,6 +137,32 @@ Law = Annotated[Ingredient, OneOf(NormalLaw)]
 Friction = Annotated[Ingredient, OneOf(FrictionLaw)]
 
 
+class JointSection(Section):
+    """What acts in one joint, in place of what the robot's file states: see JointIngredients."""
+
+    name: str
+    lower: Annotated[float | None, Parameter("rad or m", "lower end")] = None
+    upper: Annotated[float | None, Parameter("rad or m", "upper end")] = None
+    stop: Law | None = None
+    damping: Annotated[NotNegative | None, Parameter("N m s/rad", "joint damping")] = None
+    friction: Annotated[Positive | None, Parameter("N m", "dry friction")] = None
+    friction_stiffness: Annotated[Positive | None, Parameter("N m/rad", "sticking stiffness")] = (
+        None
+    )
+    friction_damping: Annotated[NotNegative | None, Parameter("N m s/rad")] = None
+    armature: Annotated[NotNegative | None, Parameter("kg m^2", "armature")] = None
+    effort: Annotated[NotNegative | None, Parameter("N m", "effort limit")] = None
+    speed: Annotated[Positive | None, Parameter("rad/s", "speed limit")] = None
+
+    @model_validator(mode="after")
+    def check_friction(self) -> JointSection:
+        """Refuse a spring of dry friction without the friction."""
+        alone = self.friction_stiffness is not None or self.friction_damping is not None
+        if self.friction is None and alone:
+            raise ValueError("friction_stiffness and friction_damping belong to friction: give it")
+        return self
+
+
 class SphereSection(Section):
     """The sphere of a contact: `radius` [m], center `offset` [m] in the robot's `frame`."""
 
@@ -129,15 +171,31 @@ class SphereSection(Section):
     offset: Annotated[Vector3, Parameter("m", "sphere offset")] = [0.0, 0.0, 0.0]
 
 
+Spheres = Annotated[list[SphereSection | str], Field(min_length=1)]
+
+
 class ContactSection(Section):
-    """A sphere that may touch a shell."""
+    """A sphere, or several, that may touch a shell or another sphere."""
 
     name: str
-    sphere: SphereSection
-    shell: str
+    sphere: SphereSection | None = None
+    spheres: Literal["collision"] | Spheres | None = None
+    shell: str | None = None
+    other_sphere: SphereSection | None = None
     method: Literal["facets", "smooth", "elements"] | None = None
     law: Law
     friction: Friction = NoFriction()
+
+    @model_validator(mode="after")
+    def check_ends(self) -> ContactSection:
+        """Refuse a contact that lacks one of its two bodies, or has too many."""
+        if (self.sphere is None) == (self.spheres is None):
+            raise ValueError("give either sphere (one) or spheres (several), not both")
+        if (self.shell is None) == (self.other_sphere is None):
+            raise ValueError("give either shell (its name) or other_sphere, not both")
+        if self.other_sphere is not None and self.method is not None:
+            raise ValueError("method belongs to a shell; drop it beside other_sphere")
+        return self
 
 
 class SourceSection(Section):
@@ -271,6 +329,7 @@ class Scenario(Section):
     description: str = ""
     gravity: Annotated[Vector3, Parameter("m/s^2", "gravity")] = [0.0, 0.0, -9.81]
     robot: Annotated[list[RobotSection], Field(min_length=1)]
+    joint: list[JointSection] = []
     shell: list[ShellSection] = []
     contact: list[ContactSection] = []
     source: list[SourceSection] = []

@@ -22,7 +22,7 @@ from sphshell_pin.view.surface import draw_patches, draw_shell, great_circles
 if TYPE_CHECKING:
     from meshcat import Visualizer
 
-    from sphshell_pin.dynamics.scene import ContactPair
+    from sphshell_pin.dynamics.pairs import ContactPair, PlacedSphere
 
 SPHERE_COLOR = 0x2F6FDE
 
@@ -30,7 +30,7 @@ COLORINGS = ("distance", "patches")
 """Ways to color a shell; of several that are on the first is seen."""
 
 ShellKey = tuple[int, int, bytes, bool]
-SphereKey = tuple[int, bytes, float]
+SphereKey = tuple[int, bytes, float]  # joint, placement in it, radius
 
 
 def shell_key(pair: ContactPair) -> ShellKey:
@@ -39,10 +39,9 @@ def shell_key(pair: ContactPair) -> ShellKey:
     return id(pair.shell), pair.joint_j, place, pair.method == "smooth"
 
 
-def sphere_key(pair: ContactPair) -> SphereKey:
-    """Return a key: pairs with equal keys share the picture of their sphere."""
-    radius = 0.0 if pair.sphere is None else pair.sphere.radius
-    return pair.joint_i, pair.placement_i.homogeneous.tobytes(), radius
+def sphere_key(sphere: PlacedSphere) -> SphereKey:
+    """Return a key: spheres with equal keys share a picture."""
+    return sphere.joint, sphere.placement.homogeneous.tobytes(), sphere.radius
 
 
 class DrawnShell:
@@ -90,13 +89,11 @@ class DrawnShell:
 
 
 class DrawnSphere:
-    """The sphere of `pair`, drawn below `visualizer`; `index` numbers the spheres of the scene."""
+    """A sphere of the pair `name`, drawn below `visualizer`; `index` numbers those of the scene."""
 
-    def __init__(self, visualizer: Visualizer, pair: ContactPair, index: int) -> None:
-        _, _, radius = sphere_key(pair)
-        self.joint = pair.joint_i
-        self._offset = pair.placement_i
-        node = visualizer[f"{index}_{node_name(pair.name)}"]
+    def __init__(self, visualizer: Visualizer, name: str, drawn: PlacedSphere, index: int) -> None:
+        self.joint, self._offset, radius = drawn
+        node = visualizer[f"{index}_{node_name(name)}"]
         set_object(
             node["ball"],
             sphere(radius, 48),

@@ -170,7 +170,7 @@ class Display:
         if {shell_key(pair) for pair in scene.pairs if pair.shell} != set(self._shells):
             self.visualizer["shells"].delete()
             self._draw_shells()
-        if {sphere_key(pair) for pair in scene.pairs if pair.sphere} != set(self._spheres):
+        if {sphere_key(one) for pair in scene.pairs for one in pair.spheres} != set(self._spheres):
             self.visualizer["spheres"].delete()
             self._draw_spheres()
         if visual_model is not self._visual_model:
@@ -218,9 +218,12 @@ class Display:
     def _draw_spheres(self) -> None:
         self._spheres.clear()
         for pair in self.scene.pairs:
-            if pair.sphere is not None and sphere_key(pair) not in self._spheres:
-                drawn = DrawnSphere(self.visualizer["spheres"], pair, len(self._spheres))
-                self._spheres[sphere_key(pair)] = drawn
+            for one in pair.spheres:
+                if sphere_key(one) not in self._spheres:
+                    drawn = DrawnSphere(
+                        self.visualizer["spheres"], pair.name, one, len(self._spheres)
+                    )
+                    self._spheres[sphere_key(one)] = drawn
         if "spheres" in self._hidden:
             show(self.visualizer["spheres"], False)
 
@@ -228,9 +231,9 @@ class Display:
         if visual_model is not None and len(visual_model.geometryObjects):
             return GeometryRobot(self.visualizer, self._model, visual_model)
         tips = [
-            (pair.joint_i, pair.placement_i.translation)
+            (one.joint, one.placement.translation)
             for pair in self.scene.pairs
-            if pair.sphere is not None
+            for one in pair.spheres
         ]
         drawn = {one.joint for one in self._spheres.values()}
         drawn |= {one.joint for one in self._shells.values()}
@@ -263,14 +266,14 @@ def choose_view(
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     centers: list[FloatArray] = []
     around: list[FloatArray] = []
-    radii = [pair.sphere.radius for pair in scene.pairs if pair.sphere is not None]
+    radii = [one.radius for pair in scene.pairs for one in pair.spheres]
     for row in np.unique(np.linspace(0, len(configurations) - 1, 60).astype(int)):
         pin.forwardKinematics(model, data, configurations[row])
         for joint in range(1, model.njoints):
             around.append(np.array(data.oMi[joint].translation))
         for pair in scene.pairs:
-            if pair.sphere is not None:
-                centers.append(data.oMi[pair.joint_i].act(pair.placement_i.translation))
+            for one in pair.spheres:
+                centers.append(data.oMi[one.joint].act(one.placement.translation))
         if row == 0:
             for joint, placement, low, high in boxes:
                 where = data.oMi[joint] * placement

@@ -115,7 +115,7 @@ def render_recording(
         contacts.normal_world,
         visual_model,
     )
-    radii = [pair.sphere.radius for pair in scene.pairs if pair.sphere is not None]
+    radii = [one.radius for pair in scene.pairs for one in pair.spheres]
     length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
     scale = ArrowScale.from_forces(_forces(shown, arrows), length)
     most = int(np.bincount(shown.row).max(initial=0)) if len(shown.row) else 0
@@ -258,7 +258,7 @@ def _legend(
     scene: Scene, scale: ArrowScale, arrows: ArrowKind, shown: ContactRows, trailed: bool
 ) -> list[tuple[str, str]]:
     legend = []
-    radii = sorted({pair.sphere.radius for pair in scene.pairs if pair.sphere is not None})
+    radii = sorted({one.radius for pair in scene.pairs for one in pair.spheres})
     firsts = {pair.frame_i for pair in scene.pairs}
     on_what = "on the sphere"
     if not radii:

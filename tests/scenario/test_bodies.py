@@ -114,7 +114,7 @@ FAULTS = {
     "no unit quaternion": ("0.6, 0.8]", "0, 0.5]", "robot.ball.start", "its length is"),
     "unknown robot": ('"ball"', '"bal"', "robot.bal", "ball"),
     "same label": ('"ball"', '"three_link_finger"\nlabel = "three_link_finger"', "robot[1]", ""),
-    "no such urdf": ('name = "ball"', 'urdf = "b.urdf"', "robot[1]", "no such URDF file"),
+    "no such urdf": ('name = "ball"', 'urdf = "b.urdf"', "robot[1]", "no such file"),
 }
 
 
@@ -130,8 +130,8 @@ def test_faults_name_the_key(fault, tmp_path):
 
 def test_a_missing_mesh_names_the_searched_folders(tmp_path):
     (tmp_path / "r.urdf").write_text(
-        '<robot name="r"><link name="a"><visual><geometry>'
-        '<mesh filename="package://arm/a.stl"/></geometry></visual></link></robot>'
+        '<robot name="r"><link name="a"><collision><geometry>'
+        '<mesh filename="package://arm/a.stl"/></geometry></collision></link></robot>'
     )
     text = 'title = "x"\nrobot.urdf = "r.urdf"\nrun.duration = 1\n'
     with pytest.raises(ScenarioError, match=r"package://arm/a.stl.*package_dirs"):

@@ -241,7 +241,7 @@ def test_wrong_input_is_told() -> None:
         check_robot("ball", radius=-1.0)
     with pytest.raises(InvalidParameter, match="must be a URDF file"):
         check_robot("ball", free_flyer=True)
-    with pytest.raises(InvalidParameter, match="must be a name, a URDF file or a pinocchio"):
+    with pytest.raises(InvalidParameter, match="must be a name, a file or a pinocchio"):
         check_robot(3)
 
 

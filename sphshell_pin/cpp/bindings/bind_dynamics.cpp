@@ -28,8 +28,8 @@ SE3 to_se3(const Eigen::Matrix4d& m) {
 
 std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matrix4d& placement_i,
                                 int joint_j, const Eigen::Matrix4d& placement_j, double radius,
-                                std::shared_ptr<Shell> shell, nb::object source, int method,
-                                const NormalLaw& law, const FrictionLaw* friction) {
+                                double ball, std::shared_ptr<Shell> shell, nb::object source,
+                                int method, const NormalLaw& law, const FrictionLaw* friction) {
   auto pair = std::make_unique<Pair>();
   pair->name = std::move(name);
   pair->joint_i = joint_i;
@@ -37,6 +37,7 @@ std::unique_ptr<Pair> make_pair(std::string name, int joint_i, const Eigen::Matr
   pair->placement_i = to_se3(placement_i);
   pair->placement_j = to_se3(placement_j);
   pair->radius = radius;
+  pair->ball = ball;
   pair->shell = std::move(shell);
   if (!source.is_none()) pair->source = PythonSource(std::move(source));
   pair->method = static_cast<Method>(method);
@@ -56,10 +57,11 @@ struct Run {
   OneUser user{"run"};
   Simulation simulation;
 
-  Run(const pinocchio::Model& model, std::vector<Pair> pairs, const RunSettings& settings,
-      std::shared_ptr<Controller> controller, VectorX q0, VectorX v0, std::vector<Sensor> sensors)
-      : simulation(model, std::move(pairs), settings, std::move(controller), std::move(q0),
-                   std::move(v0), std::move(sensors)) {}
+  Run(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
+      const RunSettings& settings, std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
+      std::vector<Sensor> sensors)
+      : simulation(model, std::move(pairs), std::move(joints), settings, std::move(controller),
+                   std::move(q0), std::move(v0), std::move(sensors)) {}
 };
 
 // What Python enters with `with`.
@@ -127,6 +129,14 @@ void bind_evaluations(nb::class_<T>& bound) {
                return to_python(scene.touching() ? scene.external() : none);
              });
            })
+      .def("joint_forces",
+           [](T& self, const VectorX& q, const VectorX& v) {
+             return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
+               evaluate();
+               const JointForces& joints = scene.joints();
+               return joints.act() ? joints.torque() : VectorX(VectorX::Zero(v.size()));
+             });
+           })
       .def("contacts",
            [](T& self, const VectorX& q, const VectorX& v) {
              return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
@@ -154,11 +164,41 @@ void bind_dynamics(nanobind::module_& m) {
   using namespace sphshell;
   nb::class_<Pair>(m, "Pair", nb::type_slots(slots<Pair, visit_pair>()))
       .def_rw("relaxation", &Pair::relaxation)
+      .def_rw("group", &Pair::group)
       .def(nb::new_(&make_pair), nb::arg("name"), nb::arg("joint_i"), nb::arg("placement_i"),
-           nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("shell").none(),
-           nb::arg("source").none(), nb::arg("method"), nb::arg("law"), nb::arg("friction").none());
+           nb::arg("joint_j"), nb::arg("placement_j"), nb::arg("radius"), nb::arg("ball"),
+           nb::arg("shell").none(), nb::arg("source").none(), nb::arg("method"), nb::arg("law"),
+           nb::arg("friction").none());
 
   m.def("contact_row_type", &contact_row_type);
+
+  nb::class_<JointEffects>(m, "JointEffects")
+      .def(
+          "__init__",
+          [](JointEffects* self, VectorX damping, VectorX least_effort, VectorX most_effort,
+             VectorX speed) {
+            new (self) JointEffects{{},
+                                    {},
+                                    std::move(damping),
+                                    std::move(least_effort),
+                                    std::move(most_effort),
+                                    std::move(speed)};
+          },
+          nb::arg("damping"), nb::arg("least_effort"), nb::arg("most_effort"), nb::arg("speed"))
+      .def(
+          "add_stop",
+          [](JointEffects& self, int q, int v, double end, double sign, const NormalLaw& law) {
+            self.stops.push_back({q, v, end, sign, law});
+          },
+          nb::arg("q"), nb::arg("v"), nb::arg("end"), nb::arg("sign"), nb::arg("law"))
+      .def(
+          "add_friction",
+          [](JointEffects& self, int v, double limit, double stiffness, double damping,
+             double relaxation) {
+            self.friction.push_back({v, limit, stiffness, damping, relaxation});
+          },
+          nb::arg("v"), nb::arg("limit"), nb::arg("stiffness"), nb::arg("damping"),
+          nb::arg("relaxation"));
 
   nb::class_<Evaluations> scene(m, "Scene",
                                 nb::type_slots(slots<Evaluations, visit_evaluations>()));
@@ -166,10 +206,11 @@ void bind_dynamics(nanobind::module_& m) {
   scene
       .def(
           "__init__",
-          [](Evaluations* self, nb::handle model, const std::vector<const Pair*>& pairs) {
-            new (self) Evaluations(model_of(model), copies(pairs));
+          [](Evaluations* self, nb::handle model, const std::vector<const Pair*>& pairs,
+             std::shared_ptr<JointEffects> joints) {
+            new (self) Evaluations(model_of(model), copies(pairs), std::move(joints));
           },
-          nb::arg("model"), nb::arg("pairs"))
+          nb::arg("model"), nb::arg("pairs"), nb::arg("joints") = nb::none())
       .def_prop_ro("bristle_size", &Evaluations::bristle_size)
       .def("rates",
            [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
@@ -206,10 +247,11 @@ void bind_dynamics(nanobind::module_& m) {
   state
       .def(
           "__init__",
-          [](OwnState* self, nb::handle model, const std::vector<const Pair*>& pairs) {
-            new (self) OwnState(model_of(model), copies(pairs));
+          [](OwnState* self, nb::handle model, const std::vector<const Pair*>& pairs,
+             std::shared_ptr<JointEffects> joints) {
+            new (self) OwnState(model_of(model), copies(pairs), std::move(joints));
           },
-          nb::arg("model"), nb::arg("pairs"))
+          nb::arg("model"), nb::arg("pairs"), nb::arg("joints") = nb::none())
       .def("copy", [](const OwnState& self) { return new OwnState(self); })
       .def("advance", &OwnState::advance, nb::arg("q"), nb::arg("v"), nb::arg("dt"));
 
@@ -282,16 +324,18 @@ void bind_dynamics(nanobind::module_& m) {
       .def(
           "__init__",
           [](Run* self, nb::handle model, const std::vector<const Pair*>& pairs,
-             std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
-             const RunSettings& settings, const std::vector<const Sensor*>& sensors) {
+             std::shared_ptr<JointEffects> joints, std::shared_ptr<Controller> controller,
+             VectorX q0, VectorX v0, const RunSettings& settings,
+             const std::vector<const Sensor*>& sensors) {
             const pinocchio::Model& own = model_of(model);
             check_count("q0", q0.size(), own.nq);
             check_count("v0", v0.size(), own.nv);
-            new (self) Run(own, copies(pairs), settings, std::move(controller), std::move(q0),
-                           std::move(v0), copies(sensors));
+            new (self) Run(own, copies(pairs), std::move(joints), settings, std::move(controller),
+                           std::move(q0), std::move(v0), copies(sensors));
           },
-          nb::arg("model"), nb::arg("pairs"), nb::arg("controller").none(), nb::arg("q0"),
-          nb::arg("v0"), nb::arg("settings"), nb::arg("sensors"))
+          nb::arg("model"), nb::arg("pairs"), nb::arg("joints").none(),
+          nb::arg("controller").none(), nb::arg("q0"), nb::arg("v0"), nb::arg("settings"),
+          nb::arg("sensors"))
       .def(
           "advance",
           [](Run& self, double wall_seconds, double until) {
@@ -307,12 +351,12 @@ void bind_dynamics(nanobind::module_& m) {
            })
       .def(
           "change",
-          [](Run& self, const std::vector<const Pair*>& pairs,
+          [](Run& self, const std::vector<const Pair*>& pairs, std::shared_ptr<JointEffects> joints,
              std::shared_ptr<Controller> controller) {
             const Use use(self.user, "change");
-            self.simulation.change(copies(pairs), std::move(controller));
+            self.simulation.change(copies(pairs), std::move(joints), std::move(controller));
           },
-          nb::arg("pairs"), nb::arg("controller").none())
+          nb::arg("pairs"), nb::arg("joints").none(), nb::arg("controller").none())
       .def(
           "push",
           [](Run& self, int joint, const Vec3& point, const Vec3& force_world, int frame) {
@@ -340,5 +384,6 @@ void bind_dynamics(nanobind::module_& m) {
       .def_prop_ro("last_step", &alone<&Simulation::last_step>)
       .def_prop_ro("wall_time", &alone<&Simulation::wall_time>)
       .def_prop_ro("summaries",
-                   [](Run& self) { return to_list(alone<&Simulation::summaries>(self)); });
+                   [](Run& self) { return to_list(alone<&Simulation::summaries>(self)); })
+      .def_prop_ro("limits", [](Run& self) { return to_list(alone<&Simulation::limits>(self)); });
 }

@@ -48,6 +48,7 @@ void bind_rollout(nanobind::module_& m) {
       .def_prop_ro("q", [](const Outcome& self) { return self.q; })
       .def_prop_ro("v", [](const Outcome& self) { return self.v; })
       .def_prop_ro("summaries", [](const Outcome& self) { return to_list(self.summaries); })
+      .def_prop_ro("limits", [](const Outcome& self) { return to_list(self.limits); })
       .def_prop_ro("residual", [](const Outcome& self) { return residual(self.record.energy); })
       .def_prop_ro("through", &through);
 
@@ -61,15 +62,16 @@ void bind_rollout(nanobind::module_& m) {
       .def(
           "add",
           [](Rollout& self, const std::vector<const Pair*>& pairs,
-             std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
-             const RunSettings& settings, const std::vector<const Sensor*>& sensors) {
+             std::shared_ptr<JointEffects> joints, std::shared_ptr<Controller> controller,
+             VectorX q0, VectorX v0, const RunSettings& settings,
+             const std::vector<const Sensor*>& sensors) {
             check_count("q0", q0.size(), self.model().nq);
             check_count("v0", v0.size(), self.model().nv);
-            self.add({copies(pairs), settings, std::move(controller), std::move(q0), std::move(v0),
-                      copies(sensors)});
+            self.add({copies(pairs), std::move(joints), settings, std::move(controller),
+                      std::move(q0), std::move(v0), copies(sensors)});
           },
-          nb::arg("pairs"), nb::arg("controller").none(), nb::arg("q0"), nb::arg("v0"),
-          nb::arg("settings"), nb::arg("sensors"))
+          nb::arg("pairs"), nb::arg("joints").none(), nb::arg("controller").none(), nb::arg("q0"),
+          nb::arg("v0"), nb::arg("settings"), nb::arg("sensors"))
       // Threads may want the interpreter for a user's routine.
       .def(
           "wait",

@@ -19,8 +19,8 @@ inline void check_state(const SceneData& scene, const VectorX& q, const VectorX&
 // itself, may begin another. The interpreter's lock guards the fields.
 class Evaluations {
  public:
-  Evaluations(const pinocchio::Model& model, std::vector<Pair> pairs)
-      : first_(model, std::move(pairs)) {}
+  Evaluations(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints)
+      : first_(model, std::move(pairs), std::move(joints)) {}
 
   Evaluations(const Evaluations&) = delete;
   Evaluations& operator=(const Evaluations&) = delete;
@@ -68,8 +68,8 @@ struct OwnState {
   OneUser user{"SceneState"};
   SceneState state;
 
-  OwnState(const pinocchio::Model& model, std::vector<Pair> pairs)
-      : state(model, std::move(pairs)) {}
+  OwnState(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints)
+      : state(model, std::move(pairs), std::move(joints)) {}
   OwnState(const OwnState& other) : state(other.state) {}
 
   // As Evaluations::at, with what the state remembers.

@@ -82,4 +82,17 @@ nb::list to_list(const std::vector<PairSummary>& summaries) {
   return out;
 }
 
+nb::list to_list(const std::vector<LimitSummary>& limits) {
+  nb::list out;
+  for (const LimitSummary& s : limits) {
+    nb::dict d;
+    d["cut_time"] = s.cut_time;
+    d["first_cut"] = s.first_cut;
+    d["peak_speed"] = s.peak_speed;
+    d["first_too_fast"] = s.first_too_fast;
+    out.append(d);
+  }
+  return out;
+}
+
 }  // namespace sphshell

@@ -19,6 +19,7 @@ nb::dict to_dict(const Counts& counts);
 // (pair, depth [m]), or None.
 nb::object to_python(const std::optional<DeepStart>& start);
 nb::list to_list(const std::vector<PairSummary>& summaries);
+nb::list to_list(const std::vector<LimitSummary>& limits);
 template <class T>
 std::vector<T> copies(const std::vector<const T*>& all) {
   std::vector<T> out;

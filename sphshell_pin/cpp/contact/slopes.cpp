@@ -95,9 +95,9 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   m.bristle = site.stretch;
   LawSlopes at;
   if (friction.has_state())
-    differentiate<8>(law, friction, site.radius, relaxation, m, at);
+    differentiate<8>(law, friction, site.disc_radius, relaxation, m, at);
   else
-    differentiate<4>(law, friction, site.radius, relaxation, m, at);
+    differentiate<4>(law, friction, site.disc_radius, relaxation, m, at);
 
   // The turning of the normal is a rotation of all vectors of the law, and what is left of their
   // change goes through its slopes.

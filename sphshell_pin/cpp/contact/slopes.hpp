@@ -25,7 +25,8 @@ struct ContactSite {
   // contacts follow, the contact point, and the contact itself stays where it is.
   Vec3 place;
   bool follows;
-  double radius;  // of the sphere [m]
+  double radius;       // of the sphere [m]
+  double disc_radius;  // that the laws take: see Pair::disc_radius [m]
   Vector6 twist;
   Vec3 stretch;  // of the bristle [m]
 };

@@ -28,17 +28,58 @@ Vec3 flattened(const Vec3& x, const Vec3& normal) {
 
 }  // namespace
 
+Bristles::Bristles(std::vector<int> groups)
+    : groups_(std::move(groups)),
+      known_(groups_.size()),
+      pools_(groups_.empty() ? 0 : static_cast<std::size_t>(groups_.back()) + 1),
+      has_(groups_.size(), 0) {}
+
 void Bristles::add(std::size_t k) {
   has_[k] = 1;
-  for (std::size_t i = k + 1; i < first_.size(); ++i) first_[i] += kSpare;
+  Pool& pool = pools_[groups_[k]];
+  pool.shared = pool.count > 0;
+  pool.count = std::min(pool.count + kSpare, kMostSpare);
+  pool.taken.reserve(kMostSpare);
+  size_ = 0;
+  for (Pool& one : pools_) {
+    one.first = size_;
+    size_ += one.count;
+  }
 }
 
-void Bristles::assign_none(std::size_t k) {
-  if (has_[k]) stretches_.resize(stretches_.size() + kSpare, Vec3::Zero());
-  next_[k + 1] = static_cast<int>(stretches_.size());
+int Bristles::slot(std::size_t k, int place) {
+  if (!has_[k]) return -1;
+  const Known& known = known_[k];
+  if (place < known.count) return known.first + place;
+  Pool& pool = pools_[groups_[k]];
+  int spare = place - known.count;
+  if (pool.shared) {
+    const std::pair<std::size_t, int> contact(k, place);
+    const auto at = std::find(pool.taken.begin(), pool.taken.end(), contact);
+    spare = static_cast<int>(at - pool.taken.begin());
+    if (at == pool.taken.end() && spare < pool.count) pool.taken.push_back(contact);
+  }
+  return spare < pool.count ? pool.first + spare : -1;
 }
 
-Vec3 Bristles::stretch(std::size_t k, int place, const VectorX& z) const {
+void Bristles::restart() {
+  for (Pool& pool : pools_) pool.taken.clear();
+}
+
+void Bristles::assign_none(std::size_t k) { close(k, stretches_.size()); }
+
+// The stretches from `begin` on are those of pair k; behind the last pair of a group come its spare
+// slots.
+void Bristles::close(std::size_t k, std::size_t begin) {
+  known_[k] = {static_cast<int>(begin), static_cast<int>(stretches_.size() - begin)};
+  if (k + 1 < groups_.size() && groups_[k + 1] == groups_[k]) return;
+  Pool& pool = pools_[groups_[k]];
+  pool.first = static_cast<int>(stretches_.size());
+  pool.taken.clear();
+  stretches_.resize(stretches_.size() + pool.count, Vec3::Zero());
+}
+
+Vec3 Bristles::stretch(std::size_t k, int place, const VectorX& z) {
   const int at = slot(k, place);
   return at < 0 ? Vec3::Zero() : Vec3(z.segment<3>(3 * at));
 }
@@ -92,11 +133,11 @@ void Bristles::assign(std::size_t k, const std::vector<Contact>& contacts,
     used_.push_back(minimum);
     add(static_cast<std::size_t>(successor), stretch(k, minimum, z) - stretch(k, saddle, z));
   }
-  assign_none(k);  // the spare slots
+  close(k, begin);
 }
 
 void Bristles::end(VectorX& z) {
-  first_.swap(next_);
+  size_ = static_cast<int>(stretches_.size());
   z.resize(size());
   for (std::size_t i = 0; i < stretches_.size(); ++i) z.segment<3>(3 * i) = stretches_[i];
 }

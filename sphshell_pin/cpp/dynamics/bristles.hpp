@@ -2,6 +2,7 @@
 // contacts begin, end, split and merge.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "contact/tracker.hpp"
@@ -10,26 +11,26 @@
 namespace sphshell {
 
 // Slots of 3 numbers each, in the order of the pairs and of the places of their contacts; behind
-// the known contacts of a pair are spare ones, for contacts that begin within a step.
+// the known contacts of a group of pairs are spare ones, for contacts that begin within a step.
 class Bristles {
  public:
-  explicit Bristles(std::size_t pairs)
-      : first_(pairs + 1, 0), next_(pairs + 1, 0), has_(pairs, 0) {}
+  // The number of each pair's group; pairs of a group stand together.
+  explicit Bristles(std::vector<int> groups);
 
   // Pair k has bristles from now on.
   void add(std::size_t k);
-  bool any() const { return first_.back() > 0; }
-  int size() const { return 3 * first_.back(); }
-  // Of the contact at this place of pair k, or -1.
-  int slot(std::size_t k, int place) const {
-    const int slot = first_[k] + place;
-    return slot < first_[k + 1] ? slot : -1;
-  }
-  bool is_spare(std::size_t k, int slot) const { return slot >= first_[k + 1] - kSpare; }
+  bool any() const { return size_ > 0; }
+  int size() const { return 3 * size_; }
+  // Of the contact at this place of pair k, or -1: the contacts of a group that begin first in a
+  // step get its spare slots.
+  int slot(std::size_t k, int place);
+  bool is_spare(std::size_t k, int slot) const { return slot >= pools_[groups_[k]].first; }
+  // Forgets which contacts have begun since the accepted state.
+  void restart();
 
   // At an accepted state all slots are assigned anew: begin(), then each pair in its order, then
   // end(), which puts the stretches z in that order.
-  void begin() { stretches_.clear(), next_[0] = 0; }
+  void begin() { stretches_.clear(); }
   void assign_none(std::size_t k);
   // `turned`: the stretches have followed their normals already.
   void assign(std::size_t k, const std::vector<Contact>& contacts, const std::vector<int>& at,
@@ -37,11 +38,26 @@ class Bristles {
   void end(VectorX& z);
 
  private:
-  static constexpr int kSpare = 4;
+  static constexpr int kSpare = 4, kMostSpare = 16;  // of a pair, of a group
 
-  Vec3 stretch(std::size_t k, int place, const VectorX& z) const;
+  // The slots of a pair's known contacts.
+  struct Known {
+    int first = 0, count = 0;
+  };
+  // The spare slots of a group, and, where it is of several pairs, who has taken them.
+  struct Pool {
+    int first = 0, count = 0;
+    bool shared = false;
+    std::vector<std::pair<std::size_t, int>> taken;  // pair, place
+  };
 
-  std::vector<int> first_, next_;  // of each pair, and behind the last
+  Vec3 stretch(std::size_t k, int place, const VectorX& z);
+  void close(std::size_t k, std::size_t begin);
+
+  std::vector<int> groups_;
+  std::vector<Known> known_;
+  std::vector<Pool> pools_;
+  int size_ = 0;  // slots
   std::vector<Vec3> stretches_;
   std::vector<char> has_;
   std::vector<int> used_;

@@ -14,9 +14,11 @@ Chain::Chain(const pinocchio::Model& model, int joint_j, int joint_i) {
 }
 
 void Chain::add(const pinocchio::Model& model, int joint, double sign) {
-  const int first = size(), count = model.nvs[joint];
+  // A mimic joint has an axis of its own, and the velocity of the joint that it mimics.
+  const int first = size(), count = model.nvExtendeds[joint];
   // A joint on the way to body j moves the shell with its own axes.
-  links_.push_back({joint, first, count, sign, sign > 0 ? first : first + count});
+  links_.push_back(
+      {joint, first, count, model.idx_vExtendeds[joint], sign, sign > 0 ? first : first + count});
   for (int k = 0; k < count; ++k) velocity_.push_back(model.idx_vs[joint] + k);
 }
 
@@ -27,7 +29,8 @@ void Chain::place(const Multibody& body, const pinocchio::SE3& world_from_shell,
   for (auto link = links_.rbegin(); link != links_.rend(); ++link) {
     Motion own = Motion::Zero();
     for (int k = link->first; k < link->first + link->count; ++k) {
-      const Motion axis = world_from_shell.actInv(Motion(body.axes().col(velocity_[k])));
+      const Motion axis =
+          world_from_shell.actInv(Motion(body.axes().col(link->column + k - link->first)));
       axes_.col(k) = link->sign * axis.toVector();
       own += Motion(v[velocity_[k]] * axes_.col(k));
     }

@@ -33,6 +33,7 @@ class Chain {
  private:
   struct Link {
     int joint, first, count;  // its axes
+    int column;               // of the first one, among those of all joints
     double sign;              // 1 on the way to body i, -1 on that to body j
     int moved;                // the first axis that it moves
   };

@@ -18,18 +18,33 @@ long count_positive(const std::vector<double>& values) {
   return std::count_if(values.begin(), values.end(), [](double value) { return value > 0; });
 }
 
+// Of a law that clamps its force at zero, less than zero where it acts. Laws are linear in the
+// rate: the force against the opposite rate is 2 elastic - unclamped.
+double clamp_gauge(const NormalLaw& law, double depth, double gap_rate, double force) {
+  if (force > 0) return -force;
+  const NormalForce<double> opposed = law.force(depth, -gap_rate);
+  return opposed.total - 2 * opposed.elastic;
+}
+
 }  // namespace
 
-void Events::begin() {
-  for (std::size_t k = 0; k < at_begin_.size(); ++k) {
-    const PairState& now = scene_.states()[k];
-    at_begin_[k] = {now.pieces, now.clamped, now.center};
+Events::Start Events::now(std::size_t k) const {
+  const std::size_t pairs = scene_.pairs().size();
+  if (k < pairs) {
+    const PairState& pair = scene_.states()[k];
+    return {pair.pieces, pair.clamped, pair.center};
   }
+  const StopState& stop = scene_.joints().stops()[k - pairs];
+  return {stop.touching, stop.clamped, Vec3::Zero()};
+}
+
+void Events::begin() {
+  for (std::size_t k = 0; k < at_begin_.size(); ++k) at_begin_[k] = now(k);
 }
 
 bool Events::changed(std::size_t k) const {
-  const PairState& now = scene_.states()[k];
-  return now.pieces != at_begin_[k].pieces || now.clamped != at_begin_[k].clamped;
+  const Start state = now(k);
+  return state.pieces != at_begin_[k].pieces || state.clamped != at_begin_[k].clamped;
 }
 
 bool Events::met() const {
@@ -49,7 +64,19 @@ bool Events::met_at(double theta, const Motion& motion, const Chart& chart) {
 // A sphere that is larger by the margin has contacts with a gap, too.
 void Events::measure(std::size_t k, double margin, Gauges& out) {
   for (std::vector<double>& values : out) values.clear();
+  if (k >= scene_.pairs().size()) {
+    const std::size_t i = k - scene_.pairs().size();
+    const StopState& state = scene_.joints().stops()[i];
+    const JointStop& stop = scene_.joints().effects()->stops[i];
+    out[Minimum].push_back(state.depth);
+    if (state.touching)
+      out[Clamp].push_back(
+          clamp_gauge(stop.law, state.depth, -stop.sign * state_.v[stop.v], state.force));
+    return;
+  }
   const Pair& pair = scene_.pairs()[k];
+  if (pair.ball > 0)
+    out[Minimum].push_back(pair.radius + pair.ball - scene_.states()[k].center.norm());
   if (pair.shell) {
     query_.find(*pair.shell, scene_.states()[k].center, pair.radius + margin, pair.method);
     for (const Contact& contact : query_.contacts)
@@ -58,10 +85,8 @@ void Events::measure(std::size_t k, double margin, Gauges& out) {
   for (const ActiveContact& active : scene_.active()) {
     if (active.pair != static_cast<int>(k)) continue;
     const ContactKinematics<double>& m = active.kinematics;
-    // Laws are linear in the rate: the force against the opposite rate is 2 elastic - unclamped.
-    const auto opposed = pair.law.force(m.depth, -m.normal.dot(m.relative));
-    out[Clamp].push_back(active.force.normal > 0 ? -active.force.normal
-                                                 : opposed.total - 2 * opposed.elastic);
+    out[Clamp].push_back(
+        clamp_gauge(pair.law, m.depth, m.normal.dot(m.relative), active.force.normal));
   }
   for (std::vector<double>& values : out)
     std::sort(values.begin(), values.end(), std::greater<double>());
@@ -72,12 +97,12 @@ double Events::locate(double before, double after, double tolerance, const Motio
   met_at(after, motion, chart);
   std::size_t k = 0;
   while (k + 1 < at_begin_.size() && !changed(k)) ++k;
-  const double radius = scene_.pairs()[k].radius;
-  const Vec3 end = scene_.states()[k].center;
+  const double radius = k < scene_.pairs().size() ? scene_.pairs()[k].radius : 0;
+  const Vec3 end = now(k).center;
   const double margin = std::min(1.1 * (end - at_begin_[k].center).norm(), kMargin * radius);
   measure(k, margin, after_);
   met_at(before, motion, chart);
-  const Vec3 start = scene_.states()[k].center;
+  const Vec3 start = now(k).center;
   measure(k, margin, before_);
 
   // The quantity that changes its sign, and where it stands at both ends.
@@ -111,7 +136,7 @@ double Events::locate(double before, double after, double tolerance, const Motio
       [&](double theta) {
         const bool is_met = met_at(theta, motion, chart);
         if (kind < kKinds) measure(k, margin, between_);
-        return value(between_, scene_.states()[k].center, is_met);
+        return value(between_, now(k).center, is_met);
       },
       before, after, value(before_, start, false), value(after_, end, true),
       [&](double a, double b) { return b - a <= tolerance; }, looks);

@@ -12,12 +12,14 @@ namespace sphshell {
 // The state of a chart at a share of a step, as its dense output or a prediction has it.
 using Motion = std::function<void(double share, VectorX& y)>;
 
-// An event is a change of sign: of a contact's depth (touch, lift-off), of a saddle's depth, or of
-// the force that a law clamps at zero. Events are located on an interpolated motion, where a
-// look costs a query of the contacts and no evaluation of the dynamics.
+// An event is a change of sign: of the depth of a contact or of a joint in its stop (touch,
+// lift-off), of a saddle's depth, or of the force that a law clamps at zero. Events are located on
+// an interpolated motion, where a look costs a query of the contacts and no evaluation of the
+// dynamics.
 class Events {
  public:
-  explicit Events(SceneData& scene) : scene_(scene), at_begin_(scene.pairs().size()) {}
+  explicit Events(SceneData& scene)
+      : scene_(scene), at_begin_(scene.pairs().size() + scene.joints().stops().size()) {}
 
   // A step begins where the scene was last evaluated.
   void begin();
@@ -37,7 +39,9 @@ class Events {
     int pieces = 0, clamped = 0;
     Vec3 center = Vec3::Zero();  // of the sphere, in the shell's frame
   };
-  // Quantities of one pair that change sign at its events, positive ones first in each list.
+  // Of a pair or, behind the pairs, of a joint's stop.
+  Start now(std::size_t k) const;
+  // Its quantities that change sign at its events, positive ones first in each list.
   enum Kind { Minimum, Saddle, Clamp, kKinds };
   using Gauges = std::array<std::vector<double>, kKinds>;
 

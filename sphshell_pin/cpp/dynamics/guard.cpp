@@ -1,5 +1,6 @@
 #include "dynamics/guard.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,13 +17,67 @@ constexpr double kSeen = 1e-3;
 constexpr double kTurn = 0.5;
 constexpr double kMostTurned = 16;
 
+bool between_same(const Pair& a, const Pair& b) {
+  return a.shell && a.shell == b.shell && a.joint_i == b.joint_i && a.joint_j == b.joint_j &&
+         a.method == b.method && a.placement_j == b.placement_j;
+}
+
 }  // namespace
+
+Guard::Guard(const SceneData& scene) : known_(scene.pairs().size()) {
+  const std::vector<Pair>& pairs = scene.pairs();
+  const std::vector<int> groups = group_numbers(pairs);
+  for (std::size_t k = 1; k < pairs.size(); ++k) {
+    if (groups[k] != groups[k - 1] || !between_same(pairs[k - 1], pairs[k])) continue;
+    if (clusters_.empty() || clusters_.back().last != k - 1)
+      clusters_.push_back({k - 1, k, 0, Vec3::Zero(), {}});
+    clusters_.back().last = k;
+  }
+  for (Cluster& cluster : clusters_) {
+    Eigen::AlignedBox3d box;
+    for (std::size_t k = cluster.first; k <= cluster.last; ++k)
+      box.extend(pairs[k].placement_i.translation());
+    cluster.center = box.center();
+  }
+}
 
 void Guard::begin(const SceneData& scene) {
   for (std::size_t k = 0; k < known_.size(); ++k) {
     known_[k].center = scene.states()[k].center;
     known_[k].touching = scene.states()[k].count > 0;
   }
+  for (Cluster& cluster : clusters_) {
+    const std::size_t k = cluster.first;
+    const int joint = scene.pairs()[k].joint_i;
+    const Multibody& body = scene.body();
+    const Vec3 center =
+        joint == 0 ? cluster.center : body.world_from_joint(joint).act(cluster.center);
+    cluster.known.center = scene.states()[k].world_from_j.actInv(center);
+    cluster.known.touching = false;
+    // Radii may have been changed.
+    cluster.reach = 0;
+    for (std::size_t i = k; i <= cluster.last; ++i) {
+      const Pair& pair = scene.pairs()[i];
+      const double away = (pair.placement_i.translation() - cluster.center).norm();
+      cluster.reach = std::max(cluster.reach, away + pair.radius);
+      cluster.known.touching = cluster.known.touching || known_[i].touching;
+    }
+  }
+}
+
+// Whether the ball of a cluster has been as far from the shell as none of its spheres moved: then
+// none of them needs a look of its own.
+bool Guard::is_clear(const SceneData& scene, Cluster& cluster) const {
+  if (cluster.known.touching) return false;
+  double moved = 0, radius = std::numeric_limits<double>::infinity();
+  for (std::size_t k = cluster.first; k <= cluster.last; ++k) {
+    if (scene.excursions()[k].touched) return false;
+    moved = std::max(moved, scene.excursions()[k].moved);
+    radius = std::min(radius, scene.pairs()[k].radius);
+  }
+  const double slack = kApart * radius;
+  return moved <= slack ||
+         moved <= slack + gap(scene.pairs()[cluster.first], cluster.reach, cluster.known);
 }
 
 double Guard::allowed(SceneData& scene, const State& from, const State& to, bool gap_at_end) {
@@ -30,21 +85,30 @@ double Guard::allowed(SceneData& scene, const State& from, const State& to, bool
   const double h = to.t - from.t;
   const double turned =
       h * std::max(from.v.lpNorm<Eigen::Infinity>(), to.v.lpNorm<Eigen::Infinity>());
+  auto cluster = clusters_.begin();
   for (std::size_t k = 0; k < known_.size(); ++k) {
+    if (cluster != clusters_.end() && cluster->first == k) {
+      Cluster& here = *cluster++;
+      if (turned <= kTurn && is_clear(scene, here)) {
+        k = here.last;
+        continue;
+      }
+    }
     const Pair& pair = scene.pairs()[k];
-    if (!pair.shell) continue;
+    if (pair.source) continue;
+    const double radius = pair.least_radius();
     Known& known = known_[k];
     const Excursion& excursion = scene.excursions()[k];
     // In and out again within a step: what the stages saw of it is not the motion.
     const bool skipped = excursion.touched && !known.touching && scene.states()[k].count == 0 &&
-                         excursion.moved > kSeen * pair.radius;
+                         excursion.moved > kSeen * radius;
     if (skipped) share = std::min(share, 0.5);
     double moved = excursion.moved;
-    const double slack = pair.radius * (known.touching ? kTouching : kApart);
+    const double slack = radius * (known.touching ? kTouching : kApart);
     if (turned > kMostTurned) share = std::min(share, kMostTurned / turned);
     if (turned > kTurn) moved = std::max(moved, path(scene, k, from, to));
     if (moved <= slack) continue;
-    double limit = slack + (known.touching ? 0 : gap(pair, known));
+    double limit = slack + (known.touching ? 0 : gap(pair, pair.radius, known));
     if (gap_at_end && moved > limit && !known.touching)
       limit += std::max(0.0, distance(pair, scene.states()[k].center) - pair.radius);
     share = std::min(share, limit / moved);
@@ -53,22 +117,23 @@ double Guard::allowed(SceneData& scene, const State& from, const State& to, bool
   return share;
 }
 
-// A lower bound of the distance to the shell.
+// A lower bound of the distance to the shell, or to the ball.
 double Guard::distance(const Pair& pair, const Vec3& center) {
+  if (pair.ball > 0) return center.norm() - pair.ball;
   const double distance = std::abs(pair.shell->closest_point(center).distance);
   const bool is_curved = pair.method == Method::Smooth && pair.shell->curved() != nullptr;
   return is_curved ? distance - pair.shell->curved()->bulge() : distance;
 }
 
-// A lower bound of the gap at the begin of the step; the distance is looked up where the one known
-// is worn out.
-double Guard::gap(const Pair& pair, Known& known) const {
+// A lower bound of the gap of a sphere at the begin of the step; the distance is looked up where
+// the one known is worn out.
+double Guard::gap(const Pair& pair, double radius, Known& known) {
   double distance = known.distance - (known.center - known.anchor).norm();
-  if (known.distance < 0 || distance < std::max(2 * pair.radius, 0.5 * known.distance)) {
+  if (known.distance < 0 || distance < std::max(2 * radius, 0.5 * known.distance)) {
     known.anchor = known.center;
     distance = known.distance = Guard::distance(pair, known.center);
   }
-  return std::max(0.0, distance - pair.radius);
+  return std::max(0.0, distance - radius);
 }
 
 // Length of the center's path in the shell's frame, by chords.

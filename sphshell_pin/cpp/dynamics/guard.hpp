@@ -13,7 +13,7 @@ namespace sphshell {
 // evaluations is a touch of at most r / 2000.
 class Guard {
  public:
-  explicit Guard(const SceneData& scene) : known_(scene.pairs().size()) {}
+  explicit Guard(const SceneData& scene);
 
   // The scene's last evaluate() was at the state where the next step begins.
   void begin(const SceneData& scene);
@@ -31,11 +31,22 @@ class Guard {
     double distance = -1;
   };
 
+  // Neighboring pairs of one group between the same two bodies and with the same shell; all their
+  // spheres are in the ball of the radius `reach`.
+  struct Cluster {
+    std::size_t first, last;
+    double reach = 0;
+    Vec3 center = Vec3::Zero();  // in the joint of the spheres
+    Known known;                 // of the ball
+  };
+
   static double distance(const Pair& pair, const Vec3& center);
-  double gap(const Pair& pair, Known& known) const;
+  static double gap(const Pair& pair, double radius, Known& known);
+  bool is_clear(const SceneData& scene, Cluster& cluster) const;
   double path(SceneData& scene, std::size_t k, const State& from, const State& to);
 
   std::vector<Known> known_;
+  std::vector<Cluster> clusters_;  // of several pairs each, in their order
   VectorX u_, q_;
 };
 

@@ -40,23 +40,46 @@ void Linearization::rates(const VectorX& q, const VectorX& v, const VectorX& z, 
   jacobian.setZero(nv + z.size(), 2 * nv + z.size());
   auto by_q = jacobian.topLeftCorner(nv, nv), by_v = jacobian.block(0, nv, nv, nv);
   force_ = tau;
-  if (scene_.touching()) add_contacts(q, v, &jacobian);
-  // The contact forces are torques like others: their derivatives pass through the inertia.
+  const bool joints_act = scene_.joints().act(), any = scene_.touching() || joints_act;
+  if (any) add_contacts(q, v, &jacobian);
+  if (joints_act) add_joints(q, v, z, jacobian);
+  // These forces are torques like others: their derivatives pass through the inertia.
   body.acceleration_derivatives(q, v, force_, by_q, by_v, inverse_mass_);
-  if (!scene_.touching()) return;
+  if (!any) return;
   for (int m : loaded_)
     for (int k : loaded_) {
       by_q.col(m) += by_q_(k, m) * inverse_mass_.col(k);
       by_v.col(m) += by_v_(k, m) * inverse_mass_.col(k);
     }
-  for (const ActiveContact& active : scene_.active()) {
-    if (active.slot < 0) continue;
-    for (int i = 0; i < 3; ++i) {
-      auto column = jacobian.col(2 * nv + 3 * active.slot + i).head(nv);
-      column_.setZero();
-      for (int k : loaded_) column_ += column[k] * inverse_mass_.col(k);
-      column = column_;
-    }
+  // What was written as generalized forces by z.
+  const auto pass_through_inertia = [&](Eigen::Index z) {
+    auto column = jacobian.col(2 * nv + z).head(nv);
+    column_.setZero();
+    for (int k : loaded_) column_ += column[k] * inverse_mass_.col(k);
+    column = column_;
+  };
+  for (const ActiveContact& active : scene_.active())
+    for (int i = 0; i < 3 && active.slot >= 0; ++i) pass_through_inertia(3 * active.slot + i);
+  for (Eigen::Index i = scene_.joint_bristles(); i < z.size(); ++i) pass_through_inertia(i);
+}
+
+// Adds stops, damping and dry friction of joints, as add_contacts() does with contacts.
+void Linearization::add_joints(const VectorX& q, const VectorX& v, const VectorX& z,
+                               MatrixX& jacobian) {
+  const JointForces& joints = scene_.joints();
+  const Eigen::Index nv = v.size(), first = scene_.joint_bristles();
+  force_ += joints.torque();
+  joints.slopes(q, v, z.tail(joints.size()), scene_.least_relaxation(), joint_slopes_);
+  for (const JointForces::Slope& slope : joint_slopes_) {
+    by_q_(slope.v, slope.v) += slope.by_q;
+    by_v_(slope.v, slope.v) += slope.by_v;
+    if (!is_loaded_[slope.v]) loaded_.push_back(slope.v);
+    is_loaded_[slope.v] = 1;
+    if (slope.spring < 0) continue;
+    const Eigen::Index row = first + slope.spring;
+    jacobian(slope.v, 2 * nv + row) += slope.by_z;
+    jacobian(nv + row, nv + slope.v) = slope.rate_by_v;
+    jacobian(nv + row, 2 * nv + row) = slope.rate_by_z;
   }
 }
 
@@ -109,9 +132,10 @@ void Linearization::add_bristle(const ActiveContact& active, const ContactSite& 
   for (int m = 0; m < chain.size(); ++m) {
     const int k = chain.velocity(m);
     const auto axis = chain.axes().col(m);
-    rate.col(k) = by_displacement * axis + slopes_.rate_by_twist * chain.twist_by_q().col(m);
-    rate.col(nv + k) = slopes_.rate_by_twist * axis;
-    jacobian.block<1, 3>(k, 2 * nv + z) = axis.transpose() * slopes_.by_stretch;
+    // Joints that mimic another have its velocity.
+    rate.col(k) += by_displacement * axis + slopes_.rate_by_twist * chain.twist_by_q().col(m);
+    rate.col(nv + k) += slopes_.rate_by_twist * axis;
+    jacobian.block<1, 3>(k, 2 * nv + z) += axis.transpose() * slopes_.by_stretch;
   }
   rate.middleCols<3>(2 * nv + z) = slopes_.rate_by_stretch;
 }
@@ -120,7 +144,8 @@ ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& t
   const Pair& pair = scene_.pairs()[active.pair];
   const PairState& state = scene_.states()[active.pair];
   const auto& turn = state.world_from_j.rotation();
-  ContactSite site{active.contact, state.center, !pair.source, pair.radius, twist, Vec3::Zero()};
+  ContactSite site{active.contact,     state.center, !pair.source, pair.radius,
+                   pair.disc_radius(), twist,        Vec3::Zero()};
   if (pair.source) site.place = site.contact.point;
   if (active.slot >= 0) site.stretch = turn.transpose() * active.kinematics.bristle;
   return site;

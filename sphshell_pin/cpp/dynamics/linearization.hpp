@@ -35,6 +35,7 @@ class Linearization {
     Matrix6 by_displacement, by_twist;
   };
   void add_contacts(const VectorX& q, const VectorX& v, MatrixX* jacobian);
+  void add_joints(const VectorX& q, const VectorX& v, const VectorX& z, MatrixX& jacobian);
   void add_bristle(const ActiveContact& active, const ContactSite& site, const Chain& chain,
                    MatrixX& jacobian);
   ContactSite site_of(const ActiveContact& active, const Vector6& twist) const;
@@ -43,9 +44,10 @@ class Linearization {
   std::vector<Chain> chains_;  // one per pair
   VectorX force_;              // generalized
   MatrixX by_q_, by_v_, inverse_mass_;
-  std::vector<int> loaded_;  // velocities that contact forces act on
+  std::vector<int> loaded_;  // velocities that these forces act on
   std::vector<char> is_loaded_;
   ContactSlopes slopes_;
+  std::vector<JointForces::Slope> joint_slopes_;
   VectorX column_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <pinocchio/algorithm/aba-derivatives.hpp>
 #include <pinocchio/algorithm/aba.hpp>
+#include <pinocchio/algorithm/crba.hpp>
 #include <pinocchio/algorithm/energy.hpp>
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
@@ -38,7 +39,10 @@ bool depth_first(const pinocchio::Model& model) {
 }  // namespace
 
 Multibody::Multibody(const pinocchio::Model& model)
-    : model_(model), data_(model_), zero_(VectorX::Zero(model_.nv)) {
+    : model_(model),
+      data_(model_),
+      zero_(VectorX::Zero(model_.nv)),
+      mimics_(!model_.mimicking_joints.empty()) {
   for (int j = 1; j < model_.njoints; ++j) find_curved(model_.joints[j], curved_);
 }
 
@@ -70,12 +74,29 @@ void Multibody::kinematics(const VectorX& q, const VectorX& v) {
     Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, v));
 }
 
+// In reduced coordinates: with G the velocities of all joints per independent one, G^T M G, and
+// G^T of the bias forces, which is what Pinocchio's CRBA and RNEA return.
+const VectorX& Multibody::solve(const VectorX& tau, const VectorX& bias) {
+  mass_.compute(data_.M);
+  solution_ = tau - bias;
+  mass_.solveInPlace(solution_);
+  return solution_;
+}
+
 const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
+  if (mimics_) {
+    pinocchio::crba(model_, data_, q, pinocchio::Convention::WORLD);
+    return solve(tau, pinocchio::rnea(model_, data_, q, v, zero_));
+  }
   return pinocchio::aba(model_, data_, VectorRef(q), VectorRef(v), VectorRef(tau));
 }
 
 const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
                                        const Forces& external) {
+  if (mimics_) {
+    pinocchio::crba(model_, data_, q, pinocchio::Convention::WORLD);
+    return solve(tau, pinocchio::rnea(model_, data_, q, v, zero_, external));
+  }
   return pinocchio::aba(model_, data_, VectorRef(q), VectorRef(v), VectorRef(tau), external);
 }
 
@@ -112,11 +133,12 @@ void Multibody::want_derivatives() {
   const VectorX q = pinocchio::integrate(model_, moved_, step_);
   for (int j = 1; j < model_.njoints; ++j) {
     const int nv = model_.nvs[j];
+    if (nv == 0) continue;  // its axis is that of a joint with one
     TurningAxes axes{j, Matrix6X::Zero(6, nv * nv)};
     turn_axes(q, axes);
     if (axes.by_q.cwiseAbs().maxCoeff() > 1e-6) turning_.push_back(axes);
   }
-  differences_ = !turning_.empty() || !depth_first(model_);
+  differences_ = mimics_ || !turning_.empty() || !depth_first(model_);
 }
 
 void Multibody::turn_axes(const VectorX& q, TurningAxes& axes) {
@@ -191,11 +213,20 @@ void Multibody::speeds(const VectorRef& v, VectorX& out) const {
 }
 
 double Multibody::kinetic_energy(const VectorX& q, const VectorX& v) {
-  return pinocchio::computeKineticEnergy(model_, data_, q, v);
+  if (!mimics_) return pinocchio::computeKineticEnergy(model_, data_, q, v);
+  pinocchio::crba(model_, data_, q, pinocchio::Convention::WORLD);
+  return 0.5 * v.dot(data_.M.selfadjointView<Eigen::Upper>() * v);
 }
 
 double Multibody::potential_energy(const VectorX& q) {
-  return pinocchio::computePotentialEnergy(model_, data_, q);
+  if (!mimics_) return pinocchio::computePotentialEnergy(model_, data_, q);
+  pinocchio::forwardKinematics(model_, data_, q);
+  double sum = 0;
+  for (int j = 1; j < model_.njoints; ++j) {
+    const auto& inertia = model_.inertias[j];
+    sum -= inertia.mass() * model_.gravity.linear().dot(data_.oMi[j].act(inertia.lever()));
+  }
+  return sum;
 }
 
 }  // namespace sphshell

@@ -43,8 +43,8 @@ class Multibody {
   const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
                               const Forces& external);
   // Derivatives (nv, nv) of acceleration(q, v, tau), with respect to q in its tangent space, v and
-  // tau. Pinocchio's derivatives leave out how axes turn, and want joints in depth-first order: for
-  // other models they are central differences, right to nine digits.
+  // tau. Pinocchio's derivatives leave out how axes turn and mimic joints, and want joints in
+  // depth-first order: for other models they are central differences, right to nine digits.
   void acceleration_derivatives(const VectorX& q, const VectorX& v, const VectorX& tau,
                                 Eigen::Ref<MatrixX> by_q, Eigen::Ref<MatrixX> by_v,
                                 Eigen::Ref<MatrixX> by_tau);
@@ -93,7 +93,8 @@ class Multibody {
     if (joint == 0) return Eigen::Vector3d::Zero();
     return data_.oMi[joint].rotation() * data_.v[joint].angular();
   }
-  // Of place_axes(): one column per velocity, linear part first, about the world's origin.
+  // Of place_axes(): one column per velocity of each joint, mimic joints' included (Pinocchio's
+  // idx_vExtended), linear part first, about the world's origin.
   const Matrix6X& axes() const { return data_.J; }
   const std::vector<TurningAxes>& turning() const { return turning_; }
   const pinocchio::Model& model() const { return model_; }
@@ -101,10 +102,15 @@ class Multibody {
 
  private:
   void turn_axes(const VectorX& q, TurningAxes& axes);
+  const VectorX& solve(const VectorX& tau, const VectorX& bias);
 
   pinocchio::Model model_;
   pinocchio::Data data_;
   VectorX zero_;
+  // Pinocchio's ABA has no mimic joints: of models with some, the mass matrix is factorized.
+  bool mimics_;
+  Eigen::LLT<MatrixX, Eigen::Upper> mass_;
+  VectorX solution_;
   std::vector<TurningAxes> turning_;
   bool differences_ = false;
   VectorX step_, moved_;  // scratch of the differences

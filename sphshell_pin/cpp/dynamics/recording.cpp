@@ -1,11 +1,21 @@
 #include "dynamics/recording.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace sphshell {
 
-Recorder::Recorder(std::size_t pairs, double start, double end, double record_dt)
-    : start_(start), end_(end), record_dt_(record_dt), summaries_(pairs), status_(pairs) {}
+Recorder::Recorder(const SceneData& scene, double start, double end, double record_dt)
+    : start_(start),
+      end_(end),
+      record_dt_(record_dt),
+      summaries_(scene.pairs().size() + scene.joints().stops().size()),
+      status_(summaries_.size()) {
+  const JointEffects* joints = scene.joints().effects();
+  if (joints) limits_.resize(std::max(joints->most_effort.size(), joints->speed.size()));
+  limit_status_.resize(limits_.size());
+}
 
 Record Recorder::take() { return std::exchange(record_, {}); }
 
@@ -57,36 +67,70 @@ void Recorder::add_row(SceneData& scene, const State& state) {
   ++rows_;
 }
 
+// Begin and end of touch; `begin` is the kind of the first, that of the end follows it.
+void Recorder::add_touch(std::size_t k, const Touch& now, double t, double h, int number,
+                         Event::Kind begin) {
+  PairSummary& summary = summaries_[k];
+  PairStatus& status = status_[k];
+  if (status.touching) summary.contact_time += h;
+  summary.impulse += 0.5 * h * (status.normal_force + now.normal_force);
+  status.normal_force = now.normal_force;
+  if (now.touching != status.touching) {
+    const int kind = static_cast<int>(begin) + (now.touching ? 0 : 1);
+    record_.events.push_back({t, number, static_cast<Event::Kind>(kind)});
+    status.touching = now.touching;
+    status.deep = false;
+    if (now.touching) ++summary.touches;
+  }
+  if (!now.touching) return;
+  if (now.normal_force > summary.peak_force)
+    summary.peak_force = now.normal_force, summary.peak_force_time = t;
+  if (now.depth > summary.max_depth) summary.max_depth = now.depth, summary.max_depth_time = t;
+}
+
 void Recorder::add_step(const SceneData& scene, double t, double h) {
-  for (std::size_t k = 0; k < summaries_.size(); ++k) {
+  const std::size_t pairs = scene.pairs().size();
+  for (std::size_t k = 0; k < pairs; ++k) {
     const PairState& now = scene.states()[k];
-    PairSummary& summary = summaries_[k];
+    const int number = static_cast<int>(k);
+    const auto add_event = [&](Event::Kind kind) { record_.events.push_back({t, number, kind}); };
     PairStatus& status = status_[k];
-    const auto add_event = [&](Event::Kind kind) {
-      record_.events.push_back({t, static_cast<int>(k), kind});
-    };
-    if (status.touching) summary.contact_time += h;
-    summary.impulse += 0.5 * h * (status.normal_force + now.normal_force);
-    status.normal_force = now.normal_force;
-    const bool touching = now.count > 0;
-    if (touching != status.touching) {
-      add_event(touching ? Event::Kind::Touch : Event::Kind::LiftOff);
-      status.touching = touching;
-      status.deep = false;
-      if (touching) ++summary.touches;
-    }
-    const double radius = scene.pairs()[k].radius;
+    add_touch(k, {now.count > 0, now.normal_force, now.depth}, t, h, number, Event::Kind::Touch);
+    const double radius = scene.pairs()[k].least_radius();
     const bool through = now.pushed_through || (radius > 0 && now.depth > radius);
     if (through && !status.through) add_event(Event::Kind::Through);
     status.through = through;
-    if (!touching) continue;
-    if (now.normal_force > summary.peak_force)
-      summary.peak_force = now.normal_force, summary.peak_force_time = t;
-    if (now.depth > summary.max_depth) summary.max_depth = now.depth, summary.max_depth_time = t;
-    if (radius > 0 && now.depth > 0.5 * radius && !status.deep) {
+    if (now.count > 0 && radius > 0 && now.depth > 0.5 * radius && !status.deep) {
       status.deep = true;
       add_event(Event::Kind::Deep);
     }
+  }
+  const std::vector<StopState>& stops = scene.joints().stops();
+  for (std::size_t i = 0; i < stops.size(); ++i)
+    add_touch(pairs + i, {stops[i].touching, stops[i].force, stops[i].depth}, t, h,
+              static_cast<int>(i), Event::Kind::Stop);
+}
+
+void Recorder::add_limits(const SceneData& scene, const VectorX& v, const std::vector<char>& cut,
+                          double t, double h) {
+  for (std::size_t i = 0; i < limits_.size(); ++i) {
+    const JointEffects& joints = *scene.joints().effects();
+    LimitSummary& summary = limits_[i];
+    LimitStatus& status = limit_status_[i];
+    const int number = static_cast<int>(i);
+    const auto change = [&](bool& was, bool is, double& first, Event::Kind begin) {
+      if (was == is) return;
+      was = is;
+      if (is && first < 0) first = t;
+      const int kind = static_cast<int>(begin) + (is ? 0 : 1);
+      record_.events.push_back({t, number, static_cast<Event::Kind>(kind)});
+    };
+    if (cut[i]) summary.cut_time += h;
+    change(status.cut, cut[i], summary.first_cut, Event::Kind::EffortLimit);
+    const double speed = std::abs(v[number]);
+    summary.peak_speed = std::max(summary.peak_speed, speed);
+    const bool too_fast = joints.speed.size() > 0 && speed > joints.speed[number];
+    change(status.too_fast, too_fast, summary.first_too_fast, Event::Kind::SpeedLimit);
   }
 }
 

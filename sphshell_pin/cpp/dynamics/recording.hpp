@@ -8,13 +8,24 @@
 namespace sphshell {
 
 struct Event {
-  enum class Kind : int { Touch = 0, LiftOff = 1, Deep = 2, Through = 3 };
+  enum class Kind : int {
+    Touch,
+    LiftOff,
+    Deep,
+    Through,
+    Stop,  // a joint reaches a stop, and leaves it
+    StopLeft,
+    EffortLimit,  // a controller's torque begins to be cut, and ends
+    EffortLimitLeft,
+    SpeedLimit,  // a joint becomes faster than its limit, and slower
+    SpeedLimitLeft
+  };
   double t;
-  int pair;
+  int pair;  // of a stop, its number; of a limit, that of the velocity
   Kind kind;
 };
 
-// Figures of one pair over the run.
+// Figures of one pair, or of one stop of a joint, over the run.
 struct PairSummary {
   double contact_time = 0;  // [s]
   double impulse = 0;       // of the normal force [N s]
@@ -23,6 +34,12 @@ struct PairSummary {
   double max_depth = 0;  // [m]
   double max_depth_time = 0;
   int touches = 0;
+};
+
+// Of one velocity over the run; times are -1 where it never was so.
+struct LimitSummary {
+  double cut_time = 0, first_cut = -1;         // of the controller's torque [s]
+  double peak_speed = 0, first_too_fast = -1;  // [rad/s or m/s], [s]
 };
 
 // Readings of sensors in the order of their arrival; `values` holds those of one after the other.
@@ -44,7 +61,7 @@ struct Record {
 class Recorder {
  public:
   // Rows every `record_dt` from `start` to `end` [s], and at `end`; 0: at the end of every step.
-  Recorder(std::size_t pairs, double start, double end, double record_dt);
+  Recorder(const SceneData& scene, double start, double end, double record_dt);
 
   // The scene's last evaluate() was at the state.
   void add_row(SceneData& scene, const State& state);
@@ -55,17 +72,33 @@ class Recorder {
   // Events and figures of a step of h [s] that ends at t; the scene has accepted its end.
   void add_step(const SceneData& scene, double t, double h);
 
+  // The same of limits of torque and speed; `cut`: which torques were cut.
+  void add_limits(const SceneData& scene, const VectorX& v, const std::vector<char>& cut, double t,
+                  double h);
+
   // Hands over what was recorded since the last call.
   Record take();
   // The state as the only row of a record; the scene's last evaluate() was there.
   Record snapshot(SceneData& scene, const State& state);
   const std::vector<PairSummary>& summaries() const { return summaries_; }
+  const std::vector<LimitSummary>& limits() const { return limits_; }
 
  private:
   struct PairStatus {
     double normal_force = 0;
     bool touching = false, deep = false, through = false;
   };
+  // A pair or a stop at the end of a step.
+  struct Touch {
+    bool touching;
+    double normal_force, depth;
+  };
+  struct LimitStatus {
+    bool cut = false, too_fast = false;
+  };
+
+  void add_touch(std::size_t k, const Touch& now, double t, double h, int number,
+                 Event::Kind begin);
 
   double due() const { return start_ + double(next_row_) * record_dt_; }
 
@@ -73,6 +106,8 @@ class Recorder {
   Record record_;
   std::vector<PairSummary> summaries_;
   std::vector<PairStatus> status_;
+  std::vector<LimitSummary> limits_;
+  std::vector<LimitStatus> limit_status_;
   long rows_ = 0, next_row_ = 1;
   State between_;
   VectorX y_;

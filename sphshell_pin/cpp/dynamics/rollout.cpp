@@ -73,8 +73,9 @@ Outcome Rollout::run(Task task, Lent& lent) const {
   Outcome out;
   // An exception that left a thread would end the process.
   try {
-    Simulation run(model_, std::move(task.pairs), task.settings, std::move(task.controller),
-                   std::move(task.q0), std::move(task.v0), std::move(task.sensors));
+    Simulation run(model_, std::move(task.pairs), std::move(task.joints), task.settings,
+                   std::move(task.controller), std::move(task.q0), std::move(task.v0),
+                   std::move(task.sensors));
     try {
       out.deep_start = run.deep_start();
       if (!out.deep_start) out.status = run.advance(kInfinity, kInfinity, &stopped_);
@@ -89,6 +90,7 @@ Outcome Rollout::run(Task task, Lent& lent) const {
     out.q = run.q();
     out.v = run.v();
     out.summaries = run.summaries();
+    out.limits = run.limits();
     lent = run.give_back();
   } catch (const std::exception& error) {
     out.fault = error.what();

@@ -19,6 +19,7 @@ namespace sphshell {
 // One run to make.
 struct Task {
   std::vector<Pair> pairs;
+  JointForces::Effects joints;
   RunSettings settings;
   std::shared_ptr<Controller> controller;
   VectorX q0, v0;
@@ -34,6 +35,7 @@ struct Outcome {
   Counts counts;
   VectorX q, v;
   std::vector<PairSummary> summaries;
+  std::vector<LimitSummary> limits;
   Record record;
 };
 

@@ -3,17 +3,21 @@
 #include <algorithm>
 #include <utility>
 
+#include "contact/ball.hpp"
+
 namespace sphshell {
 
-SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs)
+SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
+                     JointForces::Effects joints)
     : body_(model),
+      joints_(std::move(joints), model.nv),
       pairs_(std::move(pairs)),
       queries_(pairs_.size(), Query(true)),
       trackers_(pairs_.size()),
       states_(pairs_.size()),
       excursions_(pairs_.size()),
       external_(static_cast<std::size_t>(model.njoints), pinocchio::Force::Zero()),
-      bristles_(pairs_.size()) {
+      bristles_(group_numbers(pairs_)) {
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
@@ -31,8 +35,9 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs)
   active_.reserve(64);
 }
 
-void SceneData::change(std::vector<Pair> pairs) {
+void SceneData::change(std::vector<Pair> pairs, JointForces::Effects joints) {
   pairs_ = std::move(pairs);
+  joints_.change(std::move(joints));
   for (const Pair& pair : pairs_) needs_velocity_ = needs_velocity_ || pair.needs_velocity();
 }
 
@@ -43,6 +48,7 @@ void SceneData::need_velocity_of(int joint) {
 
 void SceneData::restart() {
   for (ContactTracker& tracker : trackers_) tracker.restart();
+  bristles_.restart();
   for (Excursion& excursion : excursions_) excursion.moved = 0, excursion.touched = false;
 }
 
@@ -77,12 +83,18 @@ void SceneData::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, b
         add_contact(k, contacts[i], -1, static_cast<int>(i));
     }
   }
+  evaluate_joints(q, v, z);
   compute_forces(z);
 }
 
+void SceneData::evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z) {
+  if (joints_.act()) joints_.evaluate(q, v, z.tail(joints_.size()), relaxation_);
+}
+
 void SceneData::revisit(const VectorX& q, const VectorX& v, const VectorX& z) {
-  if (active_.empty()) return;
+  if (active_.empty() && !joints_.act()) return;
   if (needs_velocity_) body_.kinematics(q, v);
+  evaluate_joints(q, v, z);
   compute_forces(z);
 }
 
@@ -110,7 +122,10 @@ void SceneData::accept(VectorX& z) {
       active_[next++].contact_id = tracker.places()[i].number;
   }
   if (!bristles_.any()) return;
+  joint_stretches_ = z.tail(joints_.size());
   bristles_.end(z);
+  z.conservativeResize(bristle_size());
+  z.tail(joints_.size()) = joint_stretches_;
   // From now on, the place of a contact is its place in the list.
   for (std::size_t i = 0, place = 0; i < active_.size(); ++i) {
     place = i > 0 && active_[i].pair == active_[i - 1].pair ? place + 1 : 0;
@@ -138,6 +153,10 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k) {
   const Vec3& center = pair.placement_i.translation();
   state.center = state.world_from_j.actInv(
       pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
+  if (pair.ball > 0) {
+    find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
+    return query.contacts;
+  }
   query.find(*pair.shell, state.center, pair.radius, pair.method);
   // Friction belongs to a place, and its spring should not be split and merged at every border
   // between elements: contacts that are nearly one are one. The elastic energy is that of their
@@ -158,8 +177,9 @@ void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int
 }
 
 void SceneData::compute_forces(const VectorX& z) {
-  powers_ = Powers();
+  powers_ = joints_.powers();
   bristle_rates_.setZero(bristle_size());
+  bristle_rates_.tail(joints_.size()) = joints_.rates();
   touching_ = !active_.empty();
   if (!touching_) return;
   for (int j : loaded_) external_[j].setZero();
@@ -188,8 +208,8 @@ void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
 
 void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
-  active.force =
-      contact_force(pair.law, pair.friction, pair.radius, relaxation(pair), active.kinematics);
+  active.force = contact_force(pair.law, pair.friction, pair.disc_radius(), relaxation(pair),
+                               active.kinematics);
   if (active.slot < 0) return;
   const auto& rotation = states_[active.pair].world_from_j.rotation();
   const int at = 3 * active.slot;
@@ -295,7 +315,8 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
 }
 
 const VectorX& SceneData::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
-  return touching_ ? body_.acceleration(q, v, tau, external_) : body_.acceleration(q, v, tau);
+  const VectorX& all = joints_.act() ? joints_.added(tau) : tau;
+  return touching_ ? body_.acceleration(q, v, all, external_) : body_.acceleration(q, v, all);
 }
 
 }  // namespace sphshell

@@ -8,7 +8,7 @@
 #include "contact/tracker.hpp"
 #include "dynamics/bristles.hpp"
 #include "dynamics/contact_row.hpp"
-#include "dynamics/multibody.hpp"
+#include "dynamics/joints.hpp"
 #include "dynamics/pair.hpp"
 
 namespace sphshell {
@@ -25,12 +25,6 @@ struct PairState {
   Vec3 center = Vec3::Zero();  // of the sphere, in the shell's frame [m]
 
   void clear_sums() { count = pieces = clamped = 0, depth = normal_force = 0; }
-};
-
-// Of all pairs at one state: power lost in damping and friction, and energy stored.
-struct Powers {
-  double damping = 0, friction = 0;  // [W]
-  double elastic = 0, bristles = 0;  // [J]
 };
 
 struct ActiveContact {
@@ -57,15 +51,17 @@ struct Excursion {
 // state. Model and pairs are its own copies. One per thread.
 class SceneData {
  public:
-  SceneData(const pinocchio::Model& model, std::vector<Pair> pairs);
+  SceneData(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints);
 
-  // The same pairs with other laws, friction of the same kind, radii and relaxation.
-  void change(std::vector<Pair> pairs);
+  // The same pairs with other laws, friction of the same kind, radii and relaxation; the same stops
+  // and dry friction of joints with other values.
+  void change(std::vector<Pair> pairs, JointForces::Effects joints);
   // Hands the pairs over; nothing can be evaluated any more.
   std::vector<Pair> give_back() { return std::move(pairs_); }
 
-  // Contact forces at (q, v), with the bristles z (3 per slot, in the shells' frames). With
-  // `identify` contacts get their ids even where no force depends on them.
+  // Forces of contacts and joints at (q, v), with the bristles z: those of contacts (3 per slot, in
+  // the shells' frames), then those of joints. With `identify` contacts get their ids even where no
+  // force depends on them.
   void evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool identify = false);
   // The same with another velocity, at the placements of the last evaluate().
   void revisit(const VectorX& q, const VectorX& v, const VectorX& z);
@@ -77,13 +73,15 @@ class SceneData {
   // Rows of the contacts at (q, v), where the forces were last evaluated.
   void log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows);
 
-  // Size of z, spare slots for new contacts included.
-  int bristle_size() const { return bristles_.size(); }
+  // Size of z, spare slots for new contacts included; where those of joints begin.
+  int bristle_size() const { return bristles_.size() + joints_.size(); }
+  int joint_bristles() const { return bristles_.size(); }
   // Of the last evaluate() (bristle_size) [m/s].
   const VectorX& bristle_rates() const { return bristle_rates_; }
   // Bristles give way no faster than this [s]: explicit fixed steps ask for it.
   void relax_in(double time) { relaxation_ = time; }
   double relaxation(const Pair& pair) const { return std::max(relaxation_, pair.relaxation); }
+  double least_relaxation() const { return relaxation_; }
   // Contacts have dn_dc, where it is known, from the next evaluate() on.
   void want_dn_dc();
 
@@ -106,11 +104,13 @@ class SceneData {
   const std::vector<Excursion>& excursions() const { return excursions_; }
   const Powers& powers() const { return powers_; }
   const std::vector<Pair>& pairs() const { return pairs_; }
+  const JointForces& joints() const { return joints_; }
   Multibody& body() { return body_; }
   const Multibody& body() const { return body_; }
 
  private:
   std::vector<Contact>& find_contacts(std::size_t k);
+  void evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z);
   void add_contact(std::size_t k, const Contact& contact, int slot, int contact_id);
   void compute_forces(const VectorX& z);
   void compute_kinematics(ActiveContact& active, const VectorX& z);
@@ -121,6 +121,7 @@ class SceneData {
   Vec3 relative_velocity(const Pair& pair, const Vec3& point_world) const;
 
   Multibody body_;
+  JointForces joints_;
   std::vector<Pair> pairs_;
   std::vector<Query> queries_;
   std::vector<Contact> merged_;
@@ -132,7 +133,7 @@ class SceneData {
   std::vector<int> loaded_;  // joints that contacts act on
   Powers powers_;
   Bristles bristles_;
-  VectorX bristle_rates_;
+  VectorX bristle_rates_, joint_stretches_;
   double relaxation_ = 0;
   bool touching_ = false;
   bool needs_velocity_ = false;

@@ -12,8 +12,9 @@ namespace sphshell {
 // its shell each sphere is, and how far bristles are stretched.
 class SceneState {
  public:
-  SceneState(const pinocchio::Model& model, std::vector<Pair> pairs)
-      : scene_(model, std::move(pairs)), z_(VectorX::Zero(scene_.bristle_size())) {}
+  SceneState(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints)
+      : scene_(model, std::move(pairs), std::move(joints)),
+        z_(VectorX::Zero(scene_.bristle_size())) {}
 
   // Forces at (q, v), with the memory as it is: they do not change it.
   void evaluate(const VectorX& q, const VectorX& v) {

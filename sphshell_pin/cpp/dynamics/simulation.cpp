@@ -25,19 +25,32 @@ State state_at(double t, VectorX q, VectorX v, int bristle_size) {
   return {t, std::move(q), std::move(v), VectorX::Zero(bristle_size), {}};
 }
 
+// Torques that sensors ask for leave no trace in the figures of the effort limits.
+class KeptCuts {
+ public:
+  explicit KeptCuts(std::vector<char>& cuts) : cuts_(cuts), kept_(cuts) {}
+  ~KeptCuts() { cuts_ = std::move(kept_); }
+
+ private:
+  std::vector<char>& cuts_;
+  std::vector<char> kept_;
+};
+
 }  // namespace
 
-Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, RunSettings settings,
+Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
+                       JointForces::Effects joints, RunSettings settings,
                        std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
                        std::vector<Sensor> sensors)
     : settings_(std::move(settings)),
-      scene_(model, std::move(pairs)),
+      scene_(model, std::move(pairs), std::move(joints)),
       controller_(std::move(controller)),
       stepping_(
           scene_, *this, settings_,
           state_at(settings_.start_time, std::move(q0), std::move(v0), scene_.bristle_size())),
-      recorder_(scene_.pairs().size(), settings_.start_time, end(), settings_.record_dt),
+      recorder_(scene_, settings_.start_time, end(), settings_.record_dt),
       tau_(VectorX::Zero(model.nv)),
+      cut_(static_cast<std::size_t>(model.nv), 0),
       next_control_(settings_.start_time) {
   if (!sensors.empty())
     sensors_ = std::make_unique<Sensors>(std::move(sensors), model, settings_.start_time);
@@ -54,14 +67,14 @@ std::optional<DeepStart> Simulation::deep_start() {
   if (!started_) start();
   for (std::size_t k = 0; k < scene_.pairs().size(); ++k) {
     const Pair& pair = scene_.pairs()[k];
-    if (!pair.shell) continue;
+    if (pair.source) continue;
     double depth = scene_.states()[k].depth;
-    if (pair.shell->side() != Side::Both && depth == 0) {
+    if (pair.shell && pair.shell->side() != Side::Both && depth == 0) {
       const double distance = pair.shell->closest_point(scene_.states()[k].center).distance;
       const double outside = pair.shell->side() == Side::Outside ? distance : -distance;
       if (outside < 0 && is_closed(*pair.shell)) depth = pair.radius - outside;
     }
-    if (depth > kDeepStart * pair.radius) return DeepStart{static_cast<int>(k), depth};
+    if (depth > kDeepStart * pair.least_radius()) return DeepStart{static_cast<int>(k), depth};
   }
   return {};
 }
@@ -92,6 +105,7 @@ void Simulation::start() {
   started_ = true;
   stepping_.restart();
   recorder_.add_step(scene_, time(), 0);
+  recorder_.add_limits(scene_, v(), cut_, time(), 0);
   recorder_.add_row(scene_, stepping_.state());
 }
 
@@ -164,9 +178,11 @@ bool Simulation::make_controlled(double end) {
       break;
   }
   if (settings_.dt == 0) {
-    if (sensors_)
+    if (sensors_) {
+      const KeptCuts kept(cut_);
       sensors_->add_dense(scene_, *this, stepping_.chart(), stepping_.stepper(), stepping_.state(),
                           stepping_.next(), push_);
+    }
     recorder_.add_rows(scene_, stepping_.chart(), stepping_.stepper(), stepping_.state(),
                        stepping_.next());
     ++steps_;
@@ -177,10 +193,13 @@ bool Simulation::make_controlled(double end) {
 
 void Simulation::accept() {
   const double before = time();
-  if (sensors_ && settings_.dt > 0)
+  if (sensors_ && settings_.dt > 0) {
+    const KeptCuts kept(cut_);
     sensors_->add_fixed(scene_, *this, stepping_.state(), stepping_.next(), settings_.dt, push_);
+  }
   stepping_.accept();
   recorder_.add_step(scene_, time(), time() - before);
+  recorder_.add_limits(scene_, v(), cut_, time(), time() - before);
 }
 
 // Not-a-number fails every comparison.
@@ -195,14 +214,26 @@ void Simulation::hold_torques() {
   if (time() + hair < next_control_) return;
   while (next_control_ <= time() + hair)
     next_control_ = settings_.start_time + double(++controls_) * settings_.control_dt;
-  controller_->torque(scene_, time(), q(), v(), tau_);
+  command(time(), q(), v());
   if (sensors_) sensors_->jump();
+}
+
+// What the controller asks for, cut to what the motors give.
+void Simulation::command(double t, const VectorX& q, const VectorX& v) {
+  controller_->torque(scene_, t, q, v, tau_);
+  const JointEffects* joints = scene_.joints().effects();
+  if (!joints || joints->most_effort.size() == 0) return;
+  for (Eigen::Index i = 0; i < tau_.size(); ++i) {
+    const double asked = tau_[i];
+    tau_[i] = std::clamp(asked, joints->least_effort[i], joints->most_effort[i]);
+    cut_[i] = tau_[i] != asked;
+  }
 }
 
 const VectorX& Simulation::torque(double t, const VectorX& q, const VectorX& v) {
   // The stages at the end of a step that ends at a kink belong to what comes before it.
   if (t >= kink_) t = std::nextafter(kink_, -kInfinity);
-  if (controller_ && settings_.control_dt == 0) controller_->torque(scene_, t, q, v, tau_);
+  if (controller_ && settings_.control_dt == 0) command(t, q, v);
   return push_.active() ? push_.added(scene_.body(), q, v, tau_) : tau_;
 }
 
@@ -225,13 +256,14 @@ void Simulation::push(int joint, const Vec3& point, const Vec3& force_world, int
   if (sensors_) sensors_->jump();
 }
 
-void Simulation::change(std::vector<Pair> pairs, std::shared_ptr<Controller> controller) {
+void Simulation::change(std::vector<Pair> pairs, JointForces::Effects joints,
+                        std::shared_ptr<Controller> controller) {
   if (!started_) start();
   State& state = stepping_.state();
   scene_.restart();
   scene_.evaluate(state.q, state.v, state.z, true);
   const double before = scene_.powers().elastic;
-  scene_.change(std::move(pairs));
+  scene_.change(std::move(pairs), std::move(joints));
   if (controller && controller != controller_) {
     controller->prepare(scene_);
     if (sensors_) controller->read(sensors_->readings());

@@ -46,12 +46,12 @@ class Simulation : private Torques {
  public:
   enum class Status : int { Running = 0, Finished = 1, Diverged = 2, Stuck = 3 };
 
-  Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, RunSettings settings,
-             std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
+  Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
+             RunSettings settings, std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
              std::vector<Sensor> sensors = {});
 
-  // The first pair whose sphere is deeper than half its radius at the start, or inside a closed
-  // one-sided shell on the wrong side, however far.
+  // The first pair whose sphere is deeper than half its radius (of two spheres, the smaller) at the
+  // start, or inside a closed one-sided shell on the wrong side, however far.
   std::optional<DeepStart> deep_start();
   // Runs for about `wall_seconds` of wall-clock time, to the first step that ends at the time
   // `until` or later, or until `stop` is set.
@@ -62,9 +62,11 @@ class Simulation : private Torques {
   // The current state as the only row of a record; what was recorded stays.
   Record snapshot();
 
-  // From now on the same pairs have other laws, friction (of the same kind) and radii, and the
-  // controller is another, unless null. The energy this brings counts as the controller's work.
-  void change(std::vector<Pair> pairs, std::shared_ptr<Controller> controller);
+  // From now on the same pairs have other laws, friction (of the same kind) and radii, stops and
+  // dry friction of joints have other values, and the controller is another, unless null. The
+  // energy this brings counts as the controller's work.
+  void change(std::vector<Pair> pairs, JointForces::Effects joints,
+              std::shared_ptr<Controller> controller);
   // From now on a force [N] in the world acts at a point of the joint's frame; zero ends it. Its
   // work counts as the controller's. `frame`: the number of the one whose origin that is.
   void push(int joint, const Vec3& point, const Vec3& force_world, int frame);
@@ -84,7 +86,10 @@ class Simulation : private Torques {
   }
   double last_step() const { return stepping_.proposal(); }  // [s]
   double wall_time() const { return wall_time_; }            // spent in advance() [s]
+  // Of the pairs, then of the joints' stops.
   const std::vector<PairSummary>& summaries() const { return recorder_.summaries(); }
+  // Of the velocities (nv), where effort or speed has a limit; else none.
+  const std::vector<LimitSummary>& limits() const { return recorder_.limits(); }
   const pinocchio::Model& model() const { return scene_.body().model(); }
   const std::vector<Pair>& pairs() const { return scene_.pairs(); }
   const Controller* controller() const { return controller_.get(); }
@@ -101,6 +106,7 @@ class Simulation : private Torques {
   bool make_controlled(double end);
   void accept();
   void hold_torques();
+  void command(double t, const VectorX& q, const VectorX& v);
   double end_of_step() const;
   bool is_finite() const;
   double end() const { return settings_.start_time + settings_.duration; }
@@ -114,6 +120,7 @@ class Simulation : private Torques {
   Push push_;
   std::unique_ptr<Sensors> sensors_;  // null where there are none
   VectorX tau_;
+  std::vector<char> cut_;  // torques that were cut to their limit, when last computed
   long grid_ = 0, grid_steps_ = 0,
        steps_ = 0;      // of the fixed step: which it is, how many there are
   int fine_steps_ = 0;  // made of the fixed step under way

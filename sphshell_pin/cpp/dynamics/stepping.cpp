@@ -55,7 +55,7 @@ void Stepping::restart() {
   scene_.evaluate(state_.q, state_.v, state_.z, true);
   last_ = scene_.powers();
   scene_.accept(state_.z);
-  free_ = !scene_.touching();
+  free_ = !scene_.touching() && !scene_.joints().act();
   guard_.begin(scene_);
   events_.begin();
   proposal_ = kFirstStep;
@@ -225,6 +225,12 @@ double Stepping::error_norm() const {
     const double e = error.segment<3>(2 * nv + 3 * active.slot).norm();
     worst = std::max(worst, e / (1e-6 * atol + rtol * (z.norm() + limit)));
   }
+  const int first = 2 * nv + scene_.joint_bristles();
+  for (int i = 0; i < scene_.joints().size(); ++i) {
+    const DryFriction& dry = scene_.joints().effects()->friction[i];
+    const double size = std::abs(y[first + i]) + dry.limit / dry.stiffness;
+    worst = std::max(worst, std::abs(error[first + i]) / (1e-6 * atol + rtol * size));
+  }
   return worst;
 }
 
@@ -268,7 +274,7 @@ void Stepping::accept() {
   last_ = now;
   scene_.accept(next_.z);
   std::swap(state_, next_);
-  free_ = !scene_.touching();
+  free_ = !scene_.touching() && !scene_.joints().act();
   guard_.begin(scene_);
   events_.begin();
 }

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import os
-import xml.etree.ElementTree as ET
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
-from sphshell_pin.robots.description import read_model
 
-# Robots that are no URDF end on these.
-_SUFFIXES = (".urdf", ".xml", ".sdf", ".xacro", ".mjcf")
+# Files of robots end on these, and files that are taken for such.
+_SUFFIXES = (".urdf", ".xml", ".sdf", ".xacro", ".mjcf", ".usd", ".usda", ".dae", ".srdf")
 
 
 @dataclass(frozen=True)
@@ -53,12 +52,19 @@ def check_known(names: Iterable[str]) -> None:
             raise NameNotFound("robot", robot, "sphshell_pin.robots", known, "sphshell-pin list")
 
 
-def load_subject(robot: str | PathLike[str] | pin.Model, *, free_flyer: bool = False) -> Subject:
-    """Load the robot of a name or a URDF file without its meshes, or take a pinocchio.Model.
+def load_subject(
+    robot: str | PathLike[str] | pin.Model,
+    *,
+    free_flyer: bool = False,
+    package_dirs: Sequence[str | PathLike[str]] = (),
+    xacro_args: Mapping[str, object] | None = None,
+) -> Subject:
+    """Load the robot of a name or a file without its meshes, or take a pinocchio.Model.
 
-    Of collision geometry only the spheres are taken, which may be its fingertips. `free_flyer`
-    frees the root link of a URDF file. Raises NameNotFound, and RobotError for a description that
-    cannot be read.
+    Mimic joints are exact. Of collision geometry only the spheres are taken, which may be its
+    fingertips. `free_flyer` frees the root link of a URDF file; `package_dirs` and `xacro_args` are
+    those of `robots.load_file`. Raises NameNotFound, and RobotError for a description that cannot
+    be read.
     """
     if isinstance(robot, pin.Model):
         if free_flyer:
@@ -67,16 +73,18 @@ def load_subject(robot: str | PathLike[str] | pin.Model, *, free_flyer: bool = F
         name = robot.name or "model"
         return Subject(name, robots.LoadedRobot(name, robot, bare, bare, pin.neutral(robot)), None)
     if not isinstance(robot, str | PathLike):
-        raise InvalidParameter("robot", robot, "must be a name, a URDF file or a pinocchio.Model")
+        raise InvalidParameter("robot", robot, "must be a name, a file or a pinocchio.Model")
     robot = str(robot)
     check_known([robot])
     if is_path(robot):
-        return _from_urdf(Path(robot), Path(robot).stem, None, free_flyer=free_flyer)
+        file = Path(robot)
+        description = robots.read(file, package_dirs, xacro_args)
+        return _without_meshes(description, file.stem, None, free_flyer=free_flyer)
     if free_flyer:
         raise InvalidParameter("free_flyer", robot, "must be a URDF file: named robots know it")
     if robot in robots.OWN:
-        file = robots.URDF_FOLDER / f"{robot}.urdf"
-        return _from_urdf(file, robot, robot, free_flyer=robots.OWN[robot])
+        description = robots.read(robots.URDF_FOLDER / f"{robot}.urdf")
+        return _without_meshes(description, robot, robot, free_flyer=robots.OWN[robot])
     return _from_library(robot)
 
 
@@ -87,58 +95,40 @@ def _from_library(name: str) -> Subject:
     reads_files_only = loader.__init__ is robots_loader.RobotLoader.__init__
     if not loader.urdf_filename or not reads_files_only:
         # It is an SDF, or changes what it has read: only itself knows how.
-        return Subject(name, robots.load(name), name)
+        loaded = robots.load(name, mimic=True)
+        return Subject(name, loaded, name, loaded.notes)
     inner = Path(loader.path, loader.urdf_subpath, loader.urdf_filename)
     folder = Path(robots_loader.getModelPath(str(inner)))
-    subject = _from_urdf(folder / inner, name, name, free_flyer=loader.free_flyer)
-    if not loader.srdf_filename:
-        return subject
-    # Rotor inertias and the reference posture stand beside the URDF.
-    robot = subject.robot
-    q0 = robots_loader.readParamsFromSrdf(
-        robot.model,
-        str(folder / loader.path / loader.srdf_subpath / loader.srdf_filename),
-        False,
-        loader.has_rotor_parameters,
-        loader.ref_posture,
-    )
-    whole = robots.LoadedRobot(
-        name, robot.model, robot.collision_model, robot.visual_model, np.array(q0)
-    )
-    return Subject(name, whole, name, subject.notes)
+    description = robots.read(folder / inner)
+    rules, notes = robots.mimics_of_library(name, description.mimics)
+    description = replace(description, mimics=rules, notes=notes)
+    srdf = folder / loader.path / loader.srdf_subpath / loader.srdf_filename
+
+    def pose(model: pin.Model) -> NDArray[np.float64]:
+        # Rotor inertias and the reference posture stand beside the URDF.
+        if not loader.srdf_filename:
+            return np.asarray(pin.neutral(model))
+        rotors, posture = loader.has_rotor_parameters, loader.ref_posture
+        return np.array(robots_loader.readParamsFromSrdf(model, str(srdf), False, rotors, posture))
+
+    return _without_meshes(description, name, name, free_flyer=loader.free_flyer, pose=pose)
 
 
-def _from_urdf(file: Path, name: str, shipped: str | None, *, free_flyer: bool) -> Subject:
-    try:
-        model = read_model(file, free_flyer=free_flyer)
-        tree = ET.parse(file)  # well-formed and not deep: this has been checked
-    except (ValueError, RuntimeError, OSError, LookupError) as error:
-        reason = " ".join(str(error).split())
-        raise robots.RobotError(f"{file}: not a URDF that can be read: {reason}") from None
-    notes = []
-    mimics = [str(one.get("name")) for one in tree.iter("joint") if one.find("mimic") is not None]
-    mimics = [joint for joint in mimics if joint in set(model.names)]
-    if mimics:
-        notes.append(
-            "mimic joints move freely here, as forward dynamics has no such constraint: "
-            f"{listed(mimics)}"
-        )
-    _keep_spheres(tree.getroot())
-    text = ET.tostring(tree.getroot(), encoding="unicode")
-    try:
-        spheres = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
-    except (ValueError, RuntimeError) as error:
-        raise robots.RobotError(f"{file}: its geometry cannot be read: {error}") from None
-    robot = robots.LoadedRobot(name, model, spheres, pin.GeometryModel(), pin.neutral(model))
-    return Subject(name, robot, shipped, tuple(notes))
-
-
-def _keep_spheres(root: ET.Element) -> None:
-    """Drop every geometry of a URDF but the spheres of its collision geometry."""
-    for link in root.iter("link"):
-        for part in [*link.findall("visual"), *link.findall("collision")]:
-            if part.tag == "visual" or part.find("geometry/sphere") is None:
-                link.remove(part)
+def _without_meshes(
+    description: robots.Description,
+    name: str,
+    shipped: str | None,
+    *,
+    free_flyer: bool,
+    pose: Callable[[pin.Model], NDArray[np.float64]] = pin.neutral,
+) -> Subject:
+    model = robots.build_model(description, free_flyer=free_flyer)
+    q0 = pose(model)
+    robots.keep_spheres(description)
+    spheres, _ = robots.build_geometry(description, model, pin.GeometryType.COLLISION)
+    robot = robots.LoadedRobot(name, model, spheres, pin.GeometryModel(), q0)
+    robot = robots.exactly(robot, description, mimic=True, warn=False)
+    return Subject(name, robot, shipped, robot.notes)
 
 
 def listed(names: list[str], most: int = 4) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
-from sphshell_pin.dynamics.models import check_no_mimic, find_frame
+from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell import Shell
 from sphshell_pin.study.robot_check.models import Subject, listed
@@ -67,7 +67,6 @@ def setting_of(
     sphere, FrameNotFound if there is no such frame.
     """
     model, notes = subject.robot.model, [*subject.notes]
-    check_no_mimic(model)
     if model.nv == 0:
         raise SphshellError(f"the robot '{subject.name}' has no joint that moves")
     postures = [random_posture(model, rng) for _ in range(5)]

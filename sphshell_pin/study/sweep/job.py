@@ -86,9 +86,10 @@ def digest(data: object) -> str:
 
 
 def files_of(scenario: Scenario) -> set[str]:
-    """Return the files that `scenario` names: surfaces, URDFs, Python routines, tables of laws."""
+    """Return the files that `scenario` names: surfaces, robots, Python routines, tables of laws."""
     routines = [one.find for one in scenario.source] + list(scenario.figures.values())
-    named = [one.file for one in scenario.shell] + [one.urdf for one in scenario.robot]
+    named = [one.file for one in scenario.shell]
+    named += [name for one in scenario.robot for name in (one.path, one.srdf)]
     stated = [scenario.controller]
     for one in scenario.contact:
         stated += one.law, one.friction

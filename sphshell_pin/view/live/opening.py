@@ -74,8 +74,10 @@ def preview(
     """
     check_speed(speed)  # before anything is built
     check_coloring(color)
+    player = player_of(what, changes=changes, scenario=scenario)
+    _warn(player)
     live = Live(
-        player_of(what, changes=changes, scenario=scenario),
+        player,
         visualizer,
         host=host,
         port=port,
@@ -100,6 +102,16 @@ def preview(
         pass
     finally:
         live.stop()
+
+
+def _warn(player: Player) -> None:
+    """Print what `explain` warns of, where a scenario is to run."""
+    from sphshell_pin.scenario import explain_built
+    from sphshell_pin.scenario.live import LiveRun
+
+    if isinstance(player, LiveRun):
+        for warning in explain_built(player.built).warnings:
+            print(f"warning: {warning}", file=sys.stderr)
 
 
 def player_of(

@@ -189,7 +189,7 @@ class _Scale:
     """Chooses the length of arrows from the first forces that appear, and then keeps it."""
 
     def __init__(self, scene: Scene, view: View) -> None:
-        radii = [pair.sphere.radius for pair in scene.pairs if pair.sphere is not None]
+        radii = [one.radius for pair in scene.pairs for one in pair.spheres]
         self._length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
         self.factor = 1.0
         self.forget()

@@ -1,0 +1,308 @@
+"""Robots' files of all formats: read into one description, then into Pinocchio's models."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import xml.etree.ElementTree as ET
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.dynamics.mimic import Mimic
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.robots import mjcf
+from sphshell_pin.robots.description import check_memory, check_size
+from sphshell_pin.robots.packages import Folders
+
+
+class RobotError(SphshellError, ValueError):
+    """A robot description that cannot be loaded."""
+
+
+# What these hold, and what to do.
+_REFUSED = {
+    (".sdf", ".world"): "is an SDF file, and the wheel of pinocchio has no SDF reader: give the "
+    "robot's URDF or xacro, or convert it to MJCF (pip install sdformat-mjcf)",
+    (".usd", ".usda", ".usdc", ".usdz"): "is a USD file, which pinocchio does not read: export "
+    "a URDF or MJCF from the program that made it (Isaac Sim has an exporter to URDF)",
+    (
+        ".dae",
+        ".stl",
+        ".obj",
+        ".ply",
+        ".gltf",
+        ".glb",
+    ): "is a mesh, without joints and masses: "
+    "write a URDF or MJCF with a link that names it; as a surface to touch it is a shell's file",
+    (".step", ".stp", ".iges", ".igs", ".brep"): "is a CAD file, without joints and masses: "
+    "export a URDF from the CAD program; as a surface to touch it is a shell's file",
+    (".srdf",): "is an SRDF file, which only adds poses to a robot: give the URDF as the file and "
+    "this one as srdf",
+    (".mjb",): "is a compiled MuJoCo model: give its MJCF (.xml)",
+}
+
+_NEXT = "robots are read from URDF (.urdf), xacro (.xacro) and MJCF (.xml) files"
+
+
+@dataclass(frozen=True)
+class Description:
+    """A robot's file, read: `root` is a URDF, or MJCF in the plain form of `mjcf.plain`."""
+
+    file: Path
+    folders: Folders
+    root: ET.Element
+    mimics: tuple[Mimic, ...] = ()
+    loops: tuple[str, ...] = ()
+    """What closes kinematic loops or couples joints otherwise than by mimicking: not modelled."""
+    notes: tuple[str, ...] = ()
+    """What else the file states that is not modelled, one sentence each."""
+    extras: Mapping[str, mjcf.Extras] = field(default_factory=dict)
+    """Of ball joints of MJCF, which pinocchio reads without damping and dry friction."""
+
+    @property
+    def is_mjcf(self) -> bool:
+        """Whether it is MJCF."""
+        return self.root.tag == "mujoco"
+
+
+def read(
+    path: str | PathLike[str],
+    package_dirs: Iterable[str | PathLike[str]] = (),
+    xacro_args: Mapping[str, object] | None = None,
+) -> Description:
+    """Read a URDF, xacro or MJCF file.
+
+    Raises RobotError, with the reason in a sentence, and MissingExtra for a xacro file without the
+    package xacro.
+    """
+    file = Path(path)
+    folders = Folders.of(file, package_dirs)
+    check_readable(file)
+    for folder in folders.given:
+        if not os.path.isdir(folder):
+            raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
+    what = "URDF"
+    try:
+        if file.suffix.lower() == ".xacro":
+            from sphshell_pin.robots.xacro_file import expand
+
+            text = expand(file, folders, xacro_args or {})
+        else:
+            text = file.read_bytes()
+            if xacro_args:
+                raise ValueError("arguments are for files that end in .xacro")
+        tag = check_size(text)
+        if tag == "sdf":
+            raise RobotError(f"{file}: {_reason('.sdf')}")
+        if tag not in ("robot", "mujoco"):
+            raise ValueError(f"its root element is <{tag}>; {_NEXT}")
+        root = ET.fromstring(text)
+        if tag == "mujoco":
+            what = "MJCF"
+            plain = mjcf.plain(root, file)
+            return Description(
+                file, folders, plain.root, plain.mimics, plain.loops, plain.notes, plain.extras
+            )
+        _check_tree(root)
+        return Description(file, folders, root, tuple(_mimics(root)))
+    except (ValueError, OSError, LookupError) as error:
+        if isinstance(error, SphshellError):
+            raise
+        raise RobotError(f"{file}: not a {what} that can be read: {_line(error)}") from None
+
+
+def check_readable(file: Path) -> None:
+    """Raise RobotError for what is no file, or a file that holds no robot, with what to do."""
+    if not os.path.isfile(file):
+        what = "is a folder, not a file" if os.path.isdir(file) else "no such file"
+        raise RobotError(f"{file}: {what}; {_NEXT}")
+    reason = _reason(file.suffix.lower())
+    if reason:
+        raise RobotError(f"{file}: {reason}")
+
+
+def _reason(suffix: str) -> str:
+    return next((reason for ends, reason in _REFUSED.items() if suffix in ends), "")
+
+
+def build_model(description: Description, *, free_flyer: bool = False) -> pin.Model:
+    """Return the model, in which every joint moves freely; with `free_flyer` the root link floats.
+
+    Raises RobotError.
+    """
+    file = description.file
+    try:
+        if not description.is_mjcf:
+            root = [pin.JointModelFreeFlyer()] if free_flyer else []
+            text = ET.tostring(description.root, encoding="unicode")
+            model = check_memory(pin.buildModelFromXML(text, *root))
+        elif free_flyer:
+            raise ValueError("an MJCF states which body is free: give that one a <freejoint/>")
+        else:
+            with _written(description.root) as path:
+                model = check_memory(pin.buildModelFromMJCF(path))
+            for name, extras in description.extras.items():
+                extras.give(model, model.joints[model.getJointId(name)])
+    except (ValueError, RuntimeError, OSError) as error:
+        what = "MJCF" if description.is_mjcf else "URDF"
+        raise RobotError(f"{file}: not a {what} that pinocchio can read: {_line(error)}") from None
+    if free_flyer:
+        _check_root(model, file)
+    return model
+
+
+def build_geometry(
+    description: Description, model: pin.Model, kind: pin.GeometryType
+) -> tuple[pin.GeometryModel, list[str]]:
+    """Return the geometry of a kind, and the visual meshes that are missing.
+
+    Raises RobotError for a collision mesh that is missing, and for a mesh that cannot be read.
+    """
+    root, missing = _with_meshes(description, visual=kind == pin.GeometryType.VISUAL)
+    try:
+        if description.is_mjcf:
+            with _written(root) as path:
+                return pin.buildGeomFromMJCF(model, path, kind), missing
+        text = ET.tostring(root, encoding="unicode")
+        return pin.buildGeomFromUrdfString(model, text, kind), missing
+    except (ValueError, RuntimeError) as error:
+        raise _mesh_fault(description, _line(error).rstrip(".")) from None
+
+
+def keep_spheres(description: Description) -> None:
+    """Drop every geometry but the spheres of collision geometry, and so all meshes."""
+    root = description.root
+    if description.is_mjcf:
+        for body in root.iter("body"):
+            for geom in body.findall("geom"):
+                if geom.get("type") != "sphere":
+                    body.remove(geom)
+        for asset in root.findall("asset"):
+            root.remove(asset)
+        return
+    for link in root.iter("link"):
+        for part in [*link.findall("visual"), *link.findall("collision")]:
+            if part.tag == "visual" or part.find("geometry/sphere") is None:
+                link.remove(part)
+
+
+def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element, list[str]]:
+    """Return a copy that names every mesh by its absolute path; missing visual ones are out."""
+    root = ET.fromstring(ET.tostring(description.root))
+    missing: dict[str, None] = {}
+    if description.is_mjcf:
+        assets = {one.get("name"): one for one in root.iter("mesh")}
+        for body in root.iter("body"):
+            for geom in body.findall("geom"):
+                mesh = assets.get(geom.get("mesh"))
+                if mesh is None or os.path.isfile(mesh.get("file", "")):
+                    continue
+                if mjcf.is_visual(geom):
+                    missing[mesh.get("file", "")] = None
+                    body.remove(geom)
+                else:
+                    raise RobotError(
+                        f"{description.file}: a mesh cannot be loaded ({mesh.get('file')} does not "
+                        "exist): correct file= of the mesh, or meshdir= of <compiler>"
+                    )
+        return root, list(missing)
+    for link in root.iter("link"):
+        for part in link.findall("visual" if visual else "collision"):
+            mesh = part.find("geometry/mesh")
+            if mesh is None:
+                continue
+            uri = mesh.get("filename", "")
+            found = description.folders.find(uri)
+            if found is not None:
+                mesh.set("filename", str(found.absolute()))
+            elif visual:
+                missing[uri] = None
+                link.remove(part)
+            else:
+                raise _mesh_fault(description, f"{uri} is not there")
+    return root, list(missing)
+
+
+def _mesh_fault(description: Description, reason: str) -> RobotError:
+    return RobotError(
+        f"{description.file}: a mesh cannot be loaded ({reason}); searched in "
+        f"{description.folders.searched()}: give the folder above the package with --package-dir, "
+        "package_dirs in a scenario or in Python"
+    )
+
+
+def _mimics(root: ET.Element) -> Iterable[Mimic]:
+    """Yield the rules of a URDF, but those of fixed joints."""
+    for joint in root.iter("joint"):
+        rule = joint.find("mimic")
+        if rule is None or joint.get("type") == "fixed":
+            continue
+        name, of = joint.get("name", ""), rule.get("joint", "")
+        try:
+            ratio, offset = (
+                float(rule.get(key) or usual) for key, usual in (("multiplier", 1), ("offset", 0))
+            )
+        except ValueError:
+            raise ValueError(f"joint '{name}' mimics '{of}' by what is no number") from None
+        yield Mimic(name, of, ratio, offset)
+
+
+def _check_tree(root: ET.Element) -> None:
+    """Raise ValueError if two joints move one link: a closed kinematic chain."""
+    movers = defaultdict(list)
+    for joint in root.findall("joint"):
+        child = joint.find("child")
+        if child is not None:
+            movers[child.get("link")].append(str(joint.get("name")))
+    for link, names in movers.items():
+        if len(names) > 1:
+            raise ValueError(
+                f"the joints {' and '.join(repr(one) for one in names)} move one link, '{link}': "
+                "kinematic loops are not supported; leave one of the joints out"
+            )
+
+
+def _check_root(model: pin.Model, file: Path) -> None:
+    """Raise RobotError if the floating link moves no mass of its own that forces could act on."""
+    if model.inertias[1].mass > 0.0 or model.nv < 6:
+        return
+    q = pin.randomConfiguration(model, np.full(model.nq, -1.0), np.full(model.nq, 1.0))
+    mass = np.triu(pin.crba(model, model.createData(), q))
+    least, *_, most = np.linalg.eigvalsh(mass + np.triu(mass, 1).T)
+    if least <= 1e-12 * most:
+        bodies = [one.name for one in model.frames if one.parentJoint == 1]
+        link = next((name for name in bodies if name != model.names[1]), model.names[1])
+        raise RobotError(
+            f"{file}: the root link '{link}' is to float but has no mass, nor has what is fixed to "
+            "it: give it an <inertial>, or leave out the free-flyer (--free-flyer, free_flyer)"
+        )
+
+
+class _written:  # noqa: N801  # a context manager
+    """The path of a file with the XML of `root`, while it is needed."""
+
+    def __init__(self, root: ET.Element) -> None:
+        self._root = root
+
+    def __enter__(self) -> str:
+        handle, self._path = tempfile.mkstemp(suffix=".xml")
+        with os.fdopen(handle, "wb") as file:
+            file.write(ET.tostring(self._root, encoding="utf-8"))
+        return self._path
+
+    def __exit__(self, *_: object) -> None:
+        os.unlink(self._path)
+
+
+def _line(error: Exception) -> str:
+    """Return what is wrong on one line, without pinocchio's source file and line."""
+    text = str(error)
+    if "message:" in text:
+        text = text.partition("message:")[2]
+    return " ".join(text.split())

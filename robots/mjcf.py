@@ -1,0 +1,454 @@
+"""MJCF in a plain form, which pinocchio's reader takes as MuJoCo does.
+
+That reader (4.1) drops all bodies of the world but the first, includes, ranges' `limited`, visual
+geoms' masses, orientations of geoms without `pos`, damping of ball joints and equalities, and makes
+one nameless joint of several in a body. The plain form has none of these: every class, include,
+frame and unit is resolved, every body states its inertia and has one joint, which keeps its name.
+"""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.dynamics.mimic import Mimic
+from sphshell_pin.robots.description import check_size
+from sphshell_pin.robots.mjcf_geoms import Meshes, geom_inertia, plain_geom
+
+Array = NDArray[np.float64]
+
+_ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
+_SCALARS = ("damping", "frictionloss", "armature", "stiffness")
+# What makes bodies that this reader does not make.
+_UNKNOWN = ("composite", "flexcomp", "replicate", "attach", "deformable", "flex", "plugin")
+_COUNT = {"free": 7, "ball": 4, "slide": 1, "hinge": 1}
+
+
+@dataclass(frozen=True)
+class Extras:
+    """Damping and dry friction of a joint of several degrees of freedom: in SI units, for each."""
+
+    damping: float
+    friction: float
+
+    def give(self, model: pin.Model, joint: pin.JointModel) -> None:
+        """Write them into `model`."""
+        span = slice(joint.idx_v, joint.idx_v + joint.nv)
+        for name, value in (
+            ("damping", self.damping),
+            ("lowerDryFrictionLimit", -self.friction),
+            ("upperDryFrictionLimit", self.friction),
+        ):
+            values = np.array(getattr(model, name))
+            values[span] = value
+            setattr(model, name, values)
+
+
+@dataclass
+class Plain:
+    """An MJCF in its plain form, and what of it cannot be said in it."""
+
+    root: ET.Element
+    mimics: tuple[Mimic, ...] = ()
+    loops: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    extras: dict[str, Extras] = field(default_factory=dict)
+
+
+def plain(root: ET.Element, file: Path) -> Plain:
+    """Return the plain form of an MJCF; ValueError says what in it cannot be read."""
+    return _Reader(root, file).read()
+
+
+def is_visual(geom: ET.Element) -> bool:
+    """Whether a geom is only seen: MuJoCo lets it touch nothing."""
+    return geom.get("contype") == "0" and geom.get("conaffinity") == "0"
+
+
+class _Reader:
+    """What one MJCF says, gathered body by body."""
+
+    def __init__(self, root: ET.Element, file: Path) -> None:
+        _include(root, file, [file.resolve()])
+        for tag in _UNKNOWN:
+            if root.find(f".//{tag}") is not None:
+                raise ValueError(
+                    f"<{tag}> is not supported: let MuJoCo write the bodies out "
+                    "(mujoco.MjSpec.from_file(...), compile(), to_xml())"
+                )
+        self.given = root
+        self.compiler = {k: v for one in root.findall("compiler") for k, v in one.attrib.items()}
+        if self.compiler.get("coordinate") == "global":
+            raise ValueError('coordinate="global" is not supported: MuJoCo 2.3.3 converts it')
+        if _number(self.compiler.get("settotalmass"), -1.0) > 0:
+            raise ValueError("settotalmass is not supported: let MuJoCo write the masses out")
+        self.angle = 1.0 if self.compiler.get("angle") == "radian" else np.pi / 180.0
+        self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
+        for one in root.findall("default"):
+            self._read_class(one, "main", self.classes["main"])
+        self.meshes = Meshes(root, file, self.compiler, self._with_defaults)
+        self.extras: dict[str, Extras] = {}
+        self.parents: dict[str, str] = {}
+        self.joints_of: dict[str, list[str]] = {"world": []}
+        self.nq = 0
+        self.springs: list[str] = []
+        self.cones: list[str] = []
+        self.weightless: list[str] = []
+
+    def read(self) -> Plain:
+        made = ET.Element("mujoco", model=self.given.get("model") or "robot")
+        ET.SubElement(made, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
+        made.append(self.meshes.asset())
+        world = ET.SubElement(made, "worldbody")
+        scenery: list[str] = []
+        bodies: list[ET.Element] = []
+        for one in self.given.findall("worldbody"):
+            held = ET.Element("body", name="world")
+            for element, pose, childclass in self._inside(one, pin.SE3.Identity(), "main"):
+                if element.tag == "body":
+                    self._body(held, element, pose, childclass, "world")
+                elif element.tag == "geom":
+                    geom = self._with_defaults(element, childclass)
+                    if not is_visual(ET.Element("geom", geom)):
+                        scenery.append(geom.get("name", geom.get("type", "sphere")))
+            bodies += list(held)
+        if len(bodies) == 1:
+            world.append(bodies[0])
+        elif bodies:
+            # The reader takes one tree only.
+            base = ET.SubElement(world, "body", name="world_base")
+            _inertial(base, pin.Inertia.Zero())
+            base.extend(bodies)
+        else:
+            raise ValueError("its <worldbody> has no <body>")
+        self._keys(made)
+        mimics, loops = self._equalities()
+        return Plain(made, mimics, loops, tuple(self._notes(scenery)), self.extras)
+
+    def _read_class(
+        self, element: ET.Element, name: str, inherited: Mapping[str, Mapping[str, str]]
+    ) -> None:
+        own = {tag: dict(attributes) for tag, attributes in inherited.items()}
+        for one in element:
+            if one.tag != "default":
+                own[one.tag] = _overlaid(own.get(one.tag, {}), one.attrib)
+        self.classes[name] = own
+        if "class" in element.attrib:
+            self.classes[element.attrib["class"]] = own
+        for one in element.findall("default"):
+            if "class" not in one.attrib:
+                raise ValueError("a <default> inside another has no class")
+            self._read_class(one, one.attrib["class"], own)
+
+    def _with_defaults(self, element: ET.Element, childclass: str) -> dict[str, str]:
+        """Return all attributes of an element, those of its class first."""
+        name = element.get("class", childclass)
+        if name not in self.classes:
+            raise ValueError(f"<{element.tag}> is of the class '{name}', which has no <default>")
+        return _overlaid(self.classes[name].get(element.tag, {}), element.attrib)
+
+    def _inside(
+        self, element: ET.Element, pose: pin.SE3, childclass: str
+    ) -> Iterator[tuple[ET.Element, pin.SE3, str]]:
+        """Yield the children of a body, those inside <frame> too, with the frame's pose."""
+        for one in element:
+            if one.tag == "frame":
+                inner = one.get("childclass", childclass)
+                yield from self._inside(one, pose * self._pose(one.attrib), inner)
+            else:
+                yield one, pose, childclass
+
+    def _body(
+        self, into: ET.Element, body: ET.Element, pose: pin.SE3, childclass: str, parent: str
+    ) -> None:
+        """Add a body, and those on it: one for each of its joints, the last is the body itself."""
+        name = body.get("name") or f"{parent}_body{len(self.parents)}"
+        childclass = body.get("childclass", childclass)
+        self.parents[name], self.joints_of[name] = parent, []
+        if _number(body.get("gravcomp"), 0.0):
+            self.weightless.append(name)
+        place = pose * self._pose(body.attrib)
+        parts = list(self._inside(body, pin.SE3.Identity(), childclass))
+        joints = [part for part in parts if part[0].tag in ("joint", "freejoint")]
+        here = into
+        for k, (joint, at, cls) in enumerate(joints):
+            made = self._joint(joint, at, cls, name, k)
+            last = k + 1 == len(joints)
+            here = ET.SubElement(
+                here, "body", name=name if last else f"{name}/{made.get('name')}", **_posed(place)
+            )
+            here.append(made)
+            if not last:
+                _inertial(here, pin.Inertia.Zero())
+            place = pin.SE3.Identity()
+        if not joints:
+            here = ET.SubElement(here, "body", name=name, **_posed(place))
+        self._fill(here, parts, name)
+        for part, at, cls in parts:
+            if part.tag == "body":
+                self._body(here, part, at, cls, name)
+
+    def _fill(
+        self, here: ET.Element, parts: list[tuple[ET.Element, pin.SE3, str]], name: str
+    ) -> None:
+        """Give a body its inertia, geoms and sites."""
+        stated: pin.Inertia | None = None
+        summed = pin.Inertia.Zero()
+        use = self.compiler.get("inertiafromgeom", "auto")
+        needs = use == "true" or not any(part.tag == "inertial" for part, *_ in parts)
+        if needs and use == "false" and self.joints_of[name]:
+            raise ValueError(f"body '{name}' moves, and states no <inertial>")
+        low, high = _numbers(self.compiler.get("inertiagrouprange", "0 5"))
+        for part, at, cls in parts:
+            if part.tag == "inertial":
+                stated = self._inertia(part, name).se3Action(at)
+            if part.tag == "site" and part.get("name"):
+                site = self._with_defaults(part, cls)
+                pose = _posed(at * self._pose(site))
+                ET.SubElement(here, "site", name=site["name"], **pose)
+            if part.tag != "geom":
+                continue
+            geom = self._with_defaults(part, cls)
+            made, pose = plain_geom(geom, self.meshes, lambda one, at=at: at * self._pose(one))
+            if needs and low <= _number(geom.get("group"), 0) <= high:
+                summed += geom_inertia(geom, made, self.meshes, name).se3Action(pose)
+            if made is not None:
+                made.attrib.update(_posed(pose))
+                here.append(made)
+        inertia = stated if stated is not None and not needs else summed
+        least_mass = _number(self.compiler.get("boundmass"), 0.0)
+        least = _number(self.compiler.get("boundinertia"), 0.0)
+        if name != "world" and (inertia.mass < least_mass or least > 0.0):
+            moments, axes = np.linalg.eigh(inertia.inertia)
+            bound = axes @ np.diag(np.maximum(moments, least)) @ axes.T
+            inertia = pin.Inertia(max(inertia.mass, least_mass), inertia.lever, bound)
+        _inertial(here, inertia)
+
+    def _joint(
+        self, element: ET.Element, at: pin.SE3, childclass: str, body: str, number: int
+    ) -> ET.Element:
+        if element.tag == "freejoint":
+            stated = {"type": "free", **element.attrib}
+        else:
+            stated = self._with_defaults(element, childclass)
+        kind = stated.get("type", "hinge")
+        if kind not in _COUNT:
+            raise ValueError(f"a joint of body '{body}' is of an unknown type, '{kind}'")
+        usual = f"{body}_joint{number or ''}" if kind != "free" else f"{body}_free"
+        name = stated.get("name", usual)
+        self.nq += _COUNT[kind]
+        self.joints_of[body].append(name)
+        made = ET.Element("joint", name=name, type=kind)
+        scalar = {key: _number(stated.get(key, "0").split()[0], 0.0) for key in _SCALARS}
+        if scalar["stiffness"]:
+            self.springs.append(name)
+        if kind == "free":
+            made.set("pos", "0 0 0")
+        else:
+            made.set("pos", _text(at.act(_numbers(stated.get("pos", "0 0 0")))))
+            made.set("axis", _text(at.rotation @ _numbers(stated.get("axis", "0 0 1"))))
+        made.set("armature", repr(scalar["armature"]))
+        limited = _limited(stated, "limited", "range", self.compiler)
+        if kind in ("free", "ball"):
+            self.extras[name] = Extras(scalar["damping"], scalar["frictionloss"])
+            if limited and kind == "ball":
+                self.cones.append(name)
+            return made
+        unit = self.angle if kind == "hinge" else 1.0
+        made.set("damping", repr(scalar["damping"]))
+        made.set("frictionloss", repr(scalar["frictionloss"]))
+        made.set("ref", repr(unit * _number(stated.get("ref"), 0.0)))
+        if limited:
+            made.set("range", _text(unit * _numbers(stated["range"])))
+        if _limited(stated, "actuatorfrclimited", "actuatorfrcrange", self.compiler):
+            made.set("actuatorfrcrange", _text(_numbers(stated["actuatorfrcrange"])))
+        return made
+
+    def _inertia(self, element: ET.Element, body: str) -> pin.Inertia:
+        if "mass" not in element.attrib or "pos" not in element.attrib:
+            raise ValueError(f"the <inertial> of body '{body}' states no mass or no pos")
+        pose = self._pose(element.attrib)
+        moments = np.zeros((3, 3))
+        if "fullinertia" in element.attrib:
+            xx, yy, zz, xy, xz, yz = _numbers(element.attrib["fullinertia"])
+            moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        elif "diaginertia" in element.attrib:
+            moments = np.diag(_numbers(element.attrib["diaginertia"]))
+        turned = pose.rotation @ moments @ pose.rotation.T
+        return pin.Inertia(float(element.attrib["mass"]), pose.translation, turned)
+
+    def _pose(self, stated: Mapping[str, str]) -> pin.SE3:
+        return pin.SE3(self._rotation(stated), _numbers(stated.get("pos", "0 0 0")))
+
+    def _rotation(self, stated: Mapping[str, str]) -> Array:
+        """Return the rotation (3,3) that an element states in one of MuJoCo's ways."""
+        if "quat" in stated:
+            w, x, y, z = _numbers(stated["quat"])
+            return np.asarray(pin.Quaternion(w, x, y, z).normalized().toRotationMatrix())
+        if "axisangle" in stated:
+            *axis, angle = _numbers(stated["axisangle"])
+            return np.asarray(pin.exp3(self.angle * angle * np.array(axis) / np.linalg.norm(axis)))
+        if "euler" in stated:
+            turned = np.eye(3)
+            sequence = self.compiler.get("eulerseq", "xyz")
+            for letter, angle in zip(sequence, _numbers(stated["euler"]), strict=True):
+                one = pin.exp3(self.angle * angle * np.eye(3)["xyz".index(letter.lower())])
+                # Upper case: about the axes of the parent, which stay.
+                turned = one @ turned if letter.isupper() else turned @ one
+            return np.asarray(turned)
+        if "xyaxes" in stated:
+            axes = np.array(_numbers(stated["xyaxes"])).reshape(2, 3)
+            x = axes[0] / np.linalg.norm(axes[0])
+            y = axes[1] - (axes[1] @ x) * x
+            y /= np.linalg.norm(y)
+            return np.column_stack([x, y, np.cross(x, y)])
+        if "zaxis" in stated:
+            return turned_to(np.array(_numbers(stated["zaxis"])))
+        return np.eye(3)
+
+    def _keys(self, made: ET.Element) -> None:
+        keys = ET.SubElement(made, "keyframe")
+        for key in self.given.iterfind("keyframe/key"):
+            qpos = key.get("qpos", "")
+            if key.get("name") and len(qpos.split()) == self.nq:
+                ET.SubElement(keys, "key", name=key.attrib["name"], qpos=qpos)
+
+    def _equalities(self) -> tuple[tuple[Mimic, ...], tuple[str, ...]]:
+        """Return the equalities that are mimic joints, and a sentence on each of the others."""
+        mimics, loops = [], []
+        for one in self.given.iterfind("equality/*"):
+            if one.get("active") == "false":
+                continue
+            label = f"<{one.tag}>" + (f" '{one.get('name')}'" if one.get("name") else "")
+            first, second = one.get(f"{one.tag}1"), one.get(f"{one.tag}2")
+            if one.tag == "joint" and first is not None:
+                terms = np.zeros(5)
+                stated = _numbers(one.get("polycoef", "0 1 0 0 0"))
+                terms[: len(stated)] = stated
+                if second is not None and not terms[2:].any():
+                    mimics.append(Mimic(first, second, float(terms[1]), float(terms[0])))
+                elif second is None:
+                    loops.append(f"{label} holds joint '{first}' at {terms[0]:g} (lock it instead)")
+                else:
+                    loops.append(f"{label} makes joint '{first}' follow '{second}' by a polynomial")
+            elif one.tag in ("connect", "weld"):
+                ends = [one.get("body1") or one.get("site1"), one.get("body2") or one.get("site2")]
+                names = self._between(*(end or "world" for end in ends))
+                bodies = " and ".join(f"'{end or 'world'}'" for end in ends)
+                loops.append(
+                    f"the kinematic loop that {label} closes between {bodies}"
+                    + (f", of the joints {', '.join(map(repr, names))}" if names else "")
+                )
+            else:
+                loops.append(f"{label} of <equality>")
+        return tuple(mimics), tuple(loops)
+
+    def _between(self, first: str, second: str) -> list[str]:
+        """Return the joints on the way from one body to another; none where one is unknown."""
+        ways = []
+        for body in (first, second):
+            way = [body]
+            while way[-1] in self.parents:
+                way.append(self.parents[way[-1]])
+            ways.append(way)
+        apart = set(ways[0]) ^ set(ways[1])
+        order = [*ways[0][::-1], *ways[1][::-1]]
+        return [name for body in order if body in apart for name in self.joints_of.get(body, [])]
+
+    def _notes(self, scenery: list[str]) -> Iterator[str]:
+        for names, text in (
+            (self.springs, "springs of joints are not modelled"),
+            (self.cones, "ranges of ball joints are not modelled"),
+            (self.weightless, "gravity acts on bodies with gravcomp too"),
+            (self.meshes.exact, "masses of meshes that are not convex are those of their volume"),
+            (self.meshes.left_out, "geoms of these kinds are left out"),
+            (scenery, "geoms of the world are no part of the robot, add them as shells"),
+        ):
+            if names:
+                yield f"{text}: {', '.join(map(repr, dict.fromkeys(names)))}"
+        tendons = [one.get("name", one.tag) for one in self.given.iterfind("tendon/*")]
+        if tendons:
+            yield f"tendons are not modelled: {', '.join(map(repr, tendons))}"
+
+
+def turned_to(axis: Array) -> Array:
+    """Return the smallest rotation (3,3) that turns z to `axis` (3,)."""
+    z = np.array([0.0, 0.0, 1.0])
+    one = pin.Quaternion.FromTwoVectors(z, axis / np.linalg.norm(axis))
+    return np.asarray(one.toRotationMatrix())
+
+
+def _include(element: ET.Element, file: Path, open_files: list[Path]) -> None:
+    """Put the content of included files in the place of <include>."""
+    for k in range(len(element) - 1, -1, -1):
+        one = element[k]
+        if one.tag != "include":
+            _include(one, file, open_files)
+            continue
+        stated = one.get("file", "")
+        places = [open_files[0].parent / stated, open_files[-1].parent / stated]
+        found = next((place for place in places if os.path.isfile(place)), None)
+        if found is None:
+            raise ValueError(f"it includes {stated}, which is not there")
+        if found.resolve() in open_files:
+            raise ValueError(f"it includes {stated}, which includes itself")
+        text = found.read_bytes()
+        check_size(text)
+        root = ET.fromstring(text)
+        _include(root, file, [*open_files, found.resolve()])
+        element[k : k + 1] = list(root)
+
+
+def _overlaid(under: Mapping[str, str], over: Mapping[str, str]) -> dict[str, str]:
+    """Return both; of what states a place or an orientation, only that of `over`."""
+    kept = dict(under)
+    for ways in (_ORIENTATIONS, ("fromto", "pos")):
+        if any(way in over for way in ways):
+            kept = {key: value for key, value in kept.items() if key not in ways}
+    return {**kept, **over}
+
+
+def _limited(stated: Mapping[str, str], key: str, limits: str, compiler: Mapping[str, str]) -> bool:
+    says = stated.get(key, "auto")
+    if says == "auto":
+        return limits in stated and compiler.get("autolimits", "true") == "true"
+    return says == "true" and limits in stated
+
+
+def _inertial(body: ET.Element, inertia: pin.Inertia) -> None:
+    i = inertia.inertia
+    full = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
+    ET.SubElement(
+        body,
+        "inertial",
+        mass=repr(float(inertia.mass)),
+        pos=_text(inertia.lever),
+        fullinertia=_text(np.array(full)),
+    )
+
+
+def _posed(pose: pin.SE3) -> dict[str, str]:
+    x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
+    return {"pos": _text(pose.translation), "quat": _text(np.array([w, x, y, z]))}
+
+
+def _numbers(text: str) -> Array:
+    try:
+        return np.array([float(one) for one in text.split()])
+    except ValueError:
+        raise ValueError(f"'{text}' are no numbers") from None
+
+
+def _number(text: str | None, usual: float) -> float:
+    return usual if text is None else float(_numbers(text)[0])
+
+
+def _text(values: Array) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,157 @@
+"""Geoms and meshes of MJCF: their shape in plain numbers, and the inertia they give a body."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_SHAPES = ("sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh")
+_SEEN = ("contype", "conaffinity", "group")
+
+
+class Meshes:
+    """The meshes of an MJCF by name, with the absolute paths of their files."""
+
+    def __init__(
+        self,
+        root: ET.Element,
+        file: Path,
+        compiler: Mapping[str, str],
+        resolved: Callable[[ET.Element, str], dict[str, str]],
+    ) -> None:
+        folder = Path(compiler.get("meshdir", compiler.get("assetdir", "")))
+        strip = compiler.get("strippath") == "true"
+        self.files: dict[str, tuple[Path, Array]] = {}
+        self.colors: dict[str, str] = {}
+        self.exact: list[str] = []
+        self.left_out: list[str] = []
+        self._moved: set[str] = set()
+        for one in root.iterfind("asset/mesh"):
+            stated = resolved(one, "main")
+            if "file" not in stated:
+                continue
+            path = Path(Path(stated["file"]).name if strip else stated["file"])
+            name = stated.get("name", path.stem)
+            scale = np.array([float(k) for k in stated.get("scale", "1 1 1").split()])
+            self.files[name] = ((file.absolute().parent / folder / path), scale)
+            if "refpos" in stated or "refquat" in stated:
+                self._moved.add(name)
+        for one in root.iterfind("asset/material"):
+            stated = resolved(one, "main")
+            if "rgba" in stated and "name" in stated:
+                self.colors[stated["name"]] = stated["rgba"]
+
+    def asset(self) -> ET.Element:
+        """Return the <asset> of the plain form."""
+        made = ET.Element("asset")
+        for name, (path, scale) in self.files.items():
+            numbers = " ".join(repr(float(k)) for k in scale)
+            ET.SubElement(made, "mesh", name=name, file=str(path), scale=numbers)
+        return made
+
+    def known(self, name: str | None) -> bool:
+        """Whether a geom can show the mesh called `name`."""
+        if name is not None and name in self._moved:
+            raise ValueError(f"mesh '{name}' states refpos or refquat: move its geoms instead")
+        return name in self.files
+
+    def solid(self, name: str, body: str) -> tuple[float, pin.Inertia]:
+        """Return volume [m^3] and inertia at a density of 1 of a mesh, in its own frame."""
+        import trimesh
+
+        path, scale = self.files[name]
+        why = f"the mass of body '{body}' would be that of mesh '{name}', "
+        try:
+            mesh = trimesh.load(path, force="mesh")
+        except (OSError, ValueError) as error:
+            raise ValueError(f"{why}which cannot be read ({error}): state <inertial>") from None
+        mesh.apply_scale(scale)
+        mesh.merge_vertices()
+        if not mesh.is_watertight or not mesh.volume:
+            raise ValueError(f"{why}which is not closed: state its <inertial>")
+        if not mesh.is_convex:
+            self.exact.append(name)
+        sign = float(np.sign(mesh.volume))
+        volume = sign * float(mesh.volume)
+        moments = sign * np.asarray(mesh.moment_inertia)
+        return volume, pin.Inertia(volume, np.asarray(mesh.center_mass), moments)
+
+
+def plain_geom(
+    stated: Mapping[str, str], meshes: Meshes, pose_of: Callable[[Mapping[str, str]], pin.SE3]
+) -> tuple[ET.Element | None, pin.SE3]:
+    """Return a geom without its place, and its place in the body; None for kinds left out."""
+    from sphshell_pin.robots.mjcf import turned_to
+
+    kind = stated.get("type", "sphere" if "mesh" not in stated else "mesh")
+    size = [float(k) for k in stated.get("size", "").split()]
+    pose = pose_of(stated)
+    if "fromto" in stated:
+        ends = np.array([float(k) for k in stated["fromto"].split()]).reshape(2, 3)
+        here = pose_of({})
+        along = ends[0] - ends[1]
+        pose = here * pin.SE3(turned_to(along), ends.mean(axis=0))
+        half = 0.5 * float(np.linalg.norm(along))
+        size = [size[0], half] if kind in ("capsule", "cylinder") else [size[0], size[0], half]
+    fitted = kind != "mesh" and "mesh" in stated
+    if kind not in _SHAPES or fitted or (kind == "mesh" and not meshes.known(stated.get("mesh"))):
+        meshes.left_out.append(f"{kind} fitted to a mesh" if fitted else kind)
+        return None, pose
+    need = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3, "mesh": 0}[kind]
+    if len(size) < need:
+        raise ValueError(f"a geom of the type {kind} needs {need} numbers in size")
+    made = ET.Element("geom", type=kind)
+    if need:
+        made.set("size", " ".join(repr(k) for k in size[:need]))
+    else:
+        made.set("mesh", stated["mesh"])
+    for key in (*_SEEN, "name"):
+        if key in stated:
+            made.set(key, stated[key])
+    color = stated.get("rgba") or meshes.colors.get(stated.get("material", ""))
+    if color:
+        made.set("rgba", color)
+    return made, pose
+
+
+def geom_inertia(
+    stated: Mapping[str, str], made: ET.Element | None, meshes: Meshes, body: str
+) -> pin.Inertia:
+    """Return the inertia that a geom gives its body, in the geom's frame."""
+    kind = stated.get("type", "sphere")
+    density = float(stated.get("density", 1000.0))
+    mass = float(stated["mass"]) if "mass" in stated else None
+    if kind in ("plane", "hfield") or mass == 0.0 or (mass is None and density == 0.0):
+        return pin.Inertia.Zero()
+    if made is None:
+        raise ValueError(f"the mass of a geom of body '{body}' is not known: state its <inertial>")
+    if stated.get("shellinertia") == "true":
+        raise ValueError(f"a geom of body '{body}' is a shell: state the body's <inertial>")
+    if made.get("type") == "mesh":
+        volume, inertia = meshes.solid(made.attrib["mesh"], body)
+        factor = density if mass is None else mass / volume
+        return pin.Inertia(factor * inertia.mass, inertia.lever, factor * inertia.inertia)
+    size = [float(k) for k in made.attrib["size"].split()]
+    volumes = {
+        "sphere": lambda r: 4 / 3 * np.pi * r**3,
+        "capsule": lambda r, h: np.pi * r**2 * (2 * h + 4 / 3 * r),
+        "cylinder": lambda r, h: np.pi * r**2 * 2 * h,
+        "box": lambda x, y, z: 8 * x * y * z,
+        "ellipsoid": lambda x, y, z: 4 / 3 * np.pi * x * y * z,
+    }
+    inertias = {
+        "sphere": pin.Inertia.FromSphere,
+        "capsule": lambda m, r, h: pin.Inertia.FromCapsule(m, r, 2 * h),
+        "cylinder": lambda m, r, h: pin.Inertia.FromCylinder(m, r, 2 * h),
+        "box": lambda m, x, y, z: pin.Inertia.FromBox(m, 2 * x, 2 * y, 2 * z),
+        "ellipsoid": pin.Inertia.FromEllipsoid,
+    }
+    weight = float(density * volumes[made.attrib["type"]](*size)) if mass is None else mass
+    return inertias[made.attrib["type"]](weight, *size)

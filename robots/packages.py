@@ -1,0 +1,111 @@
+"""Where the meshes and the packages of a robot's description are: ROS names without ROS."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from os import PathLike
+from pathlib import Path
+from urllib.parse import unquote
+
+# Folders one within another below one of ROS_PACKAGE_PATH; a workspace has three.
+_DEEPEST = 5
+
+
+@dataclass(frozen=True)
+class Folders:
+    """The folders that are searched for the packages and the relative names of `file`.
+
+    In this order: those given, the folder of the file and those above it, ROS_PACKAGE_PATH,
+    AMENT_PREFIX_PATH (its share folders).
+    """
+
+    file: Path
+    given: tuple[Path, ...] = ()
+
+    @classmethod
+    def of(cls, file: Path, given: Iterable[str | PathLike[str]] = ()) -> Folders:
+        """Return those of `file`, with the folders `given` first."""
+        return cls(file, tuple(Path(one) for one in given))
+
+    def packages(self, name: str) -> Iterator[Path]:
+        """Yield the folders that may be the package called `name`, the likeliest first."""
+        home = self.file.resolve().parent
+        for folder in (*self.given, home):
+            yield from _beside(folder, name)
+        for above in (home, *home.parents):
+            if _is_package(above, name):
+                yield above
+        for folder in _listed("ROS_PACKAGE_PATH"):
+            yield from _beside(folder, name)
+        for folder in _listed("AMENT_PREFIX_PATH"):
+            yield from _beside(folder / "share", name)
+        for folder in _listed("ROS_PACKAGE_PATH"):
+            yield from _below(folder, name)
+
+    def package(self, name: str) -> Path | None:
+        """Return the folder of the package called `name`, or None."""
+        return next((folder for folder in self.packages(name) if folder.is_dir()), None)
+
+    def find(self, uri: str) -> Path | None:
+        """Return the file that a description calls `uri`, or None: package://, file://, a path."""
+        scheme, colon, rest = uri.partition("://")
+        if colon and scheme in ("package", "model"):
+            name, _, inner = rest.partition("/")
+            places: Iterable[Path] = (folder / inner for folder in self.packages(name))
+        elif colon and scheme == "file":
+            places = [Path(unquote(rest))]
+        else:
+            roots = (self.file.parent, *self.given)
+            places = (folder / uri for folder in roots)  # of an absolute path, itself
+        return next((place for place in places if os.path.isfile(place)), None)
+
+    def searched(self) -> str:
+        """Say where has been searched."""
+        told = [str(one) for one in (*self.given, self.file.parent)]
+        told += [
+            f"${name} ({os.environ[name]})"
+            for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
+            if os.environ.get(name)
+        ]
+        return ", ".join(dict.fromkeys(told))
+
+
+def _listed(variable: str) -> list[Path]:
+    return [Path(one) for one in os.environ.get(variable, "").split(os.pathsep) if one]
+
+
+def _beside(folder: Path, name: str) -> Iterator[Path]:
+    yield folder / name
+    if _is_package(folder, name):
+        yield folder
+
+
+def _is_package(folder: Path, name: str) -> bool:
+    return folder.name == name or _stated_name(folder / "package.xml") == name
+
+
+@cache
+def _stated_name(package_xml: Path) -> str | None:
+    """Return the name that a package.xml states."""
+    try:
+        return (ET.parse(package_xml).findtext("name") or "").strip()
+    except (OSError, ET.ParseError, ValueError):
+        return None
+
+
+def _below(root: Path, name: str) -> Iterator[Path]:
+    """Yield the packages of that name anywhere below `root`, as rospack finds them."""
+    for place, folders, files in os.walk(root):
+        here = Path(place)
+        if "package.xml" in files:
+            folders.clear()  # a package has no other in it
+            if _is_package(here, name):
+                yield here
+        elif len(here.relative_to(root).parts) >= _DEEPEST:
+            folders.clear()
+        else:
+            folders[:] = sorted(one for one in folders if not one.startswith("."))

@@ -1,0 +1,294 @@
+"""The search for a draft that works: postures, and places and turns of the part."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.dynamics.models import find_frame
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.robots import WORKING
+from sphshell_pin.scenario.bodies import joint_spans
+from sphshell_pin.scenario.build import Built
+from sphshell_pin.scenario.clearance import Links, SelfContact
+from sphshell_pin.scenario.materials import Material, find_material
+from sphshell_pin.scenario.plan import (
+    GRAVITY,
+    Plan,
+    Press,
+    bearable,
+    plan_fall,
+    plan_stand,
+    press_plans,
+)
+from sphshell_pin.scenario.poses import Stance, stances
+from sphshell_pin.scenario.schema import RobotSection
+from sphshell_pin.scenario.tips import Tip, floats
+from sphshell_pin.scenario.trial import Fault, try_out
+
+Array = npt.NDArray[np.float64]
+
+PLACES: dict[str, tuple[float, float, float]] = {
+    "below": (0.0, 0.0, -1.0),
+    "above": (0.0, 0.0, 1.0),
+    "+x": (1.0, 0.0, 0.0),
+    "-x": (-1.0, 0.0, 0.0),
+    "+y": (0.0, 1.0, 0.0),
+    "-y": (0.0, -1.0, 0.0),
+}
+"""Where the surface is placed, seen from the tip."""
+
+# Drafts that are run: of one posture, and in all.
+_MOST_OF_STANCE, _MOST_RUNS = 4, 16
+# Of a draft that fails while the tip slides or after a hard touch: time to settle [s].
+_CALM_LEAD_IN = 1.5
+# A run that is cut before links reach the part ends this part of its time earlier, and is no
+# shorter than this [s].
+_BEFORE, _SHORTEST = 0.9, 0.2
+
+Draft = Callable[[RobotSection, Plan], tuple[str, Built]]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the user asked for; `word` names a surface that needs no file."""
+
+    material: str | None
+    against: str
+    press: float | None
+    place: str | None
+    word: str | None
+
+    def materials(self, tips: Sequence[Tip], load: float) -> tuple[Material, Material]:
+        """Return what sphere and surface are made of; `load` [kg] rests on each, 0: it falls."""
+        other = find_material(self.against)
+        if self.material is not None:
+            return find_material(self.material), other
+        if not load:
+            return find_material("steel"), other
+        # A tip is of rubber, unless the mass behind it would press rubber in too far.
+        rubber, radius = find_material("rubber"), min(tip.radius for tip in tips)
+        bears = bearable(radius, rubber, other) >= load * GRAVITY
+        return rubber if bears else find_material("plastic"), other
+
+
+@dataclass
+class _Tried:
+    """What a search came across, for the sentence that refuses."""
+
+    postures: int = 0
+    places: int = 0
+    runs: int = 0
+    blocked: Counter[str] = field(default_factory=Counter)
+    faults: list[Fault] = field(default_factory=list)
+    errors: list[SphshellError] = field(default_factory=list)
+
+
+def find_working(
+    section: RobotSection, built: Built, tips: Sequence[Tip], request: Request, draft: Draft
+) -> tuple[str, Built, Plan]:
+    """Return the text of a scenario that works, what is built of it, and its plan.
+
+    `draft(section, plan)` writes and builds one. Each is run: the first that touches, holds its
+    force and keeps the robot's links out of the part is taken.
+
+    Raises
+    ------
+    SphshellError
+        None does; the text says what fails and what to change.
+    """
+    if floats(built.assembly.model):
+        return _drop(section, built, tips, request, draft)
+    return _press(section, built, tips, request, draft)
+
+
+def sphere_centers(built: Built, tips: Sequence[Tip]) -> Array:
+    """Return the spheres' centers (k, 3) [m] in the world at the start."""
+    model = built.assembly.model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, built.assembly.q0)
+    return np.array([data.oMf[find_frame(model, tip.frame)].act(tip.offset) for tip in tips])
+
+
+def _press(
+    section: RobotSection, built: Built, tips: Sequence[Tip], request: Request, draft: Draft
+) -> tuple[str, Built, Plan]:
+    tip, model, q0 = tips[0], built.assembly.model, built.assembly.q0
+    (shell,) = built.shells.values()
+    if int(model.frames[find_frame(model, tip.frame)].parentJoint) == 0:
+        raise SphshellError(
+            f"no joint moves frame '{tip.frame}': name another with --frame, or let the root "
+            "float with --free-flyer"
+        )
+    geometry = built.assembly.loaded[0].collision_model
+    q_work = _working_posture(section, model, q0)
+    approach = None if request.place is None else np.array(PLACES[request.place])
+    side = {"cylinder": (1.0, 0.0, 0.0), "bowl": (0.0, 0.0, 1.0)}.get(request.word or "")
+    toward = None if side is None else np.array(side)
+    tried = _Tried()
+    for stance in stances(model, q_work, tip, approach, SelfContact(model, geometry, q_work).found):
+        tried.postures += 1
+        links = Links(model, geometry, shell, [tip], stance.lock)
+
+        def blocked(placement: pin.SE3, stance: Stance = stance, links: Links = links) -> bool:
+            tried.places += 1
+            found = links.within(stance.q, placement, whole=True)
+            if found is not None:
+                tried.blocked[found.link] += 1
+            return found is not None
+
+        pair = request.materials(tips, stance.mass)
+        inside = request.word == "bowl"
+        plans = press_plans(
+            shell, tip, stance, pair, request.press, blocked, toward=toward, inside=inside
+        )
+        start = _changed_joints(model, q0, stance.q)
+        stood = section.model_copy(update={"lock": list(stance.lock), "start": start})
+        try:
+            found = _first_working(stood, plans, links, draft, tried)
+        except SphshellError as error:  # of this posture: another one may do
+            tried.errors.append(error)
+            continue
+        if found is not None:
+            return found
+        if tried.runs >= _MOST_RUNS:
+            break
+    raise _refusal(tip, request, tried)
+
+
+def _first_working(
+    section: RobotSection, plans: Iterator[Plan], links: Links, draft: Draft, tried: _Tried
+) -> tuple[str, Built, Plan] | None:
+    runs = 0
+    for plan in plans:
+        queue = [plan]
+        while queue:
+            one = queue.pop(0)
+            text, built = draft(section, one)
+            fault = try_out(built, one, links)
+            tried.runs += 1
+            runs += 1
+            if fault is None:
+                return text, built, one
+            tried.faults.append(fault)
+            if not queue and one is plan:
+                queue = _repairs(plan, fault)
+        if runs >= _MOST_OF_STANCE or tried.runs >= _MOST_RUNS:
+            return None
+    return None
+
+
+def _repairs(plan: Plan, fault: Fault) -> list[Plan]:
+    """Return what may repair the `fault` of a plan in the same place."""
+    control = plan.control
+    if not isinstance(control, Press) or fault.kind == "touch":
+        return []
+    stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
+    still = replace(plan, control=stays, duration=_CALM_LEAD_IN + 0.5)
+    if len(control.path) < 2 or fault.kind != "links":
+        return [still]
+    return [still] if fault.t > control.lead_in else []
+
+
+def _drop(
+    section: RobotSection, built: Built, tips: Sequence[Tip], request: Request, draft: Draft
+) -> tuple[str, Built, Plan]:
+    model, q0 = built.assembly.model, built.assembly.q0
+    (shell,) = built.shells.values()
+    inside = request.word == "bowl"
+    if request.press is not None or request.place is not None:
+        raise SphshellError(
+            "a robot that floats comes down on the surface by its weight: leave out --press "
+            "and --place"
+        )
+    centers = sphere_centers(built, tips)
+    root = q0[:7]
+    if model.njoints == 2:
+        pair = request.materials(tips, 0.0)
+        plan = plan_fall(shell, tips[0], centers[0], root, pair, inside=inside)
+        tips = tips[:1]
+    else:
+        if inside:
+            raise SphshellError("a robot cannot stand in a bowl: take another --surface")
+        data = model.createData()
+        inertia = np.diag(pin.crba(model, data, q0))[6:]
+        mass = float(pin.computeTotalMass(model))
+        leg = float(np.linalg.norm(root[:3] - centers, axis=1).max())
+        pair = request.materials(tips, mass / len(tips))
+        plan = plan_stand(shell, tuple(tips), centers, mass, inertia, leg, pair)
+    links = Links(model, built.assembly.loaded[0].collision_model, shell, tips, ())
+    tried = _Tried(postures=1)
+    for _ in range(3):
+        text, made = draft(section, plan)
+        fault = try_out(made, plan, links)
+        tried.runs += 1
+        if fault is None:
+            return text, made, plan
+        tried.faults.append(fault)
+        end = float(f"{_BEFORE * fault.t:.2g}")
+        if fault.kind != "links" or end < _SHORTEST:
+            break
+        note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the surface"
+        plan = replace(plan, duration=end, why=(*plan.why, note))
+    raise _refusal(tips[0], request, tried)
+
+
+def _working_posture(section: RobotSection, model: pin.Model, q0: Array) -> Array:
+    """Return the posture in which the robot is known to work, else its reference posture."""
+    known = WORKING.get(section.name or "", ())
+    return np.array(known) if len(known) == model.nq else q0
+
+
+def _changed_joints(model: pin.Model, q0: Array, q: Array) -> dict[str, float | list[float]]:
+    start: dict[str, float | list[float]] = {}
+    for name in list(model.names)[1:]:
+        span, _ = joint_spans(model, name)
+        if not np.array_equal(q[span], q0[span]):
+            values = [round(float(one), 9) for one in q[span]]
+            start[name] = values[0] if len(values) == 1 else values
+    return start
+
+
+def _refusal(tip: Tip, request: Request, tried: _Tried) -> SphshellError:
+    """Return the error that says why no draft works, and what to change."""
+    way = f"along {request.place}" if request.place else "where its limb points"
+    if not tried.postures:
+        return SphshellError(
+            f"the tip on frame '{tip.frame}' cannot move {way} in any posture that was tried: its "
+            "joints do not allow it; take another --place or --frame"
+        )
+    if tried.faults:
+        fault = tried.faults[0]
+        when = f" at t = {fault.t:.2g} s" if fault.link else ""
+        return SphshellError(
+            f"no draft works ({_count(tried.runs, 'run')}): {fault.text}{when}; "
+            f"{_ADVICE[fault.kind]}"
+        )
+    if tried.errors:
+        return tried.errors[0]
+    if tried.blocked:
+        ((link, _),) = tried.blocked.most_common(1)
+        return SphshellError(
+            f"link '{link}' would be in the part, or another one: in each of "
+            f"{_count(tried.postures, 'posture')} and {_count(tried.places, 'place')} on the part "
+            f"that were tried; {_ADVICE['links']}"
+        )
+    return SphshellError("the surface has no point to touch")
+
+
+_ADVICE = {
+    "run": "a softer --law, or a larger --radius",
+    "touch": "another --place, or another --frame",
+    "force": "a smaller --radius, another --press or --place",
+    "links": "take another --place, a smaller part, or a sphere farther out (--frame, --radius)",
+    "figure": "another --law or --radius",
+}
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -1,0 +1,391 @@
+"""Stops, damping, dry friction, armature and limits of joints, against closed forms."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import (
+    Adaptive,
+    BristleFriction,
+    HuntCrossleyLaw,
+    ImpactLaw,
+    Implicit,
+    JointFriction,
+    JointIngredients,
+    JointLimits,
+    JointPD,
+    Result,
+    RungeKutta4,
+    Scene,
+    SemiImplicitEuler,
+    Simulation,
+    Sphere,
+)
+from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.scenario.build import build
+from tests import models
+
+MASS, LENGTH, OWN = 1.0, 0.3, 0.01
+INERTIA = OWN + MASS * LENGTH**2
+STIFFNESS = 500.0
+URDF = """<robot name="link"><link name="base"/><link name="arm"><inertial><mass value="1"/>
+<origin xyz="0 0 -0.3"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+</inertial></link><joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1.2" effort="5" velocity="3"/>
+<dynamics damping="0.7" friction="0.3"/></joint></robot>"""
+
+
+def link(gravity: float = 0.0) -> pin.Model:
+    model = pin.buildModelFromXML(URDF)
+    model.gravity.linear = np.array([0.0, 0.0, -gravity])
+    return model
+
+
+def slider() -> pin.Model:
+    """Mass that falls along z."""
+    return models.slider(mass=2.0)
+
+
+def joint_of(model: pin.Model) -> str:
+    return str(model.names[1])
+
+
+def residual(result: Result) -> float:
+    return float(np.abs(result.energy.residual).max() / result.energy.exchanged)
+
+
+def stops(law: ImpactLaw | HuntCrossleyLaw, upper: float = 0.5) -> JointIngredients:
+    return JointIngredients(limits={"hinge": JointLimits(-1.0, upper, law)})
+
+
+@pytest.mark.parametrize("integrator", [Adaptive(1e-9, 1e-11), Implicit(1e-9, 1e-11)])
+def test_a_link_bounces_off_its_stop_as_the_closed_form(integrator: Adaptive | Implicit) -> None:
+    scene = Scene(link(), joints=stops(ImpactLaw(STIFFNESS, 1.0)))
+    result = Simulation(scene, integrator).run([0.0], [2.0], 1.0)
+    rate = math.sqrt(STIFFNESS / INERTIA)
+    off = 0.25 + math.pi / rate
+    touch, lift_off = result.events
+    assert (touch.pair, touch.kind, lift_off.kind) == ("hinge", "stop", "stop_left")
+    assert touch.t == pytest.approx(0.25, abs=1e-9)
+    assert lift_off.t == pytest.approx(off, abs=1e-7)
+    assert result.v[-1, 0] == pytest.approx(-2.0, rel=1e-7)
+    assert result.q[-1, 0] == pytest.approx(0.5 - 2.0 * (1.0 - off), abs=1e-6)
+    figures = result.stats.joints["hinge"]
+    assert figures.stops == 1
+    assert figures.stop_time == pytest.approx(math.pi / rate, rel=1e-6)
+    assert residual(result) < 1e-7
+
+
+def test_the_lower_stop_is_the_mirror_image() -> None:
+    law = HuntCrossleyLaw(STIFFNESS, 1.5, 0.3)
+    joints = JointIngredients(limits={"hinge": JointLimits(-0.5, 0.5, law)})
+    up, down = (
+        Simulation(Scene(link(), joints=joints), RungeKutta4(1e-3)).run([0.0], [v], 0.5)
+        for v in (2.0, -2.0)
+    )
+    np.testing.assert_array_equal(up.q, -down.q)
+
+
+def test_a_damped_stop_throws_back_at_its_restitution() -> None:
+    law = HuntCrossleyLaw.with_restitution(STIFFNESS, 1.0, 0.6, 2.0)
+    for integrator in (Adaptive(1e-9, 1e-11), Implicit(1e-8, 1e-10)):
+        result = Simulation(Scene(link(), joints=stops(law)), integrator).run([0.0], [2.0], 0.6)
+        assert result.v[-1, 0] == pytest.approx(-1.2, abs=1e-6)
+        assert residual(result) < 1e-7
+
+
+def test_fixed_steps_bounce_too() -> None:
+    scene = Scene(link(), joints=stops(ImpactLaw(STIFFNESS, 1.0)))
+    for integrator, error in ((SemiImplicitEuler(1e-4), 0.02), (RungeKutta4(1e-4), 1e-3)):
+        result = Simulation(scene, integrator).run([0.0], [2.0], 0.5)
+        assert result.v[-1, 0] == pytest.approx(-2.0, rel=error)
+
+
+def test_damping_and_armature_decay_as_the_closed_form() -> None:
+    joints = JointIngredients(damping={"hinge": 0.3}, armature={"hinge": 0.05})
+    scene = Scene(link(), joints=joints)
+    result = Simulation(scene, Adaptive(1e-11, 1e-13)).run([0.0], [1.0], 2.0)
+    expected = np.exp(-0.3 / (INERTIA + 0.05) * result.t)
+    np.testing.assert_allclose(result.v[:, 0], expected, rtol=1e-8)
+    lost = 0.5 * (INERTIA + 0.05) * (1.0 - expected[-1] ** 2)
+    assert result.energy.damping_loss[-1] == pytest.approx(lost, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    "integrator", [Adaptive(1e-6, 1e-8), Implicit(1e-6, 1e-8), SemiImplicitEuler(1e-3)]
+)
+def test_dry_friction_holds_99_percent_for_a_minute_without_creep(
+    integrator: Adaptive | Implicit | SemiImplicitEuler,
+) -> None:
+    model = slider()
+    weight = 2.0 * 9.81
+    friction = JointFriction(weight / 0.99)
+    scene = Scene(model, joints=JointIngredients(friction={joint_of(model): friction}))
+    result = Simulation(scene, integrator).run([1.0], None, 60.0, record_dt=1.0)
+    # The load comes on at once, and the spring gives way by a part of a millimeter.
+    assert result.q[1, 0] == pytest.approx(1.0, abs=2e-3)
+    assert np.ptp(result.q[1:, 0]) < 1e-10
+
+
+@pytest.mark.parametrize("integrator", [Adaptive(1e-8, 1e-10), Implicit(1e-8, 1e-10)])
+def test_dry_friction_slides_at_101_percent(integrator: Adaptive | Implicit) -> None:
+    model = slider()
+    weight = 2.0 * 9.81
+    joints = JointIngredients(friction={joint_of(model): JointFriction(weight / 1.01)})
+    result = Simulation(Scene(model, joints=joints), integrator).run([1.0], None, 1.0)
+    # All of the limit acts once the spring has given way.
+    acceleration = np.diff(result.v[-2:, 0]) / np.diff(result.t[-2:])
+    assert acceleration[0] == pytest.approx(-9.81 * (1 - 1 / 1.01), rel=1e-6)
+    assert residual(result) < 1e-7
+
+
+def test_dry_friction_stops_a_swing_and_accounts_for_its_energy() -> None:
+    joints = JointIngredients(friction={"hinge": JointFriction(0.3)})
+    result = Simulation(Scene(link(9.81), joints=joints), Adaptive(1e-8, 1e-10)).run(
+        [0.8], None, 6.0
+    )
+    # Three half swings of a pendulum lose four fifths of its height.
+    assert abs(result.v[-1, 0]) < 1e-4
+    assert residual(result) < 1e-6
+    stored = result.energy.potential[0] - result.energy.potential[-1]
+    assert result.energy.friction_loss[-1] == pytest.approx(stored, rel=1e-3)
+
+
+def test_torques_are_cut_at_the_effort_limit_and_the_result_says_when() -> None:
+    joints = JointIngredients(effort={"hinge": 5.0}, speed={"hinge": 3.0})
+    scene = Scene(link(), joints=joints)
+    asked: list[float] = []
+
+    def push(t: float, *_: object) -> list[float]:
+        asked.append(20.0 * (1 - t))
+        return asked[-1:]
+
+    result = Simulation(scene, RungeKutta4(1e-3)).run([0.0], [0.0], 0.9, push, control_dt=0.01)
+    # 5 N m until t = 0.75, then what is asked for, held over 0.01 s.
+    speed = 5.0 * 0.75 / INERTIA
+    assert result.v[750, 0] == pytest.approx(speed, rel=1e-9)
+    figures = result.stats.joints["hinge"]
+    assert figures.cut_time == pytest.approx(0.75, abs=0.011)
+    assert figures.first_too_fast == pytest.approx(3.0 * INERTIA / 5.0, abs=2e-3)
+    assert figures.peak_speed == pytest.approx(result.v.max(), rel=1e-12)
+    kinds = [event.kind for event in result.events]
+    assert kinds == ["effort_limit", "speed_limit", "effort_limit_left"]
+    assert residual(result) < 1e-9
+
+
+def test_efforts_may_differ_by_direction() -> None:
+    scene = Scene(link(), joints=JointIngredients(effort={"hinge": (-2.0, 5.0)}))
+    for asked, got in ((10.0, 5.0), (-10.0, -2.0), (1.0, 1.0)):
+        result = Simulation(scene, RungeKutta4(1e-3)).run(
+            [0.0], [0.0], 0.1, lambda *_, asked=asked: [asked], control_dt=0.1
+        )
+        assert result.v[-1, 0] == pytest.approx(0.1 * got / INERTIA, rel=1e-9)
+
+
+def test_a_controller_at_its_effort_limit_keeps_the_energy_residual() -> None:
+    controller = JointPD(50.0, 5.0, [1.0])
+    free = Simulation(Scene(link(9.81)), Adaptive(1e-8, 1e-10)).run([0.0], None, 1.0, controller)
+    joints = JointIngredients(effort={"hinge": 5.0})
+    cut = Simulation(Scene(link(9.81), joints=joints), Adaptive(1e-8, 1e-10)).run(
+        [0.0], None, 1.0, controller
+    )
+    assert cut.stats.joints["hinge"].cut_time > 0.05
+    assert residual(free) < 1e-7
+    assert residual(cut) < 1e-7
+
+
+def everything() -> Scene:
+    model = link(9.81)
+    joints = JointIngredients(
+        limits={"hinge": JointLimits(-0.2, 0.2, HuntCrossleyLaw(80.0, 1.3, 0.4))},
+        damping={"hinge": 0.2},
+        friction={"hinge": JointFriction(0.5, stiffness=30.0, damping=0.4)},
+        armature={"hinge": 0.03},
+    )
+    return Scene(model, joints=joints)
+
+
+@pytest.mark.parametrize(
+    ("q", "v", "z"),
+    [
+        (0.1, 0.3, 0.004),  # sticks
+        (0.25, 0.3, 0.004),  # in the stop
+        (-0.26, 1.3, 0.012),  # in the other one, slides
+        (0.1, -0.4, 0.03),  # slides, and the spring gives way
+    ],
+)
+def test_slopes_agree_with_differences(q: float, v: float, z: float) -> None:
+    core = everything().core
+    tau, start, h = np.array([0.4]), np.array([q, v, z]), 1e-6
+
+    def rates(x: np.ndarray) -> np.ndarray:
+        return core.rates(x[:1], x[1:2], x[2:], tau)
+
+    found = core.rate_jacobian(start[:1], start[1:2], start[2:], tau)
+    steps = h * np.eye(3)
+    expected = np.transpose(
+        [(rates(start + step) - rates(start - step)) / (2 * h) for step in steps]
+    )
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_your_own_loop_makes_the_same_motion() -> None:
+    scene, dt = everything(), 1e-4
+    model = scene.model
+    data = model.createData()
+    q, v = np.array([0.1]), np.array([1.5])
+    state = scene.state(q, v)
+    expected = Simulation(scene, SemiImplicitEuler(dt)).run(q, v, 0.2)
+    for _ in range(2000):
+        tau = scene.joint_forces(q, v, state=state)
+        v = v + dt * pin.aba(model, data, q, v, tau)
+        q = pin.integrate(model, q, dt * v)
+        state.advance(q, v, dt)
+    np.testing.assert_allclose(q, expected.q[-1], atol=1e-12)
+    np.testing.assert_allclose(v, expected.v[-1], atol=1e-12)
+
+
+def test_springs_of_joints_and_bristles_of_contacts_live_side_by_side() -> None:
+    """Contacts that come and go reorder the state that both share."""
+    dry = JointIngredients(
+        friction={"one_joint": JointFriction(0.4), "two_joint": JointFriction(0.2)}
+    )
+    scene = Scene(models.arm(), joints=dry)
+    scene.add_contact(
+        Sphere(0.05, frame="ball"),
+        models.plate(),
+        law=HuntCrossleyLaw(1e6, 1.5, 0.2),
+        friction=BristleFriction(0.5, 0.4, 1e4, 1.0, 1e-2),
+    )
+    for integrator in (Adaptive(1e-7, 1e-9), Implicit(1e-7, 1e-9)):
+        result = Simulation(scene, integrator).run(models.ARM_Q, [1.0, 0.0, 0.0], 1.0)
+        assert next(iter(result.stats.pairs.values())).touches > 1
+        assert residual(result) < 1e-5
+        assert result.v[-1, 0] == pytest.approx(0.0, abs=1e-9)  # it sticks
+
+
+def test_a_model_states_its_joints() -> None:
+    joints = JointIngredients.from_model(link())
+    limits = joints.limits["hinge"]
+    assert (limits.lower, limits.upper) == (-1.0, 1.2)
+    assert joints.damping == {"hinge": 0.7}
+    assert joints.friction == {"hinge": JointFriction(0.3)}
+    assert joints.effort == {"hinge": 5.0}
+    assert joints.speed == {"hinge": 3.0}
+    # At its highest speed the joint goes 0.01 rad into the stop, or less if its motor is strong.
+    energy = 0.5 * INERTIA * 3.0**2
+    assert limits.law.depth_of(energy) <= 0.01 * (1 + 1e-9)
+    assert JointIngredients.from_model(link(), ["damping"]).kinds() == ("damping",)
+    with pytest.raises(NameNotFound, match=r"'drag'.*damping"):
+        JointIngredients.from_model(link(), ["drag"])
+
+
+def test_zeros_and_missing_limits_are_not_stated() -> None:
+    text = URDF.replace('effort="5" velocity="3"', 'effort="0" velocity="0"')
+    text = text.replace('lower="-1" upper="1.2"', 'lower="0" upper="0"')
+    text = text.replace('damping="0.7" friction="0.3"', 'damping="0" friction="0"')
+    assert not JointIngredients.from_model(pin.buildModelFromXML(text)).kinds()
+
+
+def test_explain_lists_what_is_modelled_and_what_is_left_out() -> None:
+    text = str(Scene(link(), joints=JointIngredients.from_model(link(), ["damping"])).explain())
+    modelled, absent = text.split("Not modelled:")
+    assert "damping of 'hinge'" in modelled
+    assert "position limits that the robot's file states, of 'hinge'" in absent
+    assert "damping" not in absent
+
+
+def test_an_open_run_takes_over_new_numbers_of_joints() -> None:
+    scenes = [Scene(link(), joints=JointIngredients(damping={"hinge": c})) for c in (0.0, 2.0)]
+    run = OpenRun(Simulation(scenes[0], Adaptive(1e-8)), [0.0], [1.0], record_dt=0.01)
+    run.advance(0.1)
+    assert run.change(scenes[1])
+    after = run.advance(0.2)
+    assert after.v[-1, 0] == pytest.approx(math.exp(-2.0 * 0.2 / INERTIA), rel=1e-4)
+    assert not run.change(Scene(link()))
+
+
+def test_results_with_joints_are_saved_and_loaded(tmp_path: Path) -> None:
+    scene = Scene(link(), joints=stops(ImpactLaw(STIFFNESS, 1.0)))
+    result = Simulation(scene, Adaptive(1e-6)).run([0.0], [2.0], 0.5)
+    loaded = Result.load(result.save(tmp_path / "run.npz"))
+    assert loaded.stats.joints == result.stats.joints
+    assert loaded.events == result.events
+    again = Simulation(pickle.loads(pickle.dumps(scene)), Adaptive(1e-6)).run([0.0], [2.0], 0.5)
+    np.testing.assert_array_equal(again.q, result.q)
+
+
+def test_a_rollout_makes_the_same_runs() -> None:
+    simulation = Simulation(everything(), Adaptive(1e-7))
+    alone = simulation.run([0.1], [2.0], 0.3)
+    (one, other) = simulation.rollout([[0.1]] * 2, [[2.0]] * 2, 0.3, threads=2)
+    np.testing.assert_array_equal(one.q[-1], alone.q[-1])
+    assert other.stats.joints == one.stats.joints
+
+
+@pytest.mark.parametrize(
+    ("joints", "error", "words"),
+    [
+        ({"damping": {"elbow": 1.0}}, NameNotFound, "elbow.*hinge"),
+        ({"damping": {"hinge": -1.0}}, InvalidParameter, "damping.hinge.*negative"),
+        ({"damping": {"hinge": [1.0, 2.0]}}, InvalidParameter, "damping.hinge.*one number or 1"),
+        ({"effort": {"hinge": (1.0, 5.0)}}, InvalidParameter, "effort.hinge.*lower <= 0"),
+        ({"limits": {"hinge": 3}}, InvalidParameter, "limits.hinge.*JointLimits"),
+        ({"friction": 1.0}, InvalidParameter, "friction.*must map joint names"),
+    ],
+)
+def test_wrong_ingredients_are_refused(
+    joints: dict[str, object], error: type[Exception], words: str
+) -> None:
+    with pytest.raises(error, match=words):
+        Scene(link(), joints=JointIngredients(**joints))  # type: ignore[arg-type]
+
+
+def test_ranges_belong_to_angles_and_lengths() -> None:
+    model = models.ball()
+    limits = JointLimits(-1.0, 1.0, ImpactLaw(1.0, 1.0))
+    with pytest.raises(InvalidParameter, match="is a joint without a range"):
+        Scene(model, joints=JointIngredients(limits={joint_of(model): limits}))
+    with pytest.raises(InvalidParameter, match="lower below upper"):
+        JointLimits(1.0, 1.0, ImpactLaw(1.0, 1.0))
+
+
+def test_a_scenario_states_joints(tmp_path: Path) -> None:
+    (tmp_path / "link.urdf").write_text(URDF)
+    path = tmp_path / "swing.toml"
+    path.write_text(
+        """
+title = "A link swings against its stop"
+[robot]
+urdf = "link.urdf"
+joints = ["limits", "damping"]
+start = { hinge = -0.9 }
+[[joint]]
+name = "hinge"
+damping = 0.05
+friction = 0.1
+stop = { type = "hunt-crossley", stiffness = 400.0, exponent = 1.0 }
+upper = 0.3
+[run]
+duration = 1.0
+[[knob]]
+key = "joint.hinge.friction"
+"""
+    )
+    built = build(path)
+    joints = built.scene.joints
+    assert joints.kinds() == ("limits", "damping", "friction")
+    assert joints.damping == {"hinge": 0.05}
+    limits = joints.limits["hinge"]
+    assert (limits.lower, limits.upper) == (-1.0, 0.3)
+    assert limits.law == HuntCrossleyLaw(400.0, 1.0)
+    result = built.simulation.run(built.q0, built.v0, 1.0, built.controller)
+    assert result.stats.joints["hinge"].stops >= 1
+    assert residual(result) < 1e-4

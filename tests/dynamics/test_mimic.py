@@ -1,0 +1,191 @@
+"""Mimic joints move exactly: against the full model reduced by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+from sphshell_pin import (
+    Adaptive,
+    BristleFriction,
+    CoulombFriction,
+    HuntCrossleyLaw,
+    Implicit,
+    JointIngredients,
+    JointPD,
+    Scene,
+    Shell,
+    Simulation,
+    Sphere,
+)
+from tests import meshes
+
+Array = NDArray[np.float64]
+
+# Two fingers of two links each, as those of Robotiq's 2F-85: the knuckles of both sides follow one
+# joint, and the fingertips turn back so that the pads stay parallel.
+FINGER = """
+<link name="{side}_knuckle"><inertial><mass value="0.03"/><origin xyz="0.02 0 0.02"/>
+<inertia ixx="1e-5" iyy="1.2e-5" izz="0.8e-5" ixy="0" ixz="1e-6" iyz="0"/></inertial></link>
+<link name="{side}_pad"><inertial><mass value="0.02"/><origin xyz="0 0 0.02"/>
+<inertia ixx="6e-6" iyy="7e-6" izz="2e-6" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="{side}_knuckle_joint" type="revolute"><parent link="{parent}"/>
+<child link="{side}_knuckle"/><origin xyz="0 {y} 0"/><axis xyz="{sign} 0 0"/>
+<limit lower="-1" upper="1" effort="5" velocity="2"/>{mimic}</joint>
+<joint name="{side}_pad_joint" type="revolute"><parent link="{side}_knuckle"/>
+<child link="{side}_pad"/><origin xyz="0 {out} 0.05"/><axis xyz="{sign} 0 0"/>
+<limit lower="-1" upper="1" effort="5" velocity="2"/>
+<mimic joint="left_knuckle_joint" multiplier="-1" offset="{offset}"/></joint>
+"""
+GRIPPER = f"""<robot name="gripper"><link name="world"/>
+<link name="palm"><inertial><mass value="0.8"/><inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0"
+ixz="0" iyz="0"/></inertial></link><joint name="lift" type="prismatic"><parent link="world"/>
+<child link="palm"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="50" velocity="1"/>
+</joint>{FINGER.format(side="left", parent="palm", y=0.02, out=0.03, sign=1, mimic="", offset=0)}{
+    FINGER.format(
+        side="right",
+        parent="palm",
+        y=-0.02,
+        out=-0.03,
+        sign=-1,
+        offset=0.1,
+        mimic='<mimic joint="left_knuckle_joint" multiplier="0.9"/>',
+    )
+}</robot>"""
+
+
+def gripper() -> tuple[pin.Model, pin.Model]:
+    """Return the gripper with exact mimic joints, and with free ones."""
+    return tuple(pin.buildModelFromXML(GRIPPER, mimic=mimic) for mimic in (True, False))  # type: ignore[return-value]
+
+
+def panda() -> tuple[pin.Model, pin.Model]:
+    """Return example-robot-data's Panda, whose second finger mimics the first."""
+    data = pytest.importorskip("example_robot_data")
+    path = data.load("panda").urdf
+    return tuple(pin.buildModelFromUrdf(path, mimic=mimic) for mimic in (True, False))  # type: ignore[return-value]
+
+
+def reduction(model: pin.Model, full: pin.Model) -> tuple[Array, Array]:
+    """Return G (nv of full, nv) and the offsets of q = G q_reduced + offset."""
+    matrix, offset = np.zeros((full.nv, model.nv)), np.zeros(full.nq)
+    for joint, free in zip(model.joints[1:], full.joints[1:], strict=True):
+        ratio = 1.0
+        if joint.shortname() == "JointModelMimic":
+            ratio, offset[free.idx_q] = joint.extract().scaling, joint.extract().offset
+        matrix[free.idx_v, joint.idx_v] = ratio
+    return matrix, offset
+
+
+def with_contact(model: pin.Model, tip: str, other: str) -> Scene:
+    """A sphere on one finger against a shell on the other, which always touch."""
+    scene = Scene(model)
+    scene.add_contact(
+        Sphere(0.5, frame=tip, offset=(0.02, 0.01, 0.03)),
+        Shell(*meshes.grid_plate(4, 4, 2.0)),
+        frame=other,
+        law=HuntCrossleyLaw(1e4, 1.5, 0.3),
+        friction=BristleFriction(0.5, 0.4, 1e4, 1.0, 1e-2),
+    )
+    return scene
+
+
+CASES = {
+    "panda": (panda, "panda_leftfinger", "panda_rightfinger"),
+    "gripper": (gripper, "left_pad", "right_pad"),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_acceleration_is_that_of_the_model_reduced_by_hand(name: str) -> None:
+    make, tip, other = CASES[name]
+    (model, full), random = make(), np.random.default_rng(3)
+    scene, free = with_contact(model, tip, other), with_contact(full, tip, other)
+    matrix, offset = reduction(model, full)
+    data = full.createData()
+    touched = 0
+    for _ in range(20):
+        q = random.uniform(-0.3, 0.3, model.nq)
+        v, tau = random.standard_normal(model.nv), random.standard_normal(model.nv)
+        z = 1e-4 * random.standard_normal(scene.core.bristle_size)
+        found = scene.core.rates(q, v, z, tau)[: model.nv]
+        forces = scene.contacts(q, v)
+        touched += len(forces.depth)
+        q_full, v_full = matrix @ q + offset, matrix @ v
+        mass = pin.crba(full, data, q_full)
+        mass = np.triu(mass) + np.triu(mass, 1).T
+        z_full = np.zeros(free.core.bristle_size)
+        z_full[: len(z)] = z
+        bias = pin.nonLinearEffects(full, data, q_full, v_full)
+        # What the contact adds, from the full model's own accelerations.
+        added = mass @ (free.core.rates(q_full, v_full, z_full, bias)[: full.nv])
+        expected = np.linalg.solve(matrix.T @ mass @ matrix, tau + matrix.T @ (added - bias))
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * abs(expected).max())
+    assert touched
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_derivatives_agree_with_differences(name: str) -> None:
+    make, tip, other = CASES[name]
+    model, _ = make()
+    scene, random, h = with_contact(model, tip, other), np.random.default_rng(5), 1e-6
+    core, nv = scene.core, model.nv
+    for _ in range(3):
+        q = random.uniform(-0.2, 0.2, model.nq)
+        v, tau = 0.1 * random.standard_normal(nv), random.standard_normal(nv)
+        z = 1e-5 * random.standard_normal(core.bristle_size)
+        found = core.rate_jacobian(q, v, z, tau)[:nv]
+        start = np.concatenate([q, v, z])
+        expected = np.empty_like(found)
+        for k in range(len(start)):
+            step = h * np.eye(len(start))[k]
+            ahead, behind = (
+                core.rates(x[:nv], x[nv : 2 * nv], x[2 * nv :], tau)[:nv]
+                for x in (start + step, start - step)
+            )
+            expected[:, k] = (ahead - behind) / (2 * h)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * abs(expected).max())
+
+
+@pytest.mark.parametrize("integrator", [Adaptive(1e-8, 1e-10), Implicit(1e-7, 1e-9)])
+def test_a_closing_grasp_keeps_its_energy(integrator: Adaptive | Implicit) -> None:
+    model, full = gripper()
+    scene = Scene(model)
+    box = Shell(*meshes.cube(0.02))
+    # The right finger, of the smaller ratio, reaches less far.
+    for side, radius in (("left", 0.006), ("right", 0.0095)):
+        scene.add_contact(
+            Sphere(radius, frame=f"{side}_pad", offset=(0.0, 0.0, 0.02)),
+            box,
+            placement=pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.078])),
+            law=HuntCrossleyLaw(1e6, 1.5, 0.5),
+            friction=CoulombFriction(0.5, 0.4, 0.01, 0.1),
+            name=side,
+        )
+    control = JointPD({"left_knuckle_joint": 2.0, "lift": 500.0}, 0.02, {"left_knuckle_joint": 0.9})
+    result = Simulation(scene, integrator).run(np.zeros(model.nq), None, 0.5, control)
+    figures = result.stats.pairs
+    assert figures["left"].touches
+    assert figures["right"].touches
+    assert np.abs(result.energy.residual).max() < 1e-5 * result.energy.exchanged
+    # Both pads stay where their ratio has them.
+    matrix, offset = reduction(model, full)
+    data, free = model.createData(), full.createData()
+    pin.forwardKinematics(model, data, result.q[-1])
+    pin.forwardKinematics(full, free, matrix @ result.q[-1] + offset)
+    for ours, theirs in zip(data.oMi, free.oMi, strict=True):
+        assert ours.isApprox(theirs, 1e-12)
+
+
+def test_joint_ingredients_act_on_the_joint_that_is_mimicked() -> None:
+    model, _ = gripper()
+    joints = JointIngredients.from_model(model)
+    assert set(joints.limits) == {"lift", "left_knuckle_joint"}
+    scene = Scene(model, joints=joints)
+    result = Simulation(scene, Adaptive(1e-7)).run(
+        np.zeros(2), [0.0, 8.0], 1.0, JointPD({"lift": 500.0}, {"lift": 1.0})
+    )
+    assert result.stats.joints["left_knuckle_joint"].stops
+    assert np.abs(result.energy.residual).max() < 1e-5 * result.energy.exchanged

@@ -1,0 +1,389 @@
+"""Spheres on spheres: closed forms, symmetry, conservation, and the ball as a fine mesh."""
+
+from __future__ import annotations
+
+import math
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+import sphshell_pin as sp
+from sphshell_pin import testing
+from sphshell_pin.errors import DeepStart, InvalidParameter
+from tests import models
+from tests.dynamics.test_contact_derivatives import (
+    BRISTLES,
+    FRICTIONS,
+    LAWS,
+    assert_close,
+    differences,
+    generalised_force,
+)
+
+Array = NDArray[np.float64]
+
+R, OTHER = 0.05, 0.08
+OFFSET, OTHER_OFFSET = (0.01, -0.02, 0.03), (-0.03, 0.01, 0.02)
+
+
+def two_bodies() -> pin.Model:
+    """Free bodies "one" and "two", no gravity."""
+    model = models.empty(0.0)
+    lump = pin.Inertia(2.0, np.array([0.02, -0.03, 0.01]), np.diag([0.03, 0.02, 0.04]))
+    models.add_body(model, "one", pin.JointModelFreeFlyer())
+    models.add_body(model, "two", pin.JointModelFreeFlyer(), inertia=lump)
+    return model
+
+
+ONE, TWO = sp.Sphere(R, "one", OFFSET), sp.Sphere(OTHER, "two", OTHER_OFFSET)
+
+
+def two_spheres(law, friction=None, *, turned: bool = False, **more) -> sp.Scene:  # type: ignore[no-untyped-def]
+    """Scene of both spheres; `turned`: the second one is given first."""
+    scene = sp.Scene(two_bodies())
+    first, second = (TWO, ONE) if turned else (ONE, TWO)
+    scene.add_contact(first, second, law=law, friction=friction, name="balls", **more)
+    return scene
+
+
+def in_touch(seed: int, depth: float = 0.004, spin: float = 20.0) -> tuple[Array, Array]:
+    """State in which the spheres are `depth` deep in each other."""
+    rng = np.random.default_rng(seed)
+    turns = [pin.Quaternion(rng.normal(size=4)).normalized().matrix() for _ in range(2)]
+    one, two = (pin.SE3(turn, rng.normal(size=3)) for turn in turns)
+    way = rng.normal(size=3)
+    way *= (R + OTHER - depth) / np.linalg.norm(way)
+    one.translation = two * np.array(OTHER_OFFSET) + way - one.rotation @ np.array(OFFSET)
+    v = np.concatenate([rng.normal(size=3), spin * rng.normal(size=3)] * 2)
+    return np.concatenate([pin.SE3ToXYZQUAT(one), pin.SE3ToXYZQUAT(two)]), v
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_depth_normal_and_point_have_closed_forms(turned: bool) -> None:
+    scene = two_spheres(sp.ImpactLaw(1e4, 1.5), turned=turned)
+    q, _ = in_touch(1)
+    data = scene.model.createData()
+    pin.framesForwardKinematics(scene.model, data, q)
+    first, second = scene.pairs[0].sphere, scene.pairs[0].other_sphere
+    centers = [
+        data.oMf[scene.model.getFrameId(s.frame)] * np.array(s.offset) for s in (first, second)
+    ]
+    away = centers[0] - centers[1]
+    found = scene.contacts(q)
+    assert np.allclose(found.depth, [R + OTHER - np.linalg.norm(away)], rtol=0, atol=1e-15)
+    assert np.allclose(found.depth, [0.004], rtol=0, atol=1e-15)
+    assert np.allclose(found.normal_world[0], away / np.linalg.norm(away), rtol=0, atol=1e-14)
+    expected = centers[1] + second.radius * found.normal_world[0]
+    assert np.allclose(found.point_world[0], expected, rtol=0, atol=1e-15)
+    assert np.allclose(found.normal_force, [1e4 * found.depth[0] ** 1.5], rtol=1e-13)
+
+
+def test_two_spheres_with_one_center_are_pushed_along_some_normal() -> None:
+    scene = two_spheres(sp.ImpactLaw(1e4, 1.5))
+    q = np.concatenate([models.free_q(-np.array(OFFSET)), models.free_q(-np.array(OTHER_OFFSET))])
+    found = scene.contacts(q)
+    assert np.isclose(np.linalg.norm(found.normal_world[0]), 1.0)
+    assert found.depth[0] == R + OTHER
+    assert all(np.isfinite(part).all() for part in scene.contact_derivatives(q))
+
+
+# Of two spheres exchanged, the contact point moves by the depth, which is all that differs: at
+# velocities that do not turn the force is the same to rounding.
+@pytest.mark.parametrize("friction", FRICTIONS)
+@pytest.mark.parametrize("law", LAWS)
+def test_the_force_is_symmetric(law: str, friction: str) -> None:
+    q, v = in_touch(2, spin=0.0)
+    forces = []
+    for turned in (False, True):
+        scene = two_spheres(LAWS[law], FRICTIONS[friction], turned=turned)
+        found = scene.contacts(q, v)
+        sign = -1.0 if turned else 1.0
+        forces.append(sign * np.vstack([found.force_world, found.friction_force_world]))
+    assert np.abs(forces[0]).max() > 0
+    assert np.allclose(*forces, rtol=1e-12, atol=1e-12 * np.abs(forces[0]).max())
+
+
+def test_torsion_is_symmetric_and_that_of_the_disc_of_both_radii() -> None:
+    # Spun about the normal, a soft finger turns with the moment mu N 3 pi / 16 sqrt(r d), where
+    # 1 / r = 1 / r_1 + 1 / r_2 (Johnson, Contact Mechanics, 4.22).
+    depth, law = 1e-3, sp.ImpactLaw(1e4, 1.5)
+    friction = sp.BristleFriction(0.5, 0.5, 1e5, 1e3, 1e-3, torsional=True)
+    moments = []
+    for turned in (False, True):
+        model = models.empty(0.0)
+        for name in ("one", "two"):
+            models.add_body(model, name, pin.JointModelFreeFlyer())
+        scene = sp.Scene(model)
+        pair = [sp.Sphere(R, "one"), sp.Sphere(OTHER, "two")]
+        scene.add_contact(*pair[:: -1 if turned else 1], law=law, friction=friction)
+        q = np.concatenate([models.free_q(np.zeros(3)), models.free_q([0, 0, R + OTHER - depth])])
+        v = np.zeros(12)
+        v[5] = 50.0
+        moments.append(scene.external_forces(q, v)[1].angular[2])
+    radius = R * OTHER / (R + OTHER)
+    limit = 0.5 * law.normal_force(depth) * 3 * math.pi / 16 * math.sqrt(radius * depth)
+    assert np.allclose(moments, -limit, rtol=1e-12)
+
+
+@pytest.mark.parametrize("friction", FRICTIONS)
+@pytest.mark.parametrize("law", LAWS)
+def test_derivatives_agree_with_differences(law: str, friction: str) -> None:
+    scene = two_spheres(LAWS[law], FRICTIONS[friction])
+    q, v = in_touch(3, spin=2.0)
+
+    def force(q: Array, v: Array) -> Array:
+        return generalised_force(scene, q, v)
+
+    by_q, by_v = scene.contact_derivatives(q, v)
+    for got, expected in zip(
+        (by_q, by_v), differences(force, scene.model, q, v, 1e-6), strict=True
+    ):
+        assert_close(got, expected, 2e-6)
+
+
+@pytest.mark.parametrize("friction", [None, *BRISTLES])
+def test_the_jacobian_of_the_motion_agrees_with_differences(friction: str | None) -> None:
+    scene = two_spheres(LAWS["impact"], FRICTIONS[friction] if friction else None)
+    q, v = in_touch(4, spin=2.0)
+    core, model = scene.core, scene.model
+    z, tau = np.zeros(core.bristle_size), np.zeros(model.nv)
+    if friction:
+        z[:3] = 1e-5, -2e-5, 1e-5
+    got = core.rate_jacobian(q, v, z, tau)
+    step = 1e-6
+    columns = []
+    for u in step * np.eye(model.nv):
+        ahead, behind = (pin.integrate(model, q, sign * u) for sign in (1, -1))
+        columns.append((core.rates(ahead, v, z, tau) - core.rates(behind, v, z, tau)) / (2 * step))
+    for u in step * np.eye(model.nv):
+        columns.append((core.rates(q, v + u, z, tau) - core.rates(q, v - u, z, tau)) / (2 * step))
+    # The rates of q in its tangent space are v; of the rest only accelerations are compared, as the
+    # turning of a bristle with its normal is linearised with the contact held.
+    expected = np.transpose(columns)[: model.nv]
+    assert_close(got[: model.nv, : 2 * model.nv], expected, 1e-5)
+
+
+# Two identical glass spheres at 10 m/s each (Chung and Ooi, Granular Matter 13 (2011) 643, test 1:
+# E = 48 GPa, nu = 0.2, radius 10 mm); by density: peak force [N] and overlap [m] of Hertz's theory.
+GLASS = {2800.0: (10696.9, 274.113e-6), 2580.0: (10184.4, 265.286e-6)}
+
+
+@pytest.mark.parametrize("density", GLASS)
+def test_two_glass_spheres(density: float) -> None:
+    radius, young, poisson, speed = 0.01, 4.8e10, 0.2, 10.0
+    mass = density * 4 / 3 * math.pi * radius**3
+    law = sp.ImpactLaw.hertz(radius, young, poisson, young, poisson, radius_2=radius)
+    scene = sp.Scene(balls_on_a_line(2, radius, mass))
+    scene.add_contact(sp.Sphere(radius, "ball0"), sp.Sphere(radius, "ball1"), law=law)
+    q = np.array([0.0, 2 * radius + 1e-6])
+    result = sp.Simulation(scene, sp.RungeKutta4(2e-8)).run(q, [speed, -speed], 6e-5)
+    (figures,) = result.stats.pairs.values()
+    depth = (5 / 4 * mass / 2 * (2 * speed) ** 2 / law.stiffness) ** 0.4
+    assert np.isclose(figures.max_depth, depth, rtol=1e-6)
+    assert np.isclose(figures.peak_force, law.stiffness * depth**1.5, rtol=1e-6)
+    assert np.allclose((figures.peak_force, figures.max_depth), GLASS[density], rtol=1e-5)
+    assert np.allclose(result.v[-1], [-speed, speed], rtol=1e-7)
+    # 2.94 d / v (Johnson, Contact Mechanics, 11.24).
+    assert np.isclose(figures.contact_time, 2.9432751 * depth / (2 * speed), rtol=2e-3)
+
+
+def balls_on_a_line(count: int, radius: float, mass: float) -> pin.Model:
+    """Balls "ball0", ... that slide along x."""
+    model = models.empty(0.0)
+    inertia = pin.Inertia.FromSphere(mass, radius)
+    for k in range(count):
+        models.add_body(model, f"ball{k}", pin.JointModelPX(), inertia=inertia)
+    return model
+
+
+def cradle(count: int, gap: float, law) -> tuple[sp.Scene, Array]:  # type: ignore[no-untyped-def]
+    radius = 0.01
+    scene = sp.Scene(balls_on_a_line(count, radius, 0.03))
+    for k in range(count - 1):
+        ends = sp.Sphere(radius, f"ball{k}"), sp.Sphere(radius, f"ball{k + 1}")
+        scene.add_contact(*ends, law=law, name=f"{k}-{k + 1}")
+    q = (2 * radius + gap) * np.arange(count, dtype=float)
+    q[0] -= 1e-3
+    return scene, q
+
+
+@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-10, 1e-12), sp.SemiImplicitEuler(1e-7)])
+def test_newtons_cradle_with_gaps_hands_the_velocity_on(integrator) -> None:  # type: ignore[no-untyped-def]
+    # Apart by more than the overlap of an impact the balls collide two by two: each hands over all
+    # of its velocity, and the last one flies off with that of the first.
+    scene, q = cradle(5, 1e-3, sp.ImpactLaw(1e9, 1.5))
+    result = sp.Simulation(scene, integrator).run(q, [1.0, 0, 0, 0, 0], 6e-3)
+    momentum = result.v.sum(axis=1)
+    assert np.abs(momentum - 1.0).max() < 1e-12
+    tolerance = 1e-8 if isinstance(integrator, sp.Adaptive) else 1e-4
+    assert np.allclose(result.v[-1], [0, 0, 0, 0, 1.0], rtol=0, atol=tolerance)
+    assert [figures.touches for figures in result.stats.pairs.values()] == [1, 1, 1, 1]
+
+
+def test_newtons_cradle_in_touch() -> None:
+    # Balls that touch from the start are in contact together, with Hertz's law: the velocities are
+    # those of the chain of springs (Hinch and Saint-Jean, Proc. R. Soc. A 455 (1999) 3201, for five
+    # balls), here integrated apart from the package.
+    law = sp.ImpactLaw(1e9, 1.5)
+    scene, q = cradle(5, 0.0, law)
+    result = sp.Simulation(scene, sp.Adaptive(1e-9, 1e-11)).run(q, [1.0, 0, 0, 0, 0], 2e-3)
+    assert np.abs(result.v.sum(axis=1) - 1.0).max() < 1e-12
+    x, v, dt = q.copy(), np.array([1.0, 0, 0, 0, 0]), 5e-8
+    x[0] += 0.999e-3
+
+    def acceleration(x: Array) -> Array:
+        push = 1e9 * np.maximum(0.02 - np.diff(x), 0.0) ** 1.5 / 0.03
+        return np.concatenate([[0.0], push]) - np.concatenate([push, [0.0]])
+
+    a = acceleration(x)
+    for _ in range(20000):  # velocity Verlet
+        v += 0.5 * dt * a
+        x += dt * v
+        a = acceleration(x)
+        v += 0.5 * dt * a
+    assert np.allclose(result.v[-1], v, rtol=0, atol=1e-5)
+    assert result.v[-1, 4] > 0.98
+
+
+def spinning_impact(friction, integrator) -> sp.Result:  # type: ignore[no-untyped-def]
+    """Two free balls that hit each other off center, spinning."""
+    model = models.empty(0.0)
+    for name, radius in (("one", R), ("two", OTHER)):
+        inertia = pin.Inertia.FromSphere(1.0, radius)
+        models.add_body(model, name, pin.JointModelFreeFlyer(), inertia=inertia)
+    scene = sp.Scene(model)
+    law = sp.HuntCrossleyLaw(1e7, 1.5, 0.1)
+    scene.add_contact(sp.Sphere(R, "one"), sp.Sphere(OTHER, "two"), law=law, friction=friction)
+    q = np.concatenate([models.free_q([0.0, 0.04, 0.01]), models.free_q([0.14, 0.0, 0.0])])
+    v = np.array([2.0, 0, 0, 10, 20, -30, -1.0, 0, 0.5, 5, -10, 20])
+    return sp.Simulation(scene, integrator).run(q, v, 0.02)
+
+
+@pytest.mark.parametrize("friction", FRICTIONS)
+@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)])
+def test_an_oblique_impact_keeps_momentum_and_the_energy_audit(friction: str, integrator) -> None:  # type: ignore[no-untyped-def]
+    result = spinning_impact(FRICTIONS[friction], integrator)
+    (figures,) = result.stats.pairs.values()
+    assert figures.touches == 1
+    assert result.energy.damping_loss[-1] > 0
+    assert (result.energy.friction_loss[-1] > 0) == (friction != "none")
+    testing.assert_momentum_kept(result, 1e-10)
+    testing.assert_energy_kept(result, 1e-6)
+
+
+@pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(1e-2), sp.Adaptive(1e-5)])
+@pytest.mark.parametrize("speed", [3.0, 3000.0])
+@pytest.mark.filterwarnings("ignore::sphshell_pin.errors.WeakLawWarning")
+def test_no_sphere_flies_through_another(integrator, speed: float) -> None:  # type: ignore[no-untyped-def]
+    # The center of one crosses that of the other in 0.01 of a step.
+    radius, mass = 0.01, 1.0
+    law = models.linear_law(0.5 * mass * (2 * speed / (0.3 * radius)) ** 2)
+    scene = sp.Scene(balls_on_a_line(2, radius, mass))
+    scene.add_contact(sp.Sphere(radius, "ball0"), sp.Sphere(radius, "ball1"), law=law)
+    q = np.array([0.0, 2 * radius + 0.2137])
+    result = sp.Simulation(scene, integrator).run(q, [speed, -speed], 0.4 / speed)
+    assert result.q[-1, 1] - result.q[-1, 0] > 2 * radius
+    assert result.v[-1, 1] > 0.5 * speed
+    assert {event.kind for event in result.events} == {"touch", "lift_off"}
+
+
+@pytest.mark.parametrize("friction", ["none", "coulomb"])
+def test_a_ball_agrees_with_its_fine_mesh(friction: str) -> None:
+    ball = pin.GeometryObject("ball", 0, pin.SE3.Identity(), coal.Sphere(OTHER))
+    shell = sp.Shell.from_geometry(ball, chord_error=1e-3 * OTHER)
+    meshed = sp.Scene(two_bodies())
+    law = LAWS["hunt-crossley"]
+    placement = pin.SE3(np.eye(3), np.array(OTHER_OFFSET))
+    meshed.add_contact(ONE, shell, "two", placement, law=law, friction=FRICTIONS[friction])
+    closed = two_spheres(law, FRICTIONS[friction])
+    for seed in range(5):
+        q, v = in_touch(10 + seed)
+        got, expected = closed.contacts(q, v), meshed.contacts(q, v)
+        assert len(got) == len(expected) == 1
+        assert np.allclose(got.depth, expected.depth, rtol=0, atol=1e-9)
+        assert np.allclose(got.point_world, expected.point_world, rtol=0, atol=1e-6)
+        for a, b in zip(closed.external_forces(q, v), meshed.external_forces(q, v), strict=True):
+            size = np.abs(b.vector).max()
+            assert np.allclose(a.vector, b.vector, rtol=0, atol=1e-4 * size)
+
+
+def test_scene_says_what_it_models() -> None:
+    scene = two_spheres(sp.ImpactLaw(1e4, 1.5))
+    pair = scene.pairs[0]
+    assert pair.kind == "sphere-sphere"
+    assert pair.shell is None
+    assert [one.radius for one in pair.spheres] == [R, OTHER]
+    q, v = in_touch(5)
+    explained = scene.explain(q, v)
+    assert (
+        "sphere of radius 50 mm on frame 'one' against sphere of radius 80 mm on frame 'two'"
+        in explained.pairs[0].modelled
+    )
+    assert np.isclose(explained.pairs[0].gap, -0.004)
+    # Along the line of their centers two bodies move as one of the mass 1 / (1 / m_1 + 1 / m_2),
+    # less for the turning of the second one.
+    assert 0.1 < explained.pairs[0].effective_mass < 2 / 3
+
+
+@pytest.mark.parametrize(
+    ("more", "what"),
+    [
+        ({"frame": "two"}, "frame = 'two'"),
+        ({"placement": pin.SE3.Identity()}, "placement"),
+        ({"method": "smooth"}, "method = 'smooth'"),
+    ],
+)
+def test_what_a_sphere_in_place_of_a_shell_does_not_take(more, what: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(InvalidParameter, match=f"{what}.* must not be given where shell is a"):
+        two_spheres(sp.ImpactLaw(1e4, 1.5), **more)
+
+
+def test_a_deep_start_is_refused_by_the_smaller_radius() -> None:
+    scene = two_spheres(sp.ImpactLaw(1e4, 1.5))
+    q, v = in_touch(6, depth=0.6 * R)
+    with pytest.raises(DeepStart, match=r"radius 0\.05 m"):
+        sp.Simulation(scene, sp.Adaptive(1e-6)).run(q, v, 1e-3)
+    q, v = in_touch(6, depth=0.4 * R)
+    assert len(scene.contacts(q, v)) == 1
+    sp.Simulation(scene, sp.Adaptive(1e-6)).run(q, v, 1e-4)
+
+
+def test_radius_and_offset_of_the_other_sphere_vary() -> None:
+    scene = two_spheres(sp.ImpactLaw(1e4, 1.5))
+    q, _ = in_touch(7)
+    results = sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).rollout(
+        np.stack([q, q]),
+        np.zeros((2, 12)),
+        1e-5,
+        vary={"balls.other_sphere.radius": [OTHER, OTHER + 1e-3]},
+    )
+    depths = [float(result.contacts.depth[0]) for result in results]
+    assert np.isclose(depths[1] - depths[0], 1e-3)
+
+
+def test_spheres_of_a_geometry_model_collide() -> None:
+    model = two_bodies()
+    geometry = pin.GeometryModel()
+    ids = []
+    for name, sphere in (("a", ONE), ("b", TWO)):
+        joint = model.getJointId(f"{sphere.frame}_joint")
+        placement = pin.SE3(np.eye(3), np.array(sphere.offset))
+        made = pin.GeometryObject(name, joint, placement, coal.Sphere(sphere.radius))
+        ids.append(geometry.addGeometryObject(made))
+    geometry.addCollisionPair(pin.CollisionPair(*ids))
+    law = sp.ImpactLaw(1e4, 1.5)
+    scene = sp.Scene.from_geometry(model, geometry, law)
+    assert [pair.name for pair in scene.pairs] == ["a-b"]
+    q, v = in_touch(8)
+    assert np.allclose(scene.contacts(q, v).depth, two_spheres(law).contacts(q, v).depth)
+
+
+def test_hertz_takes_two_radii() -> None:
+    law = sp.ImpactLaw.hertz(0.02, 1e9, 0.3, 2e9, 0.4, radius_2=0.03)
+    alone = sp.ImpactLaw.hertz(0.012, 1e9, 0.3, 2e9, 0.4)
+    assert np.isclose(law.stiffness, alone.stiffness, rtol=1e-15)
+    plane = sp.ImpactLaw.hertz(0.02, 1e9, 0.3, 2e9, 0.4, radius_2=1e9)
+    assert np.isclose(plane.stiffness, sp.ImpactLaw.hertz(0.02, 1e9, 0.3, 2e9, 0.4).stiffness)
