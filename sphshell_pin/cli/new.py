@@ -65,6 +65,9 @@ def new(
 ) -> None:
     """Write a scenario: this robot, this surface, and values that work for their size.
 
+    It is run first, and written only if it touches, holds its force within 5 %, and keeps the
+    robot's links out of the part; else the message says what fails and what to change.
+
     Example: sphshell-pin new --robot panda --surface blade.stl --unit mm
     """
     with faults(context):

@@ -350,7 +350,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
 
     def doubts(self, scene: Scene, q0: Array) -> list[str]:
         """Say where the path is off the shell, or out of the robot's reach."""
-        said = []
+        said: list[str] = []
         if isinstance(self.shell, Shell):
             corners = check_points("path", self.path)
             off = np.abs(self.shell.closest_points(corners).distances)
@@ -365,7 +365,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
 
     def doubts_after(self, result: Result) -> list[str]:
         """Say so if a controller that presses has touched nothing, or never came to its path."""
-        scene, said = result.scene, []
+        scene, said = result.scene, list[str]()
         if scene is None or len(result.t) == 0:
             return said
         touched = any(one.contact_time > 0 for one in result.stats.pairs.values())

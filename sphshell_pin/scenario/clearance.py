@@ -122,7 +122,7 @@ class Links:
         at = placement.actInv(pose.act(point))
         if (at < self._box[0]).any() or (at > self._box[1]).any():
             return False
-        return bool(self._shell.closest_points(at[None]).distances[0] < 0)
+        return bool(self._shell.closest_points(at[None], method="facets").distances[0] < 0)
 
 
 def _tree(shell: Shell) -> coal.BVHModelOBBRSS:

@@ -73,6 +73,9 @@ def new_scenario(
 ) -> NewScenario:
     """Write a scenario in which `robot` touches `surface`, with values that work for its size.
 
+    Drafts are run; the first is written that touches, holds its force within 5 %, and keeps the
+    robot's links out of the part.
+
     Parameters
     ----------
     robot
@@ -102,7 +105,8 @@ def new_scenario(
     NameNotFound, FrameNotFound
         No such robot, frame, material, place.
     SphshellError
-        What cannot be found out and is not given, or a file that cannot be read or written.
+        What cannot be found out and is not given, a file that cannot be read or written, or that no
+        draft works: the text says what fails in it and what to change.
     """
     if radius is not None:
         check_positive("radius", radius, "m")

@@ -197,7 +197,7 @@ def _gap(radius: float, force: float, materials: tuple[Material, Material]) -> f
     Fallen through g, Hertz's sphere stops at 4^(2/3) times the depth d under `force` at rest, where
     2/5 k (4^(2/3) d)^(5/2) = force (g + 4^(2/3) d): g = 1.51 d.
     """
-    rest = (force / hertz_stiffness(radius, *materials)) ** (2 / 3)
+    rest = float((force / hertz_stiffness(radius, *materials)) ** (2 / 3))
     return min(TIP_GAP * radius, 1.5 * rest)
 
 

@@ -147,7 +147,7 @@ def run_built(
         raise fault
     if interrupted:
         raise KeyboardInterrupt(f"the results are in {folder}, but not all pictures of them")
-    doubts = ()
+    doubts: tuple[str, ...] = ()
     if stopped is None and isinstance(built.controller, Controller):
         doubts = tuple(built.controller.doubts_after(result))
     return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit, doubts)
