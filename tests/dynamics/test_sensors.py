@@ -367,6 +367,15 @@ def test_readings_are_columns(tmp_path):
     assert frame["force [N]"].tolist() == result.sensors["torque"].values[:, 0].tolist()
 
 
+def test_readings_are_drawn():
+    figure = two_sensors().plot("sensors")
+    titles = [axis.get_title(loc="left") for axis in figure.axes]
+    assert titles == ["wrist", "wrist", "torque"]
+    assert [len(axis.lines) for axis in figure.axes] == [3, 3, 1]
+    empty = slider(sp.Adaptive(), []).run([0.0], None, 0.1).plot("sensors")
+    assert empty.axes[0].texts[0].get_text() == "no sensors"
+
+
 def test_an_unknown_sensor_is_named_in_a_controller():
     def tau(t, q, v, contacts, sensors):
         return [sensors["wrist"][0]]
