@@ -23,6 +23,7 @@ from sphshell_pin.dynamics.rollout import Plan, Rollout
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.dynamics.sensors import SensorSet
 from sphshell_pin.dynamics.variations import Variations, check_names_of, has_length
+from sphshell_pin.dynamics.varied_sensors import VariedSensors
 from sphshell_pin.errors import InvalidParameter, RolloutInterrupted, SphshellError
 from sphshell_pin.shell.options import thread_count
 
@@ -62,7 +63,8 @@ def roll_out(
     settings = {0.0: run_settings(scene, integrator, duration, 0.0, record_dt=rows, t0=t0)}
     controllers = _one_each(controller, len(starts))
     _check_controllers(scene, integrator, controllers, control_dt, starts, sensors)
-    variations = Variations(scene, vary, len(starts))
+    variations = Variations(scene, VariedSensors.others(vary), len(starts))
+    varied_sensors = VariedSensors(sensors, scene, vary, len(starts))
     plan = Plan(starts, [None] * len(starts), variations, {}, t0)
 
     def add(run: int) -> None:
@@ -73,10 +75,12 @@ def roll_out(
             settings[hold] = run_settings(varied, integrator, duration, hold, record_dt=rows, t0=t0)
         # The rollout warns of a weak law when a sphere has gone through.
         pairs = core_pairs(varied, q0, v0, warn=False)
-        core.add(pairs, joints, bound, q0, v0, settings[hold], sensors.core)
+        core.add(pairs, joints, bound, q0, v0, settings[hold], varied_sensors.core(run))
 
     def rollout() -> Rollout:
-        return Rollout(scene, integrator, core, plan, workers, time.perf_counter() - began, sensors)
+        return Rollout(
+            scene, integrator, core, plan, workers, time.perf_counter() - began, varied_sensors
+        )
 
     workers = max(min(workers, len(starts)), 1)
     joints = scene.joints.to_core(scene.model)

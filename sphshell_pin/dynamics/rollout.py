@@ -19,8 +19,8 @@ from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.run_stats import PairFigures
 from sphshell_pin.dynamics.scene import Scene
-from sphshell_pin.dynamics.sensors import SensorSet
 from sphshell_pin.dynamics.variations import Variations
+from sphshell_pin.dynamics.varied_sensors import VariedSensors
 from sphshell_pin.errors import (
     Interrupted,
     MissingExtra,
@@ -81,12 +81,12 @@ class Rollout(Sequence[Result]):
         plan: Plan,
         threads: int,
         wall_time: float,
-        sensors: SensorSet,
+        sensors: VariedSensors,
     ) -> None:
         self._integrator, self._core, self._plan = integrator, core, plan
-        self._sensors = sensors
+        self._sensors = sensors.base
         self.threads, self.wall_time = threads, wall_time
-        self.varied = plan.variations.columns
+        self.varied = {**plan.variations.columns, **sensors.columns}
         self.failures = dict(plan.failures)
         count = len(plan.starts)
         self.t = np.full(count, plan.t0)

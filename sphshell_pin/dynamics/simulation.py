@@ -139,7 +139,8 @@ class Simulation:
             "PAIR.friction.FIELD" (n numbers; the fields of the law or friction that the pair has),
             "PAIR.sphere.radius" (n) [m], "PAIR.sphere.offset" (n, 3) [m], the same of
             "PAIR.other_sphere", "PAIR.placement" of
-            the shell in its frame (n pinocchio.SE3)
+            the shell in its frame (n pinocchio.SE3), "sensors.NAME.FIELD" (n numbers), such as the
+            seed of a sensor's noise
         record_dt : between recorded rows [s]; unless given only start and end are recorded
         progress : called a few times a second with the share of the runs that are done
 

@@ -185,6 +185,25 @@ def test_rollouts_have_the_bits_of_runs(threads):
     assert len(alone) == 298
 
 
+def test_sensors_vary_from_run_to_run():
+    simulation = slider(sp.Adaptive(), [noisy(), torque()])
+    vary = {"sensors.wrist.seed": range(3), "sensors.torque.delay": np.array([0.0, 0.01, 0.02])}
+    rollout = simulation.rollout([0.0], None, 0.05, vary=vary)
+    for seed, delay, result in zip(*vary.values(), rollout, strict=True):
+        alone = slider(sp.Adaptive(), [noisy(seed=seed), torque(delay=delay)])
+        for name, log in alone.run([0.0], None, 0.05).sensors.items():
+            assert np.array_equal(log.values, result.sensors[name].values)
+            assert np.array_equal(log.t, result.sensors[name].t)
+    assert rollout.varied["sensors.wrist.seed"] == range(3)
+    assert rollout.to_dataframe()["sensors.torque.delay"].tolist() == [0.0, 0.01, 0.02]
+    with pytest.raises(NameNotFound, match=r"no varied parameter 'sensors.wrist.frame'"):
+        simulation.rollout([0.0], None, 0.05, vary={"sensors.wrist.frame": ["a"]})
+    with pytest.raises(InvalidParameter, match=r"of run 1'?.* = -1 cannot be taken: rate"):
+        simulation.rollout([0.0], None, 0.05, vary={"sensors.wrist.rate": [1, -1]})
+    with pytest.raises(InvalidParameter, match="must be 2 numbers, one a run"):
+        simulation.rollout([[0.0], [1.0]], None, 0.05, vary={"sensors.wrist.seed": [1]})
+
+
 def test_readings_saturate_at_the_range():
     sensors = [torque("whole"), torque("cut", range=1.5)]
     result = slider(sp.Adaptive(), sensors).run([0.0], None, 0.5, sine(7.0))
