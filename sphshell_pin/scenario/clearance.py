@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.dynamics.models import find_frame
+from sphshell_pin.dynamics.models import find_frame, held_joints
 from sphshell_pin.scenario.tips import Tip
 from sphshell_pin.shell.shell import Shell
 
@@ -53,7 +53,7 @@ class Links:
         self._surface = _tree(shell)
         self._box = shell.box
         frames = [model.frames[find_frame(model, tip.frame)] for tip in tips]
-        held = {int(model.getJointId(name)) for name in lock}
+        held = set(held_joints(model, tuple(lock)))
         own = [_fixed_to(model, int(frame.parentJoint), held) for frame in frames]
         self._objects: list[tuple[int, tuple[int, ...]]] = []
         for i, one in enumerate(geometry.geometryObjects):

@@ -42,10 +42,13 @@ title = {title}
 [robot]
 name = {robot.name!o}
 urdf = {robot.urdf!o}
+file = {robot.file!o}
 package_dirs = {robot.package_dirs!o}
 free_flyer = {robot.free_flyer!o} # the root link floats
 # They do not move the tip: locked, they cost nothing.
 lock = {robot.lock!o}
+# What acts in the joints, as the robot's file states it.
+joints = {robot.joints!o}
 """
 _ROOT = """
 [robot.start]

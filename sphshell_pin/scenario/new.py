@@ -35,6 +35,8 @@ Array = npt.NDArray[np.float64]
 WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 """Surfaces that need no file."""
 
+# Endings of the robots' files: URDF, MJCF and xacro.
+_ROBOT_FILES = (".urdf", ".xml", ".mjcf", ".xacro")
 # Half the size of a surface that needs no file, in radii of the sphere.
 _SIZE = 15.0
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
@@ -196,16 +198,21 @@ def _robot_section(
     package_dirs: Sequence[str | PathLike[str]],
 ) -> RobotSection:
     file = Path(robot)
-    if file.suffix.lower() not in (".urdf", ".xml"):
+    suffix = file.suffix.lower()
+    if suffix not in _ROBOT_FILES:
         if free_flyer or package_dirs:
             raise SphshellError(
-                f"a free root and mesh folders belong to a URDF file, not to {robot}"
+                f"a free root and mesh folders belong to a robot's file, not to {robot}"
             )
         if file.is_file():
-            raise SphshellError(f"{robot}: is not a URDF file, which ends in .urdf or .xml")
+            raise SphshellError(
+                f"{robot}: is not a robot's file, which ends in {', '.join(_ROBOT_FILES[:-1])} "
+                f"or {_ROBOT_FILES[-1]}"
+            )
         return RobotSection(name=str(robot))
+    key = "urdf" if suffix == ".urdf" else "file"
     return RobotSection(
-        urdf=_relative(file, path),
+        **{key: _relative(file, path)},  # type: ignore[arg-type]  # one of two keys
         package_dirs=[_relative(Path(one), path) for one in package_dirs],
         free_flyer=free_flyer,
     )

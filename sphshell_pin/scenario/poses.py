@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.dynamics.mimic import group_of
 from sphshell_pin.dynamics.models import find_frame, reduced_model
 from sphshell_pin.scenario.bodies import restrict
 from sphshell_pin.scenario.tips import Tip
@@ -221,8 +222,9 @@ def _bend(
 def _joints_aside(model: pin.Model, tip: Tip) -> tuple[str, ...]:
     """Return the joints that do not move the tip; none are left aside of a robot that floats."""
     parent = int(model.frames[find_frame(model, tip.frame)].parentJoint)
-    chain = set(model.supports[parent])
-    return tuple(model.names[j] for j in range(1, model.njoints) if j not in chain)
+    # Of joints that mimic one another, one that is locked locks all.
+    chain = {name for j in model.supports[parent] if j for name in group_of(model, model.names[j])}
+    return tuple(name for name in list(model.names)[1:] if name not in chain)
 
 
 def _into_limits(model: pin.Model, q: Array) -> Array:

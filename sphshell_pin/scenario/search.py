@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.dynamics.joints import JointIngredients
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
@@ -47,6 +48,8 @@ PLACES: dict[str, tuple[float, float, float]] = {
 _MOST_OF_STANCE, _MOST_RUNS = 4, 16
 # Of a draft that fails while the tip slides or after a hard touch: time to settle [s].
 _CALM_LEAD_IN = 1.5
+# What of the robot's file is left out of a scenario that does not work with it.
+_LEFT_OUT = ("friction", "damping")
 # A run that is cut before links reach the part ends this part of its time earlier, and is no
 # shorter than this [s].
 _BEFORE, _SHORTEST = 0.9, 0.2
@@ -148,7 +151,13 @@ def _press(
             shell, tip, stance, pair, request.press, blocked, toward=toward, inside=inside
         )
         start = _changed_joints(model, q0, stance.q)
-        stood = section.model_copy(update={"lock": list(stance.lock), "start": start})
+        stood = section.model_copy(
+            update={
+                "lock": list(stance.lock),
+                "start": start,
+                "joints": _stated_kinds(model, stance.lock),
+            }
+        )
         try:
             found = _first_working(stood, plans, links, draft, tried)
         except SphshellError as error:  # of this posture: another one may do
@@ -161,38 +170,47 @@ def _press(
     raise _refusal(tip, request, tried)
 
 
+def _stated_kinds(model: pin.Model, lock: Sequence[str]) -> list[str]:
+    """Return what the model states of the joints that move, as `[robot] joints` lists it."""
+    return list(JointIngredients.from_model(model).without(lock).kinds())
+
+
 def _first_working(
     section: RobotSection, plans: Iterator[Plan], links: Links, draft: Draft, tried: _Tried
 ) -> tuple[str, Built, Plan] | None:
     runs = 0
     for plan in plans:
-        queue = [plan]
+        queue = [(section, plan)]
         while queue:
-            one = queue.pop(0)
-            text, built = draft(section, one)
+            of_robot, one = queue.pop(0)
+            text, built = draft(of_robot, one)
             fault = try_out(built, one, links)
             tried.runs += 1
             runs += 1
             if fault is None:
                 return text, built, one
             tried.faults.append(fault)
-            if not queue and one is plan:
-                queue = _repairs(plan, fault)
+            if one is plan and of_robot is section:
+                queue = _repairs(section, plan, fault)
         if runs >= _MOST_OF_STANCE or tried.runs >= _MOST_RUNS:
             return None
     return None
 
 
-def _repairs(plan: Plan, fault: Fault) -> list[Plan]:
+def _repairs(section: RobotSection, plan: Plan, fault: Fault) -> list[tuple[RobotSection, Plan]]:
     """Return what may repair the `fault` of a plan in the same place."""
-    control = plan.control
-    if not isinstance(control, Press) or fault.kind == "touch":
-        return []
-    stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
-    still = replace(plan, control=stays, duration=_CALM_LEAD_IN + 0.5)
-    if len(control.path) < 2 or fault.kind != "links":
-        return [still]
-    return [still] if fault.t > control.lead_in else []
+    control, repairs = plan.control, list[tuple[RobotSection, Plan]]()
+    if isinstance(control, Press) and (fault.kind != "links" or fault.t > control.lead_in):
+        stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
+        repairs.append((section, replace(plan, control=stays, duration=_CALM_LEAD_IN + 0.5)))
+    without = [kind for kind in section.joints if kind not in _LEFT_OUT]
+    if fault.kind != "links" and without != section.joints:
+        said = " and ".join(kind for kind in section.joints if kind in _LEFT_OUT)
+        note = f"the {said} of the joints that the robot's file states is left out: with it "
+        note += fault.text
+        freed = section.model_copy(update={"joints": without})
+        repairs.append((freed, replace(plan, why=(*plan.why, note))))
+    return repairs
 
 
 def _drop(
@@ -222,19 +240,23 @@ def _drop(
         pair = request.materials(tips, mass / len(tips))
         plan = plan_stand(shell, tuple(tips), centers, mass, inertia, leg, pair)
     links = Links(model, built.assembly.loaded[0].collision_model, shell, tips, ())
+    section = section.model_copy(update={"joints": _stated_kinds(model, ())})
     tried = _Tried(postures=1)
-    for _ in range(3):
-        text, made = draft(section, plan)
+    queue = [(section, plan)]
+    while queue:
+        of_robot, plan = queue.pop(0)
+        text, made = draft(of_robot, plan)
         fault = try_out(made, plan, links)
         tried.runs += 1
         if fault is None:
             return text, made, plan
         tried.faults.append(fault)
         end = float(f"{_BEFORE * fault.t:.2g}")
-        if fault.kind != "links" or end < _SHORTEST:
-            break
-        note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the surface"
-        plan = replace(plan, duration=end, why=(*plan.why, note))
+        if fault.kind != "links":
+            queue += _repairs(of_robot, plan, fault)
+        elif end >= _SHORTEST and tried.runs < _MOST_OF_STANCE:
+            note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the "
+            queue.append((of_robot, replace(plan, duration=end, why=(*plan.why, note + "surface"))))
     raise _refusal(tips[0], request, tried)
 
 
