@@ -188,7 +188,7 @@ def load_file(
         one, without = build_geometry(description, model, kind)
         geometry.append(one)
         missing += without
-    robot = LoadedRobot(name or model.name, model, *geometry, pin.neutral(model))
+    robot = LoadedRobot(name or model.name, model, *geometry, description.q0(model))
     if missing:
         warnings.warn(
             f"{path}: without these visual meshes, which are missing: {', '.join(missing)}; "

@@ -13,12 +13,15 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.mimic import Mimic
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import mjcf
 from sphshell_pin.robots.description import check_memory, check_size
 from sphshell_pin.robots.packages import Folders
+
+Array = NDArray[np.float64]
 
 
 class RobotError(SphshellError, ValueError):
@@ -62,8 +65,18 @@ class Description:
     """What closes kinematic loops or couples joints otherwise than by mimicking: not modelled."""
     notes: tuple[str, ...] = ()
     """What else the file states that is not modelled, one sentence each."""
+    start: Mapping[str, Array] = field(default_factory=dict)
+    """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
     extras: Mapping[str, mjcf.Extras] = field(default_factory=dict)
     """Of ball joints of MJCF, which pinocchio reads without damping and dry friction."""
+
+    def q0(self, model: pin.Model) -> Array:
+        """Return the configuration (nq,) that the file draws, of the model of `build_model`."""
+        q = np.array(pin.neutral(model))
+        for name, values in self.start.items():
+            at = model.joints[model.getJointId(name)].idx_q
+            q[at : at + len(values)] = values
+        return q
 
     @property
     def is_mjcf(self) -> bool:
@@ -107,7 +120,14 @@ def read(
             what = "MJCF"
             plain = mjcf.plain(root, file)
             return Description(
-                file, folders, plain.root, plain.mimics, plain.loops, plain.notes, plain.extras
+                file,
+                folders,
+                plain.root,
+                plain.mimics,
+                plain.loops,
+                plain.notes,
+                plain.start,
+                plain.extras,
             )
         _check_tree(root)
         return Description(file, folders, root, tuple(_mimics(root)))
@@ -254,12 +274,19 @@ def _mimics(root: ET.Element) -> Iterable[Mimic]:
 
 
 def _check_tree(root: ET.Element) -> None:
-    """Raise ValueError if two joints move one link: a closed kinematic chain."""
+    """Raise ValueError if two joints move one link (a closed kinematic chain), or one none."""
     movers = defaultdict(list)
+    links = {link.get("name") for link in root.findall("link")}
     for joint in root.findall("joint"):
-        child = joint.find("child")
-        if child is not None:
-            movers[child.get("link")].append(str(joint.get("name")))
+        for end in ("parent", "child"):
+            element = joint.find(end)
+            link = None if element is None else element.get("link")
+            if link is not None and link not in links:
+                raise ValueError(
+                    f"joint '{joint.get('name')}' has the {end} '{link}', but there is no such link"
+                )
+            if end == "child" and link is not None:
+                movers[link].append(str(joint.get("name")))
     for link, names in movers.items():
         if len(names) > 1:
             raise ValueError(

@@ -60,6 +60,7 @@ class Plain:
     loops: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     extras: dict[str, Extras] = field(default_factory=dict)
+    start: dict[str, Array] = field(default_factory=dict)
 
 
 def plain(root: ET.Element, file: Path) -> Plain:
@@ -98,6 +99,8 @@ class _Reader:
         self.parents: dict[str, str] = {}
         self.joints_of: dict[str, list[str]] = {"world": []}
         self.nq = 0
+        # Where the file draws the joints that are not at zero there.
+        self.start: dict[str, Array] = {}
         self.springs: list[str] = []
         self.cones: list[str] = []
         self.weightless: list[str] = []
@@ -130,7 +133,8 @@ class _Reader:
             raise ValueError("its <worldbody> has no <body>")
         self._keys(made)
         mimics, loops = self._equalities()
-        return Plain(made, mimics, loops, tuple(self._notes(scenery)), self.extras)
+        notes = tuple(self._notes(scenery))
+        return Plain(made, mimics, loops, notes, self.extras, self.start)
 
     def _read_class(
         self, element: ET.Element, name: str, inherited: Mapping[str, Mapping[str, str]]
@@ -180,6 +184,10 @@ class _Reader:
         here = into
         for k, (joint, at, cls) in enumerate(joints):
             made = self._joint(joint, at, cls, name, k)
+            if made.get("type") == "free":
+                # Its coordinates are the pose in the world, whatever the body's place is.
+                self.start[made.attrib["name"]] = pin.SE3ToXYZQUAT(place)
+                place = pin.SE3.Identity()
             last = k + 1 == len(joints)
             here = ET.SubElement(
                 here, "body", name=name if last else f"{name}/{made.get('name')}", **_posed(place)
@@ -264,9 +272,13 @@ class _Reader:
         unit = self.angle if kind == "hinge" else 1.0
         made.set("damping", repr(scalar["damping"]))
         made.set("frictionloss", repr(scalar["frictionloss"]))
-        made.set("ref", repr(unit * _number(stated.get("ref"), 0.0)))
+        ref = unit * _number(stated.get("ref"), 0.0)
+        if ref:
+            made.set("ref", repr(ref))
+            self.start[name] = np.array([ref])
         if limited:
-            made.set("range", _text(unit * _numbers(stated["range"])))
+            # Pinocchio subtracts ref from the range, but counts positions as MuJoCo does.
+            made.set("range", _text(unit * _numbers(stated["range"]) + ref))
         if _limited(stated, "actuatorfrclimited", "actuatorfrcrange", self.compiler):
             made.set("actuatorfrcrange", _text(_numbers(stated["actuatorfrcrange"])))
         return made
@@ -333,7 +345,10 @@ class _Reader:
                 stated = _numbers(one.get("polycoef", "0 1 0 0 0"))
                 terms[: len(stated)] = stated
                 if second is not None and not terms[2:].any():
-                    mimics.append(Mimic(first, second, float(terms[1]), float(terms[0])))
+                    # It is of the distances from ref.
+                    refs = [float(self.start.get(one, np.zeros(1))[0]) for one in (first, second)]
+                    offset = float(terms[0] + refs[0] - terms[1] * refs[1])
+                    mimics.append(Mimic(first, second, float(terms[1]), offset))
                 elif second is None:
                     loops.append(f"{label} holds joint '{first}' at {terms[0]:g} (lock it instead)")
                 else:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 # A share of the exchanged energy that no sound run loses or gains.
 SUSPICIOUS_RESIDUAL = 0.05
+# Rows of the table of contacts.
+MOST_PAIRS = 16
 
 
 @app.command()
@@ -142,7 +144,10 @@ def _print_report(report: RunReport) -> None:
     table = make_table(
         "contact", "duration", "touches", "peak force", "mean force", "largest depth"
     )
+    shown = sorted(stats.pairs, key=lambda name: -stats.pairs[name].peak_force)[:MOST_PAIRS]
     for name, pair in stats.pairs.items():
+        if name not in shown:
+            continue
         table.add_row(
             plain(name),
             f"{pair.contact_time:.4g} s",
@@ -153,6 +158,14 @@ def _print_report(report: RunReport) -> None:
         )
     if stats.pairs:
         console.print(table)
+    others = [pair for name, pair in stats.pairs.items() if name not in shown]
+    if others:
+        touched = sum(1 for pair in others if pair.touches)
+        console.print(
+            f"{len(others)} more contacts with smaller peak forces, of which {touched} touched: "
+            f"all are in summary.json",
+            highlight=False,
+        )
     _print_joints(report)
     energy = measure_energy(report.result)
     console.print(

@@ -87,7 +87,7 @@ def check_expectations(built: Built) -> None:
 
 
 def measure(built: Built, result: Result, name: str) -> float:
-    """Return the figure `name` of `result` [SI units, see PAIR_FIGURES, JOINT_FIGURES, RUN_FIGURES]."""
+    """Return the figure `name` of `result`, in SI units: see PAIR_, JOINT_ and RUN_FIGURES."""
     kind, _, rest = name.partition(".")
     if kind == "pairs":
         pair, _, figure = rest.rpartition(".")

@@ -120,10 +120,10 @@ def _without_meshes(
     shipped: str | None,
     *,
     free_flyer: bool,
-    pose: Callable[[pin.Model], NDArray[np.float64]] = pin.neutral,
+    pose: Callable[[pin.Model], NDArray[np.float64]] | None = None,
 ) -> Subject:
     model = robots.build_model(description, free_flyer=free_flyer)
-    q0 = pose(model)
+    q0 = pose(model) if pose is not None else description.q0(model)
     robots.keep_spheres(description)
     spheres, _ = robots.build_geometry(description, model, pin.GeometryType.COLLISION)
     robot = robots.LoadedRobot(name, model, spheres, pin.GeometryModel(), q0)
