@@ -77,17 +77,14 @@ class Links:
             self._data.oMf[find_frame(model, tip.frame)].act(tip.offset) for tip in self._tips
         ]
         part = coal.Transform3s(placement.rotation, placement.translation)
-        for i, at in self._objects:
+        for k, (i, at) in enumerate(self._objects):
             one, pose = geometry.geometryObjects[i], self._geometry_data.oMg[i]
             found = self._touch(one, pose, part, [(centers[k], self._tips[k].radius) for k in at])
-            if (
-                found is None
-                and whole
-                and self._shell.is_closed
-                and self._inside(one, pose, placement)
-            ):
+            if found is None and whole and self._inside(one, pose, placement):
                 found = pose.translation
             if found is not None:
+                # What is in the way here will be so in the next place, too.
+                self._objects.insert(0, self._objects.pop(k))
                 return Intrusion(_link_of(model, one), np.array(found))
         return None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -45,7 +46,9 @@ PLACES: dict[str, tuple[float, float, float]] = {
 """Where the surface is placed, seen from the tip."""
 
 # Drafts that are run: of one posture, and in all.
-_MOST_OF_STANCE, _MOST_RUNS = 4, 16
+_MOST_OF_STANCE, _MOST_RUNS = 3, 9
+# Between links and part at the start, along the approach, in radii of the sphere.
+_ROOM = 0.1
 # Of a draft that fails while the tip slides or after a hard touch: time to settle [s].
 _CALM_LEAD_IN = 1.5
 # What of the robot's file is left out of a scenario that does not work with it.
@@ -134,13 +137,26 @@ def _press(
     side = {"cylinder": (1.0, 0.0, 0.0), "bowl": (0.0, 0.0, 1.0)}.get(request.word or "")
     toward = None if side is None else np.array(side)
     tried = _Tried()
-    for stance in stances(model, q_work, tip, approach, SelfContact(model, geometry, q_work).found):
-        tried.postures += 1
+    touching = SelfContact(model, geometry, q_work).found
+    postures: list[Stance] = []
+
+    def found_now() -> Iterator[Stance]:
+        for one in stances(model, q_work, tip, approach, touching):
+            postures.append(one)
+            tried.postures += 1
+            yield one
+
+    rooms = ((_ROOM * tip.radius, one) for one in found_now())
+    for room, stance in itertools.chain(rooms, ((0.0, one) for one in postures)):
         links = Links(model, geometry, shell, [tip], stance.lock)
 
-        def blocked(placement: pin.SE3, stance: Stance = stance, links: Links = links) -> bool:
+        def blocked(
+            placement: pin.SE3, stance: Stance = stance, links: Links = links, room: float = room
+        ) -> bool:
             tried.places += 1
-            found = links.within(stance.q, placement, whole=True)
+            # With a little room, as the tip yields when it is pressed on and slides.
+            nearer = pin.SE3(placement.rotation, placement.translation - room * stance.approach)
+            found = links.within(stance.q, nearer, whole=True)
             if found is not None:
                 tried.blocked[found.link] += 1
             return found is not None
@@ -257,7 +273,7 @@ def _drop(
         elif end >= _SHORTEST and tried.runs < _MOST_OF_STANCE:
             note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the "
             queue.append((of_robot, replace(plan, duration=end, why=(*plan.why, note + "surface"))))
-    raise _refusal(tips[0], request, tried)
+    raise _refusal(tips[0], request, tried, floating=True)
 
 
 def _working_posture(section: RobotSection, model: pin.Model, q0: Array) -> Array:
@@ -276,7 +292,7 @@ def _changed_joints(model: pin.Model, q0: Array, q: Array) -> dict[str, float | 
     return start
 
 
-def _refusal(tip: Tip, request: Request, tried: _Tried) -> SphshellError:
+def _refusal(tip: Tip, request: Request, tried: _Tried, *, floating: bool = False) -> SphshellError:
     """Return the error that says why no draft works, and what to change."""
     way = f"along {request.place}" if request.place else "where its limb points"
     if not tried.postures:
@@ -287,9 +303,9 @@ def _refusal(tip: Tip, request: Request, tried: _Tried) -> SphshellError:
     if tried.faults:
         fault = tried.faults[0]
         when = f" at t = {fault.t:.2g} s" if fault.link else ""
+        advice = _ADVICE_FLOATING if floating else _ADVICE[fault.kind]
         return SphshellError(
-            f"no draft works ({_count(tried.runs, 'run')}): {fault.text}{when}; "
-            f"{_ADVICE[fault.kind]}"
+            f"no draft works ({_count(tried.runs, 'run')}): {fault.text}{when}; {advice}"
         )
     if tried.errors:
         return tried.errors[0]
@@ -304,12 +320,13 @@ def _refusal(tip: Tip, request: Request, tried: _Tried) -> SphshellError:
 
 
 _ADVICE = {
-    "run": "a softer --law, or a larger --radius",
-    "touch": "another --place, or another --frame",
-    "force": "a smaller --radius, another --press or --place",
-    "links": "take another --place, a smaller part, or a sphere farther out (--frame, --radius)",
-    "figure": "another --law or --radius",
+    "run": "take a softer --law, or a larger --radius",
+    "touch": "take another --place, or another --frame",
+    "force": "take a smaller --radius, another --press or --place",
+    "links": "take another --place, a smaller part, or a sphere farther out (--frame, --offset)",
+    "figure": "take another --law or --radius",
 }
+_ADVICE_FLOATING = "take a larger part, with room for all that comes down, or another --law"
 
 
 def _count(number: int, noun: str) -> str:
