@@ -111,6 +111,10 @@ class Plan:
     """Where the free root starts: x y z and quaternion x y z w."""
     why: tuple[str, ...] = field(default=())
     """One sentence for each choice that was made for the user."""
+    left_out: tuple[str, ...] = ()
+    """Of what the robot's file states of its joints."""
+    repair: str = ""
+    """What was changed of a draft that failed; "" of the first draft."""
 
 
 def press_plans(

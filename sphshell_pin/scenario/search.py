@@ -51,8 +51,6 @@ _MOST_OF_STANCE, _MOST_RUNS = 3, 9
 _ROOM = 0.1
 # Of a draft that fails while the tip slides or after a hard touch: time to settle [s].
 _CALM_LEAD_IN = 1.5
-# What of the robot's file is left out of a scenario that does not work with it.
-_LEFT_OUT = ("friction", "damping")
 # A run that is cut before links reach the part ends this part of its time earlier, and is no
 # shorter than this [s].
 _BEFORE, _SHORTEST = 0.9, 0.2
@@ -92,6 +90,10 @@ class _Tried:
     runs: int = 0
     blocked: Counter[str] = field(default_factory=Counter)
     faults: list[Fault] = field(default_factory=list)
+    without: tuple[str, ...] = ()
+    """Kinds of what acts in the joints that are left out."""
+    note: str = ""
+    """Why they are."""
     errors: list[SphshellError] = field(default_factory=list)
 
 
@@ -196,37 +198,48 @@ def _first_working(
 ) -> tuple[str, Built, Plan] | None:
     runs = 0
     for plan in plans:
-        queue = [(section, plan)]
+        queue = [plan]
         while queue:
-            of_robot, one = queue.pop(0)
-            text, built = draft(of_robot, one)
+            one = queue.pop(0)
+            if tried.without and not one.left_out:
+                one = replace(one, left_out=tried.without, why=(*one.why, tried.note))
+            text, built = draft(_without(section, one), one)
             fault = try_out(built, one, links)
             tried.runs += 1
             runs += 1
             if fault is None:
                 return text, built, one
             tried.faults.append(fault)
-            if one is plan and of_robot is section:
-                queue = _repairs(section, plan, fault)
+            if fault.kind != "links" and "friction" in section.joints and not tried.without:
+                tried.without = ("friction",)
+                tried.note = "the joints' dry friction, which the file states, is left out: with "
+                tried.note += f"it {fault.text}"
+                queue = [one, *queue]
+            elif not queue and one.repair == "":
+                queue = _repairs(one, fault)
         if runs >= _MOST_OF_STANCE or tried.runs >= _MOST_RUNS:
             return None
     return None
 
 
-def _repairs(section: RobotSection, plan: Plan, fault: Fault) -> list[tuple[RobotSection, Plan]]:
+def _without(section: RobotSection, plan: Plan) -> RobotSection:
+    """Return the robot's table without what the plan leaves out of the joints."""
+    kinds = [kind for kind in section.joints if kind not in plan.left_out]
+    return section.model_copy(update={"joints": kinds})
+
+
+def _repairs(plan: Plan, fault: Fault) -> list[Plan]:
     """Return what may repair the `fault` of a plan in the same place."""
-    control, repairs = plan.control, list[tuple[RobotSection, Plan]]()
-    if isinstance(control, Press) and (fault.kind != "links" or fault.t > control.lead_in):
-        stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
-        repairs.append((section, replace(plan, control=stays, duration=_CALM_LEAD_IN + 0.5)))
-    without = [kind for kind in section.joints if kind not in _LEFT_OUT]
-    if fault.kind != "links" and without != section.joints:
-        said = " and ".join(kind for kind in section.joints if kind in _LEFT_OUT)
-        note = f"the {said} of the joints that the robot's file states is left out: with it "
-        note += fault.text
-        freed = section.model_copy(update={"joints": without})
-        repairs.append((freed, replace(plan, why=(*plan.why, note))))
-    return repairs
+    control = plan.control
+    if not isinstance(control, Press) or (fault.kind == "links" and fault.t < control.lead_in):
+        return []
+    repairs = []
+    if fault.kind == "force" and any(control.posture_stiffness):
+        loose = replace(control, posture_stiffness=())
+        repairs.append(replace(plan, control=loose, repair="loose"))
+    stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
+    duration = _CALM_LEAD_IN + 0.5
+    return [*repairs, replace(plan, control=stays, duration=duration, repair="stays")]
 
 
 def _drop(
@@ -258,22 +271,18 @@ def _drop(
     links = Links(model, built.assembly.loaded[0].collision_model, shell, tips, ())
     section = section.model_copy(update={"joints": _stated_kinds(model, ())})
     tried = _Tried(postures=1)
-    queue = [(section, plan)]
-    while queue:
-        of_robot, plan = queue.pop(0)
-        text, made = draft(of_robot, plan)
+    while True:
+        text, made = draft(section, plan)
         fault = try_out(made, plan, links)
         tried.runs += 1
         if fault is None:
             return text, made, plan
         tried.faults.append(fault)
         end = float(f"{_BEFORE * fault.t:.2g}")
-        if fault.kind != "links":
-            queue += _repairs(of_robot, plan, fault)
-        elif end >= _SHORTEST and tried.runs < _MOST_OF_STANCE:
-            note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the "
-            queue.append((of_robot, replace(plan, duration=end, why=(*plan.why, note + "surface"))))
-    raise _refusal(tips[0], request, tried, floating=True)
+        if fault.kind != "links" or end < _SHORTEST or tried.runs >= _MOST_OF_STANCE:
+            raise _refusal(tips[0], request, tried, floating=True)
+        note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the surface"
+        plan = replace(plan, duration=end, why=(*plan.why, note))
 
 
 def _working_posture(section: RobotSection, model: pin.Model, q0: Array) -> Array:
