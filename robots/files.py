@@ -228,6 +228,21 @@ def keep_spheres(description: Description) -> None:
                 link.remove(part)
 
 
+def keep_collision_of(description: Description, link: str) -> None:
+    """Drop every geometry but the collision geometry of one link."""
+    from sphshell_pin.robots.mjcf import is_visual
+
+    root = description.root
+    for body in root.iter("body"):
+        for geom in body.findall("geom"):
+            if body.get("name") != link or is_visual(geom):
+                body.remove(geom)
+    for one in root.iter("link"):
+        for part in [*one.findall("visual"), *one.findall("collision")]:
+            if part.tag == "visual" or one.get("name") != link:
+                one.remove(part)
+
+
 def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element, list[str]]:
     """Return a copy that names every mesh by its absolute path; missing visual ones are out."""
     root = ET.fromstring(ET.tostring(description.root))

@@ -47,8 +47,8 @@ def check_robot_(
     frame: Annotated[
         str | None,
         typer.Option(
-            help="Frame that carries the sphere; by default a known tip, or the end of "
-            "the longest limb."
+            help="Frame that carries the sphere; by default a known tip, or the end of the "
+            "longest limb and the outermost sphere inside its collision mesh."
         ),
     ] = None,
     radius: Annotated[

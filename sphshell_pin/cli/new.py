@@ -40,6 +40,10 @@ def new(
     radius: Annotated[
         str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
     ] = None,
+    offset: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(metavar="X Y Z", help="Center of the sphere in the frame \\[m]."),
+    ] = None,
     unit: Annotated[
         str | None, typer.Option(help="Length unit of the surface file: mm, cm, m, inch, ...")
     ] = None,
@@ -89,6 +93,7 @@ def new(
                 surface,
                 frame=frame,
                 radius=length_of("--radius", radius),
+                offset=offset,
                 unit=unit,
                 bodies=body,
                 faces=faces_of(face),

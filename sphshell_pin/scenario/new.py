@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin.atomic import atomic_file
-from sphshell_pin.checks import check_positive
+from sphshell_pin.checks import check_positive, check_vector
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import is_path
 from sphshell_pin.scenario.build import Built, build_scenario, explain_built
@@ -36,6 +36,7 @@ Array = npt.NDArray[np.float64]
 WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 """Surfaces that need no file."""
 
+# Endings of the robots' files: URDF, MJCF and xacro.
 # Half the size of a surface that needs no file, in radii of the sphere.
 _SIZE = 15.0
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
@@ -60,6 +61,7 @@ def new_scenario(
     *,
     frame: str | None = None,
     radius: float | None = None,
+    offset: npt.ArrayLike | None = None,
     unit: str | None = None,
     bodies: Sequence[str] | None = None,
     faces: Sequence[str | int] | None = None,
@@ -88,8 +90,9 @@ def new_scenario(
         A surface file, its `unit` where the format has none, or a word of WORDS.
     bodies, faces
         Of a CAD file: those to take, by name or number; by default all of it.
-    frame, radius
-        Of the sphere [m], whose center is the frame's origin; by default a known fingertip or foot.
+    frame, radius, offset
+        Of the sphere: the frame that carries it, its radius [m], and its center (3,) [m] in the
+        frame, by default the origin; without a frame it is a known fingertip or foot.
     material, against
         What the sphere and the surface are made of, names of MATERIALS; by default a free body is
         of steel, any other sphere of rubber, or of plastic where rubber is too soft.
@@ -134,7 +137,10 @@ def new_scenario(
         section = section.model_copy(update={"free_flyer": True})
         bare = _build_bare(section, path)
     loaded = bare.assembly.loaded[0]
-    tips = find_tips(loaded, shipped=section.name, frame=frame, radius=radius)
+    center = None if offset is None else check_vector("offset", offset, 3, " [m]")
+    if center is not None and frame is None:
+        raise SphshellError("an offset is in a frame: state that with --frame")
+    tips = find_tips(loaded, shipped=section.name, frame=frame, radius=radius, offset=center)
     shell_section, word = _shell_section(surface, unit, (bodies, faces), path, bare, tips)
     with_shell = _build_bare(section, path, shell_section, reuse=bare)
     _check_size(with_shell.shells[shell_section.name], tips)

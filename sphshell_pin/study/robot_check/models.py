@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,6 +26,8 @@ class Subject:
     shipped: str | None
     """The name under which sphshell_pin.robots knows it, or None."""
     notes: tuple[str, ...] = field(default=())
+    spheres_of: Callable[[str], robots.MeshSpheres] | None = None
+    """Approximates the collision geometry of a link, by its name; None where there is none."""
 
 
 def all_names() -> list[str]:
@@ -116,11 +119,19 @@ def _without_meshes(
 ) -> Subject:
     model = robots.build_model(description, free_flyer=free_flyer)
     q0 = pose(model) if pose is not None else description.q0(model)
+    whole = copy.deepcopy(description)
     robots.keep_spheres(description)
     spheres, _ = robots.build_geometry(description, model, pin.GeometryType.COLLISION)
     robot = robots.LoadedRobot(name, model, spheres, pin.GeometryModel(), q0)
     robot = robots.exactly(robot, description, mimic=True, warn=False)
-    return Subject(name, robot, shipped, robot.notes)
+
+    def spheres_of(link: str) -> robots.MeshSpheres:
+        part = copy.deepcopy(whole)
+        robots.keep_collision_of(part, link)
+        geometry, _ = robots.build_geometry(part, model, pin.GeometryType.COLLISION)
+        return robots.spheres_of_link(model, geometry, link, count=8)
+
+    return Subject(name, robot, shipped, robot.notes, spheres_of)
 
 
 def listed(names: list[str], most: int = 4) -> str:
