@@ -157,3 +157,38 @@ def test_a_part_with_a_hole_is_pressed_beside_it(tmp_path):
     away = np.linalg.norm(np.array(built.scenario.controller.path)[:, :2], axis=1)
     assert away.min() > 0.02
     assert re.search(r'side = "both"', (tmp_path / "a.toml").read_text())
+
+
+def test_what_the_file_states_of_the_joints_is_modelled(tmp_path):
+    """Dry friction of 0.5 N m holds off the force: it is left out, and the file says so."""
+    text = PROBE.read_text(encoding="utf-8")
+    built = new_scenario(PROBE, out=tmp_path / "plain.toml").built
+    assert built.scenario.robot[0].joints == ["limits", "effort", "speed"]
+    assert set(built.scene.joints.effort) == set(list(built.scene.model.names)[1:])
+    for damping, friction, kinds in (
+        (0.1, 0.0, ["limits", "damping", "effort", "speed"]),
+        (0.1, 0.5, ["limits", "damping", "effort", "speed"]),
+        (0.0, 1e-3, ["limits", "friction", "effort", "speed"]),
+    ):
+        stated = f'<dynamics damping="{damping}" friction="{friction}"/></joint>'
+        (tmp_path / "arm.urdf").write_text(text.replace("</joint>", stated), encoding="utf-8")
+        made = new_scenario(tmp_path / "arm.urdf", out=tmp_path / "a.toml", force=True)
+        assert made.built.scenario.robot[0].joints == kinds
+        left_out = friction > 0.1
+        assert any("dry friction, which the file states, is left out" in w for w in made.why) == (
+            left_out
+        )
+        assert ("without friction" in made.text) == left_out
+        result, _ = simulate(made.built)
+        force = made.built.scenario.controller.normal_force
+        assert held(made.built, result) == pytest.approx(force, rel=0.05)
+
+
+def test_a_sphere_is_put_where_it_is_asked_for(tmp_path):
+    offset = (0.0, 0.01, 0.09)
+    made = new_scenario(PROBE, frame="link_5", offset=offset, radius=0.008, out=tmp_path / "a.toml")
+    (pair,) = made.built.scene.pairs
+    assert pair.sphere.radius == 0.008
+    np.testing.assert_allclose(pair.sphere.offset, offset)
+    with pytest.raises(SphshellError, match="--frame"):
+        new_scenario(PROBE, offset=offset, out=tmp_path / "b.toml")

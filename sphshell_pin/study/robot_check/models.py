@@ -16,9 +16,6 @@ from numpy.typing import NDArray
 from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 
-# Files of robots end on these, and files that are taken for such.
-_SUFFIXES = (".urdf", ".xml", ".sdf", ".xacro", ".mjcf", ".usd", ".usda", ".dae", ".srdf")
-
 
 @dataclass(frozen=True)
 class Subject:
@@ -38,16 +35,11 @@ def all_names() -> list[str]:
     return list(robots.names())
 
 
-def is_path(robot: str) -> bool:
-    """Whether `robot` is meant as a file, not as a name."""
-    return Path(robot).suffix.lower() in _SUFFIXES or "/" in robot or os.path.isfile(robot)
-
-
 def check_known(names: Iterable[str]) -> None:
     """Raise SphshellError for the first of `names` that is neither a name nor a file."""
     known = all_names()
     for robot in names:
-        if is_path(robot):
+        if robots.is_path(robot):
             if not os.path.isfile(robot):
                 what = "is a folder, not a URDF file" if os.path.isdir(robot) else "no such file"
                 raise SphshellError(f"{robot}: {what}")
@@ -79,7 +71,7 @@ def load_subject(
         raise InvalidParameter("robot", robot, "must be a name, a file or a pinocchio.Model")
     robot = str(robot)
     check_known([robot])
-    if is_path(robot):
+    if robots.is_path(robot):
         file = Path(robot)
         description = robots.read(file, package_dirs, xacro_args)
         return _without_meshes(description, file.stem, None, free_flyer=free_flyer)
