@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sphshell_pin.cli.app import app, faults, length_of, terminal
+from sphshell_pin.cli.app import (
+    PackageDirOption,
+    XacroArgOption,
+    app,
+    faults,
+    length_of,
+    terminal,
+    xacro_args_of,
+)
 from sphshell_pin.cli.files import BodyOption, FaceOption, faces_of
 
 if TYPE_CHECKING:
@@ -17,7 +25,10 @@ if TYPE_CHECKING:
 @app.command()
 def new(
     context: typer.Context,
-    robot: Annotated[str, typer.Option(help="A shipped robot (sphshell-pin list), or a URDF.")],
+    robot: Annotated[
+        str,
+        typer.Option(help="A shipped robot (sphshell-pin list), or a URDF, xacro or MJCF file."),
+    ],
     surface: Annotated[
         str,
         typer.Option(help="A surface file, or one of: plane, box, sphere, cylinder, bowl."),
@@ -56,10 +67,8 @@ def new(
     free_flyer: Annotated[
         bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
     ] = False,
-    package_dir: Annotated[
-        list[Path] | None,
-        typer.Option(help="Folder above the packages of the URDF's meshes; may be repeated."),
-    ] = None,
+    package_dir: PackageDirOption = None,
+    xacro_arg: XacroArgOption = None,
     out: Annotated[
         Path | None, typer.Option(help="The file to write; default: ROBOT_on_SURFACE.toml.")
     ] = None,
@@ -94,6 +103,7 @@ def new(
                 place=place,
                 free_flyer=free_flyer,
                 package_dirs=package_dir or (),
+                xacro_args=xacro_args_of(xacro_arg),
                 out=out,
                 force=force,
             )

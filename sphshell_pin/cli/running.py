@@ -12,6 +12,7 @@ from sphshell_pin.cli.app import (
     INTERRUPTED,
     MISSED,
     DtOption,
+    PackageDirOption,
     ScenarioArgument,
     SetOption,
     app,
@@ -55,6 +56,7 @@ def run(
         ),
     ] = False,
     set_: SetOption = None,
+    package_dir: PackageDirOption = None,
 ) -> None:
     """Run a scenario and write its results folder.
 
@@ -86,7 +88,11 @@ def run(
 
 @app.command()
 def explain(
-    context: typer.Context, scenario: ScenarioArgument, dt: DtOption = None, set_: SetOption = None
+    context: typer.Context,
+    scenario: ScenarioArgument,
+    dt: DtOption = None,
+    set_: SetOption = None,
+    package_dir: PackageDirOption = None,
 ) -> None:
     """Say what a scenario models: time scales, expected depths, a fitting dt, warnings.
 

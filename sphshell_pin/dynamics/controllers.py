@@ -27,6 +27,7 @@ from sphshell_pin.checks import (
 from sphshell_pin.dynamics.callables import check_callable
 from sphshell_pin.dynamics.models import find_frame, find_joint, model_reach, set_joint
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
+from sphshell_pin.dynamics.sensor_log import Readings
 from sphshell_pin.errors import InvalidParameter, SphshellError, add_origin
 from sphshell_pin.parameters import Ingredient, parameter
 from sphshell_pin.shell import Shell
@@ -49,7 +50,8 @@ _MOST_ROWS = 200
 Gain = float | Sequence[float] | Array | Mapping[str, float]
 # Coordinates (nq,), or those of some joints, the others as at the start.
 Posture = Sequence[float] | Array | Mapping[str, float | Sequence[float]]
-Callback = Callable[[float, Array, Array, SceneContacts], ArrayLike]
+# tau(t, q, v, contacts), or tau(t, q, v, contacts, sensors).
+Callback = Callable[..., ArrayLike]
 ShellPlace = tuple[Shell, str, pin.SE3]
 
 
@@ -410,14 +412,24 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         return float(self._times(self._projected_path()[0])[-1])
 
 
-def wrap_callable(callback: Callback, model: pin.Model) -> _core.Controller:
-    """Wrap tau(t, q, v, contacts) -> (nv,) for the core; its answers are checked."""
+def wrap_callable(
+    callback: Callback,
+    model: pin.Model,
+    readings: Callable[[bytes | bytearray], Readings] | None = None,
+) -> _core.Controller:
+    """Wrap tau(t, q, v, contacts) -> (nv,) for the core; its answers are checked.
+
+    With `readings`, which reads the core's memory, it gets them as `sensors`.
+    """
     check_callable(callback)
 
-    def torque(t: float, q: bytearray, v: bytearray, rows: bytearray) -> Array:
+    def torque(
+        t: float, q: bytearray, v: bytearray, rows: bytearray, latest: bytes | bytearray = b""
+    ) -> Array:
         contacts = SceneContacts.from_rows(rows)
+        more = {} if readings is None else {"sensors": readings(latest)}
         try:
-            tau = callback(t, np.frombuffer(q), np.frombuffer(v), contacts)
+            tau = callback(t, np.frombuffer(q), np.frombuffer(v), contacts, **more)
         except Exception as error:
             add_origin(error, f"the controller at t = {t:.6g} s")
             raise

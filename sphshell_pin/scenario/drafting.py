@@ -44,6 +44,7 @@ name = {robot.name!o}
 urdf = {robot.urdf!o}
 file = {robot.file!o}
 package_dirs = {robot.package_dirs!o}
+xacro_args = {robot.xacro_args!o}
 free_flyer = {robot.free_flyer!o} # the root link floats
 # They do not move the tip: locked, they cost nothing.
 lock = {robot.lock!o}

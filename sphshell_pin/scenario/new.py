@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy.typing as npt
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive, check_vector
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.robots import is_path
 from sphshell_pin.scenario.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.drafting import draft_text
 from sphshell_pin.scenario.knobs import check_knobs
@@ -36,7 +37,6 @@ WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 """Surfaces that need no file."""
 
 # Endings of the robots' files: URDF, MJCF and xacro.
-_ROBOT_FILES = (".urdf", ".xml", ".mjcf", ".xacro")
 # Half the size of a surface that needs no file, in radii of the sphere.
 _SIZE = 15.0
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
@@ -71,6 +71,7 @@ def new_scenario(
     place: str | None = None,
     free_flyer: bool = False,
     package_dirs: Sequence[str | PathLike[str]] = (),
+    xacro_args: Mapping[str, str] | None = None,
     out: str | PathLike[str] | None = None,
     force: bool = False,
 ) -> NewScenario:
@@ -82,8 +83,9 @@ def new_scenario(
     Parameters
     ----------
     robot
-        Name of a shipped robot, or path of a URDF file (`free_flyer`: its root floats;
-        `package_dirs`: folders above the packages of its meshes).
+        Name of a shipped robot, or path of a URDF, xacro (`xacro_args`: its arguments) or MJCF file
+        (`free_flyer`: the root of a URDF floats; `package_dirs`: folders above the packages of its
+        meshes).
     surface
         A surface file, its `unit` where the format has none, or a word of WORDS.
     bodies, faces
@@ -122,7 +124,13 @@ def new_scenario(
         if one is not None:
             find_material(one)
     path = _free_path(out, robot, surface, force=force)
-    section = _robot_section(robot, path, free_flyer=free_flyer, package_dirs=package_dirs)
+    section = _robot_section(
+        robot,
+        path,
+        free_flyer=free_flyer,
+        package_dirs=package_dirs,
+        xacro_args=xacro_args or {},
+    )
     bare = _build_bare(section, path)
     if not bare.assembly.model.nv and section.path is not None:
         # A single body without a joint would be fixed to the world.
@@ -185,7 +193,9 @@ def _free_path(
     *,
     force: bool,
 ) -> Path:
-    path = Path(f"{Path(robot).stem}_on_{Path(surface).stem}.toml" if out is None else out)
+    path = Path(
+        f"{Path(robot).name.partition('.')[0]}_on_{Path(surface).stem}.toml" if out is None else out
+    )
     if path.suffix != ".toml":
         raise ScenarioError(path, "", "a scenario's file must end in .toml")
     if path.is_dir() or (path.exists() and not force):
@@ -201,24 +211,21 @@ def _robot_section(
     *,
     free_flyer: bool,
     package_dirs: Sequence[str | PathLike[str]],
+    xacro_args: Mapping[str, str],
 ) -> RobotSection:
     file = Path(robot)
-    suffix = file.suffix.lower()
-    if suffix not in _ROBOT_FILES:
-        if free_flyer or package_dirs:
+    if not is_path(robot):
+        if free_flyer or package_dirs or xacro_args:
             raise SphshellError(
-                f"a free root and mesh folders belong to a robot's file, not to {robot}"
-            )
-        if file.is_file():
-            raise SphshellError(
-                f"{robot}: is not a robot's file, which ends in {', '.join(_ROBOT_FILES[:-1])} "
-                f"or {_ROBOT_FILES[-1]}"
+                f"a free root, mesh folders and xacro arguments belong to a file, not to {robot}"
             )
         return RobotSection(name=str(robot))
-    key = "urdf" if suffix == ".urdf" else "file"
+    place, is_urdf = _relative(file, path), file.suffix.lower() == ".urdf"
     return RobotSection(
-        **{key: _relative(file, path)},  # type: ignore[arg-type]  # one of two keys
+        urdf=place if is_urdf else None,
+        file=None if is_urdf else place,
         package_dirs=[_relative(Path(one), path) for one in package_dirs],
+        xacro_args=dict(xacro_args),
         free_flyer=free_flyer,
     )
 

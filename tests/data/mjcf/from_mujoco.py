@@ -22,6 +22,7 @@ def told(path):
     data.qvel[:] = rng.normal(size=model.nv)
     model.opt.gravity[:] = 0, 0, -9.81
     model.body_gravcomp[:] = 0
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     mujoco.mj_forward(model, data)
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
