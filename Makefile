@@ -8,7 +8,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick lint format bench report robots hard-cases work-precision rollouts \
-  real-surfaces fuzz kills sweep-survival sanitize wheel docs clean
+  real-surfaces new-study fuzz kills sweep-survival sanitize wheel docs clean
 
 help:
 	@sed -nE 's/^([a-z-]+):.* ## (.*)/make \1\t\2/p' Makefile | expand -t 22
@@ -90,6 +90,9 @@ rollouts: $(VENV)/.test ## print the speed-up of 10 000 runs over threads
 
 real-surfaces: $(VENV)/.test ## jumps and energies over the surfaces of FOLDER=...
 	$(BIN)/python -m benchmarks.real_surfaces $(or $(FOLDER),tests/data/corpus)
+
+new-study: $(VENV)/.test ## what `new` writes for 14 robots and the parts of FOLDER=...
+	$(BIN)/python -m benchmarks.new_study $(or $(FOLDER),tests/data/corpus)
 
 fuzz: $(VENV)/.test ## damaged files for every reader, until one breaks it (SECONDS=600 SEED=1)
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)

@@ -22,9 +22,12 @@ from sphshell_pin.robots.files import (
     RobotError,
     build_geometry,
     build_model,
+    is_path,
+    keep_collision_of,
     keep_spheres,
     read,
 )
+from sphshell_pin.robots.spheres import MeshSpheres, spheres_of_link, spheres_of_mesh
 
 __all__ = [
     "OWN",
@@ -33,12 +36,16 @@ __all__ = [
     "WORKING",
     "Description",
     "LoadedRobot",
+    "MeshSpheres",
     "RobotError",
     "build_geometry",
     "build_model",
+    "collision_spheres",
     "end_spheres",
     "exactly",
     "fingertips",
+    "is_path",
+    "keep_collision_of",
     "keep_spheres",
     "load",
     "load_file",
@@ -46,6 +53,8 @@ __all__ = [
     "mimics_of_library",
     "names",
     "read",
+    "spheres_of_link",
+    "spheres_of_mesh",
 ]
 
 if TYPE_CHECKING:
@@ -188,7 +197,7 @@ def load_file(
         one, without = build_geometry(description, model, kind)
         geometry.append(one)
         missing += without
-    robot = LoadedRobot(name or model.name, model, *geometry, pin.neutral(model))
+    robot = LoadedRobot(name or model.name, model, *geometry, description.q0(model))
     if missing:
         warnings.warn(
             f"{path}: without these visual meshes, which are missing: {', '.join(missing)}; "

@@ -10,15 +10,21 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.mimic import Mimic
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots import mjcf
 from sphshell_pin.robots.description import check_memory, check_size
 from sphshell_pin.robots.packages import Folders
+
+if TYPE_CHECKING:
+    from sphshell_pin.robots.mjcf import Extras, Site
+
+Array = NDArray[np.float64]
 
 
 class RobotError(SphshellError, ValueError):
@@ -52,7 +58,7 @@ _NEXT = "robots are read from URDF (.urdf), xacro (.xacro) and MJCF (.xml) files
 
 @dataclass(frozen=True)
 class Description:
-    """A robot's file, read: `root` is a URDF, or MJCF in the plain form of `mjcf.plain`."""
+    """A robot's file, read: `root` is a URDF, or MJCF in the plain form of mjcf.py."""
 
     file: Path
     folders: Folders
@@ -62,8 +68,20 @@ class Description:
     """What closes kinematic loops or couples joints otherwise than by mimicking: not modelled."""
     notes: tuple[str, ...] = ()
     """What else the file states that is not modelled, one sentence each."""
-    extras: Mapping[str, mjcf.Extras] = field(default_factory=dict)
+    start: Mapping[str, Array] = field(default_factory=dict)
+    """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
+    extras: Mapping[str, Extras] = field(default_factory=dict)
     """Of ball joints of MJCF, which pinocchio reads without damping and dry friction."""
+    sites: tuple[Site, ...] = ()
+    """Of MJCF."""
+
+    def q0(self, model: pin.Model) -> Array:
+        """Return the configuration (nq,) that the file draws, of the model of `build_model`."""
+        q = np.array(pin.neutral(model))
+        for name, values in self.start.items():
+            at = model.joints[model.getJointId(name)].idx_q
+            q[at : at + len(values)] = values
+        return q
 
     @property
     def is_mjcf(self) -> bool:
@@ -104,10 +122,20 @@ def read(
             raise ValueError(f"its root element is <{tag}>; {_NEXT}")
         root = ET.fromstring(text)
         if tag == "mujoco":
+            from sphshell_pin.robots.mjcf import plain as in_plain_form
+
             what = "MJCF"
-            plain = mjcf.plain(root, file)
+            plain = in_plain_form(root, file)
             return Description(
-                file, folders, plain.root, plain.mimics, plain.loops, plain.notes, plain.extras
+                file,
+                folders,
+                plain.root,
+                plain.mimics,
+                plain.loops,
+                plain.notes,
+                plain.start,
+                plain.extras,
+                tuple(plain.sites),
             )
         _check_tree(root)
         return Description(file, folders, root, tuple(_mimics(root)))
@@ -115,6 +143,12 @@ def read(
         if isinstance(error, SphshellError):
             raise
         raise RobotError(f"{file}: not a {what} that can be read: {_line(error)}") from None
+
+
+def is_path(robot: str | PathLike[str]) -> bool:
+    """Whether `robot` is meant as a file, not as a name."""
+    known = (".urdf", ".xacro", ".xml", ".mjcf", *(one for ends in _REFUSED for one in ends))
+    return Path(robot).suffix.lower() in known or "/" in str(robot) or os.path.isfile(robot)
 
 
 def check_readable(file: Path) -> None:
@@ -149,6 +183,8 @@ def build_model(description: Description, *, free_flyer: bool = False) -> pin.Mo
                 model = check_memory(pin.buildModelFromMJCF(path))
             for name, extras in description.extras.items():
                 extras.give(model, model.joints[model.getJointId(name)])
+            for site in description.sites:
+                site.give(model)
     except (ValueError, RuntimeError, OSError) as error:
         what = "MJCF" if description.is_mjcf else "URDF"
         raise RobotError(f"{file}: not a {what} that pinocchio can read: {_line(error)}") from None
@@ -192,6 +228,19 @@ def keep_spheres(description: Description) -> None:
                 link.remove(part)
 
 
+def keep_collision_of(description: Description, link: str) -> None:
+    """Drop every geometry but the collision geometry of one link."""
+    root = description.root
+    for body in root.iter("body"):
+        for geom in body.findall("geom"):
+            if body.get("name") != link or mjcf.is_visual(geom):
+                body.remove(geom)
+    for one in root.iter("link"):
+        for part in [*one.findall("visual"), *one.findall("collision")]:
+            if part.tag == "visual" or one.get("name") != link:
+                one.remove(part)
+
+
 def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element, list[str]]:
     """Return a copy that names every mesh by its absolute path; missing visual ones are out."""
     root = ET.fromstring(ET.tostring(description.root))
@@ -203,7 +252,8 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
                 mesh = assets.get(geom.get("mesh"))
                 if mesh is None or os.path.isfile(mesh.get("file", "")):
                     continue
-                if mjcf.is_visual(geom):
+                # MuJoCo lets it touch nothing.
+                if geom.get("contype") == "0" and geom.get("conaffinity") == "0":
                     missing[mesh.get("file", "")] = None
                     body.remove(geom)
                 else:
@@ -254,12 +304,19 @@ def _mimics(root: ET.Element) -> Iterable[Mimic]:
 
 
 def _check_tree(root: ET.Element) -> None:
-    """Raise ValueError if two joints move one link: a closed kinematic chain."""
+    """Raise ValueError if two joints move one link (a closed kinematic chain), or one none."""
     movers = defaultdict(list)
+    links = {link.get("name") for link in root.findall("link")}
     for joint in root.findall("joint"):
-        child = joint.find("child")
-        if child is not None:
-            movers[child.get("link")].append(str(joint.get("name")))
+        for end in ("parent", "child"):
+            element = joint.find(end)
+            link = None if element is None else element.get("link")
+            if link is not None and link not in links:
+                raise ValueError(
+                    f"joint '{joint.get('name')}' has the {end} '{link}', but there is no such link"
+                )
+            if end == "child" and link is not None:
+                movers[link].append(str(joint.get("name")))
     for link, names in movers.items():
         if len(names) > 1:
             raise ValueError(

@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.mimic import Mimic
 from sphshell_pin.robots.description import check_size
-from sphshell_pin.robots.mjcf_geoms import Meshes, geom_inertia, plain_geom
+from sphshell_pin.robots.mjcf_geoms import (
+    Meshes,
+    geom_inertia,
+    plain_geom,
+    plain_place,
+    turned_to,
+)
 
 Array = NDArray[np.float64]
 
@@ -51,6 +57,25 @@ class Extras:
             setattr(model, name, values)
 
 
+@dataclass(frozen=True)
+class Site:
+    """A frame on a body, which pinocchio reads on bodies with joints only."""
+
+    name: str
+    body: str
+    place: pin.SE3
+
+    def give(self, model: pin.Model) -> None:
+        """Add it to `model`."""
+        place, frame, joint = self.place, 0, 0
+        if self.body != "world":
+            frame = model.getFrameId(self.body, pin.FrameType.BODY)
+            place = model.frames[frame].placement * place
+            joint = model.frames[frame].parentJoint
+        kind = pin.FrameType.OP_FRAME
+        model.addFrame(pin.Frame(self.name, joint, frame, place, kind), False)
+
+
 @dataclass
 class Plain:
     """An MJCF in its plain form, and what of it cannot be said in it."""
@@ -60,16 +85,13 @@ class Plain:
     loops: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     extras: dict[str, Extras] = field(default_factory=dict)
+    start: dict[str, Array] = field(default_factory=dict)
+    sites: list[Site] = field(default_factory=list)
 
 
 def plain(root: ET.Element, file: Path) -> Plain:
     """Return the plain form of an MJCF; ValueError says what in it cannot be read."""
     return _Reader(root, file).read()
-
-
-def is_visual(geom: ET.Element) -> bool:
-    """Whether a geom is only seen: MuJoCo lets it touch nothing."""
-    return geom.get("contype") == "0" and geom.get("conaffinity") == "0"
 
 
 class _Reader:
@@ -87,8 +109,6 @@ class _Reader:
         self.compiler = {k: v for one in root.findall("compiler") for k, v in one.attrib.items()}
         if self.compiler.get("coordinate") == "global":
             raise ValueError('coordinate="global" is not supported: MuJoCo 2.3.3 converts it')
-        if _number(self.compiler.get("settotalmass"), -1.0) > 0:
-            raise ValueError("settotalmass is not supported: let MuJoCo write the masses out")
         self.angle = 1.0 if self.compiler.get("angle") == "radian" else np.pi / 180.0
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for one in root.findall("default"):
@@ -98,6 +118,9 @@ class _Reader:
         self.parents: dict[str, str] = {}
         self.joints_of: dict[str, list[str]] = {"world": []}
         self.nq = 0
+        self.sites: list[Site] = []
+        # Where the file draws the joints that are not at zero there.
+        self.start: dict[str, Array] = {}
         self.springs: list[str] = []
         self.cones: list[str] = []
         self.weightless: list[str] = []
@@ -114,23 +137,27 @@ class _Reader:
             for element, pose, childclass in self._inside(one, pin.SE3.Identity(), "main"):
                 if element.tag == "body":
                     self._body(held, element, pose, childclass, "world")
+                elif element.tag == "site":
+                    self._site(element, pose, childclass, "world")
                 elif element.tag == "geom":
                     geom = self._with_defaults(element, childclass)
-                    if not is_visual(ET.Element("geom", geom)):
+                    if (geom.get("contype"), geom.get("conaffinity")) != ("0", "0"):
                         scenery.append(geom.get("name", geom.get("type", "sphere")))
             bodies += list(held)
-        if len(bodies) == 1:
+        if len(bodies) == 1 and bodies[0].find("joint") is not None:
             world.append(bodies[0])
         elif bodies:
-            # The reader takes one tree only.
+            # The reader takes one tree only, and a root that is fixed at the origin.
             base = ET.SubElement(world, "body", name="world_base")
             _inertial(base, pin.Inertia.Zero())
             base.extend(bodies)
         else:
             raise ValueError("its <worldbody> has no <body>")
+        self._weigh(made)
         self._keys(made)
         mimics, loops = self._equalities()
-        return Plain(made, mimics, loops, tuple(self._notes(scenery)), self.extras)
+        notes = tuple(self._notes(scenery))
+        return Plain(made, mimics, loops, notes, self.extras, self.start, self.sites)
 
     def _read_class(
         self, element: ET.Element, name: str, inherited: Mapping[str, Mapping[str, str]]
@@ -180,6 +207,10 @@ class _Reader:
         here = into
         for k, (joint, at, cls) in enumerate(joints):
             made = self._joint(joint, at, cls, name, k)
+            if made.get("type") == "free":
+                # Its coordinates are the pose in the world, whatever the body's place is.
+                self.start[made.attrib["name"]] = pin.SE3ToXYZQUAT(place)
+                place = pin.SE3.Identity()
             last = k + 1 == len(joints)
             here = ET.SubElement(
                 here, "body", name=name if last else f"{name}/{made.get('name')}", **_posed(place)
@@ -209,10 +240,8 @@ class _Reader:
         for part, at, cls in parts:
             if part.tag == "inertial":
                 stated = self._inertia(part, name).se3Action(at)
-            if part.tag == "site" and part.get("name"):
-                site = self._with_defaults(part, cls)
-                pose = _posed(at * self._pose(site))
-                ET.SubElement(here, "site", name=site["name"], **pose)
+            if part.tag == "site":
+                self._site(part, at, cls, name)
             if part.tag != "geom":
                 continue
             geom = self._with_defaults(part, cls)
@@ -231,6 +260,12 @@ class _Reader:
             inertia = pin.Inertia(max(inertia.mass, least_mass), inertia.lever, bound)
         _inertial(here, inertia)
 
+    def _site(self, element: ET.Element, at: pin.SE3, childclass: str, body: str) -> None:
+        stated = self._with_defaults(element, childclass)
+        if "name" in stated:
+            place = at * plain_place(stated, self._pose)[0]
+            self.sites.append(Site(stated["name"], body, place))
+
     def _joint(
         self, element: ET.Element, at: pin.SE3, childclass: str, body: str, number: int
     ) -> ET.Element:
@@ -247,7 +282,7 @@ class _Reader:
         self.joints_of[body].append(name)
         made = ET.Element("joint", name=name, type=kind)
         scalar = {key: _number(stated.get(key, "0").split()[0], 0.0) for key in _SCALARS}
-        if scalar["stiffness"]:
+        if scalar["stiffness"] or "springdamper" in stated:
             self.springs.append(name)
         if kind == "free":
             made.set("pos", "0 0 0")
@@ -264,9 +299,13 @@ class _Reader:
         unit = self.angle if kind == "hinge" else 1.0
         made.set("damping", repr(scalar["damping"]))
         made.set("frictionloss", repr(scalar["frictionloss"]))
-        made.set("ref", repr(unit * _number(stated.get("ref"), 0.0)))
+        ref = unit * _number(stated.get("ref"), 0.0)
+        if ref:
+            made.set("ref", repr(ref))
+            self.start[name] = np.array([ref])
         if limited:
-            made.set("range", _text(unit * _numbers(stated["range"])))
+            # Pinocchio subtracts ref from the range, but counts positions as MuJoCo does.
+            made.set("range", _text(unit * _numbers(stated["range"]) + ref))
         if _limited(stated, "actuatorfrclimited", "actuatorfrcrange", self.compiler):
             made.set("actuatorfrcrange", _text(_numbers(stated["actuatorfrcrange"])))
         return made
@@ -313,6 +352,17 @@ class _Reader:
             return turned_to(np.array(_numbers(stated["zaxis"])))
         return np.eye(3)
 
+    def _weigh(self, made: ET.Element) -> None:
+        """Scale all masses to what the file states as their sum."""
+        total = _number(self.compiler.get("settotalmass"), -1.0)
+        parts = list(made.iter("inertial"))
+        now = sum(float(one.attrib["mass"]) for one in parts)
+        if total <= 0.0 or not now:
+            return
+        for one in parts:
+            for key in ("mass", "fullinertia"):
+                one.set(key, _text(total / now * _numbers(one.attrib[key])))
+
     def _keys(self, made: ET.Element) -> None:
         keys = ET.SubElement(made, "keyframe")
         for key in self.given.iterfind("keyframe/key"):
@@ -333,7 +383,10 @@ class _Reader:
                 stated = _numbers(one.get("polycoef", "0 1 0 0 0"))
                 terms[: len(stated)] = stated
                 if second is not None and not terms[2:].any():
-                    mimics.append(Mimic(first, second, float(terms[1]), float(terms[0])))
+                    # It is of the distances from ref.
+                    refs = [float(self.start.get(one, np.zeros(1))[0]) for one in (first, second)]
+                    offset = float(terms[0] + refs[0] - terms[1] * refs[1])
+                    mimics.append(Mimic(first, second, float(terms[1]), offset))
                 elif second is None:
                     loops.append(f"{label} holds joint '{first}' at {terms[0]:g} (lock it instead)")
                 else:
@@ -364,10 +417,13 @@ class _Reader:
 
     def _notes(self, scenery: list[str]) -> Iterator[str]:
         for names, text in (
-            (self.springs, "springs of joints are not modelled"),
+            (self.springs, "springs of joints (stiffness, springdamper) are not modelled"),
             (self.cones, "ranges of ball joints are not modelled"),
             (self.weightless, "gravity acts on bodies with gravcomp too"),
-            (self.meshes.exact, "masses of meshes that are not convex are those of their volume"),
+            (
+                self.meshes.exact,
+                "masses of meshes that are not convex are those of their volume (inertia=exact)",
+            ),
             (self.meshes.left_out, "geoms of these kinds are left out"),
             (scenery, "geoms of the world are no part of the robot, add them as shells"),
         ):
@@ -376,13 +432,6 @@ class _Reader:
         tendons = [one.get("name", one.tag) for one in self.given.iterfind("tendon/*")]
         if tendons:
             yield f"tendons are not modelled: {', '.join(map(repr, tendons))}"
-
-
-def turned_to(axis: Array) -> Array:
-    """Return the smallest rotation (3,3) that turns z to `axis` (3,)."""
-    z = np.array([0.0, 0.0, 1.0])
-    one = pin.Quaternion.FromTwoVectors(z, axis / np.linalg.norm(axis))
-    return np.asarray(one.toRotationMatrix())
 
 
 def _include(element: ET.Element, file: Path, open_files: list[Path]) -> None:

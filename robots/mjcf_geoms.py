@@ -33,6 +33,7 @@ class Meshes:
         self.exact: list[str] = []
         self.left_out: list[str] = []
         self._moved: set[str] = set()
+        self._kinds: dict[str, str] = {}
         for one in root.iterfind("asset/mesh"):
             stated = resolved(one, "main")
             if "file" not in stated:
@@ -41,6 +42,7 @@ class Meshes:
             name = stated.get("name", path.stem)
             scale = np.array([float(k) for k in stated.get("scale", "1 1 1").split()])
             self.files[name] = ((file.absolute().parent / folder / path), scale)
+            self._kinds[name] = stated.get("inertia", "legacy")
             if "refpos" in stated or "refquat" in stated:
                 self._moved.add(name)
         for one in root.iterfind("asset/material"):
@@ -70,13 +72,16 @@ class Meshes:
         why = f"the mass of body '{body}' would be that of mesh '{name}', "
         try:
             mesh = trimesh.load(path, force="mesh")
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, NotImplementedError) as error:
             raise ValueError(f"{why}which cannot be read ({error}): state <inertial>") from None
         mesh.apply_scale(scale)
         mesh.merge_vertices()
-        if not mesh.is_watertight or not mesh.volume:
+        kind = self._kinds[name]
+        if kind == "convex":
+            mesh = mesh.convex_hull
+        if kind == "shell" or not mesh.is_watertight or not mesh.volume:
             raise ValueError(f"{why}which is not closed: state its <inertial>")
-        if not mesh.is_convex:
+        if kind == "legacy" and not mesh.is_convex:
             self.exact.append(name)
         sign = float(np.sign(mesh.volume))
         volume = sign * float(mesh.volume)
@@ -84,21 +89,33 @@ class Meshes:
         return volume, pin.Inertia(volume, np.asarray(mesh.center_mass), moments)
 
 
+def turned_to(axis: Array) -> Array:
+    """Return the smallest rotation (3,3) that turns z to `axis` (3,)."""
+    z = np.array([0.0, 0.0, 1.0])
+    one = pin.Quaternion.FromTwoVectors(z, axis / np.linalg.norm(axis))
+    return np.asarray(one.toRotationMatrix())
+
+
+def plain_place(
+    stated: Mapping[str, str], pose_of: Callable[[Mapping[str, str]], pin.SE3]
+) -> tuple[pin.SE3, float | None]:
+    """Return the place of a geom or site; of one that states its ends, half its length [m] too."""
+    if "fromto" not in stated:
+        return pose_of(stated), None
+    ends = np.array([float(k) for k in stated["fromto"].split()]).reshape(2, 3)
+    along = ends[0] - ends[1]
+    place = pin.SE3(turned_to(along), ends.mean(axis=0))
+    return pose_of({}) * place, 0.5 * float(np.linalg.norm(along))
+
+
 def plain_geom(
     stated: Mapping[str, str], meshes: Meshes, pose_of: Callable[[Mapping[str, str]], pin.SE3]
 ) -> tuple[ET.Element | None, pin.SE3]:
     """Return a geom without its place, and its place in the body; None for kinds left out."""
-    from sphshell_pin.robots.mjcf import turned_to
-
     kind = stated.get("type", "sphere" if "mesh" not in stated else "mesh")
     size = [float(k) for k in stated.get("size", "").split()]
-    pose = pose_of(stated)
-    if "fromto" in stated:
-        ends = np.array([float(k) for k in stated["fromto"].split()]).reshape(2, 3)
-        here = pose_of({})
-        along = ends[0] - ends[1]
-        pose = here * pin.SE3(turned_to(along), ends.mean(axis=0))
-        half = 0.5 * float(np.linalg.norm(along))
+    pose, half = plain_place(stated, pose_of)
+    if half is not None and size:
         size = [size[0], half] if kind in ("capsule", "cylinder") else [size[0], size[0], half]
     fitted = kind != "mesh" and "mesh" in stated
     if kind not in _SHAPES or fitted or (kind == "mesh" and not meshes.known(stated.get("mesh"))):

@@ -27,12 +27,15 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import contact_wrench as contact_wrench
     from sphshell_pin.dynamics import Adaptive as Adaptive
     from sphshell_pin.dynamics import CartesianImpedance as CartesianImpedance
+    from sphshell_pin.dynamics import ContactSwitch as ContactSwitch
+    from sphshell_pin.dynamics import ForceTorqueSensor as ForceTorqueSensor
     from sphshell_pin.dynamics import GravityCompensation as GravityCompensation
     from sphshell_pin.dynamics import Implicit as Implicit
     from sphshell_pin.dynamics import JointFriction as JointFriction
     from sphshell_pin.dynamics import JointIngredients as JointIngredients
     from sphshell_pin.dynamics import JointLimits as JointLimits
     from sphshell_pin.dynamics import JointPD as JointPD
+    from sphshell_pin.dynamics import JointTorqueSensor as JointTorqueSensor
     from sphshell_pin.dynamics import LinearlyImplicitEuler as LinearlyImplicitEuler
     from sphshell_pin.dynamics import Result as Result
     from sphshell_pin.dynamics import RungeKutta4 as RungeKutta4
@@ -50,13 +53,16 @@ _HOME = {
     "BristleState": "contact",
     "CartesianImpedance": "dynamics",
     "ContactSet": "contact",
+    "ContactSwitch": "dynamics",
     "CoulombFriction": "contact",
     "Feature": "contact",
+    "ForceTorqueSensor": "dynamics",
     "GravityCompensation": "dynamics",
     "HuntCrossleyLaw": "contact",
     "ImpactLaw": "contact",
     "Implicit": "dynamics",
     "JointPD": "dynamics",
+    "JointTorqueSensor": "dynamics",
     "JointLimits": "dynamics",
     "JointIngredients": "dynamics",
     "JointFriction": "dynamics",

@@ -204,4 +204,4 @@ def _shown(default: object) -> str:
         return str(default).lower()
     if isinstance(default, tuple):
         return f"[{', '.join(f'{one:g}' for one in default)}]"
-    return f"{default:g}" if isinstance(default, float) else f'"{default}"'
+    return f"{default:g}" if isinstance(default, int | float) else f'"{default}"'

@@ -12,6 +12,7 @@ from sphshell_pin import _core
 from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.controllers import Controller
 from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.dynamics.sensors import Sensor
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient, parameter, parameters_of, table, table_row
 from sphshell_pin.scenario.primitives import Primitive
@@ -22,6 +23,7 @@ FAMILIES = {
     "controller": Controller,
     "run": Integrator,
     "primitive": Primitive,
+    "sensor": Sensor,
 }
 
 
@@ -117,7 +119,12 @@ VALUES = {
     "damping": 1.0,
     "function": "a.py:b",
     "file": "a.csv",
+    "name": "a",
+    "joint": "b",
+    "threshold": 1.0,
 }
+# Where one of several is needed.
+ALSO = {"contact-switch": {"contact": "c"}}
 BOUNDS = [
     pytest.param(kind, one, wrong, id=f"{kind.__name__}-{one}-{wrong}")
     for kind in KINDS
@@ -139,7 +146,7 @@ BOUNDS = [
 @pytest.mark.parametrize(("kind", "name", "wrong"), BOUNDS)
 def test_a_value_out_of_bounds_is_named(kind, name, wrong):
     needed = [one.name for one in fields(kind) if one.default is MISSING]
-    good = {one: VALUES[one] for one in needed}
+    good = {one: VALUES[one] for one in needed} | ALSO.get(kind.kind, {})
     kind(**good)
     with pytest.raises(InvalidParameter) as caught:
         kind(**{**good, name: wrong})
@@ -164,7 +171,7 @@ def test_the_documents_have_the_tables_of_the_descriptions(family):
         assert table(kind) in page, f"docs/laws.md: a table is now\n{table(kind)}"
 
 
-@pytest.mark.parametrize("family", ["law", "friction", "controller", "primitive"])
+@pytest.mark.parametrize("family", ["law", "friction", "controller", "primitive", "sensor"])
 def test_the_reference_of_scenario_files_has_the_keys_of_the_descriptions(family):
     page = (DOCS / "scenarios.md").read_text(encoding="utf-8")
     for kind in FAMILIES[family].kinds.values():

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import sys
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
@@ -37,6 +39,37 @@ SetOption = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Change a value; may be given several times."),
 ]
 DtOption = Annotated[float | None, typer.Option(help="Time step \\[s] in place of run.dt.")]
+
+
+def _search_in(folders: list[Path] | None) -> list[Path] | None:
+    """Search `folders` for packages before those of ROS_PACKAGE_PATH, in child processes too."""
+    for folder in folders or ():
+        if not folder.is_dir():
+            raise typer.BadParameter(f"there is no folder {folder}")
+    known = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
+    every = [*map(str, map(Path.absolute, folders or ())), *filter(None, known)]
+    if folders:
+        os.environ["ROS_PACKAGE_PATH"] = os.pathsep.join(every)
+    return folders
+
+
+PackageDirOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--package-dir",
+        metavar="FOLDER",
+        callback=_search_in,
+        help="Folder above the packages of the robot's meshes; may be given several times.",
+    ),
+]
+XacroArgOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--xacro-arg",
+        metavar="NAME=VALUE",
+        help="Argument of a xacro file; may be given several times.",
+    ),
+]
 
 
 @app.callback()
@@ -137,6 +170,19 @@ def changes_of(set_: list[str] | None, dt: float | None, duration: float | None)
     if duration is not None:
         changes["run.duration"] = repr(duration)
     return changes
+
+
+def xacro_args_of(stated: list[str] | None) -> dict[str, str]:
+    """Return the arguments of a xacro file that --xacro-arg states."""
+    from sphshell_pin.errors import InvalidParameter
+
+    found = {}
+    for one in stated or []:
+        name, equals, value = one.partition("=")
+        if not equals or not name:
+            raise InvalidParameter("--xacro-arg", one, "must be NAME=VALUE")
+        found[name.strip()] = value.strip()
+    return found
 
 
 def make_table(*columns: str) -> Table:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,8 @@ from sphshell_pin.cli.app import (
     ERROR,
     INTERRUPTED,
     MISSED,
+    PackageDirOption,
+    XacroArgOption,
     app,
     faults,
     length_of,
@@ -21,10 +24,11 @@ from sphshell_pin.cli.app import (
     plain,
     progress_bar,
     terminal,
+    xacro_args_of,
 )
 
 if TYPE_CHECKING:
-    from sphshell_pin.study.robot_check import RobotReport, Sizes
+    from sphshell_pin.study.robot_check import RobotReport
 
 # A pipe has no width: so wide the table need not fold.
 _PIPE_WIDTH, _WIDE = 170, 125
@@ -35,14 +39,16 @@ def check_robot_(
     context: typer.Context,
     robot: Annotated[
         list[str] | None,
-        typer.Argument(help="Names of shipped robots (sphshell-pin list), or URDF files."),
+        typer.Argument(
+            help="Names of shipped robots (sphshell-pin list), or URDF, xacro or MJCF files."
+        ),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Check every robot there is.")] = False,
     frame: Annotated[
         str | None,
         typer.Option(
-            help="Frame that carries the sphere; by default a known tip, or the end of "
-            "the longest limb."
+            help="Frame that carries the sphere; by default a known tip, or the end of the "
+            "longest limb and the outermost sphere inside its collision mesh."
         ),
     ] = None,
     radius: Annotated[
@@ -51,6 +57,8 @@ def check_robot_(
     free_flyer: Annotated[
         bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
     ] = False,
+    package_dir: PackageDirOption = None,
+    xacro_arg: XacroArgOption = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer postures and runs.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random postures.")] = 0,
     json: Annotated[
@@ -76,16 +84,24 @@ def check_robot_(
         if every and robot:
             raise SphshellError("give robots or --all, not both")
         if not every and not robot:
-            raise SphshellError("say which robots: names, URDF files, or --all")
+            raise SphshellError("say which robots: names, files, or --all")
         names = study.all_names() if every else list(robot or [])
         study.check_known(names)
         for path in (json, write):
             if path is not None:
                 _check_writable(path)
         sizes = study.QUICK if quick else study.Sizes()
-        reports, stopped = _check(
-            names, frame, length_of("--radius", radius), free_flyer, seed, sizes
+        check = partial(
+            study.check_robot,
+            frame=frame,
+            radius=length_of("--radius", radius),
+            free_flyer=free_flyer,
+            package_dirs=package_dir or (),
+            xacro_args=xacro_args_of(xacro_arg),
+            seed=seed,
+            sizes=sizes,
         )
+        reports, stopped = _check(names, check)
         _print(reports)
         if stopped:
             left = len(names) - len(reports)
@@ -117,18 +133,13 @@ def _check_writable(path: Path) -> None:
 
 
 def _check(
-    names: Sequence[str],
-    frame: str | None,
-    radius: float | None,
-    free_flyer: bool,
-    seed: int,
-    sizes: Sizes,
+    names: Sequence[str], check: Callable[..., RobotReport]
 ) -> tuple[list[RobotReport], bool]:
-    """Return the reports, and whether Ctrl-C came before the last."""
+    """Return the reports that `check` gives, and whether Ctrl-C came before the last."""
     from rich.progress import MofNCompleteColumn
 
     from sphshell_pin.errors import FrameNotFound
-    from sphshell_pin.study.robot_check import RobotReport, check_robot
+    from sphshell_pin.study.robot_check import RobotReport
 
     bar = progress_bar(MofNCompleteColumn())
     reports: list[RobotReport] = []
@@ -141,15 +152,7 @@ def _check(
                     bar.update(task, description=f"{Path(name).name}: {title}")
 
                 try:
-                    report = check_robot(
-                        name,
-                        frame=frame,
-                        radius=radius,
-                        free_flyer=free_flyer,
-                        seed=seed,
-                        sizes=sizes,
-                        progress=show,
-                    )
+                    report = check(name, progress=show)
                 except FrameNotFound as error:
                     if len(names) == 1:
                         raise

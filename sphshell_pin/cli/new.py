@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from sphshell_pin.cli.app import app, faults, length_of, terminal
+from sphshell_pin.cli.app import (
+    PackageDirOption,
+    XacroArgOption,
+    app,
+    faults,
+    length_of,
+    terminal,
+    xacro_args_of,
+)
 from sphshell_pin.cli.files import BodyOption, FaceOption, faces_of
 
 if TYPE_CHECKING:
@@ -17,7 +25,10 @@ if TYPE_CHECKING:
 @app.command()
 def new(
     context: typer.Context,
-    robot: Annotated[str, typer.Option(help="A shipped robot (sphshell-pin list), or a URDF.")],
+    robot: Annotated[
+        str,
+        typer.Option(help="A shipped robot (sphshell-pin list), or a URDF, xacro or MJCF file."),
+    ],
     surface: Annotated[
         str,
         typer.Option(help="A surface file, or one of: plane, box, sphere, cylinder, bowl."),
@@ -28,6 +39,10 @@ def new(
     ] = None,
     radius: Annotated[
         str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
+    ] = None,
+    offset: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(metavar="X Y Z", help="Center of the sphere in the frame \\[m]."),
     ] = None,
     unit: Annotated[
         str | None, typer.Option(help="Length unit of the surface file: mm, cm, m, inch, ...")
@@ -49,13 +64,15 @@ def new(
             "default below, or before a tip that does not point down."
         ),
     ] = None,
+    tips: Annotated[
+        Literal["one", "all"],
+        typer.Option(help="all: the fingertips of a hand hold the surface, as a free part."),
+    ] = "one",
     free_flyer: Annotated[
         bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
     ] = False,
-    package_dir: Annotated[
-        list[Path] | None,
-        typer.Option(help="Folder above the packages of the URDF's meshes; may be repeated."),
-    ] = None,
+    package_dir: PackageDirOption = None,
+    xacro_arg: XacroArgOption = None,
     out: Annotated[
         Path | None, typer.Option(help="The file to write; default: ROBOT_on_SURFACE.toml.")
     ] = None,
@@ -64,6 +81,9 @@ def new(
     ] = False,
 ) -> None:
     """Write a scenario: this robot, this surface, and values that work for their size.
+
+    It is run first, and written only if it touches, holds its force within 5 %, and keeps the
+    robot's links out of the part; else the message says what fails and what to change.
 
     Example: sphshell-pin new --robot panda --surface blade.stl --unit mm
     """
@@ -77,6 +97,7 @@ def new(
                 surface,
                 frame=frame,
                 radius=length_of("--radius", radius),
+                offset=offset,
                 unit=unit,
                 bodies=body,
                 faces=faces_of(face),
@@ -84,8 +105,10 @@ def new(
                 against=against,
                 press=press,
                 place=place,
+                tips=tips,
                 free_flyer=free_flyer,
                 package_dirs=package_dir or (),
+                xacro_args=xacro_args_of(xacro_arg),
                 out=out,
                 force=force,
             )

@@ -12,6 +12,7 @@ from sphshell_pin.cli.app import (
     INTERRUPTED,
     MISSED,
     DtOption,
+    PackageDirOption,
     ScenarioArgument,
     SetOption,
     app,
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 # A share of the exchanged energy that no sound run loses or gains.
 SUSPICIOUS_RESIDUAL = 0.05
+# Rows of the table of contacts.
+MOST_PAIRS = 16
 
 
 @app.command()
@@ -53,6 +56,7 @@ def run(
         ),
     ] = False,
     set_: SetOption = None,
+    package_dir: PackageDirOption = None,
 ) -> None:
     """Run a scenario and write its results folder.
 
@@ -84,7 +88,11 @@ def run(
 
 @app.command()
 def explain(
-    context: typer.Context, scenario: ScenarioArgument, dt: DtOption = None, set_: SetOption = None
+    context: typer.Context,
+    scenario: ScenarioArgument,
+    dt: DtOption = None,
+    set_: SetOption = None,
+    package_dir: PackageDirOption = None,
 ) -> None:
     """Say what a scenario models: time scales, expected depths, a fitting dt, warnings.
 
@@ -116,6 +124,23 @@ def _exit_code(report: RunReport, *, changed: bool) -> int:
     return MISSED
 
 
+def _print_joints(report: RunReport) -> None:
+    """Print the joints that came to a stop, or beyond a limit; nothing where none did."""
+    table = make_table("joint", "stops", "stop time", "torque cut", "peak speed")
+    for name, joint in report.result.stats.joints.items():
+        cut = fast = ""
+        if joint.first_cut is not None:
+            cut = f"{joint.cut_time:.4g} s, first at {joint.first_cut:.4g} s"
+        if joint.first_too_fast is not None:
+            fast = f"{joint.peak_speed:.4g}, too fast at {joint.first_too_fast:.4g} s"
+        if joint.stops or cut or fast:
+            table.add_row(
+                plain(name), f"{joint.stops}", f"{joint.stop_time:.4g} s", cut or "-", fast or "-"
+            )
+    if table.row_count:
+        terminal().print(table)
+
+
 def _print_report(report: RunReport) -> None:
     from sphshell_pin.scenario.figures import measure_energy
 
@@ -125,7 +150,10 @@ def _print_report(report: RunReport) -> None:
     table = make_table(
         "contact", "duration", "touches", "peak force", "mean force", "largest depth"
     )
+    shown = sorted(stats.pairs, key=lambda name: -stats.pairs[name].peak_force)[:MOST_PAIRS]
     for name, pair in stats.pairs.items():
+        if name not in shown:
+            continue
         table.add_row(
             plain(name),
             f"{pair.contact_time:.4g} s",
@@ -134,7 +162,17 @@ def _print_report(report: RunReport) -> None:
             f"{pair.mean_force:.4g} N",
             f"{pair.max_depth * 1e3:.4g} mm",
         )
-    console.print(table)
+    if stats.pairs:
+        console.print(table)
+    others = [pair for name, pair in stats.pairs.items() if name not in shown]
+    if others:
+        touched = sum(1 for pair in others if pair.touches)
+        console.print(
+            f"{len(others)} more contacts with smaller peak forces, of which {touched} touched: "
+            f"all are in summary.json",
+            highlight=False,
+        )
+    _print_joints(report)
     energy = measure_energy(report.result)
     console.print(
         f"energy residual   {energy['residual']:.3g} J, {energy['relative_residual']:.2g} of the "

@@ -14,6 +14,7 @@ import typer
 from sphshell_pin.cli.app import (
     ERROR,
     DtOption,
+    PackageDirOption,
     ScenarioArgument,
     SetOption,
     app,
@@ -79,6 +80,7 @@ def sweep(
         float | None, typer.Option(help="Time to simulate \\[s] in place of run.duration.")
     ] = None,
     set_: SetOption = None,
+    package_dir: PackageDirOption = None,
 ) -> None:
     """Run a scenario with many values, over processes or a Dask cluster; write one table.
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from sphshell_pin.cli.app import SetOption, app, changes_of, faults
+from sphshell_pin.cli.app import PackageDirOption, SetOption, app, changes_of, faults
 
 
 @app.command()
@@ -21,6 +21,7 @@ def view(
         ),
     ],
     set_: SetOption = None,
+    package_dir: PackageDirOption = None,
     speed: Annotated[float, typer.Option(help="Simulated seconds per second.")] = 1.0,
     paused: Annotated[bool, typer.Option("--paused", help="Wait for the button Run.")] = False,
     host: Annotated[

@@ -1,6 +1,6 @@
 """Scenes of contact pairs on a Pinocchio model, and their motion."""
 
-from sphshell_pin.dynamics import controllers, integrators
+from sphshell_pin.dynamics import controllers, integrators, sensors
 from sphshell_pin.dynamics.controllers import *  # noqa: F403
 from sphshell_pin.dynamics.integrators import *  # noqa: F403
 from sphshell_pin.dynamics.joints import JointFriction, JointIngredients, JointLimits
@@ -8,6 +8,8 @@ from sphshell_pin.dynamics.result import ContactLog, EnergyAudit, Event, Result
 from sphshell_pin.dynamics.rollout import Rollout
 from sphshell_pin.dynamics.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts, SceneState
+from sphshell_pin.dynamics.sensor_log import Readings, SensorLog
+from sphshell_pin.dynamics.sensors import *  # noqa: F403
 from sphshell_pin.dynamics.simulation import Simulation
 
 __all__ = [
@@ -20,13 +22,16 @@ __all__ = [
     "JointIngredients",
     "JointLimits",
     "PairFigures",
+    "Readings",
     "Result",
     "Rollout",
     "RunStats",
     "Scene",
     "SceneContacts",
     "SceneState",
+    "SensorLog",
     "Simulation",
 ]
 __all__ += controllers.__all__
 __all__ += integrators.__all__
+__all__ += sensors.__all__

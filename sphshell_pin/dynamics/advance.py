@@ -20,6 +20,7 @@ from sphshell_pin.checks import (
     check_not_negative,
     check_positive,
 )
+from sphshell_pin.dynamics.callables import reads_sensors
 from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callable
 from sphshell_pin.dynamics.explain import DEFAULT_SPEED, explain_pairs, relaxation_time, weakness
 from sphshell_pin.dynamics.integrators import Integrator
@@ -27,6 +28,7 @@ from sphshell_pin.dynamics.models import find_joint
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.dynamics.sensors import SensorSet
 from sphshell_pin.errors import DeepStart, InvalidParameter, SetupWarning, WeakLawWarning
 
 Array = NDArray[np.float64]
@@ -53,6 +55,7 @@ def start_run(
     *,
     record_dt: float | None,
     t0: float,
+    sensors: SensorSet,
     warn: bool = True,
 ) -> _core.Simulation:
     """Check the arguments of Simulation.run and return the compiled run at its start.
@@ -62,14 +65,16 @@ def start_run(
     """
     q, v = scene.check_state(q0, v0)
     duration = check_not_negative("duration", duration, "s")
-    core_controller, hold = bind_controller(scene, integrator, controller, control_dt, q)
+    core_controller, hold = bind_controller(scene, integrator, controller, control_dt, q, sensors)
     if warn and isinstance(controller, Controller):
         for doubt in controller.doubts(scene, q):
             warnings.warn(doubt, SetupWarning, stacklevel=3)
     settings = run_settings(scene, integrator, duration, hold, record_dt=record_dt, t0=t0)
     pairs = core_pairs(scene, q, v, warn=warn)
     joints = scene.joints.to_core(scene.model)
-    core = _core.Simulation(scene.model, pairs, joints, core_controller, q, v, settings)
+    core = _core.Simulation(
+        scene.model, pairs, joints, core_controller, q, v, settings, sensors.core
+    )
     deep = core.deep_start()
     if deep is not None:
         raise deep_start(scene, *deep)
@@ -121,6 +126,7 @@ def bind_controller(
     controller: AnyController,
     control_dt: float | None,
     q0: Array,
+    sensors: SensorSet,
 ) -> tuple[_core.Controller | None, float]:
     """Return the C++ controller, started at q0 (nq,), and how long its torques are held [s]."""
     dt = step_of(integrator)
@@ -135,7 +141,16 @@ def bind_controller(
     if isinstance(controller, Controller):
         return controller.to_core(scene, q0), control_dt or 0.0
     if callable(controller):
-        return wrap_callable(controller, scene.model), control_dt or dt
+        if not reads_sensors(controller):
+            return wrap_callable(controller, scene.model), control_dt or dt
+        if control_dt is None and dt == 0:
+            raise InvalidParameter(
+                "control_dt",
+                None,
+                "must be given for a controller that reads sensors with an integrator of variable "
+                "step: how long its torques are held [s]",
+            )
+        return wrap_callable(controller, scene.model, sensors.readings), control_dt or dt
     raise InvalidParameter(
         "controller", controller, "must be None, a controller or tau(t, q, v, contacts)"
     )
@@ -184,7 +199,11 @@ def advance(
 
 
 def result_of(
-    scene: Scene, integrator: Integrator, core: Ended, record: dict[str, NDArray[np.generic]]
+    scene: Scene,
+    integrator: Integrator,
+    core: Ended,
+    record: dict[str, NDArray[np.generic]],
+    sensors: SensorSet,
 ) -> Result:
     """Make the result of a compiled run, or of what is left of one, and its record."""
     names = tuple(pair.name for pair in scene.pairs)
@@ -202,7 +221,7 @@ def result_of(
         pairs=dict(zip(names, figures, strict=True)),
         joints=joint_figures(scene, summaries[len(names) :], core.limits),
     )
-    return Result.from_blocks([record], names, stats, scene)
+    return Result.from_blocks([record], names, stats, scene, sensors)
 
 
 def joint_figures(

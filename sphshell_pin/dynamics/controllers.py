@@ -27,6 +27,7 @@ from sphshell_pin.checks import (
 from sphshell_pin.dynamics.callables import check_callable
 from sphshell_pin.dynamics.models import find_frame, find_joint, model_reach, set_joint
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
+from sphshell_pin.dynamics.sensor_log import Readings
 from sphshell_pin.errors import InvalidParameter, SphshellError, add_origin
 from sphshell_pin.parameters import Ingredient, parameter
 from sphshell_pin.shell import Shell
@@ -49,7 +50,8 @@ _MOST_ROWS = 200
 Gain = float | Sequence[float] | Array | Mapping[str, float]
 # Coordinates (nq,), or those of some joints, the others as at the start.
 Posture = Sequence[float] | Array | Mapping[str, float | Sequence[float]]
-Callback = Callable[[float, Array, Array, SceneContacts], ArrayLike]
+# tau(t, q, v, contacts), or tau(t, q, v, contacts, sensors).
+Callback = Callable[..., ArrayLike]
 ShellPlace = tuple[Shell, str, pin.SE3]
 
 
@@ -348,7 +350,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
 
     def doubts(self, scene: Scene, q0: Array) -> list[str]:
         """Say where the path is off the shell, or out of the robot's reach."""
-        said = []
+        said: list[str] = []
         if isinstance(self.shell, Shell):
             corners = check_points("path", self.path)
             off = np.abs(self.shell.closest_points(corners).distances)
@@ -363,7 +365,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
 
     def doubts_after(self, result: Result) -> list[str]:
         """Say so if a controller that presses has touched nothing, or never came to its path."""
-        scene, said = result.scene, []
+        scene, said = result.scene, list[str]()
         if scene is None or len(result.t) == 0:
             return said
         touched = any(one.contact_time > 0 for one in result.stats.pairs.values())
@@ -410,14 +412,24 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         return float(self._times(self._projected_path()[0])[-1])
 
 
-def wrap_callable(callback: Callback, model: pin.Model) -> _core.Controller:
-    """Wrap tau(t, q, v, contacts) -> (nv,) for the core; its answers are checked."""
+def wrap_callable(
+    callback: Callback,
+    model: pin.Model,
+    readings: Callable[[bytes | bytearray], Readings] | None = None,
+) -> _core.Controller:
+    """Wrap tau(t, q, v, contacts) -> (nv,) for the core; its answers are checked.
+
+    With `readings`, which reads the core's memory, it gets them as `sensors`.
+    """
     check_callable(callback)
 
-    def torque(t: float, q: bytearray, v: bytearray, rows: bytearray) -> Array:
+    def torque(
+        t: float, q: bytearray, v: bytearray, rows: bytearray, latest: bytes | bytearray = b""
+    ) -> Array:
         contacts = SceneContacts.from_rows(rows)
+        more = {} if readings is None else {"sensors": readings(latest)}
         try:
-            tau = callback(t, np.frombuffer(q), np.frombuffer(v), contacts)
+            tau = callback(t, np.frombuffer(q), np.frombuffer(v), contacts, **more)
         except Exception as error:
             add_origin(error, f"the controller at t = {t:.6g} s")
             raise

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -41,7 +44,7 @@ class PairExplanation:
     `contact_time` [s] of an undamped impact at that speed, `impact_depth` [m] its largest depth;
     `resting_depth` [m] under the effective mass's own weight; `depth_limit_speed` [m/s] at which
     the depth would reach the radius; `shortest_time` [s] of all time scales, damping and friction
-    included.
+    included; `group` names the pairs that were stated together.
     """
 
     name: str
@@ -54,6 +57,7 @@ class PairExplanation:
     resting_depth: float
     depth_limit_speed: float
     shortest_time: float
+    group: str = ""
 
 
 @dataclass(frozen=True)
@@ -70,8 +74,9 @@ class Explanation:
         """Return the explanation as text."""
         lines = ["Modelled:", *(f"  {line}" for line in self.modelled)]
         lines += ["Not modelled:", *(f"  {line}" for line in self.not_modelled)]
-        for pair in self.pairs:
-            lines += [f"Contact '{pair.name}':", *(f"  {line}" for line in pair.modelled)]
+        for pair, others in _shown(self.pairs):
+            alike = f", the nearest of {others + 1} of '{pair.group}'" if others else ""
+            lines += [f"Contact '{pair.name}'{alike}:", *(f"  {line}" for line in pair.modelled)]
             for label, value, unit in (
                 ("gap at q", pair.gap * 1e3, "mm"),
                 ("effective mass along the normal", pair.effective_mass, "kg"),
@@ -88,6 +93,17 @@ class Explanation:
         return "\n".join(lines)
 
 
+def _shown(pairs: tuple[PairExplanation, ...]) -> Iterator[tuple[PairExplanation, int]]:
+    """Yield the pairs as they are shown, of a group the nearest, with the number of its others."""
+    for group, several in itertools.groupby(pairs, lambda pair: pair.group):
+        members = list(several)
+        if group:
+            nearest = min(members, key=lambda pair: (math.isnan(pair.gap), pair.gap))
+            yield nearest, len(members) - 1
+        else:
+            yield from ((pair, 0) for pair in members)
+
+
 def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explanation:
     """Work out the explanation of `scene` at q (nq,), v (nv,), for a step of `dt` [s]."""
     model = scene.model
@@ -95,8 +111,19 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     gravity = float(np.linalg.norm(model.gravity.linear))
     pairs = tuple(map(_with_curvature, scene.pairs, explain_pairs(scene, q, v)))
     warnings = beyond_limits(model, q)
+    # Of the pairs that were stated together the first speaks for those with the same warning.
+    seen: dict[tuple[str, str], list[str]] = {}
     for pair, figures in zip(scene.pairs, pairs, strict=True):
-        warnings += _warnings_of(scene, pair, figures)
+        for warning in _warnings_of(scene, pair, figures):
+            kind = (
+                re.sub(r"[-+\d.]+", "", warning.replace(pair.name, "")) if pair.group else warning
+            )
+            seen.setdefault((pair.group, kind), []).append(warning)
+    for (group, _), alike in seen.items():
+        more = (
+            f" (and {_count(len(alike) - 1, 'other')} of '{group}')" if group and alike[1:] else ""
+        )
+        warnings.append(f"{alike[0]}{more}")
     scales = [p.shortest_time for p in pairs if math.isfinite(p.shortest_time)]
     scales += scene.joints.time_scales(model).values()
     recommended = _round_down(min(scales) / STEPS_PER_SCALE) if scales else 1e-3
@@ -125,7 +152,7 @@ _JOINT_KINDS = {
     "friction": "dry friction",
     "armature": "armature",
     "effort": "effort limits",
-    "speed": "speed limits, which are only reported",
+    "speed": "speed limits",
 }
 
 
@@ -133,7 +160,8 @@ def _joints_modelled(scene: Scene) -> list[str]:
     out = []
     for kind in scene.joints.kinds():
         names = list(getattr(scene.joints, kind))
-        out.append(f"{_JOINT_KINDS[kind]} of {_names(names)}")
+        only = " (reported where they are exceeded)" if kind == "speed" else ""
+        out.append(f"{_JOINT_KINDS[kind]} of {_names(names)}{only}")
     model = scene.model
     mimics = [str(model.names[j]) for j in model.mimicking_joints]
     if mimics:
@@ -149,8 +177,7 @@ def _joints_stated(scene: Scene) -> list[str]:
         stated = getattr(JointIngredients.from_model(scene.model, [kind], _ANY_LAW), kind)
         left_out = [name for name in stated if name not in getattr(scene.joints, kind)]
         if left_out:
-            what = _JOINT_KINDS[kind].partition(",")[0]
-            out.append(f"{what} that the robot's file states, of {_names(left_out)}")
+            out.append(f"{_JOINT_KINDS[kind]} that the robot's file states, of {_names(left_out)}")
     return out
 
 
@@ -285,6 +312,7 @@ def _explain_pair(
         resting_depth=resting_depth,
         depth_limit_speed=limit,
         shortest_time=min(times, default=math.inf),
+        group=pair.group,
     )
 
 

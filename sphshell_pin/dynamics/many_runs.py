@@ -21,7 +21,9 @@ from sphshell_pin.dynamics.advance import (
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.dynamics.rollout import Plan, Rollout
 from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.dynamics.sensors import SensorSet
 from sphshell_pin.dynamics.variations import Variations, check_names_of, has_length
+from sphshell_pin.dynamics.varied_sensors import VariedSensors
 from sphshell_pin.errors import InvalidParameter, RolloutInterrupted, SphshellError
 from sphshell_pin.shell.options import thread_count
 
@@ -48,6 +50,7 @@ def roll_out(
     record_dt: float | None,
     progress: Callable[[float], object] | None,
     t0: float,
+    sensors: SensorSet,
 ) -> Rollout:
     """Make the runs of Simulation.rollout; its docstring says what the arguments are."""
     began = time.perf_counter()
@@ -59,22 +62,25 @@ def roll_out(
     rows = record_dt if record_dt is not None else (duration or None)
     settings = {0.0: run_settings(scene, integrator, duration, 0.0, record_dt=rows, t0=t0)}
     controllers = _one_each(controller, len(starts))
-    _check_controllers(scene, integrator, controllers, control_dt, starts)
-    variations = Variations(scene, vary, len(starts))
+    _check_controllers(scene, integrator, controllers, control_dt, starts, sensors)
+    variations = Variations(scene, VariedSensors.others(vary), len(starts))
+    varied_sensors = VariedSensors(sensors, scene, vary, len(starts))
     plan = Plan(starts, [None] * len(starts), variations, {}, t0)
 
     def add(run: int) -> None:
         q0, v0 = starts[run]
         varied = variations.scene(run)
-        bound, hold = bind_controller(varied, integrator, controllers[run], control_dt, q0)
+        bound, hold = bind_controller(varied, integrator, controllers[run], control_dt, q0, sensors)
         if hold not in settings:
             settings[hold] = run_settings(varied, integrator, duration, hold, record_dt=rows, t0=t0)
         # The rollout warns of a weak law when a sphere has gone through.
         pairs = core_pairs(varied, q0, v0, warn=False)
-        core.add(pairs, joints, bound, q0, v0, settings[hold])
+        core.add(pairs, joints, bound, q0, v0, settings[hold], varied_sensors.core(run))
 
     def rollout() -> Rollout:
-        return Rollout(scene, integrator, core, plan, workers, time.perf_counter() - began)
+        return Rollout(
+            scene, integrator, core, plan, workers, time.perf_counter() - began, varied_sensors
+        )
 
     workers = max(min(workers, len(starts)), 1)
     joints = scene.joints.to_core(scene.model)
@@ -168,6 +174,7 @@ def _check_controllers(
     controllers: Sequence[AnyController],
     control_dt: float | None,
     starts: list[Start],
+    sensors: SensorSet,
 ) -> None:
     """Refuse a controller that cannot be, each of them once, before anything runs."""
     seen = set[int]()
@@ -176,7 +183,7 @@ def _check_controllers(
             continue
         seen.add(id(controller))
         try:
-            bind_controller(scene, integrator, controller, control_dt, starts[run][0])
+            bind_controller(scene, integrator, controller, control_dt, starts[run][0], sensors)
         except InvalidParameter as error:
             if run == 0:
                 raise

@@ -186,11 +186,12 @@ def _grouped(
     order = sorted(members, key=model.getJointId)
     leader = order[0]
     ratio, offset = members[leader]
-    if ratio == 0.0:
-        raise SphshellError(
-            f"joint '{leader}' mimics '{root}' with multiplier 0: make it a fixed joint, or load "
-            "the robot with mimic = false"
-        )
+    for name, (one, _) in members.items():
+        if one == 0.0:
+            raise SphshellError(
+                f"joint '{name}' mimics '{root}' with multiplier 0: make it a fixed joint, or load "
+                "the robot with mimic = false"
+            )
     kinds = {model.joints[model.getJointId(name)].nq for name in order}
     if len(kinds) > 1:
         raise SphshellError(

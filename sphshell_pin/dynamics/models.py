@@ -51,11 +51,32 @@ def reduced_model(model: pin.Model, lock: tuple[str, ...], q: Array) -> pin.Mode
     Of joints that mimic one another, one that is held holds all. NameNotFound lists the joints;
     InvalidParameter says why Pinocchio cannot hold one.
     """
+    return reduced_geometry(model, pin.GeometryModel(), lock, q)[0]
+
+
+def reduced_geometry(
+    model: pin.Model, geometry: pin.GeometryModel, lock: tuple[str, ...], q: Array
+) -> tuple[pin.Model, pin.GeometryModel]:
+    """Return `reduced_model`, and the geometry of `model` for it."""
     held = held_joints(model, lock)
     for joint in held:
         _check_joint_frame(model, model.names[joint], joint)
+    # Pinocchio looks frames up by name, and fails where a link is called as a joint: usual in ROS.
+    distinct, given = pin.Model(model), {}
+    seen = {frame.name for frame in model.frames if frame.type == pin.FrameType.JOINT}
+    for k, frame in enumerate(model.frames):
+        if frame.type == pin.FrameType.JOINT:
+            continue
+        if frame.name in seen:
+            name = f"{frame.name} #{k}"
+            distinct.frames[k].name, given[name] = name, frame.name
+        seen.add(frame.name)
     try:
-        return pin.buildReducedModel(model, held, q)
+        reduced, shape = pin.buildReducedModel(distinct, geometry, held, q)
+        for k, frame in enumerate(reduced.frames):
+            if frame.name in given:
+                reduced.frames[k].name = given[frame.name]
+        return reduced, shape
     except (ValueError, RuntimeError, IndexError) as error:
         what = f"cannot be held ({str(error).strip()}): name other joints to lock"
         raise InvalidParameter("lock", list(lock), what) from None

@@ -23,6 +23,7 @@ from sphshell_pin.dynamics.busy import one_at_a_time
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.run_stats import RunStats
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
+from sphshell_pin.dynamics.sensors import SensorSet
 from sphshell_pin.dynamics.simulation import Simulation
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NotPicklable
 
@@ -62,6 +63,7 @@ class OpenRun:
         self.simulation = simulation
         self.ended: str | None = None
         self._user = _core.OneUser("OpenRun")
+        self._sensors = SensorSet(simulation.sensors, simulation.scene)
         # Scene.explain reports a weak law.
         self._core = start_run(
             simulation.scene,
@@ -73,9 +75,10 @@ class OpenRun:
             control_dt,
             record_dt=record_dt,
             t0=t0,
+            sensors=self._sensors,
             warn=False,
         )
-        self._controller = controller
+        self._controller, self._control_dt = controller, control_dt
         self._rows = 0
         self._start = self.snapshot()
 
@@ -135,11 +138,13 @@ class OpenRun:
         """
         if not _alike(self.scene, scene):
             return False
-        simulation = Simulation(scene, self.simulation.integrator)
+        simulation = Simulation(scene, self.simulation.integrator, self.simulation.sensors)
         q, v = np.array(self._core.q), np.array(self._core.v)
         core_controller = None
         if controller is not None and controller is not self._controller:
-            core_controller, _ = bind_controller(scene, simulation.integrator, controller, None, q)
+            core_controller, _ = bind_controller(
+                scene, simulation.integrator, controller, self._control_dt, q, self._sensors
+            )
         pairs = core_pairs(scene, q, v, warn=False)
         self._core.change(pairs, scene.joints.to_core(scene.model), core_controller)
         if core_controller is not None:
@@ -164,16 +169,17 @@ class OpenRun:
         if not model.existFrame(frame):
             raise FrameNotFound(frame, [one.name for one in model.frames])
         where = model.frames[model.getFrameId(frame)]
+        number = model.getFrameId(frame)
         if where.parentJoint == 0:
             raise InvalidParameter("frame", frame, "is fixed to the world: nothing would move")
         force = check_vector("force_world", force_world, 3, " [N]")
-        self._core.push(where.parentJoint, where.placement.translation, force)
+        self._core.push(where.parentJoint, where.placement.translation, force, number)
 
     def _result(self, record: dict[str, NDArray[np.generic]], first: int = 0) -> Result:
         # The core counts rows from the start of the run, a result from its own first one.
         record["contact_row"] = record["contact_row"] - first
         names = tuple(pair.name for pair in self.scene.pairs)
-        return Result.from_blocks([record], names, RunStats(), self.scene)
+        return Result.from_blocks([record], names, RunStats(), self.scene, self._sensors)
 
 
 def contacts_of(row: Result) -> SceneContacts:

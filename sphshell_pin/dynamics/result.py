@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
@@ -14,6 +15,7 @@ from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.dynamics.scene_contacts import Columns, SceneContacts, columns
+from sphshell_pin.dynamics.sensor_log import SensorLog, joined_logs, sensor_columns, split_logs
 from sphshell_pin.errors import MissingExtra
 
 if TYPE_CHECKING:
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     import pinocchio as pin
     from matplotlib.figure import Figure
 
+    from sphshell_pin.dynamics.sensors import SensorSet
     from sphshell_pin.view.recording import RecordingView
 
 Array = NDArray[np.float64]
@@ -135,7 +138,8 @@ class Result:
     `t` (n,) [s], `q` (n, nq), `v` (n, nv) at the recorded rows; `pairs` the names of the contact
     pairs; `contacts` the contact log; `events` in order of time; `energy` the audit; `stats`
     its cost, and figures of each pair over all steps; `scene` that ran
-    (None after load); `origin` the scenario it came from (None without one).
+    (None after load); `origin` the scenario it came from (None without one); `sensors` the readings
+    of each sensor by its name.
     """
 
     t: Array
@@ -148,6 +152,7 @@ class Result:
     stats: RunStats
     scene: Scene | None = None
     origin: Origin | None = None
+    sensors: Mapping[str, SensorLog] = field(default_factory=dict)
 
     @classmethod
     def from_blocks(
@@ -156,6 +161,7 @@ class Result:
         pairs: tuple[str, ...],
         stats: RunStats,
         scene: Scene,
+        sensors: SensorSet,
     ) -> Result:
         """Join the core's blocks of recorded rows."""
         whole = {k: np.concatenate([b[k] for b in blocks]) for k in blocks[0]}
@@ -181,6 +187,7 @@ class Result:
             energy=EnergyAudit(**energy),
             stats=stats,
             scene=scene,
+            sensors=sensors.logs(whole),
         )
 
     def save(self, path: str | PathLike[str], *, home: str | PathLike[str] | None = None) -> Path:
@@ -189,7 +196,7 @@ class Result:
         The path of a scenario is written relative to the folder `home`, where the results will stay
         (default: that of `path`).
         """
-        from sphshell_pin.dynamics.result_file import origin_in_file, write_result
+        from sphshell_pin.dynamics.result_file import SENSOR_ARRAYS, origin_in_file, write_result
 
         target = Path(path)
         arrays: Columns = {"t": self.t, "q": self.q, "v": self.v}
@@ -206,6 +213,9 @@ class Result:
             "events": [[e.t, e.pair, e.kind] for e in self.events],
             "origin": origin,
         }
+        if self.sensors:
+            header["sensors"] = {name: log.columns for name, log in self.sensors.items()}
+            arrays |= dict(zip(SENSOR_ARRAYS, joined_logs(self.sensors), strict=True))
         write_result(target, header, arrays)
         return target
 
@@ -220,7 +230,7 @@ class Result:
         ResultError
             The file cannot be read, or is not what save() writes: the text says which part of it.
         """
-        from sphshell_pin.dynamics.result_file import read_result
+        from sphshell_pin.dynamics.result_file import SENSOR_ARRAYS, read_result
 
         header, arrays = read_result(path, max_size)
         log = {f.name: arrays[f"contacts.{f.name}"] for f in fields(ContactLog)}
@@ -238,6 +248,12 @@ class Result:
             energy=EnergyAudit(**energy),
             stats=header.stats,
             origin=origin,
+            sensors=split_logs(
+                {name: tuple(columns) for name, columns in header.sensors.items()},
+                *(arrays[name] for name in SENSOR_ARRAYS),
+            )
+            if header.sensors
+            else {},
         )
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -272,13 +288,21 @@ class Result:
             "number": log.contact_id,
         }
 
+    def sensor_columns(self) -> dict[str, Array]:
+        """Return the readings of all sensors as columns, units in the names (for CSV, tables).
+
+        One row for each time at which a reading arrived; nan where another sensor has none.
+        """
+        return sensor_columns(self.sensors)
+
     def plot(self, kind: str = "overview", scene: Scene | None = None) -> Figure:
         """Return a figure, which a notebook shows.
 
         `kind` is "overview" (forces, depth and energy over time), "force" (force and depth of each
-        pair), "energy" (the audit), "path" (of the contacts on their shells) or "map" (the impulse
-        that each element took). The last two need a scene: `scene`, or the one that ran, or that of
-        the scenario the result came from; without any, the path is drawn in the world.
+        pair), "energy" (the audit), "sensors" (their readings), "path" (of the contacts on their
+        shells) or "map" (the impulse that each element took). The last two need a scene: `scene`,
+        or the one that ran, or that of the scenario the result came from; without any, the path is
+        drawn in the world.
 
         Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where
         there is no scene for the map or the scenario cannot be built again.

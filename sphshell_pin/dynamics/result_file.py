@@ -55,7 +55,16 @@ ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
 }
 """By name: the numbers of an array and its shape; a size of the same name is the same in all."""
 
-_IN_FILE = {name: name for name in ARRAYS} | {"contacts.contact_id": "contacts.number"}
+SENSOR_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
+    "sensors.sensor": (INT, ("s",)),
+    "sensors.t": (FLOAT, ("s",)),
+    "sensors.sampled": (FLOAT, ("s",)),
+    "sensors.values": (FLOAT, ("w",)),
+}
+"""The same of a run with sensors; other files have none of them."""
+
+_IN_FILE = {name: name for name in ARRAYS | SENSOR_ARRAYS}
+_IN_FILE["contacts.contact_id"] = "contacts.number"
 
 
 class _Part(BaseModel):
@@ -85,6 +94,7 @@ class Header(_Part):
     stats: RunStats
     events: list[tuple[float, str, EventKind]]
     origin: _Origin | None = None
+    sensors: dict[str, list[str]] = {}
 
 
 def origin_in_file(scenario: str, settings: dict[str, object], home: Path) -> dict[str, object]:
@@ -136,7 +146,8 @@ def _read(
 ) -> tuple[Header, Columns]:
     files = {one.filename: one for one in archive.infolist()}
     shapes: dict[str, tuple[int, ...]] = {}
-    parts = {"header": "header.npy"} | {name: f"{_IN_FILE[name]}.npy" for name in ARRAYS}
+    arrays_in = ARRAYS | (SENSOR_ARRAYS if "sensors.t.npy" in files else {})
+    parts = {"header": "header.npy"} | {name: f"{_IN_FILE[name]}.npy" for name in arrays_in}
     for name, part in parts.items():
         if part not in files:
             raise _refused(path, f"it has no array '{name}'")
@@ -144,9 +155,9 @@ def _read(
         if name == "header":
             if kind.kind != "U" or shapes[name] != () or kind.itemsize > 4 * LARGEST_HEADER:
                 raise _refused(path, f"'header' is no text but {kind} {shapes[name]}")
-        elif kind != ARRAYS[name][0]:
-            raise _refused(path, f"'{name}' holds {kind}, not {ARRAYS[name][0]}")
-    _check_shapes(path, shapes)
+        elif kind != arrays_in[name][0]:
+            raise _refused(path, f"'{name}' holds {kind}, not {arrays_in[name][0]}")
+    _check_shapes(path, shapes, arrays_in)
     size = sum(files[part].file_size for part in parts.values())
     if size > max_size:
         raise ResultError(
@@ -157,6 +168,8 @@ def _read(
     arrays = {name: _array(archive, files[part]) for name, part in parts.items()}
     header = _header(path, str(arrays.pop("header")))
     _check_values(path, arrays, len(header.pairs))
+    if header.sensors:
+        _check_sensors(path, arrays, header.sensors)
     return header, arrays
 
 
@@ -182,9 +195,13 @@ def _announced(
     return kind, shape
 
 
-def _check_shapes(path: str | PathLike[str], shapes: dict[str, tuple[int, ...]]) -> None:
+def _check_shapes(
+    path: str | PathLike[str],
+    shapes: dict[str, tuple[int, ...]],
+    arrays: Mapping[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]],
+) -> None:
     sizes: dict[str | int, tuple[int, str]] = {3: (3, "")}
-    for name, (_, wanted) in ARRAYS.items():
+    for name, (_, wanted) in arrays.items():
         shape = shapes[name]
         called = f"({', '.join(map(str, wanted))}{',' * (len(wanted) == 1)})"
         if len(shape) != len(wanted):
@@ -234,6 +251,21 @@ def _check_values(path: str | PathLike[str], arrays: Columns, pairs: int) -> Non
         falls = np.flatnonzero(~(np.diff(arrays[name]) >= 0))
         if falls.size or not np.isfinite(arrays[name]).all():
             raise _refused(path, f"'{name}' does not rise at row {falls[0] if falls.size else 0}")
+
+
+def _check_sensors(
+    path: str | PathLike[str], arrays: Columns, sensors: Mapping[str, list[str]]
+) -> None:
+    if "sensors.t" not in arrays:
+        raise _refused(path, "it has no array 'sensors.t'")
+    which = arrays["sensors.sensor"]
+    if which.size and not (which.min() >= 0 and which.max() < len(sensors)):
+        raise _refused(path, f"'sensors.sensor' is not from 0 to {len(sensors) - 1}")
+    widths = np.array([len(columns) for columns in sensors.values()])
+    wanted = int(widths[which].sum())
+    if wanted != arrays["sensors.values"].size:
+        found = arrays["sensors.values"].size
+        raise _refused(path, f"'sensors.values' has {found} values, its readings {wanted}")
 
 
 def _refused(path: str | PathLike[str], why: str) -> ResultError:

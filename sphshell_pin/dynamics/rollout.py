@@ -20,6 +20,7 @@ from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.run_stats import PairFigures
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.dynamics.variations import Variations
+from sphshell_pin.dynamics.varied_sensors import VariedSensors
 from sphshell_pin.errors import (
     Interrupted,
     MissingExtra,
@@ -80,10 +81,12 @@ class Rollout(Sequence[Result]):
         plan: Plan,
         threads: int,
         wall_time: float,
+        sensors: VariedSensors,
     ) -> None:
         self._integrator, self._core, self._plan = integrator, core, plan
+        self._sensors = sensors.base
         self.threads, self.wall_time = threads, wall_time
-        self.varied = plan.variations.columns
+        self.varied = {**plan.variations.columns, **sensors.columns}
         self.failures = dict(plan.failures)
         count = len(plan.starts)
         self.t = np.full(count, plan.t0)
@@ -182,7 +185,8 @@ class Rollout(Sequence[Result]):
         number = self._plan.numbers[run]
         assert number is not None
         scene = self._plan.variations.scene(run)
-        return result_of(scene, self._integrator, outcome, self._core.record(number))
+        record = self._core.record(number)
+        return result_of(scene, self._integrator, outcome, record, self._sensors)
 
     def _why_not_begun(self, run: int, outcome: _core.Outcome) -> SphshellError | None:
         if outcome.deep_start is not None:

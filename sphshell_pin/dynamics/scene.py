@@ -81,6 +81,8 @@ class Scene:
                 "q_lock", q_lock, "must come with lock, the joints to hold there"
             )
         self._model = reduced_model(model, self.lock, q) if self.lock else pin.Model(model)
+        # What a locked joint holds, its frames do not say any more.
+        self._whole = (pin.Model(model), q) if self.lock else (self._model, q)
         # Of joints that are held nothing is left to model.
         held = () if joints is None else tuple(n for n in model.names if n not in self._model.names)
         self._joints = check_joints(joints, self._model, held)
@@ -105,6 +107,11 @@ class Scene:
             self._shown = pin.Model(self._model)
         self._check_unchanged()
         return self._shown
+
+    @property
+    def whole(self) -> tuple[pin.Model, Array]:
+        """The model with the locked joints, and a configuration that has them where they are."""
+        return self._whole
 
     @property
     def neutral(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from numpy.typing import ArrayLike
 
@@ -19,13 +19,22 @@ from sphshell_pin.dynamics.many_runs import roll_out
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.rollout import Rollout
 from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.dynamics.sensors import Sensor, SensorSet, check_sensors
 from sphshell_pin.errors import Interrupted, InvalidParameter, SimulationDiverged
 
 
 class Simulation:
-    """Moves `scene` in time with `integrator`, Adaptive() unless given."""
+    """Moves `scene` in time with `integrator`, Adaptive() unless given.
 
-    def __init__(self, scene: Scene, integrator: Integrator | None = None) -> None:
+    `sensors` are read on the way: for the results, and for controller callables.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        integrator: Integrator | None = None,
+        sensors: Iterable[Sensor] = (),
+    ) -> None:
         if not isinstance(scene, Scene):
             raise InvalidParameter("scene", type(scene).__name__, "must be a sphshell_pin.Scene")
         integrator = Adaptive() if integrator is None else integrator
@@ -38,6 +47,7 @@ class Simulation:
             )
         self.scene = scene
         self.integrator = integrator
+        self.sensors = check_sensors(sensors)
 
     def run(
         self,
@@ -57,9 +67,10 @@ class Simulation:
         tau(t, q, v, contacts) -> (nv,). Torques are held for `control_dt` [s]; by default a
         callable is asked once a fixed step, a controller of this package at every stage of it.
         Adaptive and Implicit ask at every stage, and Implicit 2 nv + 2 times more a step, at states
-        nearby: a callable with a memory needs control_dt. Rows are recorded every `record_dt` [s]
-        (default: every step); `progress` is called a few times a second with the share done. The
-        same input gives the same bits.
+        nearby: a callable with a memory needs control_dt. So does one with a fifth argument
+        `sensors`: it gets the latest reading of each sensor by name. Rows are recorded every
+        `record_dt` [s] (default: every step); `progress` is called a few times a second with the
+        share done. The same input gives the same bits.
 
         A law that cannot stop its sphere earns a WeakLawWarning, a path off its shell a
         SetupWarning.
@@ -67,6 +78,7 @@ class Simulation:
         Raises InvalidParameter for wrong sizes and values, DeepStart for a sphere that starts
         deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.
         """
+        sensors = SensorSet(self.sensors, self.scene)
         core = start_run(
             self.scene,
             self.integrator,
@@ -77,6 +89,7 @@ class Simulation:
             control_dt,
             record_dt=record_dt,
             t0=t0,
+            sensors=sensors,
         )
         ctrl_c = CtrlC()
 
@@ -90,9 +103,9 @@ class Simulation:
             with ctrl_c:
                 status = advance(core, glance=glance)
         except KeyboardInterrupt:
-            result = result_of(self.scene, self.integrator, core, core.take())
+            result = result_of(self.scene, self.integrator, core, core.take(), sensors)
             raise Interrupted(core.time, result) from None
-        result = result_of(self.scene, self.integrator, core, core.take())
+        result = result_of(self.scene, self.integrator, core, core.take(), sensors)
         reason = why_ended(status, core, self.scene)
         if reason is not None:
             raise SimulationDiverged(core.time, reason, result)
@@ -126,7 +139,8 @@ class Simulation:
             "PAIR.friction.FIELD" (n numbers; the fields of the law or friction that the pair has),
             "PAIR.sphere.radius" (n) [m], "PAIR.sphere.offset" (n, 3) [m], the same of
             "PAIR.other_sphere", "PAIR.placement" of
-            the shell in its frame (n pinocchio.SE3)
+            the shell in its frame (n pinocchio.SE3), "sensors.NAME.FIELD" (n numbers), such as the
+            seed of a sensor's noise
         record_dt : between recorded rows [s]; unless given only start and end are recorded
         progress : called a few times a second with the share of the runs that are done
 
@@ -155,4 +169,5 @@ class Simulation:
             record_dt=record_dt,
             progress=progress,
             t0=t0,
+            sensors=SensorSet(self.sensors, self.scene),
         )

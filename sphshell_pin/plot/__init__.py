@@ -18,6 +18,7 @@ from sphshell_pin.plot.over_time import (
     plot_force_and_depth,
     plot_overview,
 )
+from sphshell_pin.plot.sensors import plot_sensors
 from sphshell_pin.plot.series import MOST_POINTS, PairSeries
 
 if TYPE_CHECKING:
@@ -41,10 +42,11 @@ __all__ = [
     "plot_force_and_depth",
     "plot_overview",
     "plot_result",
+    "plot_sensors",
     "save_figures",
 ]
 
-KINDS = ("overview", "force", "energy", "path", "map")
+KINDS = ("overview", "force", "energy", "path", "map", "sensors")
 
 
 def plot_result(result: Result, kind: str = "overview", scene: Scene | None = None) -> Figure:
@@ -52,8 +54,9 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
 
     `kind` is one of KINDS: force, depth and energy over time ("overview"), force and depth of each
     pair ("force"), the energy audit ("energy"), the contacts' path on their shells ("path"), the
-    impulse that each element took ("map"). The last two are drawn on the shells of `scene`
-    (default: the scene that ran, or that of the scenario the result came from).
+    impulse that each element took ("map"), the readings over time ("sensors"). Path and map are
+    drawn on the shells of `scene` (default: the scene that ran, or that of the scenario the result
+    came from).
 
     Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where "map"
     has no scene.
@@ -68,6 +71,7 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
         "overview": plot_overview,
         "force": plot_force_and_depth,
         "energy": plot_energy,
+        "sensors": plot_sensors,
     }
     return over_time[kind](result)
 
@@ -90,10 +94,10 @@ def save_figures(
 ) -> list[Path]:
     """Write the figures of `result` as .png files into `folder`; return their paths.
 
-    They are force_and_depth, energy, contact_path and, of a result that touched a shell,
-    contact_map. Paths and map are drawn on the shells of `scene` (default: the scene that ran; a
-    loaded result has none: then the path is drawn in the world, and there is no map). Raises
-    MissingExtra without matplotlib, ResultError if a file cannot be written.
+    They are force_and_depth, energy, contact_path, of a result that touched a shell contact_map,
+    and of one with sensors sensors. Paths and map are drawn on the shells of `scene` (default: the
+    scene that ran; a loaded result has none: then the path is drawn in the world, and there is no
+    map). Raises MissingExtra without matplotlib, ResultError if a file cannot be written.
     """
     scene = result.scene if scene is None else scene
     figures = {
@@ -104,4 +108,6 @@ def save_figures(
     touched = {int(pair) for pair in result.contacts.pair}
     if scene is not None and any(scene.pairs[pair].shell is not None for pair in touched):
         figures["contact_map.png"] = plot_contact_map(result, scene)
+    if result.sensors:
+        figures["sensors.png"] = plot_sensors(result)
     return [write_figure(Path(folder) / name, figure) for name, figure in figures.items()]

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene import Scene
 
 
+MOST_NAMES = 8  # beside the paths with the largest forces
+
+
 def plot_contact_path(result: Result, scene: Scene | None = None) -> Figure:
     """Return a Figure of the contact points' path colored by normal force.
 
@@ -69,6 +72,7 @@ def _draw(axis: Axes3D, group: PathGroup, names: list[str], factor: float) -> Li
     if group.shell is not None:
         picture.draw_shell(group.shell)
     segments, colors = [], []
+    strongest = sorted(group.paths, key=lambda path: -float(path.force.max()))[:MOST_NAMES]
     for path in group.paths:
         for run in path.runs:
             kept = run[picture.kept(path.points[run])]
@@ -77,7 +81,8 @@ def _draw(axis: Axes3D, group: PathGroup, names: list[str], factor: float) -> Li
             segments.append(path.points[ends] * picture.factor)
             colors.append(path.force[ends].mean(axis=1))
         hidden = group.shell is not None and float(path.normals[0] @ picture.toward) < 0.0
-        picture.mark_start(path.points[0], names[path.pair], hidden=hidden)
+        name = names[path.pair] if any(path is one for one in strongest) else ""
+        picture.mark_start(path.points[0], name, hidden=hidden)
     lines = Line3DCollection(
         np.concatenate(segments), cmap="turbo", linewidths=2.4, capstyle="round", zorder=3
     )

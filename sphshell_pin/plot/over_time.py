@@ -37,7 +37,8 @@ def plot_overview(result: Result) -> Figure:
     """
     figure = new_figure(12.5, 7.0)
     axes = figure.subplots(2, 2, sharex=True)
-    touched = [pair for pair in _series(result) if pair.touches]
+    every = [pair for pair in _series(result) if pair.touches]
+    touched = _largest(every)
     if len(touched) == 1:
         _draw_forces(axes[0, 0], result, touched[0], touched[0].peak)
         axes[0, 0].set_title(f"force of {touched[0].name}", fontsize=10)
@@ -49,7 +50,7 @@ def plot_overview(result: Result) -> Figure:
     _draw_residual(axes[1, 1], result)
     for axis in axes[1]:
         axis.set_xlabel("time [s]")
-    figure.suptitle(_headline(result), fontsize=11)
+    figure.suptitle(f"{_headline(result)}{_left_out(every, touched)}", fontsize=11)
     return figure
 
 
@@ -59,8 +60,7 @@ def plot_force_and_depth(result: Result) -> Figure:
     Of more than eight pairs in touch, the eight with the largest peak force are drawn.
     """
     touched = [pair for pair in _series(result) if pair.touches]
-    largest = sorted(touched, key=lambda pair: -pair.peak)[:MOST_PAIRS]
-    shown = [pair for pair in touched if pair in largest]
+    shown = _largest(touched)
     if len(shown) <= 1:
         figure = new_figure(9.0, 6.5)
         axes = figure.subplots(2, 1, sharex=True).reshape(1, 2)
@@ -75,12 +75,10 @@ def plot_force_and_depth(result: Result) -> Figure:
             say(axis, NO_CONTACT)
             axis.set_ylabel(quantity)
     for pair, (force, depth) in zip(shown, axes, strict=False):
-        _draw_forces(force, result, pair, largest[0].peak)
+        _draw_forces(force, result, pair, max(one.peak for one in shown))
         _draw_depths(depth, result, [pair])
         force.set_title(_pair_title(result, pair), fontsize=10, loc="left")
-    left_out = len(touched) - len(shown)
-    note = f" ({count(left_out, 'pair', 'pairs')} with smaller forces left out)" if left_out else ""
-    figure.suptitle(f"Contact force and depth{note}", fontsize=12)
+    figure.suptitle(f"Contact force and depth{_left_out(touched, shown)}", fontsize=12)
     return figure
 
 
@@ -93,6 +91,17 @@ def plot_energy(result: Result) -> Figure:
     lower.set_xlabel("time [s]")
     figure.suptitle("Energy audit", fontsize=12)
     return figure
+
+
+def _largest(touched: list[PairSeries]) -> list[PairSeries]:
+    """Return the pairs with the largest peak force, MOST_PAIRS at most, in their order."""
+    largest = sorted(touched, key=lambda pair: -pair.peak)[:MOST_PAIRS]
+    return [pair for pair in touched if any(pair is one for one in largest)]
+
+
+def _left_out(touched: list[PairSeries], shown: list[PairSeries]) -> str:
+    left_out = len(touched) - len(shown)
+    return f" ({count(left_out, 'pair', 'pairs')} with smaller forces left out)" if left_out else ""
 
 
 def _series(result: Result) -> list[PairSeries]:

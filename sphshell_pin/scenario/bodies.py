@@ -13,7 +13,12 @@ import pinocchio as pin
 
 from sphshell_pin.checks import off_unit_length
 from sphshell_pin.dynamics.mimic import check_follows, count_of_all, mimics, shortened
-from sphshell_pin.dynamics.models import find_frame, find_joint, held_joints, set_joint
+from sphshell_pin.dynamics.models import (
+    find_frame,
+    find_joint,
+    reduced_geometry,
+    set_joint,
+)
 from sphshell_pin.errors import MissingExtra, ScenarioError, SphshellError
 from sphshell_pin.robots import LoadedRobot, load, load_file
 from sphshell_pin.scenario.reading import item_key
@@ -147,9 +152,7 @@ def reduce_visual(assembly: Assembly) -> pin.GeometryModel:
     """Return the visual geometry for the model with `assembly.lock` locked."""
     if not assembly.lock:
         return assembly.visual_model
-    ids = held_joints(assembly.model, assembly.lock)
-    _, geometry = pin.buildReducedModel(assembly.model, assembly.visual_model, ids, assembly.q0)
-    return geometry
+    return reduced_geometry(assembly.model, assembly.visual_model, assembly.lock, assembly.q0)[1]
 
 
 def restrict(model: pin.Model, reduced: pin.Model, q: Array, v: Array) -> tuple[Array, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -18,6 +18,7 @@ import sphshell_pin as sp
 from sphshell_pin.dynamics.callables import check_callable
 from sphshell_pin.dynamics.controllers import Callback, Controller, PythonFunction, ShellPlace
 from sphshell_pin.dynamics.explain import Explanation
+from sphshell_pin.dynamics.sensors import Sensor, check_sensors
 from sphshell_pin.errors import (
     InvalidParameter,
     NameNotFound,
@@ -172,8 +173,9 @@ def build_scenario(
             )
     q0, v0 = restrict(assembly.model, scene.model, assembly.q0, assembly.v0)
     controller = _build_controller(scenario.controller, scene, q0, shells, path, load)
+    sensors = _build_sensors(scenario.sensor, scene, path)
     with blamed_on(path, "run"):
-        simulation = sp.Simulation(scene, integrator=scenario.run.made())
+        simulation = sp.Simulation(scene, scenario.run.made(), sensors)
     figures = {
         figure: load(where, f"figures.{figure}") for figure, where in scenario.figures.items()
     }
@@ -303,6 +305,16 @@ def _add_contact(
                 method=contact.method,
                 name=contact.name,
             )
+
+
+def _build_sensors(stated: Sequence[Ingredient], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
+    for i, one in enumerate(stated):
+        with blamed_on(path, item_key("sensor", stated, i)):
+            assert isinstance(one, Sensor)
+            # A wrong frame or joint is reported now, not when the run starts.
+            one.to_core(scene)
+    with blamed_on(path, "sensor"):
+        return check_sensors(stated)
 
 
 def _build_controller(

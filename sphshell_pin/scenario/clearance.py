@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.dynamics.models import find_frame
+from sphshell_pin.dynamics.models import find_frame, held_joints
 from sphshell_pin.scenario.tips import Tip
 from sphshell_pin.shell.shell import Shell
 
@@ -53,7 +53,7 @@ class Links:
         self._surface = _tree(shell)
         self._box = shell.box
         frames = [model.frames[find_frame(model, tip.frame)] for tip in tips]
-        held = {int(model.getJointId(name)) for name in lock}
+        held = set(held_joints(model, tuple(lock)))
         own = [_fixed_to(model, int(frame.parentJoint), held) for frame in frames]
         self._objects: list[tuple[int, tuple[int, ...]]] = []
         for i, one in enumerate(geometry.geometryObjects):
@@ -77,17 +77,14 @@ class Links:
             self._data.oMf[find_frame(model, tip.frame)].act(tip.offset) for tip in self._tips
         ]
         part = coal.Transform3s(placement.rotation, placement.translation)
-        for i, at in self._objects:
+        for k, (i, at) in enumerate(self._objects):
             one, pose = geometry.geometryObjects[i], self._geometry_data.oMg[i]
             found = self._touch(one, pose, part, [(centers[k], self._tips[k].radius) for k in at])
-            if (
-                found is None
-                and whole
-                and self._shell.is_closed
-                and self._inside(one, pose, placement)
-            ):
+            if found is None and whole and self._inside(one, pose, placement):
                 found = pose.translation
             if found is not None:
+                # What is in the way here will be so in the next place, too.
+                self._objects.insert(0, self._objects.pop(k))
                 return Intrusion(_link_of(model, one), np.array(found))
         return None
 
@@ -122,7 +119,7 @@ class Links:
         at = placement.actInv(pose.act(point))
         if (at < self._box[0]).any() or (at > self._box[1]).any():
             return False
-        return bool(self._shell.closest_points(at[None]).distances[0] < 0)
+        return bool(self._shell.closest_points(at[None], method="facets").distances[0] < 0)
 
 
 def _tree(shell: Shell) -> coal.BVHModelOBBRSS:

@@ -42,10 +42,14 @@ title = {title}
 [robot]
 name = {robot.name!o}
 urdf = {robot.urdf!o}
+file = {robot.file!o}
 package_dirs = {robot.package_dirs!o}
+xacro_args = {robot.xacro_args!o}
 free_flyer = {robot.free_flyer!o} # the root link floats
 # They do not move the tip: locked, they cost nothing.
 lock = {robot.lock!o}
+# What acts in the joints, as the robot's file states it{left_out}.
+joints = {robot.joints!o}
 """
 _ROOT = """
 [robot.start]
@@ -166,7 +170,10 @@ def draft_text(
     """Return the text of the scenario called `name`."""
     pairs = pair_names(plan.tips, shell.name)
     digits = decimals(plan.gap)
-    text = _fill(_ROBOT, name=name, title=title, robot=robot)
+    left_out = ""
+    if plan.left_out:
+        left_out = f", without {' and '.join(plan.left_out)}: the tip would not hold its force"
+    text = _fill(_ROBOT, name=name, title=title, robot=robot, left_out=left_out)
     if plan.root is not None:
         text += _fill(_ROOT, root=_rounded(plan.root, digits))
     elif robot.start:

@@ -21,6 +21,15 @@ PAIR_FIGURES = {
     "max_depth": "m",
     "max_depth_time": "s",
 }
+JOINT_FIGURES = {
+    "stop_time": "s",
+    "stops": "",
+    "stop_impulse": "N m s",
+    "peak_stop_force": "N m",
+    "max_stop_depth": "rad",
+    "cut_time": "s",
+    "peak_speed": "rad/s",
+}
 RUN_FIGURES = {
     "energy.exchanged": "J",
     "energy.residual": "J",
@@ -44,6 +53,9 @@ class Verdict:
 def figure_names(built: Built) -> list[str]:
     """Return every figure that a run of this scenario can be measured by."""
     names = [f"pairs.{pair.name}.{one}" for pair in built.scene.pairs for one in PAIR_FIGURES]
+    joints = built.scene.joints
+    watched = dict.fromkeys((*joints.limits, *joints.effort, *joints.speed))
+    names += [f"joints.{name}.{one}" for name in watched for one in JOINT_FIGURES]
     names += RUN_FIGURES
     names += [f"figures.{name}" for name in built.figures]
     model = built.scene.model
@@ -75,11 +87,14 @@ def check_expectations(built: Built) -> None:
 
 
 def measure(built: Built, result: Result, name: str) -> float:
-    """Return the figure `name` of `result` [SI units, see PAIR_FIGURES and RUN_FIGURES]."""
+    """Return the figure `name` of `result`, in SI units: see PAIR_, JOINT_ and RUN_FIGURES."""
     kind, _, rest = name.partition(".")
     if kind == "pairs":
         pair, _, figure = rest.rpartition(".")
         return float(getattr(result.stats.pairs[pair], figure))
+    if kind == "joints":
+        joint, _, figure = rest.rpartition(".")
+        return float(getattr(result.stats.joints[joint], figure))
     if kind == "figures":
         try:
             return float(built.figures[rest](result, built.scene))

@@ -184,15 +184,15 @@ class LiveRun:
         after = rebuild(before, {key: repr(float(value))})
         same = {
             name: getattr(before.scenario, name) == getattr(after.scenario, name)
-            for name in ("robot", "shell", "controller", "run")
+            for name in ("robot", "shell", "sensor", "controller", "run")
         }
         controller = None if same["controller"] else after.controller
         goes_on = same["robot"] and same["shell"] and same["run"] and self.ended is None
         if not goes_on:
             self._begin(_open_run(after, after.q0, after.v0, 0.0))
-        elif self._run.change(after.scene, controller):
+        elif same["sensor"] and self._run.change(after.scene, controller):
             self._row = self._run.snapshot()
-        else:  # another gravity: from here on, under it
+        else:  # another gravity or sensor: from here on, with it
             self._go_on(_open_run(after, self.q, self.v, self.time))
         self.built = after
         # Their ranges stay those of the start: they do not wander with the values.

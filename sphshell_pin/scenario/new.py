@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -13,10 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin.atomic import atomic_file
-from sphshell_pin.checks import check_positive
+from sphshell_pin.checks import check_positive, check_vector
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
+from sphshell_pin.robots import is_path
 from sphshell_pin.scenario.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.drafting import draft_text
+from sphshell_pin.scenario.hand import every_tip, hold_in_hand, part_file, word_primitive
 from sphshell_pin.scenario.knobs import check_knobs
 from sphshell_pin.scenario.materials import find_material
 from sphshell_pin.scenario.plan import Hold, Plan, Press
@@ -35,6 +37,8 @@ Array = npt.NDArray[np.float64]
 WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 """Surfaces that need no file."""
 
+# Endings of the robots' files: URDF, MJCF and xacro.
+_ROBOT_FILES = (".urdf", ".xml", ".mjcf", ".xacro")
 # Half the size of a surface that needs no file, in radii of the sphere.
 _SIZE = 15.0
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
@@ -59,6 +63,7 @@ def new_scenario(
     *,
     frame: str | None = None,
     radius: float | None = None,
+    offset: npt.ArrayLike | None = None,
     unit: str | None = None,
     bodies: Sequence[str] | None = None,
     faces: Sequence[str | int] | None = None,
@@ -66,24 +71,31 @@ def new_scenario(
     against: str = "steel",
     press: float | None = None,
     place: str | None = None,
+    tips: Literal["one", "all"] = "one",
     free_flyer: bool = False,
     package_dirs: Sequence[str | PathLike[str]] = (),
+    xacro_args: Mapping[str, str] | None = None,
     out: str | PathLike[str] | None = None,
     force: bool = False,
 ) -> NewScenario:
     """Write a scenario in which `robot` touches `surface`, with values that work for its size.
 
+    Drafts are run; the first is written that touches, holds its force within 5 %, and keeps the
+    robot's links out of the part.
+
     Parameters
     ----------
     robot
-        Name of a shipped robot, or path of a URDF file (`free_flyer`: its root floats;
-        `package_dirs`: folders above the packages of its meshes).
+        Name of a shipped robot, or path of a URDF, xacro (`xacro_args`: its arguments) or MJCF file
+        (`free_flyer`: the root of a URDF floats; `package_dirs`: folders above the packages of its
+        meshes).
     surface
         A surface file, its `unit` where the format has none, or a word of WORDS.
     bodies, faces
         Of a CAD file: those to take, by name or number; by default all of it.
-    frame, radius
-        Of the sphere [m], whose center is the frame's origin; by default a known fingertip or foot.
+    frame, radius, offset
+        Of the sphere: the frame that carries it, its radius [m], and its center (3,) [m] in the
+        frame, by default the origin; without a frame it is a known fingertip or foot.
     material, against
         What the sphere and the surface are made of, names of MATERIALS; by default a free body is
         of steel, any other sphere of rubber, or of plastic where rubber is too soft.
@@ -91,6 +103,9 @@ def new_scenario(
         Normal force [N] of a robot with a fixed base.
     place
         Where the surface stands as seen from its tip, a key of PLACES.
+    tips
+        "all": all fingertips of a hand hold the surface, which then is a free part, of `against`
+        all through; its URDF is written beside the scenario, as NAME_part.urdf.
     out
         The file to write, by default ROBOT_on_SURFACE.toml here; an existing one is replaced with
         `force` only, and only when all went well.
@@ -102,7 +117,8 @@ def new_scenario(
     NameNotFound, FrameNotFound
         No such robot, frame, material, place.
     SphshellError
-        What cannot be found out and is not given, or a file that cannot be read or written.
+        What cannot be found out and is not given, a file that cannot be read or written, or that no
+        draft works: the text says what fails in it and what to change.
     """
     if radius is not None:
         check_positive("radius", radius, "m")
@@ -114,18 +130,51 @@ def new_scenario(
         if one is not None:
             find_material(one)
     path = _free_path(out, robot, surface, force=force)
-    section = _robot_section(robot, path, free_flyer=free_flyer, package_dirs=package_dirs)
+    section = _robot_section(
+        robot,
+        path,
+        free_flyer=free_flyer,
+        package_dirs=package_dirs,
+        xacro_args=xacro_args or {},
+    )
     bare = _build_bare(section, path)
     if not bare.assembly.model.nv and section.path is not None:
         # A single body without a joint would be fixed to the world.
         section = section.model_copy(update={"free_flyer": True})
         bare = _build_bare(section, path)
     loaded = bare.assembly.loaded[0]
-    tips = find_tips(loaded, shipped=section.name, frame=frame, radius=radius)
-    shell_section, word = _shell_section(surface, unit, (bodies, faces), path, bare, tips)
+    center = None if offset is None else check_vector("offset", offset, 3, " [m]")
+    if center is not None and frame is None:
+        raise SphshellError("an offset is in a frame: state that with --frame")
+    if tips == "all":
+        found = every_tip(loaded, frame, radius, place)
+    else:
+        found = find_tips(loaded, shipped=section.name, frame=frame, radius=radius, offset=center)
+    shell_section, word = _shell_section(surface, unit, (bodies, faces), path, bare, found)
+    if word is not None and tips == "all":
+        held = word_primitive(word, max(one.radius for one in found))
+        shell_section = shell_section.model_copy(update={"primitive": held})
     with_shell = _build_bare(section, path, shell_section, reuse=bare)
-    _check_size(with_shell.shells[shell_section.name], tips)
+    _check_size(with_shell.shells[shell_section.name], found)
     shell_section, with_shell = _sided(shell_section, with_shell, word)
+    if tips == "all":
+        pair = find_material(material or "rubber"), find_material(against)
+        grasp = hold_in_hand(
+            section,
+            shell_section,
+            with_shell,
+            found,
+            pair,
+            press,
+            path.stem,
+            lambda text, reuse: _build_text(text, path, reuse),
+        )
+        part = path.with_name(part_file(path.stem))
+        if part.exists() and not force:
+            raise ScenarioError(part, "", "is there already: give another --out, or --force")
+        _write(part, grasp.urdf)
+        _write(path, grasp.text)
+        return NewScenario(path, grasp.text, grasp.built, explain_built(grasp.built), grasp.why)
     request = Request(material, against, press, place, word)
     title = f"{loaded.name} {{}} {shell_section.name}"
 
@@ -135,7 +184,7 @@ def new_scenario(
         return text, _build_text(text, path, with_shell)
 
     # What is written is what was built, and tried.
-    text, built, plan = find_working(section, with_shell, tips, request, draft)
+    text, built, plan = find_working(section, with_shell, found, request, draft)
     _write(path, text)
     why = (*plan.why, _materials_note(plan))
     return NewScenario(path, text, built, explain_built(built), why)
@@ -174,7 +223,9 @@ def _free_path(
     *,
     force: bool,
 ) -> Path:
-    path = Path(f"{Path(robot).stem}_on_{Path(surface).stem}.toml" if out is None else out)
+    path = Path(
+        f"{Path(robot).name.partition('.')[0]}_on_{Path(surface).stem}.toml" if out is None else out
+    )
     if path.suffix != ".toml":
         raise ScenarioError(path, "", "a scenario's file must end in .toml")
     if path.is_dir() or (path.exists() and not force):
@@ -190,19 +241,21 @@ def _robot_section(
     *,
     free_flyer: bool,
     package_dirs: Sequence[str | PathLike[str]],
+    xacro_args: Mapping[str, str],
 ) -> RobotSection:
     file = Path(robot)
-    if file.suffix.lower() not in (".urdf", ".xml"):
-        if free_flyer or package_dirs:
+    if not is_path(robot):
+        if free_flyer or package_dirs or xacro_args:
             raise SphshellError(
-                f"a free root and mesh folders belong to a URDF file, not to {robot}"
+                f"a free root, mesh folders and xacro arguments belong to a file, not to {robot}"
             )
-        if file.is_file():
-            raise SphshellError(f"{robot}: is not a URDF file, which ends in .urdf or .xml")
         return RobotSection(name=str(robot))
+    place, is_urdf = _relative(file, path), file.suffix.lower() == ".urdf"
     return RobotSection(
-        urdf=_relative(file, path),
+        urdf=place if is_urdf else None,
+        file=None if is_urdf else place,
         package_dirs=[_relative(Path(one), path) for one in package_dirs],
+        xacro_args=dict(xacro_args),
         free_flyer=free_flyer,
     )
 

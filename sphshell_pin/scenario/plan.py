@@ -43,6 +43,8 @@ LEAD_IN = 0.5
 # where the sphere touches no single face.
 _YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
 _MOST_UNEVEN = 3
+# Places and turns at which links are held against the part.
+_MOST_TRIED = 250
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
 # radii.
 TIP_RATE, TIP_LAG = 20.0, 0.2
@@ -109,6 +111,10 @@ class Plan:
     """Where the free root starts: x y z and quaternion x y z w."""
     why: tuple[str, ...] = field(default=())
     """One sentence for each choice that was made for the user."""
+    left_out: tuple[str, ...] = ()
+    """Of what the robot's file states of its joints."""
+    repair: str = ""
+    """What was changed of a draft that failed; "" of the first draft."""
 
 
 def press_plans(
@@ -137,14 +143,18 @@ def press_plans(
     force = _force(stance, tip, materials, press)
     gap = _gap(tip.radius, force, materials)
     uneven: list[Plan] = []
+    tried = 0
     for touch in touch_points(shell, tip.radius, gap, toward=toward, inside=inside):
         on_face = touches_once(shell, touch, touch.point[None], tip.radius, 2 * gap)
+        if tried >= _MOST_TRIED:
+            break
         if not on_face and len(uneven) >= _MOST_UNEVEN:
             continue
         facing = _turn(touch.normal, -stance.approach)
         for angle in _YAWS:
             turned = pin.AngleAxis(angle, stance.approach).toRotationMatrix() @ facing
             placement = pin.SE3(turned, stance.center - turned @ touch.center)
+            tried += 1
             if blocked(placement):
                 continue
             path = touch.point[None]
@@ -197,7 +207,7 @@ def _gap(radius: float, force: float, materials: tuple[Material, Material]) -> f
     Fallen through g, Hertz's sphere stops at 4^(2/3) times the depth d under `force` at rest, where
     2/5 k (4^(2/3) d)^(5/2) = force (g + 4^(2/3) d): g = 1.51 d.
     """
-    rest = (force / hertz_stiffness(radius, *materials)) ** (2 / 3)
+    rest = float((force / hertz_stiffness(radius, *materials)) ** (2 / 3))
     return min(TIP_GAP * radius, 1.5 * rest)
 
 

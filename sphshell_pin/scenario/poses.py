@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.dynamics.mimic import group_of
 from sphshell_pin.dynamics.models import find_frame, reduced_model
 from sphshell_pin.scenario.bodies import restrict
 from sphshell_pin.scenario.tips import Tip
@@ -158,6 +159,7 @@ def _point_limb(
     )
     for _ in range(_TURNS):
         jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
+        jacobian = np.reshape(jacobian, (6, model.nv))  # of one velocity Pinocchio returns (6,)
         pin.framesForwardKinematics(model, data, q)
         limb = _limb(data, data.oMf[frame], tip)
         turn = np.cross(limb, approach)
@@ -221,8 +223,11 @@ def _bend(
 def _joints_aside(model: pin.Model, tip: Tip) -> tuple[str, ...]:
     """Return the joints that do not move the tip; none are left aside of a robot that floats."""
     parent = int(model.frames[find_frame(model, tip.frame)].parentJoint)
-    chain = set(model.supports[parent])
-    return tuple(model.names[j] for j in range(1, model.njoints) if j not in chain)
+    # A joint that is held holds those that mimic it, and what it mimics.
+    moving = {
+        one for j in list(model.supports[parent])[1:] for one in group_of(model, model.names[j])
+    }
+    return tuple(name for name in list(model.names)[1:] if name not in moving)
 
 
 def _into_limits(model: pin.Model, q: Array) -> Array:
@@ -265,6 +270,7 @@ def _stance(
     pose = data.oMf[frame]
     center = pose.act(tip.offset)
     local = pin.getFrameJacobian(reduced, data, frame, pin.LOCAL_WORLD_ALIGNED)
+    local = np.reshape(local, (6, reduced.nv))  # of one velocity Pinocchio returns (6,)
     linear = local[:3] - pin.skew(center - pose.translation) @ local[3:]
     mobility = linear @ np.linalg.solve(mass_matrix, linear.T)
     values, axes = np.linalg.eigh(mobility)
@@ -360,7 +366,8 @@ def _slide_room(stance: Stance, tip: Tip, direction: Array) -> float:
     rows = 6 if model.nv >= 6 else 3
     goal = np.concatenate([step * direction, np.zeros(3)])[:rows]
     for k in range(_SLIDE_STEPS):
-        jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)[:rows]
+        jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
+        jacobian = np.reshape(jacobian, (6, model.nv))[:rows]
         turn, *_ = np.linalg.lstsq(jacobian, goal, rcond=1e-3)
         q = pin.integrate(model, q, turn)
         fast = np.abs(turn).max() > _FASTEST * step / stance.reach

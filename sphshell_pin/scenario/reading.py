@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, TypeAlias
 from pydantic import BaseModel, ValidationError
 
 from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.dynamics.sensors import Sensor
 from sphshell_pin.errors import NameNotFound, ScenarioError
 from sphshell_pin.parameters import parameters_of
 from sphshell_pin.scenario.schema import LISTS, STEPPING, RunSection, Scenario
@@ -174,7 +175,10 @@ def _validated(data: dict[str, Toml], path: str | PathLike[str]) -> Scenario:
 
 def item_key(table: str, items: Sequence[Toml], index: int) -> str:
     """Return the dotted key of an item of a list: by its label or name, else by its index."""
-    entries = [dict(one) if isinstance(one, BaseModel | Mapping) else {} for one in items]
+    entries = [
+        dict(one) if isinstance(one, BaseModel | Mapping) else getattr(one, "__dict__", {})
+        for one in items
+    ]
     names = [str(one.get("label") or one.get("name") or "") for one in entries]
     name = names[index]
     return f"{table}.{name}" if name and names.count(name) == 1 else f"{table}[{index}]"
@@ -269,6 +273,8 @@ def _spelled_out(node: Toml, head: str) -> str:
 def _keys_of(table: str) -> Iterable[str]:
     """Return the keys that a table of a list of LISTS may have."""
     (section,) = typing.get_args(Scenario.model_fields[table].annotation)
+    if table == "sensor":
+        return {key for kind in Sensor.kinds.values() for key in parameters_of(kind)}
     return section.model_fields  # type: ignore[no-any-return]
 
 

@@ -24,7 +24,7 @@ from sphshell_pin.scenario.schema import Scenario
 Array = npt.NDArray[np.float64]
 
 # What moves the bodies, and what judges the outcome, is not needed to show them.
-UNSHOWN = ("controller", "figures", "expect", "knob")
+UNSHOWN = ("controller", "sensor", "figures", "expect", "knob")
 HOW = "give its scenario with --scenario (in Python: scenario=...)"
 
 

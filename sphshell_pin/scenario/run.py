@@ -6,6 +6,7 @@ import contextlib
 import csv
 import hashlib
 import json
+import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -41,11 +42,13 @@ STOPPED = "stopped"
 RESULTS = (
     "run.npz",
     "contacts.csv",
+    "sensors.csv",
     SUMMARY,
     "force_and_depth.png",
     "energy.png",
     "contact_path.png",
     "contact_map.png",
+    "sensors.png",
     RECORDING,
 )
 
@@ -130,6 +133,8 @@ def run_built(
             desk = place.desk()
             result.save(desk / "run.npz", home=folder)
             write_contacts(desk / "contacts.csv", result, audit)
+            if result.sensors:
+                write_sensors(desk / "sensors.csv", result)
             interrupted = _draw(built, result, desk, notes, recording=recording)
             _write_summary(desk, built, result, verdicts, stopped, audit)
             files = tuple(folder / name for name in RESULTS if (desk / name).exists())
@@ -142,7 +147,7 @@ def run_built(
         raise fault
     if interrupted:
         raise KeyboardInterrupt(f"the results are in {folder}, but not all pictures of them")
-    doubts = ()
+    doubts: tuple[str, ...] = ()
     if stopped is None and isinstance(built.controller, Controller):
         doubts = tuple(built.controller.doubts_after(result))
     return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit, doubts)
@@ -263,6 +268,17 @@ def write_contacts(
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(zip(*(np.asarray(one).tolist() for one in columns.values()), strict=True))
+
+
+def write_sensors(path: str | PathLike[str], result: Result) -> None:
+    """Write the readings of the sensors as comma-separated values, one row for each time."""
+    columns = result.sensor_columns()
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        for row in zip(*(one.tolist() for one in columns.values()), strict=True):
+            # nan: no reading
+            writer.writerow(["" if math.isnan(one) else one for one in row])
 
 
 def _write_summary(

@@ -22,14 +22,14 @@ from pydantic import (
 from sphshell_pin.contact import Friction as FrictionLaw
 from sphshell_pin.contact import NormalLaw
 from sphshell_pin.contact.friction import NoFriction
-from sphshell_pin.dynamics import controllers
+from sphshell_pin.dynamics import controllers, sensors
 from sphshell_pin.dynamics.controllers import NoController
 from sphshell_pin.dynamics.integrators import Adaptive, Integrator, SemiImplicitEuler
 from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
 from sphshell_pin.scenario.primitives import Primitive
 from sphshell_pin.scenario.tables import OneOf, Positive, Vector3, refuse_unknown_keys
 
-LISTS = ("robot", "joint", "shell", "contact", "source", "knob")
+LISTS = ("robot", "joint", "shell", "contact", "source", "sensor", "knob")
 """Tables of which there may be several."""
 
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -213,6 +213,9 @@ class SourceSection(Section):
 Controller = Annotated[Ingredient, OneOf(controllers.Controller)]
 
 
+Sensor = Annotated[Ingredient, OneOf(sensors.Sensor)]
+
+
 def _bounds(about: Parameter) -> object:
     return Field(gt=about.above, ge=about.at_least, le=about.at_most)
 
@@ -331,6 +334,7 @@ class Scenario(Section):
     shell: list[ShellSection] = []
     contact: list[ContactSection] = []
     source: list[SourceSection] = []
+    sensor: list[Sensor] = []
     controller: Controller = NoController()
     run: RunSection
     knob: list[KnobSection] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.dynamics.joints import JointIngredients
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
@@ -44,7 +46,9 @@ PLACES: dict[str, tuple[float, float, float]] = {
 """Where the surface is placed, seen from the tip."""
 
 # Drafts that are run: of one posture, and in all.
-_MOST_OF_STANCE, _MOST_RUNS = 4, 16
+_MOST_OF_STANCE, _MOST_RUNS = 3, 9
+# Between links and part at the start, along the approach, in radii of the sphere.
+_ROOM = 0.1
 # Of a draft that fails while the tip slides or after a hard touch: time to settle [s].
 _CALM_LEAD_IN = 1.5
 # A run that is cut before links reach the part ends this part of its time earlier, and is no
@@ -86,6 +90,10 @@ class _Tried:
     runs: int = 0
     blocked: Counter[str] = field(default_factory=Counter)
     faults: list[Fault] = field(default_factory=list)
+    without: tuple[str, ...] = ()
+    """Kinds of what acts in the joints that are left out."""
+    note: str = ""
+    """Why they are."""
     errors: list[SphshellError] = field(default_factory=list)
 
 
@@ -131,13 +139,26 @@ def _press(
     side = {"cylinder": (1.0, 0.0, 0.0), "bowl": (0.0, 0.0, 1.0)}.get(request.word or "")
     toward = None if side is None else np.array(side)
     tried = _Tried()
-    for stance in stances(model, q_work, tip, approach, SelfContact(model, geometry, q_work).found):
-        tried.postures += 1
+    touching = SelfContact(model, geometry, q_work).found
+    postures: list[Stance] = []
+
+    def found_now() -> Iterator[Stance]:
+        for one in stances(model, q_work, tip, approach, touching):
+            postures.append(one)
+            tried.postures += 1
+            yield one
+
+    rooms = ((_ROOM * tip.radius, one) for one in found_now())
+    for room, stance in itertools.chain(rooms, ((0.0, one) for one in postures)):
         links = Links(model, geometry, shell, [tip], stance.lock)
 
-        def blocked(placement: pin.SE3, stance: Stance = stance, links: Links = links) -> bool:
+        def blocked(
+            placement: pin.SE3, stance: Stance = stance, links: Links = links, room: float = room
+        ) -> bool:
             tried.places += 1
-            found = links.within(stance.q, placement, whole=True)
+            # With a little room, as the tip yields when it is pressed on and slides.
+            nearer = pin.SE3(placement.rotation, placement.translation - room * stance.approach)
+            found = links.within(stance.q, nearer, whole=True)
             if found is not None:
                 tried.blocked[found.link] += 1
             return found is not None
@@ -148,7 +169,13 @@ def _press(
             shell, tip, stance, pair, request.press, blocked, toward=toward, inside=inside
         )
         start = _changed_joints(model, q0, stance.q)
-        stood = section.model_copy(update={"lock": list(stance.lock), "start": start})
+        stood = section.model_copy(
+            update={
+                "lock": list(stance.lock),
+                "start": start,
+                "joints": _stated_kinds(model, stance.lock),
+            }
+        )
         try:
             found = _first_working(stood, plans, links, draft, tried)
         except SphshellError as error:  # of this posture: another one may do
@@ -161,6 +188,11 @@ def _press(
     raise _refusal(tip, request, tried)
 
 
+def _stated_kinds(model: pin.Model, lock: Sequence[str]) -> list[str]:
+    """Return what the model states of the joints that move, as `[robot] joints` lists it."""
+    return list(JointIngredients.from_model(model).without(lock).kinds())
+
+
 def _first_working(
     section: RobotSection, plans: Iterator[Plan], links: Links, draft: Draft, tried: _Tried
 ) -> tuple[str, Built, Plan] | None:
@@ -169,30 +201,45 @@ def _first_working(
         queue = [plan]
         while queue:
             one = queue.pop(0)
-            text, built = draft(section, one)
+            if tried.without and not one.left_out:
+                one = replace(one, left_out=tried.without, why=(*one.why, tried.note))
+            text, built = draft(_without(section, one), one)
             fault = try_out(built, one, links)
             tried.runs += 1
             runs += 1
             if fault is None:
                 return text, built, one
             tried.faults.append(fault)
-            if not queue and one is plan:
-                queue = _repairs(plan, fault)
+            if fault.kind != "links" and "friction" in section.joints and not tried.without:
+                tried.without = ("friction",)
+                tried.note = "the joints' dry friction, which the file states, is left out: with "
+                tried.note += f"it {fault.text}"
+                queue = [one, *queue]
+            elif not queue and one.repair == "":
+                queue = _repairs(one, fault)
         if runs >= _MOST_OF_STANCE or tried.runs >= _MOST_RUNS:
             return None
     return None
 
 
+def _without(section: RobotSection, plan: Plan) -> RobotSection:
+    """Return the robot's table without what the plan leaves out of the joints."""
+    kinds = [kind for kind in section.joints if kind not in plan.left_out]
+    return section.model_copy(update={"joints": kinds})
+
+
 def _repairs(plan: Plan, fault: Fault) -> list[Plan]:
     """Return what may repair the `fault` of a plan in the same place."""
     control = plan.control
-    if not isinstance(control, Press) or fault.kind == "touch":
+    if not isinstance(control, Press) or (fault.kind == "links" and fault.t < control.lead_in):
         return []
+    repairs = []
+    if fault.kind == "force" and any(control.posture_stiffness):
+        loose = replace(control, posture_stiffness=())
+        repairs.append(replace(plan, control=loose, repair="loose"))
     stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
-    still = replace(plan, control=stays, duration=_CALM_LEAD_IN + 0.5)
-    if len(control.path) < 2 or fault.kind != "links":
-        return [still]
-    return [still] if fault.t > control.lead_in else []
+    duration = _CALM_LEAD_IN + 0.5
+    return [*repairs, replace(plan, control=stays, duration=duration, repair="stays")]
 
 
 def _drop(
@@ -222,8 +269,9 @@ def _drop(
         pair = request.materials(tips, mass / len(tips))
         plan = plan_stand(shell, tuple(tips), centers, mass, inertia, leg, pair)
     links = Links(model, built.assembly.loaded[0].collision_model, shell, tips, ())
+    section = section.model_copy(update={"joints": _stated_kinds(model, ())})
     tried = _Tried(postures=1)
-    for _ in range(3):
+    while True:
         text, made = draft(section, plan)
         fault = try_out(made, plan, links)
         tried.runs += 1
@@ -231,11 +279,10 @@ def _drop(
             return text, made, plan
         tried.faults.append(fault)
         end = float(f"{_BEFORE * fault.t:.2g}")
-        if fault.kind != "links" or end < _SHORTEST:
-            break
+        if fault.kind != "links" or end < _SHORTEST or tried.runs >= _MOST_OF_STANCE:
+            raise _refusal(tips[0], request, tried, floating=True)
         note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the surface"
         plan = replace(plan, duration=end, why=(*plan.why, note))
-    raise _refusal(tips[0], request, tried)
 
 
 def _working_posture(section: RobotSection, model: pin.Model, q0: Array) -> Array:
@@ -254,7 +301,7 @@ def _changed_joints(model: pin.Model, q0: Array, q: Array) -> dict[str, float | 
     return start
 
 
-def _refusal(tip: Tip, request: Request, tried: _Tried) -> SphshellError:
+def _refusal(tip: Tip, request: Request, tried: _Tried, *, floating: bool = False) -> SphshellError:
     """Return the error that says why no draft works, and what to change."""
     way = f"along {request.place}" if request.place else "where its limb points"
     if not tried.postures:
@@ -265,9 +312,9 @@ def _refusal(tip: Tip, request: Request, tried: _Tried) -> SphshellError:
     if tried.faults:
         fault = tried.faults[0]
         when = f" at t = {fault.t:.2g} s" if fault.link else ""
+        advice = _ADVICE_FLOATING if floating else _ADVICE[fault.kind]
         return SphshellError(
-            f"no draft works ({_count(tried.runs, 'run')}): {fault.text}{when}; "
-            f"{_ADVICE[fault.kind]}"
+            f"no draft works ({_count(tried.runs, 'run')}): {fault.text}{when}; {advice}"
         )
     if tried.errors:
         return tried.errors[0]
@@ -282,12 +329,13 @@ def _refusal(tip: Tip, request: Request, tried: _Tried) -> SphshellError:
 
 
 _ADVICE = {
-    "run": "a softer --law, or a larger --radius",
-    "touch": "another --place, or another --frame",
-    "force": "a smaller --radius, another --press or --place",
-    "links": "take another --place, a smaller part, or a sphere farther out (--frame, --radius)",
-    "figure": "another --law or --radius",
+    "run": "take a softer --law, or a larger --radius",
+    "touch": "take another --place, or another --frame",
+    "force": "take a smaller --radius, another --press or --place",
+    "links": "take another --place, a smaller part, or a sphere farther out (--frame, --offset)",
+    "figure": "take another --law or --radius",
 }
+_ADVICE_FLOATING = "take a larger part, with room for all that comes down, or another --law"
 
 
 def _count(number: int, noun: str) -> str:

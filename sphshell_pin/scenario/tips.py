@@ -29,12 +29,17 @@ class Tip:
 
 
 def find_tips(
-    robot: LoadedRobot, *, shipped: str | None, frame: str | None, radius: float | None
+    robot: LoadedRobot,
+    *,
+    shipped: str | None,
+    frame: str | None,
+    radius: float | None,
+    offset: Array | None = None,
 ) -> list[Tip]:
     """Return the spheres of `robot` to put on a surface.
 
     One for a robot with a fixed base, all feet of one that floats. `shipped` is the name of a
-    shipped robot; `frame` and `radius` [m] are what the user gave.
+    shipped robot; `frame`, `radius` [m] and `offset` (3,) [m] in the frame are what the user gave.
 
     Raises
     ------
@@ -47,6 +52,8 @@ def find_tips(
     if frame is not None:
         find_frame(robot.model, frame)
         found = [one for one in known if one.frame == frame]
+        if offset is not None:
+            return [_sized(Tip(frame, 0.0, offset, "as it was asked for"), radius)]
         return [_sized(found[0] if found else Tip(frame, 0.0, np.zeros(3), ""), radius)]
     if known:
         chosen = known if floats(robot.model) else known[:1]

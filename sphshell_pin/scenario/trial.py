@@ -116,7 +116,8 @@ def _forces(result: Result) -> Array:
     np.add.at(total, log.row, pushes + log.friction_force_world)
     size = np.linalg.norm(normal, axis=1)
     along = np.einsum("ij,ij->i", normal, total)
-    return np.divide(along, size, out=np.zeros_like(size), where=size > 0)
+    sizes: Array = np.divide(along, size, out=np.zeros_like(size), where=size > 0)
+    return sizes
 
 
 def _figure_fault(built: Built, result: Result) -> Fault | None:

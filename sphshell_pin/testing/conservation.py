@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from sphshell_pin.dynamics import Result, Scene
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.testing.finding import Finding
+from sphshell_pin.testing.forces import mass_matrix
 
 Array = NDArray[np.float64]
 
@@ -97,9 +98,23 @@ def elastic_energy(result: Result) -> Finding:
 def _energies(scene: Scene, result: Result) -> tuple[Array, Array]:
     model, data = scene.model, scene.model.createData()
     rows = list(zip(result.q, result.v, strict=True))
-    kinetic = [pin.computeKineticEnergy(model, data, q, v) for q, v in rows]
-    potential = [pin.computePotentialEnergy(model, data, q) for q, _ in rows]
+    kinetic = [kinetic_energy(model, data, q, v) for q, v in rows]
+    potential = [_potential_energy(model, data, q) for q, _ in rows]
     return np.array(kinetic), np.array(potential)
+
+
+def kinetic_energy(model: pin.Model, data: pin.Data, q: Array, v: Array) -> float:
+    """Return the kinetic energy [J]; Pinocchio's function refuses mimic joints."""
+    if not len(model.mimicking_joints):
+        return float(pin.computeKineticEnergy(model, data, q, v))
+    return 0.5 * float(v @ mass_matrix(model, data, q) @ v)
+
+
+def _potential_energy(model: pin.Model, data: pin.Data, q: Array) -> float:
+    if not len(model.mimicking_joints):
+        return float(pin.computePotentialEnergy(model, data, q))
+    center = np.array(pin.centerOfMass(model, data, q))
+    return -float(data.mass[0] * (model.gravity.linear @ center))
 
 
 def _residual(result: Result, parts: Array) -> Finding:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.testing.finding import Finding, Optional, worst
-from sphshell_pin.testing.forces import joint_jacobian, joint_names
+from sphshell_pin.testing.forces import accelerations, joint_jacobian, joint_names
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def derivatives(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = 
         return total
 
     def acceleration(q: Array, v: Array) -> Array:
-        return np.array(pin.aba(model, data, q, v, tau, scene.external_forces(q, v)))
+        return accelerations(model, q, v, tau, scene.external_forces(q, v))
 
     compared: list[_Compared] = [("contact forces", force, scene.contact_derivatives(q, v))]
     if not any(pair.friction and pair.friction.has_state for pair in scene.pairs):

@@ -67,8 +67,24 @@ def mass_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
     return np.asarray(upper + np.triu(upper, 1).T)
 
 
+def accelerations(
+    model: pin.Model, q: Array, v: Array, tau: Array, forces: pin.StdVec_Force
+) -> Array:
+    """Return the accelerations (nv,) under torques and wrenches on the joints, by Pinocchio.
+
+    That is ABA; of models with mimic joints, which ABA has not, M^-1 (tau - rnea).
+    """
+    data = model.createData()
+    if not len(model.mimicking_joints):
+        return np.array(pin.aba(model, data, q, v, tau, forces))
+    free = tau - pin.rnea(model, data, q, v, np.zeros(model.nv), forces)
+    return np.linalg.solve(mass_matrix(model, data, q), free)
+
+
 def balance(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None) -> Finding:
     """Compare ABA with `scene.external_forces` to M^-1 (tau - nle + J^T f), with f the contacts'.
+
+    Of models with mimic joints, which ABA has not, recursive Newton-Euler takes its place.
 
     The error is the difference of the two accelerations relative to what the contacts add to them
     (without contacts, to all of it), both measured by the mass matrix, sqrt(a . M a), so that
@@ -94,7 +110,7 @@ def balance(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None
             "q", q.tolist(), "is where the mass matrix is singular: lock the joints that move none"
         ) from None
     expected = answers[:, 0]
-    found = pin.aba(model, data, q, v, tau, scene.external_forces(q, v)).copy()
+    found = accelerations(model, q, v, tau, scene.external_forces(q, v))
 
     def size(acceleration: Array) -> float:
         return math.sqrt(max(float(acceleration @ mass @ acceleration), 0.0))

@@ -47,3 +47,31 @@ def test_gains_and_posture_by_joint() -> None:
     for wrong in (sp.JointPD({"x": 3.0}, 1.0), sp.JointPD(1.0, 1.0, {"x": 0.5})):
         with pytest.raises(InvalidParameter, match=rf"joint 'x'.*{first}"):
             wrong.to_core(sp.Scene(model), start)
+
+
+def test_a_point_beside_the_frame_is_moved_as_a_frame_there() -> None:
+    """Torques with an offset are those of a frame of the model at the same point."""
+    model = models.arm()
+    frame = model.frames[model.nframes - 1]
+    offset = np.array([0.03, -0.02, 0.08])
+    model.addFrame(
+        pin.Frame(
+            "beside",
+            frame.parentJoint,
+            frame.placement * pin.SE3(np.eye(3), offset),
+            pin.FrameType.OP_FRAME,
+        )
+    )
+    shell, scene = models.plate(), sp.Scene(model)
+    start = pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq))
+
+    def end(name: str, **more) -> np.ndarray:
+        pressing = sp.CartesianImpedance(
+            name, PATH, 100.0, 10.0, 1.0, shell, rotational_stiffness=2.0, **more
+        )
+        return sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(start, None, 0.1, pressing).q[-1]
+
+    np.testing.assert_array_equal(end(frame.name, offset=offset), end("beside"))
+    assert np.abs(end(frame.name) - end("beside")).max() > 1e-6
+    with pytest.raises(InvalidParameter, match="offset"):
+        sp.CartesianImpedance("ball", PATH, 100.0, 10.0, offset=[0.0, 0.1])

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from sphshell_pin.dynamics import Scene
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario.bodies import assemble, reduce_visual, restrict
 from sphshell_pin.scenario.reading import read_scenario
@@ -138,3 +141,77 @@ def test_a_missing_mesh_names_the_searched_folders(tmp_path):
         assembled(tmp_path, text)
     with pytest.raises(ScenarioError, match="does not exist"):
         assembled(tmp_path, text + 'robot.package_dirs = ["meshes"]\n')
+
+
+DATA = Path(__file__).parents[1] / "data"
+GRIPPER = f"""title = "x"
+[robot]
+file = "{DATA / "mjcf/gripper.xml"}"
+KEYS
+[run]
+duration = 1
+"""
+
+
+def gripper(tmp_path, keys=""):
+    return assembled(tmp_path, GRIPPER.replace("KEYS", keys))
+
+
+def test_mimic_joints_are_exact_unless_they_are_not_wanted(tmp_path):
+    assert gripper(tmp_path).model.nv == 2
+    assert gripper(tmp_path, "mimic = false").model.nv == 3
+
+
+@pytest.mark.parametrize(
+    ("keys", "q"),
+    [
+        ("start = { left_finger = 0.01 }", [0, 0.01]),
+        ("start = { right_finger = 0.01 }", [0, 0.01]),
+        ("start = { right_finger = 0.01, lift = 0.1, left_finger = 0.01 }", [0.1, 0.01]),
+        ("q = [0.1, 0.02]", [0.1, 0.02]),
+        ("q = [0.1, 0.02, 0.02]", [0.1, 0.02]),
+    ],
+)
+def test_a_start_may_name_mimic_joints(tmp_path, keys, q):
+    assert np.allclose(gripper(tmp_path, keys).q0, q)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        (
+            "start = { right_finger = 0.01, left_finger = 0.02 }",
+            r'start."right_finger": joint \'right_finger\' cannot be at 0.01: it mimics .* at 0.02',
+        ),
+        ("q = [0.1, 0.02, 0.03]", r"robot\[0\].q: joint 'right_finger' cannot be at 0.03"),
+        ("q = [0.1]", r"has 2 coordinates \(3 with those of mimic joints\), not 1"),
+        ("speed = { right_finger = 0.1 }", "mimics 'left_finger': state the speed of that one"),
+        ('pose = "home"', "no pose 'home'"),
+        ("xacro_args = { a = 1 }", "arguments are for files that end in .xacro"),
+    ],
+)
+def test_a_start_against_a_mimic_joint_is_refused(tmp_path, keys, words):
+    with pytest.raises(ScenarioError, match=words):
+        gripper(tmp_path, keys)
+
+
+def test_one_joint_of_a_group_locks_all(tmp_path):
+
+    for name in ("left_finger", "right_finger"):
+        found = gripper(tmp_path, f'lock = ["{name}"]\nstart = {{ {name} = 0.03 }}')
+        scene = Scene(found.model, found.lock, found.q0)
+        assert list(scene.model.names)[1:] == ["lift"]
+        data = scene.model.createData()
+        pin.framesForwardKinematics(scene.model, data, np.zeros(1))
+        right = data.oMf[scene.model.getFrameId("right", pin.FrameType.BODY)]
+        assert np.allclose(right.translation, [-0.06, 0, -0.02])
+        assert reduce_visual(found).ngeoms == found.visual_model.ngeoms
+
+
+def test_several_robots_keep_their_armature(tmp_path):
+    two = GRIPPER.replace("[robot]", "[[robot]]")
+    two = two.replace("KEYS", two.partition("\n")[2].partition("[run]")[0].replace("KEYS", ""))
+    two = two.replace("[[robot]]", '[[robot]]\nlabel = "a"', 1)
+    model = assembled(tmp_path, two).model
+    # 0.02 of each of two fingers.
+    assert np.allclose(model.armature, [0, 0.04, 0, 0.04])

@@ -112,15 +112,21 @@ def test_a_long_chain(tmp_path: Path) -> None:
     assert report.nv == 30
 
 
-def test_mimic_joints_are_told(tmp_path: Path) -> None:
+def test_mimic_joints_are_exact(tmp_path: Path) -> None:
     report = check_robot(str(chain(tmp_path, ("revolute",) * 3, extra="mimic2")), sizes=TINY)
     assert passes(report)
-    assert any("mimic joints move freely here" in n and "'joint2'" in n for n in report.notes)
-    # Kept as a constraint by the user: forward dynamics refuses, and so it is told.
+    assert report.nv == 2
     kept = pin.buildModelFromUrdf(str(tmp_path / "chain.urdf"), mimic=True)
-    report = check_robot(kept, sizes=TINY)
-    assert report.verdict == NOT_CHECKED
-    assert "mimic" in str(report.reason)
+    assert passes(check_robot(kept, sizes=TINY))
+
+
+DATA = Path(__file__).parents[1] / "data"
+FILES = [*sorted((DATA / "mjcf").glob("*.xml")), *sorted((DATA / "xacro").glob("*.urdf.xacro"))]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+def test_mjcf_and_xacro_files_pass(file: Path) -> None:
+    assert passes(check_robot(file, sizes=TINY, free_flyer="legged" in file.name))
 
 
 def test_massless_links_are_held_and_told(tmp_path: Path) -> None:

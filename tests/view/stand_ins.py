@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.dynamics.pairs import PlacedSphere
 from sphshell_pin.dynamics.run_stats import RunStats
 
 CUBE_VERTICES = np.array(np.meshgrid(*3 * [(-0.5, 0.5)], indexing="ij")).reshape(3, -1).T
@@ -48,15 +49,17 @@ def contact_pair(model, frame, radius, shell, shell_frame="universe", placement=
     sphere_frame = model.frames[model.getFrameId(frame)]
     shell_body = model.frames[model.getFrameId(shell_frame)]
     placement = placement or pin.SE3.Identity()
+    joint, center = sphere_frame.parentJoint, sphere_frame.placement
     return SimpleNamespace(
+        spheres=() if radius is None else (PlacedSphere(joint, center, radius),),
         name=name,
         frame_i=frame,
         sphere=None if radius is None else SimpleNamespace(radius=radius),
         shell=shell,
         placement=placement,
-        placement_i=sphere_frame.placement,
+        placement_i=center,
         placement_j=shell_body.placement * placement,
-        joint_i=sphere_frame.parentJoint,
+        joint_i=joint,
         joint_j=shell_body.parentJoint,
         method="facets",
     )
@@ -122,6 +125,7 @@ def a_result(t, q, rows=(), pairs=("tip",), **energy):
         stats=RunStats(),
         scene=None,
         origin=None,
+        sensors={},
     )
 
 

@@ -58,9 +58,10 @@ struct Run {
   Simulation simulation;
 
   Run(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
-      const RunSettings& settings, std::shared_ptr<Controller> controller, VectorX q0, VectorX v0)
+      const RunSettings& settings, std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
+      std::vector<Sensor> sensors)
       : simulation(model, std::move(pairs), std::move(joints), settings, std::move(controller),
-                   std::move(q0), std::move(v0)) {}
+                   std::move(q0), std::move(v0), std::move(sensors)) {}
 };
 
 // What Python enters with `with`.
@@ -324,15 +325,17 @@ void bind_dynamics(nanobind::module_& m) {
           "__init__",
           [](Run* self, nb::handle model, const std::vector<const Pair*>& pairs,
              std::shared_ptr<JointEffects> joints, std::shared_ptr<Controller> controller,
-             VectorX q0, VectorX v0, const RunSettings& settings) {
+             VectorX q0, VectorX v0, const RunSettings& settings,
+             const std::vector<const Sensor*>& sensors) {
             const pinocchio::Model& own = model_of(model);
             check_count("q0", q0.size(), own.nq);
             check_count("v0", v0.size(), own.nv);
             new (self) Run(own, copies(pairs), std::move(joints), settings, std::move(controller),
-                           std::move(q0), std::move(v0));
+                           std::move(q0), std::move(v0), copies(sensors));
           },
           nb::arg("model"), nb::arg("pairs"), nb::arg("joints").none(),
-          nb::arg("controller").none(), nb::arg("q0"), nb::arg("v0"), nb::arg("settings"))
+          nb::arg("controller").none(), nb::arg("q0"), nb::arg("v0"), nb::arg("settings"),
+          nb::arg("sensors"))
       .def(
           "advance",
           [](Run& self, double wall_seconds, double until) {
@@ -356,11 +359,11 @@ void bind_dynamics(nanobind::module_& m) {
           nb::arg("pairs"), nb::arg("joints").none(), nb::arg("controller").none())
       .def(
           "push",
-          [](Run& self, int joint, const Vec3& point, const Vec3& force_world) {
+          [](Run& self, int joint, const Vec3& point, const Vec3& force_world, int frame) {
             const Use use(self.user, "push");
-            self.simulation.push(joint, point, force_world);
+            self.simulation.push(joint, point, force_world, frame);
           },
-          nb::arg("joint"), nb::arg("point"), nb::arg("force_world"))
+          nb::arg("joint"), nb::arg("point"), nb::arg("force_world"), nb::arg("frame"))
       .def("take",
            [](Run& self) {
              const Use use(self.user, "take");

@@ -63,14 +63,15 @@ void bind_rollout(nanobind::module_& m) {
           "add",
           [](Rollout& self, const std::vector<const Pair*>& pairs,
              std::shared_ptr<JointEffects> joints, std::shared_ptr<Controller> controller,
-             VectorX q0, VectorX v0, const RunSettings& settings) {
+             VectorX q0, VectorX v0, const RunSettings& settings,
+             const std::vector<const Sensor*>& sensors) {
             check_count("q0", q0.size(), self.model().nq);
             check_count("v0", v0.size(), self.model().nv);
             self.add({copies(pairs), std::move(joints), settings, std::move(controller),
-                      std::move(q0), std::move(v0)});
+                      std::move(q0), std::move(v0), copies(sensors)});
           },
           nb::arg("pairs"), nb::arg("joints").none(), nb::arg("controller").none(), nb::arg("q0"),
-          nb::arg("v0"), nb::arg("settings"))
+          nb::arg("v0"), nb::arg("settings"), nb::arg("sensors"))
       // Threads may want the interpreter for a user's routine.
       .def(
           "wait",

@@ -15,7 +15,7 @@ PyObject* bytes_of(const T* first, std::size_t count) {
                                        static_cast<Py_ssize_t>(count * sizeof(T)));
 }
 
-PyObject* pack(std::initializer_list<PyObject*> items) {
+PyObject* pack(const std::vector<PyObject*>& items) {
   PyObject* out = PyTuple_New(static_cast<Py_ssize_t>(items.size()));
   bool complete = out != nullptr;
   Py_ssize_t i = 0;
@@ -74,8 +74,10 @@ void PythonController::torque(SceneData& scene, double t, const VectorX& q, cons
   scene.log(q, v, rows);
   const AcquireGil gil;
   const nb::object answer = gil.call(callable_, [&] {
-    return pack({PyFloat_FromDouble(t), bytes_of(q.data(), q.size()), bytes_of(v.data(), v.size()),
-                 bytes_of(rows.data(), rows.size())});
+    std::vector<PyObject*> items{PyFloat_FromDouble(t), bytes_of(q.data(), q.size()),
+                                 bytes_of(v.data(), v.size()), bytes_of(rows.data(), rows.size())};
+    if (readings_) items.push_back(bytes_of(readings_->data(), readings_->size()));
+    return pack(items);
   });
   const std::vector<double> torque = doubles_of(answer);
   tau = Eigen::Map<const VectorX>(torque.data(), static_cast<Eigen::Index>(torque.size()));

@@ -30,18 +30,21 @@ class PythonSource {
 };
 
 // A callable tau(t, q, v, contacts): vectors and rows of contacts come as memory, of which its
-// Python wrapper makes arrays; it returns an array of float64 (nv).
+// Python wrapper makes arrays; it returns an array of float64 (nv). One that reads sensors takes
+// their latest readings too.
 class PythonController : public Controller {
  public:
   explicit PythonController(nb::object callable) : callable_(std::move(callable)) {}
   ~PythonController() override;
   bool follows_time() const override { return true; }
+  void read(const std::vector<double>& readings) override { readings_ = &readings; }
   void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
               VectorX& tau) override;
   nb::handle callable() const { return callable_; }
 
  private:
   nb::object callable_;
+  const std::vector<double>* readings_ = nullptr;  // of the run's sensors
 };
 
 int visit_sources(const std::vector<Pair>& pairs, visitproc visit, void* arg);

@@ -9,6 +9,7 @@ void bind_shell(nb::module_& m);
 void bind_contact(nb::module_& m);
 void bind_dynamics(nb::module_& m);
 void bind_rollout(nb::module_& m);
+void bind_sensors(nb::module_& m);
 
 NB_MODULE(_core, m) {
   // Interpreters that end with objects alive are no leak of ours.
@@ -19,6 +20,7 @@ NB_MODULE(_core, m) {
   bind_mending(m);
   bind_shell(m);
   bind_contact(m);
+  bind_sensors(m);
   bind_dynamics(m);
   bind_rollout(m);
 }

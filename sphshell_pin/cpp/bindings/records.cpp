@@ -44,6 +44,10 @@ nb::dict to_dict(Record record, int nq, int nv) {
   out["event_t"] = to_array(std::move(event_t));
   out["event_pair"] = to_array(std::move(event_pair));
   out["event_kind"] = to_array(std::move(event_kind));
+  out["sensor"] = to_array(std::move(record.sensors.sensor));
+  out["sensor_t"] = to_array(std::move(record.sensors.t));
+  out["sensor_sampled"] = to_array(std::move(record.sensors.sampled));
+  out["sensor_values"] = to_array(std::move(record.sensors.values));
   return out;
 }
 
@@ -88,12 +92,6 @@ nb::list to_list(const std::vector<LimitSummary>& limits) {
     d["first_too_fast"] = s.first_too_fast;
     out.append(d);
   }
-  return out;
-}
-
-std::vector<Pair> copies(const std::vector<const Pair*>& pairs) {
-  std::vector<Pair> out;
-  for (const Pair* pair : pairs) out.push_back(*pair);
   return out;
 }
 

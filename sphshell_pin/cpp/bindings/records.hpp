@@ -20,6 +20,11 @@ nb::dict to_dict(const Counts& counts);
 nb::object to_python(const std::optional<DeepStart>& start);
 nb::list to_list(const std::vector<PairSummary>& summaries);
 nb::list to_list(const std::vector<LimitSummary>& limits);
-std::vector<Pair> copies(const std::vector<const Pair*>& pairs);
+template <class T>
+std::vector<T> copies(const std::vector<const T*>& all) {
+  std::vector<T> out;
+  for (const T* one : all) out.push_back(*one);
+  return out;
+}
 
 }  // namespace sphshell

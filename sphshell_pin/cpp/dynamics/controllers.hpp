@@ -14,6 +14,8 @@ class Controller {
   virtual ~Controller() = default;
   // Called once before a run, to ask for the placements that torque() reads.
   virtual void prepare(SceneData&) {}
+  // Called once before a run that has sensors: where their latest readings will be.
+  virtual void read(const std::vector<double>& /*readings*/) {}
   // Writes the torques; the scene's contacts have been evaluated at (q, v).
   virtual void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
                       VectorX& tau) = 0;

@@ -30,7 +30,7 @@ Guard::Guard(const SceneData& scene) : known_(scene.pairs().size()) {
   for (std::size_t k = 1; k < pairs.size(); ++k) {
     if (groups[k] != groups[k - 1] || !between_same(pairs[k - 1], pairs[k])) continue;
     if (clusters_.empty() || clusters_.back().last != k - 1)
-      clusters_.push_back({k - 1, k, 0, Vec3::Zero(), {}});
+      clusters_.push_back({k - 1, k, Vec3::Zero(), {}});
     clusters_.back().last = k;
   }
   for (Cluster& cluster : clusters_) {
@@ -54,14 +54,8 @@ void Guard::begin(const SceneData& scene) {
         joint == 0 ? cluster.center : body.world_from_joint(joint).act(cluster.center);
     cluster.known.center = scene.states()[k].world_from_j.actInv(center);
     cluster.known.touching = false;
-    // Radii may have been changed.
-    cluster.reach = 0;
-    for (std::size_t i = k; i <= cluster.last; ++i) {
-      const Pair& pair = scene.pairs()[i];
-      const double away = (pair.placement_i.translation() - cluster.center).norm();
-      cluster.reach = std::max(cluster.reach, away + pair.radius);
+    for (std::size_t i = k; i <= cluster.last; ++i)
       cluster.known.touching = cluster.known.touching || known_[i].touching;
-    }
   }
 }
 
@@ -76,8 +70,14 @@ bool Guard::is_clear(const SceneData& scene, Cluster& cluster) const {
     radius = std::min(radius, scene.pairs()[k].radius);
   }
   const double slack = kApart * radius;
-  return moved <= slack ||
-         moved <= slack + gap(scene.pairs()[cluster.first], cluster.reach, cluster.known);
+  if (moved <= slack) return true;
+  const std::vector<Pair>& pairs = scene.pairs();
+  double reach = 0;
+  for (std::size_t k = cluster.first; k <= cluster.last; ++k) {
+    const double away = (pairs[k].placement_i.translation() - cluster.center).norm();
+    reach = std::max(reach, away + pairs[k].radius);
+  }
+  return moved <= slack + gap(pairs[cluster.first], reach, cluster.known);
 }
 
 double Guard::allowed(SceneData& scene, const State& from, const State& to, bool gap_at_end) {

@@ -31,11 +31,10 @@ class Guard {
     double distance = -1;
   };
 
-  // Neighboring pairs of one group between the same two bodies and with the same shell; all their
-  // spheres are in the ball of the radius `reach`.
+  // Neighboring pairs of one group between the same two bodies and with the same shell, and a ball
+  // round all their spheres.
   struct Cluster {
     std::size_t first, last;
-    double reach = 0;
     Vec3 center = Vec3::Zero();  // in the joint of the spheres
     Known known;                 // of the ball
   };

@@ -173,6 +173,11 @@ const VectorX& Multibody::bias(const VectorX& q, const VectorX& v, const Forces&
   return pinocchio::rnea(model_, data_, q, v, zero_, external);
 }
 
+void Multibody::transmit(const VectorX& q, const VectorX& v, const VectorX& acceleration,
+                         const Forces& external) {
+  pinocchio::rnea(model_, data_, q, v, acceleration, external);
+}
+
 void Multibody::integrate(const VectorX& q, const VectorX& step, VectorX& out) const {
   pinocchio::integrate(model_, q, step, out);
 }

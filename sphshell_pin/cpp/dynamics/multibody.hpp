@@ -56,6 +56,17 @@ class Multibody {
   const VectorX& gravity(const VectorX& q);
   // Torque that holds the bias forces and opposes `external`: rnea(q, v, 0, external).
   const VectorX& bias(const VectorX& q, const VectorX& v, const Forces& external);
+  // Inverse dynamics, and what it leaves, all in the joints' frames.
+  void transmit(const VectorX& q, const VectorX& v, const VectorX& acceleration,
+                const Forces& external);
+  const VectorX& transmitted() const { return data_.tau; }
+  // What a joint's parent exerts on the joint's body and all beyond it, in the parent's frame.
+  pinocchio::Force transmitted_to_parent(int joint) const {
+    return data_.liMi[joint].act(data_.f[joint]);
+  }
+  const pinocchio::Motion& transmitted_velocity(int joint) const { return data_.v[joint]; }
+  // Less the acceleration of gravity.
+  const pinocchio::Motion& transmitted_acceleration(int joint) const { return data_.a_gf[joint]; }
   void integrate(const VectorX& q, const VectorX& step, VectorX& out) const;
   void difference(const VectorX& q0, const VectorX& q1, VectorX& out) const;
   // By which errors of coordinates and velocities are measured, per velocity component: lengths of

@@ -2,11 +2,18 @@
 
 namespace sphshell {
 
-void Push::set(int joint, const Eigen::Vector3d& point, const Eigen::Vector3d& force_world) {
+void Push::set(int joint, const Eigen::Vector3d& point, const Eigen::Vector3d& force_world,
+               int frame) {
   if (!opposed_.empty()) opposed_[joint_].setZero();
   joint_ = joint;
+  frame_ = frame;
   point_ = point;
   force_world_ = force_world;
+}
+
+pinocchio::Force Push::on_joint(const Multibody& body) const {
+  const Eigen::Vector3d force = body.world_from_joint(joint_).rotation().transpose() * force_world_;
+  return {force, point_.cross(force)};
 }
 
 // Inverse dynamics against the force, less that without it.
@@ -16,8 +23,7 @@ const VectorX& Push::added(Multibody& body, const VectorX& q, const VectorX& v,
   pinocchio::Force& opposed = opposed_[joint_];
   opposed.setZero();
   sum_ = tau - body.bias(q, v, opposed_);
-  opposed.linear() = -(body.world_from_joint(joint_).rotation().transpose() * force_world_);
-  opposed.angular() = point_.cross(opposed.linear());
+  opposed = -on_joint(body);
   sum_ += body.bias(q, v, opposed_);
   return sum_;
 }

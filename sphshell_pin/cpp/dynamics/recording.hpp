@@ -42,6 +42,12 @@ struct LimitSummary {
   double peak_speed = 0, first_too_fast = -1;  // [rad/s or m/s], [s]
 };
 
+// Readings of sensors in the order of their arrival; `values` holds those of one after the other.
+struct SensorRows {
+  std::vector<int> sensor;
+  std::vector<double> t, sampled, values;  // when it arrived, and when it was taken [s]
+};
+
 // Recorded rows: t, q, v, and the terms of the energy audit.
 struct Record {
   static constexpr int kEnergies = 6;  // kinetic, potential, elastic, damping, friction, control
@@ -49,6 +55,7 @@ struct Record {
   std::vector<ContactRow> contacts;
   std::vector<double> contact_row;  // the recorded row of each contact
   std::vector<Event> events;
+  SensorRows sensors;
 };
 
 class Recorder {

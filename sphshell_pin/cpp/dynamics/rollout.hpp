@@ -23,6 +23,7 @@ struct Task {
   RunSettings settings;
   std::shared_ptr<Controller> controller;
   VectorX q0, v0;
+  std::vector<Sensor> sensors;
 };
 
 // What is left of a run.

@@ -229,16 +229,22 @@ Vec3 SceneData::rate_of_turning(const ActiveContact& active, const Vec3& stretch
   return contact.normal.cross(normal_rate).cross(stretch);
 }
 
+ContactWrench SceneData::wrench(const ActiveContact& active) const {
+  const ContactForce<double>& f = active.force;
+  const Vec3& normal = active.kinematics.normal;
+  const double weight = active.contact.weight;
+  return {active.point, weight * (f.normal * normal + f.friction), weight * f.torsion * normal};
+}
+
 // Adds a contact to the forces on the joints and to the sums of its pair.
 void SceneData::add_force(const ActiveContact& active) {
   const Pair& pair = pairs_[active.pair];
   const ContactForce<double>& f = active.force;
   const ContactKinematics<double>& m = active.kinematics;
   const double weight = active.contact.weight;
-  const Vec3 force = weight * (f.normal * m.normal + f.friction);
-  const Vec3 moment = weight * f.torsion * m.normal;
-  apply(pair.joint_i, active.point, force, moment);
-  apply(pair.joint_j, active.point, -force, -moment);
+  const ContactWrench on_i = wrench(active);
+  apply(pair.joint_i, active.point, on_i.force, on_i.moment);
+  apply(pair.joint_j, active.point, -on_i.force, -on_i.moment);
   PairState& state = states_[active.pair];
   if (weight > 0) ++state.count;
   state.pieces += weight > 0 ? 1 : -1;

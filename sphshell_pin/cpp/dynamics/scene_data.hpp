@@ -35,6 +35,11 @@ struct ActiveContact {
   ContactForce<double> force;
 };
 
+// On body i, in the world; body j takes the opposite.
+struct ContactWrench {
+  Vec3 point, force, moment;
+};
+
 // How far a sphere came from where a step began, in all evaluations since, and whether it touched.
 struct Excursion {
   Vec3 from = Vec3::Zero();  // center in the shell's frame
@@ -88,6 +93,7 @@ class SceneData {
 
   bool touching() const { return touching_; }
   const std::vector<ActiveContact>& active() const { return active_; }
+  ContactWrench wrench(const ActiveContact& active) const;
   // Whether a contact with a bristle has begun since the last accepted state.
   bool is_new(const ActiveContact& active) const {
     return bristles_.is_spare(active.pair, active.slot);

@@ -25,11 +25,23 @@ State state_at(double t, VectorX q, VectorX v, int bristle_size) {
   return {t, std::move(q), std::move(v), VectorX::Zero(bristle_size), {}};
 }
 
+// Torques that sensors ask for leave no trace in the figures of the effort limits.
+class KeptCuts {
+ public:
+  explicit KeptCuts(std::vector<char>& cuts) : cuts_(cuts), kept_(cuts) {}
+  ~KeptCuts() { cuts_ = std::move(kept_); }
+
+ private:
+  std::vector<char>& cuts_;
+  std::vector<char> kept_;
+};
+
 }  // namespace
 
 Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
                        JointForces::Effects joints, RunSettings settings,
-                       std::shared_ptr<Controller> controller, VectorX q0, VectorX v0)
+                       std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
+                       std::vector<Sensor> sensors)
     : settings_(std::move(settings)),
       scene_(model, std::move(pairs), std::move(joints)),
       controller_(std::move(controller)),
@@ -40,7 +52,10 @@ Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
       tau_(VectorX::Zero(model.nv)),
       cut_(static_cast<std::size_t>(model.nv), 0),
       next_control_(settings_.start_time) {
+  if (!sensors.empty())
+    sensors_ = std::make_unique<Sensors>(std::move(sensors), model, settings_.start_time);
   if (controller_) controller_->prepare(scene_);
+  if (controller_ && sensors_) controller_->read(sensors_->readings());
   if (settings_.dt > 0) {
     // The last step is shortened to end at the duration; a hair's breadth is not a step.
     const double ratio = settings_.duration / settings_.dt;
@@ -71,6 +86,7 @@ Simulation::Status Simulation::advance(double wall_seconds, double until,
   const auto start_of_call = std::chrono::steady_clock::now();
   Status status = Status::Running;
   if (!started_) start();
+  if (sensors_ && !sensors_->begun()) begin_sensors();
   int pause = 15;
   for (int checked = 0; status == Status::Running && time() < until; ++checked) {
     if ((checked & pause) == pause) {
@@ -93,6 +109,19 @@ void Simulation::start() {
   recorder_.add_row(scene_, stepping_.state());
 }
 
+// The first sample needs the first torque, for which a controller may read the sensors.
+void Simulation::begin_sensors() {
+  sensors_->hold_still(scene_, stepping_.state(), push_);
+  hold_torques();
+  sensors_->begin(scene_, *this, stepping_.state(), push_);
+}
+
+Record Simulation::take() {
+  Record out = recorder_.take();
+  if (sensors_) out.sensors = sensors_->take();
+  return out;
+}
+
 double Simulation::end_of_step() const {
   if (settings_.dt > 0)
     return grid_ + 1 >= grid_steps_ ? end()
@@ -105,6 +134,7 @@ double Simulation::end_of_step() const {
 
 Simulation::Status Simulation::step() {
   if (fine_steps_ == 0) hold_torques();
+  if (sensors_) sensors_->begin_step(scene_, *this, stepping_.state(), push_);
   const double end = end_of_step();
   Status status = Status::Running;
   if (settings_.dt == 0) {
@@ -148,6 +178,11 @@ bool Simulation::make_controlled(double end) {
       break;
   }
   if (settings_.dt == 0) {
+    if (sensors_) {
+      const KeptCuts kept(cut_);
+      sensors_->add_dense(scene_, *this, stepping_.chart(), stepping_.stepper(), stepping_.state(),
+                          stepping_.next(), push_);
+    }
     recorder_.add_rows(scene_, stepping_.chart(), stepping_.stepper(), stepping_.state(),
                        stepping_.next());
     ++steps_;
@@ -158,6 +193,10 @@ bool Simulation::make_controlled(double end) {
 
 void Simulation::accept() {
   const double before = time();
+  if (sensors_ && settings_.dt > 0) {
+    const KeptCuts kept(cut_);
+    sensors_->add_fixed(scene_, *this, stepping_.state(), stepping_.next(), settings_.dt, push_);
+  }
   stepping_.accept();
   recorder_.add_step(scene_, time(), time() - before);
   recorder_.add_limits(scene_, v(), cut_, time(), time() - before);
@@ -176,6 +215,7 @@ void Simulation::hold_torques() {
   while (next_control_ <= time() + hair)
     next_control_ = settings_.start_time + double(++controls_) * settings_.control_dt;
   command(time(), q(), v());
+  if (sensors_) sensors_->jump();
 }
 
 // What the controller asks for, cut to what the motors give.
@@ -210,9 +250,10 @@ Record Simulation::snapshot() {
   return recorder_.snapshot(scene_, stepping_.state());
 }
 
-void Simulation::push(int joint, const Vec3& point, const Vec3& force_world) {
+void Simulation::push(int joint, const Vec3& point, const Vec3& force_world, int frame) {
   scene_.need_velocity_of(joint);
-  push_.set(joint, point, force_world);
+  push_.set(joint, point, force_world, frame);
+  if (sensors_) sensors_->jump();
 }
 
 void Simulation::change(std::vector<Pair> pairs, JointForces::Effects joints,
@@ -225,6 +266,7 @@ void Simulation::change(std::vector<Pair> pairs, JointForces::Effects joints,
   scene_.change(std::move(pairs), std::move(joints));
   if (controller && controller != controller_) {
     controller->prepare(scene_);
+    if (sensors_) controller->read(sensors_->readings());
     if (controller_) controller->take_over(*controller_, state.t);
     controller_ = std::move(controller);
     next_control_ = state.t;
@@ -233,6 +275,7 @@ void Simulation::change(std::vector<Pair> pairs, JointForces::Effects joints,
   // A change of stiffness adds the change of stored energy.
   state.ledger.control += scene_.powers().elastic - before;
   recorder_.add_step(scene_, state.t, 0);
+  if (sensors_) sensors_->jump();
 }
 
 }  // namespace sphshell

@@ -10,6 +10,7 @@
 #include "dynamics/controllers.hpp"
 #include "dynamics/push.hpp"
 #include "dynamics/recording.hpp"
+#include "dynamics/sensors.hpp"
 #include "dynamics/stepping.hpp"
 
 namespace sphshell {
@@ -46,7 +47,8 @@ class Simulation : private Torques {
   enum class Status : int { Running = 0, Finished = 1, Diverged = 2, Stuck = 3 };
 
   Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
-             RunSettings settings, std::shared_ptr<Controller> controller, VectorX q0, VectorX v0);
+             RunSettings settings, std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
+             std::vector<Sensor> sensors = {});
 
   // The first pair whose sphere is deeper than half its radius (of two spheres, the smaller) at the
   // start, or inside a closed one-sided shell on the wrong side, however far.
@@ -56,7 +58,7 @@ class Simulation : private Torques {
   Status advance(double wall_seconds, double until = std::numeric_limits<double>::infinity(),
                  const std::atomic<bool>* stop = nullptr);
   // Hands over what was recorded since the last call.
-  Record take() { return recorder_.take(); }
+  Record take();
   // The current state as the only row of a record; what was recorded stays.
   Record snapshot();
 
@@ -66,8 +68,8 @@ class Simulation : private Torques {
   void change(std::vector<Pair> pairs, JointForces::Effects joints,
               std::shared_ptr<Controller> controller);
   // From now on a force [N] in the world acts at a point of the joint's frame; zero ends it. Its
-  // work counts as the controller's.
-  void push(int joint, const Vec3& point, const Vec3& force_world);
+  // work counts as the controller's. `frame`: the number of the one whose origin that is.
+  void push(int joint, const Vec3& point, const Vec3& force_world, int frame);
 
   // Hands over what a caller may share; the run is at its end.
   Lent give_back() { return {scene_.give_back(), std::move(controller_)}; }
@@ -98,6 +100,7 @@ class Simulation : private Torques {
   bool follow_time() const override;
 
   void start();
+  void begin_sensors();
   Status step();
   Status replace_fixed_step(double end);
   bool make_controlled(double end);
@@ -115,6 +118,7 @@ class Simulation : private Torques {
   Stepping stepping_;
   Recorder recorder_;
   Push push_;
+  std::unique_ptr<Sensors> sensors_;  // null where there are none
   VectorX tau_;
   std::vector<char> cut_;  // torques that were cut to their limit, when last computed
   long grid_ = 0, grid_steps_ = 0,

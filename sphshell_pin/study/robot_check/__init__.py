@@ -1,12 +1,12 @@
 """Seven checks of contact on a robot, by computations independent of the compiled core.
 
-`check_robot` takes a name that sphshell_pin.robots knows or a URDF file, and returns a RobotReport.
+`check_robot` takes a name that sphshell_pin.robots knows or a file, and returns a RobotReport.
 """
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 
 import numpy as np
@@ -55,16 +55,21 @@ def check_robot(
     frame: str | None = None,
     radius: float | None = None,
     free_flyer: bool = False,
+    package_dirs: Sequence[str | PathLike[str]] = (),
+    xacro_args: Mapping[str, object] | None = None,
     seed: int = 0,
     sizes: Sizes | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> RobotReport:
-    """Check contact on a robot: a name that sphshell_pin.robots knows, a URDF file, or a model.
+    """Check contact on a robot: a name that sphshell_pin.robots knows, a file, or a model.
 
     A sphere of `radius` [m] sits at `frame`; without them it is a fingertip or foot that is known,
-    else the end of the longest limb. `free_flyer` frees the root link of a URDF file. Meshes are
-    not loaded. The same `seed` gives the same postures; `sizes` says how many; `progress` is called
-    with the title of each check before it starts. A model is a pinocchio.Model.
+    else the outermost of the spheres inside the collision mesh at the end of the longest limb, or
+    that end. A file is a URDF, xacro (`xacro_args` are its arguments) or MJCF; `free_flyer` frees
+    the root link of a URDF, `package_dirs` are the folders that hold packages that it includes.
+    Mimic joints are exact. Other meshes are not loaded. The same `seed` gives the same postures;
+    `sizes` says how many; `progress` is called with the title of each check before it starts. A
+    model is a pinocchio.Model.
 
     A robot that cannot be loaded on this machine, or whose sphere nothing can move, is reported as
     not checked, with the reason.
@@ -83,7 +88,9 @@ def check_robot(
     if radius is not None:
         radius = check_positive("radius", radius, "m")
     try:
-        subject = load_subject(robot, free_flyer=free_flyer)
+        subject = load_subject(
+            robot, free_flyer=free_flyer, package_dirs=package_dirs, xacro_args=xacro_args
+        )
     except (MissingExtra, NameNotFound):
         raise
     except _load_fault() as error:

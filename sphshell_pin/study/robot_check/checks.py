@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.dynamics import Adaptive, Result, Scene, SemiImplicitEuler, Simulation
@@ -24,7 +23,12 @@ from sphshell_pin.study.robot_check.setting import (
     random_torques,
     stopping_law,
 )
-from sphshell_pin.testing.conservation import elastic_energy, energy, momentum
+from sphshell_pin.testing.conservation import (
+    elastic_energy,
+    energy,
+    kinetic_energy,
+    momentum,
+)
 from sphshell_pin.testing.differences import derivatives
 from sphshell_pin.testing.finding import Finding, worst
 from sphshell_pin.testing.forces import balance, reaction
@@ -193,7 +197,7 @@ def _impact(setting: Setting, rng: np.random.Generator) -> list[Result]:
     pair = touch.scene.pairs[0]
     scene, data = Scene(touch.scene.model), touch.scene.model.createData()
     # Whatever the joints do, the law can take up all the energy they have.
-    heavy = 2.0 * pin.computeKineticEnergy(scene.model, data, touch.q, touch.v) / speed**2
+    heavy = 2.0 * kinetic_energy(scene.model, data, touch.q, touch.v) / speed**2
     law = stopping_law(heavy, speed, 0.3 * radius)
     scene.add_contact(setting.sphere, setting.shell, pair.frame_j, pair.placement, law)
     start = replace(touch, scene=scene)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,9 +16,6 @@ from numpy.typing import NDArray
 from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 
-# Files of robots end on these, and files that are taken for such.
-_SUFFIXES = (".urdf", ".xml", ".sdf", ".xacro", ".mjcf", ".usd", ".usda", ".dae", ".srdf")
-
 
 @dataclass(frozen=True)
 class Subject:
@@ -28,6 +26,8 @@ class Subject:
     shipped: str | None
     """The name under which sphshell_pin.robots knows it, or None."""
     notes: tuple[str, ...] = field(default=())
+    spheres_of: Callable[[str], robots.MeshSpheres] | None = None
+    """Approximates the collision geometry of a link, by its name; None where there is none."""
 
 
 def all_names() -> list[str]:
@@ -35,16 +35,11 @@ def all_names() -> list[str]:
     return list(robots.names())
 
 
-def is_path(robot: str) -> bool:
-    """Whether `robot` is meant as a file, not as a name."""
-    return Path(robot).suffix.lower() in _SUFFIXES or "/" in robot or os.path.isfile(robot)
-
-
 def check_known(names: Iterable[str]) -> None:
     """Raise SphshellError for the first of `names` that is neither a name nor a file."""
     known = all_names()
     for robot in names:
-        if is_path(robot):
+        if robots.is_path(robot):
             if not os.path.isfile(robot):
                 what = "is a folder, not a URDF file" if os.path.isdir(robot) else "no such file"
                 raise SphshellError(f"{robot}: {what}")
@@ -76,7 +71,7 @@ def load_subject(
         raise InvalidParameter("robot", robot, "must be a name, a file or a pinocchio.Model")
     robot = str(robot)
     check_known([robot])
-    if is_path(robot):
+    if robots.is_path(robot):
         file = Path(robot)
         description = robots.read(file, package_dirs, xacro_args)
         return _without_meshes(description, file.stem, None, free_flyer=free_flyer)
@@ -120,15 +115,23 @@ def _without_meshes(
     shipped: str | None,
     *,
     free_flyer: bool,
-    pose: Callable[[pin.Model], NDArray[np.float64]] = pin.neutral,
+    pose: Callable[[pin.Model], NDArray[np.float64]] | None = None,
 ) -> Subject:
     model = robots.build_model(description, free_flyer=free_flyer)
-    q0 = pose(model)
+    q0 = pose(model) if pose is not None else description.q0(model)
+    whole = copy.deepcopy(description)
     robots.keep_spheres(description)
     spheres, _ = robots.build_geometry(description, model, pin.GeometryType.COLLISION)
     robot = robots.LoadedRobot(name, model, spheres, pin.GeometryModel(), q0)
     robot = robots.exactly(robot, description, mimic=True, warn=False)
-    return Subject(name, robot, shipped, robot.notes)
+
+    def spheres_of(link: str) -> robots.MeshSpheres:
+        part = copy.deepcopy(whole)
+        robots.keep_collision_of(part, link)
+        geometry, _ = robots.build_geometry(part, model, pin.GeometryType.COLLISION)
+        return robots.spheres_of_link(model, geometry, link, count=8)
+
+    return Subject(name, robot, shipped, robot.notes, spheres_of)
 
 
 def listed(names: list[str], most: int = 4) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin.dynamics.models import reduced_model
 from sphshell_pin.testing.forces import joint_names, mass_matrix
 
 Array = NDArray[np.float64]
@@ -59,8 +60,7 @@ def massless_joints(model: pin.Model, postures: list[Array]) -> list[str]:
     light = least <= 1e-14 * least.max(initial=0.0)
     held = list(dict.fromkeys(name for name, bare in zip(names, light, strict=True) if bare))
     while len(held) < model.njoints - 1:
-        ids = [model.getJointId(name) for name in held]
-        rest = pin.buildReducedModel(model, ids, postures[0]) if held else model
+        rest = reduced_model(model, tuple(held), postures[0]) if held else model
         keep = [k for k, name in enumerate(names) if name not in held]
         space = [_pivots(rest, rest.createData(), _kept(model, rest, q)) for q in postures]
         shares = np.max(space, axis=0)
@@ -82,10 +82,13 @@ def _pivots(model: pin.Model, data: pin.Data, q: Array) -> Array:
 
     Relative to that with the other joints held.
     """
-    held = np.diag(mass_matrix(model, data, q))
-    pin.cholesky.decompose(model, data)
+    mass = mass_matrix(model, data, q)
+    held = np.diag(mass).copy()
+    # M = U D U^T, from the last velocity on; Pinocchio's own has no mimic joints.
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.array(data.D) / held)
+        for k in range(model.nv - 1, 0, -1):
+            mass[:k, :k] -= np.outer(mass[:k, k], mass[:k, k]) / mass[k, k]
+        return np.asarray(np.diag(mass) / held)
 
 
 def _kept(model: pin.Model, rest: pin.Model, q: Array) -> Array:
@@ -94,7 +97,7 @@ def _kept(model: pin.Model, rest: pin.Model, q: Array) -> Array:
         q[joint.idx_q : joint.idx_q + joint.nq]
         for joint in (model.joints[model.getJointId(name)] for name in list(rest.names)[1:])
     ]
-    return np.concatenate(parts)
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def _turn(rng: np.random.Generator) -> Array:

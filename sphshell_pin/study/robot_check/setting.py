@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
+from sphshell_pin.dynamics.mimic import mimics, with_mimics
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell import Shell
@@ -208,8 +209,7 @@ class _Contact:
         pin.computeJointJacobians(model, data, q)
         jacobian = point_jacobian(model, data, joint, point)
         row = self.normal @ (jacobian - point_jacobian(model, data, other, point))
-        half = np.triu(np.asarray(pin.computeMinverse(model, data, q)).reshape(len(row), len(row)))
-        return 1.0 / float(row @ (half + np.triu(half, 1).T) @ row)
+        return 1.0 / float(row @ np.linalg.solve(mass_matrix(model, data, q), row))
 
     def _point(self, model: pin.Model, data: pin.Data, sphere: Sphere) -> tuple[int, Array]:
         joint, center = center_of(model, data, sphere)
@@ -262,19 +262,23 @@ def _floating(model: pin.Model, sphere: Sphere) -> pin.Model:
     whole.gravity.vector = np.zeros(6)
     joints = range(1, model.njoints)
     anew = {0: 0}
+    rules = mimics(model)
+    kinds = _kinds(model)
     if any(model.parents[j] == 0 and not _flies(model.joints[j]) for j in joints):
         mass = max(float(sum(model.inertias[j].mass for j in joints)), 1e-3)
         anew[0] = _add_free(whole, BASE, pin.Inertia.FromSphere(mass, 0.2))
     for j in joints:
         parent = anew[int(model.parents[j])] if not _flies(model.joints[j]) else 0
         placed = model.jointPlacements[j], model.names[j]
-        anew[j] = int(whole.addJoint(parent, model.joints[j], *placed))
+        anew[j] = int(whole.addJoint(parent, kinds[j], *placed))
         whole.appendBodyToJoint(anew[j], model.inertias[j], pin.SE3.Identity())
     frame = model.frames[find_frame(model, sphere.frame)]
     whole.addFrame(
         pin.Frame(sphere.frame, anew[frame.parentJoint], 0, frame.placement, pin.FrameType.OP_FRAME)
     )
     _add_free(whole, PLATE, pin.Inertia.FromSphere(1.0, 1.0))
+    if rules:
+        whole = with_mimics(whole, rules.values())
     for name in ("lowerPositionLimit", "upperPositionLimit", "armature"):
         values = np.array(getattr(whole, name))
         of = np.asarray(getattr(model, name))
@@ -286,6 +290,28 @@ def _floating(model: pin.Model, sphere: Sphere) -> pin.Model:
             values[to : to + n] = of[at : at + n]
         setattr(whole, name, values)
     return whole
+
+
+def _kinds(model: pin.Model) -> list[pin.JointModel]:
+    """Return the joints of `model`, in place of a mimic joint what it would be if it moved freely.
+
+    Pinocchio keeps that to itself, but the joint's axis times the ratio is in its Data.
+    """
+    kinds, data = list(model.joints), model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    for name, rule in mimics(model).items():
+        j = model.getJointId(name)
+        axis = np.array(data.joints[j].S).ravel() / rule.ratio
+        continuous = model.joints[model.getJointId(rule.of)].nq == 2
+        turning = (
+            pin.JointModelRevoluteUnboundedUnaligned
+            if continuous
+            else (pin.JointModelRevoluteUnaligned)
+        )
+        kinds[j] = (
+            turning(axis[3:]) if axis[3:].any() else pin.JointModelPrismaticUnaligned(axis[:3])
+        )
+    return kinds
 
 
 def _flies(joint: pin.JointModel) -> bool:

@@ -53,8 +53,41 @@ def find_sphere(
             return tip, []
         break
     end = _longest_limb(model)
+    if radius is None:
+        on_mesh = _on_mesh(subject, model, end, why)
+        if on_mesh is not None:
+            return on_mesh, [on_mesh.source]
     said = f"{why}: the sphere sits at '{end}', the end of the longest limb"
     return Tip(end, radius or size, np.zeros(3), said), [said]
+
+
+def _on_mesh(subject: Subject, model: pin.Model, end: str, why: str) -> Tip | None:
+    """Return the outermost sphere of those inside the collision meshes on the body of `end`.
+
+    None where it has no closed mesh, or where that cannot be read.
+    """
+    if subject.spheres_of is None:
+        return None
+    joint = model.frames[find_frame(model, end)].parentJoint
+    best, reach = None, 0.0
+    for frame in model.frames:
+        if frame.parentJoint != joint or frame.type != pin.FrameType.BODY:
+            continue
+        try:
+            made = subject.spheres_of(frame.name)
+        except SphshellError:
+            continue
+        least = max(_DUMMY, 0.25 * max(one.radius for one in made.spheres))
+        for one in made.spheres:
+            far = float(np.linalg.norm(frame.placement.act(np.array(one.offset)))) + one.radius
+            if one.radius >= least and far > reach:
+                said = (
+                    f"{why}: the sphere is the outermost of {len(made.spheres)} inside the "
+                    f"collision mesh of '{frame.name}', which is nowhere farther than "
+                    f"{made.mesh_to_spheres * 1e3:.3g} mm from them"
+                )
+                best, reach = Tip(frame.name, one.radius, np.array(one.offset), said), far
+    return best
 
 
 def _sphere(tip: Tip, shift: Array | float = 0.0) -> Sphere:

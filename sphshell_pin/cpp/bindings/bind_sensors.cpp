@@ -1,0 +1,59 @@
+#include "bindings/interop.hpp"
+
+#include "dynamics/sensors.hpp"
+
+#include <nanobind/eigen/dense.h>
+#include <nanobind/stl/vector.h>
+
+namespace nb = nanobind;
+
+void bind_sensors(nb::module_& m) {
+  using namespace sphshell;
+  using Parameters = Eigen::Matrix<double, 10, 1>;
+  nb::class_<Sensor>(m, "Sensor")
+      .def_static(
+          "force_torque",
+          [](int joint, const Eigen::Matrix4d& frame, const Parameters& inertia,
+             std::vector<int> children, std::vector<int> pairs_i, std::vector<int> pairs_j,
+             std::vector<int> frames) {
+            ForceTorque kind;
+            kind.joint = joint;
+            kind.frame = SE3(Eigen::Matrix3d(frame.topLeftCorner<3, 3>()),
+                             Vec3(frame.topRightCorner<3, 1>()));
+            kind.inertia = inertia[0] > 0 ? pinocchio::Inertia::FromDynamicParameters(inertia)
+                                          : pinocchio::Inertia::Zero();
+            kind.children = std::move(children);
+            kind.pairs_i = std::move(pairs_i);
+            kind.pairs_j = std::move(pairs_j);
+            kind.frames = std::move(frames);
+            Sensor sensor;
+            sensor.kind = std::move(kind);
+            return sensor;
+          },
+          nb::kw_only(), nb::arg("joint"), nb::arg("frame"), nb::arg("inertia"),
+          nb::arg("children"), nb::arg("pairs_i"), nb::arg("pairs_j"), nb::arg("frames"))
+      .def_static(
+          "joint_torque",
+          [](int index) {
+            Sensor sensor;
+            sensor.kind = JointTorque{index};
+            return sensor;
+          },
+          nb::kw_only(), nb::arg("index"))
+      .def_static(
+          "contact_switch",
+          [](std::vector<int> pairs, double threshold, double release) {
+            Sensor sensor;
+            sensor.kind = ContactSwitch{std::move(pairs), threshold, release};
+            return sensor;
+          },
+          nb::kw_only(), nb::arg("pairs"), nb::arg("threshold"), nb::arg("release"))
+      .def_prop_ro("size", &Sensor::size)
+      .def_rw("rate", &Sensor::rate)
+      .def_rw("delay", &Sensor::delay)
+      .def_rw("cutoff", &Sensor::cutoff)
+      .def_rw("range", &Sensor::range)
+      .def_rw("noise", &Sensor::noise)
+      .def_rw("seed", &Sensor::seed);
+  m.def("normal_noise", &normal_noise, nb::arg("seed"), nb::arg("sample"), nb::arg("value"));
+}

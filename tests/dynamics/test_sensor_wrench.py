@@ -1,0 +1,376 @@
+"""What force-torque and joint torque sensors measure, against Newton's and Euler's laws by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin import robots
+from sphshell_pin.dynamics.open_run import OpenRun
+from tests import models
+
+# A joint, its link, a sensor fixed to it, on that a flange with a tool fixed to it and a finger on
+# a joint: masses [kg], centers of mass [m] in the link, inertia about it.
+PARTS = {
+    "upper": (2.0, (0.01, 0.02, 0.15), (0.02, 0.03, 0.01)),
+    "flange": (0.4, (0.0, 0.01, 0.02), (1e-3, 2e-3, 3e-3)),
+    "tool": (0.7, (0.05, 0.0, 0.03), (4e-3, 1e-3, 2e-3)),
+    "finger": (0.3, (0.0, 0.0, 0.06), (1e-3, 1e-3, 5e-4)),
+}
+BEYOND = ("flange", "tool", "finger")
+
+
+def _link(name):
+    mass, com, (a, b, c) = PARTS[name]
+    at = " ".join(map(str, com))
+    return f"""<link name="{name}"><inertial><origin xyz="{at}"/><mass value="{mass}"/>
+    <inertia ixx="{a}" iyy="{b}" izz="{c}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+
+
+def _joint(name, kind, parent, child, xyz, rpy="0 0 0", axis="0 1 0"):
+    more = f'<axis xyz="{axis}"/><limit lower="-3" upper="3" effort="90" velocity="9"/>'
+    return f"""<joint name="{name}" type="{kind}"><origin xyz="{xyz}" rpy="{rpy}"/>
+    <parent link="{parent}"/><child link="{child}"/>{more if kind != "fixed" else ""}</joint>"""
+
+
+URDF = "\n".join(
+    [
+        '<robot name="arm"><link name="base"/>',
+        *map(_link, PARTS),
+        '<link name="tip"/>',
+        _joint("shoulder", "revolute", "base", "upper", "0 0 0.4", "0.3 0 0", "0 0.6 0.8"),
+        _joint("mount", "fixed", "upper", "flange", "0 0 0.3", "0.2 -0.4 0.7"),
+        _joint("grip", "fixed", "flange", "tool", "0.02 0 0.05", "0 0.5 0"),
+        _joint("knuckle", "revolute", "flange", "finger", "0 0.03 0.05"),
+        _joint("end", "fixed", "finger", "tip", "0 0 0.1"),
+        "</robot>",
+    ]
+)
+
+
+def arm():
+    return pin.buildModelFromXML(URDF)
+
+
+def sensor(frame="mount", **more):
+    return sp.ForceTorqueSensor(name="wrist", frame=frame, **more)
+
+
+def poses(model, q):
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return {f.name: data.oMf[k] for k, f in enumerate(model.frames)}
+
+
+def weight(model, q, at="mount", parts=BEYOND):
+    """Force and torque that carry the weight of the parts, in the frame `at`."""
+    pose = poses(model, q)
+    force, torque = np.zeros(3), np.zeros(3)
+    for name in parts:
+        mass, com, _ = PARTS[name]
+        up = np.array([0.0, 0.0, 9.81 * mass])
+        force += up
+        torque += np.cross(pose[name].act(np.array(com)) - pose[at].translation, up)
+    turn = pose[at].rotation.T
+    return np.concatenate([turn @ force, turn @ torque])
+
+
+def read(scene, q, controller, sensors, duration=0.0, **more):
+    return sp.Simulation(scene, sp.Adaptive(), sensors).run(q, None, duration, controller, **more)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    ("frame", "parts"),
+    [
+        ("mount", BEYOND),
+        ("flange", BEYOND),
+        ("grip", ("tool",)),
+        ("finger", ("finger",)),
+        ("shoulder", tuple(PARTS)),
+        ("upper", tuple(PARTS)),
+        ("base", tuple(PARTS)),
+    ],
+)
+def test_at_rest_it_reads_the_weight_beyond_it(seed, frame, parts):
+    model = arm()
+    q = np.random.default_rng(seed).uniform(-1.5, 1.5, model.nq)
+    result = read(sp.Scene(model), q, sp.GravityCompensation(), [sensor(frame)])
+    expected = weight(model, q, frame, parts)
+    assert np.abs(result.sensors["wrist"].values[0] - expected).max() < 1e-10
+
+
+@pytest.mark.parametrize("locked", [["knuckle"], ["shoulder"]])
+def test_a_locked_joint_changes_nothing(locked):
+    model = arm()
+    q = np.array([0.4, -0.7])
+    scene = sp.Scene(model, lock=locked, q_lock=q)
+    left = q[[k for k, name in enumerate(("shoulder", "knuckle")) if name not in locked]]
+    for frame, parts in (("mount", BEYOND), ("grip", ("tool",)), ("upper", tuple(PARTS))):
+        result = read(scene, left, sp.GravityCompensation(), [sensor(frame)])
+        expected = weight(model, q, frame, parts)
+        assert np.abs(result.sensors["wrist"].values[0] - expected).max() < 1e-10, frame
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_pressed_tip_reads_the_opposite_of_the_contact_force(seed):
+    model, radius, depth = arm(), 0.02, 3e-4
+    q = np.random.default_rng(seed).uniform(-1.0, 1.0, model.nq)
+    center = poses(model, q)["tip"].translation
+    law = sp.ImpactLaw(1e6, 1.5)
+    scene = sp.Scene(model)
+    scene.add_contact(
+        sp.Sphere(radius, frame="tip"),
+        models.plate(),
+        placement=pin.SE3(np.eye(3), center - [0.01, 0.02, radius - depth]),
+        law=law,
+        method="facets",
+        name="tip-plate",
+    )
+    data = model.createData()
+    hold = pin.rnea(model, data, q, np.zeros(2), np.zeros(2), scene.external_forces(q))
+    switch = sp.ContactSwitch(name="switch", frame="finger", threshold=1.0)
+    result = read(scene, q, lambda t, q, v, contacts: hold, [sensor(), sensor_of("tool"), switch])
+    pose = poses(model, q)["mount"]
+    push = np.array([0.0, 0.0, law.normal_force(depth)])
+    arm_of_force = center - [0, 0, radius] - pose.translation
+    contact = np.concatenate([push, np.cross(arm_of_force, push)])
+    contact = np.concatenate([pose.rotation.T @ contact[:3], pose.rotation.T @ contact[3:]])
+    assert push[2] > 5
+    seen = result.sensors["wrist"].values[0]
+    assert np.abs(seen - (weight(model, q) - contact)).max() < 1e-10
+    # The finger is not beyond the tool.
+    tool = result.sensors["tool"].values[0]
+    assert np.abs(tool - weight(model, q, "grip", ("tool",))).max() < 1e-10
+    assert result.sensors["switch"].values.tolist() == [[1.0]]
+
+
+def sensor_of(name):
+    return sp.ForceTorqueSensor(name=name, frame={"tool": "grip"}[name])
+
+
+def one_link():
+    """A link swinging about an oblique axis, with a part fixed to it beyond "mount"."""
+    urdf = "\n".join(
+        [
+            '<robot name="swing"><link name="base"/>',
+            _link("upper"),
+            _link("tool"),
+            _joint("shoulder", "revolute", "base", "upper", "0 0 0", "0.3 0 0", "0 0.6 0.8"),
+            _joint("mount", "fixed", "upper", "tool", "0 0 0.3", "0.2 -0.4 0.7"),
+            "</robot>",
+        ]
+    )
+    return pin.buildModelFromXML(urdf)
+
+
+@pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.Implicit(), sp.RungeKutta4(1e-3)])
+def test_a_swinging_link_needs_centripetal_and_angular_acceleration(integrator):
+    model = one_link()
+    rate = 250.0
+    scene = sp.Scene(model)
+    result = sp.Simulation(scene, integrator, [sensor(rate=rate)]).run(
+        [0.9], [4.0], 0.4, record_dt=1 / rate
+    )
+    log = result.sensors["wrist"]
+    assert np.allclose(log.t, result.t, rtol=0, atol=1e-12)
+    gravity = np.array([0.0, 0.0, -9.81])
+    for q, v, seen in zip(result.q, result.v, log.values, strict=True):
+        pose = poses(model, q)
+        axis = pose["shoulder"].rotation @ np.array([0.0, 0.6, 0.8])
+        # About the fixed axis: the sum of m r^2 and the parts' own inertia; gravity's torque.
+        inertia = torque = 0.0
+        for name in ("upper", "tool"):
+            mass, com, own = PARTS[name]
+            r = pose[name].act(np.array(com))
+            inertia += axis @ pose[name].rotation @ np.diag(own) @ pose[name].rotation.T @ axis
+            inertia += mass * (r @ r - (r @ axis) ** 2)
+            torque += axis @ np.cross(r, mass * gravity)
+        spin, alpha = v[0] * axis, torque / inertia * axis
+        mass, com, own = PARTS["tool"]
+        center = pose["tool"].act(np.array(com))
+        acceleration = np.cross(alpha, center) + np.cross(spin, np.cross(spin, center))
+        force = mass * (acceleration - gravity)
+        about = pose["tool"].rotation @ np.diag(own) @ pose["tool"].rotation.T
+        moment = about @ alpha + np.cross(spin, about @ spin)
+        moment += np.cross(center - pose["mount"].translation, force)
+        turn = pose["mount"].rotation.T
+        assert np.allclose(seen, np.concatenate([turn @ force, turn @ moment]), rtol=0, atol=1e-9)
+    assert np.abs(log.values).max() > 9
+
+
+def test_a_joint_torque_at_rest_carries_the_weight():
+    model = arm()
+    q = np.array([0.4, -0.7])
+    names = ("shoulder", "knuckle")
+    sensors = [sp.JointTorqueSensor(name=name, joint=name) for name in names]
+    result = read(sp.Scene(model), q, sp.GravityCompensation(), sensors)
+    for name, axis, parts in (
+        ("shoulder", (0.0, 0.6, 0.8), tuple(PARTS)),
+        ("knuckle", (0.0, 1.0, 0.0), ("finger",)),
+    ):
+        wrench = weight(model, q, name, parts)
+        assert abs(result.sensors[name].values[0, 0] - wrench[3:] @ np.array(axis)) < 1e-10
+        assert result.sensors[name].columns == ("torque [N m]",)
+
+
+def test_a_rotor_takes_its_share_of_the_torque():
+    """An armature J and a link of inertia I: the link gets tau I / (I + J)."""
+    model = models.empty(gravity=0.0)
+    link, rotor, tau = 0.3, 0.2, 5.0
+    inertia = pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.1, link]))
+    models.add_body(model, "wheel", pin.JointModelRZ(), inertia=inertia)
+    model.armature = np.array([rotor])
+    result = read(
+        sp.Scene(model),
+        [0.0],
+        lambda t, q, v, contacts: [tau],
+        [
+            sp.JointTorqueSensor(name="torque", joint="wheel_joint"),
+            sp.ForceTorqueSensor(name="wrench", frame="wheel_joint"),
+        ],
+        0.1,
+        control_dt=0.01,
+    )
+    expected = tau * link / (link + rotor)
+    assert np.allclose(result.sensors["torque"].values, expected, rtol=1e-12)
+    assert np.allclose(result.sensors["wrench"].values[:, 5], expected, rtol=1e-12)
+
+
+def test_a_force_plate_on_the_world():
+    """A ball rests on a plate; the sensor is between the plate and the world."""
+    urdf = """<robot name="plate"><link name="world"/>
+    <link name="plate"><inertial><mass value="3"/><origin xyz="0.1 0 0"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <link name="ball"><inertial><mass value="2"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="legs" type="fixed"><parent link="world"/><child link="plate"/>
+    <origin xyz="0 0 -0.05"/></joint>
+    <joint name="up" type="prismatic"><parent link="world"/><child link="ball"/>
+    <origin xyz="0.2 0.1 0"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    model = pin.buildModelFromXML(urdf)
+    law = models.linear_law(1e5)
+    scene = sp.Scene(model)
+    scene.add_contact(
+        sp.Sphere(0.05, frame="ball"),
+        models.plate(),
+        frame="plate",
+        placement=pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.05])),
+        law=law,
+        method="facets",
+        name="ball-plate",
+    )
+    rest = 0.05 - 2 * 9.81 / 1e5
+    result = read(scene, [rest], None, [sensor("legs")])
+    f = 5 * 9.81
+    expected = [0, 0, f, 2 * 9.81 * 0.1, -(2 * 9.81 * 0.2 + 3 * 9.81 * 0.1), 0]
+    assert np.allclose(result.sensors["wrist"].values[0], expected, rtol=0, atol=1e-9)
+
+
+def test_a_push_from_outside_is_felt():
+    model = models.slider()
+    simulation = sp.Simulation(
+        sp.Scene(model), sp.SemiImplicitEuler(1e-3), [sensor("ball_joint", rate=1000)]
+    )
+    run = OpenRun(simulation, [0.0], record_dt=1e-3, controller=sp.GravityCompensation())
+    run.advance(0.01)
+    run.push("ball", [3.0, -4.0, 7.0])
+    rows = run.advance(0.01)
+    # The joint slides along z: it holds the push across, and the weight.
+    assert np.allclose(rows.sensors["wrist"].values[-1, :3], [-3.0, 4.0, 9.81], atol=1e-12)
+    assert np.allclose(rows.sensors["wrist"].t[0], 0.011)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (sp.ForceTorqueSensor(name="s", frame="nowhere"), "nowhere"),
+        (sp.ForceTorqueSensor(name="s", frame="tip"), "frame = 'tip' has nothing beyond it"),
+        (sp.JointTorqueSensor(name="s", joint="mount"), "no joint 'mount'"),
+        (sp.ContactSwitch(name="s", contact="a", threshold=0), "no contact 'a'"),
+        (sp.ContactSwitch(name="s", frame="finger", threshold=0), "has no contact on it"),
+    ],
+)
+def test_what_the_scene_does_not_have_is_named(given, said):
+    with pytest.raises(sp.SphshellError, match=said):
+        read(sp.Scene(arm()), [0.0, 0.0], None, [given])
+
+
+def test_a_point_on_a_link_divides_nothing():
+    with pytest.raises(sp.SphshellError, match="'ball' is a point on a link"):
+        read(sp.Scene(models.slider()), [0.0], None, [sensor("ball")])
+    free = sp.JointTorqueSensor(name="s", joint="ball_joint")
+    with pytest.raises(sp.SphshellError, match="must have one degree of freedom, this has 6"):
+        read(sp.Scene(models.ball()), models.free_q([0, 0, 0]), None, [free])
+
+
+def test_what_a_joint_adds_is_transmitted():
+    """A wheel driven against damping and sliding dry friction, with a rotor: I times alpha."""
+    model = models.empty(gravity=0.0)
+    link, rotor, damping, friction, tau = 0.3, 0.2, 0.4, 1.5, 5.0
+    inertia = pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.1, link]))
+    models.add_body(model, "wheel", pin.JointModelRZ(), inertia=inertia)
+    joint = "wheel_joint"
+    scene = sp.Scene(
+        model,
+        joints=sp.JointIngredients(
+            damping={joint: damping},
+            friction={joint: sp.JointFriction(friction)},
+            armature={joint: rotor},
+            effort={joint: 4.0},
+        ),
+    )
+    sensor = sp.JointTorqueSensor(name="torque", joint=joint, rate=200)
+    simulation = sp.Simulation(scene, sp.Adaptive(rtol=1e-9), [sensor])
+    result = simulation.run(
+        [0.0], [1.0], 0.2, lambda t, q, v, contacts: [tau], control_dt=0.05, record_dt=1 / 200
+    )
+    # Cut to 4 N m by the motor's limit.
+    alpha = (4.0 - damping * result.v[:, 0] - friction) / (link + rotor)
+    seen = result.sensors["torque"].values[:, 0]
+    assert np.allclose(seen[20:], link * alpha[20:], rtol=1e-6)
+    assert result.stats.joints[joint].cut_time > 0.19
+
+
+def test_joints_that_mimic_others():
+    """A gripper's finger hangs on a joint that follows: its weight counts, it has no motor."""
+    model = robots.load("panda", mimic=True).model
+    finger = model.names[model.njoints - 1]
+    q = np.array([0.3, 0.2, -0.4, -1.5, 0.3, 1.2, 0.5, *([0.02] * (model.nq - 7))])
+    sensors = [sp.ForceTorqueSensor(name="hand", frame="panda_hand")]
+    result = read(sp.Scene(model), q, sp.GravityCompensation(), sensors)
+    hand = model.frames[model.getFrameId("panda_hand_joint")].inertia.mass
+    mass = hand + sum(model.inertias[k].mass for k in (model.njoints - 2, model.njoints - 1))
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    turn = data.oMf[model.getFrameId("panda_hand")].rotation
+    force = result.sensors["hand"].values[0, :3]
+    assert np.allclose(turn @ force, [0, 0, 9.81 * mass], rtol=0, atol=1e-10)
+    follower = sp.JointTorqueSensor(name="s", joint=finger)
+    with pytest.raises(sp.SphshellError, match="it follows another joint, measure that one"):
+        read(sp.Scene(model), q, None, [follower])
+
+
+def test_the_drive_of_joints_that_follow_carries_them():
+    """A slide of 1 kg, and one of 0.5 kg that goes up twice as far."""
+    part = """<inertial><mass value="{}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+    </inertial>"""
+    slide = """<joint name="{0}" type="prismatic"><parent link="base"/><child link="{1}"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>{2}</joint>"""
+    urdf = f"""<robot name="r"><link name="base"/><link name="one">{part.format(1.0)}</link>
+    <link name="two">{part.format(0.5)}</link>{slide.format("first", "one", "")}
+    {slide.format("second", "two", '<mimic joint="first" multiplier="2"/>')}</robot>"""
+    model = pin.buildModelFromXML(urdf, mimic=True)
+    drive = sp.JointTorqueSensor(name="drive", joint="first")
+    wrench = sp.ForceTorqueSensor(name="wrench", frame="two")
+    result = read(sp.Scene(model), [0.1], sp.GravityCompensation(), [drive, wrench])
+    assert abs(result.sensors["drive"].values[0, 0] - 9.81 * (1.0 + 2 * 0.5)) < 1e-12
+    assert abs(result.sensors["wrench"].values[0, 2] - 9.81 * 0.5) < 1e-12
+    # Let go, the first falls with g (1 + 1) / (1 + 4 0.5): the drive gives nothing.
+    fall = read(sp.Scene(model), [0.1], None, [drive, wrench])
+    assert abs(fall.sensors["drive"].values[0, 0]) < 1e-12
+    acceleration = -2 * 9.81 * (1.0 + 2 * 0.5) / (1.0 + 4 * 0.5)
+    assert abs(fall.sensors["wrench"].values[0, 2] - 0.5 * (acceleration + 9.81)) < 1e-12

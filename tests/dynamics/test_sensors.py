@@ -1,0 +1,429 @@
+"""What becomes of a signal on its way to the controller: filter, sampling, noise, range, delay."""
+
+from __future__ import annotations
+
+import csv
+from math import erf
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin import _core
+from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
+from sphshell_pin.scenario.run import write_sensors
+from tests import models
+
+BALL = "ball_joint"
+
+
+def torque(name="torque", **more):
+    """Sensor of the force that drives the slider."""
+    return sp.JointTorqueSensor(name=name, joint=BALL, **more)
+
+
+def slider(integrator, sensors):
+    return sp.Simulation(sp.Scene(models.slider(gravity=0.0)), integrator, sensors)
+
+
+def sine(frequency, amplitude=3.0):
+    return lambda t, q, v, contacts: [amplitude * np.sin(2 * np.pi * frequency * t)]
+
+
+def response(log, frequency, skip):
+    """Gain and phase [rad] of a log against a sine of amplitude 3."""
+    t, x = log.sampled[log.sampled >= skip], log.values[log.sampled >= skip, 0]
+    waves = np.column_stack([np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)])
+    (a, b), *_ = np.linalg.lstsq(waves, x, rcond=None)
+    return np.hypot(a, b) / 3.0, np.arctan2(b, a)
+
+
+@pytest.mark.parametrize("share", [0.1, 1.0, 10.0])
+@pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.RungeKutta4(5e-5)])
+def test_the_filter_is_of_first_order(integrator, share):
+    """-3 dB and -45 degrees at the cutoff; far from the rate of sampling too."""
+    frequency = 50.0
+    cutoff = frequency / share
+    sensors = [
+        torque("fast", rate=4000, cutoff=cutoff),
+        torque("slow", rate=90, cutoff=cutoff),
+    ]
+    if share < 1:
+        sensors = sensors[:1]
+    skip = 5 / cutoff
+    result = slider(integrator, sensors).run([0.0], None, skip + 0.2, sine(frequency))
+    for log in result.sensors.values():
+        gain, phase = response(log, frequency, skip)
+        assert abs(gain * np.hypot(1, share) - 1) < 2e-3
+        assert abs(phase + np.arctan(share)) < 2e-2
+    if share == 1:
+        assert abs(20 * np.log10(gain) + 3.0103) < 0.02
+
+
+# A tip of a quarter of the mass, with a sensor between the two.
+HAMMER = """<robot name="r"><link name="base"/><link name="body"><inertial><mass value="0.75"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="ball"><inertial><mass value="0.25"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="body"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="mount" type="fixed"><parent link="body"/><child link="ball"/></joint></robot>"""
+
+
+def test_the_filter_misses_no_impact():
+    """Of a blow between two samples, the filtered signal keeps the impulse."""
+    model = pin.buildModelFromXML(HAMMER)
+    scene = models.on_plate(model, sp.ImpactLaw(1e9, 1.5))
+    sensor = sp.ForceTorqueSensor(name="wrist", frame="mount", rate=1000, cutoff=30)
+    duration = 0.12
+    result = sp.Simulation(scene, sp.Adaptive(), [sensor]).run([0.0501], [-1.0], duration)
+    contact = result.stats.pairs["ball-plate"]
+    assert contact.touches == 1
+    assert contact.contact_time < 1e-3
+    impulse = result.v[-1, 0] + 1.0 + 9.81 * duration
+    # Tip: m (a + g) = F + N, body and tip: a + g = N.
+    expected = -0.75 * impulse
+    assert abs(result.sensors["wrist"].values[:, 2].sum() / 1000 / expected - 1) < 1e-3
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        sp.Adaptive(),
+        sp.Implicit(),
+        sp.SemiImplicitEuler(1e-4),
+        sp.RungeKutta4(1e-4),
+        sp.LinearlyImplicitEuler(1e-3),
+    ],
+)
+def test_sensors_do_not_change_the_motion(integrator):
+    friction = sp.BristleFriction(0.5, 0.4, 1e4, 10.0)
+    scene = models.on_plate(models.arm(), sp.HuntCrossleyLaw(1e6, 1.5, 0.2), friction)
+    controller = sp.CartesianImpedance(
+        frame="ball", path=[(0.3, 0.1, 0.04), (0.35, 0.1, 0.04)], stiffness=900, damping=30
+    )
+    sensors = [
+        sp.ForceTorqueSensor(name="a", frame="two_joint", rate=700, cutoff=100, delay=1e-3),
+        sp.ForceTorqueSensor(name="b", frame=BALL, rate=331, force_noise=1.0),
+        sp.ContactSwitch(name="c", contact="ball-plate", threshold=0.1),
+    ]
+    results = []
+    for record_dt in (None, 7e-3):
+        for some in ([], sensors):
+            simulation = sp.Simulation(scene, integrator, some)
+            results.append(simulation.run(models.ARM_Q, None, 0.1, controller, record_dt=record_dt))
+        plain, measured = results[-2:]
+        assert np.array_equal(plain.q, measured.q)
+        assert np.array_equal(plain.v, measured.v)
+        assert np.array_equal(plain.contacts.contact_id, measured.contacts.contact_id)
+        assert np.array_equal(plain.energy.total, measured.energy.total)
+        assert plain.sensors == {}
+    assert results[1].stats.pairs["ball-plate"].touches > 0
+
+
+def splitmix(x):
+    mask = (1 << 64) - 1
+    x = (x + 0x9E3779B97F4A7C15) & mask
+    x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & mask
+    x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & mask
+    return x ^ (x >> 31)
+
+
+def test_noise_is_the_same_on_every_machine():
+    """Integers alone decide, and one division that IEEE 754 rounds."""
+    for seed, sample, value in ((0, 0, 0), (1, 2, 3), (2**64 - 1, 10**6, 5)):
+        key = splitmix(splitmix(splitmix(seed) ^ sample) ^ value)
+        total = sum(bin(splitmix(key ^ splitmix(i))).count("1") for i in range(4)) - 128.0
+        rest = splitmix(key ^ splitmix(4))
+        total += (rest >> 32) * 2.0**-32 - (rest & 0xFFFFFFFF) * 2.0**-32
+        assert _core.normal_noise(seed, sample, value) == total / 8.010409893800427
+
+
+def test_noise_is_normal():
+    n = 200_000
+    x = np.array([_core.normal_noise(7, k, 0) for k in range(n)])
+    assert abs(x.mean()) < 4 / np.sqrt(n)
+    assert abs(x.std() - 1) < 4 / np.sqrt(2 * n)
+    assert abs((x**3).mean()) < 4 * np.sqrt(15 / n)
+    assert abs((x**4).mean() - 3) < 4 * np.sqrt(96 / n) + 0.01
+    # Kolmogorov and Smirnov: 1.63 / sqrt(n) at one in a hundred.
+    cdf = np.array([0.5 * (1 + erf(v / np.sqrt(2))) for v in np.sort(x)])
+    assert np.abs(cdf - np.arange(n) / n).max() < 1.63 / np.sqrt(n)
+    assert abs(np.corrcoef(x[1:], x[:-1])[0, 1]) < 4 / np.sqrt(n)
+
+
+def noisy(**more):
+    return sp.ForceTorqueSensor(name="wrist", frame=BALL, force_noise=0.5, torque_noise=0.1, **more)
+
+
+def test_the_same_seed_gives_the_same_bits():
+    def values(sensor, **more):
+        result = slider(sp.Adaptive(), [sensor]).run([0.0], None, 0.5, sine(3.0), **more)
+        return result.sensors["wrist"].values
+
+    first = values(noisy(seed=4))
+    assert np.array_equal(first, values(noisy(seed=4)))
+    # It is that of the sample, however the rows are recorded.
+    assert np.array_equal(first, values(noisy(seed=4), record_dt=0.1))
+    assert not np.array_equal(first, values(noisy(seed=5)))
+    assert abs(first[:, :2].std() - 0.5) < 0.05
+    assert abs(first[:, 3:].std() - 0.1) < 0.01
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_rollouts_have_the_bits_of_runs(threads):
+    simulation = slider(sp.SemiImplicitEuler(1e-3), [noisy(cutoff=50, delay=3e-3)])
+    starts = [[0.1 * k] for k in range(6)]
+    controller = sp.JointPD(kp=50, kd=1, q_ref=[0.0])
+    rollout = simulation.rollout(starts, None, 0.3, threads, controller=controller)
+    for start, result in zip(starts, rollout, strict=True):
+        alone = simulation.run(start, None, 0.3, controller).sensors["wrist"]
+        assert np.array_equal(result.sensors["wrist"].values, alone.values)
+        assert np.array_equal(result.sensors["wrist"].t, alone.t)
+    assert len(alone) == 298
+
+
+def test_sensors_vary_from_run_to_run():
+    simulation = slider(sp.Adaptive(), [noisy(), torque()])
+    vary = {"sensors.wrist.seed": range(3), "sensors.torque.delay": np.array([0.0, 0.01, 0.02])}
+    rollout = simulation.rollout([0.0], None, 0.05, vary=vary)
+    for seed, delay, result in zip(*vary.values(), rollout, strict=True):
+        alone = slider(sp.Adaptive(), [noisy(seed=seed), torque(delay=delay)])
+        for name, log in alone.run([0.0], None, 0.05).sensors.items():
+            assert np.array_equal(log.values, result.sensors[name].values)
+            assert np.array_equal(log.t, result.sensors[name].t)
+    assert rollout.varied["sensors.wrist.seed"] == range(3)
+    assert rollout.to_dataframe()["sensors.torque.delay"].tolist() == [0.0, 0.01, 0.02]
+    with pytest.raises(NameNotFound, match=r"no varied parameter 'sensors.wrist.frame'"):
+        simulation.rollout([0.0], None, 0.05, vary={"sensors.wrist.frame": ["a"]})
+    with pytest.raises(InvalidParameter, match=r"of run 1'?.* = -1 cannot be taken: rate"):
+        simulation.rollout([0.0], None, 0.05, vary={"sensors.wrist.rate": [1, -1]})
+    with pytest.raises(InvalidParameter, match="must be 2 numbers, one a run"):
+        simulation.rollout([[0.0], [1.0]], None, 0.05, vary={"sensors.wrist.seed": [1]})
+
+
+def test_readings_saturate_at_the_range():
+    sensors = [torque("whole"), torque("cut", range=1.5)]
+    result = slider(sp.Adaptive(), sensors).run([0.0], None, 0.5, sine(7.0))
+    whole, cut = (result.sensors[name].values for name in ("whole", "cut"))
+    assert np.abs(whole).max() > 2.9
+    assert np.array_equal(cut, np.clip(whole, -1.5, 1.5))
+
+
+@pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.SemiImplicitEuler(1e-3)])
+@pytest.mark.parametrize("delay", [0.0, 2e-3, 4.3e-3, 0.05])
+def test_a_reading_arrives_after_its_delay(integrator, delay):
+    """The controller knows what was sampled so long ago, and no more."""
+    seen = []
+
+    def tau(t, q, v, contacts, sensors):
+        seen.append((t, sensors["torque"], sensors["now"]))
+        return [1.0 + t]
+
+    sensors = [torque(rate=500, delay=delay), torque("now", rate=500)]
+    result = slider(integrator, sensors).run([0.0], None, 0.1, tau, control_dt=1e-3)
+    log = result.sensors["torque"]
+    assert np.array_equal(log.t, log.sampled + delay)
+    assert np.allclose(log.sampled, np.arange(len(log)) / 500, rtol=0, atol=1e-15)
+    assert len(log) == int((0.1 - delay + 1e-9) * 500) + 1
+    assert len(seen) == 100
+    for t, late, now in seen[1:]:
+        if t + 1e-12 >= delay:
+            assert late == log.at(t + 1e-12)[0]
+        assert now == result.sensors["now"].at(t + 1e-12)[0]
+    # Held torques change after the samples of the same time are taken.
+    held = np.floor(log.sampled * 1000 - 0.5) / 1000
+    assert np.allclose(log.values[1:, 0], 1 + held[1:], rtol=0, atol=1e-12)
+
+
+def test_before_the_first_reading_the_robot_is_held_still():
+    """Without acceleration, as brakes hold it: then the weight is all that is read."""
+    seen = []
+
+    def tau(t, q, v, contacts, sensors):
+        seen.append(sensors["torque"])
+        return [0.0]
+
+    simulation = sp.Simulation(
+        sp.Scene(models.slider()), sp.SemiImplicitEuler(1e-3), [torque(delay=5e-3)]
+    )
+    result = simulation.run([0.0], None, 0.01, tau)
+    assert np.allclose(seen[:5], 9.81)
+    assert np.allclose(seen[6:], 0)
+    assert np.allclose(result.sensors["torque"].values, 0)
+
+
+@pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.SemiImplicitEuler(1e-4)])
+def test_a_controller_stops_on_the_contact_switch(integrator):
+    """The ball moves down at 20 mm/s until the switch closes, and stays there."""
+    scene = models.on_plate(models.slider(), sp.HuntCrossleyLaw(1e5, 1.5, 2.0))
+    stop = []
+
+    def tau(t, q, v, contacts, sensors):
+        if sensors["switch"] and not stop:
+            stop.append((t, q[0]))
+        goal = 0.0 if stop else -0.02
+        hold = 400.0 * (stop[0][1] - q[0]) if stop else 0.0
+        return [9.81 + 60 * (goal - v[0]) + hold]
+
+    switch = sp.ContactSwitch(name="switch", contact="ball-plate", threshold=0.5, rate=500)
+    result = sp.Simulation(scene, integrator, [switch]).run(
+        [0.052], None, 1.0, tau, control_dt=1e-3, record_dt=1e-3
+    )
+    assert len(stop) == 1
+    assert 0.05 < stop[0][0] < 0.2
+    log = result.contacts
+    force = np.zeros(len(result.t))
+    force[log.row] = log.normal_force
+    first = result.t[np.argmax(force > 0.5)]
+    closed = result.sensors["switch"]
+    # At the first sample after the force has passed the threshold.
+    at = closed.t[np.argmax(closed.values[:, 0] > 0)]
+    assert first - 1e-3 <= at <= first + 2e-3
+    assert at <= stop[0][0] <= at + 1e-3 + 1e-9
+    assert abs(result.q[-1, 0] - stop[0][1]) < 1e-3
+    assert abs(result.v[-1, 0]) < 1e-4
+    assert result.q[:, 0].min() > 0.049
+
+
+def test_a_switch_opens_below_its_release():
+    scene = models.on_plate(models.slider(gravity=0.0), models.linear_law(1e4))
+    sensors = [
+        sp.ContactSwitch(name="plain", contact="ball-plate", threshold=2.0, rate=1000),
+        sp.ContactSwitch(name="hysteresis", frame="ball", threshold=2.0, release=1.0, rate=1000),
+    ]
+    # Half a period of a mass on a spring: the force is v sqrt(k m) sin(sqrt(k/m) t).
+    result = sp.Simulation(scene, sp.Adaptive(), sensors).run([0.05], [-0.04], 0.035)
+    t = result.sensors["plain"].t
+    force = np.clip(4 * np.sin(100 * t), 0, None)
+    assert np.array_equal(result.sensors["plain"].values[:, 0], force > 2)
+    held = (force > 2) | ((force >= 1) & (t > 0.01) & (t < np.pi / 100))
+    assert np.array_equal(result.sensors["hysteresis"].values[:, 0], held)
+    assert 0 < (force > 2).sum() < held.sum()
+
+
+@pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.RungeKutta4(1e-3)])
+def test_samples_between_steps(integrator):
+    """A rate that fits no step: values within the error of the interpolation."""
+    simulation = slider(integrator, [torque(rate=731.0)])
+    controller = sp.JointPD(kp=100, kd=0, q_ref=[0.0], gravity_compensation=False)
+    result = simulation.run([0.1], None, 0.5, controller)
+    log = result.sensors["torque"]
+    assert len(log) == 366
+    expected = -10 * np.cos(10 * log.t)
+    assert np.abs(log.values[:, 0] - expected).max() < 2e-4
+
+
+def test_an_open_run_gives_the_readings_of_its_pieces():
+    simulation = slider(sp.SemiImplicitEuler(1e-3), [noisy(rate=250, delay=6e-3, cutoff=60)])
+    controller = sp.JointPD(kp=100, kd=1, q_ref=[0.0])
+    whole = simulation.run([0.1], None, 0.2, controller).sensors["wrist"]
+    run = OpenRun(simulation, [0.1], record_dt=1e-3, controller=controller)
+    assert len(run.snapshot().sensors["wrist"]) == 0
+    parts = [run.advance(0.05).sensors["wrist"] for _ in range(4)]
+    assert np.array_equal(np.concatenate([one.values for one in parts]), whole.values)
+    assert np.array_equal(np.concatenate([one.t for one in parts]), whole.t)
+
+
+def two_sensors():
+    sensors = [noisy(rate=100), torque(rate=150, delay=1e-3)]
+    return slider(sp.Adaptive(), sensors).run([0.0], None, 0.1, sine(5.0))
+
+
+def test_readings_are_saved_and_loaded(tmp_path):
+    result = two_sensors()
+    loaded = sp.Result.load(result.save(tmp_path / "run.npz"))
+    assert list(loaded.sensors) == ["wrist", "torque"]
+    for name, log in result.sensors.items():
+        other = loaded.sensors[name]
+        assert other.columns == log.columns
+        for part in ("t", "sampled", "values"):
+            assert np.array_equal(getattr(other, part), getattr(log, part))
+            assert not getattr(other, part).flags.writeable
+    plain = slider(sp.Adaptive(), []).run([0.0], None, 0.1)
+    assert sp.Result.load(plain.save(tmp_path / "plain.npz")).sensors == {}
+    with np.load(tmp_path / "plain.npz") as file:
+        assert not [name for name in file if name.startswith("sensors")]
+
+
+def test_a_file_with_other_readings_is_refused(tmp_path):
+    two_sensors().save(tmp_path / "run.npz")
+    with np.load(tmp_path / "run.npz") as file:
+        arrays = dict(file)
+    for name, wrong, said in (
+        ("sensors.values", arrays["sensors.values"][:-1], "its readings"),
+        ("sensors.sensor", arrays["sensors.sensor"] + 1, "not from 0 to 1"),
+        ("sensors.t", arrays["sensors.t"][:-1], "'sensors.t' has the shape"),
+    ):
+        np.savez_compressed(tmp_path / "bad.npz", **arrays | {name: wrong})
+        with pytest.raises(ResultError, match=said):
+            sp.Result.load(tmp_path / "bad.npz")
+    del arrays["sensors.t"]
+    np.savez_compressed(tmp_path / "bad.npz", **arrays)
+    with pytest.raises(ResultError, match=r"no array 'sensors\.t'"):
+        sp.Result.load(tmp_path / "bad.npz")
+
+
+def test_readings_are_columns(tmp_path):
+    result = two_sensors()
+    columns = result.sensor_columns()
+    assert list(columns)[:2] == ["t [s]", "wrist.force_x [N]"]
+    assert list(columns)[-1] == "torque.force [N]"
+    write_sensors(tmp_path / "sensors.csv", result)
+    with open(tmp_path / "sensors.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(result.sensors["wrist"]) + len(result.sensors["torque"])
+    for name, column in (("wrist", "force_z [N]"), ("torque", "force [N]")):
+        log = result.sensors[name]
+        found = [(r["t [s]"], r[f"{name}.{column}"]) for r in rows if r[f"{name}.{column}"]]
+        at = log.columns.index(column)
+        assert [float(t) for t, _ in found] == log.t.tolist()
+        assert [float(x) for _, x in found] == log.values[:, at].tolist()
+    frame = result.sensors["torque"].to_dataframe()
+    assert list(frame) == ["t [s]", "sampled [s]", "force [N]"]
+    assert frame["force [N]"].tolist() == result.sensors["torque"].values[:, 0].tolist()
+
+
+def test_readings_are_drawn():
+    figure = two_sensors().plot("sensors")
+    titles = [axis.get_title(loc="left") for axis in figure.axes]
+    assert titles == ["wrist", "wrist", "torque"]
+    assert [len(axis.lines) for axis in figure.axes] == [3, 3, 1]
+    empty = slider(sp.Adaptive(), []).run([0.0], None, 0.1).plot("sensors")
+    assert empty.axes[0].texts[0].get_text() == "no sensors"
+
+
+def test_an_unknown_sensor_is_named_in_a_controller():
+    def tau(t, q, v, contacts, sensors):
+        return [sensors["wrist"][0]]
+
+    with pytest.raises(NameNotFound, match=r"no sensor 'wrist'.*torque"):
+        slider(sp.SemiImplicitEuler(1e-3), [torque()]).run([0.0], None, 0.01, tau)
+    with pytest.raises(NameNotFound, match="no sensor 'wrist'"):
+        slider(sp.SemiImplicitEuler(1e-3), []).run([0.0], None, 0.01, tau)
+    with pytest.raises(InvalidParameter, match="control_dt = None must be given for a controller"):
+        slider(sp.Adaptive(), [torque()]).run([0.0], None, 0.01, tau)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: slider(None, [torque(), torque()]), r"sensors\[1\].name = 'torque' is taken"),
+        (lambda: slider(None, torque()), "must be a list of sensors"),
+        (lambda: slider(None, ["wrist"]), r"sensors\[0\] = 'wrist' must be a sensor"),
+        (lambda: torque(rate=0), "rate = 0 must lie in"),
+        (lambda: torque(delay=-1), "delay = -1 must not be negative"),
+        (lambda: torque(seed=1.5), "seed = 1.5 must be a whole number"),
+        (lambda: torque(range=0), "range = 0 must be positive"),
+        (lambda: sp.ContactSwitch(name="a", threshold=1), "must be one of the two"),
+        (
+            lambda: sp.ContactSwitch(name="a", contact="b", threshold=1, release=2),
+            "release = 2.0 must not be above threshold = 1",
+        ),
+    ],
+)
+def test_wrong_sensors_are_refused(make, said):
+    with pytest.raises(InvalidParameter, match=said):
+        make()

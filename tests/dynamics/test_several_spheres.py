@@ -1,0 +1,158 @@
+"""All spheres of a body or a robot in one entry: as one by one, but cheaper."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin import testing
+from sphshell_pin.errors import FrameNotFound, InvalidParameter
+from tests import meshes, models
+
+R = 0.006
+LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
+BRISTLE = sp.BristleFriction(0.6, 0.5, 1e5, 30.0)
+BUMPS = meshes.dome(12)
+
+
+def pad(count: int = 8, lift: float = 0.0005) -> list[sp.Sphere]:
+    """Square of spheres below the frame "ball", curved upwards to its rim."""
+    places = 0.012 * (np.arange(count) - 0.5 * (count - 1))
+    return [
+        sp.Sphere(R, "ball", (x, y, lift * ((x / 0.012 - 1) ** 2 + (y / 0.012) ** 2)))
+        for x in places.tolist()
+        for y in places.tolist()
+    ]
+
+
+def scene_of(spheres, *, together: bool, shell=None, model=None, **more) -> sp.Scene:  # type: ignore[no-untyped-def]
+    scene = sp.Scene(model or models.ball())
+    shell = shell or models.plate()
+    more = {"law": LAW, "friction": BRISTLE, "method": "facets", **more}
+    if together:
+        scene.add_contacts(spheres, shell, **more)
+    else:
+        for sphere in spheres:
+            scene.add_contact(sphere, shell, **more)
+    return scene
+
+
+def test_together_they_are_the_same_pairs() -> None:
+    spheres = pad()
+    together, alone = (scene_of(spheres, together=one) for one in (True, False))
+    assert [pair.sphere for pair in together.pairs] == spheres
+    assert {pair.group for pair in together.pairs} == {"shell"}
+    assert [pair.name for pair in together.pairs[:2]] == ["shell/ball-0", "shell/ball-1"]
+    q = models.free_q([0.01, 0.02, 0.005])
+    v = np.array([0.1, 0.2, -0.3, 1.0, 2.0, 3.0])
+    assert len(together.contacts(q, v)) == 4
+    for a, b in zip(together.external_forces(q, v), alone.external_forces(q, v), strict=True):
+        assert (a.vector == b.vector).all()
+    for a, b in zip(
+        together.contact_derivatives(q, v), alone.contact_derivatives(q, v), strict=True
+    ):
+        assert (a == b).all()
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    [sp.SemiImplicitEuler(1e-4), sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)],
+    ids=lambda one: type(one).__name__,
+)
+def test_together_they_move_as_one_by_one(integrator) -> None:  # type: ignore[no-untyped-def]
+    # Falls, hits, tumbles.
+    q, v = models.free_q([0.0, 0.0, 0.012]), np.array([0.3, 0.1, -0.5, 1.0, -2.0, 5.0])
+    ends = []
+    for together in (True, False):
+        scene = scene_of(pad(3), together=together)
+        result = sp.Simulation(scene, integrator).run(q, v, 0.05)
+        assert result.stats.pairs[scene.pairs[0].name].touches >= 0
+        assert sum(figures.touches for figures in result.stats.pairs.values()) > 3
+        if not isinstance(integrator, sp.SemiImplicitEuler):
+            testing.assert_energy_kept(result, 1e-5)
+        ends.append(np.concatenate([result.q[-1], result.v[-1]]))
+    exact = isinstance(integrator, sp.SemiImplicitEuler)
+    assert np.allclose(*ends, rtol=0, atol=1e-12 if exact else 2e-5)
+
+
+@pytest.mark.parametrize("speed", [30.0, 3000.0])
+@pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(1e-2), sp.Adaptive(1e-5)])
+def test_a_fast_pad_passes_through_nothing(integrator, speed: float) -> None:  # type: ignore[no-untyped-def]
+    law = models.linear_law(1.0 * (speed / (0.3 * R)) ** 2)
+    inertia = pin.Inertia.FromSphere(1.0, R)
+    model = models.empty(0.0)
+    models.add_body(model, "ball", pin.JointModelTranslation(), inertia=inertia)
+    sheet = sp.Shell(*meshes.grid_plate(size=1.0, quads=True))
+    scene = scene_of(pad(), together=True, shell=sheet, model=model, law=law, friction=None)
+    start = np.array([-0.03, 0.02, 0.2137])
+    result = sp.Simulation(scene, integrator).run(start, [0.1 * speed, 0, -speed], 0.42 / speed)
+    assert result.v[-1, 2] > 0.5 * speed
+    assert {event.kind for event in result.events} == {"touch", "lift_off"}
+
+
+def test_bristles_share_the_room_for_contacts_that_begin() -> None:
+    # 16 spare slots of 3 numbers for the group, 4 for each pair alone.
+    assert scene_of(pad(), together=True).core.bristle_size == 48
+    assert scene_of(pad(), together=False).core.bristle_size == 64 * 4 * 3
+    assert scene_of(pad(1), together=True).core.bristle_size == 12
+
+
+@pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(2e-5), sp.Adaptive(1e-7, 1e-9)])
+def test_more_contacts_begin_at_once_than_there_is_room_for(integrator) -> None:  # type: ignore[no-untyped-def]
+    # 64 spheres land at the same instant, and hold on a slope of 0.3 with friction 0.6.
+    model = models.ball()
+    model.gravity.linear = np.array([9.81 * np.sin(0.3), 0.0, -9.81 * np.cos(0.3)])
+    law = sp.HuntCrossleyLaw(1e5, 1.5, 5.0)
+    scene = scene_of(pad(lift=0.0), together=True, model=model, law=law)
+    result = sp.Simulation(scene, integrator).run(
+        models.free_q([0, 0, R + 1e-4]), np.zeros(6), 0.4, record_dt=0.1
+    )
+    assert [figures.touches > 0 for figures in result.stats.pairs.values()] == [True] * 64
+    assert np.abs(result.v[-1]).max() < 1e-3
+    assert abs(result.q[-1, 0] - result.q[-2, 0]) < 1e-6
+    if isinstance(integrator, sp.Adaptive):
+        testing.assert_energy_kept(result, 1e-4)
+
+
+def test_names_tell_frames() -> None:
+    model = models.ball()
+    models.add_body(model, "other", pin.JointModelFreeFlyer())
+    scene = sp.Scene(model)
+    spheres = [sp.Sphere(R, "ball"), sp.Sphere(R, "other"), sp.Sphere(R, "other", (0, 0, 0.01))]
+    made = scene.add_contacts(spheres, models.plate(), law=LAW, name="hand")
+    assert [pair.name for pair in made] == ["hand/ball", "hand/other-0", "hand/other-1"]
+    ball = scene.add_contacts(spheres[1:], sp.Sphere(0.1, "ball"), law=LAW)
+    assert [pair.name for pair in ball] == ["ball/other-0", "ball/other-1"]
+    assert {pair.kind for pair in ball} == {"sphere-sphere"}
+    assert scene.pairs == (*made, *ball)
+
+
+@pytest.mark.parametrize(
+    ("spheres", "what"),
+    [
+        ([], "spheres = .* must be spheres, one at least"),
+        (sp.Sphere(R, "ball"), "must be spheres, one at least"),
+        ([sp.Sphere(R, "ball"), "ball"], r"spheres\[1\] = 'ball' must be a Sphere"),
+    ],
+)
+def test_what_is_no_list_of_spheres_is_refused(spheres, what: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(InvalidParameter, match=what):
+        sp.Scene(models.ball()).add_contacts(spheres, models.plate(), law=LAW)
+
+
+def test_a_refused_entry_leaves_the_scene_as_it_was() -> None:
+    scene = sp.Scene(models.ball())
+    with pytest.raises(FrameNotFound, match="'hand'"):
+        scene.add_contacts([sp.Sphere(R, "ball"), sp.Sphere(R, "hand")], models.plate(), law=LAW)
+    assert scene.pairs == ()
+
+
+def test_they_are_explained_by_the_nearest() -> None:
+    scene = scene_of(pad(), together=True, law=sp.ImpactLaw(50.0, 1.0))
+    told = str(scene.explain(models.free_q([0, 0, 0.02])))
+    assert told.count("Contact 'shell/ball-") == 1
+    assert ", the nearest of 64 of 'shell':" in told
+    assert told.count("the law is soft for this mass") == 0
+    assert told.count("the law cannot stop the sphere, make it stiffer (and 63 others of ") == 1

@@ -1,0 +1,304 @@
+"""Robots' files: xacro, package paths, poses, mimic joints, and what is refused."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import robots
+from sphshell_pin.dynamics.mimic import mimics
+from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning
+
+FOLDER = Path(__file__).parents[1] / "data" / "xacro"
+INERTIAL = (
+    "<inertial><mass value='1'/>"
+    "<inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+)
+MESH = "<geometry><mesh filename='{0}'/></geometry>"
+
+
+@pytest.mark.parametrize(
+    ("name", "nq", "spheres"),
+    [
+        ("one_finger", 1, 1),
+        ("hand", 4, 3),
+        ("from_yaml", 3, 0),
+        ("gripper", 2, 2),
+        ("legged", 6, 2),
+    ],
+)
+def test_xacro_files_are_read(name, nq, spheres):
+    robot = robots.load_file(FOLDER / f"{name}.urdf.xacro", mimic=True)
+    assert robot.model.name == name
+    assert robot.model.nq == nq
+    assert len(robots.end_spheres(robot)) == spheres
+    assert all(inertia.mass > 0 for inertia in list(robot.model.inertias)[1:])
+
+
+def test_xacro_has_arguments_and_finds_packages():
+    file = FOLDER / "hand.urdf.xacro"
+    robot = robots.load_file(file, xacro_args={"fingers": 2, "with_wrist": False})
+    assert list(robot.model.names)[1:] == ["f1_base", "f1_end", "f2_base", "f2_end"]
+    # The meshes of its visual geometry, by package://.
+    assert robot.visual_model.ngeoms == 4
+    model = robot.model
+    assert np.all(model.damping == 0.02)
+    assert np.all(model.upperDryFrictionLimit == 0.01)
+    assert np.all(model.upperEffortLimit == 2)
+    assert np.all(model.velocityLimit == 3)
+    assert np.all(model.lowerPositionLimit == -0.3)
+    length, radius = 0.05, 0.01
+    mass = 2700 * np.pi * radius**2 * length
+    assert model.inertias[1].mass == pytest.approx(mass)
+
+
+def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):
+    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    path = tmp_path / "r.xacro"
+    for inside, words in (
+        ("${nix}", "xacro cannot expand it: .*nix"),
+        ('<xacro:include filename="$(find nix)/a.xacro"/>', "no package 'nix' in .*--package-dir"),
+        ('<xacro:include filename="b.xacro"/>', r"b\.xacro"),
+        ("<link name='a'>", "xacro cannot expand it"),
+    ):
+        path.write_text(f"{head}{inside}</robot>")
+        with pytest.raises(robots.RobotError, match=words):
+            robots.load_file(path)
+    with pytest.raises(robots.RobotError, match=r"arguments are for files that end in \.xacro"):
+        robots.load_file(robots.URDF_FOLDER / "ball.urdf", xacro_args={"a": 1})
+    monkeypatch.setitem(__import__("sys").modules, "xacro", None)
+    with pytest.raises(MissingExtra, match=r"needs xacro: .*sphshell-pin\[robots\]"):
+        robots.load_file(FOLDER / "hand.urdf.xacro")
+
+
+def arm(tmp_path, *, collision="", visual="", name="arm.urdf"):
+    """Return the file of a pendulum with meshes."""
+    parts = "".join(
+        f"<{kind}>{MESH.format(uri)}</{kind}>"
+        for kind, uri in (("collision", collision), ("visual", visual))
+        if uri
+    )
+    file = tmp_path / name
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(
+        f"<robot name='arm'><link name='a'/><link name='b'>{INERTIAL}{parts}</link>"
+        "<joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint></robot>"
+    )
+    return file
+
+
+def package(folder, *, manifest=True):
+    """Make the package arm_meshes with a mesh in `folder`."""
+    (folder / "meshes").mkdir(parents=True)
+    shutil.copy(FOLDER / "finger_description/meshes/cube.stl", folder / "meshes")
+    if manifest:
+        (folder / "package.xml").write_text("<package><name>arm_meshes</name></package>")
+
+
+URI = "package://arm_meshes/meshes/cube.stl"
+
+
+@pytest.mark.parametrize(
+    ("place", "manifest", "variable", "folder"),
+    [
+        ("packages/arm_meshes", False, None, "packages"),
+        ("packages/renamed", True, None, "packages/renamed"),
+        ("ros/src/stack/arm_meshes", True, "ROS_PACKAGE_PATH", "ros/src"),
+        ("ros/arm_meshes", False, "ROS_PACKAGE_PATH", "nothing:{}/ros"),
+        ("ament/share/arm_meshes", False, "AMENT_PREFIX_PATH", "ament"),
+    ],
+)
+def test_packages_are_found(tmp_path, monkeypatch, place, manifest, variable, folder):
+    package(tmp_path / place, manifest=manifest)
+    file = arm(tmp_path, collision=URI, visual=URI, name="robot/arm.urdf")
+    given = [tmp_path / folder]
+    if variable:
+        full = folder.format(tmp_path) if "{}" in folder else str(tmp_path / folder)
+        with pytest.raises(robots.RobotError, match="package_dirs"):
+            robots.load_file(file)
+        monkeypatch.setenv(variable, full)
+        given = []
+    robot = robots.load_file(file, given)
+    assert robot.collision_model.ngeoms == robot.visual_model.ngeoms == 1
+    assert robot.visual_model.geometryObjects[0].meshPath == str(
+        tmp_path / place / "meshes/cube.stl"
+    )
+
+
+def test_the_package_that_the_file_is_in_is_found(tmp_path):
+    package(tmp_path / "arm_meshes", manifest=False)
+    file = arm(tmp_path, collision=URI, name="arm_meshes/urdf/arm.urdf")
+    assert robots.load_file(file).collision_model.ngeoms == 1
+
+
+def test_other_names_of_meshes(tmp_path):
+    package(tmp_path / "arm_meshes")
+    mesh = tmp_path / "arm_meshes/meshes/cube.stl"
+    for uri in (str(mesh), f"file://{mesh}", "arm_meshes/meshes/cube.stl"):
+        assert robots.load_file(arm(tmp_path, collision=uri)).collision_model.ngeoms == 1
+
+
+def test_a_visual_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
+    file = arm(tmp_path, visual=URI)
+    text = file.read_text()
+    part = f"<visual>{MESH.format(URI)}</visual>"
+    file.write_text(text.replace(part, part + part.replace("cube", "ball") + part))
+    with pytest.warns(RobotWarning, match=r"cube\.stl, .*ball\.stl; searched in") as caught:
+        robot = robots.load_file(file)
+    assert len(caught) == 1
+    assert robot.visual_model.ngeoms == 0
+    with pytest.raises(robots.RobotError, match=r"cube\.stl is not there.*--package-dir"):
+        robots.load_file(arm(tmp_path, collision=URI))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("r.sdf", "SDF file.*convert it to MJCF"),
+        ("r.usda", "export a URDF or MJCF"),
+        ("r.dae", "is a mesh, .*URDF or MJCF with a link"),
+        ("r.step", "CAD file"),
+        ("r.srdf", "give the URDF as the file"),
+        ("r.txt", "root element is <model>; robots are read from URDF"),
+    ],
+)
+def test_other_formats_name_the_next_step(tmp_path, name, words):
+    path = tmp_path / name
+    path.write_text("<model/>")
+    with pytest.raises(robots.RobotError, match=words):
+        robots.load_file(path)
+
+
+def test_sdf_is_known_by_its_content_too(tmp_path):
+    path = tmp_path / "model.xml"
+    path.write_text("<sdf version='1.6'><model name='m'/></sdf>")
+    with pytest.raises(robots.RobotError, match="has no SDF reader"):
+        robots.load_file(path)
+
+
+def test_a_massless_root_cannot_float(tmp_path):
+    with pytest.raises(robots.RobotError, match=r"root link 'a' is to float but has no mass"):
+        robots.load_file(arm(tmp_path), free_flyer=True)
+    # What is fixed to it counts: usual in ROS.
+    text = arm(tmp_path).read_text().replace("continuous", "fixed")
+    (tmp_path / "fixed.urdf").write_text(text)
+    assert robots.load_file(tmp_path / "fixed.urdf", free_flyer=True).model.nv == 6
+
+
+def test_a_kinematic_loop_names_its_joints(tmp_path):
+    file = arm(tmp_path)
+    again = (
+        f"<link name='c'>{INERTIAL}</link>"
+        "<joint name='k' type='continuous'><parent link='a'/><child link='c'/></joint>"
+        "<joint name='l' type='continuous'><parent link='c'/><child link='b'/></joint></robot>"
+    )
+    file.write_text(file.read_text().replace("</robot>", again))
+    with pytest.raises(robots.RobotError, match=r"joints 'j' and 'l' move one link, 'b'.*loops"):
+        robots.load_file(file)
+
+
+def test_poses_of_an_srdf():
+    file, srdf = FOLDER / "hand.urdf.xacro", FOLDER / "hand.srdf"
+    robot = robots.load_file(file, srdf=srdf, pose="closed", mimic=True)
+    at = {n: robot.model.joints[robot.model.getJointId(n)].idx_q for n in robot.model.names}
+    assert robot.q0.shape == (robot.model.nq,)
+    assert (robot.q0[at["f1_base"]], robot.q0[at["f2_base"]]) == (0.8, 0.9)
+    with pytest.raises(NameNotFound, match=r"no pose 'open'; .*has: closed"):
+        robots.load_file(file, srdf=srdf, pose="open")
+    with pytest.raises(robots.RobotError, match=r"nix\.srdf: no such"):
+        robots.load_file(file, srdf=FOLDER / "nix.srdf")
+
+
+def check_reduced(whole: pin.Model, model: pin.Model) -> None:
+    """Assert that the mimic model's mass matrix and forces are G^T M G and G^T tau."""
+    rng = np.random.default_rng(0)
+    rules = mimics(model)
+    assert list(model.names) == list(whole.names)
+    assert [one.name for one in model.frames] == [one.name for one in whole.frames]
+    q = pin.integrate(model, pin.neutral(model), rng.uniform(-1, 1, model.nv))
+    g, q_whole = np.zeros((whole.nv, model.nv)), np.zeros(whole.nq)
+    for name, old, new in zip(whole.names, whole.joints, model.joints, strict=True):
+        if name == "universe":
+            continue
+        rule = rules.get(name)
+        of = model.joints[model.getJointId(rule.of)] if rule else new
+        ratio, offset = (rule.ratio, rule.offset) if rule else (1.0, 0.0)
+        g[old.idx_v : old.idx_v + old.nv, of.idx_v : of.idx_v + of.nv] = ratio * np.eye(old.nv)
+        values = q[of.idx_q : of.idx_q + of.nq]
+        q_whole[old.idx_q : old.idx_q + old.nq] = ratio * values + offset if rule else values
+    v, a = rng.normal(size=(2, model.nv))
+    full, data = whole.createData(), model.createData()
+
+    def both(upper):
+        return np.triu(upper) + np.triu(upper, 1).T
+
+    expected = g.T @ both(pin.crba(whole, full, q_whole)) @ g
+    found = both(pin.crba(model, data, q))
+    assert np.allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+    expected = g.T @ pin.rnea(whole, full, q_whole, g @ v, g @ a)
+    found = pin.rnea(model, data, q, v, a)
+    assert np.allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    # What the joints dissipate: damping v^2, and dry friction |v|.
+    assert np.allclose(model.damping * v @ v, whole.damping * (g @ v) @ (g @ v))
+    assert np.allclose(
+        model.upperDryFrictionLimit @ abs(v), whole.upperDryFrictionLimit @ abs(g @ v)
+    )
+
+
+MIMICKING = {
+    "alex_psyonic_hands": 8,
+    "baxter": 2,
+    "panda": 1,
+    "pr2": 10,
+    "romeo": 22,
+    "talos_full": 12,
+    "tiago_pro": 10,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.robots
+@pytest.mark.parametrize("name", MIMICKING)
+def test_mimic_joints_of_the_library_are_exact(name):
+    pytest.importorskip("example_robot_data")
+    whole, robot = robots.load(name), robots.load(name, mimic=True)
+    assert whole.model.nv - robot.model.nv == len(mimics(robot.model)) == MIMICKING[name]
+    assert robot.q0.shape == (robot.model.nq,)
+    check_reduced(whole.model, robot.model)
+
+
+@pytest.mark.parametrize("name", ["one_finger", "hand", "gripper"])
+def test_mimic_joints_of_files_are_exact(name):
+    file = FOLDER / f"{name}.urdf.xacro"
+    whole, model = robots.load_file(file).model, robots.load_file(file, mimic=True).model
+    assert model.nv < whole.nv
+    check_reduced(whole, model)
+    # A geometry keeps its joint and frame.
+    (tip, *_) = robots.end_spheres(robots.load_file(file, mimic=True))
+    assert model.existFrame(tip.frame)
+
+
+@pytest.mark.parametrize("name", ["gripper.xml", "hand.xml", "chained_fingers.xml"])
+def test_mimic_joints_of_mjcf_are_exact(name):
+    file = FOLDER.parent / "mjcf" / name
+    check_reduced(robots.load_file(file).model, robots.load_file(file, mimic=True).model)
+
+
+MIMIC = "<mimic joint='{0}' multiplier='{1}'/>"
+
+
+@pytest.mark.parametrize(
+    ("of", "ratio", "words"),
+    [
+        ("nix", 1, "mimics 'nix', but the robot has no joint 'nix'"),
+        ("j", 1, "'j' mimics 'j', which in the end mimics 'j' again"),
+        ("j", "a", "mimics 'j' by what is no number"),
+    ],
+)
+def test_wrong_mimic_joints_are_named(tmp_path, of, ratio, words):
+    file = arm(tmp_path)
+    file.write_text(file.read_text().replace("</joint>", MIMIC.format(of, ratio) + "</joint>"))
+    with pytest.raises(robots.RobotError, match=words):
+        robots.load_file(file, mimic=True)

@@ -1,0 +1,223 @@
+"""MJCF files are read as MuJoCo reads them: its own numbers are in tests/data/mjcf/mujoco.json."""
+
+import json
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin import robots
+from sphshell_pin.dynamics.mimic import mimics
+from sphshell_pin.errors import RobotWarning
+
+FOLDER = Path(__file__).parents[1] / "data" / "mjcf"
+MUJOCO = json.loads((FOLDER / "mujoco.json").read_text())
+FREE, BALL = 0, 1
+
+
+def load(name, **options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotWarning)
+        return robots.load_file(FOLDER / name, **options)
+
+
+def state(model, told):
+    """Return q, v of the model, and the matrix from its velocities to those of MuJoCo."""
+    qpos, qvel = np.array(told["qpos"]), np.array(told["qvel"])
+    q, v, to_mujoco = np.zeros(model.nq), np.zeros(model.nv), np.eye(model.nv)
+    assert len(told["joints"]) == model.njoints - 1
+    for joint, one in zip(list(model.joints)[1:], told["joints"], strict=True):
+        at, av = joint.idx_q, joint.idx_v
+        if one["type"] == FREE:
+            q[at : at + 7] = [*qpos[at : at + 3], *qpos[at + 4 : at + 7], qpos[at + 3]]
+            turn = pin.Quaternion(q[at + 3 : at + 7]).toRotationMatrix()
+            to_mujoco[av : av + 3, av : av + 3] = turn  # linear velocity in the world's axes
+        elif one["type"] == BALL:
+            q[at : at + 4] = [*qpos[at + 1 : at + 4], qpos[at]]
+        else:
+            q[at] = qpos[at]
+    v[:] = np.linalg.solve(to_mujoco, qvel)
+    return q, v, to_mujoco
+
+
+@pytest.mark.parametrize("name", MUJOCO)
+def test_mass_and_forces_are_those_of_mujoco(name):
+    told, model = MUJOCO[name], load(name).model
+    q, v, to_mujoco = state(model, told)
+    data = model.createData()
+    upper = np.triu(pin.crba(model, data, q))
+    mass = upper + np.triu(upper, 1).T
+    expected = to_mujoco.T @ np.array(told["mass"]) @ to_mujoco
+    assert np.allclose(mass, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+    # Of a free joint, MuJoCo's acceleration is that of the linear velocity in the world's axes.
+    turning = np.zeros(model.nv)
+    for joint, one in zip(list(model.joints)[1:], told["joints"], strict=True):
+        if one["type"] == FREE:
+            at = joint.idx_v
+            turning[at : at + 3] = -np.cross(v[at + 3 : at + 6], v[at : at + 3])
+    forces = pin.rnea(model, data, q, v, turning) - model.armature * turning
+    expected = to_mujoco.T @ np.array(told["bias"])
+    assert np.allclose(forces, expected, rtol=0, atol=1e-12 * max(np.abs(expected).max(), 1.0))
+
+
+@pytest.mark.parametrize("name", MUJOCO)
+def test_spheres_and_sites_are_where_mujoco_has_them(name):
+    told, robot = MUJOCO[name], load(name)
+    model, data = robot.model, robot.model.createData()
+    q, _, _ = state(model, told)
+    pin.framesForwardKinematics(model, data, q)
+    found = {}
+    for one in robot.collision_model.geometryObjects:
+        if type(one.geometry).__name__ == "Sphere":
+            center = data.oMi[one.parentJoint].act(one.placement.translation)
+            found[one.name] = [*center, one.geometry.radius]
+    for sphere, expected in told["spheres"].items():
+        assert np.allclose(found[sphere], expected, rtol=0, atol=1e-14)
+    for site, expected in told["sites"].items():
+        here = data.oMf[model.getFrameId(site)].translation
+        assert np.allclose(here, expected, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", MUJOCO)
+def test_joints_have_the_names_and_numbers_of_the_file(name):
+    told, model = MUJOCO[name], load(name).model
+    for j, one in enumerate(told["joints"], 1):
+        joint = model.joints[j]
+        at, av = joint.idx_q, slice(joint.idx_v, joint.idx_v + joint.nv)
+        assert not one["name"] or model.names[j] == one["name"]
+        assert np.all(model.damping[av] == one["damping"])
+        assert np.all(model.upperDryFrictionLimit[av] == one["friction"])
+        assert np.all(model.lowerDryFrictionLimit[av] == -one["friction"])
+        assert np.all(model.armature[av] == one["armature"])
+        if joint.nq == 1:
+            limits = [model.lowerPositionLimit[at], model.upperPositionLimit[at]]
+            if one["range"] is None:
+                assert limits == [-np.inf, np.inf]
+            else:
+                assert np.allclose(limits, one["range"], rtol=0, atol=1e-15)
+
+
+def test_equalities_of_joints_are_mimic_joints():
+    model = load("chained_fingers.xml", mimic=True).model
+    rules = mimics(model)
+    # tip_joint is the first in the tree, and so the coordinate: it is half of what follow does,
+    # follow is 0.1 + 1.2 drive.
+    assert set(rules) == {"drive", "follow"}
+    assert rules["follow"].ratio == pytest.approx(2.0)
+    assert rules["drive"].ratio == pytest.approx(2 / 1.2)
+    assert rules["drive"].offset == pytest.approx(-0.1 / 1.2)
+    assert (model.nq, model.nv) == (2, 2)
+    # The stops are those of the joint that drives the others, at tip = (0.1 + 1.2 drive) / 2.
+    at = model.joints[model.getJointId("tip_joint")].idx_q
+    expected = 0.5 * (0.1 + 1.2 * np.deg2rad([-10, 80]))
+    limits = model.lowerPositionLimit[at], model.upperPositionLimit[at]
+    assert np.allclose(limits, expected, rtol=1e-12)
+
+
+def test_keys_are_poses():
+    robot = load("quadruped.xml", pose="stand")
+    assert np.allclose(robot.q0[:7], [0, 0, 0.3, 0, 0, 0, 1])
+    assert np.allclose(robot.q0[7:], [0.5, -1, 0.5, -1, -0.5, 0, -1])
+    assert np.allclose(load("reference.xml", pose="home").q0, [0.5, 0.6])
+
+
+def test_without_a_pose_it_starts_as_drawn():
+    assert np.allclose(load("reference.xml").q0, [0.2, np.pi / 6])
+    robot = load("free.xml")
+    turn = pin.exp3(np.pi / 6 * np.array([1, 2, 0]) / np.sqrt(5))
+    drawn = pin.SE3ToXYZQUAT(pin.SE3(turn, np.array([0, 0, 0.5])))
+    assert np.allclose(robot.q0, [*drawn, 0.0])
+
+
+def test_what_is_not_modelled_is_said():
+    with pytest.warns(RobotWarning) as caught:
+        robots.load_file(FOLDER / "springs.xml")
+    said = " ".join(str(one.message) for one in caught)
+    for words in (
+        "(stiffness, springdamper) are not modelled: 'sprung'",
+        "ranges of ball joints are not modelled: 'cone'",
+        "gravcomp too: 'b'",
+        "tendons are not modelled: 'cord'",
+        "add them as shells: 'floor'",
+    ):
+        assert words in said
+
+
+def written(tmp_path, inside, head=""):
+    path = tmp_path / "r.xml"
+    path.write_text(f"<mujoco>{head}<worldbody>{inside}</worldbody></mujoco>")
+    return path
+
+
+LINK = '<joint name="{0}"/><geom size="0.1"/>'
+ARM = (
+    f'<body name="a">{LINK.format("j1")}<body name="b">{LINK.format("j2")}</body></body>'
+    f'<body name="c">{LINK.format("j3")}</body>'
+)
+
+
+@pytest.mark.parametrize(
+    ("equality", "words"),
+    [
+        (
+            '<connect name="pin" body1="b" body2="c" anchor="0 0 0"/>',
+            r"loop that <connect> 'pin' closes between 'b' and 'c', of the joints 'j1', 'j2', 'j3'",
+        ),
+        ('<weld body1="b"/>', r"<weld> closes between 'b' and 'world', of the joints 'j1', 'j2'"),
+        ('<joint joint1="j1" joint2="j2" polycoef="0 1 2"/>', r"'j1' follow 'j2' by a polynomial"),
+        ('<joint joint1="j1" polycoef="0.5"/>', r"holds joint 'j1' at 0.5 \(lock it"),
+        ('<tendon tendon1="t"/>', r"<tendon> of <equality>"),
+    ],
+)
+def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality, words):
+    path = written(tmp_path, ARM)
+    end = f"<equality>{equality}</equality></mujoco>"
+    path.write_text(path.read_text().replace("</mujoco>", end))
+    with pytest.raises(robots.RobotError, match=rf"not supported: .*{words}.*mimic = false"):
+        robots.load_file(path, mimic=True)
+    with pytest.warns(RobotWarning, match=rf"move freely that the file couples: .*{words}"):
+        assert robots.load_file(path).model.nv == 3
+
+
+@pytest.mark.parametrize(
+    ("inside", "head", "words"),
+    [
+        ("<replicate count='2'/>", "", "<replicate> is not supported"),
+        (ARM, "<compiler coordinate='global'/>", "coordinate"),
+        (ARM, "<include file='nix.xml'/>", "includes nix.xml, which is not there"),
+        ("<body><joint class='x'/></body>", "", "class 'x', which has no <default>"),
+        ("<body><joint type='screw'/></body>", "", "unknown type, 'screw'"),
+        ("<geom size='1'/>", "", "has no <body>"),
+        ("<body><joint/><geom size='a'/></body>", "", "."),
+        ("<body name='b'><joint/></body>", "<compiler inertiafromgeom='false'/>", "'b' moves"),
+    ],
+)
+def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, inside, head, words):
+    with pytest.raises(robots.RobotError, match=rf"not a MJCF that can be read: .*{words}"):
+        robots.load_file(written(tmp_path, inside, head))
+
+
+def test_a_free_body_is_stated_in_the_file():
+    with pytest.raises(robots.RobotError, match="<freejoint/>"):
+        robots.load_file(FOLDER / "hinge.xml", free_flyer=True)
+
+
+def test_meshes_of_mjcf(tmp_path):
+    robot = load("meshes.xml")
+    kinds = [type(one.geometry).__name__ for one in robot.collision_model.geometryObjects]
+    assert kinds.count("Sphere") == 1
+    assert len(kinds) == 4
+    text = (FOLDER / "meshes.xml").read_text()
+    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    text = text.replace('<geom type="mesh" mesh="w', f'{inertial}<geom type="mesh" mesh="w')
+    text = text.replace('meshdir="assets"', f'meshdir="{FOLDER / "assets"}"')
+    path = tmp_path / "r.xml"
+    path.write_text(text.replace("wedge.stl", "nix.stl"))
+    with pytest.raises(robots.RobotError, match=r"nix.stl does not exist.*meshdir"):
+        robots.load_file(path)
+    seen = 'mesh="wedge" contype="0" conaffinity="0"'
+    path.write_text(path.read_text().replace('mesh="wedge"', seen))
+    with pytest.warns(RobotWarning, match=r"visual meshes, which are missing: .*nix.stl"):
+        assert robots.load_file(path).model.nv == 2

@@ -1,0 +1,145 @@
+"""Spheres inside a mesh: nowhere beyond it, near it as measured apart, and nearer the more."""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+
+from sphshell_pin import Shell, Sphere, robots
+from sphshell_pin.errors import FrameNotFound, InvalidParameter
+
+UPRIGHT = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.4, 0.5), np.array([0.1, -0.2, 0.3]))
+SIZE = np.array([0.1, 0.06, 0.04])
+
+
+def shell_of(geometry) -> Shell:  # type: ignore[no-untyped-def]
+    return Shell.from_geometry(
+        pin.GeometryObject("part", 0, pin.SE3.Identity(), geometry), chord_error=2e-4
+    )
+
+
+SHAPES = {
+    "box": coal.Box(*SIZE),
+    "cylinder": coal.Cylinder(0.03, 0.1),
+    "cone": coal.Cone(0.03, 0.08),
+    "capsule": coal.Capsule(0.02, 0.06),
+}
+
+
+def centers_and_radii(found: robots.MeshSpheres) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([one.offset for one in found.spheres]), np.array(
+        [one.radius for one in found.spheres]
+    )
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_no_sphere_reaches_beyond_the_mesh(shape: str) -> None:
+    # The mesh's signed distance, by trimesh: positive inside.
+    shell = shell_of(SHAPES[shape])
+    found = robots.spheres_of_mesh(shell, "link", count=12)
+    assert len(found.spheres) == 12
+    centers, radii = centers_and_radii(found)
+    mesh = trimesh.Trimesh(shell.vertices, shell.triangles, process=False)
+    _, distance, _ = trimesh.proximity.closest_point_naive(mesh, centers)
+    assert (radii <= distance * (1 + 1e-9)).all()
+    hull = trimesh.convex.convex_hull(mesh)  # these shapes are convex
+    planes = (
+        hull.face_normals @ centers.T
+        - np.sum(hull.face_normals * hull.triangles[:, 0], axis=1)[:, None]
+    )
+    assert (planes.max(axis=0) <= -radii * (1 - 1e-6)).all()
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_the_distances_are_those_of_other_places(shape: str) -> None:
+    shell = shell_of(SHAPES[shape])
+    found = robots.spheres_of_mesh(shell, "link", count=12)
+    centers, radii = centers_and_radii(found)
+    mesh = trimesh.Trimesh(shell.vertices, shell.triangles, process=False)
+    places, _ = trimesh.sample.sample_surface(mesh, 5000, seed=7)
+    heights = np.linalg.norm(places[:, None] - centers, axis=2) - radii
+    largest = heights.min(axis=1).max()
+    assert 0.7 * found.mesh_to_spheres < largest < found.mesh_to_spheres * 1.05
+    rng = np.random.default_rng(3)
+    unit = rng.normal(size=(500, 3))
+    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    around = (centers[:, None] + radii[:, None, None] * unit).reshape(-1, 3)
+    inside_another = np.linalg.norm(around[:, None] - centers, axis=2) < radii - 1e-9
+    free = around[~inside_another.any(axis=1)]
+    _, distance, _ = trimesh.proximity.closest_point_naive(mesh, free)
+    assert 0.7 * found.spheres_to_mesh < distance.max() < found.spheres_to_mesh * 1.1
+
+
+def test_more_spheres_are_nearer() -> None:
+    shell = shell_of(SHAPES["capsule"])
+    gaps = [
+        robots.spheres_of_mesh(shell, "link", count=count).mesh_to_spheres for count in (1, 3, 9)
+    ]
+    assert gaps[0] > 4 * gaps[1] > 16 * gaps[2]
+
+
+def test_a_ball_is_one_sphere_and_a_cube_leaves_its_corners() -> None:
+    ball = robots.spheres_of_mesh(shell_of(coal.Sphere(0.05)), "link", count=1)
+    assert np.isclose(ball.spheres[0].radius, 0.05, rtol=1e-2)
+    assert ball.mesh_to_spheres < 1e-3
+    cube = robots.spheres_of_mesh(shell_of(coal.Box(0.1, 0.1, 0.1)), "link", count=1)
+    assert np.isclose(cube.spheres[0].radius, 0.05, rtol=5e-2)
+    assert np.isclose(cube.mesh_to_spheres, 0.05 * (np.sqrt(3) - 1), rtol=0.15)
+
+
+def test_the_same_mesh_gives_the_same_spheres_where_it_is_placed() -> None:
+    shell = shell_of(SHAPES["box"])
+    plain, moved = (
+        robots.spheres_of_mesh(shell, "link", placement=placement, count=5)
+        for placement in (None, UPRIGHT)
+    )
+    assert plain == robots.spheres_of_mesh(shell, "link", count=5)
+    for a, b in zip(plain.spheres, moved.spheres, strict=True):
+        assert a.radius == b.radius
+        assert np.allclose(UPRIGHT.act(np.array(a.offset)), b.offset, rtol=0, atol=1e-15)
+
+
+def test_a_mesh_that_cuts_itself_has_an_inside() -> None:
+    # Two boxes in a cross, as one mesh: the walls inside bound the balls, the outside has none.
+    boxes = [trimesh.creation.box(size) for size in ((0.1, 0.03, 0.03), (0.03, 0.1, 0.03))]
+    cross = trimesh.util.concatenate(boxes)
+    shell = Shell(cross.vertices, cross.faces)
+    centers, radii = centers_and_radii(robots.spheres_of_mesh(shell, "link", count=8))
+    outside = np.min([np.abs(centers) - box.extents / 2 for box in boxes], axis=0).max(axis=1)
+    depth = -np.min([np.max(np.abs(centers) - box.extents / 2, axis=1) for box in boxes], axis=0)
+    assert (depth > 0).all(), outside
+    assert (radii <= depth + 1e-9).all()
+
+
+def test_an_open_mesh_is_refused() -> None:
+    shell = Shell([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    with pytest.raises(InvalidParameter, match=r"is open, but must be closed, to have an inside"):
+        robots.spheres_of_mesh(shell, "link")
+    with pytest.raises(InvalidParameter, match="count = 0 must be a whole number, 1 at least"):
+        robots.spheres_of_mesh(shell_of(SHAPES["box"]), "link", count=0)
+
+
+def test_spheres_of_a_link() -> None:
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "hinge")
+    frame = model.addFrame(pin.Frame("link", joint, UPRIGHT, pin.FrameType.BODY))
+    model.addFrame(pin.Frame("bare", joint, UPRIGHT, pin.FrameType.BODY))
+    geometry = pin.GeometryModel()
+    here = UPRIGHT * pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.02]))
+    for name, shape in (("rod", SHAPES["capsule"]), ("ball", coal.Sphere(0.01))):
+        geometry.addGeometryObject(pin.GeometryObject(name, joint, frame, here, shape))
+    found = robots.spheres_of_link(model, geometry, "link", count=4)
+    assert len(found.spheres) == 5
+    assert {one.frame for one in found.spheres} == {"link"}
+    assert found.spheres[-1] == Sphere(0.01, "link", (0.0, 0.0, 0.02)) or np.allclose(
+        found.spheres[-1].offset, [0.0, 0.0, 0.02]
+    )
+    centers, _ = centers_and_radii(found)
+    assert np.allclose(centers[:, :2], 0.0, atol=2e-3)  # on the rod's axis
+    with pytest.raises(InvalidParameter, match="link = 'bare' must have geometry"):
+        robots.spheres_of_link(model, geometry, "bare")
+    with pytest.raises(FrameNotFound, match="'hand'"):
+        robots.spheres_of_link(model, geometry, "hand")

@@ -1,0 +1,141 @@
+"""Input that is allowed and probably a mistake earns a warning, in all commands that meet it."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from typer.testing import CliRunner
+
+import sphshell_pin as sp
+from sphshell_pin.cli import app
+from sphshell_pin.errors import InvalidParameter, ScenarioError, SetupWarning
+from sphshell_pin.scenario import build, explain_built
+from sphshell_pin.scenario.new import new_scenario
+from sphshell_pin.scenario.run import simulate
+from tests.scenario.files import DROP, write
+
+SHORT = {"run.duration": "1e-4"}
+OFF = {"controller.path": "[[0, 0, 0], [0.5, 2.0, 0.0]]"}
+AWAY = {"shell.box.placement.xyz": "[3.0, 2.0, -3.0]"}
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    """A finger that presses on a box; the run is short."""
+    path = tmp_path_factory.mktemp("finger") / "a.toml"
+    new_scenario("three_link_finger", "box", out=path)
+    return path
+
+
+def told(path, changes):
+    built = build(path, {"run.duration": "0.1", **changes})
+    return explain_built(built).warnings
+
+
+def test_a_sound_scenario_earns_none(scenario):
+    assert told(scenario, {}) == ()
+    built = build(scenario)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = built.simulation.run(built.q0, built.v0, 0.3, built.controller, record_dt=0.01)
+    assert built.controller.doubts_after(result) == []
+
+
+def test_a_path_that_is_off_the_part(scenario):
+    (said,) = told(scenario, OFF)
+    assert "path[1] is 1.88 m" in said
+    assert "'box', which measures" in said
+    built = build(scenario, {"run.duration": "0.01", **OFF})
+    with pytest.warns(SetupWarning, match=r"path\[1\] is 1.88 m"):
+        built.simulation.run(built.q0, None, 0.01, built.controller)
+
+
+def test_a_start_beyond_a_limit(scenario):
+    model = build(scenario).scene.model
+    name, high = model.names[1], model.upperPositionLimit[0]
+    (said,) = [
+        one
+        for one in told(scenario, {f"robot.start.{name}": repr(float(high) + 0.25)})
+        if "limits" in one
+    ]
+    assert said.startswith(f"joint '{name}' starts at {high + 0.25:.6g}, beyond its limits")
+    assert f"to {high:.6g} " in said
+
+
+def test_a_press_on_nothing_and_a_target_out_of_reach(scenario):
+    built = build(scenario, AWAY)
+    result, _ = simulate(replace(built, scenario=build(scenario, {**AWAY, **SHORT}).scenario))
+    nothing, far = built.controller.doubts_after(result)
+    assert nothing.startswith("nothing was touched, though the controller presses with")
+    # Across the normal, as the force acts along it.
+    (pair,), model = built.scene.pairs, built.scene.model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, built.q0)
+    tip = pair.placement.actInv(data.oMf[model.getFrameId("tip")].translation)
+    at = pair.shell.closest_points(built.scenario.controller.path[:1])
+    away, normal = tip - at.points[0], at.normals[0]
+    expected = np.linalg.norm(away - normal * (normal @ away))
+    assert far.startswith("the controller's target was never in reach: frame 'tip'")
+    assert float(far.split("than ")[1].split(" m")[0]) == pytest.approx(expected, rel=0.01)
+
+
+def test_the_commands_say_so(scenario, tmp_path):
+    off = [f"--set={key}={value}" for key, value in OFF.items()]
+    ran = CliRunner().invoke(
+        app,
+        ["run", str(scenario), "--no-recording", "--duration=0.01", *off, f"--out={tmp_path}/o"]
+        + [f"--set={key}={value}" for key, value in AWAY.items()],
+    )
+    assert "warning: the controller's path is off the shell" in ran.output
+    assert "warning: nothing was touched" in ran.output
+    explained = CliRunner().invoke(app, ["explain", str(scenario), *off])
+    assert "Warning: the controller's path is off the shell" in explained.output
+
+
+def test_the_live_page_says_so(scenario, capsys):
+    from sphshell_pin.scenario.live import LiveRun
+    from sphshell_pin.view.live.opening import _warn
+
+    _warn(LiveRun(build(scenario, OFF)))
+    assert "warning: the controller's path is off the shell" in capsys.readouterr().err
+
+
+WRONG = {
+    "short": (
+        "def tau(t, q):\n    return 0\n",
+        r"'tau\(t, q\)' must take tau\(t, q, v, contacts\)",
+    ),
+    "long": (
+        "def tau(t, q, v, contacts, gain):\n    return 0\n",
+        r"'tau\(t, q, v, contacts, gain\)' must take tau\(t, q, v, contacts\).*'gain'",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_a_callable_of_the_wrong_signature(kind, tmp_path):
+    code, said = WRONG[kind]
+    (tmp_path / "own.py").write_text(code, encoding="utf-8")
+    text = DROP + '\n[controller]\ntype = "python"\nfunction = "own.py:tau"\n'
+    with pytest.raises(ScenarioError, match=said):
+        build(write(tmp_path, text))
+    names: dict[str, object] = {}
+    exec(code, names)
+    built = build(write(tmp_path))
+    with pytest.raises(InvalidParameter, match=said):
+        built.simulation.run(built.q0, None, 0.01, names["tau"])
+
+
+def test_callables_that_can_be_called_pass(tmp_path):
+    built = build(write(tmp_path))
+
+    class Torque:
+        def __call__(self, t, q, v, contacts, gain=1.0):
+            return np.zeros(len(v))
+
+    for one in (Torque(), lambda *arguments: np.zeros(6), lambda t, q, v, c: np.zeros(6)):
+        assert isinstance(built.simulation.run(built.q0, None, 0.001, one), sp.Result)

@@ -1,0 +1,194 @@
+"""A new scenario works: it touches, holds its force, and keeps links off the part."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin import robots
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.scenario import build, judge, shipped_scenarios
+from sphshell_pin.scenario.clearance import Links
+from sphshell_pin.scenario.new import new_scenario
+from sphshell_pin.scenario.run import simulate
+from sphshell_pin.scenario.tips import Tip
+
+PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
+BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"
+PLACES = ("below", "above", "+x", "-x", "+y", "-y")
+
+
+def held(built, result):
+    """Return the mean normal force [N] from the end of the lead-in on."""
+    log = result.contacts
+    force = np.bincount(log.row, log.normal_force, len(result.t))
+    return float(force[result.t > built.scenario.controller.lead_in].mean())
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_sphere_away_from_its_frame_presses_and_follows_its_path(place, tmp_path):
+    """The tip's sphere is 80 mm before its frame."""
+    made = new_scenario(PROBE, BLADE, unit="mm", place=place, out=tmp_path / "a.toml")
+    built = build(made.path)
+    result, stopped = simulate(built)
+    assert stopped is None
+    assert [v.figure for v in judge(built, result) if not v.met] == []
+    control = built.scenario.controller
+    assert held(built, result) == pytest.approx(control.normal_force, rel=0.05)
+    (pair,), model = built.scene.pairs, built.scene.model
+    np.testing.assert_allclose(control.offset, [0, 0, 0.08])
+    # The sphere's center ends over the path's last point.
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, result.q[-1])
+    center = pair.placement.actInv(data.oMf[model.getFrameId("link_5")].act(np.array([0, 0, 0.08])))
+    away = center - control.path[-1]
+    normal = pair.shell.closest_points([control.path[-1]]).normals[0]
+    assert abs(away @ normal) == pytest.approx(pair.sphere.radius, rel=0.03)
+    assert np.linalg.norm(away - normal * (away @ normal)) < 0.25 * pair.sphere.radius
+
+
+def test_no_link_is_in_a_closed_part(tmp_path):
+    """Corners of the links' cylinders against the signed distance of the part."""
+    part = sp.Shell.from_geometry(coal.Box(0.5, 0.4, 0.1))
+    part.to_file(tmp_path / "part.shl")
+    for place in ("below", "+x"):
+        made = new_scenario(
+            PROBE, tmp_path / "part.shl", place=place, out=tmp_path / "a.toml", force=True
+        )
+        built = made.built
+        result, _ = simulate(built)
+        (shell,), (pair,) = built.shells.values(), built.scene.pairs
+        assert shell.side == "outside"
+        geometry = built.assembly.loaded[0].collision_model
+        data, at = built.assembly.model.createData(), pin.GeometryData(geometry)
+        turns = np.linspace(0, 2 * np.pi, 12)
+        for q in result.q[:: max(1, len(result.q) // 5)]:
+            pin.updateGeometryPlacements(built.assembly.model, data, geometry, at, q)
+            for one, pose in zip(geometry.geometryObjects, at.oMg, strict=True):
+                if not isinstance(one.geometry, coal.Cylinder):
+                    continue
+                ring = one.geometry.radius * np.array([np.cos(turns), np.sin(turns), 0 * turns]).T
+                for z in np.linspace(-1, 1, 9) * one.geometry.halfLength:
+                    rim = [pose.act(p + [0, 0, z]) for p in ring]
+                    local = np.array([pair.placement.actInv(p) for p in rim])
+                    assert shell.closest_points(local).distances.min() > -1e-6
+
+
+def test_a_hard_tip_settles(tmp_path):
+    made = new_scenario(PROBE, "plane", material="steel", out=tmp_path / "a.toml")
+    result, _ = simulate(made.built)
+    (figures,) = result.stats.pairs.values()
+    force = made.built.scenario.controller.normal_force
+    assert figures.touches <= 5
+    assert figures.peak_force < 6 * force
+    assert held(made.built, result) == pytest.approx(force, rel=0.05)
+    assert result.events[-1].t < made.built.scenario.controller.lead_in
+
+
+@pytest.mark.parametrize(
+    ("surface", "side"),
+    [("plane", "both"), ("box", "outside"), ("bowl", "inside"), ("sphere", "outside")],
+)
+def test_a_closed_body_has_one_side(surface, side, tmp_path):
+    built = new_scenario("ball", surface, out=tmp_path / "a.toml").built
+    assert built.shells[surface].side == side
+    (pair,) = built.scene.explain(built.q0, built.v0).pairs
+    assert 0 < pair.gap < 0.03
+
+
+REFUSED = [
+    ("three_link_finger", "plane", {"place": "+y"}, r"cannot move along \+y in any posture"),
+    (PROBE, "plane", {"press": 1e3}, r"effort limits allow a push of [\d.]+ N along"),
+    (PROBE, "plane", {"press": 50.0, "material": "silicone"}, "by more than half of it"),
+    # A small sphere in the middle of the wider end of a link.
+    (PROBE, "plane", {"frame": "joint_5", "radius": 0.002}, r"link_5' (would be|is) in the part"),
+]
+
+
+@pytest.mark.parametrize(("robot", "surface", "options", "match"), REFUSED)
+def test_what_would_not_work_is_refused(robot, surface, options, match, tmp_path):
+    with pytest.raises(SphshellError, match=match) as caught:
+        new_scenario(robot, surface, out=tmp_path / "a.toml", **options)
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_links_in_a_part_are_found():
+    """A cube of 0.1 m before, around and beside links of the arm that stands straight up."""
+    robot = robots.load_urdf(PROBE)
+    q = pin.neutral(robot.model)
+    cube = sp.Shell.from_geometry(coal.Box(0.1, 0.1, 0.1), side="outside")
+    tip = Tip("link_5", 0.01, np.array([0, 0, 0.08]), "")
+    links = Links(robot.model, robot.collision_model, cube, [tip], [])
+    # The cylinder of link_2 goes from z = 0.42 to 0.58 with radius 0.03: the cube begins at 0.05.
+    for x, found in ((0.0805, False), (0.0795, True)):
+        place = pin.SE3(np.eye(3), np.array([x, 0, 0.5]))
+        inside = links.within(q, place)
+        assert (inside is not None) == found
+        assert not found or inside.link == "link_2"
+    # The sphere itself, and what of its own link is near it, may touch; the rest of the link not.
+    top = 1.0 + 0.08
+    for z, found in ((top + 0.049, False), (top + 0.05 - 0.0201, True)):
+        inside = links.within(q, pin.SE3(np.eye(3), np.array([0, 0, z])))
+        assert (inside is not None) == found
+    # All of link_5 inside a large part touches no surface of it.
+    block = sp.Shell.from_geometry(coal.Box(4.0, 4.0, 4.0), side="outside")
+    links = Links(robot.model, robot.collision_model, block, [tip], [])
+    assert links.within(q, pin.SE3.Identity()) is None
+    assert links.within(q, pin.SE3.Identity(), whole=True) is not None
+
+
+def test_a_part_with_a_hole_is_pressed_beside_it(tmp_path):
+    """A washer: its middle is a hole, as large as the sphere."""
+    turns = np.linspace(0, 2 * np.pi, 49)[:-1]
+    ring = np.array([np.cos(turns), np.sin(turns), 0 * turns]).T
+    n = len(turns)
+    quads = [[k, (k + 1) % n, n + (k + 1) % n, n + k] for k in range(n)]
+    sp.Shell(np.concatenate([0.06 * ring, 0.02 * ring]), quads).to_file(tmp_path / "washer.shl")
+    built = new_scenario(PROBE, tmp_path / "washer.shl", out=tmp_path / "a.toml").built
+    result, _ = simulate(built)
+    assert held(built, result) == pytest.approx(built.scenario.controller.normal_force, rel=0.05)
+    away = np.linalg.norm(np.array(built.scenario.controller.path)[:, :2], axis=1)
+    assert away.min() > 0.02
+    assert re.search(r'side = "both"', (tmp_path / "a.toml").read_text())
+
+
+def test_what_the_file_states_of_the_joints_is_modelled(tmp_path):
+    """Dry friction of 0.5 N m holds off the force: it is left out, and the file says so."""
+    text = PROBE.read_text(encoding="utf-8")
+    built = new_scenario(PROBE, out=tmp_path / "plain.toml").built
+    assert built.scenario.robot[0].joints == ["limits", "effort", "speed"]
+    assert set(built.scene.joints.effort) == set(list(built.scene.model.names)[1:])
+    for damping, friction, kinds in (
+        (0.1, 0.0, ["limits", "damping", "effort", "speed"]),
+        (0.1, 0.5, ["limits", "damping", "effort", "speed"]),
+        (0.0, 1e-3, ["limits", "friction", "effort", "speed"]),
+    ):
+        stated = f'<dynamics damping="{damping}" friction="{friction}"/></joint>'
+        (tmp_path / "arm.urdf").write_text(text.replace("</joint>", stated), encoding="utf-8")
+        made = new_scenario(tmp_path / "arm.urdf", out=tmp_path / "a.toml", force=True)
+        assert made.built.scenario.robot[0].joints == kinds
+        left_out = friction > 0.1
+        assert any("dry friction, which the file states, is left out" in w for w in made.why) == (
+            left_out
+        )
+        assert ("without friction" in made.text) == left_out
+        result, _ = simulate(made.built)
+        force = made.built.scenario.controller.normal_force
+        assert held(made.built, result) == pytest.approx(force, rel=0.05)
+
+
+def test_a_sphere_is_put_where_it_is_asked_for(tmp_path):
+    offset = (0.0, 0.01, 0.09)
+    made = new_scenario(PROBE, frame="link_5", offset=offset, radius=0.008, out=tmp_path / "a.toml")
+    (pair,) = made.built.scene.pairs
+    assert pair.sphere.radius == 0.008
+    np.testing.assert_allclose(pair.sphere.offset, offset)
+    with pytest.raises(SphshellError, match="--frame"):
+        new_scenario(PROBE, offset=offset, out=tmp_path / "b.toml")

@@ -1,0 +1,106 @@
+"""Sensors in scenario files: tables, keys, results."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import ScenarioError
+from sphshell_pin.scenario import build, rebuild, run_scenario
+from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.replay import Replay
+from tests.scenario.files import DROP, write
+
+SENSORS = """
+[[sensor]]
+type = "force-torque"
+name = "inside"
+frame = "root_joint"
+rate = 500
+cutoff = 100
+force_noise = 0.1
+
+[[sensor]]
+type = "contact-switch"
+name = "touch"
+contact = "ball-plate"
+threshold = 0.5
+
+[[knob]]
+key = "sensor.inside.cutoff"
+"""
+READING = """
+def tau(t, q, v, contacts, sensors):
+    push = [0.0] * 6
+    push[2] = 3.0 if sensors["touch"] else 0.0
+    return push
+"""
+
+
+def test_a_scenario_states_its_sensors(tmp_path):
+    (tmp_path / "own.py").write_text(READING, encoding="utf-8")
+    controller = '\n[controller]\ntype = "python"\nfunction = "own.py:tau"\n'
+    path = write(tmp_path, DROP + SENSORS + controller)
+    report = run_scenario(path, tmp_path / "out", recording=False)
+    names = {file.name for file in report.files}
+    assert {"sensors.csv", "sensors.png"} <= names
+    loaded = sp.Result.load(tmp_path / "out" / "run.npz")
+    assert {name: log.values.shape for name, log in loaded.sensors.items()} == {
+        "inside": (26, 6),
+        "touch": (51, 1),
+    }
+    assert 0 < loaded.sensors["touch"].values.sum() < 51
+    with open(tmp_path / "out" / "sensors.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    assert rows[0][0] == "t [s]"
+    assert rows[0][-1] == "touch.closed"
+    assert len(rows) == 52
+    assert Replay(tmp_path / "out" / "run.npz").scene.pairs[0].name == "ball-plate"
+    plain = run_scenario(write(tmp_path), tmp_path / "out", recording=False)
+    assert not {"sensors.csv", "sensors.png"} & {file.name for file in plain.files}
+    assert not (tmp_path / "out" / "sensors.csv").exists()
+
+
+def test_values_of_sensors_can_be_changed(tmp_path):
+    path = write(tmp_path, DROP + SENSORS)
+    built = build(path, {"sensor.inside.rate": "250", "sensor.touch.delay": "0.002"})
+    assert [one.rate for one in built.simulation.sensors] == [250.0, 1000.0]
+    assert built.simulation.sensors[1].delay == 0.002
+    assert rebuild(built, {"sensor.inside.cutoff": "20"}).simulation.sensors[0].cutoff == 20.0
+    live = LiveRun(build(path))
+    live.advance(0.01)
+    live.change("sensor.inside.cutoff", 50.0)
+    assert live.time > 0.009
+    live.advance(0.01)
+    assert live.built.simulation.sensors[0].cutoff == 50.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        (('frame = "root_joint"', 'frame = "tip"'), r"sensor.inside: no frame 'tip'"),
+        (('type = "force-torque"', 'type = "force"'), "unknown type 'force'; valid types: force-"),
+        (("rate = 500", "rte = 500"), "sensor.inside.rte: unknown key; did you mean 'rate'"),
+        (("rate = 500", "rate = -500"), "sensor.inside.rate: should be greater than 0"),
+        (('contact = "ball-plate"', 'contact = "b"'), "sensor.touch: no contact 'b'"),
+        (('name = "touch"', 'name = "inside"'), r"sensor: sensors\[1\].name = 'inside' is taken"),
+        (("threshold = 0.5", ""), "sensor.touch.threshold: is missing"),
+    ],
+)
+def test_a_wrong_sensor_is_named_with_its_key(changed, said, tmp_path):
+    text = SENSORS[: SENSORS.index("[[knob]]")]
+    path = write(tmp_path, (DROP + text).replace(*changed))
+    with pytest.raises(ScenarioError, match=said):
+        build(path)
+
+
+def test_a_single_table_will_do(tmp_path):
+    table = (
+        '\n[sensor]\ntype = "contact-switch"\nname = "a"\ncontact = "ball-plate"\nthreshold = 1\n'
+    )
+    built = build(write(tmp_path, DROP + table), {"sensor.threshold": "0.25"})
+    assert built.simulation.sensors[0].threshold == 0.25
+    assert np.isfinite(built.simulation.sensors[0].rate)

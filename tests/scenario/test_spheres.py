@@ -1,0 +1,138 @@
+"""The spheres of a contact: one, those of a list, those of the collision geometry; on spheres."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sphshell_pin import robots
+from sphshell_pin.errors import ScenarioError
+from sphshell_pin.scenario import build, run_scenario
+from tests.scenario.files import write
+
+LAW = 'law = { type = "hunt-crossley", stiffness = 1e6, dissipation = 0.5 }\n'
+TWO_BALLS = f"""
+title = "A ball falls on a ball"
+
+[[robot]]
+name = "ball"
+label = "upper"
+start = {{ root_joint = [0.002, 0.0, 0.04, 0.0, 0.0, 0.0, 1.0] }}
+
+[[robot]]
+name = "ball"
+label = "lower"
+start = {{ root_joint = [0.0, 0.0, 0.012, 0.0, 0.0, 0.0, 1.0] }}
+
+[[shell]]
+name = "plate"
+primitive = {{ type = "half-space", extent = 1.0 }}
+
+[[contact]]
+name = "balls"
+sphere = {{ frame = "upper/ball", radius = 0.012 }}
+other_sphere = {{ frame = "lower/ball", radius = 0.012 }}
+{LAW}
+[[contact]]
+name = "floor"
+spheres = [
+    {{ frame = "upper/ball", radius = 0.012 }},
+    {{ frame = "lower/ball", radius = 0.012, offset = [0, 0, 0.0] }},
+]
+shell = "plate"
+{LAW}
+[run]
+duration = 0.1
+"""
+HAND = f"""
+title = "A hand over a plate"
+[robot]
+name = "allegro_right_hand"
+[[shell]]
+name = "plate"
+primitive = {{ type = "half-space", extent = 1.0 }}
+[[contact]]
+name = "tips"
+spheres = "collision"
+shell = "plate"
+{LAW}
+[run]
+duration = 0.01
+"""
+
+
+def test_a_ball_falls_on_a_ball(tmp_path):
+    report = run_scenario(write(tmp_path, TWO_BALLS), tmp_path / "out", recording=False)
+    pairs = report.result.stats.pairs
+    assert list(pairs) == ["balls", "floor/upper/ball", "floor/lower/ball"]
+    assert pairs["balls"].touches >= 1
+    # The lower ball lies on the floor: it takes the weight of the upper one and its own.
+    assert pairs["floor/lower/ball"].peak_force > pairs["balls"].peak_force > 1.0
+    assert np.abs(report.result.energy.residual).max() < 1e-6 * report.result.energy.exchanged
+    assert [pair.kind for pair in report.built.scene.pairs][:2] == ["sphere-sphere", "sphere-shell"]
+
+
+def test_a_slider_changes_the_other_sphere(tmp_path):
+    changes = {
+        "contact.balls.other_sphere.radius": "0.013",
+        "contact.floor.spheres.1.radius": "0.02",
+    }
+    scene = build(write(tmp_path, TWO_BALLS), changes).scene
+    assert scene.pair("balls").other_sphere.radius == 0.013
+    assert scene.pair("floor/lower/ball").sphere.radius == 0.02
+
+
+def test_collision_spheres_of_a_hand(tmp_path):
+    scene = build(write(tmp_path, HAND)).scene
+    wanted = robots.collision_spheres(robots.load("allegro_right_hand"))
+    assert len(wanted) >= 4
+    assert [pair.sphere for pair in scene.pairs] == wanted
+    assert {pair.group for pair in scene.pairs} == {"tips"}
+
+
+def test_collision_spheres_of_several_robots(tmp_path):
+    start = TWO_BALLS.index("spheres = [")
+    text = f"{TWO_BALLS[:start]}spheres = 'collision'\n{TWO_BALLS[TWO_BALLS.index('shell = ') :]}"
+    scene = build(write(tmp_path, text)).scene
+    assert [pair.frame_i for pair in scene.pairs[1:]] == ["upper/ball", "lower/ball"]
+
+
+def test_collision_spheres_of_frames_and_others(tmp_path):
+    names = [one.frame for one in robots.collision_spheres(robots.load("allegro_right_hand"))]
+    own = '{ frame = "palm", radius = 0.03 }'
+    frame = robots.load("allegro_right_hand").model.frames[1].name
+    text = HAND.replace('"collision"', f'["{names[1]}", {own.replace("palm", frame)}]')
+    scene = build(write(tmp_path, text)).scene
+    assert [(pair.frame_i, pair.sphere.radius) for pair in scene.pairs] == [
+        (names[1], 0.012),
+        (frame, 0.03),
+    ]
+
+
+SPHERE = 'sphere = { frame = "upper/ball", radius = 0.012 }'
+FIRST = '{ frame = "upper/ball", radius = 0.012 },'
+BALLS = 'other_sphere = { frame = "lower/ball", radius = 0.012 }'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        (BALLS, "", "contact.balls: give either shell .* or other_sphere, not both"),
+        (BALLS, f'{BALLS}\nshell = "plate"', "contact.balls: give either shell"),
+        (BALLS, f'{BALLS}\nmethod = "smooth"', "contact.balls: method belongs to a shell"),
+        ("spheres = [", f"{SPHERE}\nspheres = [", "contact.floor: give either sphere "),
+        ('"lower/ball", radius', '"ball", radius', "contact.balls: .*'ball'"),
+        (FIRST, '"universe",', "contact.floor.spheres: frame 'universe' has no sphere in its coll"),
+        (FIRST, '"hand",', "contact.floor.spheres: .*'hand'"),
+    ],
+)
+def test_what_is_wrong_with_the_ends_of_a_contact(old, new, what, tmp_path):
+    assert TWO_BALLS.count(old) >= 1
+    with pytest.raises(ScenarioError, match=what):
+        build(write(tmp_path, TWO_BALLS.replace(old, new, 1)))
+
+
+def test_no_collision_spheres(tmp_path):
+    text = HAND.replace("allegro_right_hand", "turntable")
+    with pytest.raises(ScenarioError, match=r"contact.tips.spheres: no collision geometry of the"):
+        build(write(tmp_path, text))
