@@ -102,7 +102,7 @@ class LoadedRobot:
     q0: npt.NDArray[np.float64]
     """A posture (nq,): the robot's reference posture where it has one, else neutral."""
     notes: tuple[str, ...] = ()
-    """What its file states that is not modelled, one sentence each."""
+    """What its file states that is not modeled, one sentence each."""
 
 
 def names() -> list[str]:
@@ -176,7 +176,7 @@ def load_file(
 
     Limits, damping, dry friction and armature are in the model's attributes of those names. Warns
     with RobotWarning of visual meshes that are missing, and of what the file states that is not
-    modelled.
+    modeled.
 
     Raises
     ------

@@ -65,9 +65,9 @@ class Description:
     root: ET.Element
     mimics: tuple[Mimic, ...] = ()
     loops: tuple[str, ...] = ()
-    """What closes kinematic loops or couples joints otherwise than by mimicking: not modelled."""
+    """What closes kinematic loops or couples joints otherwise than by mimicking: not modeled."""
     notes: tuple[str, ...] = ()
-    """What else the file states that is not modelled, one sentence each."""
+    """What else the file states that is not modeled, one sentence each."""
     start: Mapping[str, Array] = field(default_factory=dict)
     """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
     extras: Mapping[str, Extras] = field(default_factory=dict)

@@ -10,21 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin.robots.mjcf_values import numbers, turned_to
+
 Array = NDArray[np.float64]
 
 _SHAPES = ("sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh")
 _SEEN = ("contype", "conaffinity", "group")
-
-
-def numbers(text: str, count: int | None = None) -> Array:
-    """Return the numbers in `text`; ValueError if they are not `count`."""
-    try:
-        found = np.array([float(one) for one in text.split()])
-    except ValueError:
-        raise ValueError(f"'{text}' are no numbers") from None
-    if count is not None and len(found) != count:
-        raise ValueError(f"'{text}' should be {count} number{'s' if count > 1 else ''}")
-    return found
 
 
 class Meshes:
@@ -98,13 +89,6 @@ class Meshes:
         volume = sign * float(mesh.volume)
         moments = sign * np.asarray(mesh.moment_inertia)
         return volume, pin.Inertia(volume, np.asarray(mesh.center_mass), moments)
-
-
-def turned_to(axis: Array) -> Array:
-    """Return the smallest rotation (3,3) that turns z to `axis` (3,)."""
-    z = np.array([0.0, 0.0, 1.0])
-    one = pin.Quaternion.FromTwoVectors(z, axis / np.linalg.norm(axis))
-    return np.asarray(one.toRotationMatrix())
 
 
 def plain_place(
