@@ -41,7 +41,7 @@ def least_friction(
 
 
 def _forces(points: Array, normals: Array, wrench: Array, total: float, mu: float) -> Array | None:
-    """Return forces (k, 3) in the pyramids of `mu` that balance `wrench`, or None."""
+    """Return forces (k, 3) in the pyramids of `mu` that balance `wrench`; None if none do."""
     count = len(points)
     angles = 2 * np.pi * np.arange(_SIDES) / _SIDES
     edges = np.empty((count, _SIDES, 3))
@@ -50,8 +50,9 @@ def _forces(points: Array, normals: Array, wrench: Array, total: float, mu: floa
         first = np.cross(normal, aside)
         first /= np.linalg.norm(first)
         second = np.cross(normal, first)
-        around = np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second)
-        edges[k] = -normal + mu * around
+        edges[k] = -normal + mu * (
+            np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second)
+        )
     middle = points.mean(axis=0)
     size = max(float(np.linalg.norm(points - middle, axis=1).max()), 1e-9)
     torques = np.cross((points - middle)[:, None], edges) / size

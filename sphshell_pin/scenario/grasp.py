@@ -18,13 +18,13 @@ from sphshell_pin.shell.shell import Shell
 Array = npt.NDArray[np.float64]
 
 # Hands that are tried: random postures, and how many of them, the best, get a part.
-_POSTURES, _BEST = 4000, 40
+_POSTURES, _BEST = 4000, 60
 # Of a posture: the tips stand in front of the thumb within this part of their distance to it.
 _UNEVEN = 0.35
 # Part of a joint's range that is left free at its ends.
 _MARGIN = 0.05
 # Of the inverse kinematics: steps, damping [m^2], longest step [rad], gap's tolerance [m].
-_STEPS, _DAMPING, _LONGEST, _CLOSE = 60, 1e-6, 0.15, 1e-7
+_STEPS, _DAMPING, _LONGEST, _CLOSE = 30, 1e-6, 0.15, 1e-7
 # How much the part may be wider or narrower than the open hand, as a part of it, and how many
 # places with a part are looked at.
 _WIDER, _MOST_PLACES = 0.5, 400
@@ -50,6 +50,11 @@ class Grasp:
     """On the part (k, 3) [N]: they balance its weight."""
     friction: float
     """Coefficient of friction that they need."""
+
+    def normal_forces(self) -> Array:
+        """Return the normal force (k,) [N] of each tip."""
+        forces: Array = -np.einsum("ki,ki->k", self.forces, self.normals)
+        return forces
 
 
 class Hand:
@@ -146,31 +151,35 @@ def grasps(
     total: float,
     mu: float,
     gap: float,
-    allowed: Callable[[Array, pin.SE3], bool],
-) -> Iterator[Grasp]:
-    """Yield grasps of the part, those that use less friction first.
+    free_of_itself: Callable[[Array], bool],
+    free_of_part: Callable[[Array, pin.SE3], bool],
+) -> list[Grasp]:
+    """Return grasps of the part, those that use less friction first.
 
     The hand's other joints are as in q0 (nq,). `wrench(placement)` (6,) is what acts on the part
     beside the tips, about the world's origin; `total` [N] all their normal forces; `mu` the
-    friction there is; `gap` [m] that of each tip; `allowed(q, placement)` whether no link is in the
-    part, and none in another. The same call yields the same.
+    friction there is; `gap` [m] that of each tip. `free_of_itself(q)` and
+    `free_of_part(q, placement)` say whether no link is in another one, or in the part. The same
+    call returns the same.
     """
     found: list[Grasp] = []
-    places = itertools.islice(_places(hand, q0, shell), _MOST_PLACES)
+    places = itertools.islice(_places(hand, q0, shell, free_of_itself), _MOST_PLACES)
     for q_open, placement in places:
         closed = hand.close_on(q_open, shell, placement, gap)
         if closed is None:
             continue
         q, points, normals = closed
         balance = least_friction(points, normals, wrench(placement), total, _USED * mu)
-        if balance is None or not allowed(q, placement):
+        if balance is None or not (free_of_itself(q) and free_of_part(q, placement)):
             continue
         friction, forces = balance
         found.append(Grasp(q, placement, points, normals, forces, friction))
-    yield from sorted(found, key=lambda one: one.friction)
+    return sorted(found, key=lambda one: one.friction)
 
 
-def _places(hand: Hand, q0: Array, shell: Shell) -> Iterator[tuple[Array, pin.SE3]]:
+def _places(
+    hand: Hand, q0: Array, shell: Shell, free_of_itself: Callable[[Array], bool]
+) -> Iterator[tuple[Array, pin.SE3]]:
     """Yield postures of the hand with the part between its tips, the best fitting first.
 
     The part's box is turned in all 24 ways: one side across, between thumb and fingers.
@@ -178,7 +187,7 @@ def _places(hand: Hand, q0: Array, shell: Shell) -> Iterator[tuple[Array, pin.SE
     extent, middle = shell.box[1] - shell.box[0], shell.box.mean(axis=0)
     root = _root(hand, q0)
     found: list[tuple[float, int, Array, pin.SE3]] = []
-    for _, q, thumb in _postures(hand, q0):
+    for _, q, thumb in itertools.islice(_postures(hand, q0, free_of_itself), _BEST):
         centers = hand.centers(q)
         others = np.delete(centers, thumb, axis=0)
         across = others.mean(axis=0) - centers[thumb]
@@ -204,10 +213,11 @@ def _places(hand: Hand, q0: Array, shell: Shell) -> Iterator[tuple[Array, pin.SE
         yield q, placement
 
 
-def _postures(hand: Hand, q0: Array) -> list[tuple[float, Array, int]]:
-    """Return postures in which one tip, the thumb, stands against all others; how well they do."""
+def _postures(
+    hand: Hand, q0: Array, free_of_itself: Callable[[Array], bool]
+) -> Iterator[tuple[float, Array, int]]:
+    """Yield postures in which one tip, the thumb, stands against all others; how well they do."""
     rng = np.random.default_rng(0)
-    model = hand.model
     found: list[tuple[float, Array, int]] = []
     bounded = np.isfinite(hand.low) & np.isfinite(hand.high)
     for _ in range(_POSTURES):
@@ -226,8 +236,7 @@ def _postures(hand: Hand, q0: Array) -> list[tuple[float, Array, int]]:
             if uneven < _UNEVEN and beside > 2 * hand.radii.max():
                 found.append((uneven, q, thumb))
     found.sort(key=lambda one: one[0])
-    del model
-    return found[:_BEST]
+    yield from (one for one in found if free_of_itself(one[1]))
 
 
 def _root(hand: Hand, q0: Array) -> Array:

@@ -3,7 +3,7 @@
     python tests/data/make_valve_body.py
 
 A valve body as one prints it of nylon: a barrel with a bore on a bolted flange, a collar on top,
-two side ports, all edges rounded. The axis is z, the flange stands on z = 0.
+two side ports, edges rounded. The axis is z, the flange stands on z = 0.
 """
 
 from __future__ import annotations

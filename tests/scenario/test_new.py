@@ -260,7 +260,7 @@ def test_its_knobs_turn(tmp_path):
         (("ball",), {"material": "iron"}, NameNotFound, "steel, aluminium"),
         (("ball",), {"against": "iron"}, NameNotFound, "steel, aluminium"),
         (("ball",), {"place": "left"}, NameNotFound, "below, above"),
-        (("ball",), {"free_flyer": True}, SphshellError, "belong to a file"),
+        (("ball",), {"free_flyer": True}, SphshellError, "belong to a file, not to ball"),
         (("turntable",), {}, SphshellError, "--radius 0.012"),
         (("ball", BLADE), {"unit": "um"}, SphshellError, "less than the sphere's radius"),
         (("gear_pair",), {}, SphshellError, "one of gear_1, gear_2"),

@@ -402,3 +402,25 @@ def test_the_page_of_the_docs_is_of_these_robots() -> None:
     assert [name for name, verdict in verdicts.items() if verdict == NOT_CHECKED] == ["cassie"]
     if len(robots.names()) > len(robots.OWN):
         assert list(verdicts) == robots.names()
+
+
+def test_the_command_takes_xacro_arguments_and_package_folders(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_PACKAGE_PATH", "")
+    file = tmp_path / "hand.urdf.xacro"
+    text = (DATA / "xacro" / "hand.urdf.xacro").read_text()
+    inside = "finger_description/urdf"
+    file.write_text(text.replace(inside, f"$(find {inside.partition('/')[0]})/urdf"))
+    command = ["check-robot", str(file), "--quick", "--xacro-arg", "fingers=1"]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 2
+    assert "no package 'finger_description'" in result.stdout
+    result = CliRunner().invoke(app, [*command, "--package-dir", str(DATA / "xacro")])
+    assert result.exit_code == 0, result.stdout
+    assert "2/2" in result.stdout
+    result = CliRunner().invoke(app, ["check-robot", str(file), "--xacro-arg", "fingers"])
+    assert result.exit_code == 2
+    assert "--xacro-arg = 'fingers' must be NAME=VALUE" in result.stderr
+    result = CliRunner().invoke(app, ["run", "x.toml", "--package-dir", str(tmp_path / "nix")])
+    assert result.exit_code == 2
