@@ -233,7 +233,8 @@ def keep_collision_of(description: Description, link: str) -> None:
     root = description.root
     for body in root.iter("body"):
         for geom in body.findall("geom"):
-            if body.get("name") != link or mjcf.is_visual(geom):
+            is_visual = (geom.get("contype"), geom.get("conaffinity")) == ("0", "0")
+            if body.get("name") != link or is_visual:
                 body.remove(geom)
     for one in root.iter("link"):
         for part in [*one.findall("visual"), *one.findall("collision")]:

@@ -23,6 +23,7 @@ from sphshell_pin.robots.description import check_size
 from sphshell_pin.robots.mjcf_geoms import (
     Meshes,
     geom_inertia,
+    numbers,
     plain_geom,
     plain_place,
     turned_to,
@@ -236,7 +237,7 @@ class _Reader:
         needs = use == "true" or not any(part.tag == "inertial" for part, *_ in parts)
         if needs and use == "false" and self.joints_of[name]:
             raise ValueError(f"body '{name}' moves, and states no <inertial>")
-        low, high = _numbers(self.compiler.get("inertiagrouprange", "0 5"))
+        low, high = numbers(self.compiler.get("inertiagrouprange", "0 5"), 2)
         for part, at, cls in parts:
             if part.tag == "inertial":
                 stated = self._inertia(part, name).se3Action(at)
@@ -281,14 +282,14 @@ class _Reader:
         self.nq += _COUNT[kind]
         self.joints_of[body].append(name)
         made = ET.Element("joint", name=name, type=kind)
-        scalar = {key: _number(stated.get(key, "0").split()[0], 0.0) for key in _SCALARS}
+        scalar = {key: _number(" ".join(stated.get(key, "0").split()[:1]), 0.0) for key in _SCALARS}
         if scalar["stiffness"] or "springdamper" in stated:
             self.springs.append(name)
         if kind == "free":
             made.set("pos", "0 0 0")
         else:
-            made.set("pos", _text(at.act(_numbers(stated.get("pos", "0 0 0")))))
-            made.set("axis", _text(at.rotation @ _numbers(stated.get("axis", "0 0 1"))))
+            made.set("pos", _text(at.act(numbers(stated.get("pos", "0 0 0"), 3))))
+            made.set("axis", _text(at.rotation @ numbers(stated.get("axis", "0 0 1"), 3)))
         made.set("armature", repr(scalar["armature"]))
         limited = _limited(stated, "limited", "range", self.compiler)
         if kind in ("free", "ball"):
@@ -305,9 +306,9 @@ class _Reader:
             self.start[name] = np.array([ref])
         if limited:
             # Pinocchio subtracts ref from the range, but counts positions as MuJoCo does.
-            made.set("range", _text(unit * _numbers(stated["range"]) + ref))
+            made.set("range", _text(unit * numbers(stated["range"], 2) + ref))
         if _limited(stated, "actuatorfrclimited", "actuatorfrcrange", self.compiler):
-            made.set("actuatorfrcrange", _text(_numbers(stated["actuatorfrcrange"])))
+            made.set("actuatorfrcrange", _text(numbers(stated["actuatorfrcrange"], 2)))
         return made
 
     def _inertia(self, element: ET.Element, body: str) -> pin.Inertia:
@@ -316,40 +317,42 @@ class _Reader:
         pose = self._pose(element.attrib)
         moments = np.zeros((3, 3))
         if "fullinertia" in element.attrib:
-            xx, yy, zz, xy, xz, yz = _numbers(element.attrib["fullinertia"])
+            xx, yy, zz, xy, xz, yz = numbers(element.attrib["fullinertia"], 6)
             moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         elif "diaginertia" in element.attrib:
-            moments = np.diag(_numbers(element.attrib["diaginertia"]))
+            moments = np.diag(numbers(element.attrib["diaginertia"], 3))
         turned = pose.rotation @ moments @ pose.rotation.T
-        return pin.Inertia(float(element.attrib["mass"]), pose.translation, turned)
+        return pin.Inertia(_number(element.attrib["mass"], 0.0), pose.translation, turned)
 
     def _pose(self, stated: Mapping[str, str]) -> pin.SE3:
-        return pin.SE3(self._rotation(stated), _numbers(stated.get("pos", "0 0 0")))
+        return pin.SE3(self._rotation(stated), numbers(stated.get("pos", "0 0 0"), 3))
 
     def _rotation(self, stated: Mapping[str, str]) -> Array:
         """Return the rotation (3,3) that an element states in one of MuJoCo's ways."""
         if "quat" in stated:
-            w, x, y, z = _numbers(stated["quat"])
+            w, x, y, z = numbers(stated["quat"], 4)
             return np.asarray(pin.Quaternion(w, x, y, z).normalized().toRotationMatrix())
         if "axisangle" in stated:
-            *axis, angle = _numbers(stated["axisangle"])
+            *axis, angle = numbers(stated["axisangle"], 4)
             return np.asarray(pin.exp3(self.angle * angle * np.array(axis) / np.linalg.norm(axis)))
         if "euler" in stated:
             turned = np.eye(3)
             sequence = self.compiler.get("eulerseq", "xyz")
-            for letter, angle in zip(sequence, _numbers(stated["euler"]), strict=True):
+            if len(sequence) != 3 or set(sequence.lower()) - set("xyz"):
+                raise ValueError(f"eulerseq '{sequence}' is no three of x, y, z")
+            for letter, angle in zip(sequence, numbers(stated["euler"], 3), strict=True):
                 one = pin.exp3(self.angle * angle * np.eye(3)["xyz".index(letter.lower())])
                 # Upper case: about the axes of the parent, which stay.
                 turned = one @ turned if letter.isupper() else turned @ one
             return np.asarray(turned)
         if "xyaxes" in stated:
-            axes = np.array(_numbers(stated["xyaxes"])).reshape(2, 3)
+            axes = numbers(stated["xyaxes"], 6).reshape(2, 3)
             x = axes[0] / np.linalg.norm(axes[0])
             y = axes[1] - (axes[1] @ x) * x
             y /= np.linalg.norm(y)
             return np.column_stack([x, y, np.cross(x, y)])
         if "zaxis" in stated:
-            return turned_to(np.array(_numbers(stated["zaxis"])))
+            return turned_to(numbers(stated["zaxis"], 3))
         return np.eye(3)
 
     def _weigh(self, made: ET.Element) -> None:
@@ -361,7 +364,7 @@ class _Reader:
             return
         for one in parts:
             for key in ("mass", "fullinertia"):
-                one.set(key, _text(total / now * _numbers(one.attrib[key])))
+                one.set(key, _text(total / now * numbers(one.attrib[key])))
 
     def _keys(self, made: ET.Element) -> None:
         keys = ET.SubElement(made, "keyframe")
@@ -380,7 +383,7 @@ class _Reader:
             first, second = one.get(f"{one.tag}1"), one.get(f"{one.tag}2")
             if one.tag == "joint" and first is not None:
                 terms = np.zeros(5)
-                stated = _numbers(one.get("polycoef", "0 1 0 0 0"))
+                stated = numbers(one.get("polycoef", "0 1 0 0 0"))[:5]
                 terms[: len(stated)] = stated
                 if second is not None and not terms[2:].any():
                     # It is of the distances from ref.
@@ -488,15 +491,8 @@ def _posed(pose: pin.SE3) -> dict[str, str]:
     return {"pos": _text(pose.translation), "quat": _text(np.array([w, x, y, z]))}
 
 
-def _numbers(text: str) -> Array:
-    try:
-        return np.array([float(one) for one in text.split()])
-    except ValueError:
-        raise ValueError(f"'{text}' are no numbers") from None
-
-
 def _number(text: str | None, usual: float) -> float:
-    return usual if text is None else float(_numbers(text)[0])
+    return usual if text is None else float(numbers(text, 1)[0])
 
 
 def _text(values: Array) -> str:

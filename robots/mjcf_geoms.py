@@ -16,6 +16,17 @@ _SHAPES = ("sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh")
 _SEEN = ("contype", "conaffinity", "group")
 
 
+def numbers(text: str, count: int | None = None) -> Array:
+    """Return the numbers in `text`; ValueError if they are not `count`."""
+    try:
+        found = np.array([float(one) for one in text.split()])
+    except ValueError:
+        raise ValueError(f"'{text}' are no numbers") from None
+    if count is not None and len(found) != count:
+        raise ValueError(f"'{text}' should be {count} number{'s' if count > 1 else ''}")
+    return found
+
+
 class Meshes:
     """The meshes of an MJCF by name, with the absolute paths of their files."""
 
@@ -40,7 +51,7 @@ class Meshes:
                 continue
             path = Path(Path(stated["file"]).name if strip else stated["file"])
             name = stated.get("name", path.stem)
-            scale = np.array([float(k) for k in stated.get("scale", "1 1 1").split()])
+            scale = numbers(stated.get("scale", "1 1 1"), 3)
             self.files[name] = ((file.absolute().parent / folder / path), scale)
             self._kinds[name] = stated.get("inertia", "legacy")
             if "refpos" in stated or "refquat" in stated:
@@ -102,7 +113,7 @@ def plain_place(
     """Return the place of a geom or site; of one that states its ends, half its length [m] too."""
     if "fromto" not in stated:
         return pose_of(stated), None
-    ends = np.array([float(k) for k in stated["fromto"].split()]).reshape(2, 3)
+    ends = numbers(stated["fromto"], 6).reshape(2, 3)
     along = ends[0] - ends[1]
     place = pin.SE3(turned_to(along), ends.mean(axis=0))
     return pose_of({}) * place, 0.5 * float(np.linalg.norm(along))
@@ -113,7 +124,7 @@ def plain_geom(
 ) -> tuple[ET.Element | None, pin.SE3]:
     """Return a geom without its place, and its place in the body; None for kinds left out."""
     kind = stated.get("type", "sphere" if "mesh" not in stated else "mesh")
-    size = [float(k) for k in stated.get("size", "").split()]
+    size = numbers(stated.get("size", "")).tolist()
     pose, half = plain_place(stated, pose_of)
     if half is not None and size:
         size = [size[0], half] if kind in ("capsule", "cylinder") else [size[0], size[0], half]
@@ -143,8 +154,8 @@ def geom_inertia(
 ) -> pin.Inertia:
     """Return the inertia that a geom gives its body, in the geom's frame."""
     kind = stated.get("type", "sphere")
-    density = float(stated.get("density", 1000.0))
-    mass = float(stated["mass"]) if "mass" in stated else None
+    density = float(numbers(stated.get("density", "1000"), 1)[0])
+    mass = float(numbers(stated["mass"], 1)[0]) if "mass" in stated else None
     if kind in ("plane", "hfield") or mass == 0.0 or (mass is None and density == 0.0):
         return pin.Inertia.Zero()
     if made is None:
@@ -155,7 +166,7 @@ def geom_inertia(
         volume, inertia = meshes.solid(made.attrib["mesh"], body)
         factor = density if mass is None else mass / volume
         return pin.Inertia(factor * inertia.mass, inertia.lever, factor * inertia.inertia)
-    size = [float(k) for k in made.attrib["size"].split()]
+    size = numbers(made.attrib["size"]).tolist()
     volumes = {
         "sphere": lambda r: 4 / 3 * np.pi * r**3,
         "capsule": lambda r, h: np.pi * r**2 * (2 * h + 4 / 3 * r),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -64,6 +64,10 @@ def new(
             "default below, or before a tip that does not point down."
         ),
     ] = None,
+    tips: Annotated[
+        Literal["one", "all"],
+        typer.Option(help="all: the fingertips of a hand hold the surface, as a free part."),
+    ] = "one",
     free_flyer: Annotated[
         bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
     ] = False,
@@ -101,6 +105,7 @@ def new(
                 against=against,
                 press=press,
                 place=place,
+                tips=tips,
                 free_flyer=free_flyer,
                 package_dirs=package_dir or (),
                 xacro_args=xacro_args_of(xacro_arg),

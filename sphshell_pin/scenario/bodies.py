@@ -13,7 +13,12 @@ import pinocchio as pin
 
 from sphshell_pin.checks import off_unit_length
 from sphshell_pin.dynamics.mimic import check_follows, count_of_all, mimics, shortened
-from sphshell_pin.dynamics.models import find_joint, reduced_geometry, set_joint
+from sphshell_pin.dynamics.models import (
+    find_frame,
+    find_joint,
+    reduced_geometry,
+    set_joint,
+)
 from sphshell_pin.errors import MissingExtra, ScenarioError, SphshellError
 from sphshell_pin.robots import LoadedRobot, load, load_file
 from sphshell_pin.scenario.reading import item_key
@@ -109,10 +114,12 @@ def assemble(
             in_q, in_v = joint_spans(model, name)
             starts.append((name, q[in_q], v[in_v], np.array(model.armature[in_v])))
         stand = to_se3(section.placement)
+        with blamed_on(path, f"{key}.frame"):
+            carrier = find_frame(base, section.frame)
         if not several and stand.isIdentity():
             base, visual = model, geometry
         else:
-            base, visual = pin.appendModel(base, model, visual, geometry, 0, stand)
+            base, visual = pin.appendModel(base, model, visual, geometry, carrier, stand)
     base.gravity.linear = np.array(scenario.gravity)
     q0, v0, armature = pin.neutral(base), np.zeros(base.nv), np.zeros(base.nv)
     for name, q_joint, v_joint, inertia in starts:

@@ -27,17 +27,19 @@ class Material:
     """Static coefficient against dry steel."""
     slip: float
     """Dynamic coefficient as a part of the static one."""
+    density: float
+    """[kg/m^3]"""
 
 
 MATERIALS: dict[str, Material] = {
     one.name: one
     for one in (
-        Material("steel", 2.1e11, 0.30, 0.90, 0.40, 0.75),
-        Material("aluminium", 7.0e10, 0.33, 0.80, 0.45, 0.75),
-        Material("plastic", 2.5e9, 0.38, 0.80, 0.30, 0.80),
-        Material("wood", 1.0e10, 0.35, 0.60, 0.40, 0.75),
-        Material("rubber", 1.0e7, 0.49, 0.70, 0.80, 0.85),
-        Material("silicone", 6.0e5, 0.49, 0.60, 0.70, 0.85),
+        Material("steel", 2.1e11, 0.30, 0.90, 0.40, 0.75, 7850.0),
+        Material("aluminium", 7.0e10, 0.33, 0.80, 0.45, 0.75, 2700.0),
+        Material("plastic", 2.5e9, 0.38, 0.80, 0.30, 0.80, 1050.0),
+        Material("wood", 1.0e10, 0.35, 0.60, 0.40, 0.75, 700.0),
+        Material("rubber", 1.0e7, 0.49, 0.70, 0.80, 0.85, 1100.0),
+        Material("silicone", 6.0e5, 0.49, 0.60, 0.70, 0.85, 1100.0),
     )
 }
 

@@ -18,6 +18,7 @@ from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import is_path
 from sphshell_pin.scenario.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.drafting import draft_text
+from sphshell_pin.scenario.hand import every_tip, hold_in_hand, part_file, word_primitive
 from sphshell_pin.scenario.knobs import check_knobs
 from sphshell_pin.scenario.materials import find_material
 from sphshell_pin.scenario.plan import Hold, Plan, Press
@@ -37,7 +38,6 @@ WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 """Surfaces that need no file."""
 
 # Endings of the robots' files: URDF, MJCF and xacro.
-_ROBOT_FILES = (".urdf", ".xml", ".mjcf", ".xacro")
 # Half the size of a surface that needs no file, in radii of the sphere.
 _SIZE = 15.0
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}
@@ -70,6 +70,7 @@ def new_scenario(
     against: str = "steel",
     press: float | None = None,
     place: str | None = None,
+    tips: Literal["one", "all"] = "one",
     free_flyer: bool = False,
     package_dirs: Sequence[str | PathLike[str]] = (),
     xacro_args: Mapping[str, str] | None = None,
@@ -101,6 +102,9 @@ def new_scenario(
         Normal force [N] of a robot with a fixed base.
     place
         Where the surface stands as seen from its tip, a key of PLACES.
+    tips
+        "all": all fingertips of a hand hold the surface, which then is a free part, of `against`
+        all through; its URDF is written beside the scenario, as NAME_part.urdf.
     out
         The file to write, by default ROBOT_on_SURFACE.toml here; an existing one is replaced with
         `force` only, and only when all went well.
@@ -141,11 +145,35 @@ def new_scenario(
     center = None if offset is None else check_vector("offset", offset, 3, " [m]")
     if center is not None and frame is None:
         raise SphshellError("an offset is in a frame: state that with --frame")
-    tips = find_tips(loaded, shipped=section.name, frame=frame, radius=radius, offset=center)
-    shell_section, word = _shell_section(surface, unit, (bodies, faces), path, bare, tips)
+    if tips == "all":
+        found = every_tip(loaded, frame, radius, place)
+    else:
+        found = find_tips(loaded, shipped=section.name, frame=frame, radius=radius, offset=center)
+    shell_section, word = _shell_section(surface, unit, (bodies, faces), path, bare, found)
+    if word is not None and tips == "all":
+        held = word_primitive(word, max(one.radius for one in found))
+        shell_section = shell_section.model_copy(update={"primitive": held})
     with_shell = _build_bare(section, path, shell_section, reuse=bare)
-    _check_size(with_shell.shells[shell_section.name], tips)
+    _check_size(with_shell.shells[shell_section.name], found)
     shell_section, with_shell = _sided(shell_section, with_shell, word)
+    if tips == "all":
+        pair = find_material(material or "rubber"), find_material(against)
+        grasp = hold_in_hand(
+            section,
+            shell_section,
+            with_shell,
+            found,
+            pair,
+            press,
+            path.stem,
+            lambda text, reuse: _build_text(text, path, reuse),
+        )
+        part = path.with_name(part_file(path.stem))
+        if part.exists() and not force:
+            raise ScenarioError(part, "", "is there already: give another --out, or --force")
+        _write(part, grasp.urdf)
+        _write(path, grasp.text)
+        return NewScenario(path, grasp.text, grasp.built, explain_built(grasp.built), grasp.why)
     request = Request(material, against, press, place, word)
     title = f"{loaded.name} {{}} {shell_section.name}"
 
@@ -155,7 +183,7 @@ def new_scenario(
         return text, _build_text(text, path, with_shell)
 
     # What is written is what was built, and tried.
-    text, built, plan = find_working(section, with_shell, tips, request, draft)
+    text, built, plan = find_working(section, with_shell, found, request, draft)
     _write(path, text)
     why = (*plan.why, _materials_note(plan))
     return NewScenario(path, text, built, explain_built(built), why)

@@ -70,6 +70,7 @@ class RobotSection(Section):
     free_flyer: bool = False
     mimic: bool = True
     label: str | None = None
+    frame: str = "universe"
     placement: Placement = Placement()
     lock: list[str] = []
     joints: list[Literal["limits", "damping", "friction", "armature", "effort", "speed"]] = []

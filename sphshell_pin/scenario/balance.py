@@ -1,0 +1,104 @@
+"""Forces of fingertips that hold a part: in their friction cones, in balance with its weight."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+# Sides of the pyramid that stands for a friction cone, inscribed in it.
+_SIDES = 8
+# Of all normal forces, the least share of each contact, of an even one.
+_LEAST = 0.15
+# Bisections of the coefficient of friction, and a residual that is none, as a part of all forces.
+_HALVINGS, _BALANCED = 9, 1e-7
+
+
+def least_friction(
+    points: Array, normals: Array, wrench: Array, total: float, most: float
+) -> tuple[float, Array] | None:
+    """Return the least coefficient of friction that holds a part, and the forces (k, 3) [N] on it.
+
+    At `points` (k, 3) [m] pushes act against the outward unit `normals` (k, 3), `total` [N] in all,
+    each at least a part of an even share. They balance `wrench` (6,): what else acts on the part,
+    force [N] and torque [N m] about the points' origin. None where `most` is not enough: force
+    closure with pyramids inside the friction cones (Murray, Li, Sastry, A Mathematical Introduction
+    to Robotic Manipulation, 1994, chapter 5).
+    """
+    forces = _forces(points, normals, wrench, total, most)
+    if forces is None:
+        return None
+    low, high = 0.0, most
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        found = _forces(points, normals, wrench, total, middle)
+        if found is None:
+            low = middle
+        else:
+            high, forces = middle, found
+    return high, forces
+
+
+def _forces(points: Array, normals: Array, wrench: Array, total: float, mu: float) -> Array | None:
+    """Return forces (k, 3) in the pyramids of `mu` that balance `wrench`; None if none do."""
+    count = len(points)
+    angles = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    edges = np.empty((count, _SIDES, 3))
+    for k, normal in enumerate(normals):
+        aside = np.eye(3)[int(np.argmin(np.abs(normal)))]
+        first = np.cross(normal, aside)
+        first /= np.linalg.norm(first)
+        second = np.cross(normal, first)
+        edges[k] = -normal + mu * (
+            np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second)
+        )
+    middle = points.mean(axis=0)
+    size = max(float(np.linalg.norm(points - middle, axis=1).max()), 1e-9)
+    torques = np.cross((points - middle)[:, None], edges) / size
+    matrix = np.vstack(
+        [
+            np.concatenate([edges, torques], axis=2).reshape(-1, 6).T,
+            np.ones(count * _SIDES),
+        ]
+    )
+    about = wrench[3:] - np.cross(middle, wrench[:3])
+    goal = np.concatenate([-wrench[:3], -about / size, [total]])
+    least = np.full(count * _SIDES, _LEAST * total / (count * _SIDES))
+    shares, residual = nonnegative(matrix, goal - matrix @ least)
+    if residual > _BALANCED * max(total, float(np.linalg.norm(wrench[:3]))):
+        return None
+    forces: Array = ((shares + least).reshape(count, _SIDES, 1) * edges).sum(axis=1)
+    return forces
+
+
+def nonnegative(matrix: Array, goal: Array) -> tuple[Array, float]:
+    """Return x >= 0 with the least |matrix x - goal|, and that.
+
+    Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
+    """
+    columns = matrix.shape[1]
+    x, free = np.zeros(columns), np.zeros(columns, dtype=bool)
+    tolerance = 1e-12 * float(np.abs(matrix).max()) * max(float(np.abs(goal).max()), 1e-300)
+    for _ in range(3 * columns):
+        slope = matrix.T @ (goal - matrix @ x)
+        slope[free] = -np.inf
+        entering = int(np.argmax(slope))
+        if slope[entering] <= tolerance:
+            break
+        free[entering] = True
+        while True:
+            trial = np.zeros(columns)
+            trial[free] = np.linalg.lstsq(matrix[:, free], goal, rcond=None)[0]
+            low = free & (trial <= 0)
+            if not low.any():
+                break
+            share = float((x[low] / (x[low] - trial[low])).min())
+            x = np.maximum(x + share * (trial - x), 0.0)
+            free &= x > 1e-14 * max(float(x.max()), 1e-300)
+            x[~free] = 0.0
+            if not free.any():
+                trial = x
+                break
+        x = trial
+    return x, float(np.linalg.norm(matrix @ x - goal))
