@@ -57,6 +57,27 @@ def test_the_filter_is_of_first_order(integrator, share):
         assert abs(20 * np.log10(gain) + 3.0103) < 0.02
 
 
+@pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.SemiImplicitEuler(1e-3)])
+def test_the_filter_follows_held_torques_exactly(integrator):
+    """Between the jumps of a staircase a filter of first order moves exponentially."""
+    stairs = np.array([2.0, -1.0, 4.0, 0.5])
+    cutoff, hold, rate = 30.0, 5e-3, 2000
+
+    def tau(t, q, v, contacts):
+        return [stairs[round(t / hold)]]
+
+    result = slider(integrator, [torque(cutoff=cutoff, rate=rate)]).run(
+        [0.0], None, 4 * hold - 1e-4, tau, control_dt=hold
+    )
+    log = result.sensors["torque"]
+    x, expected = stairs[0], []
+    for t in log.sampled:
+        expected.append(x)
+        step = stairs[int((t + 1e-9) / hold)]
+        x = step + (x - step) * np.exp(-2 * np.pi * cutoff / rate)
+    assert np.allclose(log.values[:, 0], expected, rtol=0, atol=1e-12)
+
+
 # A tip of a quarter of the mass, with a sensor between the two.
 HAMMER = """<robot name="r"><link name="base"/><link name="body"><inertial><mass value="0.75"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
