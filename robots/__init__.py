@@ -139,6 +139,7 @@ def load(name: str, *, mimic: bool = False, pose: str | None = None) -> LoadedRo
         reason = str(error)
         if "SDF" in reason or "Sdf" in reason:
             reason = "it is an SDF file, and the wheel of pinocchio has no SDF reader"
+            reason += ": give its URDF or MJCF"
         raise RobotError(f"the robot '{name}' cannot be loaded: {reason}") from error
     # A reference posture may state a free-flyer's quaternion with a few digits only.
     q0 = pin.normalize(robot.model, np.asarray(robot.q0, dtype=float))

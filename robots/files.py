@@ -233,13 +233,17 @@ def keep_collision_of(description: Description, link: str) -> None:
     root = description.root
     for body in root.iter("body"):
         for geom in body.findall("geom"):
-            is_visual = (geom.get("contype"), geom.get("conaffinity")) == ("0", "0")
-            if body.get("name") != link or is_visual:
+            if body.get("name") != link or _is_visual(geom):
                 body.remove(geom)
     for one in root.iter("link"):
         for part in [*one.findall("visual"), *one.findall("collision")]:
             if part.tag == "visual" or one.get("name") != link:
                 one.remove(part)
+
+
+def _is_visual(geom: ET.Element) -> bool:
+    """Whether MuJoCo lets a geom touch nothing."""
+    return geom.get("contype") == "0" and geom.get("conaffinity") == "0"
 
 
 def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element, list[str]]:
@@ -253,8 +257,7 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
                 mesh = assets.get(geom.get("mesh"))
                 if mesh is None or os.path.isfile(mesh.get("file", "")):
                     continue
-                # MuJoCo lets it touch nothing.
-                if geom.get("contype") == "0" and geom.get("conaffinity") == "0":
+                if _is_visual(geom):
                     missing[mesh.get("file", "")] = None
                     body.remove(geom)
                 else:

@@ -21,15 +21,19 @@ Array = npt.NDArray[np.float64]
 _POSTURES, _BEST = 4000, 60
 # Of a posture: the tips stand in front of the thumb within this part of their distance to it.
 _UNEVEN = 0.35
+# Of a finger's last link, the least part of it that points to the part between the tips.
+_INWARD = 0.1
 # Part of a joint's range that is left free at its ends.
 _MARGIN = 0.05
 # Of the inverse kinematics: steps, damping [m^2], longest step [rad], gap's tolerance [m].
 _STEPS, _DAMPING, _LONGEST, _CLOSE = 30, 1e-6, 0.15, 1e-7
-# How much the part may be wider or narrower than the open hand, as a part of it, and how many
-# places with a part are looked at.
-_WIDER, _MOST_PLACES = 0.5, 400
+# How much the part may be wider or narrower than the open hand, as a part of it, how many places
+# with a part are looked at, and how many grasps are enough.
+_WIDER, _MOST_PLACES, _ENOUGH = 0.5, 600, 30
 # Farther along the fingers, as parts of the part's size there.
-_OFFSETS = (0.0, 0.25, -0.25)
+_OFFSETS = (0.0, 0.2, 0.4)
+# Places of one posture that are looked at before it is another one's turn.
+_TURN = 6
 # Of the friction that there is, how much a grasp may use.
 _USED = 0.6
 
@@ -89,6 +93,21 @@ class Hand:
             ]
         )
 
+    def limbs(self) -> Array:
+        """Return unit vectors (k, 3) from the last joints to the `centers` that were asked last."""
+        data, parents = (
+            self._data,
+            [int(self.model.frames[one].parentJoint) for one in self._frames],
+        )
+        out = np.array(
+            [
+                data.oMf[frame].act(tip.offset) - data.oMi[parent].translation
+                for frame, parent, tip in zip(self._frames, parents, self.tips, strict=True)
+            ]
+        )
+        unit: Array = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+        return unit
+
     def jacobians(self, q: Array) -> Array:
         """Return (k, 3, nv): velocities of the centers from those of the joints."""
         pin.computeJointJacobians(self.model, self._data, q)
@@ -102,7 +121,8 @@ class Hand:
 
     def torques(self, grasp: Grasp) -> Array:
         """Return the joint torques (nv,) [N m], beside those against gravity, of its forces."""
-        return np.einsum("kij,ki->j", self._point_jacobians(grasp), grasp.forces)
+        torques: Array = np.einsum("kij,ki->j", self._point_jacobians(grasp), grasp.forces)
+        return torques
 
     def _point_jacobians(self, grasp: Grasp) -> Array:
         """Return (k, 3, nv) of the points of the tips that touch the part."""
@@ -119,9 +139,9 @@ class Hand:
         return inside
 
     def close_on(
-        self, q: Array, shell: Shell, placement: pin.SE3, gap: float
+        self, q: Array, shell: Shell, placement: pin.SE3, gap: float | Array
     ) -> tuple[Array, Array, Array] | None:
-        """Return q near the given one at which each tip has the `gap` [m] to the shell.
+        """Return q near the given one at which each tip has the `gap` [m] to the shell, or its own.
 
         With the points on it (k, 3) [m] and its outward normals (k, 3), in the world. None where
         the tips do not get there.
@@ -169,11 +189,16 @@ def grasps(
         if closed is None:
             continue
         q, points, normals = closed
+        # The quickest first.
+        if not (free_of_itself(q) and free_of_part(q, placement)):
+            continue
         balance = least_friction(points, normals, wrench(placement), total, _USED * mu)
-        if balance is None or not (free_of_itself(q) and free_of_part(q, placement)):
+        if balance is None:
             continue
         friction, forces = balance
         found.append(Grasp(q, placement, points, normals, forces, friction))
+        if len(found) == _ENOUGH:
+            break
     return sorted(found, key=lambda one: one.friction)
 
 
@@ -186,7 +211,7 @@ def _places(
     """
     extent, middle = shell.box[1] - shell.box[0], shell.box.mean(axis=0)
     root = _root(hand, q0)
-    found: list[tuple[float, int, Array, pin.SE3]] = []
+    found: list[tuple[int, float, int, Array, pin.SE3]] = []
     for _, q, thumb in itertools.islice(_postures(hand, q0, free_of_itself), _BEST):
         centers = hand.centers(q)
         others = np.delete(centers, thumb, axis=0)
@@ -199,6 +224,7 @@ def _places(
         frame = np.column_stack([across, ahead, np.cross(across, ahead)])
         center = 0.5 * (others.mean(axis=0) + centers[thumb])
         free = width - 2 * float(hand.radii.mean())
+        own: list[tuple[float, pin.SE3]] = []
         for turn in _turns():
             sizes = np.abs(turn) @ extent  # along across, ahead and the third
             misfit = abs(free - sizes[0]) / width
@@ -207,9 +233,13 @@ def _places(
             rotation = frame @ turn
             for offset in _OFFSETS:
                 at = center + offset * sizes[1] * ahead - rotation @ middle
-                found.append((misfit + 0.1 * abs(offset), len(found), q, pin.SE3(rotation, at)))
-    found.sort(key=lambda one: one[:2])
-    for _, _, q, placement in found:
+                own.append((misfit, pin.SE3(rotation, at)))
+        own.sort(key=lambda one: one[0])
+        ranked = enumerate(own)
+        found += [(rank // _TURN, misfit, len(found), q, place) for rank, (misfit, place) in ranked]
+    # A few places of each posture, then the next few.
+    found.sort(key=lambda one: one[:3])
+    for *_, q, placement in found:
         yield q, placement
 
 
@@ -223,7 +253,7 @@ def _postures(
     for _ in range(_POSTURES):
         q = q0.copy()
         q[bounded] = rng.uniform(hand.low[bounded], hand.high[bounded])
-        centers = hand.centers(q)
+        centers, limbs = hand.centers(q), hand.limbs()
         for thumb in range(len(centers)):
             others = np.delete(centers, thumb, axis=0)
             across = others.mean(axis=0) - centers[thumb]
@@ -232,6 +262,10 @@ def _postures(
                 continue
             depth = (others - centers[thumb]) @ across / width
             uneven = float(np.ptp(depth)) / width
+            inward = -limbs @ across / width
+            inward[thumb] *= -1
+            if inward.min() < _INWARD:
+                continue
             beside = np.linalg.norm(np.diff(others, axis=0), axis=1).min(initial=np.inf)
             if uneven < _UNEVEN and beside > 2 * hand.radii.max():
                 found.append((uneven, q, thumb))
@@ -243,7 +277,8 @@ def _root(hand: Hand, q0: Array) -> Array:
     """Return where the fingers begin (3,) [m]: the mean of the joints that move single tips."""
     data = hand.model.createData()
     pin.forwardKinematics(hand.model, data, q0)
-    return np.mean([data.oMi[j].translation for j in hand.joints], axis=0)
+    root: Array = np.mean([data.oMi[j].translation for j in hand.joints], axis=0)
+    return root
 
 
 def _turns() -> list[Array]:

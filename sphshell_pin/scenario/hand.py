@@ -199,7 +199,7 @@ def hold_in_hand(
     fault = ""
     for one in found[:_MOST_RUNS]:
         grasp = _pressed(one, part, press, mu)
-        draft = _Draft(section, shell_section, hand, grasp, part, materials, lock, name)
+        draft = _Draft(section, shell_section, shell, hand, grasp, part, materials, lock, name)
         fault = draft.fault()
         if fault:
             continue
@@ -264,6 +264,7 @@ def _pressed(grasp: Grasp, part: Part, press: float | None, mu: float) -> Grasp:
 class _Draft:
     section: RobotSection
     shell: ShellSection
+    surface: Shell
     hand: Hand
     grasp: Grasp
     part: Part
@@ -308,11 +309,19 @@ class _Draft:
         moved = [model.joints[j].idx_v for j in self.hand.joints]
         return kp, _round(1.4 * math.sqrt(kp * float(np.median(inertia[moved]))))
 
+    def pressed_in(self) -> Array:
+        """Return the configuration (nq,) in which the tips are as deep in the part as pressed."""
+        radii = self.hand.radii
+        stiffness = [hertz_stiffness(float(radius), *self.materials) for radius in radii]
+        depths = (self.grasp.normal_forces() / stiffness) ** (2 / 3)
+        found = self.hand.close_on(self.grasp.q, self.surface, self.grasp.placement, -depths)
+        return self.grasp.q if found is None else found[0]
+
     def text(self) -> str:
         """Return the scenario's text."""
         model, grasp, hand = self.hand.model, self.grasp, self.hand
         kp, kd = self.gains()
-        drawn = pin.integrate(model, grasp.q, hand.torques(grasp) / kp)
+        drawn = pin.integrate(model, self.pressed_in(), hand.torques(grasp) / kp)
         one, other = self.materials
         static, dynamic = friction_between(one, other)
         radius, load = float(hand.radii.min()), self.press
