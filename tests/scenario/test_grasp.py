@@ -1,0 +1,235 @@
+"""A hand about a part: forces in closed form, distances, and drafts that are run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.optimize import nnls
+
+from sphshell_pin import robots
+from sphshell_pin.errors import ScenarioError, SphshellError
+from sphshell_pin.scenario import build, judge
+from sphshell_pin.scenario.balance import least_friction, nonnegative
+from sphshell_pin.scenario.grasp import Hand
+from sphshell_pin.scenario.hand import GAP, Part
+from sphshell_pin.scenario.materials import find_material
+from sphshell_pin.scenario.new import new_scenario
+from sphshell_pin.scenario.primitives import Box, Cylinder
+from sphshell_pin.scenario.run import simulate
+from sphshell_pin.scenario.tips import Tip
+
+NO_WEIGHT = np.zeros(6)
+
+
+def shell_of(primitive):
+    return primitive.shell(
+        chord_error=None, segments=None, side="outside", crease_angle=0.5, name="part"
+    )
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_least_squares_without_negative_numbers(seed):
+    rng = np.random.default_rng(seed)
+    matrix, goal = rng.normal(size=(7, 24)), rng.normal(size=7)
+    if seed % 2:
+        matrix = np.abs(matrix)  # not every goal can be reached
+    x, residual = nonnegative(matrix, goal)
+    _, expected = nnls(matrix, goal)
+    assert (x >= 0).all()
+    assert residual == pytest.approx(expected, abs=1e-10)
+
+
+def test_two_fingers_carry_a_weight_by_friction():
+    """It takes the weight over all normal forces, and nothing less."""
+    points, normals = np.array([[0.03, 0, 0], [-0.03, 0, 0]]), np.array([[1.0, 0, 0], [-1, 0, 0]])
+    weight = np.array([0, 0, -2.0, 0, 0, 0])
+    mu, forces = least_friction(points, normals, weight, 10.0, 1.0)
+    assert mu == pytest.approx(0.2, abs=1 / 2**9)
+    assert np.allclose(forces.sum(axis=0), [0, 0, 2.0], atol=1e-6)
+    assert least_friction(points, normals, weight, 10.0, 0.19) is None
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.3, 0.5])
+def test_two_fingers_hold_where_their_line_is_in_both_cones(angle):
+    """Nguyen 1988: the cones must contain the line between the points."""
+    normals = np.array([[np.cos(angle), 0, np.sin(angle)], [-np.cos(angle), 0, np.sin(angle)]])
+    points = np.array([[0.03, 0, 0], [-0.03, 0, 0]])
+    mu, _ = least_friction(points, normals, NO_WEIGHT, 10.0, 1.0)
+    assert mu == pytest.approx(np.tan(angle), abs=1 / 2**8)
+
+
+def test_three_fingers_round_a_disc_need_no_friction():
+    angles = 2 * np.pi * np.arange(3) / 3
+    normals = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)])
+    mu, forces = least_friction(0.03 * normals + 0.5, normals, NO_WEIGHT, 9.0, 0.5)
+    assert mu < 2e-3
+    assert np.allclose(forces, -3 * normals, atol=0.02)
+
+
+def test_a_part_weighs_what_its_material_weighs():
+    size = np.array([0.02, 0.03, 0.05])
+    part = Part.of(shell_of(Box(size.tolist())), find_material("steel"))
+    mass = 7850 * size.prod()
+    assert part.mass == pytest.approx(mass)
+    squares = size**2
+    assert np.allclose(part.inertia, np.diag(mass / 12 * (squares.sum() - squares)))
+    loaded = part.loaded()
+    assert loaded.model.inertias[1].mass == pytest.approx(mass)
+    assert loaded.model.nq == 7
+
+
+def test_an_open_surface_has_no_weight(tmp_path):
+    with pytest.raises(SphshellError, match="is open, so it has no weight"):
+        new_scenario(gripper(tmp_path), sheet(tmp_path), tips="all", unit="m", out=out(tmp_path))
+
+
+def gripper(folder):
+    """Write a hand of three fingers, two against one, each with two hinges about y."""
+    parts = ['<robot name="gripper"><link name="palm"/>']
+    for name, side, y in (("thumb", 1, 0.0), ("left", -1, 0.03), ("right", -1, -0.03)):
+        above = "palm"
+        for k, (link, length) in enumerate((("upper", 0.06), ("lower", 0.05))):
+            at = f"{side * 0.035} {y} 0" if k == 0 else "0 0 -0.06"
+            low, high = ((-0.9, 0.4), (-0.2, 1.3))[k]
+            parts.append(
+                f'<joint name="{name}_{link}" type="revolute"><parent link="{above}"/>'
+                f'<child link="{name}_{link}"/><origin xyz="{at}"/><axis xyz="0 {side} 0"/>'
+                f'<limit lower="{low}" upper="{high}" effort="5" velocity="5"/></joint>'
+                f'<link name="{name}_{link}"><inertial><origin xyz="0 0 {-0.5 * length}"/>'
+                '<mass value="0.05"/><inertia ixx="2e-5" iyy="2e-5" izz="5e-6" ixy="0" ixz="0" '
+                f'iyz="0"/></inertial><collision><origin xyz="0 0 {-0.5 * length}"/><geometry>'
+                f'<box size="0.01 0.01 {0.8 * length}"/></geometry></collision>'
+            )
+            if link == "lower":
+                parts.append(
+                    f'<collision><origin xyz="0 0 {-length}"/><geometry><sphere radius="0.01"/>'
+                    "</geometry></collision>"
+                )
+            parts.append("</link>")
+            above = f"{name}_{link}"
+    file = folder / "gripper.urdf"
+    file.write_text("".join(parts) + "</robot>", encoding="utf-8")
+    return file
+
+
+def sheet(folder):
+    file = folder / "sheet.obj"
+    file.write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n", encoding="utf-8")
+    return file
+
+
+def out(folder):
+    return folder / "made.toml"
+
+
+def hand_of(folder):
+    loaded = robots.load_file(gripper(folder))
+    tips = [Tip(s.frame, s.radius, np.array(s.offset), "") for s in robots.end_spheres(loaded)]
+    return Hand(loaded.model, tips)
+
+
+def test_velocities_of_tips_are_those_of_differences(tmp_path):
+    hand, rng = hand_of(tmp_path), np.random.default_rng(3)
+    q, step = rng.uniform(-0.2, 0.4, hand.model.nq), 1e-6
+    found = hand.jacobians(q)
+    for k in range(hand.model.nv):
+        change = np.zeros(hand.model.nv)
+        change[k] = step
+        ahead = hand.centers(pin.integrate(hand.model, q, change))
+        behind = hand.centers(pin.integrate(hand.model, q, -change))
+        assert np.allclose(found[:, :, k], (ahead - behind) / (2 * step), atol=1e-8)
+
+
+def test_fingers_close_on_a_part(tmp_path):
+    """All centers stand a radius and the gap away from a cylinder, which is a distance to a line.
+
+    Torques do the work of the forces (virtual work).
+    """
+    hand, shell = hand_of(tmp_path), shell_of(Cylinder(radius=0.02, length=0.2))
+    along_y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
+    q, points, normals = hand.close_on(
+        np.tile([-0.3, 0.6], 3), shell, along_y, np.array([1e-4, 2e-4, -1e-4])
+    )
+    centers = hand.centers(q)
+    away = np.hypot(centers[:, 0], centers[:, 2] + 0.1)
+    gaps = dict(zip(("thumb_lower", "left_lower", "right_lower"), away - 0.03, strict=True))
+    names = [tip.frame for tip in hand.tips]
+    expected = dict(zip(names, (1e-4, 2e-4, -1e-4), strict=True))
+    # The cylinder is a mesh: curved elements, a micrometer off.
+    assert [gaps[name] for name in names] == pytest.approx(
+        [expected[name] for name in gaps], abs=2e-6
+    )
+    assert np.allclose(points, centers - (away - 0.02)[:, None] * normals, atol=2e-6)
+
+
+def test_what_is_out_of_reach_is_not_touched(tmp_path):
+    hand, shell = hand_of(tmp_path), shell_of(Box([0.02, 0.02, 0.02]))
+    far = pin.SE3(np.eye(3), np.array([0, 0, -0.5]))
+    assert hand.close_on(np.zeros(6), shell, far, GAP) is None
+
+
+@pytest.mark.parametrize("surface", ["box", "cylinder", "sphere"])
+def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
+    made = new_scenario(
+        gripper(tmp_path), surface, tips="all", against="plastic", out=out(tmp_path)
+    )
+    assert (tmp_path / "made_part.urdf").is_file()
+    built = build(made.path)  # what stands in the files, read again
+    gaps = [pair.gap for pair in built.scene.explain(built.q0, built.v0).pairs]
+    assert gaps == pytest.approx([GAP] * 3, abs=2e-6)
+    result, stopped = simulate(built)
+    assert stopped is None
+    assert [one.figure for one in judge(built, result) if not one.met] == []
+    log, last = result.contacts, len(result.t) - 1
+    forces = log.normal_force[:, None] * log.normal_world + log.friction_force_world
+    mass = built.scene.model.inertias[built.scene.model.getJointId("part/root_joint")].mass
+    # At the end the tips carry the weight, and nothing else.
+    assert np.allclose(-forces[log.row == last].sum(axis=0), [0, 0, 9.81 * mass], atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"surface": "plane"}, "a hand cannot hold a plane"),
+        ({"place": "below"}, "--place belongs to a single tip"),
+        ({"radius": 0.01}, "--radius belongs to a single tip"),
+        ({"robot": "three_link_finger"}, "needs two fingertips or more"),
+        ({"against": "steel", "press": 500.0}, "no grasp .* works"),
+        ({"unit": "m", "surface": "large"}, "cannot hold a part of 400 x 400 x 400 mm"),
+    ],
+)
+def test_what_cannot_be_held_is_refused(options, why, tmp_path):
+    options = {"robot": gripper(tmp_path), "surface": "box", **options}
+    if options["surface"] == "large":
+        import trimesh
+
+        options["surface"] = tmp_path / "large.stl"
+        trimesh.creation.box((0.4, 0.4, 0.4)).export(options["surface"])
+    robot, surface = options.pop("robot"), options.pop("surface")
+    with pytest.raises(SphshellError, match=why):
+        new_scenario(robot, surface, tips="all", out=out(tmp_path), **options)
+    assert not out(tmp_path).exists()
+    assert not (tmp_path / "made_part.urdf").exists()
+
+
+def test_a_part_that_is_there_is_not_replaced(tmp_path):
+    (tmp_path / "made_part.urdf").write_text("mine", encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"made_part\.urdf: .*is there already"):
+        new_scenario(gripper(tmp_path), "box", tips="all", against="plastic", out=out(tmp_path))
+    assert (tmp_path / "made_part.urdf").read_text(encoding="utf-8") == "mine"
+    assert not out(tmp_path).exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["allegro_right_hand", "allegro_left_hand"])
+@pytest.mark.parametrize("surface", ["box", "cylinder", "sphere"])
+def test_an_allegro_hand_holds(robot, surface, tmp_path):
+    pytest.importorskip("example_robot_data")
+    made = new_scenario(robot, surface, tips="all", against="plastic", out=out(tmp_path))
+    built = build(made.path)
+    result, _ = simulate(built)
+    assert [one.figure for one in judge(built, result) if not one.met] == []
+    assert {name.rpartition("/")[2] for name in result.pairs} == {
+        f"link_{k}.0_tip" for k in (3, 7, 11, 15)
+    }
