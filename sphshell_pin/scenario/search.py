@@ -310,7 +310,7 @@ def _refusal(tip: Tip, request: Request, tried: _Tried, *, floating: bool = Fals
             "joints do not allow it; take another --place or --frame"
         )
     if tried.faults:
-        fault = tried.faults[0]
+        fault = tried.faults[-1]
         when = f" at t = {fault.t:.2g} s" if fault.link else ""
         advice = _ADVICE_FLOATING if floating else _ADVICE[fault.kind]
         return SphshellError(
