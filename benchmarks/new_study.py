@@ -33,6 +33,7 @@ from sphshell_pin.scenario.trial import whole_posture
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "new_study.md"
+DATA = ROOT / "tests" / "data" / "corpus"
 PROBE = ROOT / "tests" / "data" / "robots" / "arm_with_probe.urdf"
 
 ROBOTS: dict[str, tuple[str, dict[str, object]]] = {
@@ -62,8 +63,8 @@ INTRODUCTION = """\
 `sphshell-pin new` was asked for a scenario of each of {robots} robots with each of {parts} parts
 at 5 places (`--place below`, `above`, `+x`, `-x`, `+y`; a robot that floats has none). Each
 scenario that it wrote was read again, run, and judged by its own expectations: it touches, the
-force is within 5 %, the energy adds up. No link was in the part: tried with Coal at each recorded
-row, and in another way with the corners of the links' meshes and the signed distance of closed
+force is within 5 %, the energy adds up. No link was in the part: tried with Coal at 300 rows of
+its run, and in another way with the corners of the links' meshes and the signed distance of closed
 parts. `make new-study FOLDER=...` repeats it with the parts of a folder, `python -m
 benchmarks.new_study FOLDER --write` wrote this page. A cell says how many places got a scenario
 that works.
@@ -193,7 +194,7 @@ def cases_of(robots: Sequence[str], parts: Sequence[Path]) -> list[tuple[str, Pa
 def main() -> int:
     """Ask, run, print a table; with --write put it into the documentation."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, nargs="?", default=ROOT / "tests" / "data" / "corpus")
+    parser.add_argument("folder", type=Path, nargs="?", default=DATA)
     parser.add_argument("--robots", nargs="*", default=list(ROBOTS), choices=list(ROBOTS))
     parser.add_argument("--files", nargs="*", help="names without a suffix; default: the first 8")
     parser.add_argument("--write", action="store_true", help=f"write {PAGE.name}")

@@ -102,7 +102,7 @@ class LoadedRobot:
     q0: npt.NDArray[np.float64]
     """A posture (nq,): the robot's reference posture where it has one, else neutral."""
     notes: tuple[str, ...] = ()
-    """What its file states that is not modelled, one sentence each."""
+    """What its file states that is not modeled, one sentence each."""
 
 
 def names() -> list[str]:
@@ -139,6 +139,7 @@ def load(name: str, *, mimic: bool = False, pose: str | None = None) -> LoadedRo
         reason = str(error)
         if "SDF" in reason or "Sdf" in reason:
             reason = "it is an SDF file, and the wheel of pinocchio has no SDF reader"
+            reason += ": give its URDF or MJCF"
         raise RobotError(f"the robot '{name}' cannot be loaded: {reason}") from error
     # A reference posture may state a free-flyer's quaternion with a few digits only.
     q0 = pin.normalize(robot.model, np.asarray(robot.q0, dtype=float))
@@ -175,7 +176,7 @@ def load_file(
 
     Limits, damping, dry friction and armature are in the model's attributes of those names. Warns
     with RobotWarning of visual meshes that are missing, and of what the file states that is not
-    modelled.
+    modeled.
 
     Raises
     ------

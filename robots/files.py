@@ -65,9 +65,9 @@ class Description:
     root: ET.Element
     mimics: tuple[Mimic, ...] = ()
     loops: tuple[str, ...] = ()
-    """What closes kinematic loops or couples joints otherwise than by mimicking: not modelled."""
+    """What closes kinematic loops or couples joints otherwise than by mimicking: not modeled."""
     notes: tuple[str, ...] = ()
-    """What else the file states that is not modelled, one sentence each."""
+    """What else the file states that is not modeled, one sentence each."""
     start: Mapping[str, Array] = field(default_factory=dict)
     """Positions (nq of the joint) in which MJCF draws the joints that are not at zero there."""
     extras: Mapping[str, Extras] = field(default_factory=dict)
@@ -233,12 +233,17 @@ def keep_collision_of(description: Description, link: str) -> None:
     root = description.root
     for body in root.iter("body"):
         for geom in body.findall("geom"):
-            if body.get("name") != link or mjcf.is_visual(geom):
+            if body.get("name") != link or _is_visual(geom):
                 body.remove(geom)
     for one in root.iter("link"):
         for part in [*one.findall("visual"), *one.findall("collision")]:
             if part.tag == "visual" or one.get("name") != link:
                 one.remove(part)
+
+
+def _is_visual(geom: ET.Element) -> bool:
+    """Whether MuJoCo lets a geom touch nothing."""
+    return geom.get("contype") == "0" and geom.get("conaffinity") == "0"
 
 
 def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element, list[str]]:
@@ -252,8 +257,7 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
                 mesh = assets.get(geom.get("mesh"))
                 if mesh is None or os.path.isfile(mesh.get("file", "")):
                     continue
-                # MuJoCo lets it touch nothing.
-                if geom.get("contype") == "0" and geom.get("conaffinity") == "0":
+                if _is_visual(geom):
                     missing[mesh.get("file", "")] = None
                     body.remove(geom)
                 else:

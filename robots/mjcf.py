@@ -8,7 +8,6 @@ frame and unit is resolved, every body states its inertia and has one joint, whi
 
 from __future__ import annotations
 
-import os
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -19,18 +18,22 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.mimic import Mimic
-from sphshell_pin.robots.description import check_size
-from sphshell_pin.robots.mjcf_geoms import (
-    Meshes,
-    geom_inertia,
-    plain_geom,
-    plain_place,
-    turned_to,
+from sphshell_pin.robots.mjcf_geoms import Meshes, geom_inertia, plain_geom, plain_place
+from sphshell_pin.robots.mjcf_values import (
+    add_inertial,
+    include,
+    limited,
+    number,
+    numbers,
+    overlaid,
+    posed,
+    rotation,
+    text_of,
+    unit_of_angles,
 )
 
 Array = NDArray[np.float64]
 
-_ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
 _SCALARS = ("damping", "frictionloss", "armature", "stiffness")
 # What makes bodies that this reader does not make.
 _UNKNOWN = ("composite", "flexcomp", "replicate", "attach", "deformable", "flex", "plugin")
@@ -98,7 +101,7 @@ class _Reader:
     """What one MJCF says, gathered body by body."""
 
     def __init__(self, root: ET.Element, file: Path) -> None:
-        _include(root, file, [file.resolve()])
+        include(root, file, [file.resolve()])
         for tag in _UNKNOWN:
             if root.find(f".//{tag}") is not None:
                 raise ValueError(
@@ -109,7 +112,7 @@ class _Reader:
         self.compiler = {k: v for one in root.findall("compiler") for k, v in one.attrib.items()}
         if self.compiler.get("coordinate") == "global":
             raise ValueError('coordinate="global" is not supported: MuJoCo 2.3.3 converts it')
-        self.angle = 1.0 if self.compiler.get("angle") == "radian" else np.pi / 180.0
+        self.angle = unit_of_angles(self.compiler)
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for one in root.findall("default"):
             self._read_class(one, "main", self.classes["main"])
@@ -149,7 +152,7 @@ class _Reader:
         elif bodies:
             # The reader takes one tree only, and a root that is fixed at the origin.
             base = ET.SubElement(world, "body", name="world_base")
-            _inertial(base, pin.Inertia.Zero())
+            add_inertial(base, pin.Inertia.Zero())
             base.extend(bodies)
         else:
             raise ValueError("its <worldbody> has no <body>")
@@ -165,7 +168,7 @@ class _Reader:
         own = {tag: dict(attributes) for tag, attributes in inherited.items()}
         for one in element:
             if one.tag != "default":
-                own[one.tag] = _overlaid(own.get(one.tag, {}), one.attrib)
+                own[one.tag] = overlaid(own.get(one.tag, {}), one.attrib)
         self.classes[name] = own
         if "class" in element.attrib:
             self.classes[element.attrib["class"]] = own
@@ -179,7 +182,7 @@ class _Reader:
         name = element.get("class", childclass)
         if name not in self.classes:
             raise ValueError(f"<{element.tag}> is of the class '{name}', which has no <default>")
-        return _overlaid(self.classes[name].get(element.tag, {}), element.attrib)
+        return overlaid(self.classes[name].get(element.tag, {}), element.attrib)
 
     def _inside(
         self, element: ET.Element, pose: pin.SE3, childclass: str
@@ -199,7 +202,7 @@ class _Reader:
         name = body.get("name") or f"{parent}_body{len(self.parents)}"
         childclass = body.get("childclass", childclass)
         self.parents[name], self.joints_of[name] = parent, []
-        if _number(body.get("gravcomp"), 0.0):
+        if number(body.get("gravcomp"), 0.0):
             self.weightless.append(name)
         place = pose * self._pose(body.attrib)
         parts = list(self._inside(body, pin.SE3.Identity(), childclass))
@@ -213,14 +216,14 @@ class _Reader:
                 place = pin.SE3.Identity()
             last = k + 1 == len(joints)
             here = ET.SubElement(
-                here, "body", name=name if last else f"{name}/{made.get('name')}", **_posed(place)
+                here, "body", name=name if last else f"{name}/{made.get('name')}", **posed(place)
             )
             here.append(made)
             if not last:
-                _inertial(here, pin.Inertia.Zero())
+                add_inertial(here, pin.Inertia.Zero())
             place = pin.SE3.Identity()
         if not joints:
-            here = ET.SubElement(here, "body", name=name, **_posed(place))
+            here = ET.SubElement(here, "body", name=name, **posed(place))
         self._fill(here, parts, name)
         for part, at, cls in parts:
             if part.tag == "body":
@@ -236,7 +239,7 @@ class _Reader:
         needs = use == "true" or not any(part.tag == "inertial" for part, *_ in parts)
         if needs and use == "false" and self.joints_of[name]:
             raise ValueError(f"body '{name}' moves, and states no <inertial>")
-        low, high = _numbers(self.compiler.get("inertiagrouprange", "0 5"))
+        low, high = numbers(self.compiler.get("inertiagrouprange", "0 5"), 2)
         for part, at, cls in parts:
             if part.tag == "inertial":
                 stated = self._inertia(part, name).se3Action(at)
@@ -246,19 +249,19 @@ class _Reader:
                 continue
             geom = self._with_defaults(part, cls)
             made, pose = plain_geom(geom, self.meshes, lambda one, at=at: at * self._pose(one))
-            if needs and low <= _number(geom.get("group"), 0) <= high:
+            if needs and low <= number(geom.get("group"), 0) <= high:
                 summed += geom_inertia(geom, made, self.meshes, name).se3Action(pose)
             if made is not None:
-                made.attrib.update(_posed(pose))
+                made.attrib.update(posed(pose))
                 here.append(made)
         inertia = stated if stated is not None and not needs else summed
-        least_mass = _number(self.compiler.get("boundmass"), 0.0)
-        least = _number(self.compiler.get("boundinertia"), 0.0)
+        least_mass = number(self.compiler.get("boundmass"), 0.0)
+        least = number(self.compiler.get("boundinertia"), 0.0)
         if name != "world" and (inertia.mass < least_mass or least > 0.0):
             moments, axes = np.linalg.eigh(inertia.inertia)
             bound = axes @ np.diag(np.maximum(moments, least)) @ axes.T
             inertia = pin.Inertia(max(inertia.mass, least_mass), inertia.lever, bound)
-        _inertial(here, inertia)
+        add_inertial(here, inertia)
 
     def _site(self, element: ET.Element, at: pin.SE3, childclass: str, body: str) -> None:
         stated = self._with_defaults(element, childclass)
@@ -267,7 +270,7 @@ class _Reader:
             self.sites.append(Site(stated["name"], body, place))
 
     def _joint(
-        self, element: ET.Element, at: pin.SE3, childclass: str, body: str, number: int
+        self, element: ET.Element, at: pin.SE3, childclass: str, body: str, order: int
     ) -> ET.Element:
         if element.tag == "freejoint":
             stated = {"type": "free", **element.attrib}
@@ -276,38 +279,38 @@ class _Reader:
         kind = stated.get("type", "hinge")
         if kind not in _COUNT:
             raise ValueError(f"a joint of body '{body}' is of an unknown type, '{kind}'")
-        usual = f"{body}_joint{number or ''}" if kind != "free" else f"{body}_free"
+        usual = f"{body}_joint{order or ''}" if kind != "free" else f"{body}_free"
         name = stated.get("name", usual)
         self.nq += _COUNT[kind]
         self.joints_of[body].append(name)
         made = ET.Element("joint", name=name, type=kind)
-        scalar = {key: _number(stated.get(key, "0").split()[0], 0.0) for key in _SCALARS}
+        scalar = {key: number(" ".join(stated.get(key, "0").split()[:1]), 0.0) for key in _SCALARS}
         if scalar["stiffness"] or "springdamper" in stated:
             self.springs.append(name)
         if kind == "free":
             made.set("pos", "0 0 0")
         else:
-            made.set("pos", _text(at.act(_numbers(stated.get("pos", "0 0 0")))))
-            made.set("axis", _text(at.rotation @ _numbers(stated.get("axis", "0 0 1"))))
+            made.set("pos", text_of(at.act(numbers(stated.get("pos", "0 0 0"), 3))))
+            made.set("axis", text_of(at.rotation @ numbers(stated.get("axis", "0 0 1"), 3)))
         made.set("armature", repr(scalar["armature"]))
-        limited = _limited(stated, "limited", "range", self.compiler)
+        is_limited = limited(stated, "limited", "range", self.compiler)
         if kind in ("free", "ball"):
             self.extras[name] = Extras(scalar["damping"], scalar["frictionloss"])
-            if limited and kind == "ball":
+            if is_limited and kind == "ball":
                 self.cones.append(name)
             return made
         unit = self.angle if kind == "hinge" else 1.0
         made.set("damping", repr(scalar["damping"]))
         made.set("frictionloss", repr(scalar["frictionloss"]))
-        ref = unit * _number(stated.get("ref"), 0.0)
+        ref = unit * number(stated.get("ref"), 0.0)
         if ref:
             made.set("ref", repr(ref))
             self.start[name] = np.array([ref])
-        if limited:
+        if is_limited:
             # Pinocchio subtracts ref from the range, but counts positions as MuJoCo does.
-            made.set("range", _text(unit * _numbers(stated["range"]) + ref))
-        if _limited(stated, "actuatorfrclimited", "actuatorfrcrange", self.compiler):
-            made.set("actuatorfrcrange", _text(_numbers(stated["actuatorfrcrange"])))
+            made.set("range", text_of(unit * numbers(stated["range"], 2) + ref))
+        if limited(stated, "actuatorfrclimited", "actuatorfrcrange", self.compiler):
+            made.set("actuatorfrcrange", text_of(numbers(stated["actuatorfrcrange"], 2)))
         return made
 
     def _inertia(self, element: ET.Element, body: str) -> pin.Inertia:
@@ -316,52 +319,26 @@ class _Reader:
         pose = self._pose(element.attrib)
         moments = np.zeros((3, 3))
         if "fullinertia" in element.attrib:
-            xx, yy, zz, xy, xz, yz = _numbers(element.attrib["fullinertia"])
+            xx, yy, zz, xy, xz, yz = numbers(element.attrib["fullinertia"], 6)
             moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         elif "diaginertia" in element.attrib:
-            moments = np.diag(_numbers(element.attrib["diaginertia"]))
+            moments = np.diag(numbers(element.attrib["diaginertia"], 3))
         turned = pose.rotation @ moments @ pose.rotation.T
-        return pin.Inertia(float(element.attrib["mass"]), pose.translation, turned)
+        return pin.Inertia(number(element.attrib["mass"], 0.0), pose.translation, turned)
 
     def _pose(self, stated: Mapping[str, str]) -> pin.SE3:
-        return pin.SE3(self._rotation(stated), _numbers(stated.get("pos", "0 0 0")))
-
-    def _rotation(self, stated: Mapping[str, str]) -> Array:
-        """Return the rotation (3,3) that an element states in one of MuJoCo's ways."""
-        if "quat" in stated:
-            w, x, y, z = _numbers(stated["quat"])
-            return np.asarray(pin.Quaternion(w, x, y, z).normalized().toRotationMatrix())
-        if "axisangle" in stated:
-            *axis, angle = _numbers(stated["axisangle"])
-            return np.asarray(pin.exp3(self.angle * angle * np.array(axis) / np.linalg.norm(axis)))
-        if "euler" in stated:
-            turned = np.eye(3)
-            sequence = self.compiler.get("eulerseq", "xyz")
-            for letter, angle in zip(sequence, _numbers(stated["euler"]), strict=True):
-                one = pin.exp3(self.angle * angle * np.eye(3)["xyz".index(letter.lower())])
-                # Upper case: about the axes of the parent, which stay.
-                turned = one @ turned if letter.isupper() else turned @ one
-            return np.asarray(turned)
-        if "xyaxes" in stated:
-            axes = np.array(_numbers(stated["xyaxes"])).reshape(2, 3)
-            x = axes[0] / np.linalg.norm(axes[0])
-            y = axes[1] - (axes[1] @ x) * x
-            y /= np.linalg.norm(y)
-            return np.column_stack([x, y, np.cross(x, y)])
-        if "zaxis" in stated:
-            return turned_to(np.array(_numbers(stated["zaxis"])))
-        return np.eye(3)
+        return pin.SE3(rotation(stated, self.compiler), numbers(stated.get("pos", "0 0 0"), 3))
 
     def _weigh(self, made: ET.Element) -> None:
         """Scale all masses to what the file states as their sum."""
-        total = _number(self.compiler.get("settotalmass"), -1.0)
+        total = number(self.compiler.get("settotalmass"), -1.0)
         parts = list(made.iter("inertial"))
         now = sum(float(one.attrib["mass"]) for one in parts)
         if total <= 0.0 or not now:
             return
         for one in parts:
             for key in ("mass", "fullinertia"):
-                one.set(key, _text(total / now * _numbers(one.attrib[key])))
+                one.set(key, text_of(total / now * numbers(one.attrib[key])))
 
     def _keys(self, made: ET.Element) -> None:
         keys = ET.SubElement(made, "keyframe")
@@ -380,7 +357,7 @@ class _Reader:
             first, second = one.get(f"{one.tag}1"), one.get(f"{one.tag}2")
             if one.tag == "joint" and first is not None:
                 terms = np.zeros(5)
-                stated = _numbers(one.get("polycoef", "0 1 0 0 0"))
+                stated = numbers(one.get("polycoef", "0 1 0 0 0"))[:5]
                 terms[: len(stated)] = stated
                 if second is not None and not terms[2:].any():
                     # It is of the distances from ref.
@@ -417,8 +394,8 @@ class _Reader:
 
     def _notes(self, scenery: list[str]) -> Iterator[str]:
         for names, text in (
-            (self.springs, "springs of joints (stiffness, springdamper) are not modelled"),
-            (self.cones, "ranges of ball joints are not modelled"),
+            (self.springs, "springs of joints (stiffness, springdamper) are not modeled"),
+            (self.cones, "ranges of ball joints are not modeled"),
             (self.weightless, "gravity acts on bodies with gravcomp too"),
             (
                 self.meshes.exact,
@@ -431,73 +408,4 @@ class _Reader:
                 yield f"{text}: {', '.join(map(repr, dict.fromkeys(names)))}"
         tendons = [one.get("name", one.tag) for one in self.given.iterfind("tendon/*")]
         if tendons:
-            yield f"tendons are not modelled: {', '.join(map(repr, tendons))}"
-
-
-def _include(element: ET.Element, file: Path, open_files: list[Path]) -> None:
-    """Put the content of included files in the place of <include>."""
-    for k in range(len(element) - 1, -1, -1):
-        one = element[k]
-        if one.tag != "include":
-            _include(one, file, open_files)
-            continue
-        stated = one.get("file", "")
-        places = [open_files[0].parent / stated, open_files[-1].parent / stated]
-        found = next((place for place in places if os.path.isfile(place)), None)
-        if found is None:
-            raise ValueError(f"it includes {stated}, which is not there")
-        if found.resolve() in open_files:
-            raise ValueError(f"it includes {stated}, which includes itself")
-        text = found.read_bytes()
-        check_size(text)
-        root = ET.fromstring(text)
-        _include(root, file, [*open_files, found.resolve()])
-        element[k : k + 1] = list(root)
-
-
-def _overlaid(under: Mapping[str, str], over: Mapping[str, str]) -> dict[str, str]:
-    """Return both; of what states a place or an orientation, only that of `over`."""
-    kept = dict(under)
-    for ways in (_ORIENTATIONS, ("fromto", "pos")):
-        if any(way in over for way in ways):
-            kept = {key: value for key, value in kept.items() if key not in ways}
-    return {**kept, **over}
-
-
-def _limited(stated: Mapping[str, str], key: str, limits: str, compiler: Mapping[str, str]) -> bool:
-    says = stated.get(key, "auto")
-    if says == "auto":
-        return limits in stated and compiler.get("autolimits", "true") == "true"
-    return says == "true" and limits in stated
-
-
-def _inertial(body: ET.Element, inertia: pin.Inertia) -> None:
-    i = inertia.inertia
-    full = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
-    ET.SubElement(
-        body,
-        "inertial",
-        mass=repr(float(inertia.mass)),
-        pos=_text(inertia.lever),
-        fullinertia=_text(np.array(full)),
-    )
-
-
-def _posed(pose: pin.SE3) -> dict[str, str]:
-    x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
-    return {"pos": _text(pose.translation), "quat": _text(np.array([w, x, y, z]))}
-
-
-def _numbers(text: str) -> Array:
-    try:
-        return np.array([float(one) for one in text.split()])
-    except ValueError:
-        raise ValueError(f"'{text}' are no numbers") from None
-
-
-def _number(text: str | None, usual: float) -> float:
-    return usual if text is None else float(_numbers(text)[0])
-
-
-def _text(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
+            yield f"tendons are not modeled: {', '.join(map(repr, tendons))}"

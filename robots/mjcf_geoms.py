@@ -10,6 +10,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin.robots.mjcf_values import numbers, turned_to
+
 Array = NDArray[np.float64]
 
 _SHAPES = ("sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh")
@@ -40,7 +42,7 @@ class Meshes:
                 continue
             path = Path(Path(stated["file"]).name if strip else stated["file"])
             name = stated.get("name", path.stem)
-            scale = np.array([float(k) for k in stated.get("scale", "1 1 1").split()])
+            scale = numbers(stated.get("scale", "1 1 1"), 3)
             self.files[name] = ((file.absolute().parent / folder / path), scale)
             self._kinds[name] = stated.get("inertia", "legacy")
             if "refpos" in stated or "refquat" in stated:
@@ -89,20 +91,13 @@ class Meshes:
         return volume, pin.Inertia(volume, np.asarray(mesh.center_mass), moments)
 
 
-def turned_to(axis: Array) -> Array:
-    """Return the smallest rotation (3,3) that turns z to `axis` (3,)."""
-    z = np.array([0.0, 0.0, 1.0])
-    one = pin.Quaternion.FromTwoVectors(z, axis / np.linalg.norm(axis))
-    return np.asarray(one.toRotationMatrix())
-
-
 def plain_place(
     stated: Mapping[str, str], pose_of: Callable[[Mapping[str, str]], pin.SE3]
 ) -> tuple[pin.SE3, float | None]:
     """Return the place of a geom or site; of one that states its ends, half its length [m] too."""
     if "fromto" not in stated:
         return pose_of(stated), None
-    ends = np.array([float(k) for k in stated["fromto"].split()]).reshape(2, 3)
+    ends = numbers(stated["fromto"], 6).reshape(2, 3)
     along = ends[0] - ends[1]
     place = pin.SE3(turned_to(along), ends.mean(axis=0))
     return pose_of({}) * place, 0.5 * float(np.linalg.norm(along))
@@ -113,7 +108,7 @@ def plain_geom(
 ) -> tuple[ET.Element | None, pin.SE3]:
     """Return a geom without its place, and its place in the body; None for kinds left out."""
     kind = stated.get("type", "sphere" if "mesh" not in stated else "mesh")
-    size = [float(k) for k in stated.get("size", "").split()]
+    size = numbers(stated.get("size", "")).tolist()
     pose, half = plain_place(stated, pose_of)
     if half is not None and size:
         size = [size[0], half] if kind in ("capsule", "cylinder") else [size[0], size[0], half]
@@ -143,8 +138,8 @@ def geom_inertia(
 ) -> pin.Inertia:
     """Return the inertia that a geom gives its body, in the geom's frame."""
     kind = stated.get("type", "sphere")
-    density = float(stated.get("density", 1000.0))
-    mass = float(stated["mass"]) if "mass" in stated else None
+    density = float(numbers(stated.get("density", "1000"), 1)[0])
+    mass = float(numbers(stated["mass"], 1)[0]) if "mass" in stated else None
     if kind in ("plane", "hfield") or mass == 0.0 or (mass is None and density == 0.0):
         return pin.Inertia.Zero()
     if made is None:
@@ -155,7 +150,7 @@ def geom_inertia(
         volume, inertia = meshes.solid(made.attrib["mesh"], body)
         factor = density if mass is None else mass / volume
         return pin.Inertia(factor * inertia.mass, inertia.lever, factor * inertia.inertia)
-    size = [float(k) for k in made.attrib["size"].split()]
+    size = numbers(made.attrib["size"]).tolist()
     volumes = {
         "sphere": lambda r: 4 / 3 * np.pi * r**3,
         "capsule": lambda r, h: np.pi * r**2 * (2 * h + 4 / 3 * r),

@@ -85,7 +85,7 @@ class WeakLawWarning(UserWarning):
 
 
 class RobotWarning(UserWarning):
-    """A robot's file states what is not modelled, or names a visual mesh that is missing."""
+    """A robot's file states what is not modeled, or names a visual mesh that is missing."""
 
 
 class SetupWarning(UserWarning):

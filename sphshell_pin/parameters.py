@@ -203,5 +203,6 @@ def _shown(default: object) -> str:
     if isinstance(default, bool):
         return str(default).lower()
     if isinstance(default, tuple):
-        return f"[{', '.join(f'{one:g}' for one in default)}]"
+        # In code: Markdown takes [m] behind brackets for a link.
+        return f"`[{', '.join(f'{one:g}' for one in default)}]`"
     return f"{default:g}" if isinstance(default, int | float) else f'"{default}"'

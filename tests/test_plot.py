@@ -164,6 +164,21 @@ def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
     assert any("3 pairs with smaller forces left out" in text for text in written)
 
 
+def test_many_pairs_leave_the_overview_and_the_path_readable():
+    count = MOST_PAIRS + 3
+    rows = [
+        {"row": 1, "pair": k, "normal_force": 1.0 + k, "point_world": [0.1 * k, 0, 0]}
+        for k in range(count)
+    ]
+    names = [f"pair {k}" for k in range(count)]
+    result = a_result([0, 1], np.zeros((2, 8)), rows, names)
+    for figure in (plot_result(result), plot_contact_path(result)):
+        written = " ".join(texts(figure))
+        assert "pair 0" not in written
+        assert f"pair {count - 1}" in written
+    assert "3 pairs with smaller forces left out" in " ".join(texts(plot_result(result)))
+
+
 def test_a_long_run_keeps_its_one_row_peak():
     count = 300_000
     result = a_result(np.arange(count) * 1e-4, np.zeros((count, 1)), pairs=("tip",))

@@ -78,9 +78,8 @@ def roll_out(
         core.add(pairs, joints, bound, q0, v0, settings[hold], varied_sensors.core(run))
 
     def rollout() -> Rollout:
-        return Rollout(
-            scene, integrator, core, plan, workers, time.perf_counter() - began, varied_sensors
-        )
+        wall_time = time.perf_counter() - began
+        return Rollout(scene, integrator, core, plan, workers, wall_time, varied_sensors)
 
     workers = max(min(workers, len(starts)), 1)
     joints = scene.joints.to_core(scene.model)

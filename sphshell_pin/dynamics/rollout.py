@@ -173,7 +173,7 @@ class Rollout(Sequence[Result]):
         columns: dict[str, object] = {"run": np.arange(len(self))}
         for name, values in self.varied.items():
             array = np.asarray(values)
-            if array.dtype.kind == "f" and array.ndim < 3:  # poses are matrices
+            if array.dtype.kind in "fi" and array.ndim < 3:  # poses are matrices
                 parts = array.T if array.ndim == 2 else [array]
                 suffixes = [f".{i}" for i in range(len(parts))] if array.ndim == 2 else [""]
                 columns |= {f"{name}{s}": part for s, part in zip(suffixes, parts, strict=True)}

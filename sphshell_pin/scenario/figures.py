@@ -30,6 +30,8 @@ JOINT_FIGURES = {
     "cut_time": "s",
     "peak_speed": "rad/s",
 }
+SENSOR_FIGURES = ("min", "max", "mean", "last")
+"""Of each value of a sensor's readings, in the unit of its column."""
 RUN_FIGURES = {
     "energy.exchanged": "J",
     "energy.residual": "J",
@@ -56,6 +58,12 @@ def figure_names(built: Built) -> list[str]:
     joints = built.scene.joints
     watched = dict.fromkeys((*joints.limits, *joints.effort, *joints.speed))
     names += [f"joints.{name}.{one}" for name in watched for one in JOINT_FIGURES]
+    names += [
+        f"sensors.{sensor.name}.{_label(column)}.{one}"
+        for sensor in built.simulation.sensors
+        for column in sensor.columns(built.scene)
+        for one in SENSOR_FIGURES
+    ]
     names += RUN_FIGURES
     names += [f"figures.{name}" for name in built.figures]
     model = built.scene.model
@@ -87,7 +95,7 @@ def check_expectations(built: Built) -> None:
 
 
 def measure(built: Built, result: Result, name: str) -> float:
-    """Return the figure `name` of `result`, in SI units: see PAIR_, JOINT_ and RUN_FIGURES."""
+    """Return the figure `name` of `result`, in SI units; see PAIR_FIGURES and those after it."""
     kind, _, rest = name.partition(".")
     if kind == "pairs":
         pair, _, figure = rest.rpartition(".")
@@ -95,6 +103,8 @@ def measure(built: Built, result: Result, name: str) -> float:
     if kind == "joints":
         joint, _, figure = rest.rpartition(".")
         return float(getattr(result.stats.joints[joint], figure))
+    if kind == "sensors":
+        return _of_sensor(result, rest)
     if kind == "figures":
         try:
             return float(built.figures[rest](result, built.scene))
@@ -123,6 +133,25 @@ def judge(built: Built, result: Result) -> list[Verdict]:
         measured = measure(built, result, name)
         verdicts.append(Verdict(name, str(expected), measured, expected.met_by(measured)))
     return verdicts
+
+
+def _label(column: str) -> str:
+    """Return the name of a sensor's column without its unit."""
+    return column.partition(" ")[0]
+
+
+def _of_sensor(result: Result, rest: str) -> float:
+    """Return a figure of the readings: `rest` is a sensor, a column, and one of SENSOR_FIGURES.
+
+    It is nan where no reading arrived.
+    """
+    rest, _, figure = rest.rpartition(".")
+    name, _, label = rest.rpartition(".")
+    log = result.sensors[name]
+    values = log.values[:, [_label(column) for column in log.columns].index(label)]
+    if not len(values):
+        return float("nan")
+    return float(values[-1] if figure == "last" else getattr(values, figure)())
 
 
 def _final(model: pin.Model, result: Result, rest: str) -> float:

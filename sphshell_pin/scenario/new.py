@@ -37,8 +37,6 @@ Array = npt.NDArray[np.float64]
 WORDS = ("plane", "box", "sphere", "cylinder", "bowl")
 """Surfaces that need no file."""
 
-# Endings of the robots' files: URDF, MJCF and xacro.
-_ROBOT_FILES = (".urdf", ".xml", ".mjcf", ".xacro")
 # Half the size of a surface that needs no file, in radii of the sphere.
 _SIZE = 15.0
 _DOES = {Press: "presses on", Hold: "stands on", type(None): "falls on"}

@@ -391,6 +391,8 @@ def _roomier(model: pin.Model, q: Array, linear: Array, mass_matrix: Array, axis
     """Return `axis` or its opposite: the direction in which the joints are farther from limits."""
     rates = np.linalg.solve(mass_matrix, linear.T @ axis)
     rooms = []
+    if not np.abs(rates).max() > 1e-12:  # nothing moves along it
+        return axis
     for sign in (1.0, -1.0):
         room = np.inf
         for j in range(1, model.njoints):

@@ -320,10 +320,11 @@ def _refusal(tip: Tip, request: Request, tried: _Tried, *, floating: bool = Fals
         return tried.errors[0]
     if tried.blocked:
         ((link, _),) = tried.blocked.most_common(1)
+        advice = _ADVICE_BOWL if request.word == "bowl" else _ADVICE["links"]
         return SphshellError(
             f"link '{link}' would be in the part, or another one: in each of "
             f"{_count(tried.postures, 'posture')} and {_count(tried.places, 'place')} on the part "
-            f"that were tried; {_ADVICE['links']}"
+            f"that were tried; {advice}"
         )
     return SphshellError("the surface has no point to touch")
 
@@ -335,7 +336,10 @@ _ADVICE = {
     "links": "take another --place, a smaller part, or a sphere farther out (--frame, --offset)",
     "figure": "take another --law or --radius",
 }
-_ADVICE_FLOATING = "take a larger part, with room for all that comes down, or another --law"
+_ADVICE_BOWL = "the bowl is a whole ball, which the limb would pass: take the file of an open one"
+_ADVICE_FLOATING = (
+    "take a flatter or larger part, on which all spheres can come down, or another --law"
+)
 
 
 def _count(number: int, noun: str) -> str:

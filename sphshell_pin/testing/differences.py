@@ -57,7 +57,7 @@ def derivatives(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = 
         return total
 
     def acceleration(q: Array, v: Array) -> Array:
-        return accelerations(model, q, v, tau, scene.external_forces(q, v))
+        return accelerations(model, data, q, v, tau, scene.external_forces(q, v))
 
     compared: list[_Compared] = [("contact forces", force, scene.contact_derivatives(q, v))]
     if not any(pair.friction and pair.friction.has_state for pair in scene.pairs):

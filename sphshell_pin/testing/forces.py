@@ -68,13 +68,12 @@ def mass_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
 
 
 def accelerations(
-    model: pin.Model, q: Array, v: Array, tau: Array, forces: pin.StdVec_Force
+    model: pin.Model, data: pin.Data, q: Array, v: Array, tau: Array, forces: pin.StdVec_Force
 ) -> Array:
     """Return the accelerations (nv,) under torques and wrenches on the joints, by Pinocchio.
 
     That is ABA; of models with mimic joints, which ABA has not, M^-1 (tau - rnea).
     """
-    data = model.createData()
     if not len(model.mimicking_joints):
         return np.array(pin.aba(model, data, q, v, tau, forces))
     free = tau - pin.rnea(model, data, q, v, np.zeros(model.nv), forces)
@@ -110,7 +109,7 @@ def balance(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None
             "q", q.tolist(), "is where the mass matrix is singular: lock the joints that move none"
         ) from None
     expected = answers[:, 0]
-    found = accelerations(model, q, v, tau, scene.external_forces(q, v))
+    found = accelerations(model, model.createData(), q, v, tau, scene.external_forces(q, v))
 
     def size(acceleration: Array) -> float:
         return math.sqrt(max(float(acceleration @ mass @ acceleration), 0.0))

@@ -60,7 +60,8 @@ def contacts_of_shell(
 def contacts_of_scene(scene: Scene, q: ArrayLike, data: pin.Data | None = None) -> Finding:
     """Compare `scene.contacts` at q (nq,) to the distances of all triangles of all its shells.
 
-    Pinocchio's frames place spheres and shells. Contact sources have no triangles and are left out.
+    Pinocchio's frames place spheres and shells; of two spheres the distance of their centers is
+    compared. Contact sources have no triangles and are left out.
     `data` of the scene's model is made unless given, which takes long for a large one.
     """
     q, _ = scene.check_state(q)
@@ -70,17 +71,36 @@ def contacts_of_scene(scene: Scene, q: ArrayLike, data: pin.Data | None = None) 
     contacts = scene.contacts(q)
     findings = []
     for k, pair in enumerate(scene.pairs):
+        mine = contacts.pair == k
+        if pair.sphere is not None and pair.other_sphere is not None:
+            finding = _of_two_spheres(model, data, pair, contacts.depth[mine])
+            findings.append(Finding(finding.error, f"contact '{pair.name}': {finding.where}"))
         if pair.shell is None or pair.sphere is None:
             continue
         if pair.shell.side != "both":
             raise InvalidParameter("scene", pair.name, "must have a shell with side 'both'")
         placement, center = _places(model, pair)(data)
-        mine = contacts.pair == k
         points = np.array([placement.actInv(p) for p in contacts.point_world[mine]]).reshape(-1, 3)
         query = _Query(pair.shell, center, pair.sphere.radius, points, contacts.depth[mine])
         finding = query.compare(whole=pair.method == "facets")
         findings.append(Finding(finding.error, f"contact '{pair.name}': {finding.where}"))
-    return worst(findings, "the scene has no pair of a sphere and a shell")
+    return worst(findings, "the scene has no pair of a sphere and a shell or another one")
+
+
+def _of_two_spheres(model: pin.Model, data: pin.Data, pair: ContactPair, depths: Array) -> Finding:
+    """Compare the depths (1,) or (0,) of two spheres to the distance of their centers."""
+    centers, radii = [], []
+    for sphere in (pair.sphere, pair.other_sphere):
+        assert sphere is not None  # the caller has looked
+        frame = data.oMf[find_frame(model, sphere.frame)]
+        centers.append(frame.act(np.array(sphere.offset)))
+        radii.append(sphere.radius)
+    depth = sum(radii) - float(np.linalg.norm(centers[0] - centers[1]))
+    where = f"the spheres are {depth:.6g} m deep in each other"
+    if len(depths) > 1 or (len(depths) == 0 and depth > _SAME * min(radii)):
+        return Finding(np.inf, f"{where}, and have {len(depths)} contacts")
+    found = float(depths[0]) if len(depths) else 0.0
+    return Finding(abs(found - max(depth, 0.0)) / min(radii), where)
 
 
 def passage(result: Result) -> Finding:

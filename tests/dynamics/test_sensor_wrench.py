@@ -7,7 +7,6 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import robots
 from sphshell_pin.dynamics.open_run import OpenRun
 from tests import models
 
@@ -333,44 +332,3 @@ def test_what_a_joint_adds_is_transmitted():
     seen = result.sensors["torque"].values[:, 0]
     assert np.allclose(seen[20:], link * alpha[20:], rtol=1e-6)
     assert result.stats.joints[joint].cut_time > 0.19
-
-
-def test_joints_that_mimic_others():
-    """A gripper's finger hangs on a joint that follows: its weight counts, it has no motor."""
-    model = robots.load("panda", mimic=True).model
-    finger = model.names[model.njoints - 1]
-    q = np.array([0.3, 0.2, -0.4, -1.5, 0.3, 1.2, 0.5, *([0.02] * (model.nq - 7))])
-    sensors = [sp.ForceTorqueSensor(name="hand", frame="panda_hand")]
-    result = read(sp.Scene(model), q, sp.GravityCompensation(), sensors)
-    hand = model.frames[model.getFrameId("panda_hand_joint")].inertia.mass
-    mass = hand + sum(model.inertias[k].mass for k in (model.njoints - 2, model.njoints - 1))
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
-    turn = data.oMf[model.getFrameId("panda_hand")].rotation
-    force = result.sensors["hand"].values[0, :3]
-    assert np.allclose(turn @ force, [0, 0, 9.81 * mass], rtol=0, atol=1e-10)
-    follower = sp.JointTorqueSensor(name="s", joint=finger)
-    with pytest.raises(sp.SphshellError, match="it follows another joint, measure that one"):
-        read(sp.Scene(model), q, None, [follower])
-
-
-def test_the_drive_of_joints_that_follow_carries_them():
-    """A slide of 1 kg, and one of 0.5 kg that goes up twice as far."""
-    part = """<inertial><mass value="{}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
-    </inertial>"""
-    slide = """<joint name="{0}" type="prismatic"><parent link="base"/><child link="{1}"/>
-    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>{2}</joint>"""
-    urdf = f"""<robot name="r"><link name="base"/><link name="one">{part.format(1.0)}</link>
-    <link name="two">{part.format(0.5)}</link>{slide.format("first", "one", "")}
-    {slide.format("second", "two", '<mimic joint="first" multiplier="2"/>')}</robot>"""
-    model = pin.buildModelFromXML(urdf, mimic=True)
-    drive = sp.JointTorqueSensor(name="drive", joint="first")
-    wrench = sp.ForceTorqueSensor(name="wrench", frame="two")
-    result = read(sp.Scene(model), [0.1], sp.GravityCompensation(), [drive, wrench])
-    assert abs(result.sensors["drive"].values[0, 0] - 9.81 * (1.0 + 2 * 0.5)) < 1e-12
-    assert abs(result.sensors["wrench"].values[0, 2] - 9.81 * 0.5) < 1e-12
-    # Let go, the first falls with g (1 + 1) / (1 + 4 0.5): the drive gives nothing.
-    fall = read(sp.Scene(model), [0.1], None, [drive, wrench])
-    assert abs(fall.sensors["drive"].values[0, 0]) < 1e-12
-    acceleration = -2 * 9.81 * (1.0 + 2 * 0.5) / (1.0 + 4 * 0.5)
-    assert abs(fall.sensors["wrench"].values[0, 2] - 0.5 * (acceleration + 9.81)) < 1e-12

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-from math import erf
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import _core
 from sphshell_pin.dynamics.open_run import OpenRun
-from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
-from sphshell_pin.scenario.run import write_sensors
+from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import models
 
 BALL = "ball_joint"
@@ -60,6 +55,27 @@ def test_the_filter_is_of_first_order(integrator, share):
         assert abs(phase + np.arctan(share)) < 2e-2
     if share == 1:
         assert abs(20 * np.log10(gain) + 3.0103) < 0.02
+
+
+@pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.SemiImplicitEuler(1e-3)])
+def test_the_filter_follows_held_torques_exactly(integrator):
+    """Between the jumps of a staircase a filter of first order moves exponentially."""
+    stairs = np.array([2.0, -1.0, 4.0, 0.5])
+    cutoff, hold, rate = 30.0, 5e-3, 2000
+
+    def tau(t, q, v, contacts):
+        return [stairs[round(t / hold)]]
+
+    result = slider(integrator, [torque(cutoff=cutoff, rate=rate)]).run(
+        [0.0], None, 4 * hold - 1e-4, tau, control_dt=hold
+    )
+    log = result.sensors["torque"]
+    x, expected = stairs[0], []
+    for t in log.sampled:
+        expected.append(x)
+        step = stairs[int((t + 1e-9) / hold)]
+        x = step + (x - step) * np.exp(-2 * np.pi * cutoff / rate)
+    assert np.allclose(log.values[:, 0], expected, rtol=0, atol=1e-12)
 
 
 # A tip of a quarter of the mass, with a sensor between the two.
@@ -123,37 +139,6 @@ def test_sensors_do_not_change_the_motion(integrator):
     assert results[1].stats.pairs["ball-plate"].touches > 0
 
 
-def splitmix(x):
-    mask = (1 << 64) - 1
-    x = (x + 0x9E3779B97F4A7C15) & mask
-    x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & mask
-    x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & mask
-    return x ^ (x >> 31)
-
-
-def test_noise_is_the_same_on_every_machine():
-    """Integers alone decide, and one division that IEEE 754 rounds."""
-    for seed, sample, value in ((0, 0, 0), (1, 2, 3), (2**64 - 1, 10**6, 5)):
-        key = splitmix(splitmix(splitmix(seed) ^ sample) ^ value)
-        total = sum(bin(splitmix(key ^ splitmix(i))).count("1") for i in range(4)) - 128.0
-        rest = splitmix(key ^ splitmix(4))
-        total += (rest >> 32) * 2.0**-32 - (rest & 0xFFFFFFFF) * 2.0**-32
-        assert _core.normal_noise(seed, sample, value) == total / 8.010409893800427
-
-
-def test_noise_is_normal():
-    n = 200_000
-    x = np.array([_core.normal_noise(7, k, 0) for k in range(n)])
-    assert abs(x.mean()) < 4 / np.sqrt(n)
-    assert abs(x.std() - 1) < 4 / np.sqrt(2 * n)
-    assert abs((x**3).mean()) < 4 * np.sqrt(15 / n)
-    assert abs((x**4).mean() - 3) < 4 * np.sqrt(96 / n) + 0.01
-    # Kolmogorov and Smirnov: 1.63 / sqrt(n) at one in a hundred.
-    cdf = np.array([0.5 * (1 + erf(v / np.sqrt(2))) for v in np.sort(x)])
-    assert np.abs(cdf - np.arange(n) / n).max() < 1.63 / np.sqrt(n)
-    assert abs(np.corrcoef(x[1:], x[:-1])[0, 1]) < 4 / np.sqrt(n)
-
-
 def noisy(**more):
     return sp.ForceTorqueSensor(name="wrist", frame=BALL, force_noise=0.5, torque_noise=0.1, **more)
 
@@ -195,7 +180,9 @@ def test_sensors_vary_from_run_to_run():
             assert np.array_equal(log.values, result.sensors[name].values)
             assert np.array_equal(log.t, result.sensors[name].t)
     assert rollout.varied["sensors.wrist.seed"] == range(3)
-    assert rollout.to_dataframe()["sensors.torque.delay"].tolist() == [0.0, 0.01, 0.02]
+    table = rollout.to_dataframe()
+    assert table["sensors.torque.delay"].tolist() == [0.0, 0.01, 0.02]
+    assert table["sensors.wrist.seed"].tolist() == [0, 1, 2]
     with pytest.raises(NameNotFound, match=r"no varied parameter 'sensors.wrist.frame'"):
         simulation.rollout([0.0], None, 0.05, vary={"sensors.wrist.frame": ["a"]})
     with pytest.raises(InvalidParameter, match=r"of run 1'?.* = -1 cannot be taken: rate"):
@@ -325,74 +312,6 @@ def test_an_open_run_gives_the_readings_of_its_pieces():
     parts = [run.advance(0.05).sensors["wrist"] for _ in range(4)]
     assert np.array_equal(np.concatenate([one.values for one in parts]), whole.values)
     assert np.array_equal(np.concatenate([one.t for one in parts]), whole.t)
-
-
-def two_sensors():
-    sensors = [noisy(rate=100), torque(rate=150, delay=1e-3)]
-    return slider(sp.Adaptive(), sensors).run([0.0], None, 0.1, sine(5.0))
-
-
-def test_readings_are_saved_and_loaded(tmp_path):
-    result = two_sensors()
-    loaded = sp.Result.load(result.save(tmp_path / "run.npz"))
-    assert list(loaded.sensors) == ["wrist", "torque"]
-    for name, log in result.sensors.items():
-        other = loaded.sensors[name]
-        assert other.columns == log.columns
-        for part in ("t", "sampled", "values"):
-            assert np.array_equal(getattr(other, part), getattr(log, part))
-            assert not getattr(other, part).flags.writeable
-    plain = slider(sp.Adaptive(), []).run([0.0], None, 0.1)
-    assert sp.Result.load(plain.save(tmp_path / "plain.npz")).sensors == {}
-    with np.load(tmp_path / "plain.npz") as file:
-        assert not [name for name in file if name.startswith("sensors")]
-
-
-def test_a_file_with_other_readings_is_refused(tmp_path):
-    two_sensors().save(tmp_path / "run.npz")
-    with np.load(tmp_path / "run.npz") as file:
-        arrays = dict(file)
-    for name, wrong, said in (
-        ("sensors.values", arrays["sensors.values"][:-1], "its readings"),
-        ("sensors.sensor", arrays["sensors.sensor"] + 1, "not from 0 to 1"),
-        ("sensors.t", arrays["sensors.t"][:-1], "'sensors.t' has the shape"),
-    ):
-        np.savez_compressed(tmp_path / "bad.npz", **arrays | {name: wrong})
-        with pytest.raises(ResultError, match=said):
-            sp.Result.load(tmp_path / "bad.npz")
-    del arrays["sensors.t"]
-    np.savez_compressed(tmp_path / "bad.npz", **arrays)
-    with pytest.raises(ResultError, match=r"no array 'sensors\.t'"):
-        sp.Result.load(tmp_path / "bad.npz")
-
-
-def test_readings_are_columns(tmp_path):
-    result = two_sensors()
-    columns = result.sensor_columns()
-    assert list(columns)[:2] == ["t [s]", "wrist.force_x [N]"]
-    assert list(columns)[-1] == "torque.force [N]"
-    write_sensors(tmp_path / "sensors.csv", result)
-    with open(tmp_path / "sensors.csv", newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == len(result.sensors["wrist"]) + len(result.sensors["torque"])
-    for name, column in (("wrist", "force_z [N]"), ("torque", "force [N]")):
-        log = result.sensors[name]
-        found = [(r["t [s]"], r[f"{name}.{column}"]) for r in rows if r[f"{name}.{column}"]]
-        at = log.columns.index(column)
-        assert [float(t) for t, _ in found] == log.t.tolist()
-        assert [float(x) for _, x in found] == log.values[:, at].tolist()
-    frame = result.sensors["torque"].to_dataframe()
-    assert list(frame) == ["t [s]", "sampled [s]", "force [N]"]
-    assert frame["force [N]"].tolist() == result.sensors["torque"].values[:, 0].tolist()
-
-
-def test_readings_are_drawn():
-    figure = two_sensors().plot("sensors")
-    titles = [axis.get_title(loc="left") for axis in figure.axes]
-    assert titles == ["wrist", "wrist", "torque"]
-    assert [len(axis.lines) for axis in figure.axes] == [3, 3, 1]
-    empty = slider(sp.Adaptive(), []).run([0.0], None, 0.1).plot("sensors")
-    assert empty.axes[0].texts[0].get_text() == "no sensors"
 
 
 def test_an_unknown_sensor_is_named_in_a_controller():

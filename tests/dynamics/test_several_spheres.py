@@ -14,7 +14,6 @@ from tests import meshes, models
 R = 0.006
 LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
 BRISTLE = sp.BristleFriction(0.6, 0.5, 1e5, 30.0)
-BUMPS = meshes.dome(12)
 
 
 def pad(count: int = 8, lift: float = 0.0005) -> list[sp.Sphere]:
@@ -54,6 +53,29 @@ def test_together_they_are_the_same_pairs() -> None:
         together.contact_derivatives(q, v), alone.contact_derivatives(q, v), strict=True
     ):
         assert (a == b).all()
+
+
+@pytest.mark.parametrize("method", ["smooth", "facets", "elements"])
+def test_no_contact_is_missed_at_the_border_of_the_shell(method: str) -> None:
+    # A dome, which bulges over its flat elements: far, near its box, and in touch at its rim.
+    shell = sp.Shell(*meshes.dome(6))
+    spheres = pad(4)
+    together, alone = (
+        scene_of(spheres, together=one, shell=shell, method=method, friction=None)
+        for one in (True, False)
+    )
+    rng = np.random.default_rng(0)
+    low, high = shell.box
+    met = 0
+    for _ in range(300):
+        place = low + rng.uniform(-0.3, 1.3, 3) * (high - low)
+        turn = pin.Quaternion(rng.normal(size=4)).normalized().coeffs()
+        q = np.concatenate([place, turn])
+        a, b = together.contacts(q), alone.contacts(q)
+        assert (a.pair == b.pair).all()
+        assert (a.depth == b.depth).all()
+        met += len(a)
+    assert met > 50
 
 
 @pytest.mark.parametrize(

@@ -79,6 +79,8 @@ def test_depth_normal_and_point_have_closed_forms(turned: bool) -> None:
     expected = centers[1] + second.radius * found.normal_world[0]
     assert np.allclose(found.point_world[0], expected, rtol=0, atol=1e-15)
     assert np.allclose(found.normal_force, [1e4 * found.depth[0] ** 1.5], rtol=1e-13)
+    assert testing.assert_contacts_found(scene, q) < 1e-12
+    testing.assert_wrenches_cancel(scene, q)
 
 
 def test_two_spheres_with_one_center_are_pushed_along_some_normal() -> None:

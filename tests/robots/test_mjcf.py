@@ -131,15 +131,15 @@ def test_without_a_pose_it_starts_as_drawn():
     assert np.allclose(robot.q0, [*drawn, 0.0])
 
 
-def test_what_is_not_modelled_is_said():
+def test_what_is_not_modeled_is_said():
     with pytest.warns(RobotWarning) as caught:
         robots.load_file(FOLDER / "springs.xml")
     said = " ".join(str(one.message) for one in caught)
     for words in (
-        "(stiffness, springdamper) are not modelled: 'sprung'",
-        "ranges of ball joints are not modelled: 'cone'",
+        "(stiffness, springdamper) are not modeled: 'sprung'",
+        "ranges of ball joints are not modeled: 'cone'",
         "gravcomp too: 'b'",
-        "tendons are not modelled: 'cord'",
+        "tendons are not modeled: 'cord'",
         "add them as shells: 'floor'",
     ):
         assert words in said

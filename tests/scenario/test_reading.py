@@ -52,7 +52,7 @@ FAULTS = {
         ["number", "'stiff'"],
     ),
     "missing": ("duration = 0.05", "", "run.duration", ["is missing"]),
-    "no source": ('name = "ball"\n', "", "robot[0]", ["either name", "or urdf"]),
+    "no source": ('name = "ball"\n', "", "robot[0]", ["either name", "or file"]),
     "two sources": ('name = "plate"', 'name = "p"\nfile = "x"', "shell.p", ["file or primitive"]),
     "not a table": ("[run]", "[expect]\nx = 1\n[run]", "expect.x", ["must be a table"]),
     "no tolerance": (

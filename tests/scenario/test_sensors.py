@@ -64,6 +64,21 @@ def test_a_scenario_states_its_sensors(tmp_path):
     assert not (tmp_path / "out" / "sensors.csv").exists()
 
 
+def test_readings_are_figures(tmp_path):
+    expect = """
+[expect]
+"sensors.touch.closed.max" = { value = 1.0, atol = 1e-9 }
+"sensors.inside.force_z.last" = { min = -1.0, max = 1.0 }
+"sensors.inside.torque_x.mean" = { max = 1.0 }
+"""
+    report = run_scenario(write(tmp_path, DROP + SENSORS + expect), tmp_path, recording=False)
+    assert [one.met for one in report.verdicts] == [True] * 3
+    log = report.result.sensors["inside"].values
+    assert [one.measured for one in report.verdicts] == [1.0, log[-1, 2], log[:, 3].mean()]
+    with pytest.raises(ScenarioError, match=r"nearest ones are: sensors\.inside\.force_"):
+        run_scenario(write(tmp_path, DROP + SENSORS + expect.replace("force_z", "force")))
+
+
 def test_values_of_sensors_can_be_changed(tmp_path):
     path = write(tmp_path, DROP + SENSORS)
     built = build(path, {"sensor.inside.rate": "250", "sensor.touch.delay": "0.002"})

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from sphshell_pin import robots
+from sphshell_pin.cli import app
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build, run_scenario
 from tests.scenario.files import write
@@ -136,3 +140,20 @@ def test_no_collision_spheres(tmp_path):
     text = HAND.replace("allegro_right_hand", "turntable")
     with pytest.raises(ScenarioError, match=r"contact.tips.spheres: no collision geometry of the"):
         build(write(tmp_path, text))
+
+
+def test_the_table_of_many_contacts_lists_the_largest(tmp_path):
+    # 20 spheres of one ball that falls on one of them.
+    spheres = ", ".join(
+        f"{{ frame = 'lower/ball', radius = 0.012, offset = [0, 0, {0.001 * k}] }}"
+        for k in range(20)
+    )
+    start, end = TWO_BALLS.index("spheres = ["), TWO_BALLS.index('shell = "plate"')
+    file = write(tmp_path, f"{TWO_BALLS[:start]}spheres = [{spheres}]\n{TWO_BALLS[end:]}")
+    options = ["run", str(file), "--out", str(tmp_path / "out"), "--no-recording"]
+    told = CliRunner().invoke(app, options).output
+    assert "floor/lower/ball-0 " in told
+    assert "floor/lower/ball-19" not in told
+    assert "5 more contacts with smaller peak forces, of which" in told
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert len(summary["stats"]["pairs"]) == 21

@@ -31,6 +31,7 @@ from sphshell_pin.study.robot_check import (
 from sphshell_pin.study.robot_check.models import load_subject
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
 from sphshell_pin.study.robot_check.setting import patch
+from sphshell_pin.study.robot_check.spheres import find_sphere
 from sphshell_pin.testing.finding import Finding
 
 ROOT = Path(__file__).parents[2]
@@ -265,6 +266,40 @@ REPORTS = [
 ]
 
 
+MESHED = """<robot name="meshed"><link name="base"/>
+<link name="rod">{mass}<collision><origin xyz="0 0 0.2"/>
+    <geometry><box size="0.05 0.05 0.4"/></geometry></collision></link>
+<joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/>
+    <axis xyz="0 1 0"/></joint></robot>"""
+URDF_MASS = """<inertial><mass value="1"/><origin xyz="0 0 0.2"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>"""
+MESHED_MJCF = """<mujoco><worldbody><body name="rod"><joint name="hinge" axis="0 1 0"/>{mass}
+    <geom type="box" size="0.025 0.025 0.2" pos="0 0 0.2"/>
+    <geom type="box" size="1 1 1" contype="0" conaffinity="0" group="2"/>
+    </body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "mass"),
+    [
+        ("meshed.urdf", MESHED, URDF_MASS),
+        ("meshed.xml", MESHED_MJCF, '<inertial pos="0 0 0.2" mass="1" diaginertia="1 1 1"/>'),
+    ],
+)
+def test_a_sphere_inside_the_last_mesh_is_used(
+    name: str, text: str, mass: str, tmp_path: Path
+) -> None:
+    file = tmp_path / name
+    file.write_text(text.format(mass=mass))
+    report = check_robot(file, sizes=TINY)
+    assert report.verdict == PASS, report
+    assert any("the outermost of 8 inside the collision mesh of 'rod'" in n for n in report.notes)
+    subject = load_subject(file)
+    tip, _ = find_sphere(subject, subject.robot.model, np.random.default_rng(0), None, None)
+    assert 0.3 < tip.offset[2] < 0.4  # near the rod's end at 0.4 m
+    assert 0.01 < tip.radius <= 0.025
+
+
 def test_the_page() -> None:
     REPORTS[3].findings["fast"] = Finding(0.0, "never")
     page = as_markdown(REPORTS, "a command")
@@ -367,3 +402,25 @@ def test_the_page_of_the_docs_is_of_these_robots() -> None:
     assert [name for name, verdict in verdicts.items() if verdict == NOT_CHECKED] == ["cassie"]
     if len(robots.names()) > len(robots.OWN):
         assert list(verdicts) == robots.names()
+
+
+def test_the_command_takes_xacro_arguments_and_package_folders(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_PACKAGE_PATH", "")
+    file = tmp_path / "hand.urdf.xacro"
+    text = (DATA / "xacro" / "hand.urdf.xacro").read_text()
+    inside = "finger_description/urdf"
+    file.write_text(text.replace(inside, f"$(find {inside.partition('/')[0]})/urdf"))
+    command = ["check-robot", str(file), "--quick", "--xacro-arg", "fingers=1"]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 2
+    assert "no package 'finger_description'" in result.stdout
+    result = CliRunner().invoke(app, [*command, "--package-dir", str(DATA / "xacro")])
+    assert result.exit_code == 0, result.stdout
+    assert "2/2" in result.stdout
+    result = CliRunner().invoke(app, ["check-robot", str(file), "--xacro-arg", "fingers"])
+    assert result.exit_code == 2
+    assert "--xacro-arg = 'fingers' must be NAME=VALUE" in result.stderr
+    result = CliRunner().invoke(app, ["run", "x.toml", "--package-dir", str(tmp_path / "nix")])
+    assert result.exit_code == 2

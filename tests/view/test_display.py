@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from sphshell_pin import ImpactLaw, Scene, Sphere
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view import ArrowScale, Display
 from sphshell_pin.view.page import FilmWindow
@@ -47,6 +48,18 @@ def test_shells_and_spheres_move_with_their_bodies():
     expected = pin.SE3(pin.utils.rotate("z", 0.7), np.zeros(3)) * scene.pairs[0].placement
     np.testing.assert_allclose(where["shells/0_disc"], expected.homogeneous, atol=1e-12)
     np.testing.assert_allclose(where["spheres/0_tip"][:3, 3], [1.0, 2.0, 3.0])
+
+
+def test_both_of_two_spheres_are_drawn():
+    model = ball_model()
+    scene = Scene(model)
+    ends = Sphere(0.05, "ball"), Sphere(0.02, "table", (0.3, 0.0, 0.1))
+    scene.add_contact(*ends, law=ImpactLaw(1e4), name="tip")
+    where, commands = filmed(scene, ball_configuration([1.0, 2.0, 3.0], 0.7))
+    np.testing.assert_allclose(where["spheres/0_tip"][:3, 3], [1.0, 2.0, 3.0])
+    turned = pin.utils.rotate("z", 0.7) @ [0.3, 0.0, 0.1]
+    np.testing.assert_allclose(where["spheres/1_tip"][:3, 3], turned, atol=1e-12)
+    assert not any("/shells/" in command["path"] for command in commands)
 
 
 def test_a_shell_shared_by_many_spheres_is_drawn_once():

@@ -1,6 +1,5 @@
 #include "dynamics/guard.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,52 +16,32 @@ constexpr double kSeen = 1e-3;
 constexpr double kTurn = 0.5;
 constexpr double kMostTurned = 16;
 
-bool between_same(const Pair& a, const Pair& b) {
-  return a.shell && a.shell == b.shell && a.joint_i == b.joint_i && a.joint_j == b.joint_j &&
-         a.method == b.method && a.placement_j == b.placement_j;
-}
-
 }  // namespace
 
-Guard::Guard(const SceneData& scene) : known_(scene.pairs().size()) {
-  const std::vector<Pair>& pairs = scene.pairs();
-  const std::vector<int> groups = group_numbers(pairs);
-  for (std::size_t k = 1; k < pairs.size(); ++k) {
-    if (groups[k] != groups[k - 1] || !between_same(pairs[k - 1], pairs[k])) continue;
-    if (clusters_.empty() || clusters_.back().last != k - 1)
-      clusters_.push_back({k - 1, k, Vec3::Zero(), {}});
-    clusters_.back().last = k;
-  }
-  for (Cluster& cluster : clusters_) {
-    Eigen::AlignedBox3d box;
-    for (std::size_t k = cluster.first; k <= cluster.last; ++k)
-      box.extend(pairs[k].placement_i.translation());
-    cluster.center = box.center();
-  }
-}
+Guard::Guard(const SceneData& scene)
+    : known_(scene.pairs().size()), known_of_cluster_(scene.clusters().size()) {}
 
 void Guard::begin(const SceneData& scene) {
   for (std::size_t k = 0; k < known_.size(); ++k) {
     known_[k].center = scene.states()[k].center;
     known_[k].touching = scene.states()[k].count > 0;
   }
-  for (Cluster& cluster : clusters_) {
+  for (std::size_t c = 0; c < known_of_cluster_.size(); ++c) {
+    const Cluster& cluster = scene.clusters()[c];
     const std::size_t k = cluster.first;
-    const int joint = scene.pairs()[k].joint_i;
-    const Multibody& body = scene.body();
-    const Vec3 center =
-        joint == 0 ? cluster.center : body.world_from_joint(joint).act(cluster.center);
-    cluster.known.center = scene.states()[k].world_from_j.actInv(center);
-    cluster.known.touching = false;
+    Known& known = known_of_cluster_[c];
+    known.center =
+        cluster.center_in_shell(scene.body(), scene.pairs()[k], scene.states()[k].world_from_j);
+    known.touching = false;
     for (std::size_t i = k; i <= cluster.last; ++i)
-      cluster.known.touching = cluster.known.touching || known_[i].touching;
+      known.touching = known.touching || known_[i].touching;
   }
 }
 
 // Whether the ball of a cluster has been as far from the shell as none of its spheres moved: then
 // none of them needs a look of its own.
-bool Guard::is_clear(const SceneData& scene, Cluster& cluster) const {
-  if (cluster.known.touching) return false;
+bool Guard::is_clear(const SceneData& scene, const Cluster& cluster, Known& known) const {
+  if (known.touching) return false;
   double moved = 0, radius = std::numeric_limits<double>::infinity();
   for (std::size_t k = cluster.first; k <= cluster.last; ++k) {
     if (scene.excursions()[k].touched) return false;
@@ -70,14 +49,8 @@ bool Guard::is_clear(const SceneData& scene, Cluster& cluster) const {
     radius = std::min(radius, scene.pairs()[k].radius);
   }
   const double slack = kApart * radius;
-  if (moved <= slack) return true;
-  const std::vector<Pair>& pairs = scene.pairs();
-  double reach = 0;
-  for (std::size_t k = cluster.first; k <= cluster.last; ++k) {
-    const double away = (pairs[k].placement_i.translation() - cluster.center).norm();
-    reach = std::max(reach, away + pairs[k].radius);
-  }
-  return moved <= slack + gap(pairs[cluster.first], reach, cluster.known);
+  return moved <= slack ||
+         moved <= slack + gap(scene.pairs()[cluster.first], cluster.radius, known);
 }
 
 double Guard::allowed(SceneData& scene, const State& from, const State& to, bool gap_at_end) {
@@ -85,12 +58,13 @@ double Guard::allowed(SceneData& scene, const State& from, const State& to, bool
   const double h = to.t - from.t;
   const double turned =
       h * std::max(from.v.lpNorm<Eigen::Infinity>(), to.v.lpNorm<Eigen::Infinity>());
-  auto cluster = clusters_.begin();
+  std::size_t next = 0;
   for (std::size_t k = 0; k < known_.size(); ++k) {
-    if (cluster != clusters_.end() && cluster->first == k) {
-      Cluster& here = *cluster++;
-      if (turned <= kTurn && is_clear(scene, here)) {
-        k = here.last;
+    if (next < known_of_cluster_.size() && scene.clusters()[next].first == k) {
+      const Cluster& cluster = scene.clusters()[next];
+      Known& known = known_of_cluster_[next++];
+      if (turned <= kTurn && is_clear(scene, cluster, known)) {
+        k = cluster.last;
         continue;
       }
     }

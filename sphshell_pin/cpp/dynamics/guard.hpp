@@ -31,21 +31,13 @@ class Guard {
     double distance = -1;
   };
 
-  // Neighboring pairs of one group between the same two bodies and with the same shell, and a ball
-  // round all their spheres.
-  struct Cluster {
-    std::size_t first, last;
-    Vec3 center = Vec3::Zero();  // in the joint of the spheres
-    Known known;                 // of the ball
-  };
-
   static double distance(const Pair& pair, const Vec3& center);
   static double gap(const Pair& pair, double radius, Known& known);
-  bool is_clear(const SceneData& scene, Cluster& cluster) const;
+  bool is_clear(const SceneData& scene, const Cluster& cluster, Known& known) const;
   double path(SceneData& scene, std::size_t k, const State& from, const State& to);
 
   std::vector<Known> known_;
-  std::vector<Cluster> clusters_;  // of several pairs each, in their order
+  std::vector<Known> known_of_cluster_;  // of the ball round its spheres
   VectorX u_, q_;
 };
 

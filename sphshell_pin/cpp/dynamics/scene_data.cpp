@@ -12,6 +12,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
     : body_(model),
       joints_(std::move(joints), model.nv),
       pairs_(std::move(pairs)),
+      clusters_(clusters_of(pairs_)),
       queries_(pairs_.size(), Query(true)),
       trackers_(pairs_.size()),
       states_(pairs_.size()),
@@ -37,6 +38,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
 
 void SceneData::change(std::vector<Pair> pairs, JointForces::Effects joints) {
   pairs_ = std::move(pairs);
+  clusters_ = clusters_of(pairs_);
   joints_.change(std::move(joints));
   for (const Pair& pair : pairs_) needs_velocity_ = needs_velocity_ || pair.needs_velocity();
 }
@@ -63,12 +65,22 @@ void SceneData::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, b
     body_.kinematics(q, v);
   else if (!pairs_.empty())
     body_.kinematics(q);
+  auto cluster = clusters_.begin();
+  bool far = false;  // whether the cluster of the pair is
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     PairState& state = states_[k];
     state = PairState();
-    state.world_from_j = body_.world_from(pair.joint_j, pair.placement_j);
-    std::vector<Contact>& contacts = find_contacts(k);
+    if (cluster != clusters_.end() && k > cluster->last) ++cluster, far = false;
+    const bool clustered = cluster != clusters_.end() && k >= cluster->first;
+    if (clustered && k > cluster->first) {
+      state.world_from_j = states_[k - 1].world_from_j;
+    } else {
+      state.world_from_j = body_.world_from(pair.joint_j, pair.placement_j);
+      if (clustered)
+        far = cluster->is_far(pair, cluster->center_in_shell(body_, pair, state.world_from_j));
+    }
+    std::vector<Contact>& contacts = find_contacts(k, far);
     Excursion& excursion = excursions_[k];
     excursion.moved = std::max(excursion.moved, (state.center - excursion.from).norm());
     excursion.touched = excursion.touched || !contacts.empty();
@@ -134,7 +146,7 @@ void SceneData::accept(VectorX& z) {
   compute_forces(z);
 }
 
-std::vector<Contact>& SceneData::find_contacts(std::size_t k) {
+std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
   const Pair& pair = pairs_[k];
   PairState& state = states_[k];
   Query& query = queries_[k];
@@ -153,6 +165,10 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k) {
   const Vec3& center = pair.placement_i.translation();
   state.center = state.world_from_j.actInv(
       pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
+  if (far) {
+    query.contacts.clear();
+    return query.contacts;
+  }
   if (pair.ball > 0) {
     find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
     return query.contacts;

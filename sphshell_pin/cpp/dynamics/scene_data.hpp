@@ -7,6 +7,7 @@
 
 #include "contact/tracker.hpp"
 #include "dynamics/bristles.hpp"
+#include "dynamics/clusters.hpp"
 #include "dynamics/contact_row.hpp"
 #include "dynamics/joints.hpp"
 #include "dynamics/pair.hpp"
@@ -104,12 +105,13 @@ class SceneData {
   const std::vector<Excursion>& excursions() const { return excursions_; }
   const Powers& powers() const { return powers_; }
   const std::vector<Pair>& pairs() const { return pairs_; }
+  const std::vector<Cluster>& clusters() const { return clusters_; }
   const JointForces& joints() const { return joints_; }
   Multibody& body() { return body_; }
   const Multibody& body() const { return body_; }
 
  private:
-  std::vector<Contact>& find_contacts(std::size_t k);
+  std::vector<Contact>& find_contacts(std::size_t k, bool far);
   void evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z);
   void add_contact(std::size_t k, const Contact& contact, int slot, int contact_id);
   void compute_forces(const VectorX& z);
@@ -123,6 +125,7 @@ class SceneData {
   Multibody body_;
   JointForces joints_;
   std::vector<Pair> pairs_;
+  std::vector<Cluster> clusters_;
   std::vector<Query> queries_;
   std::vector<Contact> merged_;
   std::vector<ContactTracker> trackers_;

@@ -113,6 +113,14 @@ class Bvh {
     }
   }
 
+  // False where no triangle meets the ball: the box of all of them does not.
+  bool may_meet(const Vec3& center, double radius) const {
+    const Vec3 local = center - origin_;
+    const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
+    const float reach = float(radius) * 1.000001f;
+    return distance2(root_, 0, c) <= reach * reach;
+  }
+
   const Vec3& origin() const { return origin_; }
   std::size_t bytes() const { return nodes_.size() * sizeof(Node); }
 
