@@ -56,19 +56,24 @@ def _forces(points: Array, normals: Array, wrench: Array, total: float, mu: floa
     middle = points.mean(axis=0)
     size = max(float(np.linalg.norm(points - middle, axis=1).max()), 1e-9)
     torques = np.cross((points - middle)[:, None], edges) / size
-    matrix = np.vstack(
+    wrenches = np.concatenate([edges, torques], axis=2).reshape(-1, 6).T
+    # All normal forces are the total; each is its least share and more, by one more unknown.
+    each = np.kron(np.eye(count), np.ones(_SIDES))
+    matrix = np.block(
         [
-            np.concatenate([edges, torques], axis=2).reshape(-1, 6).T,
-            np.ones(count * _SIDES),
+            [wrenches, np.zeros((6, count))],
+            [np.ones(count * _SIDES), np.zeros(count)],
+            [each, -np.eye(count)],
         ]
     )
     about = wrench[3:] - np.cross(middle, wrench[:3])
-    goal = np.concatenate([-wrench[:3], -about / size, [total]])
-    least = np.full(count * _SIDES, _LEAST * total / (count * _SIDES))
-    shares, residual = nonnegative(matrix, goal - matrix @ least)
+    least = np.full(count, _LEAST * total / count)
+    goal = np.concatenate([-wrench[:3], -about / size, [total], least])
+    shares, residual = nonnegative(matrix, goal)
     if residual > _BALANCED * max(total, float(np.linalg.norm(wrench[:3]))):
         return None
-    forces: Array = ((shares + least).reshape(count, _SIDES, 1) * edges).sum(axis=1)
+    shares = shares[: count * _SIDES].reshape(count, _SIDES, 1)
+    forces: Array = (shares * edges).sum(axis=1)
     return forces
 
 

@@ -119,7 +119,11 @@ def assemble(
         if not several and stand.isIdentity():
             base, visual = model, geometry
         else:
-            base, visual = pin.appendModel(base, model, visual, geometry, carrier, stand)
+            try:
+                base, visual = pin.appendModel(base, model, visual, geometry, carrier, stand)
+            except ValueError as error:
+                why = f"robots whose joints and links share names cannot be combined: {error}"
+                raise ScenarioError(path, key, why) from None
     base.gravity.linear = np.array(scenario.gravity)
     q0, v0, armature = pin.neutral(base), np.zeros(base.nv), np.zeros(base.nv)
     for name, q_joint, v_joint, inertia in starts:

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from sphshell_pin import robots
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario.bodies import assemble, reduce_visual, restrict
@@ -71,6 +72,55 @@ def test_each_robot_moves_as_it_would_alone(tmp_path):
     np.testing.assert_allclose(masses, [inertia.mass for inertia in alone.inertias][1:])
 
 
+MOUNTED = """
+title = "a finger on a turntable, and a ball"
+
+[[robot]]
+name = "turntable"
+start = { axle = 0.7 }
+
+[[robot]]
+name = "ball"
+start = { root_joint = [1, 2, 3, 0, 0, 0.6, 0.8] }
+
+[[robot]]
+name = "three_link_finger"
+frame = "turntable/disc"
+placement = { xyz = [0.1, 0.2, 0.3], rpy_deg = [0, 0, 90] }
+start = { knuckle = 0.3, middle_joint = 0.4, distal_joint = 0.5 }
+
+[run]
+duration = 1
+"""
+
+
+def test_a_robot_may_be_mounted_on_another(tmp_path):
+    assembly = assembled(tmp_path, MOUNTED)
+    model = assembly.model
+
+    def pose(model, q, frame):
+        data = model.createData()
+        pin.framesForwardKinematics(model, data, q)
+        return data.oMf[model.getFrameId(frame)]
+
+    finger = robots.load("three_link_finger").model
+    stand = pin.SE3(pin.rpy.rpyToMatrix(0, 0, np.pi / 2), np.array([0.1, 0.2, 0.3]))
+    expected = (
+        pose(model, assembly.q0, "turntable/disc")
+        * stand
+        * pose(finger, np.array([0.3, 0.4, 0.5]), "tip")
+    )
+    found = pose(model, assembly.q0, "three_link_finger/tip")
+    assert found.isApprox(expected, 1e-12)
+    assert np.allclose(pose(model, assembly.q0, "ball/root_joint").translation, [1, 2, 3])
+    # The disc carries the finger's weight too.
+    single = robots.load("turntable").model
+    both = pin.computeTotalMass(single) + pin.computeTotalMass(finger)
+    assert sum(
+        model.inertias[j].mass for j in model.subtrees[model.getJointId("turntable/axle")]
+    ) == pytest.approx(both)
+
+
 def test_locking_keeps_the_other_joints_values(tmp_path):
     assembly = assembled(tmp_path)
     ids = [assembly.model.getJointId(name) for name in assembly.lock]
@@ -115,6 +165,12 @@ FAULTS = {
     "number for a free-flyer": ("[1, 2, 3, 0, 0, 0.6, 0.8]", "1", "robot.ball.start", "list of 7"),
     "short list": ("[1, 2, 3, 4, 5, 6]", "[1, 2]", 'robot.ball.speed."root_joint"', "6 numbers"),
     "no unit quaternion": ("0.6, 0.8]", "0, 0.5]", "robot.ball.start", "its length is"),
+    "unknown mount": (
+        'name = "ball"',
+        'name = "ball"\nframe = "three_link_finger/tpi"',
+        "robot.ball.frame",
+        "three_link_finger/tip",
+    ),
     "unknown robot": ('"ball"', '"bal"', "robot.bal", "ball"),
     "same label": ('"ball"', '"three_link_finger"\nlabel = "three_link_finger"', "robot[1]", ""),
     "no such urdf": ('name = "ball"', 'urdf = "b.urdf"', "robot[1]", "no such file"),

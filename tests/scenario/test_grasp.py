@@ -11,7 +11,7 @@ from sphshell_pin import robots
 from sphshell_pin.errors import ScenarioError, SphshellError
 from sphshell_pin.scenario import build, judge
 from sphshell_pin.scenario.balance import least_friction, nonnegative
-from sphshell_pin.scenario.grasp import Hand
+from sphshell_pin.scenario.grasp import Grasp, Hand
 from sphshell_pin.scenario.hand import GAP, Part
 from sphshell_pin.scenario.materials import find_material
 from sphshell_pin.scenario.new import new_scenario
@@ -93,7 +93,7 @@ def gripper(folder):
             at = f"{side * 0.035} {y} 0" if k == 0 else "0 0 -0.06"
             low, high = ((-0.9, 0.4), (-0.2, 1.3))[k]
             parts.append(
-                f'<joint name="{name}_{link}" type="revolute"><parent link="{above}"/>'
+                f'<joint name="{name}_{link}_hinge" type="revolute"><parent link="{above}"/>'
                 f'<child link="{name}_{link}"/><origin xyz="{at}"/><axis xyz="0 {side} 0"/>'
                 f'<limit lower="{low}" upper="{high}" effort="5" velocity="5"/></joint>'
                 f'<link name="{name}_{link}"><inertial><origin xyz="0 0 {-0.5 * length}"/>'
@@ -142,10 +142,7 @@ def test_velocities_of_tips_are_those_of_differences(tmp_path):
 
 
 def test_fingers_close_on_a_part(tmp_path):
-    """All centers stand a radius and the gap away from a cylinder, which is a distance to a line.
-
-    Torques do the work of the forces (virtual work).
-    """
+    """All centers stand a radius and the gap away from a cylinder: a distance to its axis."""
     hand, shell = hand_of(tmp_path), shell_of(Cylinder(radius=0.02, length=0.2))
     along_y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
     q, points, normals = hand.close_on(
@@ -153,14 +150,35 @@ def test_fingers_close_on_a_part(tmp_path):
     )
     centers = hand.centers(q)
     away = np.hypot(centers[:, 0], centers[:, 2] + 0.1)
-    gaps = dict(zip(("thumb_lower", "left_lower", "right_lower"), away - 0.03, strict=True))
-    names = [tip.frame for tip in hand.tips]
-    expected = dict(zip(names, (1e-4, 2e-4, -1e-4), strict=True))
     # The cylinder is a mesh: curved elements, a micrometer off.
-    assert [gaps[name] for name in names] == pytest.approx(
-        [expected[name] for name in gaps], abs=2e-6
-    )
+    assert away - 0.03 == pytest.approx([1e-4, 2e-4, -1e-4], abs=2e-6)
     assert np.allclose(points, centers - (away - 0.02)[:, None] * normals, atol=2e-6)
+
+
+def test_torques_do_the_work_of_the_forces(tmp_path):
+    """Virtual work: of forces on points that move with the tips."""
+    hand, shell = hand_of(tmp_path), shell_of(Cylinder(radius=0.02, length=0.2))
+    along_y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
+    q, points, normals = hand.close_on(np.tile([-0.3, 0.6], 3), shell, along_y, 0.0)
+    forces = np.random.default_rng(0).normal(size=(3, 3))
+    torques = hand.torques(Grasp(q, along_y, points, normals, forces, 0.0))
+    model, step = hand.model, 1e-6
+    data = model.createData()
+
+    def moved(q):
+        pin.framesForwardKinematics(model, data, q)
+        return [data.oMf[model.getFrameId(tip.frame)] for tip in hand.tips]
+
+    local = [pose.actInv(point) for pose, point in zip(moved(q), points, strict=True)]
+    for k in range(model.nv):
+        change = np.zeros(model.nv)
+        change[k] = step
+        ahead, behind = (
+            [pose.act(at) for pose, at in zip(moved(q + sign * change), local, strict=True)]
+            for sign in (1, -1)
+        )
+        work = (forces * (np.array(ahead) - np.array(behind))).sum() / (2 * step)
+        assert torques[k] == pytest.approx(work, abs=1e-8)
 
 
 def test_what_is_out_of_reach_is_not_touched(tmp_path):
