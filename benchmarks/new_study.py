@@ -75,9 +75,9 @@ sphere.
 NOTES = """
 Looked at one by one: `three_link_finger` moves in the plane of x and z, so `+y` is refused. The
 legs of `a1` and `solo12` need a ground for four feet; the refused parts are under one or two of
-them, or stand up between them. The palm of the Allegro hand is beside a finger that points down and
-touches a part that is wider than the finger; a finger that points up is nearly stretched, and does
-not hold a force along itself.
+them, or stand up between them. The palm, or other fingers, of the Allegro hand are beside the finger
+that touches, and would be in a part that is wider than it. Where its force is not held, the sphere
+touches an edge of the part, at which a path has no single normal.
 """
 PLACES = ("below", "above", "+x", "-x", "+y")
 SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep", ".stl", ".obj", ".shl", ".ply", ".off")
