@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.dynamics.mimic import leader_of, mimics
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.scenario.balance import least_friction
 from sphshell_pin.scenario.tips import Tip
@@ -71,8 +72,10 @@ class Hand:
         self._frames = [find_frame(model, tip.frame) for tip in tips]
         parents = [int(model.frames[one].parentJoint) for one in self._frames]
         chain = {int(j) for parent in parents for j in model.supports[parent]} - {0}
-        self.joints = tuple(sorted(chain))
-        """Joints that move a tip."""
+        rules = mimics(model)
+        leaders = {int(model.getJointId(leader_of(rules, model.names[j]))) for j in chain}
+        self.joints = tuple(sorted(leaders))
+        """Joints that move a tip, without those that mimic them."""
         self.low, self.high = np.full(model.nq, -np.inf), np.full(model.nq, np.inf)
         for j in self.joints:
             joint = model.joints[j]

@@ -14,6 +14,8 @@ import numpy.typing as npt
 import pinocchio as pin
 import trimesh
 
+from sphshell_pin.dynamics.joints import JointIngredients
+from sphshell_pin.dynamics.mimic import mimics
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, end_spheres, load_file
 from sphshell_pin.scenario.balance import least_friction
@@ -27,6 +29,7 @@ from sphshell_pin.scenario.plan import GRAVITY, bearable, hertz_stiffness
 from sphshell_pin.scenario.primitives import Ball, Box, Cylinder, Primitive
 from sphshell_pin.scenario.run import simulate
 from sphshell_pin.scenario.schema import RobotSection, ShellSection
+from sphshell_pin.scenario.search import stated_kinds
 from sphshell_pin.scenario.tips import Tip, floats
 from sphshell_pin.shell.shell import Shell
 
@@ -45,6 +48,8 @@ _MOST_RUNS, _DURATION, _SETTLED = 6, 1.5, 0.4
 # How far the part may move in that time, in radii, and how well the largest force is held.
 _MOVED, _HELD = 0.2, 0.05
 _NO_LIMIT = 1e9
+# What may keep fingers from pressing as their motors do.
+_BRAKES = ("friction", "damping")
 
 
 @dataclass(frozen=True)
@@ -171,7 +176,9 @@ def hold_in_hand(
     mu, _ = friction_between(*materials)
     total = _SAFETY * part.mass * GRAVITY / mu if press is None else 2.0 * press
     hand_geometry = built.assembly.loaded[0].collision_model
-    lock = tuple(model.names[j] for j in range(1, model.njoints) if j not in hand.joints)
+    rules = mimics(model)
+    moving = {model.names[j] for j in hand.joints}
+    lock = tuple(name for name in list(model.names)[1:] if name not in rules and name not in moving)
     links = Links(model, hand_geometry, shell, tips, lock)
     touching = SelfContact(model, hand_geometry, built.assembly.q0)
     blocked: list[str] = []
@@ -196,6 +203,7 @@ def hold_in_hand(
     if not found:
         raise _no_grasp(shell, len(tips), blocked)
     reuse = _with_part(built, section, part, name)
+    kinds = stated_kinds(model, lock)
     fault = ""
     for one in found[:_MOST_RUNS]:
         grasp = _pressed(one, part, press, mu)
@@ -203,11 +211,12 @@ def hold_in_hand(
         fault = draft.fault()
         if fault:
             continue
-        text = draft.text()
-        made = make(text, reuse)
-        fault = _try(made, draft, links)
-        if not fault:
-            return Held(text, part.urdf(), made, draft.why())
+        for joints in draft.choices(kinds):
+            text = draft.text(joints)
+            made = make(text, reuse)
+            fault = _try(made, draft, links)
+            if not fault:
+                return Held(text, part.urdf(), made, draft.why(kinds, joints))
     raise SphshellError(
         f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {fault}; a lighter "
         "--against, another --press, or a smaller part"
@@ -317,8 +326,16 @@ class _Draft:
         found = self.hand.close_on(self.grasp.q, self.surface, self.grasp.placement, -depths)
         return self.grasp.q if found is None else found[0]
 
-    def text(self) -> str:
-        """Return the scenario's text."""
+    def choices(self, kinds: list[str]) -> list[list[str]]:
+        """Return what may act in the joints: what the file states, then without what brakes."""
+        free = [kind for kind in kinds if kind not in _BRAKES]
+        pushes = float(np.abs(self.hand.torques(self.grasp)).max())
+        dry = JointIngredients.from_model(self.hand.model, ["friction"]).friction.values()
+        stuck = any(one.torque > pushes for one in dry)
+        return [free] if stuck or free == kinds else [kinds, free]
+
+    def text(self, joints: list[str]) -> str:
+        """Return the scenario's text, with `joints` of what the robot's file states."""
         model, grasp, hand = self.hand.model, self.grasp, self.hand
         kp, kd = self.gains()
         drawn = pin.integrate(model, self.pressed_in(), hand.torques(grasp) / kp)
@@ -329,11 +346,9 @@ class _Draft:
         damping = 0.2 * math.sqrt(slope * self.part.mass / len(hand.tips))
         place = grasp.placement
         root = [*place.translation.tolist(), *pin.Quaternion(place.rotation).coeffs().tolist()]
-        source = f"name = {_toml(self.section.name)}"
-        if self.section.path is not None:
-            source = f"urdf = {_toml(self.section.path)}"
-            if self.section.package_dirs:
-                source += f"\npackage_dirs = {_toml(self.section.package_dirs)}"
+        stated = self.section.model_dump(exclude_defaults=True)
+        keys = ("name", "urdf", "file", "package_dirs", "xacro_args")
+        source = "\n".join(f"{key} = {_toml(stated[key])}" for key in keys if key in stated)
         if self.lock:
             source += f"\nlock = {_toml(list(self.lock))} # they move no fingertip"
         surface = self.shell.model_dump(exclude_defaults=True, exclude={"frame", "placement"})
@@ -356,6 +371,7 @@ title = {_toml(f"{len(hand.tips)} fingertips hold {self.shell.name}")}
 [[robot]]
 {source}
 label = "hand"
+joints = {_toml(joints)}
 
 # All fingertips are {1e3 * GAP:g} mm away from the part.
 [robot.start]
@@ -436,8 +452,11 @@ max = 0.0
 "energy.relative_residual" = {{ max = 1e-3 }}
 """
 
-    def why(self) -> tuple[str, ...]:
+    def why(self, kinds: list[str], joints: list[str]) -> tuple[str, ...]:
         """Return one sentence for each choice that was made."""
+        left_out = [kind for kind in kinds if kind not in joints]
+        note = f"the joints' {' and '.join(left_out)}, which the file states, is left out: with it "
+        notes = (note + "the fingers do not press as they should",) if left_out else ()
         one, other = self.materials
         frames = ", ".join(f"'{tip.frame}'" for tip in self.hand.tips)
         used = self.grasp.friction / friction_between(one, other)[0]
@@ -448,6 +467,7 @@ max = 0.0
             f"use {100 * used:.0f} % of the friction",
             f"law and friction of {one.name} on {other.name}, typical values: --law and --against "
             "name others",
+            *notes,
         )
 
 

@@ -181,7 +181,7 @@ def _press(
             update={
                 "lock": list(stance.lock),
                 "start": start,
-                "joints": _stated_kinds(model, stance.lock),
+                "joints": stated_kinds(model, stance.lock),
             }
         )
         try:
@@ -196,7 +196,7 @@ def _press(
     raise _refusal(tip, request, tried)
 
 
-def _stated_kinds(model: pin.Model, lock: Sequence[str]) -> list[str]:
+def stated_kinds(model: pin.Model, lock: Sequence[str]) -> list[str]:
     """Return what the model states of the joints that move, as `[robot] joints` lists it."""
     return list(JointIngredients.from_model(model).without(lock).kinds())
 
@@ -280,7 +280,7 @@ def _drop(
         pair = request.materials(tips, mass / len(tips))
         plan = plan_stand(shell, tuple(tips), centers, mass, inertia, leg, pair)
     links = Links(model, built.assembly.loaded[0].collision_model, shell, tips, ())
-    section = section.model_copy(update={"joints": _stated_kinds(model, ())})
+    section = section.model_copy(update={"joints": stated_kinds(model, ())})
     tried = _Tried(postures=1)
     while True:
         text, made = draft(section, plan)
