@@ -65,9 +65,9 @@ at 5 places (`--place below`, `above`, `+x`, `-x`, `+y`; a robot that floats has
 scenario that it wrote was read again, run, and judged by its own expectations: it touches, the
 force is within 5 %, the energy adds up. No link was in the part: tried with Coal at 300 rows of
 its run, and in another way with the corners of the links' meshes and the signed distance of closed
-parts. `make new-study FOLDER=...` repeats it with the parts of a folder, `python -m
-benchmarks.new_study FOLDER --write` wrote this page. A cell says how many places got a scenario
-that works.
+parts. `make new-study FOLDER=...` repeats it with the parts of a folder; `python -m
+benchmarks.new_study FOLDER` takes some robots with `--robots`, and writes this page with `--write`.
+A cell says how many places got a scenario that works.
 
 The parts are CAD files of other projects, from 3 mm to 41 m; one of 3.5 mm is smaller than each
 sphere.
@@ -75,9 +75,9 @@ sphere.
 NOTES = """
 Looked at one by one: `three_link_finger` moves in the plane of x and z, so `+y` is refused. The
 legs of `a1` and `solo12` need a ground for four feet; the refused parts are under one or two of
-them, or stand up between them. The palm of the Allegro hand is beside a finger that points down and
-touches a part that is wider than the finger; a finger that points up is nearly stretched, and does
-not hold a force along itself.
+them, or stand up between them. The palm, or other fingers, of the Allegro hand are beside the
+finger that touches, and would be in a part that is wider than it. Where its force is not held,
+the sphere touches an edge of the part, at which a path has no single normal.
 """
 PLACES = ("below", "above", "+x", "-x", "+y")
 SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep", ".stl", ".obj", ".shl", ".ply", ".off")

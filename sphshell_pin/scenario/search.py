@@ -96,6 +96,14 @@ class _Tried:
     """Why they are."""
     errors: list[SphshellError] = field(default_factory=list)
 
+    def leave_out(self, kind: str, fault: Fault) -> None:
+        """Leave one more kind of what the file states of the joints out, for this `fault`."""
+        self.without = (*self.without, kind)
+        self.note = (
+            f"what the file states of the joints' {' and '.join(self.without)} is left out: with "
+            f"it {fault.text}"
+        )
+
 
 def find_working(
     section: RobotSection, built: Built, tips: Sequence[Tip], request: Request, draft: Draft
@@ -210,13 +218,16 @@ def _first_working(
             if fault is None:
                 return text, built, one
             tried.faults.append(fault)
-            if fault.kind != "links" and "friction" in section.joints and not tried.without:
-                tried.without = ("friction",)
-                tried.note = "the joints' dry friction, which the file states, is left out: with "
-                tried.note += f"it {fault.text}"
-                queue = [one, *queue]
+            left = [] if fault.kind in ("links", "run") else _without(section, one).joints
+            if "friction" in left:
+                tried.leave_out("friction", fault)
+                queue = [plan]
             elif not queue and one.repair == "":
                 queue = _repairs(one, fault)
+            elif not queue and "damping" in left:
+                # The tip creeps to the surface, or drags behind.
+                tried.leave_out("damping", fault)
+                queue = [plan]
         if runs >= _MOST_OF_STANCE or tried.runs >= _MOST_RUNS:
             return None
     return None
