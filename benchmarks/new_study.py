@@ -72,6 +72,13 @@ that works.
 The parts are CAD files of other projects, from 3 mm to 41 m; one of 3.5 mm is smaller than each
 sphere.
 """
+NOTES = """
+Looked at one by one: `three_link_finger` moves in the plane of x and z, so `+y` is refused. The
+legs of `a1` and `solo12` need a ground for four feet; the refused parts are under one or two of
+them, or stand up between them. The palm of the Allegro hand is beside a finger that points down and
+touches a part that is wider than the finger; a finger that points up is nearly stretched, and does
+not hold a force along itself.
+"""
 PLACES = ("below", "above", "+x", "-x", "+y")
 SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep", ".stl", ".obj", ".shl", ".ply", ".off")
 UNITS = {".stl": "mm", ".obj": "mm", ".brep": "mm", ".ply": "mm", ".off": "mm"}
@@ -244,7 +251,7 @@ def report(cases: Sequence[Case]) -> str:
     reasons = Counter(reason(case.refused) for case in cases if case.refused)
     lines += ["", "| refused because | cases |", "|---|---|"]
     lines += [f"| {text} | {count} |" for text, count in reasons.most_common()]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n" + NOTES
 
 
 def reason(text: str) -> str:
@@ -254,6 +261,7 @@ def reason(text: str) -> str:
         ("is in the part", "a link comes into the part in each run that was tried"),
         ("cannot move", "the joints cannot move the tip that way"),
         ("is not held", "the force is not held"),
+        ("never touches", "the sphere does not come to the surface"),
         ("is not carried", "the weight is not carried"),
         ("less than the sphere's radius", "the part is smaller than the sphere"),
         ("effort limits", "the joints are too weak"),

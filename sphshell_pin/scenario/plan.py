@@ -42,7 +42,7 @@ LEAD_IN = 0.5
 # Turns of the part about the approach, tried in this order [rad], and how many places are kept
 # where the sphere touches no single face.
 _YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
-_MOST_UNEVEN = 3
+_MOST_UNEVEN = 1
 # Places and turns at which links are held against the part.
 _MOST_TRIED = 250
 # How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in

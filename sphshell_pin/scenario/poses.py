@@ -123,12 +123,12 @@ def _turned(
         seed = start if k == 0 else _seed(model, start, moving, rng)
         q = _point_limb(model, seed, moving, tip, first.approach)
         stance, mobility = _stance(model, q, first.lock, tip, first.approach, best_way=False)
-        if mobility < _EASY or stance.ahead <= _BESIDE or touching(q):
+        if mobility < _MOBILE or stance.ahead <= _BESIDE or touching(q):
             continue
         away = float(np.linalg.norm(pin.difference(model, start, q)))
         if all(np.linalg.norm(pin.difference(model, one.q, q)) > _APART for _, one in found):
             found.append((away, replace(stance, bent=True)))
-    found.sort(key=lambda one: one[0])
+    found.sort(key=lambda one: (one[1].mobility < _EASY, one[0]))
     return [_with_room(one, tip) for _, one in found[:_MOST_STANCES]]
 
 

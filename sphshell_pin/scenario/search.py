@@ -279,7 +279,9 @@ def _drop(
             return text, made, plan
         tried.faults.append(fault)
         end = float(f"{_BEFORE * fault.t:.2g}")
-        if fault.kind != "links" or end < _SHORTEST or tried.runs >= _MOST_OF_STANCE:
+        # What can stand has to stand.
+        falls = fault.kind == "links" and (plan.control is None or len(plan.tips) < 3)
+        if not falls or end < _SHORTEST or tried.runs >= _MOST_OF_STANCE:
             raise _refusal(tips[0], request, tried, floating=True)
         note = f"the run ends after {end:g} s, before link '{fault.link}' comes down on the surface"
         plan = replace(plan, duration=end, why=(*plan.why, note))
@@ -310,7 +312,7 @@ def _refusal(tip: Tip, request: Request, tried: _Tried, *, floating: bool = Fals
             "joints do not allow it; take another --place or --frame"
         )
     if tried.faults:
-        fault = tried.faults[0]
+        fault = tried.faults[-1]
         when = f" at t = {fault.t:.2g} s" if fault.link else ""
         advice = _ADVICE_FLOATING if floating else _ADVICE[fault.kind]
         return SphshellError(

@@ -68,16 +68,28 @@ def find_touch_point(
 def touch_points(
     shell: Shell, radius: float, gap: float, *, toward: Array | None = None, inside: bool = False
 ) -> Iterator[TouchPoint]:
-    """Yield touch points: that of `find_touch_point`, then others farther and farther from it."""
+    """Yield touch points: that of `find_touch_point`, then others farther and farther from it.
+
+    Without `toward` those on the six sides of the surface's box follow.
+    """
     yield find_touch_point(shell, radius, gap, toward=toward, inside=inside)
-    half = 0.5 * (shell.box[1] - shell.box[0])
     for part in _PARTS:
-        for signs in itertools.product((0, 1, -1), repeat=3):
-            if any(signs):
-                aside = part * half * np.array(signs)
-                yield find_touch_point(
-                    shell, radius, gap, toward=toward, inside=inside, beside=aside
-                )
+        yield from _around(shell, radius, gap, part, toward, inside=inside)
+    if toward is None:
+        for side in (*np.eye(3)[::-1], *-np.eye(3)[::-1]):
+            yield find_touch_point(shell, radius, gap, toward=side)
+            yield from _around(shell, radius, gap, _PARTS[1], side, inside=False)
+
+
+def _around(
+    shell: Shell, radius: float, gap: float, part: float, toward: Array | None, *, inside: bool
+) -> Iterator[TouchPoint]:
+    """Yield touch points beside the middle, by `part` of half the box along its axes."""
+    half = 0.5 * (shell.box[1] - shell.box[0])
+    for signs in itertools.product((0, 1, -1), repeat=3):
+        if any(signs):
+            aside = part * half * np.array(signs)
+            yield find_touch_point(shell, radius, gap, toward=toward, inside=inside, beside=aside)
 
 
 def touches_once(

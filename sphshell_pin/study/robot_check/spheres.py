@@ -79,7 +79,8 @@ def _on_mesh(subject: Subject, model: pin.Model, end: str, why: str) -> Tip | No
             continue
         least = max(_DUMMY, 0.25 * max(one.radius for one in made.spheres))
         for one in made.spheres:
-            far = float(np.linalg.norm(frame.placement.act(np.array(one.offset)))) + one.radius
+            out = np.linalg.norm(frame.placement.act(np.array(one.offset)))
+            far = round(float(out) + one.radius, 9)  # of two fingers that are alike the first
             if one.radius >= least and far > reach:
                 said = (
                     f"{why}: the sphere is the outermost of {len(made.spheres)} inside the "
