@@ -50,13 +50,22 @@ class Held:
 def every_tip(
     robot: LoadedRobot, frame: str | None, radius: float | None, place: str | None
 ) -> list[Tip]:
-    """Return all fingertips of `robot`; SphshellError for options that belong to a single one."""
+    """Return all fingertips of `robot`.
+
+    SphshellError for fewer than two, and for options that belong to a single one.
+    """
     for option, value in (("--frame", frame), ("--radius", radius), ("--place", place)):
         if value is not None:
             raise SphshellError(f"{option} belongs to a single tip: leave it out with --tips all")
+    spheres = end_spheres(robot)
+    if len(spheres) < 2:
+        raise SphshellError(
+            "--tips all needs two fingertips or more, spheres in the collision geometry of links "
+            f"that carry no further joint; this robot has {len(spheres)}"
+        )
     return [
         Tip(one.frame, one.radius, np.array(one.offset), "the sphere of its collision geometry")
-        for one in end_spheres(robot)
+        for one in spheres
     ]
 
 
@@ -83,11 +92,6 @@ def hold_in_hand(
     model = built.assembly.model
     if floats(model):
         raise SphshellError("a hand with a free root cannot hold a part: leave out --free-flyer")
-    if len(tips) < 2:
-        raise SphshellError(
-            f"--tips all needs two fingertips or more; the collision geometry of this robot has "
-            f"{len(tips)} with a sphere"
-        )
     (shell,) = built.shells.values()
     part = Part.of(shell, materials[1])
     hand = Hand(model, tips)
