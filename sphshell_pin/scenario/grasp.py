@@ -19,11 +19,13 @@ from sphshell_pin.shell.shell import Shell
 Array = npt.NDArray[np.float64]
 
 # Hands that are tried: random postures, and how many of them, the best, get a part.
-_POSTURES, _BEST = 4000, 60
+_POSTURES, _BEST = 8000, 60
 # Of a posture: the tips stand in front of the thumb within this part of their distance to it.
 _UNEVEN = 0.35
 # Of a finger's last link, the least part of it that points to the part between the tips.
 _INWARD = 0.1
+# How much fingers differ from each other, as a part of the joints' ranges.
+_ALIKE = 0.1
 # Part of a joint's range that is left free at its ends.
 _MARGIN = 0.05
 # Of the inverse kinematics: steps, damping [m^2], longest step [rad], gap's tolerance [m].
@@ -70,7 +72,7 @@ class Hand:
         self.radii = np.array([tip.radius for tip in tips])
         self._data = model.createData()
         self._frames = [find_frame(model, tip.frame) for tip in tips]
-        parents = [int(model.frames[one].parentJoint) for one in self._frames]
+        self._ends = parents = [int(model.frames[one].parentJoint) for one in self._frames]
         chain = {int(j) for parent in parents for j in model.supports[parent]} - {0}
         rules = mimics(model)
         leaders = {int(model.getJointId(leader_of(rules, model.names[j]))) for j in chain}
@@ -85,6 +87,13 @@ class Hand:
                 if np.isfinite(low) and np.isfinite(high) and low < high:
                     room = _MARGIN * (high - low)
                     self.low[joint.idx_q], self.high[joint.idx_q] = low + room, high - room
+
+    def ranks(self) -> list[list[int]]:
+        """Return the coordinates that move each tip alone, from the tip on."""
+        chains = [set(map(int, self.model.supports[one])) & set(self.joints) for one in self._ends]
+        own = [chain - set().union(*(c for c in chains if c is not chain)) for chain in chains]
+        joints = self.model.joints
+        return [[joints[j].idx_q for j in sorted(one, reverse=True)] for one in own]
 
     def centers(self, q: Array) -> Array:
         """Return the centers (k, 3) [m] of the tips' spheres."""
@@ -253,25 +262,31 @@ def _postures(
     rng = np.random.default_rng(0)
     found: list[tuple[float, Array, int]] = []
     bounded = np.isfinite(hand.low) & np.isfinite(hand.high)
-    for _ in range(_POSTURES):
+    low, high = hand.low[bounded], hand.high[bounded]
+    ranks = hand.ranks()
+    for k in range(_POSTURES):
+        thumb = k % len(hand.tips)
+        # Fingers close alike, the thumb by itself.
+        parts, alike = rng.uniform(size=(2, hand.model.nq))
+        for one, chain in enumerate(ranks):
+            if one != thumb:
+                parts[chain] = alike[: len(chain)] + rng.normal(0, _ALIKE, len(chain))
         q = q0.copy()
-        q[bounded] = rng.uniform(hand.low[bounded], hand.high[bounded])
+        q[bounded] = low + np.clip(parts[bounded], 0, 1) * (high - low)
         centers, limbs = hand.centers(q), hand.limbs()
-        for thumb in range(len(centers)):
-            others = np.delete(centers, thumb, axis=0)
-            across = others.mean(axis=0) - centers[thumb]
-            width = float(np.linalg.norm(across))
-            if width < 4 * hand.radii.max():
-                continue
-            depth = (others - centers[thumb]) @ across / width
-            uneven = float(np.ptp(depth)) / width
-            inward = -limbs @ across / width
-            inward[thumb] *= -1
-            if inward.min() < _INWARD:
-                continue
-            beside = np.linalg.norm(np.diff(others, axis=0), axis=1).min(initial=np.inf)
-            if uneven < _UNEVEN and beside > 2 * hand.radii.max():
-                found.append((uneven, q, thumb))
+        others = np.delete(centers, thumb, axis=0)
+        across = others.mean(axis=0) - centers[thumb]
+        width = float(np.linalg.norm(across))
+        if width < 4 * hand.radii.max():
+            continue
+        depth = (others - centers[thumb]) @ across / width
+        uneven = float(np.ptp(depth)) / width
+        inward = -limbs @ across / width
+        inward[thumb] *= -1
+        beside = np.linalg.norm(np.diff(others, axis=0), axis=1).min(initial=np.inf)
+        apart = beside > 2 * hand.radii.max()
+        if uneven < _UNEVEN and inward.min() > _INWARD and apart:
+            found.append((uneven, q, thumb))
     found.sort(key=lambda one: one[0])
     yield from (one for one in found if free_of_itself(one[1]))
 

@@ -18,9 +18,10 @@ from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import is_path
 from sphshell_pin.scenario.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.drafting import draft_text
-from sphshell_pin.scenario.hand import every_tip, hold_in_hand, part_file, word_primitive
+from sphshell_pin.scenario.hand import every_tip, hold_in_hand
 from sphshell_pin.scenario.knobs import check_knobs
 from sphshell_pin.scenario.materials import find_material
+from sphshell_pin.scenario.part import part_file, word_primitive
 from sphshell_pin.scenario.plan import Hold, Plan, Press
 from sphshell_pin.scenario.primitives import Ball, Box, Cylinder, HalfSpace, Primitive
 from sphshell_pin.scenario.reading import parse_scenario

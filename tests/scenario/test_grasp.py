@@ -12,9 +12,10 @@ from sphshell_pin.errors import ScenarioError, SphshellError
 from sphshell_pin.scenario import build, judge
 from sphshell_pin.scenario.balance import least_friction, nonnegative
 from sphshell_pin.scenario.grasp import Grasp, Hand
-from sphshell_pin.scenario.hand import GAP, Part
+from sphshell_pin.scenario.hand_text import GAP
 from sphshell_pin.scenario.materials import find_material
 from sphshell_pin.scenario.new import new_scenario
+from sphshell_pin.scenario.part import Part
 from sphshell_pin.scenario.primitives import Box, Cylinder
 from sphshell_pin.scenario.run import simulate
 from sphshell_pin.scenario.tips import Tip
@@ -206,6 +207,24 @@ def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
     assert np.allclose(-forces[log.row == last].sum(axis=0), [0, 0, 9.81 * mass], atol=0.02)
 
 
+def test_fingers_that_mimic_others_hold_too(tmp_path):
+    """Two fingers move as one; the file's dry friction would keep them from pressing."""
+    file = gripper(tmp_path)
+    text = file.read_text(encoding="utf-8")
+    for link in ("upper", "lower"):
+        at = text.index("</joint>", text.index(f'<joint name="right_{link}_hinge"'))
+        text = f'{text[:at]}<mimic joint="left_{link}_hinge"/>{text[at:]}'
+    text = text.replace("</joint>", '<dynamics damping="0" friction="5"/></joint>')
+    file.write_text(text, encoding="utf-8")
+    made = new_scenario(file, "cylinder", tips="all", against="plastic", out=out(tmp_path))
+    assert any("without friction" in one for one in made.why)
+    built = build(made.path)
+    assert built.scene.model.nv == 4 + 6
+    assert built.scenario.robot[0].joints == ["limits", "effort", "speed"]
+    result, _ = simulate(built)
+    assert [one.figure for one in judge(built, result) if not one.met] == []
+
+
 @pytest.mark.parametrize(
     ("options", "why"),
     [
@@ -213,6 +232,7 @@ def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
         ({"place": "below"}, "--place belongs to a single tip"),
         ({"radius": 0.01}, "--radius belongs to a single tip"),
         ({"robot": "three_link_finger"}, "needs two fingertips or more"),
+        ({"robot": "turntable"}, "this robot has 0"),
         ({"against": "steel", "press": 500.0}, "no grasp .* works"),
         ({"unit": "m", "surface": "large"}, "cannot hold a part of 400 x 400 x 400 mm"),
     ],
