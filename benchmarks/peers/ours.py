@@ -16,6 +16,7 @@ from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
 from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Impact, Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
 from sphshell_pin.dynamics.advance import advance, start_run
+from sphshell_pin.dynamics.sensors import SensorSet
 
 Array = NDArray[np.float64]
 # Bristles are so much stiffer than the contact: what rolls should not slip.
@@ -97,6 +98,7 @@ def timed(simulation: sp.Simulation, q0: Array, v0: Any, duration: float, contro
         None,
         record_dt=duration,
         t0=0.0,
+        sensors=SensorSet((), simulation.scene),
     )
     with CpuClock() as clock:
         advance(core)

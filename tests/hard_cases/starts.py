@@ -157,17 +157,26 @@ def singular() -> Verdicts:
 
 @case("joint driven past its limit")
 def limits() -> Verdicts:
-    """Limits are not modeled: that is said, and the joint goes on."""
+    """Without joint ingredients it goes on, and that is said; with limits it comes to its stop."""
     model = robots.load("three_link_finger").model
-    scene = sp.Scene(model)
     q = np.array([0.2, 0.6, 0.4])
-    beyond = np.array([0.2, -0.3, 0.4])
-    said = any("joint limits" in line for line in scene.explain(q).not_modelled)
+    gain, beyond = 0.5, np.array([0.2, -0.3, 0.4])
+    bare = sp.Scene(model)
+    said = any("limits" in line for line in bare.explain(q).not_modelled)
     yield at_most("joint limit", "explain", "says not modelled", float(not said), 0)
+    joints = sp.JointIngredients.from_model(model, ["limits"])
+    lower, stop = float(model.lowerPositionLimit[1]), joints.limits[model.names[2]].law
+    # The springs of motor and stop, which is linear, in balance.
+    stiffness = stop.normal_stiffness(1e-3)
+    held = (stiffness * lower + gain * beyond[1]) / (stiffness + gain)
     for integrator in (sp.Adaptive(), sp.Implicit(), sp.SemiImplicitEuler(1e-4)):
-        result = sp.Simulation(scene, integrator).run(
-            q, duration=2.0, controller=sp.JointPD(0.5, 0.01, beyond), record_dt=2.0
-        )
-        tried = f"{type(integrator).__name__}, limit {model.lowerPositionLimit[1]:g} rad"
-        angle = float(result.q[-1, 1])
-        yield compare("joint limit", tried, "goes on [rad]", -0.3, angle, 1e-3)
+        tried = f"{type(integrator).__name__}, limit {lower:g} rad"
+        for scene, expected, what in (
+            (bare, -0.3, "goes on [rad]"),
+            (sp.Scene(model, joints=joints), held, "is held [rad]"),
+        ):
+            result = sp.Simulation(scene, integrator).run(
+                q, duration=2.0, controller=sp.JointPD(gain, 0.01, beyond), record_dt=2.0
+            )
+            angle = float(result.q[-1, 1])
+            yield compare("joint limit", tried, what, expected, angle, 1e-3)
