@@ -324,7 +324,10 @@ class _Reader:
         elif "diaginertia" in element.attrib:
             moments = np.diag(numbers(element.attrib["diaginertia"], 3))
         turned = pose.rotation @ moments @ pose.rotation.T
-        return pin.Inertia(number(element.attrib["mass"], 0.0), pose.translation, turned)
+        mass, even = number(element.attrib["mass"], 0.0), 0.5 * (turned + turned.T)
+        if not np.isfinite(even).all():
+            raise ValueError(f"the <inertial> of body '{body}' is too large to compute with")
+        return pin.Inertia(mass, pose.translation, even)
 
     def _pose(self, stated: Mapping[str, str]) -> pin.SE3:
         return pin.SE3(rotation(stated, self.compiler), numbers(stated.get("pos", "0 0 0"), 3))

@@ -24,6 +24,8 @@ def numbers(text: str, count: int | None = None) -> Array:
         found = np.array([float(one) for one in text.split()])
     except ValueError:
         raise ValueError(f"'{text}' are no numbers") from None
+    if not np.isfinite(found).all():
+        raise ValueError(f"'{text}' should be finite")
     if count is not None and len(found) != count:
         raise ValueError(f"'{text}' should be {count} number{'s' if count > 1 else ''}")
     return found

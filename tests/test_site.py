@@ -1,4 +1,4 @@
-"""The documentation site: builds without a warning, asks nobody for anything, and is complete."""
+"""The documentation site: builds without a warning, makes no external requests, and is complete."""
 
 from __future__ import annotations
 

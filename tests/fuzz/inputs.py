@@ -64,6 +64,7 @@ _CORPORA = {
     "toml": tables.toml_corpus,
     "journal": tables.journal_corpus,
     "urdf": tables.urdf_corpus,
+    "mjcf": tables.mjcf_corpus,
 }
 
 KINDS: dict[str, tuple[str, Callable[[random.Random], bytes]]] = {
@@ -72,6 +73,7 @@ KINDS: dict[str, tuple[str, Callable[[random.Random], bytes]]] = {
     "toml": (".toml", _table("toml", tables.damaged_toml)),
     "journal": (".journal", _table("journal", tables.damaged_journal)),
     "urdf": (".urdf", _table("urdf", tables.damaged_urdf)),
+    "mjcf": (".xml", _table("mjcf", tables.damaged_mjcf)),
 }
 """By kind of file: the suffix, and what makes a damaged one."""
 TURNS = (*KINDS, "npz", "toml", "npz")  # the reader with the most to check comes more often

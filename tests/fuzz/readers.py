@@ -71,14 +71,14 @@ def _read_journal(path: Path) -> None:
 
 def _read_robot(path: Path) -> None:
     fault = None
-    for load in (load_subject, robots.load_urdf):
+    for load in (load_subject, robots.load_file):
         try:
             loaded = load(str(path))
         except SphshellError as error:
             fault = error  # the other one has to refuse it, or read it, as well
             continue
         robot = getattr(loaded, "robot", loaded)
-        scene = sp.Scene(robot.model)
+        scene = sp.Scene(robot.model, joints=sp.JointIngredients.from_model(robot.model))
         pin.forwardKinematics(scene.model, scene.model.createData(), robot.q0)
         robots.end_spheres(robot)
     if fault is not None:
@@ -90,4 +90,5 @@ _READERS = {
     ".toml": _read_scenario,
     ".journal": _read_journal,
     ".urdf": _read_robot,
+    ".xml": _read_robot,
 }

@@ -323,9 +323,24 @@ def urdf_corpus() -> tuple[bytes, ...]:
     return tuple(data for data in every if b"<mesh" not in data)
 
 
+def mjcf_corpus() -> tuple[bytes, ...]:
+    folder = Path(__file__).parents[1] / "data" / "mjcf"
+    every = (path.read_bytes() for path in sorted(folder.glob("*.xml")))
+    return tuple(data for data in every if b"<mesh" not in data and b"<include" not in data)
+
+
 def damaged_urdf(rng: random.Random) -> bytes:
     """Return a robot some of whose elements, attributes and names were changed."""
-    root = ET.fromstring(rng.choice(urdf_corpus()))
+    return _damaged(rng, urdf_corpus())
+
+
+def damaged_mjcf(rng: random.Random) -> bytes:
+    """Return a robot as MuJoCo describes it, damaged in the same way."""
+    return _damaged(rng, mjcf_corpus())
+
+
+def _damaged(rng: random.Random, corpus: tuple[bytes, ...]) -> bytes:
+    root = ET.fromstring(rng.choice(corpus))
     for _ in range(rng.choice((1, 1, 2, 3))):
         parents = [one for one in root.iter() if len(one)]
         every = list(root.iter())

@@ -108,7 +108,7 @@ class Journal:
             return
         try:
             empty = not self._file.execute("SELECT count(*) FROM runs").fetchone()[0]
-        except sqlite3.Error:
+        except (sqlite3.Error, UnicodeDecodeError):  # of a damaged file, even the error's text
             empty = False
         self._file.close()
         if empty:
