@@ -218,7 +218,8 @@ def _first_working(
             if fault is None:
                 return text, built, one
             tried.faults.append(fault)
-            left = [] if fault.kind in ("links", "run") else _without(section, one).joints
+            kept = fault.kind in ("links", "run") or fault.excess
+            left = [] if kept else _without(section, one).joints
             if "friction" in left:
                 tried.leave_out("friction", fault)
                 queue = [plan]

@@ -38,6 +38,8 @@ class Fault:
     t: float = 0.0
     """When [s]."""
     link: str = ""
+    excess: bool = False
+    """Whether the force is too large: nothing in the joints keeps it off."""
 
 
 def try_out(built: Built, plan: Plan, links: Links) -> Fault | None:
@@ -97,7 +99,8 @@ def _force_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
         return Fault("force", f"{what}: nothing touches at t = {t[after][k]:.3g} s")
     mean = float(held.mean())
     if abs(mean / force - 1) > HELD:
-        return Fault("force", f"{what}: the surface bears {mean:.3g} N on average")
+        text = f"{what}: the surface bears {mean:.3g} N on average"
+        return Fault("force", text, excess=mean > force)
     if off.mean() > _SHAKEN:
         k = int(np.argmax(np.abs(held / force - 1)))
         return Fault(
