@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from collections import defaultdict
 from xml.parsers import expat
 
@@ -29,6 +30,17 @@ def check_memory(model: pin.Model) -> pin.Model:
             f"{MOST_MEMORY * 1e-9:g} GB; fix some joints, or build the pinocchio.Model yourself"
         )
     return model
+
+
+def parsed(text: bytes) -> ET.Element:
+    """Return the root element of XML that `check_size` has passed; ValueError where it has faults.
+
+    The parser knows namespaces, which `check_size` does not look at.
+    """
+    try:
+        return ET.fromstring(text)
+    except ET.ParseError as error:
+        raise ValueError(f"it is not well-formed XML: {error}") from None
 
 
 def check_size(text: bytes) -> str:

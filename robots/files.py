@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.mimic import Mimic
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots.description import check_memory, check_size
+from sphshell_pin.robots.description import check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def read(
             raise RobotError(f"{file}: {_reason('.sdf')}")
         if tag not in ("robot", "mujoco"):
             raise ValueError(f"its root element is <{tag}>; {_NEXT}")
-        root = ET.fromstring(text)
+        root = parsed(text)
         if tag == "mujoco":
             from sphshell_pin.robots.mjcf import plain as in_plain_form
 
@@ -139,7 +139,7 @@ def read(
             )
         _check_tree(root)
         return Description(file, folders, root, tuple(_mimics(root)))
-    except (ValueError, OSError, LookupError) as error:
+    except (ValueError, OSError, LookupError, RuntimeError) as error:  # the last: Pinocchio's
         if isinstance(error, SphshellError):
             raise
         raise RobotError(f"{file}: not a {what} that can be read: {_line(error)}") from None

@@ -9,7 +9,7 @@ frame and unit is resolved, every body states its inertia and has one joint, whi
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -95,6 +95,16 @@ class Plain:
 def plain(root: ET.Element, file: Path) -> Plain:
     """Return the plain form of an MJCF; ValueError says what in it cannot be read."""
     return _Reader(root, file).read()
+
+
+def _check_name(what: str, name: str, known: Collection[str]) -> None:
+    """Raise ValueError for a name that is known, or that Pinocchio takes for the world."""
+    if name in known:
+        raise ValueError(f"its name '{name}' is that of more than one {what}")
+    if name == "universe":
+        raise ValueError(
+            f"a {what} is called 'universe', as Pinocchio calls the world: give it another name"
+        )
 
 
 class _Reader:
@@ -200,6 +210,7 @@ class _Reader:
     ) -> None:
         """Add a body, and those on it: one for each of its joints, the last is the body itself."""
         name = body.get("name") or f"{parent}_body{len(self.parents)}"
+        _check_name("body", name, self.parents)
         childclass = body.get("childclass", childclass)
         self.parents[name], self.joints_of[name] = parent, []
         if number(body.get("gravcomp"), 0.0):
@@ -281,6 +292,8 @@ class _Reader:
             raise ValueError(f"a joint of body '{body}' is of an unknown type, '{kind}'")
         usual = f"{body}_joint{order or ''}" if kind != "free" else f"{body}_free"
         name = stated.get("name", usual)
+        known = [one for joints in self.joints_of.values() for one in joints]
+        _check_name("joint", name, known)
         self.nq += _COUNT[kind]
         self.joints_of[body].append(name)
         made = ET.Element("joint", name=name, type=kind)

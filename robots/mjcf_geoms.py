@@ -165,5 +165,8 @@ def geom_inertia(
         "box": lambda m, x, y, z: pin.Inertia.FromBox(m, 2 * x, 2 * y, 2 * z),
         "ellipsoid": pin.Inertia.FromEllipsoid,
     }
-    weight = float(density * volumes[made.attrib["type"]](*size)) if mass is None else mass
+    try:
+        weight = float(density * volumes[made.attrib["type"]](*size)) if mass is None else mass
+    except OverflowError:
+        raise ValueError(f"a geom of body '{body}' is too large to compute with: {size}") from None
     return inertias[made.attrib["type"]](weight, *size)

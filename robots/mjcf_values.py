@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.robots.description import check_size
+from sphshell_pin.robots.description import check_size, parsed
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def include(element: ET.Element, file: Path, open_files: list[Path]) -> None:
             raise ValueError(f"it includes {stated}, which includes itself")
         text = found.read_bytes()
         check_size(text)
-        root = ET.fromstring(text)
+        root = parsed(text)
         include(root, file, [*open_files, found.resolve()])
         element[k : k + 1] = list(root)
 

@@ -374,7 +374,7 @@ def _xml_attribute(rng: random.Random, parent: ET.Element, other: ET.Element) ->
         other.attrib[name] = " ".join(words * rng.choice((1, 1, 2)))
     elif way == 2:
         other.attrib[name] = rng.choice(
-            ("", "base", "tip", "universe", "root_joint", "floating", "x")
+            ("", "base", "tip", "universe", "root_joint", "world", "floating", "x")
         )
     else:
         value = odd_value(rng)
