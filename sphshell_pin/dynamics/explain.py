@@ -171,11 +171,13 @@ def _joints_modelled(scene: Scene) -> list[str]:
 
 def _joints_stated(scene: Scene) -> list[str]:
     """List what the model states of its joints and the scene leaves out."""
-    out = []
     # In ABA the model's armature acts anyhow.
-    for kind in (one for one in WHICH if one != "armature"):
-        stated = getattr(JointIngredients.from_model(scene.model, [kind], _ANY_LAW), kind)
-        left_out = [name for name in stated if name not in getattr(scene.joints, kind)]
+    kinds = [one for one in WHICH if one != "armature"]
+    stated = JointIngredients.from_model(scene.model, kinds, _ANY_LAW)
+    out = []
+    for kind in stated.kinds():
+        modelled = getattr(scene.joints, kind)
+        left_out = [name for name in getattr(stated, kind) if name not in modelled]
         if left_out:
             out.append(f"{_JOINT_KINDS[kind]} that the robot's file states, of {_names(left_out)}")
     return out

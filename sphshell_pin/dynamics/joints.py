@@ -136,7 +136,7 @@ class JointIngredients:
             if one not in WHICH:
                 raise NameNotFound("kind", one, "JointIngredients.from_model", WHICH)
         found: dict[str, dict[str, object]] = {one: {} for one in WHICH}
-        inertia = joint_inertia(model) if {"limits"} & set(wanted) and law is None else None
+        inertia = joint_inertia(model) if "limits" in wanted and law is None else None
         for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
             if not joint.nv:
                 continue
@@ -184,11 +184,6 @@ class JointIngredients:
             others = {k: v for k, v in getattr(self, one).items() if k != joint}
             parts[one] = others if value is None else {**others, joint: value}
         return replace(self, **parts)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Joints that are named, each once."""
-        return tuple(dict.fromkeys(name for one in WHICH for name in getattr(self, one)))
 
     def kinds(self) -> tuple[str, ...]:
         """Those of WHICH that some joint has."""
