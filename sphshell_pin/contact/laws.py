@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import cast
 
 from sphshell_pin import _core
 from sphshell_pin.contact.normal_law import NormalLaw, bisect
@@ -121,8 +122,7 @@ class ImpactLaw(_PowerLaw, kind="impact"):
         stated = Hertz(
             young_1, poisson_1, young_2, poisson_2, restitution, speed, radius_2, radius=radius
         )
-        law: ImpactLaw | HuntCrossleyLaw = stated.made()
-        return law
+        return cast(ImpactLaw | HuntCrossleyLaw, stated.made())
 
     @property
     def text(self) -> str:

@@ -158,8 +158,8 @@ def _beyond_hertz(result: Result) -> tuple[str, ...]:
     first = {e.pair: e.t for e in reversed(result.events) if e.kind == "beyond_hertz"}
     return tuple(
         f"contact '{pair}': from t = {t:.4g} s Hertz's theory does not hold: the ellipse of "
-        "contact is more than half as long as the sphere, or a socket fits it closely; make it stiffer, or "
-        "take a law for thick contacts, such as FoundationLaw"
+        "contact is more than half as long as the sphere, or a socket fits the sphere closely; "
+        "make the bodies stiffer, or take a FoundationLaw"
         for pair, t in first.items()
     )
 
