@@ -6,15 +6,18 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from sphshell_pin.checks import check_not_negative
+from sphshell_pin.checks import check_not_negative, check_type
 from sphshell_pin.contact.friction import Coefficients
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import parameter
 
 __all__ = ["BristleFriction", "MindlinFriction"]
 
 # Bristles stick below this part of Stribeck's speed: almost nothing moves.
 STICKING_SHARE = 0.01
+# As many as the compiled core knows.
+MOST_RINGS = 8
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,7 @@ class BristleFriction(Coefficients, kind="bristle"):
         torsional: bool = False,
         rolling: float = 0.0,
         rolling_speed: float = 1e-3,
+        rings: int = 1,
     ) -> MindlinFriction:
         """Build the bristle whose stiffness follows from the bodies' materials and the contact.
 
@@ -110,6 +114,7 @@ class BristleFriction(Coefficients, kind="bristle"):
             torsional,
             rolling,
             rolling_speed,
+            rings,
         )
 
 
@@ -121,7 +126,8 @@ class MindlinFriction(Coefficients, kind="mindlin"):
     of radius a = sqrt(radius depth): k = 8 G* a, 1/G* = (2 - nu_1)/G_1 + (2 - nu_2)/G_2, with the
     shear moduli G = E / (2 (1 + nu)). While the bodies approach, the force is kept (the new rim of
     the disc carries none of it); while they part, it falls with k. So no path in load and slip
-    gains energy. All of the disc sticks or slips at once: there is no annulus of micro-slip.
+    gains energy. With one of `rings` all of the disc sticks or slips at once; with several each of
+    them for itself, so that micro-slip grows inwards from the rim.
 
     `torsional`: against spin about the normal the stiffness is 16/3 G a^3, 1/G = 1/G_1 + 1/G_2,
     with the limit that BristleFriction has. `rolling`: against rolling the moment is
@@ -184,6 +190,20 @@ class MindlinFriction(Coefficients, kind="mindlin"):
         label="rolling friction speed",
         help="speed of rolling, radius times rad/s, from which on it is whole; below, it creeps",
     )
+    rings: int = parameter(
+        1,
+        at_least=1,
+        at_most=MOST_RINGS,
+        help="1 to 8: of the disc, each with a state; for micro-slip",
+    )
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for a value outside its bounds."""
+        super().__post_init__()
+        must = f"must be a whole number in [1, {MOST_RINGS}]"
+        check_type("rings", self.rings, int, must)
+        if isinstance(self.rings, bool) or not 1 <= self.rings <= MOST_RINGS:
+            raise InvalidParameter("rings", self.rings, must)
 
     @cached_property
     def _moduli(self) -> tuple[float, float]:
@@ -203,22 +223,28 @@ class MindlinFriction(Coefficients, kind="mindlin"):
         return self._moduli[1] * check_not_negative("disc", disc, "m") ** 3
 
     @property
+    def state_size(self) -> int:
+        """Three numbers for each ring."""
+        return 3 * self.rings
+
+    @property
     def needs_radius(self) -> bool:
         """True: the disc of contact depends on it."""
         return True
 
     def numbers(self) -> list[float]:
         """Return the parameters as the compiled core takes them, moduli for the materials."""
-        more = self.v_stribeck, self.damping_time, self.torsional, self.rolling, self.rolling_speed
-        return [self.mu_static, self.mu_dynamic, *self._moduli, *map(float, more)]
+        names = ["v_stribeck", "damping_time", "torsional", "rolling", "rolling_speed", "rings"]
+        more = [float(getattr(self, name)) for name in names]
+        return [self.mu_static, self.mu_dynamic, *self._moduli, *more]
 
     @property
     def text(self) -> str:
         """Parameters in one line."""
         spin = ", and against spin" if self.torsional else ""
-        rolling = ""
+        rolling = f"; {self.rings} rings of the disc slip apart" if self.rings > 1 else ""
         if self.rolling:
-            rolling = (
+            rolling += (
                 f"; rolling friction {self.rolling:g} from {self.rolling_speed:g} m/s, creeps below"
             )
         return (

@@ -35,6 +35,11 @@ class Friction(Ingredient):
         return self.core.has_state
 
     @property
+    def state_size(self) -> int:
+        """How many numbers the state of a contact has."""
+        return 3 * self.has_state
+
+    @property
     def sticking_speed(self) -> float:
         """Slip speed [m/s] below which a contact sticks."""
         raise NotImplementedError

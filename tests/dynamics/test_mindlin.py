@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 import sphshell_pin as sp
 from sphshell_pin import _core
+from sphshell_pin.dynamics.open_run import OpenRun
 from sphshell_pin.errors import InvalidParameter
 from tests import meshes, models
 from tests.bounces import bounce
@@ -89,13 +91,15 @@ def held_ball(joint: pin.JointModel, depth: float, friction, inertia: pin.Inerti
 
 @pytest.mark.parametrize("integrator", [sp.Adaptive(1e-10), sp.Implicit(1e-8)], ids=str)
 @pytest.mark.parametrize("twist", [False, True])
-def test_a_ball_swings_on_its_bristle(twist: bool, integrator) -> None:  # type: ignore[no-untyped-def]
+@pytest.mark.parametrize("rings", [1, 5])
+def test_a_ball_swings_on_its_bristle(rings: int, twist: bool, integrator) -> None:  # type: ignore[no-untyped-def]
     depth, inertia = 1e-3, pin.Inertia.FromSphere(1.0, R)
+    friction = replace(STICKS, rings=rings)
     stiffness = STICKS.tangential_stiffness(disc(depth)) / inertia.mass
     if twist:
         stiffness = STICKS.torsional_stiffness(disc(depth)) / inertia.inertia[2, 2]
     period = 2 * math.pi / math.sqrt(stiffness)
-    scene = held_ball(pin.JointModelRZ() if twist else pin.JointModelPX(), depth, STICKS, inertia)
+    scene = held_ball(pin.JointModelRZ() if twist else pin.JointModelPX(), depth, friction, inertia)
     run = sp.Simulation(scene, integrator).run([0.0], [1e-3], 3 * period, record_dt=period / 8)
     exact = 1e-3 * np.cos(2 * math.pi * run.t / period)
     assert run.v[:, 0] == pytest.approx(exact, abs=1e-9)
@@ -198,6 +202,11 @@ def test_no_closed_path_gains_energy(seed: int, mu: float) -> None:
     assert work[-1] < -1e-3 * size_of_work
 
 
+# The ball of models.ball, r 50 mm, 1 kg: some 5 mm deep.
+SOFT = (1e6, 0.4)
+DEEP_LAW = sp.ImpactLaw.hertz(0.05, *SOFT, *SOFT)
+
+
 ALUMINA_GLASS = (380e9, 0.23, 70e9, 0.25)
 BALL, DENSITY, MU, SPEED = 2.5e-3, 4000.0, 0.092, 3.9
 ELASTIC = sp.ImpactLaw.hertz(BALL, *ALUMINA_GLASS)
@@ -242,6 +251,94 @@ def test_what_micro_slip_adds() -> None:
     assert ratios[1] == pytest.approx([0.774, 0.736, 0.637, 0.590, 0.592, 0.622, 0.681], abs=1e-3)
 
 
+@pytest.mark.parametrize("rings", [1, 2, 8])
+def test_rings_against_the_theory(rings: int) -> None:
+    degrees = np.array([5, 10, 20, 28])
+    psi = KAPPA * np.tan(np.radians(degrees)) / MU
+    theory = 1 + 2 / 7 * (oblique.rings(psi, KAPPA, rings, steps=20_000) / psi - 1)
+    friction = replace(KHARAZ, rings=rings)
+    runs = [thrown(one, 0.0039, friction=friction) for one in degrees]
+    assert [one.tangential for one in runs] == pytest.approx(theory, abs=1e-4)
+    for one in runs:
+        energy = one.result.energy
+        assert np.abs(energy.residual).max() < 1e-8 * energy.exchanged
+        assert np.diff(energy.friction_loss).min() > -1e-8 * energy.exchanged
+
+
+def test_rings_converge_to_micro_slip() -> None:
+    """The figures of docs/laws.md: rms of v_t' / v_t against Maw et al.'s theory."""
+    psi = KAPPA * np.tan(np.radians([2.0, 5, 10, 15, 20, 25, 30, 40, 60, 80])) / MU
+    exact = oblique.micro_slip(psi, KAPPA, steps=20_000)
+    errors = [
+        2 / 7 * (oblique.rings(psi, KAPPA, n, steps=20_000) - exact) / psi for n in (1, 2, 4, 8)
+    ]
+    rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
+    assert rms == pytest.approx([0.0581, 0.0333, 0.0158, 0.0073], abs=1e-4)
+
+
+@pytest.mark.parametrize(("rings", "bound"), [(2, 0.08), (4, 0.025), (8, 0.007)])
+def test_loading_curve_of_mindlin(rings: int, bound: float) -> None:
+    """At constant load F = mu N (1 - (1 - s / s_0)^1.5), s_0 = 3 mu N / (2 k).
+
+    A mass comes in at a speed and stops where the curve has taken its energy, at 0.8 s_0.
+    """
+    depth = 1e-3
+    friction = sp.BristleFriction.mindlin(0.5, None, *RUBBER, *STEEL, rings=rings)
+    limit = 0.5 * LAW.normal_force(depth)
+    s_0 = 1.5 * limit / friction.tangential_stiffness(disc(depth))
+    taken = limit * s_0 * (0.8 + 0.4 * (0.2**2.5 - 1))
+    scene = held_ball(pin.JointModelPX(), depth, friction, pin.Inertia.FromSphere(1.0, R))
+    speed = math.sqrt(2 * taken)
+    run = sp.Simulation(scene, sp.Adaptive(1e-9)).run([0.0], [speed], 4 * s_0 / speed)
+    assert run.q.max() == pytest.approx(0.8 * s_0, rel=bound)
+    force = run.contacts.friction_force_world[:, 0]
+    before = run.t <= run.t[np.argmax(run.q)]
+    exact = -limit * (1 - (1 - np.minimum(run.q[before, 0] / s_0, 1)) ** 1.5)
+    assert force[before] == pytest.approx(exact, abs=bound * limit)
+
+
+def test_spheres_that_were_stated_together_have_rings_of_their_own() -> None:
+    """Two spheres of one entry share the room for new contacts: as if they were stated apart."""
+    ends = []
+    for together in (True, False):
+        scene = sp.Scene(models.ball())
+        friction = sp.BristleFriction.mindlin(0.3, None, *SOFT, rings=4, torsional=True)
+        spheres = [sp.Sphere(0.02, "ball", offset=(x, 0.0, -0.03)) for x in (-0.02, 0.02)]
+        if together:
+            scene.add_contacts(spheres, models.plate(), law=DEEP_LAW, friction=friction)
+        else:
+            for one in spheres:
+                scene.add_contact(one, models.plate(), law=DEEP_LAW, friction=friction)
+        run = sp.Simulation(scene, sp.RungeKutta4(1e-4)).run(
+            models.free_q([0, 0, 0.055]), [0.3, 0.1, -0.5, 1.0, 2.0, 3.0], 0.2
+        )
+        assert run.stats.pairs[scene.pairs[0].name].touches > 0
+        ends.append(np.concatenate([run.q[-1], run.v[-1]]))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-10)
+
+
+def test_rings_are_whole_numbers() -> None:
+    for wrong in (0, 9, 2.0, True):
+        with pytest.raises(
+            InvalidParameter, match=r"rings = .* must be a whole number in \[1, 8\]"
+        ):
+            replace(KHARAZ, rings=wrong)
+
+
+def test_a_run_goes_on_with_as_many_rings() -> None:
+    def scene(**more: float) -> sp.Scene:
+        friction = replace(STICKS, **more)  # type: ignore[arg-type]
+        return models.on_plate(models.ball(), DEEP_LAW, friction)
+
+    now = scene(rings=2)
+    run = OpenRun(sp.Simulation(now, sp.Adaptive()), models.free_q([0, 0, 0.045]), record_dt=0.01)
+    changed = now.with_pairs((replace(now.pairs[0], friction=replace(STICKS, rings=3)),))
+    assert not run.change(changed)
+    changed = now.with_pairs((replace(now.pairs[0], friction=replace(STICKS, rings=2, young=5e6)),))
+    assert run.change(changed)
+    assert len(run.advance(0.05).t) > 1
+
+
 @pytest.mark.parametrize("restitution", [1.0, 0.98])
 @pytest.mark.parametrize("degrees", [35, 50, 70, 85])
 def test_gross_sliding(degrees: float, restitution: float) -> None:
@@ -261,18 +358,15 @@ def test_gross_sliding(degrees: float, restitution: float) -> None:
         assert out.spin == pytest.approx(2.5 * lost * (BALL - mean) / BALL**2, rel=1e-6)
 
 
-# The ball of models.ball, r 50 mm, 1 kg: some 5 mm deep.
-SOFT = (1e6, 0.4)
-DEEP_LAW = sp.ImpactLaw.hertz(0.05, *SOFT, *SOFT)
-
-
 @pytest.mark.parametrize(("integrator", "order"), [(sp.SemiImplicitEuler, 1), (sp.RungeKutta4, 4)])
 @pytest.mark.parametrize("parts", [False, True])
-def test_order_of_convergence(integrator, order: int, parts: bool) -> None:  # type: ignore[no-untyped-def]
+@pytest.mark.parametrize("rings", [1, 3])
+def test_order_of_convergence(integrator, order: int, parts: bool, rings: int) -> None:  # type: ignore[no-untyped-def]
     """The ball sticks, spins and rolls while the depth grows, or falls, all the time."""
     friction = sp.BristleFriction.mindlin(
-        5.0, None, *SOFT, torsional=True, damping_time=1e-3, rolling=0.01, rolling_speed=10.0
-    )
+        5.0, None, *SOFT, torsional=True, damping_time=1e-3, rolling=0.01, rolling_speed=10.0,
+        rings=rings,
+    )  # fmt: skip
     scene = models.on_plate(models.ball(gravity=0.0), DEEP_LAW, friction)
     depth = 0.008 if parts else 0.003
     v = np.array([0.02, -0.03, 0.05 if parts else -0.5, 0.3, 0.2, 1.0])
@@ -362,12 +456,15 @@ class TestRolling:
         assert run.q[-1, 0] - run.q[-2, 0] == pytest.approx(0.1 * share * 0.01, rel=1e-3)
 
 
-def test_friction_is_continuous_over_a_groove() -> None:
+@pytest.mark.parametrize("rings", [1, 3])
+def test_friction_is_continuous_over_a_groove(rings: int) -> None:
     """Where contacts split and merge; and friction gives nothing back."""
     shell = sp.Shell(*meshes.v_groove(math.radians(5), size=2.0, cells=6))
     scene = sp.Scene(models.ball(radius=0.1))
     law = sp.HuntCrossleyLaw(3e5, 1.5, 0.5)
-    friction = sp.BristleFriction.mindlin(0.4, 0.3, 1e6, 0.4, torsional=True, damping_time=1e-4)
+    friction = sp.BristleFriction.mindlin(
+        0.4, 0.3, 1e6, 0.4, torsional=True, damping_time=1e-4, rings=rings
+    )
     scene.add_contact(sp.Sphere(0.1, "ball"), shell, law=law, friction=friction)
     height = 0.1 / math.cos(math.radians(5)) + 0.02 * math.tan(math.radians(5)) - 5e-4
     jumps = []
@@ -393,7 +490,7 @@ def test_energy_of_random_rolls(seed: int) -> None:
     shell = sp.Shell(vertices * [1, 1, -1] + height[:, None] * [0, 0, 1], triangles)
     scene = sp.Scene(models.ball(radius=0.1))
     friction = sp.BristleFriction.mindlin(
-        0.3, 0.25, 1e6, 0.4, torsional=bool(seed % 2), rolling=0.01 * (seed // 2)
+        0.3, 0.25, 1e6, 0.4, torsional=bool(seed % 2), rolling=0.01 * (seed // 2), rings=1 + seed
     )
     law = sp.HuntCrossleyLaw(3e5, 1.5, 0.3)
     scene.add_contact(sp.Sphere(0.1, "ball"), shell, law=law, friction=friction)
@@ -415,6 +512,10 @@ def test_a_wrench_needs_the_radius() -> None:
     still = pin.Motion.Zero()
     with pytest.raises(InvalidParameter, match="must be a BristleState, which holds"):
         sp.contact_wrench(np.zeros(3), UP, 1e-4, still, still, LAW, STICKS)
+    with pytest.raises(InvalidParameter, match=r"rings = 2 must be 1"):
+        sp.contact_wrench(
+            np.zeros(3), UP, 1e-4, still, still, LAW, replace(STICKS, rings=2), sp.BristleState(R)
+        )
     plain = sp.BristleFriction.mindlin(0.5, 0.4, *RUBBER)
     with pytest.raises(InvalidParameter, match="must be the sphere's, of Mindlin's friction"):
         sp.contact_wrench(np.zeros(3), UP, 1e-4, still, still, LAW, plain, sp.BristleState())
