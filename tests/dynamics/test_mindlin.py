@@ -14,10 +14,12 @@ from scipy.integrate import solve_ivp
 import sphshell_pin as sp
 from sphshell_pin import _core
 from sphshell_pin.dynamics.open_run import OpenRun
-from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.errors import InvalidParameter, ScenarioError
+from sphshell_pin.scenario import build
 from tests import meshes, models
 from tests.bounces import bounce
 from tests.oracle import oblique
+from tests.scenario import files
 
 R = 0.02
 RUBBER, STEEL = (4e6, 0.48), (2.1e11, 0.3)
@@ -407,10 +409,11 @@ def test_nothing_creeps_on_a_slope(integrator) -> None:  # type: ignore[no-untyp
     assert run.q[-1, 0] == pytest.approx(stretch, rel=1e-3)
 
 
-def test_a_spin_dies_out_at_the_moment_limit() -> None:
+@pytest.mark.parametrize("rings", [1, 4])
+def test_a_spin_dies_out_at_the_moment_limit(rings: int) -> None:
     """M = 3 pi / 16 mu N a."""
     depth = 1e-3
-    friction = sp.BristleFriction.mindlin(0.4, None, *RUBBER, *STEEL, torsional=True)
+    friction = sp.BristleFriction.mindlin(0.4, None, *RUBBER, *STEEL, torsional=True, rings=rings)
     inertia = pin.Inertia.FromSphere(1.0, R)
     scene = held_ball(pin.JointModelRZ(), depth, friction, inertia)
     moment = 3 * math.pi / 16 * 0.4 * LAW.normal_force(depth) * disc(depth)
@@ -500,6 +503,20 @@ def test_energy_of_random_rolls(seed: int) -> None:
     energy = sp.Simulation(scene, sp.Adaptive(1e-8)).run(q, v, 0.5).energy
     assert np.abs(energy.residual).max() < 1e-5 * energy.exchanged
     assert np.diff(energy.friction_loss).min() > -1e-6 * energy.exchanged
+
+
+def test_a_scenario_states_it(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    stated = 'friction = { type = "mindlin", mu_static = 0.5, mu_dynamic = 0.4, young = 5e6, '
+    stated += "poisson = 0.48, young_2 = 2.1e11, poisson_2 = 0.3, torsional = true, rings = 4 }"
+    text = files.DROP.replace("damping = 20.0 }", "damping = 20.0 }\n" + stated)
+    built = build(files.write(tmp_path, text), {"contact.ball-plate.friction.young": "6e6"})
+    (pair,) = built.scene.pairs
+    materials = 6e6, 0.48, 2.1e11, 0.3
+    assert pair.friction == sp.BristleFriction.mindlin(
+        0.5, 0.4, *materials, torsional=True, rings=4
+    )
+    with pytest.raises(ScenarioError, match=r"rings"):
+        build(files.write(tmp_path, text.replace("rings = 4", "rings = 9")), {})
 
 
 def test_a_source_has_no_radius() -> None:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 
 #include <Eigen/Geometry>
 
@@ -113,15 +114,6 @@ struct Sticking {
   static S arm_of(const S& a) {
     return 3 * M_PI / 16 * a;
   }
-
-  // Friction and torsion of a force whose part along the normal acts on the arm.
-  template <class S>
-  static void split(ContactForce<S>& out, const ContactKinematics<S>& m, const Vector3<S>& all,
-                    const S& arm) {
-    const S along = all.dot(m.normal);
-    out.friction = all - along * m.normal;
-    out.torsion = arm * along;
-  }
 };
 
 // An elastic, perfectly plastic spring between sphere and shell (Dupont et al. 2002; Stribeck's
@@ -164,7 +156,10 @@ struct BristleFriction : Sticking {
     const Vector3<S> held = in_ball(stretched, limit) / stiffness;
     out.stretch2 = held.squaredNorm();
     out.bristle_rate = w - (z - held) / relaxation;
-    split(out, m, Vector3<S>(-in_ball(Vector3<S>(stretched + damping * w), limit)), arm);
+    const Vector3<S> all = -in_ball(Vector3<S>(stretched + damping * w), limit);
+    const S along = all.dot(m.normal);
+    out.friction = all - along * m.normal;
+    out.torsion = arm * along;
   }
 };
 
@@ -182,7 +177,8 @@ inline constexpr int kMostRings = 8;
 // With several rings each sticks or slips for itself, as in Mindlin's theory. By the method of
 // dimensionality reduction (Popov and Hess 2015) the disc is a row of independent springs at x in
 // (0, a), of stiffness 8 G* dx, 16 G x^2 dx and of a limit in proportion to (a^2 - x^2) dx. A ring
-// holds those between two shares of a. Where the shares move over the springs they pass from ring
+// holds those between two shares of a; its limit of the moment is that of Hertz's pressure between
+// them. Where the shares move over the springs they pass from ring
 // to ring with the mean stretch of the ring that they leave: the upwind scheme of finite volumes,
 // in which one ring is the law above, and which cannot gain energy, as a mean stretch holds less.
 struct MindlinFriction : Sticking {
@@ -190,7 +186,12 @@ struct MindlinFriction : Sticking {
   double shear, twist;            // 8 G*, 16/3 G [Pa]
   double damping_time;            // of a damper beside the spring, over its stiffness [s]
   double rolling, rolling_speed;  // 1, [m/s]
-  double axial;                   // k / a of a spring on the arm that twists like the disc [Pa]
+  struct Ring {
+    double inner, rim;    // of a
+    double width, limit;  // of the disc's
+    double cube, arm;     // of the disc's stiffness against spin, of its arm
+  };
+  std::array<Ring, kMostRings> parts;
 
   explicit MindlinFriction(const Numbers& p)
       : Sticking{p.at(0), p.at(1), p.at(4), p.at(6) != 0, static_cast<int>(p.at(9))},
@@ -198,11 +199,18 @@ struct MindlinFriction : Sticking {
         twist(p.at(3)),
         damping_time(p.at(5)),
         rolling(p.at(7)),
-        rolling_speed(p.at(8)),
-        axial(twist / (arm_of(1.0) * arm_of(1.0))) {}
-
-  // Where a ring begins, as a share of a.
-  double edge(int ring) const { return double(ring) / rings; }
+        rolling_speed(p.at(8)) {
+    // Of the moment of Hertz's pressure within r, over that of all of it.
+    const auto moment = [](double r) {
+      return (std::asin(r) - r * (1 - 2 * r * r) * std::sqrt(1 - r * r)) / M_PI_2;
+    };
+    for (int i = 0; i < rings; ++i) {
+      const double inner = double(i) / rings, rim = double(i + 1) / rings;
+      const double width = rim - inner, cube = rim * rim * rim - inner * inner * inner;
+      const double limit = 1.5 * (width - cube / 3);
+      parts[i] = {inner, rim, width, limit, cube, (moment(rim) - moment(inner)) / limit};
+    }
+  }
 
   double stretch(const Vec3& z, const Vec3& normal, double stiffness) const {
     const double a = stiffness / shear, along = z.dot(normal);
@@ -220,48 +228,51 @@ struct MindlinFriction : Sticking {
     if (!(a > 0)) return;
     const Vector3<S>& n = m.normal;
     const S growth = -0.5 * n.dot(m.relative) / m.depth;  // a' / a
-    const S arm = torsional ? arm_of(a) : S(0);
-    Vector3<S> w = out.slip;
-    if (torsional) w += arm * m.spin * n;
-    const S limit = stribeck(S(w.squaredNorm())) * out.normal;
+    const S disc_arm = torsional ? arm_of(a) : S(0);
+    const S speed2 = out.slip.squaredNorm() + (disc_arm * m.spin) * (disc_arm * m.spin);
+    const S limit = stribeck(speed2) * out.normal;
     out.stiffness = shear * a;
 
-    // A force, its part along the normal on the arm, times two factors.
+    // A force, its part along the normal on an arm, times two factors.
     const auto scaled = [&](const Vector3<S>& x, const S& across, const S& along) -> Vector3<S> {
       const Vector3<S> part = x.dot(n) * n;
       return across * (x - part) + along * part;
     };
-    Vector3<S> all = Vector3<S>::Zero();
     if (m.outer_rate) std::fill_n(m.outer_rate, rings - 1, Vector3<S>::Zero());
     for (int i = 0; i < rings; ++i) {
-      const double inner = edge(i), rim = edge(i + 1);
-      const double width = rim - inner, cube = rim * rim * rim - inner * inner * inner;
-      const S most = limit * (1.5 * (width - cube / 3));
+      const Ring& part = parts[i];
+      const S arm = part.arm * disc_arm, most = part.limit * limit;
+      Vector3<S> w = out.slip;
+      if (torsional) w += arm * m.spin * n;
       const Vector3<S> z = i == 0 ? m.bristle : m.outer ? m.outer[i - 1] : Vector3<S>::Zero();
       const Vector3<S> load = scaled(z, S(shear), torsional ? S(shear / arm) : S(0));
       const Vector3<S> held = in_ball(load, most);
-      const double k = shear * width, k_along = axial * cube;
+      // Over a, across the normal and, on the arm, along it.
+      const double unit_arm = part.arm * arm_of(1.0);
+      const double k = shear * part.width, k_along = twist * part.cube / (unit_arm * unit_arm);
       out.stretch2 += scaled(held, S(1 / k), S(1 / k_along)).dot(held) / (shear * a * a);
 
       const double stiffest = torsional ? std::max(k, k_along) : k;
       const Vector3<S> slip = a * w - (load - held) / (stiffest * relaxation);
-      rate(out, m, i) += scaled(slip, S(width), S(arm * (k_along / shear)));
+      rate(out, m, i) += scaled(slip, S(part.width), S(arm * (k_along / shear)));
       // What leaves the ring over the edge that moves into it.
       const bool grows = growth > 0;
-      const double share = grows ? inner : rim;
-      if (share > 0) {
+      const double edge = grows ? part.inner : part.rim;
+      if (edge > 0) {
         const S g = (grows ? growth : S(-growth)) / shear;
-        const Vector3<S> left =
-            scaled(held, S(g * (share / width)), S(g * arm * (3 * share * share * share / cube)));
+        const Vector3<S> left = scaled(held, S(g * (edge / part.width)),
+                                       S(g * arm * (3 * edge * edge * edge / part.cube)));
         rate(out, m, i) -= left;
         if (grows || i + 1 < rings) rate(out, m, grows ? i - 1 : i + 1) += left;
       }
       Vector3<S> damped = load;
       if (damping_time > 0)
         damped += scaled(w, S(k * damping_time * a), S(k_along * damping_time * a));
-      all -= in_ball(damped, most);
+      const Vector3<S> all = -in_ball(damped, most);
+      const S along = all.dot(n);
+      out.friction += all - along * n;
+      out.torsion += arm * along;
     }
-    split(out, m, all, arm);
   }
 
   template <class S>
