@@ -31,14 +31,13 @@ def page(ran: list[tuple[Case, Outcome]]) -> str:
     """Return the whole page: a table of all cases, then a section for each."""
     rows = [
         (
-            f"[{one.title}](#{one.key.replace('_', '-')})",
+            f"[{one.title}](#{anchor(one.title)})" if k == 0 else "",
             f.what,
             f.text,
-            bound(f),
-            verdict(found, f),
+            *judged(found, f),
         )
         for one, found in ran
-        for f in found.findings
+        for k, f in enumerate(found.findings)
     ]
     names = ("case", "figure", "ours: error", "bound", "verdict")
     table = Table("validation", "", columns(*names), rows)
@@ -50,16 +49,12 @@ def anchor(title: str) -> str:
     return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
-def bound(finding: Finding) -> str:
-    """Return the bound as the table shows it."""
-    return finding.aim_text.removeprefix("at most ")
-
-
-def verdict(found: Outcome, finding: Finding) -> str:
-    """Return "within" or "explained", or nothing where there is no bound."""
+def judged(found: Outcome, finding: Finding) -> tuple[str, str]:
+    """Return the bound and whether the figure is within it; nothing where there is none."""
     if finding.met is None:
-        return ""
-    return "within" if finding.met else "explained" if finding.key in found.explained else "OUT"
+        return "", ""
+    out = "explained" if finding.key in found.explained else "OUT"
+    return finding.aim_text.removeprefix("at most "), "within" if finding.met else out
 
 
 def section(one: Case, found: Outcome) -> str:
