@@ -26,7 +26,7 @@ from sphshell_pin.study.report.page import Heading
 
 Array = NDArray[np.float64]
 
-MODULES = ("chung_ooi_normal",)
+MODULES = ("chung_ooi_normal", "kharaz", "chung_ooi_spin")
 """In the order of the page."""
 HEADING = Heading(
     "sphshell_pin: against published experiments",
@@ -66,7 +66,7 @@ class Case:
     """One comparison: `source` is a citation with its address, `files` are names of csv files.
 
     `bound` says where the bounds of the figures come from; `leaves_out` what the theory does not
-    hold.
+    hold; `reading` how data were read that no file has.
     """
 
     key: str
@@ -78,11 +78,12 @@ class Case:
     files: Sequence[str]
     run: Callable[[], Outcome]
     slow: bool = False
+    reading: str = ""
 
     @property
     def data(self) -> str:
         """How the data were read, as their files say."""
-        return " ".join(read(name).origin for name in self.files)
+        return " ".join(filter(None, [self.reading, *(read(name).origin for name in self.files)]))
 
     @property
     def texts(self) -> dict[str, str]:
@@ -129,15 +130,17 @@ def case(
     setting: str,
     bound: str,
     leaves_out: str,
-    files: Sequence[str],
+    files: Sequence[str] = (),
     slow: bool = False,
+    reading: str = "",
 ) -> Callable[[Callable[[], Outcome]], Callable[[], Outcome]]:
     """Decorate the function that runs a case; the case joins those of its module."""
 
     def register(run: Callable[[], Outcome]) -> Callable[[], Outcome]:
         if key in _CASES:
             raise ValueError(f"two cases are called {key!r}")
-        _CASES[key] = Case(key, title, source, setting, bound, leaves_out, files, run, slow)
+        texts = source, setting, bound, leaves_out
+        _CASES[key] = Case(key, title, *texts, files, run, slow, reading)
         return run
 
     return register
