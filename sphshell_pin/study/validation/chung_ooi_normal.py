@@ -124,8 +124,8 @@ STATED = (0.2, 0.4, 0.6, 0.8, 1.0)
     "Restitution (Chung and Ooi, test 3)",
     source=f"{PAPER}3: spheres of aluminum oxide and cast iron on a rigid plane, 3.9 m/s.",
     setting="Radius 2.5 mm; oxide: E 380 GPa, Poisson's ratio 0.23, density 4000 kg/m^3; cast "
-    "iron: 100 GPa, 0.25, 7000 kg/m^3; restitutions 0.2 to 1. Zero, which the benchmark has too, is left "
-    "out: Hunt and Crossley's law has no dissipation for it.",
+    "iron: 100 GPa, 0.25, 7000 kg/m^3; restitutions 0.2 to 1. Zero, which the benchmark has "
+    "too, is left out: Hunt and Crossley's law has no dissipation for it.",
     reading="What comes back is what was stated. Parameters from YADE's script of the test "
     "(Test3.py, V. Angelidakis and others, 2023); the points of the figure were not found.",
     bound="One millionth: the law is stated by its restitution, and the run has a tolerance.",
