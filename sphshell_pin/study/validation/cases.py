@@ -12,7 +12,7 @@ from __future__ import annotations
 import csv
 import importlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -36,9 +36,10 @@ HEADING = Heading(
 )
 DATA = Path("tests", "data", "validation")
 NOT_FOUND = (
-    "D. Gugan, Inelastic collision and the Hertz theory of impact, Am. J. Phys. 68 (2000) 920, and "
-    "R. Cross, The bounce of a ball (1999), on contact times: only their beginnings could be read, "
-    "not the measured times.",
+    "D. Gugan, Inelastic collision and the Hertz theory of impact, Am. J. Phys. 68 (2000) 920; "
+    "R. Cross, The bounce of a ball (1999); T. Pozar and others, Optical detection of impact contact "
+    "times, Experimental Mechanics 57 (2017) 1225, all on contact times: only their beginnings could "
+    "be read, not the measured times.",
     "C. Guettler and others, Normal collisions of spheres, arXiv 1204.0001, on restitution against "
     "speed: its digitised points are files of their own, which could not be read.",
 )
@@ -111,7 +112,11 @@ class Case:
         return Section(
             self.key,
             self.title,
-            findings=list(found.findings),
+            # Those on top of the page stand there without their section.
+            findings=[
+                replace(f, what=f"{self.title}: {f.what}") if f.headline else f
+                for f in found.findings
+            ],
             pictures=list(found.pictures),
             tables=list(found.tables),
             notes=[*stated, *found.notes, *explanations(found)],

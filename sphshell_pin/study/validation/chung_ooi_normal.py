@@ -133,7 +133,8 @@ STATED = (0.2, 0.4, 0.6, 0.8, 1.0)
 )
 def restitution() -> Outcome:
     """Run test 3."""
-    findings, ours = [], []
+    findings: list[Finding] = []
+    ours = []
     for name, young, poisson, density in (
         ("aluminum oxide", 3.8e11, 0.23, 4000.0),
         ("cast iron", 1e11, 0.25, 7000.0),

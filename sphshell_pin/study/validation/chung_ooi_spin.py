@@ -46,7 +46,8 @@ def sliding() -> Outcome:
     data = read("chung_ooi_5")
     spheres = {"steel": STEEL, "polyethylene": POLYETHYLENE}
     x = np.concatenate([np.linspace(0.05, 6.0, 25), [8.0, 10.0, 13.0]])
-    findings, panels, explained = [], [], {}
+    findings: list[Finding] = []
+    panels, explained = [], {}
     for quantity in ("recoil", "spin"):
         chosen = data.where("quantity", quantity)
         for name, compared in (("fem", STEEL), *spheres.items()):
@@ -132,7 +133,8 @@ HOW_MUCH = (
 def _spinning(key: str, spheres: dict[str, Setting]) -> Outcome:
     """Compare beta and recoil; the sliding points for themselves, as there only mu counts."""
     data = read(key)
-    findings, panels, explained = [], [], {}
+    findings: list[Finding] = []
+    panels, explained = [], {}
     for quantity, bound in (("beta", 0.02), ("recoil", 0.05)):
         chosen = data.where("quantity", quantity)
         for name, one in spheres.items():
@@ -205,7 +207,8 @@ def opposite() -> Outcome:
     data = read("chung_ooi_7")
     before = data["before"]
     copper = Setting(0.1, 8900.0, 1.2e11, 0.35, 0.4, restitution=0.5)
-    findings, panels = [], []
+    findings: list[Finding] = []
+    panels = []
     for name, one in (("alloy", ALLOY), ("copper", copper)):
         two = dataclasses.replace(one, young_2=one.young, radius_2=one.radius)
         law, friction = two.laws(0.4)

@@ -89,7 +89,8 @@ def measured() -> Outcome:
     data = read("kharaz")
     bounds = {"restitution": 0.02, "spin": 0.03, "rebound_angle": 1.0, "patch_angle": 1.0}
     lines = thrown(GLASS, SPEED, ANGLES)
-    findings, panels, explained = [], [], {}
+    findings: list[Finding] = []
+    panels, explained = [], {}
     for quantity, bound in bounds.items():
         points = data.where("quantity", quantity)
         angle, value = points["angle"], points["value"]
@@ -171,7 +172,8 @@ def _panel(quantity: str, points: Data, lines: list[Rebound]) -> Panel:
 def rigid() -> Outcome:
     """Run test 4, and at a tenth and a hundredth of its speed."""
     data = read("chung_ooi_4")
-    findings, panels = [], []
+    findings: list[Finding] = []
+    panels = []
     spheres = {"oxide": OXIDE, "alloy": ALLOY}
     lines = {name: thrown(one, SPEED, ANGLES) for name, one in spheres.items()}
     for quantity, bound in (("restitution", 0.02), ("spin", 0.03), ("patch_angle", 2.0)):
@@ -245,7 +247,8 @@ def mfix() -> Outcome:
     setting = dataclasses.replace(GLASS, restitution=None)
     angle = data["angle"]
     ours = thrown(setting, SPEED, angle)
-    findings, panels, explained = [], [], {}
+    findings: list[Finding] = []
+    panels, explained = [], {}
     for quantity, bound in (("restitution", 0.01), ("spin", 0.01), ("rebound_angle", 0.5)):
         here, there = taken(ours, quantity, angle), data[quantity]
         scale = there.max() if quantity == "spin" else 1.0
