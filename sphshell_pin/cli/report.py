@@ -71,8 +71,6 @@ def report(
 def _print(made: Report) -> None:
     table = make_table("figure", "median", "quartiles", "aim", "verdict")
     for section in made.sections:
-        if section.findings:
-            table.add_row(f"[bold]{plain(section.title)}[/bold]")
         for finding in section.findings:
             word = {True: "[green]met[/green]", False: "[red]missed[/red]", None: ""}[finding.met]
             texts = (finding.what, finding.text, finding.spread_text, finding.aim_text)

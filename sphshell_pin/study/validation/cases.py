@@ -36,9 +36,9 @@ HEADING = Heading(
 )
 DATA = Path("tests", "data", "validation")
 NOT_FOUND = (
-    "D. Gugan, Inelastic collision and the Hertz theory of impact, Am. J. Phys. 68 (2000) 920; "
-    "R. Cross, The bounce of a ball (1999); T. Pozar and others, Optical detection of impact contact "
-    "times, Experimental Mechanics 57 (2017) 1225, all on contact times: only their beginnings could "
+    "D. Gugan, Inelastic collision and the Hertz theory of impact, Am. J. Phys. 68 (2000) 920; R. "
+    "Cross, The bounce of a ball (1999); T. Pozar and others, Optical detection of impact contact "
+    "times, Experimental Mechanics (2017) 1225, all on contact times: only their beginnings could "
     "be read, not the measured times.",
     "C. Guettler and others, Normal collisions of spheres, arXiv 1204.0001, on restitution against "
     "speed: its digitised points are files of their own, which could not be read.",
