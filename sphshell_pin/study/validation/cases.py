@@ -124,12 +124,12 @@ class Case:
 
 
 def explanations(found: Outcome) -> list[str]:
-    """Return why findings are out of their bounds, a sentence for each of them."""
-    return [
-        f"Out of its bound: {f.what}. {found.explained[f.key]}"
-        for f in found.findings
-        if f.met is False and f.key in found.explained
-    ]
+    """Return why findings are out of their bounds, a text for those that have the same reason."""
+    reasons: dict[str, list[str]] = {}
+    for finding in found.findings:
+        if finding.met is False and finding.key in found.explained:
+            reasons.setdefault(found.explained[finding.key], []).append(finding.what)
+    return [f"Out of bounds: {'; '.join(names)}. {text}" for text, names in reasons.items()]
 
 
 _CASES: dict[str, Case] = {}

@@ -111,21 +111,21 @@ def measured() -> Outcome:
                 "slips early takes energy along the plane at angles below 15 degrees."
             )
         panels.append(_panel(quantity, points, lines))
-    spin = data.where("quantity", "spin")
-    if "spin" in explained:
-        explained["spin"] += (
-            " The measured spins have an error of their own, too: whatever the friction, angular "
-            "momentum about the contact point gives spin = 5/2 (v - v') / r, and what follows from "
-            f"the measured v' differs by {_own_error(data, spin):.1%} (rms, over the largest)."
-        )
+    own = (
+        " The measured spins, and the angles of the patch that follow from them, have an error of "
+        "their own, too: whatever the friction, angular momentum about the contact point gives "
+        "spin = 5/2 (v - v') / r, and what follows from the measured v' differs by "
+        f"{_own_error(data):.1%} (rms, over the largest)."
+    )
+    explained |= {key: explained[key] + own for key in ("spin", "patch_angle") if key in explained}
     caption = "Measured points, each as read by three codes; our line; the theory with micro-slip."
     return Outcome(findings, [draw("kharaz", panels, caption)], explained=explained)
 
 
-def _own_error(data: Data, spin: Data) -> float:
+def _own_error(data: Data) -> float:
     """Return by how much measured spins contradict measured velocities, over the largest."""
     velocity = data.where("quantity", "restitution").where("reading", "kratos")
-    spin = spin.where("reading", "kratos")
+    spin = data.where("quantity", "spin").where("reading", "kratos")
     ratio = np.interp(spin["angle"], velocity["angle"], velocity["value"])
     along = SPEED * np.sin(np.radians(spin["angle"]))
     return rms(2.5 * (1 - ratio) * along / GLASS.radius - spin["value"]) / float(
