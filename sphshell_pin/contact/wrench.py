@@ -154,6 +154,10 @@ def contact_wrench(
                 f"must be a BristleState, which holds the stretch of {type(friction).__name__}"
             )
             raise InvalidParameter("state", state, without)
+        if friction.state_size > len(state.stretch_world):
+            raise InvalidParameter(
+                "rings", friction.state_size // 3, "must be 1: a BristleState has one"
+            )
         if friction.needs_radius and not state.radius:
             kind = "torsional" if friction.core.torsional else "Mindlin's"
             raise InvalidParameter("state.radius", 0.0, f"must be the sphere's, of {kind} friction")

@@ -1,11 +1,13 @@
 """Oblique impact of elastic spheres, computed apart from the package.
 
-Two theories of the same impact, both in Maw, Barber and Fawcett's dimensionless numbers (Wear 38
+Three theories of the same impact, both in Maw, Barber and Fawcett's dimensionless numbers (Wear 38
 (1976) 101): psi = kappa u / (mu v_n) of the contact point's tangential velocity u, and
 chi = kappa (1 + 1 / K^2) / 2, with kappa = 4 G* / E* and K^2 = 2/5 of a solid ball.
 
 - `rigid_disc`: the disc of contact sticks or slips as a whole, its force is kept while it grows and
   falls with its radius: what MindlinFriction states.
+- `rings`: the disc is divided into equal shares of its radius, each of which sticks or slips as a
+  whole; what it carries moves with the places that the shares move over.
 - `micro_slip`: each ring of it slips for itself, the theory of Mindlin, Deresiewicz and Maw, by the
   method of dimensionality reduction (Popov and Hess, Method of Dimensionality Reduction in Contact
   Mechanics and Friction, 2015; of impacts Lyashenko and Popov, Scientific Reports 5 (2015) 8479):
@@ -47,6 +49,31 @@ def rigid_disc(psi_1: Array, kappa: float, dissipation: float = 0.0, steps: int 
         force = np.clip(kept + 15 / 8 * np.sqrt(x) * h * psi, -limit, limit)
         before = x
         return force
+
+    return _rebound(psi_1, kappa, dissipation, steps, advance)
+
+
+def rings(
+    psi_1: Array, kappa: float, count: int, dissipation: float = 0.0, steps: int = 40_000
+) -> Array:
+    """Return psi (k,) of the rebound, where `count` shares of the disc slip for themselves."""
+    edges = np.linspace(0.0, 1.0, count + 1)[:, None]
+    widths = np.diff(edges, axis=0)
+    shares = 1.5 * (widths - np.diff(edges**3, axis=0) / 3)
+    force = np.zeros((count, len(psi_1)))
+    before = 0.0
+
+    def advance(psi: Array, x: float, limit: float, h: float) -> Array:
+        nonlocal force, before
+        a = np.sqrt(x)
+        # What crosses the edges, outwards where they move inwards, with the force per length there.
+        density = np.vstack([force / (a * widths), np.zeros_like(psi)])
+        moved = a - np.sqrt(before)
+        crosses = -moved * edges * (density if moved > 0 else np.roll(density, 1, axis=0))
+        force = force - np.diff(crosses, axis=0) + 15 / 8 * a * widths * h * psi
+        force = np.clip(force, -limit * shares, limit * shares)
+        before = x
+        return np.asarray(force.sum(axis=0))
 
     return _rebound(psi_1, kappa, dissipation, steps, advance)
 

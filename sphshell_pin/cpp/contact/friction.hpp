@@ -1,6 +1,8 @@
 // Tangential force of one contact, and both forces together.
 #pragma once
 
+#include <algorithm>
+
 #include <Eigen/Geometry>
 
 #include "contact/laws.hpp"
@@ -15,7 +17,7 @@ struct ContactForce {
   S torsion = S(0);                              // moment about the normal [N m]
   Vector3<S> rolling = Vector3<S>::Zero();       // moment against rolling [N m]
   S stiffness = S(0);                            // of the bristle along the surface [N/m]
-  Vector3<S> bristle = Vector3<S>::Zero();       // its stretch, brought back to the cone [m]
+  S stretch2 = S(0);                             // square of what it is stretched [m^2]
   Vector3<S> bristle_rate = Vector3<S>::Zero();  // but for its turning with the normal [m/s]
   Vector3<S> slip = Vector3<S>::Zero();          // of the sphere against the shell [m/s]
 };
@@ -41,6 +43,9 @@ struct ContactKinematics {
   S spin = S(0);
   Vector3<S> bristle = Vector3<S>::Zero();  // [m]
   Vector3<S> rolling = Vector3<S>::Zero();
+  // Of a bristle of several rings: the states of those behind the first, and where their rates go.
+  const Vector3<S>* outer = nullptr;
+  Vector3<S>* outer_rate = nullptr;
 };
 
 // The friction laws. Each has its name, its parameters, and
@@ -92,6 +97,7 @@ struct CoulombFriction {
 struct Sticking {
   double mu_static, mu_dynamic, v_stribeck;  // 1, 1, [m/s]
   bool torsional;
+  int rings = 1;  // each with a state of three numbers
 
   // Stribeck's curve.
   template <class S>
@@ -134,7 +140,9 @@ struct BristleFriction : Sticking {
   double stiffness, damping;  // [N/m], [N s/m]
 
   explicit BristleFriction(const Numbers& p)
-      : Sticking{p.at(0), p.at(1), p.at(4), p.at(5) != 0}, stiffness(p.at(2)), damping(p.at(3)) {}
+      : Sticking{p.at(0), p.at(1), p.at(4), p.at(5) != 0, 1},
+        stiffness(p.at(2)),
+        damping(p.at(3)) {}
 
   double stretch(const Vec3& z, const Vec3&, double) const { return z.norm(); }
 
@@ -153,20 +161,30 @@ struct BristleFriction : Sticking {
     if (!torsional) z -= z.dot(m.normal) * m.normal;
     const Vector3<S> stretched = stiffness * z;
     out.stiffness = stiffness;
-    out.bristle = in_ball(stretched, limit) / stiffness;
-    out.bristle_rate = w - (z - out.bristle) / relaxation;
+    const Vector3<S> held = in_ball(stretched, limit) / stiffness;
+    out.stretch2 = held.squaredNorm();
+    out.bristle_rate = w - (z - held) / relaxation;
     split(out, m, Vector3<S>(-in_ball(Vector3<S>(stretched + damping * w), limit)), arm);
   }
 };
 
+inline constexpr int kMostRings = 8;
+
 // The same with the stiffness of two elastic bodies that touch on a disc of radius a (Mindlin, J.
-// Appl. Mech. 16 (1949) 259; Johnson 1985, ch. 7): 8 G* a against slip, 16/3 G a^3 against
-// spin. It grows with the disc, which begins to carry without a load, so force and moment are kept
-// while the bodies close and fall with the stiffness while they part: dF = k dw + F dk / k for dk <
-// 0. The state is therefore not the stretch but the force over 8 G* x 1 m, and along the normal the
+// Appl. Mech. 16 (1949) 259; Johnson 1985, ch. 7): 8 G* a against slip, 16/3 G a^3 against spin.
+// It grows with the disc, whose new rim carries nothing, so force and moment are kept while
+// the bodies close and fall with the stiffness while they part: dF = k dw + F dk / k for dk < 0.
+// The state is therefore not the stretch but the force over 8 G* x 1 m, and along the normal the
 // moment over 8 G* x 1 m^2, of a contact that has lost nothing: regular at the touch, where a is
 // zero. Beyond the limit both give way in the direction of the force, as maximal dissipation
 // demands.
+//
+// With several rings each sticks or slips for itself, as in Mindlin's theory. By the method of
+// dimensionality reduction (Popov and Hess 2015) the disc is a row of independent springs at x in
+// (0, a), of stiffness 8 G* dx, 16 G x^2 dx and of a limit in proportion to (a^2 - x^2) dx. A ring
+// holds those between two shares of a. Where the shares move over the springs they pass from ring
+// to ring with the mean stretch of the ring that they leave: the upwind scheme of finite volumes,
+// in which one ring is the law above, and which cannot gain energy, as a mean stretch holds less.
 struct MindlinFriction : Sticking {
   static constexpr const char* kind = "mindlin";
   double shear, twist;            // 8 G*, 16/3 G [Pa]
@@ -175,13 +193,16 @@ struct MindlinFriction : Sticking {
   double axial;                   // k / a of a spring on the arm that twists like the disc [Pa]
 
   explicit MindlinFriction(const Numbers& p)
-      : Sticking{p.at(0), p.at(1), p.at(4), p.at(6) != 0},
+      : Sticking{p.at(0), p.at(1), p.at(4), p.at(6) != 0, static_cast<int>(p.at(9))},
         shear(p.at(2)),
         twist(p.at(3)),
         damping_time(p.at(5)),
         rolling(p.at(7)),
         rolling_speed(p.at(8)),
         axial(twist / (arm_of(1.0) * arm_of(1.0))) {}
+
+  // Where a ring begins, as a share of a.
+  double edge(int ring) const { return double(ring) / rings; }
 
   double stretch(const Vec3& z, const Vec3& normal, double stiffness) const {
     const double a = stiffness / shear, along = z.dot(normal);
@@ -198,31 +219,54 @@ struct MindlinFriction : Sticking {
     const S a = sqrt(S(radius * m.depth));
     if (!(a > 0)) return;
     const Vector3<S>& n = m.normal;
-    const S gap_rate = n.dot(m.relative);
-    // k' / k while the bodies part.
-    const S fall = gap_rate > 0 ? S(-0.5 * gap_rate / m.depth) : S(0);
+    const S growth = -0.5 * n.dot(m.relative) / m.depth;  // a' / a
     const S arm = torsional ? arm_of(a) : S(0);
-    const double stiffest = torsional ? std::max(shear, axial) : shear;
     Vector3<S> w = out.slip;
     if (torsional) w += arm * m.spin * n;
     const S limit = stribeck(S(w.squaredNorm())) * out.normal;
+    out.stiffness = shear * a;
 
+    // A force, its part along the normal on the arm, times two factors.
     const auto scaled = [&](const Vector3<S>& x, const S& across, const S& along) -> Vector3<S> {
       const Vector3<S> part = x.dot(n) * n;
       return across * (x - part) + along * part;
     };
-    const Vector3<S> load = scaled(m.bristle, S(shear), torsional ? S(shear / arm) : S(0));
-    const Vector3<S> held = in_ball(load, limit);
-    const Vector3<S> give = (load - held) / (stiffest * relaxation);
-    out.bristle_rate = scaled(Vector3<S>(a * w - give), S(1), S(arm * (axial / shear)));
-    if (fall < 0) out.bristle_rate += scaled(held, S(fall / shear), S(3 * fall * arm / shear));
-    // Its length is that of a stretch with the same energy.
-    out.stiffness = shear * a;
-    out.bristle = scaled(held, S(1), S(std::sqrt(shear / axial))) / out.stiffness;
-    Vector3<S> all = load;
-    if (damping_time > 0)
-      all += scaled(w, S(shear * damping_time * a), S(axial * damping_time * a));
-    split(out, m, Vector3<S>(-in_ball(all, limit)), arm);
+    Vector3<S> all = Vector3<S>::Zero();
+    if (m.outer_rate) std::fill_n(m.outer_rate, rings - 1, Vector3<S>::Zero());
+    for (int i = 0; i < rings; ++i) {
+      const double inner = edge(i), rim = edge(i + 1);
+      const double width = rim - inner, cube = rim * rim * rim - inner * inner * inner;
+      const S most = limit * (1.5 * (width - cube / 3));
+      const Vector3<S> z = i == 0 ? m.bristle : m.outer ? m.outer[i - 1] : Vector3<S>::Zero();
+      const Vector3<S> load = scaled(z, S(shear), torsional ? S(shear / arm) : S(0));
+      const Vector3<S> held = in_ball(load, most);
+      const double k = shear * width, k_along = axial * cube;
+      out.stretch2 += scaled(held, S(1 / k), S(1 / k_along)).dot(held) / (shear * a * a);
+
+      const double stiffest = torsional ? std::max(k, k_along) : k;
+      const Vector3<S> slip = a * w - (load - held) / (stiffest * relaxation);
+      rate(out, m, i) += scaled(slip, S(width), S(arm * (k_along / shear)));
+      // What leaves the ring over the edge that moves into it.
+      const bool grows = growth > 0;
+      const double share = grows ? inner : rim;
+      if (share > 0) {
+        const S g = (grows ? growth : S(-growth)) / shear;
+        const Vector3<S> left =
+            scaled(held, S(g * (share / width)), S(g * arm * (3 * share * share * share / cube)));
+        rate(out, m, i) -= left;
+        if (grows || i + 1 < rings) rate(out, m, grows ? i - 1 : i + 1) += left;
+      }
+      Vector3<S> damped = load;
+      if (damping_time > 0)
+        damped += scaled(w, S(k * damping_time * a), S(k_along * damping_time * a));
+      all -= in_ball(damped, most);
+    }
+    split(out, m, all, arm);
+  }
+
+  template <class S>
+  static Vector3<S>& rate(ContactForce<S>& out, const ContactKinematics<S>& m, int ring) {
+    return ring == 0 || !m.outer_rate ? out.bristle_rate : m.outer_rate[ring - 1];
   }
 
   // Of the moment rolling x radius x N, regularized at a slow speed of rolling: it creeps.
@@ -251,6 +295,8 @@ struct FrictionLaw {
   }
   bool has_state() const { return sticking() != nullptr; }
   bool torsional() const { return has_state() && sticking()->torsional; }
+  // States of a contact, of three numbers each.
+  int rings() const { return has_state() ? sticking()->rings : 1; }
   bool rolls() const {
     const MindlinFriction* mindlin = std::get_if<MindlinFriction>(&law);
     return mindlin && mindlin->rolling > 0;

@@ -23,7 +23,8 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
     const Pair& pair = pairs_[k];
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
     if (pair.friction.has_state()) {
-      bristles_.add(k);
+      bristles_.add(k, pair.friction.rings());
+      several_rings_ = several_rings_ || pair.friction.rings() > 1;
       if (pair.has_dn_dc()) queries_[k].want_dn_dc();
     }
     for (int j : {pair.joint_i, pair.joint_j}) {
@@ -198,6 +199,7 @@ void SceneData::compute_forces(const VectorX& z) {
   bristle_rates_.tail(joints_.size()) = joints_.rates();
   touching_ = !active_.empty();
   if (!touching_) return;
+  if (several_rings_) stretches_ = z;
   for (int j : loaded_) external_[j].setZero();
   for (PairState& state : states_) state.clear_sums();
   for (ActiveContact& active : active_) {
@@ -228,13 +230,22 @@ void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
 
 void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
-  active.force = contact_force(pair.law, pair.friction, pair.disc_radius(), relaxation(pair),
-                               active.kinematics);
-  if (active.slot < 0) return;
   const auto& rotation = states_[active.pair].world_from_j.rotation();
-  const int at = 3 * active.slot;
+  const int at = 3 * active.slot, rings = active.slot >= 0 ? pair.friction.rings() : 1;
+  Vec3 outer[kMostRings - 1], outer_rate[kMostRings - 1];
+  ContactKinematics<double> m = active.kinematics;
+  if (rings > 1) {
+    for (int i = 1; i < rings; ++i) outer[i - 1] = rotation * z.segment<3>(at + 3 * i);
+    m.outer = outer;
+    m.outer_rate = outer_rate;
+  }
+  active.force = contact_force(pair.law, pair.friction, pair.disc_radius(), relaxation(pair), m);
+  if (active.slot < 0) return;
   bristle_rates_.segment<3>(at) =
       rotation.transpose() * active.force.bristle_rate + rate_of_turning(active, z.segment<3>(at));
+  for (int i = 1; i < rings; ++i)
+    bristle_rates_.segment<3>(at + 3 * i) = rotation.transpose() * outer_rate[i - 1] +
+                                            rate_of_turning(active, z.segment<3>(at + 3 * i));
 }
 
 // How fast a stretch turns with the normal, in the shell's frame.
@@ -277,7 +288,7 @@ void SceneData::add_force(const ActiveContact& active) {
   powers_.damping += weight * damping_power(f, m);
   powers_.friction += weight * friction_power(f, m);
   powers_.elastic += share * pair.law.energy(m.depth);
-  if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.bristle.squaredNorm();
+  if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.stretch2;
 }
 
 void SceneData::apply(int joint, const Vec3& point_world, const Vec3& force_world,
