@@ -11,7 +11,7 @@ from sphshell_pin.study.validation import maw
 from sphshell_pin.study.validation.balls import Ball, head_on
 from sphshell_pin.study.validation.cases import Array, Data, Outcome, case, read
 from sphshell_pin.study.validation.chung_ooi_normal import PAPER
-from sphshell_pin.study.validation.kharaz import MICRO_SLIP, THEORY
+from sphshell_pin.study.validation.kharaz import AS_A_WHOLE, RINGS, THEORY
 from sphshell_pin.study.validation.oblique import Setting, rms
 from sphshell_pin.study.validation.pictures import Panel, draw
 
@@ -38,19 +38,21 @@ def after_sliding(one: Setting, incident: Array, quantity: str) -> Array:
     setting="Radius 10 µm, mu 0.3, no damping; steel: E 208 GPa, Poisson's ratio 0.3, density "
     "7850 kg/m^3; polyethylene: 1 GPa, 0.4, 1400 kg/m^3.",
     bound="0.1, a hundredth of the figures' axes or two.",
-    leaves_out=MICRO_SLIP,
+    leaves_out="Waves in the spheres. With the points of the codes our run has no micro-slip, as "
+    "they have none; with the finite elements it has, with eight rings.",
     files=("chung_ooi_5",),
 )
 def sliding() -> Outcome:
     """Run test 5."""
     data = read("chung_ooi_5")
     spheres = {"steel": STEEL, "polyethylene": POLYETHYLENE}
+    rings = dataclasses.replace(STEEL, rings=RINGS)
     x = np.concatenate([np.linspace(0.05, 6.0, 25), [8.0, 10.0, 13.0]])
     findings: list[Finding] = []
     panels, explained = [], {}
     for quantity in ("recoil", "spin"):
         chosen = data.where("quantity", quantity)
-        for name, compared in (("fem", STEEL), *spheres.items()):
+        for name, compared in (("fem", rings), *spheres.items()):
             points = chosen.where("sphere", name)
             incident, value = points["incident"], points["value"]
             finding = Finding(
@@ -61,13 +63,8 @@ def sliding() -> Outcome:
                 headline=not findings,
             )
             findings.append(finding)
-            if not finding.met:
-                theory = rms(by_theory(STEEL, incident, quantity) - value)
-                explained[finding.key] = (
-                    f"Micro-slip: by the theory that has it, drawn dashed, it is {theory:.2g}."
-                    if name == "fem"
-                    else CONTRADICTED
-                )
+            if not finding.met and name != "fem":
+                explained[finding.key] = CONTRADICTED
         panels.append(
             Panel(
                 "tangential over mu normal velocity",
@@ -75,7 +72,7 @@ def sliding() -> Outcome:
                 [_points(chosen, name, "incident") for name in ("fem", *spheres)],
                 [
                     (f"ours, {name}", x, after_sliding(one, x, quantity))
-                    for name, one in spheres.items()
+                    for name, one in (*spheres.items(), ("steel, micro-slip", rings))
                 ],
                 [(THEORY, x, by_theory(STEEL, x, quantity))],
             )
@@ -183,7 +180,7 @@ AXES = {
     source=f"{PAPER}6: spheres fall on a rigid plane, their spin varied.",
     setting=f"{SPINNING}; the plane is rigid.",
     bound="0.02 in beta and 0.05 in the recoil, a hundredth of the figures' axes.",
-    leaves_out=DAMPED + MICRO_SLIP,
+    leaves_out=DAMPED + AS_A_WHOLE,
     files=("chung_ooi_6",),
 )
 def on_a_plane() -> Outcome:
@@ -253,7 +250,7 @@ def opposite() -> Outcome:
     setting=f"{SPINNING}; the large one at rest, 0.5 m, 1000 times as dense and as stiff. Case B "
     "is left out: what was read of it does not say which stiffness it changes.",
     bound="0.02 in beta and 0.05 in the recoil, a hundredth of the figures' axes.",
-    leaves_out=DAMPED + MICRO_SLIP,
+    leaves_out=DAMPED + AS_A_WHOLE,
     files=("chung_ooi_8",),
     slow=True,
 )

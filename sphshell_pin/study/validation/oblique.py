@@ -23,7 +23,8 @@ class Setting:
     """A ball of one material on a plane or ball of another; Young's moduli in Pa.
 
     `restitution` is that of each impact at its own normal speed, None without damping; `radius_2`
-    [m] and `density_2` are those of a second ball in place of the plane.
+    [m] and `density_2` are those of a second ball in place of the plane; `rings` of the disc of
+    contact slip for themselves.
     """
 
     radius: float
@@ -36,6 +37,7 @@ class Setting:
     restitution: float | None = None
     radius_2: float | None = None
     density_2: float = 0.0
+    rings: int = 1
 
     @property
     def materials(self) -> tuple[float, float, float, float]:
@@ -47,7 +49,7 @@ class Setting:
         """Return the law along the normal and that of friction at a normal `speed` [m/s]."""
         damping = (self.restitution, speed) if self.restitution is not None else (None, None)
         law = sp.ImpactLaw.hertz(self.radius, *self.materials, *damping, radius_2=self.radius_2)
-        return law, sp.BristleFriction.mindlin(self.mu, None, *self.materials)
+        return law, sp.BristleFriction.mindlin(self.mu, None, *self.materials, rings=self.rings)
 
     def impact(self, normal: float, tangential: float, spin: float = 0.0) -> Rebound:
         """Shoot the ball down at `normal` and along x at `tangential` speed [m/s].
