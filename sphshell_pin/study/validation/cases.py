@@ -26,7 +26,7 @@ from sphshell_pin.study.report.page import Heading
 
 Array = NDArray[np.float64]
 
-MODULES = ("chung_ooi_normal",)
+MODULES = ("chung_ooi_normal", "cam", "rolling")
 """In the order of the page."""
 HEADING = Heading(
     "sphshell_pin: against published experiments",
