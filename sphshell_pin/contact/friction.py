@@ -13,7 +13,7 @@ from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient, parameter
 
-__all__ = ["BristleFriction", "CoulombFriction", "Friction"]
+__all__ = ["BristleFriction", "CoulombFriction", "Friction", "MindlinFriction"]
 
 # Bristles stick below this part of Stribeck's speed: almost nothing moves.
 STICKING_SHARE = 0.01
@@ -42,10 +42,16 @@ class Friction(Ingredient):
         """Slip speed [m/s] below which a contact sticks."""
         raise NotImplementedError
 
-    def slip_time(self, mass: float, load: float) -> float:
+    @property
+    def needs_radius(self) -> bool:
+        """Whether the forces depend on the radius of the sphere."""
+        return self.core.torsional
+
+    def slip_time(self, mass: float, load: float, disc: float) -> float:
         """Return the time scale [s] of slow slip of `mass` [kg] along the surface under `load` [N].
 
         20 times its decay where friction acts like a damper; half a period where like a spring.
+        `disc` [m] is the radius of the disc of contact under this load.
         """
         raise NotImplementedError
 
@@ -145,7 +151,7 @@ class CoulombFriction(_Coefficients, kind="coulomb"):
         """Slip speed [m/s] below which a contact creeps."""
         return self.v_static
 
-    def slip_time(self, mass: float, load: float) -> float:
+    def slip_time(self, mass: float, load: float, disc: float) -> float:
         """Return 20 times the decay of a slip below `v_static` [s]."""
         if not self.mu_static or not load > 0:
             return math.inf
@@ -209,17 +215,179 @@ class BristleFriction(_Coefficients, kind="bristle"):
         """Slip speed [m/s] below which almost nothing moves."""
         return STICKING_SHARE * self.v_stribeck
 
-    def slip_time(self, mass: float, load: float) -> float:
+    def slip_time(self, mass: float, load: float, disc: float) -> float:
         """Return half a period of the spring, or 20 times its decay if that is shorter [s]."""
-        times = [math.pi * math.sqrt(mass / self.stiffness)]
-        if self.damping:
-            times.append(DECAYS_PER_PERIOD * mass / self.damping)
+        return _spring_time(mass, self.stiffness, self.damping)
+
+    @staticmethod
+    def mindlin(
+        mu_static: float,
+        mu_dynamic: float | None,
+        young: float,
+        poisson: float,
+        young_2: float | None = None,
+        poisson_2: float | None = None,
+        *,
+        v_stribeck: float = 0.01,
+        damping_time: float = 0.0,
+        torsional: bool = False,
+        rolling: float = 0.0,
+        rolling_speed: float = 1e-3,
+    ) -> MindlinFriction:
+        """Build the bristle whose stiffness follows from the bodies' materials and the contact.
+
+        `young` [Pa] and `poisson` are the sphere's, `young_2` and `poisson_2` the shell's (without
+        them the same). Without `mu_dynamic` it is `mu_static`. See MindlinFriction.
+        """
+        dynamic = mu_static if mu_dynamic is None else mu_dynamic
+        materials = young, poisson, young_2, poisson_2
+        more = v_stribeck, damping_time, torsional, rolling, rolling_speed
+        return MindlinFriction(mu_static, dynamic, *materials, *more)
+
+
+@dataclass(frozen=True)
+class MindlinFriction(_Coefficients, kind="mindlin"):
+    """Friction that sticks with the stiffness of two elastic bodies, after Mindlin.
+
+    As BristleFriction, but the spring follows from the materials and the present disc of contact,
+    of radius a = sqrt(radius depth): k = 8 G* a, 1/G* = (2 - nu_1)/G_1 + (2 - nu_2)/G_2, with the
+    shear moduli G = E / (2 (1 + nu)). While the bodies approach, the force is kept (the new rim of
+    the disc carries none of it); while they part, it falls with k. So no path in load and slip
+    gains energy. All of the disc sticks or slips at once: there is no annulus of micro-slip.
+
+    `torsional`: against spin about the normal the stiffness is 16/3 G a^3, 1/G = 1/G_1 + 1/G_2,
+    with the limit that BristleFriction has. `rolling`: against rolling the moment is
+    `rolling` radius N; below `rolling_speed` it is regularized, and creeps.
+
+    Sources: Mindlin, J. Appl. Mech. 16 (1949) 259; Johnson, Contact Mechanics (1985), ch. 7;
+    Thornton, Cummins, Cleary, Powder Technology 233 (2013) 30; Elata and Berryman, Mechanics of
+    Materials 24 (1996) 229.
+    """
+
+    young: float = parameter(
+        above=0, unit="Pa", label="Young's modulus", help="Young's modulus of the sphere"
+    )
+    poisson: float = parameter(
+        above=-1, at_most=0.5, label="Poisson's ratio", help="Poisson's ratio of the sphere"
+    )
+    young_2: float | None = parameter(
+        None,
+        above=0,
+        unit="Pa",
+        label="Young's modulus 2",
+        help="Young's modulus of the shell; without it that of the sphere",
+    )
+    poisson_2: float | None = parameter(
+        None,
+        above=-1,
+        at_most=0.5,
+        label="Poisson's ratio 2",
+        help="Poisson's ratio of the shell; without it that of the sphere",
+    )
+    v_stribeck: float = parameter(
+        0.01,
+        above=0,
+        unit="m/s",
+        label="Stribeck speed",
+        help="slip speed at which mu has come down from `mu_static` by 63 % of the way to "
+        "`mu_dynamic`",
+    )
+    damping_time: float = parameter(
+        0.0,
+        at_least=0,
+        unit="s",
+        label="damping time",
+        help="of a damper beside the spring, `damping_time` times as large as the spring is stiff: "
+        "2 / omega damps a motion at omega [rad/s] critically",
+    )
+    torsional: bool = parameter(
+        False, help="True: also against spin about the normal, as a soft finger"
+    )
+    rolling: float = parameter(
+        0.0,
+        at_least=0,
+        label="rolling friction",
+        help="moment against rolling, over the sphere's radius and the normal force",
+    )
+    rolling_speed: float = parameter(
+        1e-3,
+        above=0,
+        unit="m/s",
+        label="rolling friction speed",
+        help="speed of rolling, radius times rad/s, from which on it is whole; below, it creeps",
+    )
+
+    @cached_property
+    def _moduli(self) -> tuple[float, float]:
+        """8 G* and 16/3 G [Pa]."""
+        young = self.young, self.young if self.young_2 is None else self.young_2
+        poisson = self.poisson, self.poisson if self.poisson_2 is None else self.poisson_2
+        softness = [2 * (1 + nu) / e for e, nu in zip(young, poisson, strict=True)]
+        tangential = sum((2 - nu) * s for s, nu in zip(softness, poisson, strict=True))
+        return 8 / tangential, 16 / 3 / sum(softness)
+
+    def tangential_stiffness(self, disc: float) -> float:
+        """Return 8 G* a [N/m] on a disc of contact of the radius a = `disc` [m]."""
+        return self._moduli[0] * check_not_negative("disc", disc, "m")
+
+    def torsional_stiffness(self, disc: float) -> float:
+        """Return 16/3 G a^3 [N m/rad] on a disc of contact of the radius a = `disc` [m]."""
+        return self._moduli[1] * check_not_negative("disc", disc, "m") ** 3
+
+    @property
+    def needs_radius(self) -> bool:
+        """True: the disc of contact depends on it."""
+        return True
+
+    def numbers(self) -> list[float]:
+        """Return the parameters as the compiled core takes them, moduli for the materials."""
+        more = self.v_stribeck, self.damping_time, self.torsional, self.rolling, self.rolling_speed
+        return [self.mu_static, self.mu_dynamic, *self._moduli, *map(float, more)]
+
+    @property
+    def text(self) -> str:
+        """Parameters in one line."""
+        spin = ", and against spin" if self.torsional else ""
+        rolling = ""
+        if self.rolling:
+            rolling = (
+                f"; rolling friction {self.rolling:g} from {self.rolling_speed:g} m/s, creeps below"
+            )
+        return (
+            f"Mindlin, coefficient {self.mu_static:g} at rest, {self.mu_dynamic:g} beyond "
+            f"{self.v_stribeck:g} m/s; sticks with {self._moduli[0]:.4g} N/m per m of the disc's "
+            f"radius, damping time {self.damping_time:g} s{spin}{rolling}; the force is a state of "
+            "the contact"
+        )
+
+    @property
+    def sticking_speed(self) -> float:
+        """Slip speed [m/s] below which almost nothing moves."""
+        return STICKING_SHARE * self.v_stribeck
+
+    def slip_time(self, mass: float, load: float, disc: float) -> float:
+        """Return half a period of the spring, or 20 times its decay if that is shorter [s]."""
+        stiffness = self._moduli[0] * disc
+        times = [_spring_time(mass, stiffness, self.damping_time * stiffness)]
+        if self.rolling and load > 0:
+            decay = mass * self.rolling_speed / (1.5 * self.rolling * load)
+            times.append(DECAYS_PER_PERIOD * decay)
         return min(times)
+
+
+def _spring_time(mass: float, stiffness: float, damping: float) -> float:
+    """Return half a period, or 20 times the decay if that is shorter [s]."""
+    if not stiffness > 0:
+        return math.inf
+    times = [math.pi * math.sqrt(mass / stiffness)]
+    if damping:
+        times.append(DECAYS_PER_PERIOD * mass / damping)
+    return min(times)
 
 
 def check_friction(friction: object) -> Friction | None:
     """Return `friction`; raise InvalidParameter unless it is a friction law, or None."""
     if friction is None:
         return None
-    kinds = "a CoulombFriction, a BristleFriction or None"
+    kinds = "a CoulombFriction, a BristleFriction, a MindlinFriction or None"
     return check_type("friction", friction, Friction, f"must be {kinds}")

@@ -11,9 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
-from sphshell_pin.contact import Friction, Method, NormalLaw, Sphere
+from sphshell_pin.contact import Friction, Method, MindlinFriction, NormalLaw, Sphere
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.sources import Find, checked_source
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
 
 
@@ -51,6 +52,12 @@ class ContactPair:
     find: Find | None = None
     other_sphere: Sphere | None = None
     group: str = ""
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for friction that needs a sphere where there is none."""
+        if self.find is not None and isinstance(self.friction, MindlinFriction):
+            must = "needs a sphere, and a contact source has none: take a BristleFriction"
+            raise InvalidParameter("friction", self.friction.kind, must)
 
     frame = renamed("frame", "frame_j")
     sphere_placement = renamed("sphere_placement", "placement_i")

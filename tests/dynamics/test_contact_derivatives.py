@@ -47,8 +47,21 @@ FRICTIONS = {
     "coulomb": CoulombFriction(0.3, 0.1, 0.1, 1.0),
     "bristle": BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05),
     "soft finger": BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05, torsional=True),
+    "mindlin": BristleFriction.mindlin(
+        0.5,
+        0.3,
+        5e3,
+        0.3,
+        2e4,
+        0.45,
+        v_stribeck=0.05,
+        damping_time=3e-3,
+        torsional=True,
+        rolling=0.1,
+        rolling_speed=0.2,
+    ),
 }
-BRISTLES = ["bristle", "soft finger"]
+BRISTLES = ["bristle", "soft finger", "mindlin"]
 
 
 def differences(
@@ -71,11 +84,13 @@ def generalised_force(scene: Scene, q: Array, v: Array) -> Array:
     return total
 
 
-def assert_close(got: Array, expected: Array, tolerance: float = 1e-6) -> None:
+def assert_close(
+    got: Array, expected: Array, tolerance: float = 1e-6, rounding: float = 0.0
+) -> None:
     """Each column right to the tolerance of its own size, or of a hundredth of the whole's."""
     sizes = np.abs(expected).max(axis=0) + 1e-2 * np.abs(expected).max()
     assert got.shape == expected.shape
-    assert (np.abs(got - expected).max(axis=0) <= tolerance * sizes).all()
+    assert (np.abs(got - expected).max(axis=0) <= tolerance * sizes + rounding).all()
 
 
 def assert_derivatives(scene: Scene, q: Array, v: Array, step: float = 1e-6) -> None:
@@ -103,7 +118,9 @@ def assert_rate_jacobian(
     if len(z) == 0:
         return
     assert_close(got[nv:, :nv], by_q[nv:], turning)
-    assert_close(got[nv:, nv : 2 * nv], by_v[nv:])
+    # Far over the limit a stretch gives way at a rate that is large against what differences it.
+    rounding = 50 * np.finfo(float).eps * np.abs(core.rates(q, v, z, tau)[nv:]).max() / step
+    assert_close(got[nv:, nv : 2 * nv], by_v[nv:], rounding=rounding)
     step = 1e-4 * np.abs(z).max()
     moves = step * np.eye(len(z))
     changes = [core.rates(q, v, z + u, tau) - core.rates(q, v, z - u, tau) for u in moves]

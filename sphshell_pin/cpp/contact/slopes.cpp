@@ -10,7 +10,7 @@ struct LawSlopes {
   Vec3 force, moment, rate;  // force and moment on the sphere but for the weight
   struct By {
     Vec3 depth, spin;
-    Mat3 relative, stretch;
+    Mat3 relative, stretch, rolling;
   } force_by, moment_by, rate_by;
 };
 
@@ -20,16 +20,17 @@ void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
     value[i] = x[i].value;
     by.depth[i] = x[i].slope[0];
     by.relative.row(i) = x[i].slope.template segment<3>(1);
-    if constexpr (N == 8) {
+    if constexpr (N >= 8) {
       by.spin[i] = x[i].slope[4];
       by.stretch.row(i) = x[i].slope.template segment<3>(5);
     }
+    if constexpr (N == 11) by.rolling.row(i) = x[i].slope.template segment<3>(8);
   }
-  if constexpr (N != 8) by.spin.setZero(), by.stretch.setZero();
+  if constexpr (N < 8) by.spin.setZero(), by.stretch.setZero();
 }
 
-// Seeds: depth, relative velocity and, of 8, spin and stretch. The normal needs none, as a law does
-// not change with the axes it is written in.
+// Seeds: depth, relative velocity and, of 8, spin and stretch, of 11, rolling as well. The normal
+// needs none, as a law does not change with the axes it is written in.
 template <int N>
 void differentiate(const NormalLaw& law, const FrictionLaw& friction, double radius,
                    double relaxation, const ContactKinematics<double>& at, LawSlopes& out) {
@@ -39,12 +40,15 @@ void differentiate(const NormalLaw& law, const FrictionLaw& friction, double rad
   for (int i = 0; i < 3; ++i) {
     m.normal[i] = at.normal[i];
     m.relative[i] = S::seed(at.relative[i], 1 + i);
-    if constexpr (N == 8) m.bristle[i] = S::seed(at.bristle[i], 5 + i);
+    if constexpr (N >= 8) m.bristle[i] = S::seed(at.bristle[i], 5 + i);
+    if constexpr (N == 11) m.rolling[i] = S::seed(at.rolling[i], 8 + i);
   }
-  if constexpr (N == 8) m.spin = S::seed(at.spin, 4);
+  if constexpr (N >= 8) m.spin = S::seed(at.spin, 4);
   const ContactForce<S> f = contact_force(law, friction, radius, relaxation, m);
   read<N>(f.normal * m.normal + f.friction, out.force, out.force_by);
-  read<N>(f.torsion * m.normal, out.moment, out.moment_by);
+  Vector3<S> moment = f.torsion * m.normal;
+  if constexpr (N == 11) moment += f.rolling;
+  read<N>(moment, out.moment, out.moment_by);
   read<N>(f.bristle_rate, out.rate, out.rate_by);
 }
 
@@ -94,7 +98,12 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   m.spin = n.dot(spin);
   m.bristle = site.stretch;
   LawSlopes at;
-  if (friction.has_state())
+  const bool rolls = friction.rolls();
+  const Mat3 across = Mat3::Identity() - n * n.transpose();
+  if (rolls) {
+    m.rolling = across * spin;
+    differentiate<11>(law, friction, site.disc_radius, relaxation, m, at);
+  } else if (friction.has_state())
     differentiate<8>(law, friction, site.disc_radius, relaxation, m, at);
   else
     differentiate<4>(law, friction, site.disc_radius, relaxation, m, at);
@@ -106,13 +115,16 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   const Mat3 stretch_by = cross_matrix(m.bristle) * turned_by;
   const Eigen::RowVector3d spin_by = spin.transpose() * normal_by;
   const auto by_place = [&](const Vec3& value, const LawSlopes::By& by) -> Mat3 {
-    return by.depth * depth_by + by.relative * relative_by + by.spin * spin_by +
-           by.stretch * stretch_by - cross_matrix(value) * turned_by;
+    Mat3 all = by.depth * depth_by + by.relative * relative_by + by.spin * spin_by +
+               by.stretch * stretch_by - cross_matrix(value) * turned_by;
+    if (rolls) all += by.rolling * across * cross_matrix(spin) * turned_by;
+    return all;
   };
   const Mat3 arm = cross_matrix(point);
   const auto by_twist = [&](const LawSlopes::By& by) -> Matrix36 {
     Matrix36 all;
     all << by.relative, by.spin * n.transpose() - by.relative * arm;
+    if (rolls) all.rightCols<3>() += by.rolling * across;
     return all;
   };
 

@@ -219,6 +219,10 @@ void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
   if (pair.friction.torsional())
     m.spin =
         m.normal.dot(body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
+  if (pair.friction.rolls()) {
+    const Vec3 spin = body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j);
+    m.rolling = spin - spin.dot(m.normal) * m.normal;
+  }
   if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
 }
 
@@ -249,7 +253,8 @@ ContactWrench SceneData::wrench(const ActiveContact& active) const {
   const ContactForce<double>& f = active.force;
   const Vec3& normal = active.kinematics.normal;
   const double weight = active.contact.weight;
-  return {active.point, weight * (f.normal * normal + f.friction), weight * f.torsion * normal};
+  return {active.point, weight * (f.normal * normal + f.friction),
+          weight * f.torsion * normal + weight * f.rolling};
 }
 
 // Adds a contact to the forces on the joints and to the sums of its pair.
@@ -272,8 +277,7 @@ void SceneData::add_force(const ActiveContact& active) {
   powers_.damping += weight * damping_power(f, m);
   powers_.friction += weight * friction_power(f, m);
   powers_.elastic += share * pair.law.energy(m.depth);
-  if (active.slot >= 0)
-    powers_.bristles += 0.5 * share * pair.friction.bristle()->stiffness * f.bristle.squaredNorm();
+  if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.bristle.squaredNorm();
 }
 
 void SceneData::apply(int joint, const Vec3& point_world, const Vec3& force_world,
