@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from sphshell_pin import (
     Adaptive,
     BristleFriction,
-    CoulombFriction,
     HuntCrossleyLaw,
     ImpactLaw,
     Scene,
@@ -25,6 +24,7 @@ from sphshell_pin import (
     Sphere,
 )
 from sphshell_pin.benchmarks.swing import GRAVITY, mean_period
+from sphshell_pin.contact.friction import Friction
 from sphshell_pin.dynamics import Result
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ class Ball:
         self,
         shell: Shell,
         law: ImpactLaw | HuntCrossleyLaw,
-        friction: BristleFriction | CoulombFriction | None = None,
+        friction: Friction | None = None,
         *,
         model: pin.Model | None = None,
         frame: str = "universe",
@@ -219,20 +219,22 @@ def in_bowl(
     angle: float,
     *,
     stiffness: float,
-    mu: float = 1.0,
+    friction: Friction | None = None,
     periods: int = 2,
 ) -> Swinging:
     """Let the ball swing, rolling, from rest at `angle` [rad] in a bowl of `radius` [m] about 0.
 
     The period is 4 sqrt((1 + b) (R - r + depth) / g) K(sin(angle / 2)), and for small angles
-    2 pi sqrt(7 (R - r) / (5 g)). `stiffness` [N/m] is that of the contact and of the bristles.
+    2 pi sqrt(7 (R - r) / (5 g)). `stiffness` [N/m] is that of the contact and of the bristles,
+    which another friction law may replace.
     """
     depth = ball.mass * GRAVITY * math.cos(angle) / stiffness
     reach = radius - ball.radius + depth
     start = reach * np.array([math.sin(angle), 0.0, -math.cos(angle)])
     q0, v0 = state(start, np.zeros(3), np.zeros(3))
     expected = swing_period(angle, reach) * math.sqrt(1 + ball.beta(depth))
-    scene = ball.scene(shell, ball.spring(stiffness), ball.bristle(mu, stiffness))
+    bristles = ball.bristle(1.0, stiffness)
+    scene = ball.scene(shell, ball.spring(stiffness), bristles if friction is None else friction)
     duration = (periods + 0.35) * expected
     result = Simulation(scene, PRECISE).run(q0, v0, duration, record_dt=1e-3)
     seen = mean_period(result.t, result.q[:, 0], velocities(result)[:, 0], periods)

@@ -66,6 +66,6 @@ def draw(name: str, panels: Sequence[Panel], caption: str, description: str = ""
             axis.set_xlabel(panel.x)
             axis.set_ylabel(panel.y)
             axis.grid(visible=True)
-            axis.legend(fontsize=SMALL - 0.5, frameon=False)
+            axis.legend(fontsize=SMALL - 0.5, edgecolor="none", framealpha=0.85)
         png = png_of(figure)
     return Picture(name, png, description or caption, caption)
