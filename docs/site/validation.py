@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sphshell_pin.study.report.contents import Finding, Table, columns
 from sphshell_pin.study.validation import Case, Outcome, collect
-from sphshell_pin.study.validation.cases import explanations
+from sphshell_pin.study.validation.cases import NOT_FOUND, explanations
 
 DOCS = Path(__file__).parents[1]
 PAGE = DOCS / "validation.md"
@@ -41,7 +41,9 @@ def page(ran: list[tuple[Case, Outcome]]) -> str:
     ]
     names = ("case", "figure", "ours: error", "bound", "verdict")
     table = Table("validation", "", columns(*names), rows)
-    return "\n".join([HEAD, table.markdown(), *(section(*one) for one in ran)])
+    parts = [HEAD, table.markdown(), *(section(*one) for one in ran)]
+    missing = ["## Not found", "", *(f"- {text}" for text in NOT_FOUND), ""]
+    return "\n".join([*parts, *missing])
 
 
 def anchor(title: str) -> str:

@@ -63,7 +63,7 @@ def test_command(tmp_path, monkeypatch):
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "against published experiments" in text
     assert "1 of 2 aims are met" in text
-    assert "Out of its bound: error of force. Balls have hair." in text
+    assert "Out of bounds: error of force. Balls have hair." in text
     assert "Source: S, https://x" in text
 
 

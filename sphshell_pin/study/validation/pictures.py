@@ -45,10 +45,11 @@ class Panel:
 
 def draw(name: str, panels: Sequence[Panel], caption: str, description: str = "") -> Picture:
     """Draw the panels side by side; `description` is for those who cannot see them."""
-    with drawing(max(4.6, 3.9 * len(panels)), 3.3) as figure:
-        for axis, panel in zip(
-            figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True
-        ):
+    wide = 2 if len(panels) == 4 else len(panels)
+    tall = len(panels) // wide
+    with drawing(max(4.6, 3.9 * wide), 3.3 * tall) as figure:
+        axes = figure.subplots(tall, wide, squeeze=False).flat
+        for axis, panel in zip(axes, panels, strict=True):
             for k, (label, x, y) in enumerate(panel.ours):
                 axis.plot(x, y, color=COLORS[k % len(COLORS)], label=label)
             for label, x, y in panel.theory:
