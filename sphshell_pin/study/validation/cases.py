@@ -26,7 +26,7 @@ from sphshell_pin.study.report.page import Heading
 
 Array = NDArray[np.float64]
 
-MODULES = ("kharaz", "chung_ooi_normal", "chung_ooi_spin", "pressed")
+MODULES = ("kharaz", "chung_ooi_normal", "chung_ooi_spin", "pressed", "cam", "rolling")
 """In the order of the page."""
 HEADING = Heading(
     "sphshell_pin: against published experiments",
@@ -42,6 +42,13 @@ NOT_FOUND = (
     "be read, not the measured times.",
     "C. Guettler and others, Normal collisions of spheres, arXiv 1204.0001, on restitution against "
     "speed: its digitised points are files of their own, which could not be read.",
+    "K. L. Johnson and others, Surface energy and the contact of elastic solids (1971), and "
+    "measured areas of a small sphere on glass: on contact radii against load.",
+    "B. M. Dzidek and others, J. R. Soc. Interface 14 (2017); T. Inoue and S. Hirai, IEEE Trans. "
+    "Robotics 22 (2006); N. Xydas and I. Kao (1999): force, indentation and area of finger pads "
+    "and soft fingertips with modulus and thickness.",
+    "R. Cross, Measurements of rolling friction with a stringless pendulum: the measured "
+    "coefficients; the measured frequencies of balls on turntables and in cylinders.",
 )
 """What could not be compared, as its numbers were not found: none is made up."""
 ABSENT = (

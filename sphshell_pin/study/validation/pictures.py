@@ -29,7 +29,10 @@ Series = tuple[str, ArrayLike, ArrayLike]
 
 @dataclass(frozen=True)
 class Panel:
-    """One diagram: `published` series are marks, `ours` are lines, `theory` are dashed ones."""
+    """One diagram: `published` series are marks, `ours` are lines, `theory` are dashed ones.
+
+    `equal`: x and y have one scale.
+    """
 
     x: str
     y: str
@@ -37,6 +40,7 @@ class Panel:
     ours: Sequence[Series] = ()
     theory: Sequence[Series] = ()
     logarithmic: bool = False
+    equal: bool = False
 
 
 def draw(name: str, panels: Sequence[Panel], caption: str, description: str = "") -> Picture:
@@ -58,9 +62,11 @@ def draw(name: str, panels: Sequence[Panel], caption: str, description: str = ""
             if panel.logarithmic:
                 axis.set_xscale("log")
                 axis.set_yscale("log")
+            if panel.equal:
+                axis.set_aspect("equal", "datalim")
             axis.set_xlabel(panel.x)
             axis.set_ylabel(panel.y)
             axis.grid(visible=True)
-            axis.legend(fontsize=SMALL - 0.5, frameon=False)
+            axis.legend(fontsize=SMALL - 0.5, edgecolor="none", framealpha=0.85)
         png = png_of(figure)
     return Picture(name, png, description or caption, caption)
