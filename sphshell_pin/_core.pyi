@@ -105,6 +105,7 @@ def contact_force(
     relaxation: float,
 ) -> tuple[float, _Doubles, float, _Doubles]: ...
 def contact_row_type() -> Any: ...
+def patch_row_type() -> Any: ...
 
 class Pair:
     relaxation: float
@@ -229,6 +230,7 @@ class RunSettings:
         start_time: float,
         control_dt: float,
         record_dt: float,
+        patches: bool,
     ) -> None: ...
 
 class OneUser:

@@ -253,6 +253,7 @@ def _open_run(built: Built, q: Array, v: Array, t: float) -> OpenRun:
         built.controller,
         built.scenario.run.control_dt,
         record_dt=ROW_DT,
+        record=built.scenario.run.record,
         t0=t,
     )
 

@@ -177,6 +177,7 @@ def simulate(
                 built.controller,
                 run.control_dt,
                 record_dt=run.record_dt,
+                record=run.record,
                 progress=progress,
             )
     except (Interrupted, SimulationDiverged) as error:

@@ -240,6 +240,8 @@ def _check_integrator(kind: str) -> str:
 class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integrators have
     """How long and how finely to simulate [s]; `recording_speed` 0.1 films in slow motion.
 
+    With `record = ["patch"]` the patch of each contact is recorded and drawn.
+
     The parameters of the integrator stand in this table; it is adaptive unless `dt` is given.
     """
 
@@ -247,6 +249,7 @@ class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integ
     integrator: Annotated[str, AfterValidator(_check_integrator)] = ""
     control_dt: Annotated[Positive | None, Parameter("s", "control period")] = None
     record_dt: Annotated[Positive | None, Parameter("s", "time between rows")] = None
+    record: list[Literal["patch"]] = []
     recording_speed: Annotated[Positive, Parameter(label="speed of the recording")] = 1.0
 
     @model_validator(mode="after")
