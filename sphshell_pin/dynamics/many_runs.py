@@ -63,9 +63,7 @@ def roll_out(
     rows = record_dt if record_dt is not None else (duration or None)
 
     def settings_of(scene: Scene, hold: float) -> _core.RunSettings:
-        return run_settings(
-            scene, integrator, duration, hold, record_dt=rows, record=record, t0=t0
-        )
+        return run_settings(scene, integrator, duration, hold, record_dt=rows, record=record, t0=t0)
 
     settings = {0.0: settings_of(scene, 0.0)}
     controllers = _one_each(controller, len(starts))

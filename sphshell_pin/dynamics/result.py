@@ -318,11 +318,15 @@ class Result:
             ("slip_velocity", "m/s", log.slip_velocity_world),
         ):
             columns |= {f"{label}_{a} [{unit}]": vectors[:, i] for i, a in enumerate("xyz")}
-        return columns | {
-            "element": log.element,
-            "feature": log.feature,
-            "number": log.contact_id,
-        } | ({} if self.patch_rows is None else patch_columns(self.patch_rows))
+        return (
+            columns
+            | {
+                "element": log.element,
+                "feature": log.feature,
+                "number": log.contact_id,
+            }
+            | ({} if self.patch_rows is None else patch_columns(self.patch_rows))
+        )
 
     def sensor_columns(self) -> dict[str, Array]:
         """Return the readings of all sensors as columns, units in the names (for CSV, tables).

@@ -74,7 +74,8 @@ def stroke(start: Array, step: Array, first: float = 1.0, last: float = 1.0) -> 
     whole = (_half_disc(begin, half2, half) - _half_disc(end, half2, half)) / width
     if first == last:
         return np.asarray(first * whole)
-    cube = (half2 - begin * begin) ** 1.5 - (half2 - end * end) ** 1.5
+    left = np.maximum(0.0, half2 - np.stack((begin, end)) ** 2) ** 1.5
+    cube = left[0] - left[1]
     # Of the share s = (c - x) / width of the stroke, times the pressure.
     late = (c * whole + cube / (3.0 * width)) / width
     return np.asarray(first * whole + (last - first) * late)

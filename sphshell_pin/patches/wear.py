@@ -1,0 +1,250 @@
+"""Wear by Preston's law: what the patches of a run took off the shells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sphshell_pin.atomic import atomic_file
+from sphshell_pin.checks import check_positive, read_only
+from sphshell_pin.errors import ResultError
+from sphshell_pin.patches.ellipse import stroke
+from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, scene_of
+from sphshell_pin.patches.sampling import Grid, Samples, divide
+from sphshell_pin.patches.taxels import same_shell
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from sphshell_pin.dynamics.pairs import ContactPair
+    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.shell.shell import Shell
+
+# Samples over the smaller half axis of a patch, unless a resolution is given.
+_PER_HALF_AXIS = 5.0
+# A patch wears what faces it within 72 degrees and is no farther from its plane than this share of
+# its larger half axis.
+_FACING, _FAR = 0.3, 1.0
+
+
+@dataclass(frozen=True)
+class WearMap:
+    """What was removed from one shell, on small triangles where contacts passed.
+
+    Attributes
+    ----------
+    shell : the Shell
+    corners : (k, 3, 3) of the triangles [m], in the shell's frame
+    triangle : (k,) the shell's triangle that each is a part of
+    areas : (k,) [m^2]
+    depth : (k,) removed, along the normal [m]
+    resolution : longest side of a triangle [m]
+    unresolved : share of the volume that passed between the triangles, and was given to the nearest
+    """
+
+    shell: Shell
+    corners: Array
+    triangle: Longs
+    areas: Array
+    depth: Array
+    resolution: float
+    unresolved: float
+
+    @property
+    def points(self) -> Array:
+        """Middles (k, 3) of the triangles [m]."""
+        return np.asarray(self.corners.mean(axis=1))
+
+    @property
+    def volume(self) -> float:
+        """Removed volume [m^3]: the coefficient times the sum of force, slip and time."""
+        return float(self.depth @ self.areas)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write corners, triangle, areas and depth to a compressed .npz file; return its path."""
+        names = ("corners", "triangle", "areas", "depth")
+        with atomic_file(Path(path)) as stream:
+            np.savez_compressed(stream, **{name: getattr(self, name) for name in names})
+        return Path(path)
+
+    def plot(self) -> Figure:
+        """Return a picture of it; MissingExtra without matplotlib."""
+        from sphshell_pin.plot.wear import plot_wear
+
+        return plot_wear([self])
+
+
+def wear_maps(
+    result: Result,
+    coefficient: float,
+    scene: Scene | None = None,
+    *,
+    resolution: float | None = None,
+) -> tuple[WearMap, ...]:
+    """Return what each shell lost by Preston's law: depth = coefficient x pressure x slip x time.
+
+    Between two recorded rows a patch moves on a straight line, and force times slip changes
+    linearly: the pressure that a place of the shell feels is integrated exactly along that stroke.
+    Strokes are therefore smooth, whatever the time between rows, as long as the path is straight
+    between them to a small share of a half axis. Each stroke is scaled so that the volume it
+    removes is that of Preston's law for its force, at any resolution.
+
+    The slip is that of the contact point: a sphere that only spins about the normal removes
+    nothing. The shell keeps its shape: wear does not act back on the contacts.
+
+    Parameters
+    ----------
+    result : of a run with record=("patch",)
+    coefficient : Preston's [1/Pa]
+    scene : by default the one that ran
+    resolution : largest side of the triangles on which the depth is given [m]; by default a fifth
+        of the median smaller half axis
+
+    Raises
+    ------
+    ResultError
+        There are no patches, or no scene.
+    InvalidParameter
+        The coefficient or the resolution is not positive, or that needs too many triangles.
+    """
+    coefficient = check_positive("coefficient", coefficient, "1/Pa")
+    if resolution is not None:
+        resolution = check_positive("resolution", resolution, "m")
+    scene = scene_of(result, scene)
+    result.patches  # noqa: B018  # which may have none, before the work begins
+    maps = []
+    seen: set[int] = set()
+    for k, pair in enumerate(scene.pairs):
+        if k in seen or pair.shell is None:
+            continue
+        alike = same_shell(scene, pair)
+        seen |= set(alike)
+        patches = patches_on(result, scene, alike, pair.joint_j, pair.placement_j)
+        if len(patches.row):
+            maps.append(_map(pair, np.asarray(result.t), patches, coefficient, resolution))
+    return tuple(maps)
+
+
+def _map(
+    pair: ContactPair,
+    t: Array,
+    patches: PlacedPatches,
+    coefficient: float,
+    resolution: float | None,
+) -> WearMap:
+    shell = pair.shell
+    assert shell is not None
+    fine = resolution or float(np.median(patches.half_axes[:, 1])) / _PER_HALF_AXIS
+    strokes = strokes_of(t, patches)
+    largest = float(patches.half_axes.max())
+    places = _along(patches.points, strokes, largest)
+    curved = pair.method == "smooth"
+    samples = divide(shell, places, 1.1 * largest + fine, fine, curved)
+    if not len(samples.areas):
+        raise ResultError("the result", f"has no contact near shell '{shell.name}': is it another?")
+    removed, lost = _deposit(samples, patches, strokes, closed=shell.is_closed, size=largest)
+    volume = float(removed @ samples.areas)
+    return WearMap(
+        shell,
+        read_only(samples.corners),
+        read_only(samples.triangle),
+        read_only(samples.areas),
+        read_only(coefficient * removed),
+        fine,
+        lost / volume if volume else 0.0,
+    )
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """Motions of patches from entry `first` to entry `last` (k,), which are one at ends of touch.
+
+    `begin` and `end` (k,) are force times slip [W] at the two, `time` [s] how long it takes.
+    """
+
+    first: Longs
+    last: Longs
+    begin: Array
+    end: Array
+    time: Array
+
+
+def strokes_of(t: Array, patches: PlacedPatches) -> Strokes:
+    """Return the strokes between the rows `t` (n,) [s]: each contact goes on by its id.
+
+    Where it has no next or previous row, it stays for half the time to that. So the sum of all is
+    that of force, slip and time with the trapezoid rule over rows.
+    """
+    order = np.lexsort((patches.row, patches.contact_id, patches.pair))
+    pair, contact, row = (getattr(patches, name)[order] for name in ("pair", "contact_id", "row"))
+    goes_on = (np.diff(pair) == 0) & (np.diff(contact) == 0) & (np.diff(row) == 1)
+    first, last = order[:-1][goes_on], order[1:][goes_on]
+    power = patches.force * patches.slip
+    gap = np.append(np.diff(t), 0.0)
+    alone = []
+    for there, step in ((np.append(goes_on, False), 0), (np.append(False, goes_on), -1)):
+        at = order[~there]
+        time = np.append(0.0, gap)[patches.row[at] + 1 + step]
+        alone.append((at, 0.5 * time))
+    at = np.concatenate([first, *(one[0] for one in alone)])
+    to = np.concatenate([last, *(one[0] for one in alone)])
+    time = np.concatenate([gap[patches.row[first]], *(one[1] for one in alone)])
+    return Strokes(at, to, power[at], power[to], time)
+
+
+def _along(points: Array, strokes: Strokes, step: float) -> Array:
+    """Return places along the strokes, no farther apart than `step` [m]."""
+    begin, end = points[strokes.first], points[strokes.last]
+    pieces = np.ceil(np.linalg.norm(end - begin, axis=1) / step).astype(np.int64) + 1
+    which = np.repeat(np.arange(len(pieces)), pieces)
+    at = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    share = (at / np.maximum(pieces[which] - 1, 1))[:, None]
+    return np.asarray(begin[which] + share * (end - begin)[which])
+
+
+def _deposit(
+    samples: Samples, patches: PlacedPatches, strokes: Strokes, *, closed: bool, size: float
+) -> tuple[Array, float]:
+    """Return the work of slip on the samples [J/m^2], and what of it [J] the nearest ones got."""
+    grid = Grid(samples.points, size)
+    removed, lost = np.zeros(len(samples.areas)), 0.0
+    for k in np.flatnonzero((strokes.begin != 0.0) | (strokes.end != 0.0)):
+        i, j = strokes.first[k], strokes.last[k]
+        begin, end = strokes.begin[k], strokes.end[k]
+        work = 0.5 * (begin + end) * strokes.time[k]
+        if work == 0.0:
+            continue
+        half = 0.5 * (patches.half_axes[i] + patches.half_axes[j])
+        normal = patches.normals[i] + patches.normals[j]
+        normal /= np.linalg.norm(normal)
+        # Axes have no sign.
+        other = patches.axes[j] * (1.0 if patches.axes[i] @ patches.axes[j] >= 0.0 else -1.0)
+        axis = patches.axes[i] + other
+        axis -= normal * (normal @ axis)
+        axis /= np.linalg.norm(axis)
+        plane = np.stack([axis, np.cross(normal, axis)], axis=1) / half
+        a, b = patches.points[i], patches.points[j]
+        near = grid.within(np.minimum(a, b) - half[0], np.maximum(a, b) + half[0])
+        facing = samples.normals[near] @ normal
+        near = near[(facing if closed else np.abs(facing)) > _FACING]
+        seen = samples.points[near] - a
+        step = (b - a) @ plane
+        shape = stroke(seen @ plane, step, begin, end)
+        shape[np.abs(seen @ normal) > _FAR * half[0] + np.linalg.norm(b - a)] = 0.0
+        total = float(shape @ samples.areas[near])
+        if total * work > 0.0:
+            removed[near] += shape * (work / total)
+        else:
+            close = _nearest(samples.points, 0.5 * (a + b))
+            removed[close] += work / samples.areas[close]
+            lost += work
+    return removed, lost
+
+
+def _nearest(points: Array, place: Array) -> int:
+    return int(np.argmin(((points - place) ** 2).sum(axis=1)))
