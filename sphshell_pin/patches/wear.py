@@ -67,10 +67,13 @@ class WearMap:
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write corners, triangle, areas and depth to a compressed .npz file; return its path."""
-        names = ("corners", "triangle", "areas", "depth")
         with atomic_file(Path(path)) as stream:
-            np.savez_compressed(stream, **{name: getattr(self, name) for name in names})
+            np.savez_compressed(stream, **self.arrays())
         return Path(path)
+
+    def arrays(self) -> dict[str, Array | Longs]:
+        """Return corners, triangle, areas and depth by name."""
+        return {name: getattr(self, name) for name in ("corners", "triangle", "areas", "depth")}
 
     def plot(self) -> Figure:
         """Return a picture of it; MissingExtra without matplotlib."""

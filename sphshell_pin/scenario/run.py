@@ -48,6 +48,8 @@ RESULTS = (
     "energy.png",
     "contact_path.png",
     "contact_map.png",
+    "wear.npz",
+    "wear.png",
     "sensors.png",
     RECORDING,
 )
@@ -239,8 +241,16 @@ def _draw(built: Built, result: Result, desk: Path, notes: list[str], *, recordi
         view = result.view(built.scene, built.visual_model, speed=speed, title=title)
         view.save(desk / RECORDING)
 
+    def write_wear() -> None:
+        if scenario.run.wear is not None:
+            from sphshell_pin.patches import wear_maps
+            from sphshell_pin.plot.wear import write_wear
+
+            write_wear(desk, wear_maps(result, scenario.run.wear, built.scene))
+
     writers: dict[str, Callable[[], object]] = {
         "figures": lambda: result.save_figures(desk, built.scene),
+        "wear": write_wear,
         RECORDING: write_recording,
     }
     for what, write in writers.items():

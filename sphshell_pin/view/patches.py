@@ -28,7 +28,7 @@ RAMP = ("#0d0887", "#6a00a8", "#b12a90", "#e16462", "#fca636", "#f0f921")
 """From no pressure to the largest: colors of matplotlib's plasma, evenly spaced."""
 LEVELS = 8
 """Peak pressures that differ in color: the page cannot change the colors of a mesh in a film."""
-SEEN = 0.009  # half axis of the largest patch in the picture, over its size, at least
+SEEN = 0.014  # half axis of the largest patch in the picture, over its size, at least
 
 PatchRows = NDArray[Any]
 
