@@ -110,6 +110,7 @@ LAYERS = (
     ("shell",),
     ("contact",),
     ("dynamics",),
+    ("patches",),
     ("sphshell_pin",),  # its public names are those of the folders above
     ("scenario",),
     ("plot", "view"),

@@ -34,21 +34,23 @@ _FACING, _FAR = 0.3, 1.0
 
 @dataclass(frozen=True)
 class WearMap:
-    """What was removed from one shell, on small triangles where contacts passed.
+    """What was removed from one shell, on small pieces of it where contacts passed.
 
     Attributes
     ----------
     shell : the Shell
-    corners : (k, 3, 3) of the triangles [m], in the shell's frame
+    corners : (k, 4, 3) of the pieces [m], in the shell's frame
+    points : (k, 3), their centers [m]
     triangle : (k,) the shell's triangle that each is a part of
     areas : (k,) [m^2]
     depth : (k,) removed, along the normal [m]
-    resolution : longest side of a triangle [m]
-    unresolved : share of the volume that passed between the triangles, and was given to the nearest
+    resolution : longest side of a piece [m]
+    unresolved : share of the volume that passed between the centers, and was given to the nearest
     """
 
     shell: Shell
     corners: Array
+    points: Array
     triangle: Longs
     areas: Array
     depth: Array
@@ -56,24 +58,20 @@ class WearMap:
     unresolved: float
 
     @property
-    def points(self) -> Array:
-        """Middles (k, 3) of the triangles [m]."""
-        return np.asarray(self.corners.mean(axis=1))
-
-    @property
     def volume(self) -> float:
         """Removed volume [m^3]: the coefficient times the sum of force, slip and time."""
         return float(self.depth @ self.areas)
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write corners, triangle, areas and depth to a compressed .npz file; return its path."""
+        """Write the arrays to a compressed .npz file; return its path."""
         with atomic_file(Path(path)) as stream:
             np.savez_compressed(stream, **self.arrays())
         return Path(path)
 
     def arrays(self) -> dict[str, Array | Longs]:
-        """Return corners, triangle, areas and depth by name."""
-        return {name: getattr(self, name) for name in ("corners", "triangle", "areas", "depth")}
+        """Return corners, points, triangle, areas and depth by name."""
+        names = ("corners", "points", "triangle", "areas", "depth")
+        return {name: getattr(self, name) for name in names}
 
     def plot(self) -> Figure:
         """Return a picture of it; MissingExtra without matplotlib."""
@@ -105,7 +103,7 @@ def wear_maps(
     result : of a run with record=("patch",)
     coefficient : Preston's [1/Pa]
     scene : by default the one that ran
-    resolution : largest side of the triangles on which the depth is given [m]; by default a fifth
+    resolution : largest side of the pieces on which the depth is given [m]; by default a fifth
         of the median smaller half axis
 
     Raises
@@ -113,7 +111,7 @@ def wear_maps(
     ResultError
         There are no patches, or no scene.
     InvalidParameter
-        The coefficient or the resolution is not positive, or that needs too many triangles.
+        The coefficient or the resolution is not positive, or that needs too many pieces.
     """
     coefficient = check_positive("coefficient", coefficient, "1/Pa")
     if resolution is not None:
@@ -155,6 +153,7 @@ def _map(
     return WearMap(
         shell,
         read_only(samples.corners),
+        read_only(samples.points),
         read_only(samples.triangle),
         read_only(samples.areas),
         read_only(coefficient * removed),

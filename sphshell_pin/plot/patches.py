@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sphshell_pin.plot.on_shell import PathGroup, Picture
 
 COLORS = "viridis"
-MOST = 80  # ellipses in one picture
+MOST = 40  # ellipses in one picture
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 33)
 
 
@@ -51,23 +51,22 @@ def draw_patches(
     seen = np.flatnonzero(patches.normals @ normal > 0.0)
     peak = peak_pressure(patches)
     kept: list[int] = []
-    apart = 0.0
     extent = float(np.ptp(patches.points[seen], axis=0).max(initial=0.0))
     for k in seen:
         near = patches.points[kept] - patches.points[k]
         apart = max(1.5 * float(patches.half_axes[k, 0]), extent / MOST)
         if not kept or float((near**2).sum(axis=1).min()) > apart**2:
             kept.append(int(k))
+    if not kept:
+        return
+    kept = [kept[k] for k in np.unique(np.linspace(0, len(kept) - 1, MOST).astype(int))]
     ellipses = []
-    for k in kept[:MOST]:
+    for k in kept:
         axis = patches.axes[k]
         across = np.cross(patches.normals[k], axis)
         a, b = patches.half_axes[k]
         ring = a * np.cos(_CIRCLE)[:, None] * axis + b * np.sin(_CIRCLE)[:, None] * across
         ellipses.append((patches.points[k] + ring) * picture.factor)
-    if ellipses:
-        colors = scale.to_rgba(peak[kept[:MOST]] * 1e-6)
-        shown = Poly3DCollection(
-            ellipses, facecolors=colors, edgecolors=INK, linewidths=0.6, zorder=5
-        )
-        picture.axis.add_collection3d(shown, autolim=False)
+    colors = scale.to_rgba(peak[kept] * 1e-6)
+    shown = Poly3DCollection(ellipses, facecolors=colors, edgecolors=INK, linewidths=0.6, zorder=5)
+    picture.axis.add_collection3d(shown, autolim=False)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 COLORS = "viridis"
 LEAST = 2e-3  # of the largest depth: less is bare
-MOST_TRIANGLES = 60_000  # of the picture: of more, neighbors are drawn as one
+MOST_PIECES = 60_000  # of the picture: of more, neighbors are drawn as one
 
 
 def plot_wear(maps: Sequence[WearMap]) -> Figure:
@@ -45,7 +45,7 @@ def plot_wear(maps: Sequence[WearMap]) -> Figure:
     for axis, one in zip(axes, shown, strict=True):
         worn = one.depth > LEAST * largest
         corners, depth = one.corners[worn], one.depth[worn]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         middle = (depth[:, None] * normals).sum(axis=0)
         if np.linalg.norm(middle) < 1e-9 * (depth * np.linalg.norm(normals, axis=1)).sum():
             middle = normals[np.argmax(depth)]
@@ -53,7 +53,7 @@ def plot_wear(maps: Sequence[WearMap]) -> Figure:
         touched = np.asarray(one.shell.vertices)[triangles].reshape(-1, 3)
         picture = Picture.of(axis, one.shell, middle, touched)
         picture.draw_shell(one.shell)
-        step = -(-len(corners) // MOST_TRIANGLES)
+        step = -(-len(corners) // MOST_PIECES)
         # What stands for several is as large as they are.
         center = corners[::step].mean(axis=1, keepdims=True)
         drawn = center + np.sqrt(step) * (corners[::step] - center)
