@@ -89,7 +89,9 @@ def divide(shell: Shell, places: Array, reach: float, resolution: float, curved:
         done_owner.append(owner[fine])
         done_corners.append(corners[fine])
         owner, weights = _halved(owner[~fine], weights[~fine], np.argmax(pairs[~fine], axis=1))
-        if len(owner) + sum(map(len, done_owner)) > _MOST_SAMPLES:
+        # How many there will be, once they are small beside what they are cut from.
+        least = pairs[~fine].prod(axis=1).sum() / resolution**2 if small.all() else len(owner)
+        if least + sum(map(len, done_owner)) > _MOST_SAMPLES:
             raise InvalidParameter(
                 "resolution",
                 resolution,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -65,7 +66,7 @@ class WearMap:
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the arrays to a compressed .npz file; return its path."""
         with atomic_file(Path(path)) as stream:
-            np.savez_compressed(stream, **self.arrays())
+            np.savez_compressed(stream, allow_pickle=False, **self.arrays())
         return Path(path)
 
     def arrays(self) -> dict[str, Array | Longs]:
@@ -160,6 +161,24 @@ def _map(
         fine,
         lost / volume if volume else 0.0,
     )
+
+
+def save_wear(maps: Sequence[WearMap], folder: str | PathLike[str]) -> None:
+    """Write wear.npz, the arrays of all maps, and wear.png into `folder`.
+
+    Of several maps the names of the arrays begin with that of the shell. Raises MissingExtra
+    without matplotlib.
+    """
+    arrays = {}
+    for one in maps:
+        prefix = "" if len(maps) == 1 else f"{one.shell.name}."
+        arrays |= {f"{prefix}{name}": array for name, array in one.arrays().items()}
+    with atomic_file(Path(folder) / "wear.npz") as stream:
+        np.savez_compressed(stream, allow_pickle=False, **arrays)
+    from sphshell_pin.plot.figure import write_figure
+    from sphshell_pin.plot.wear import plot_wear
+
+    write_figure(Path(folder) / "wear.png", plot_wear(maps))
 
 
 @dataclass(frozen=True)

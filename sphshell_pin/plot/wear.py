@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.atomic import atomic_file
-from sphshell_pin.plot.figure import NO_CONTACT, new_figure, only_say, reading_unit, write_figure
+from sphshell_pin.plot.figure import NO_CONTACT, new_figure, only_say, reading_unit
 from sphshell_pin.plot.on_shell import FINE, Picture, shell_axes
 
 if TYPE_CHECKING:
@@ -73,14 +71,3 @@ def plot_wear(maps: Sequence[WearMap]) -> Figure:
     figure.colorbar(scale, ax=axes, label=f"removed depth [{unit}]", shrink=0.8)
     figure.suptitle("Wear by Preston's law", fontsize=12)
     return figure
-
-
-def write_wear(folder: Path, maps: Sequence[WearMap]) -> None:
-    """Write wear.npz, the arrays of all maps, and wear.png into `folder`."""
-    arrays = {}
-    for one in maps:
-        prefix = "" if len(maps) == 1 else f"{one.shell.name}."
-        arrays |= {f"{prefix}{name}": array for name, array in one.arrays().items()}
-    with atomic_file(folder / "wear.npz") as stream:
-        np.savez_compressed(stream, **arrays)
-    write_figure(folder / "wear.png", plot_wear(maps))

@@ -243,10 +243,9 @@ def _draw(built: Built, result: Result, desk: Path, notes: list[str], *, recordi
 
     def write_wear() -> None:
         if scenario.run.wear is not None:
-            from sphshell_pin.patches import wear_maps
-            from sphshell_pin.plot.wear import write_wear
+            from sphshell_pin.patches.wear import save_wear, wear_maps
 
-            write_wear(desk, wear_maps(result, scenario.run.wear, built.scene))
+            save_wear(wear_maps(result, scenario.run.wear, built.scene), desk)
 
     writers: dict[str, Callable[[], object]] = {
         "figures": lambda: result.save_figures(desk, built.scene),
