@@ -169,7 +169,7 @@ def save_wear(maps: Sequence[WearMap], folder: str | PathLike[str]) -> None:
     Of several maps the names of the arrays begin with that of the shell. Raises MissingExtra
     without matplotlib.
     """
-    arrays = {}
+    arrays: dict[str, Array | Longs] = {}
     for one in maps:
         prefix = "" if len(maps) == 1 else f"{one.shell.name}."
         arrays |= {f"{prefix}{name}": array for name, array in one.arrays().items()}

@@ -52,11 +52,11 @@ def draw_patches(
     peak = peak_pressure(patches)
     kept: list[int] = []
     extent = float(np.ptp(patches.points[seen], axis=0).max(initial=0.0))
-    for k in seen:
+    for k in seen.tolist():
         near = patches.points[kept] - patches.points[k]
         apart = max(1.5 * float(patches.half_axes[k, 0]), extent / MOST)
         if not kept or float((near**2).sum(axis=1).min()) > apart**2:
-            kept.append(int(k))
+            kept.append(k)
     if not kept:
         return
     kept = [kept[k] for k in np.unique(np.linspace(0, len(kept) - 1, MOST).astype(int))]

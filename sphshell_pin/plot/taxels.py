@@ -125,7 +125,7 @@ def _write_mp4(path: Path, frames: NDArray[np.uint8], fps: float) -> Path:
     height, width = frames.shape[1:3]
     figure = Figure(figsize=(width / 100, height / 100), dpi=100)
     image = figure.figimage(frames[0], origin="upper")
-    writer = FFMpegWriter(fps=fps)
+    writer = FFMpegWriter(fps=fps)  # type: ignore[arg-type]  # as ffmpeg has it
     with atomic_path(path, ".mp4") as aside, writer.saving(figure, str(aside), dpi=100):
         for frame in frames:
             image.set_data(frame)

@@ -290,7 +290,9 @@ def _legend(
 
 def _color_keys(display: Display, shown: ContactRows) -> list[tuple[str, str]]:
     """Return the legend of the colors of shells and patches."""
-    keys = [] if display.coloring is None else [(RAMP, display.coloring)]
+    keys: list[tuple[tuple[str, ...], str]] = []
+    if display.coloring is not None:
+        keys.append((RAMP, display.coloring))
     if shown.patches is not None and len(shown.row):
         keys.append((PRESSURE_RAMP, str(display.patch_scale)))
     return [(f"linear-gradient(90deg, {', '.join(ramp)})", meaning) for ramp, meaning in keys]
