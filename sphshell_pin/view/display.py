@@ -149,6 +149,11 @@ class Display:
         return range_text(self.largest_distance)
 
     @property
+    def draws_patches(self) -> bool:
+        """Whether patches were given to `update`."""
+        return self._patches is not None
+
+    @property
     def trail_width(self) -> float:
         """Radius of the lines that `draw_trail` draws [m]."""
         return 0.0014 * self.view.distance

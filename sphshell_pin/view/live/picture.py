@@ -75,6 +75,12 @@ class Picture:
         """What the length of an arrow means now."""
         return self.display.arrow_scale
 
+    @property
+    def pressure(self) -> str | None:
+        """What the colors and sizes of patches mean; None without any in the picture."""
+        shown = self.shown["points"] and self.display.draws_patches
+        return str(self.display.patch_scale) if shown else None
+
     def update(self, player: Player, push: PushShown | None) -> None:
         """Show the state of `player`, and a `push` on a body."""
         if player.scene.pairs is not self._pairs:
