@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.plot.figure import NO_CONTACT, new_figure, only_say, reading_unit
+from sphshell_pin.plot.figure import new_figure, only_say, reading_unit
 from sphshell_pin.plot.on_shell import FINE, Picture, shell_axes
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def plot_wear(maps: Sequence[WearMap]) -> Figure:
     """
     shown = [one for one in maps if one.depth.max(initial=0.0) > 0.0]
     if not shown:
-        return only_say("Wear", NO_CONTACT)
+        return only_say("Wear by Preston's law", "Nothing was worn off.")
     columns = min(len(shown), 2)
     figure = new_figure(2.4 + 5.2 * columns, 0.8 + 5.4 * -(-len(shown) // columns))
     from matplotlib import colormaps
