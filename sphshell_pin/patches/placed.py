@@ -26,7 +26,7 @@ class PlacedPatches:
 
     `row`, `pair`, `contact_id` (k,) as in the contact log; `points`, `normals` (from the shell to
     the sphere) and `axes` (of the larger half axis) (k, 3); `half_axes` (k, 2) [m]; `force`, the
-    normal force (k,) [N], negative at a saddle; `slip` (k,) [m/s].
+    normal force (k,) [N], negative at a saddle; `slip` (k,) [m/s]; `element` (k,) of the shell.
     """
 
     row: Longs
@@ -38,6 +38,7 @@ class PlacedPatches:
     half_axes: Array
     force: Array
     slip: Array
+    element: Longs
 
     def select(self, chosen: Longs | NDArray[np.bool_]) -> PlacedPatches:
         """Return those that `chosen`, a mask or indices, picks."""
@@ -76,6 +77,7 @@ def patches_on(
         np.asarray(patches["half_axes"][chosen]),
         np.asarray(log.normal_force[chosen]),
         np.linalg.norm(log.slip_velocity_world[chosen], axis=1),
+        np.asarray(log.element[chosen], dtype=np.int64),
     )
 
 

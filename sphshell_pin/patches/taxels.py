@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive, check_vector, read_only
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from sphshell_pin.patches.ellipse import load_in_polygons
-from sphshell_pin.patches.placed import Array, PlacedPatches, patches_on, scene_of
+from sphshell_pin.patches.foundation import foundation_loads, has_foundation
+from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, scene_of
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.pairs import ContactPair
@@ -140,19 +142,34 @@ class TaxelGrid:
             and np.array_equal(one.placement.homogeneous, own.placement.homogeneous)
         ]
         on_j = {k for k, second in alike if second}
-        patches = patches_on(result, scene, [k for k, _ in alike], own.joint, own.placement)
-        # From the sphere's center to the contact: of the second of two spheres the normal leads out
-        # of it.
-        sides = np.where(np.isin(patches.pair, sorted(on_j)), 1.0, -1.0)
-        return self._images(result.t, patches, sides[:, None] * patches.normals, own.radius)
+        pairs = [k for k, _ in alike if not has_foundation(scene.pairs[k])]
+        patches = patches_on(result, scene, pairs, own.joint, own.placement)
+        forces, outside = np.zeros((len(result.t), *self.shape)), np.zeros(len(result.t))
+        if len(patches.row):
+            # From the sphere's center to the contact: of the second of two spheres the normal leads
+            # out of it.
+            sides = np.where(np.isin(patches.pair, sorted(on_j)), 1.0, -1.0)
+            places = sides[:, None] * patches.normals
+            self._add_ellipses(forces, outside, patches, places, own.radius)
+        for k in sorted({k for k, _ in alike} - set(pairs)):
+            found = foundation_loads(result, scene, k, own.joint, own.placement)
+            for row, points, loads in found:
+                i, j, on_grid = self._cells(points)
+                np.add.at(forces[row], (i[on_grid], j[on_grid]), loads[on_grid])
+                outside[row] += loads[~on_grid].sum()
+        return TaxelImages(result.t, read_only(forces), read_only(outside))
 
-    def _images(
-        self, t: Array, patches: PlacedPatches, places: Array, radius: float
-    ) -> TaxelImages:
+    def _cells(self, points: Array) -> tuple[Longs, Longs, NDArray[np.bool_]]:
+        """Return row and column (k,) of the taxels at `points` (k, 3), and which are there."""
+        along, right, up = (points / np.linalg.norm(points, axis=1)[:, None] @ self._basis).T
+        angles = np.stack([np.arcsin(np.clip(up, -1.0, 1.0)), np.arctan2(right, along)], axis=1)
+        cells = np.floor((angles / self.extent + 0.5) * self.shape).astype(np.int64)
+        return cells[:, 0], cells[:, 1], ((cells >= 0) & (cells < self.shape)).all(axis=1)
+
+    def _add_ellipses(
+        self, forces: Array, outside: Array, patches: PlacedPatches, places: Array, radius: float
+    ) -> None:
         n, m = self.shape
-        forces, outside = np.zeros((len(t), n, m)), np.zeros(len(t))
-        if not len(patches.row):
-            return TaxelImages(t, read_only(forces), read_only(outside))
         cuts = self._cuts(float(np.median(patches.half_axes[:, 0])) / radius)
         corners = self.corners(cuts).reshape(-1, 3)
         step = max(self.extent[0] / n, self.extent[1] / m) / cuts
@@ -174,7 +191,6 @@ class TaxelGrid:
             loads = patches.force[k] * load_in_polygons(cells)
             np.add.at(forces[row], (i // cuts, j // cuts), loads)
             outside[row] += patches.force[k] - loads.sum()
-        return TaxelImages(t, read_only(forces), read_only(outside))
 
     def _cuts(self, half: float) -> int:
         """Return into how many pieces the sides of taxels are cut, for half axes of `half` [rad].
@@ -225,7 +241,8 @@ class ShellTaxels:
             owner = np.asarray(shell.element_face, dtype=np.int64)[owner]
             count = len(shell.face_names)
         alike = same_shell(scene, pair)
-        patches = patches_on(result, scene, alike, pair.joint_j, pair.placement_j)
+        pairs = [k for k in alike if not has_foundation(scene.pairs[k])]
+        patches = patches_on(result, scene, pairs, pair.joint_j, pair.placement_j)
         corners = np.asarray(shell.vertices, dtype=float)[np.asarray(shell.triangles)]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.linalg.norm(normals, axis=1)[:, None]
@@ -242,6 +259,13 @@ class ShellTaxels:
             loads = patches.force[k] * np.abs(load_in_polygons(u))
             np.add.at(forces[row], owner[near], loads)
             outside[row] += patches.force[k] - loads.sum()
+        taxel = np.arange(count) if self.of == "elements" else np.asarray(shell.element_face)
+        for k in sorted(set(alike) - set(pairs)):
+            method = scene.pairs[k].method
+            found = foundation_loads(result, scene, k, pair.joint_j, pair.placement_j)
+            for row, points, loads in found:
+                at = taxel[shell.closest_points(points, method=method).elements]
+                np.add.at(forces[row], at, loads)
         return TaxelImages(result.t, read_only(forces), read_only(outside))
 
 

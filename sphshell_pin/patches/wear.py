@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -14,6 +13,7 @@ from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive, read_only
 from sphshell_pin.errors import ResultError
 from sphshell_pin.patches.ellipse import stroke
+from sphshell_pin.patches.foundation import Overlap, overlap_of
 from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, scene_of
 from sphshell_pin.patches.sampling import Grid, Samples, divide
 from sphshell_pin.patches.taxels import same_shell
@@ -128,14 +128,17 @@ def wear_maps(
         seen |= set(alike)
         patches = patches_on(result, scene, alike, pair.joint_j, pair.placement_j)
         if len(patches.row):
-            maps.append(_map(pair, np.asarray(result.t), patches, coefficient, resolution))
+            overlap = overlap_of(result, scene, patches)
+            t = np.asarray(result.t)
+            maps.append(_map(t, pair, patches, overlap, coefficient, resolution))
     return tuple(maps)
 
 
 def _map(
-    pair: ContactPair,
     t: Array,
+    pair: ContactPair,
     patches: PlacedPatches,
+    overlap: Overlap | None,
     coefficient: float,
     resolution: float | None,
 ) -> WearMap:
@@ -145,11 +148,10 @@ def _map(
     strokes = strokes_of(t, patches)
     largest = float(patches.half_axes.max())
     places = _along(patches.points, strokes, largest)
-    curved = pair.method == "smooth"
-    samples = divide(shell, places, 1.1 * largest + fine, fine, curved)
+    samples = divide(shell, places, 1.1 * largest + fine, fine, curved=pair.method == "smooth")
     if not len(samples.areas):
         raise ResultError("the result", f"has no contact near shell '{shell.name}': is it another?")
-    removed, lost = _deposit(samples, patches, strokes, closed=shell.is_closed, size=largest)
+    removed, lost = deposit(samples, patches, strokes, shell, overlap)
     volume = float(removed @ samples.areas)
     return WearMap(
         shell,
@@ -228,11 +230,16 @@ def _along(points: Array, strokes: Strokes, step: float) -> Array:
     return np.asarray(begin[which] + share * (end - begin)[which])
 
 
-def _deposit(
-    samples: Samples, patches: PlacedPatches, strokes: Strokes, *, closed: bool, size: float
+def deposit(
+    samples: Samples,
+    patches: PlacedPatches,
+    strokes: Strokes,
+    shell: Shell,
+    overlap: Overlap | None = None,
 ) -> tuple[Array, float]:
     """Return the work of slip on the samples [J/m^2], and what of it [J] the nearest ones got."""
-    grid = Grid(samples.points, size)
+    grid = Grid(samples.points, float(patches.half_axes.max()))
+    part = np.asarray(shell.element_patch)[np.asarray(shell.triangle_element)[samples.triangle]]
     removed, lost = np.zeros(len(samples.areas)), 0.0
     for k in np.flatnonzero((strokes.begin != 0.0) | (strokes.end != 0.0)):
         i, j = strokes.first[k], strokes.last[k]
@@ -243,20 +250,21 @@ def _deposit(
         half = 0.5 * (patches.half_axes[i] + patches.half_axes[j])
         normal = patches.normals[i] + patches.normals[j]
         normal /= np.linalg.norm(normal)
-        # Axes have no sign.
-        other = patches.axes[j] * (1.0 if patches.axes[i] @ patches.axes[j] >= 0.0 else -1.0)
-        axis = patches.axes[i] + other
-        axis -= normal * (normal @ axis)
-        axis /= np.linalg.norm(axis)
-        plane = np.stack([axis, np.cross(normal, axis)], axis=1) / half
         a, b = patches.points[i], patches.points[j]
-        near = grid.within(np.minimum(a, b) - half[0], np.maximum(a, b) + half[0])
+        # An overlap is no ellipse about the contact: it may reach farther.
+        whole = overlap is not None and overlap.holds[i]
+        reach = 2.0 * half[0] if whole else half[0]
+        near = grid.within(np.minimum(a, b) - reach, np.maximum(a, b) + reach)
         facing = samples.normals[near] @ normal
-        near = near[(facing if closed else np.abs(facing)) > _FACING]
-        seen = samples.points[near] - a
-        step = (b - a) @ plane
-        shape = stroke(seen @ plane, step, begin, end)
-        shape[np.abs(seen @ normal) > _FAR * half[0] + np.linalg.norm(b - a)] = 0.0
+        near = near[(facing if shell.is_closed else np.abs(facing)) > _FACING]
+        if overlap is not None and whole:
+            near = near[part[near] == shell.element_patch[patches.element[i]]]
+            shape = overlap.stroke(samples.points[near], i, j, half[1], begin, end)
+        else:
+            seen = samples.points[near] - a
+            plane = _axes(patches, i, j, normal) / half
+            shape = stroke(seen @ plane, (b - a) @ plane, begin, end)
+            shape[np.abs(seen @ normal) > _FAR * half[0] + np.linalg.norm(b - a)] = 0.0
         total = float(shape @ samples.areas[near])
         if total * work > 0.0:
             removed[near] += shape * (work / total)
@@ -265,6 +273,16 @@ def _deposit(
             removed[close] += work / samples.areas[close]
             lost += work
     return removed, lost
+
+
+def _axes(patches: PlacedPatches, i: int, j: int, normal: Array) -> Array:
+    """Return the mean directions (3, 2) of the half axes of two patches."""
+    # Axes have no sign.
+    other = patches.axes[j] * (1.0 if patches.axes[i] @ patches.axes[j] >= 0.0 else -1.0)
+    axis = patches.axes[i] + other
+    axis -= normal * (normal @ axis)
+    axis /= np.linalg.norm(axis)
+    return np.stack([axis, np.cross(normal, axis)], axis=1)
 
 
 def _nearest(points: Array, place: Array) -> int:

@@ -9,7 +9,7 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.patches import wear_maps
 from sphshell_pin.patches.placed import PlacedPatches
 from sphshell_pin.patches.sampling import divide
-from sphshell_pin.patches.wear import _deposit, strokes_of
+from sphshell_pin.patches.wear import deposit, strokes_of
 from tests.patches.scenes import plate, slide
 
 COEFFICIENT = 1e-12
@@ -88,9 +88,11 @@ def test_an_elliptical_patch_in_any_direction(angle):
         half_axes=np.tile([a, b], (n, 1)),
         force=np.full(n, force),
         slip=np.full(n, 0.2),
+        element=np.zeros(n, dtype=np.int64),
     )
-    samples = divide(plate(0.02), patches.points, 1.2 * a, 1e-4, curved=False)
-    depth, lost = _deposit(samples, patches, strokes_of(t, patches), closed=False, size=a)
+    shell = plate(0.02)
+    samples = divide(shell, patches.points, 1.2 * a, 1e-4, curved=False)
+    depth, lost = deposit(samples, patches, strokes_of(t, patches), shell)
     assert lost == 0.0
     # Half width of the ellipse across the path, and half chord along it in its middle.
     w = np.hypot(a * np.sin(angle), b * np.cos(angle))
