@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,8 +34,7 @@ def foundation_loads(
     They are the row's number, points (n, 3) in the frame at `placement` in a joint, and loads (n,)
     [N] that add up to the recorded normal forces: damping is shared out as the elastic pressure is.
     """
-    from sphshell_pin.contact.foundation import foundation_pressure
-
+    foundation_pressure = import_module("sphshell_pin.contact.foundation").foundation_pressure
     pair = scene.pairs[index]
     assert pair.shell is not None
     assert pair.sphere is not None

@@ -164,7 +164,8 @@ class TaxelGrid:
         along, right, up = (points / np.linalg.norm(points, axis=1)[:, None] @ self._basis).T
         angles = np.stack([np.arcsin(np.clip(up, -1.0, 1.0)), np.arctan2(right, along)], axis=1)
         cells = np.floor((angles / self.extent + 0.5) * self.shape).astype(np.int64)
-        return cells[:, 0], cells[:, 1], ((cells >= 0) & (cells < self.shape)).all(axis=1)
+        on_grid = np.asarray(((cells >= 0) & (cells < self.shape)).all(axis=1))
+        return cells[:, 0], cells[:, 1], on_grid
 
     def _add_ellipses(
         self, forces: Array, outside: Array, patches: PlacedPatches, places: Array, radius: float
