@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "contact/ball.hpp"
+#include "dynamics/patch.hpp"
 
 namespace sphshell {
 
@@ -360,7 +361,8 @@ Vec3 SceneData::relative_velocity(const Pair& pair, const Vec3& point_world) con
 }
 
 // Contacts of one place as one, with the sum of their forces.
-void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows) {
+void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows,
+                    std::vector<PatchRow>* patches) {
   if (active_.empty()) return;
   if (!needs_velocity_) body_.kinematics(q, v);
   const auto write = [](double* to, const Vec3& x) { std::copy_n(x.data(), 3, to); };
@@ -397,6 +399,8 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     row.element = whole.element;
     row.contact_id = active.contact_id;
     row.feature = whole.feature;
+    if (patches)
+      patches->push_back(hertz_patch(pair.disc_radius(), normal, row.depth, row.normal_force));
   }
 }
 
