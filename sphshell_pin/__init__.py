@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import ContactSet as ContactSet
     from sphshell_pin.contact import CoulombFriction as CoulombFriction
     from sphshell_pin.contact import Feature as Feature
+    from sphshell_pin.contact import HertzLaw as HertzLaw
     from sphshell_pin.contact import HuntCrossleyLaw as HuntCrossleyLaw
     from sphshell_pin.contact import ImpactLaw as ImpactLaw
     from sphshell_pin.contact import MindlinFriction as MindlinFriction
@@ -59,6 +60,7 @@ _HOME = {
     "Feature": "contact",
     "ForceTorqueSensor": "dynamics",
     "GravityCompensation": "dynamics",
+    "HertzLaw": "contact",
     "HuntCrossleyLaw": "contact",
     "ImpactLaw": "contact",
     "Implicit": "dynamics",

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from sphshell_pin import _core
 from sphshell_pin.contact import Friction, Method, MindlinFriction, NormalLaw, Sphere
+from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.sources import Find, checked_source
 from sphshell_pin.errors import InvalidParameter
@@ -53,15 +54,25 @@ class ContactPair:
     other_sphere: Sphere | None = None
     group: str = ""
 
-    def __post_init__(self) -> None:
-        """Raise InvalidParameter for friction that needs a sphere where there is none."""
-        if self.find is not None and isinstance(self.friction, MindlinFriction):
-            must = "needs a sphere, and a contact source has none: take a BristleFriction"
-            raise InvalidParameter("friction", self.friction.kind, must)
-
     frame = renamed("frame", "frame_j")
     sphere_placement = renamed("sphere_placement", "placement_i")
     shell_placement = renamed("shell_placement", "placement_j")
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for what a contact source says too little for."""
+        if self.find is None:
+            return
+        check_law(self.law, "at the points of a contact source")
+        if isinstance(self.friction, MindlinFriction):
+            must = "needs a sphere, and a contact source has none: take a BristleFriction"
+            raise InvalidParameter("friction", self.friction.kind, must)
+
+    @property
+    def plane_law(self) -> NormalLaw:
+        """The law, and of one that follows the curvature of the shell that of a plane shell."""
+        if not self.law.needs_shape:
+            return self.law
+        return self.law.on_plane(1 / sum(1 / one.radius for one in self.spheres))
 
     @property
     def kind(self) -> str:

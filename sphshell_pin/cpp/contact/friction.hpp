@@ -47,6 +47,7 @@ struct ContactKinematics {
   // Of a bristle of several rings: the states of those behind the first, and where their rates go.
   const Vector3<S>* outer = nullptr;
   Vector3<S>* outer_rate = nullptr;
+  S scale = S(0);  // of the gap, for Hertz's law [m^0.5]
 };
 
 // The friction laws. Each has its name, its parameters, and
@@ -224,7 +225,8 @@ struct MindlinFriction : Sticking {
            double relaxation) const {
     using std::sqrt;
     if (rolling > 0) add_rolling(out, m, radius);
-    const S a = sqrt(S(radius * m.depth));
+    // On an ellipse, that of the disc of the same normal stiffness.
+    const S a = m.scale > 0 ? S(0.75 * m.scale * sqrt(m.depth)) : S(sqrt(radius * m.depth));
     if (!(a > 0)) return;
     const Vector3<S>& n = m.normal;
     const S growth = -0.5 * n.dot(m.relative) / m.depth;  // a' / a
@@ -333,7 +335,7 @@ ContactForce<S> contact_force(const NormalLaw& law, const FrictionLaw& friction,
                               double relaxation, const ContactKinematics<S>& m) {
   ContactForce<S> out;
   const S gap_rate = m.normal.dot(m.relative);
-  const NormalForce<S> push = law.force(m.depth, gap_rate);
+  const NormalForce<S> push = law.force(m.depth, gap_rate, m.scale);
   out.normal = push.total;
   out.elastic = push.elastic;
   out.slip = m.relative - gap_rate * m.normal;

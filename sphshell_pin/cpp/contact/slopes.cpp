@@ -10,7 +10,7 @@ namespace {
 // The law's outputs and their derivatives in axes that turn with the normal.
 struct LawSlopes {
   struct By {
-    Vec3 depth, spin;
+    Vec3 depth, spin, scale;
     Mat3 relative, stretch, rolling, outer[kMostRings - 1];
   };
   Vec3 force, moment, rate;  // force and moment on the sphere but for the weight
@@ -19,11 +19,13 @@ struct LawSlopes {
   By outer_by[kMostRings - 1];
 };
 
-// Seeds: depth, relative velocity and, of 8, spin and stretch, of 11, rolling as well, and of more
-// the rings behind the first. The normal needs none, as a law does not change with the axes it is
-// written in.
-constexpr int kSpin = 4, kStretch = 5, kRolling = 8, kOuter = 11;
-constexpr int rings_of(int seeds) { return seeds > kOuter ? (seeds - kOuter) / 3 + 1 : 1; }
+// Seeds: depth, relative velocity; of 8 and more, spin and stretch; of 12 and more, rolling and the
+// rings behind the first; of 5, 9 and of 12 and more, the scale, which is the last. The normal
+// needs none, as a law does not change with the axes it is written in.
+constexpr int kSpin = 4, kStretch = 5, kRolling = 8, kOuter = 11, kWide = 12;
+constexpr bool has_spin(int seeds) { return seeds >= 8; }
+constexpr bool has_scale(int seeds) { return seeds % 2 || seeds >= kWide; }
+constexpr int rings_of(int seeds) { return seeds > kWide ? (seeds - kWide) / 3 + 1 : 1; }
 
 template <int N>
 void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
@@ -31,17 +33,18 @@ void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
     value[i] = x[i].value;
     by.depth[i] = x[i].slope[0];
     by.relative.row(i) = x[i].slope.template segment<3>(1);
-    if constexpr (N > kSpin) {
+    if constexpr (has_spin(N)) {
       by.spin[i] = x[i].slope[kSpin];
       by.stretch.row(i) = x[i].slope.template segment<3>(kStretch);
     }
-    if constexpr (N > kRolling) {
+    if constexpr (N >= kWide) {
       by.rolling.row(i) = x[i].slope.template segment<3>(kRolling);
       for (int k = 1; k < rings_of(N); ++k)
         by.outer[k - 1].row(i) = x[i].slope.template segment<3>(kOuter + 3 * (k - 1));
     }
+    by.scale[i] = has_scale(N) ? x[i].slope[N - 1] : 0;
   }
-  if constexpr (N <= kSpin) by.spin.setZero(), by.stretch.setZero();
+  if constexpr (!has_spin(N)) by.spin.setZero(), by.stretch.setZero();
 }
 
 template <int N>
@@ -53,10 +56,11 @@ void differentiate(const NormalLaw& law, const FrictionLaw& friction, const Cont
   for (int i = 0; i < 3; ++i) {
     m.normal[i] = at.normal[i];
     m.relative[i] = S::seed(at.relative[i], 1 + i);
-    if constexpr (N > kSpin) m.bristle[i] = S::seed(at.bristle[i], kStretch + i);
-    if constexpr (N > kRolling) m.rolling[i] = S::seed(at.rolling[i], kRolling + i);
+    if constexpr (has_spin(N)) m.bristle[i] = S::seed(at.bristle[i], kStretch + i);
+    if constexpr (N >= kWide) m.rolling[i] = S::seed(at.rolling[i], kRolling + i);
   }
-  if constexpr (N > kSpin) m.spin = S::seed(at.spin, kSpin);
+  if constexpr (has_spin(N)) m.spin = S::seed(at.spin, kSpin);
+  if constexpr (has_scale(N)) m.scale = S::seed(at.scale, N - 1);
   constexpr int most = rings_of(N) - 1;
   const int outer = std::min(most, friction.rings() - 1);
   Vector3<S> states[most + 1], rates[most + 1];
@@ -113,10 +117,11 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     normal_by = (contact.dn_dc - n * weight_by) / weight;
     depth_by *= std::abs(weight);
     point_by = Mat3::Identity() + n * depth_by - (site.radius - contact.depth) * normal_by;
+    if (site.shape) depth_by -= site.shape->tilt.transpose();
   }
 
   ContactKinematics<double> m;
-  m.depth = contact.depth;
+  m.depth = site.shape ? site.shape->depth : contact.depth;
   m.normal = n;
   m.relative = site.twist.head<3>() + spin.cross(point);
   m.spin = n.dot(spin);
@@ -126,16 +131,26 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   const Mat3 across = Mat3::Identity() - n * n.transpose();
   const int outer = friction.rings() - 1;
   if (rolls) m.rolling = across * spin;
+  const auto differentiated = [&](auto seeds) {
+    differentiate<seeds>(law, friction, site, relaxation, m, at);
+  };
+  Eigen::RowVector3d scale_by = Eigen::RowVector3d::Zero();
+  if (site.shape) {
+    m.scale = site.shape->scale;
+    scale_by = site.shape->gradient.transpose();
+  }
   if (outer > 3)
-    differentiate<kOuter + 3 * (kMostRings - 1)>(law, friction, site, relaxation, m, at);
+    differentiated(std::integral_constant<int, kWide + 3 * (kMostRings - 1)>());
   else if (outer > 0)
-    differentiate<kOuter + 9>(law, friction, site, relaxation, m, at);
+    differentiated(std::integral_constant<int, kWide + 9>());
   else if (rolls)
-    differentiate<kOuter>(law, friction, site, relaxation, m, at);
-  else if (friction.has_state())
-    differentiate<kRolling>(law, friction, site, relaxation, m, at);
+    differentiated(std::integral_constant<int, kWide>());
+  else if (site.shape)
+    friction.has_state() ? differentiated(std::integral_constant<int, 9>())
+                         : differentiated(std::integral_constant<int, 5>());
   else
-    differentiate<kSpin>(law, friction, site, relaxation, m, at);
+    friction.has_state() ? differentiated(std::integral_constant<int, 8>())
+                         : differentiated(std::integral_constant<int, 4>());
 
   // The turning of the normal is a rotation of all vectors of the law, and what is left of their
   // change goes through its slopes.
@@ -145,7 +160,7 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   const Eigen::RowVector3d spin_by = spin.transpose() * normal_by;
   const auto by_place = [&](const Vec3& value, const LawSlopes::By& by) -> Mat3 {
     Mat3 all = by.depth * depth_by + by.relative * relative_by + by.spin * spin_by +
-               by.stretch * stretch_by - cross_matrix(value) * turned_by;
+               by.stretch * stretch_by + by.scale * scale_by - cross_matrix(value) * turned_by;
     if (rolls) all += by.rolling * across * cross_matrix(spin) * turned_by;
     for (int k = 0; k < outer; ++k) all += by.outer[k] * cross_matrix(site.outer[k]) * turned_by;
     return all;
@@ -167,6 +182,24 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
                                  at.moment * weight_by + weight * by_place(at.moment, at.moment_by);
   out.by_twist.topRows<3>() = force_by_twist;
   out.by_twist.bottomRows<3>() = arm * force_by_twist + weight * by_twist(at.moment_by);
+  if (site.shape && law.hertz()) {
+    // Of the force at the sphere's center, see SceneData::compute_force.
+    const HertzLaw& hertz = *law.hertz();
+    const ContactShape& shape = *site.shape;
+    const double energy = hertz.energy(m.depth, 1);
+    const NormalForce<Dual<1>> unit =
+        hertz.force(Dual<1>::seed(m.depth, 0), Dual<1>(0), Dual<1>(1));
+    const double push = unit.elastic.value, push_by = unit.elastic.slope[0];
+    const Vec3 climb = weight * (shape.scale * push * shape.tilt - energy * shape.gradient);
+    const Mat3 by =
+        weight * (push * shape.tilt * scale_by + shape.scale * push_by * shape.tilt * depth_by +
+                  shape.scale * push * shape.tilt_by - push * shape.gradient * depth_by -
+                  energy * shape.second);
+    out.wrench.head<3>() += climb;
+    out.wrench.tail<3>() += site.place.cross(climb);
+    out.by_place.topRows<3>() += by;
+    out.by_place.bottomRows<3>() += cross_matrix(site.place) * by - cross_matrix(climb);
+  }
   if (!friction.has_state()) return;
   const auto by_stretch = [&](const Mat3& force, const Mat3& moment) -> Matrix63 {
     Matrix63 all;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "contact/friction.hpp"
+#include "contact/hertz.hpp"
 #include "contact/query.hpp"
 
 namespace sphshell {
@@ -28,8 +29,9 @@ struct ContactSite {
   double radius;       // of the sphere [m]
   double disc_radius;  // that the laws take: see Pair::disc_radius [m]
   Vector6 twist;
-  Vec3 stretch;                // of the bristle [m]
-  Vec3 outer[kMostRings - 1];  // of its rings behind the first
+  Vec3 stretch;                         // of the bristle [m]
+  const ContactShape* shape = nullptr;  // of Hertz's law
+  Vec3 outer[kMostRings - 1];           // of the bristle's rings behind the first
 };
 
 struct ContactSlopes {

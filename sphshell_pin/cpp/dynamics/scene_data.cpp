@@ -14,6 +14,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
       pairs_(std::move(pairs)),
       clusters_(clusters_of(pairs_)),
       queries_(pairs_.size(), Query(true)),
+      shapes_(pairs_.size()),
       trackers_(pairs_.size()),
       states_(pairs_.size()),
       excursions_(pairs_.size()),
@@ -56,6 +57,7 @@ void SceneData::restart() {
 }
 
 void SceneData::want_dn_dc() {
+  wants_second_ = true;
   for (std::size_t k = 0; k < pairs_.size(); ++k)
     if (pairs_[k].has_dn_dc()) queries_[k].want_dn_dc();
 }
@@ -170,19 +172,49 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
     query.contacts.clear();
     return query.contacts;
   }
-  if (pair.ball > 0) {
+  if (pair.ball > 0)
     find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
-    return query.contacts;
-  }
-  query.find(*pair.shell, state.center, pair.radius, pair.method);
+  else
+    query.find(*pair.shell, state.center, pair.radius, pair.method);
+  if (pair.needs_shape()) find_shapes(k);
   // Friction belongs to a place, and its spring should not be split and merged at every border
   // between elements: contacts that are nearly one are one. The elastic energy is that of their
   // depths' sum, off by the square of the depths' difference, 1e-4 at most.
   if (pair.friction.active() && query.contacts.size() > 1) {
     merge_groups(query.contacts, state.center, pair.radius, merged_);
+    if (pair.needs_shape()) {
+      merge_shapes(query.contacts, shapes_[k], merged_shapes_);
+      shapes_[k].swap(merged_shapes_);
+    }
     query.contacts.swap(merged_);
   }
   return query.contacts;
+}
+
+// The shapes of the gaps at a pair's contacts.
+void SceneData::find_shapes(std::size_t k) {
+  const Pair& pair = pairs_[k];
+  std::vector<ContactShape>& shapes = shapes_[k];
+  shapes.clear();
+  const std::vector<Contact>& contacts = queries_[k].contacts;
+  if (contacts.empty()) return;
+  if (pair.ball > 0 || pair.method != Method::Smooth) {
+    const double curvature = 1 / pair.radius + (pair.ball > 0 ? 1 / pair.ball : 0);
+    for (const Contact& contact : contacts) {
+      shapes.push_back(shape_of_gap(curvature * Mat3::Identity(), contact.normal, pair.radius));
+      shapes.back().depth = contact.depth;
+    }
+    return;
+  }
+  const auto at = std::find(shell_of_.begin(), shell_of_.end(), pair.shell.get());
+  const std::size_t number = at - shell_of_.begin();
+  if (at == shell_of_.end()) {
+    shell_of_.push_back(pair.shell.get());
+    curvatures_.emplace_back();
+  }
+  for (const Contact& contact : contacts)
+    shapes.push_back(curvatures_[number].shape(*pair.shell, contact, states_[k].center, pair.radius,
+                                               wants_second_));
 }
 
 void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {
@@ -191,6 +223,8 @@ void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int
   active.slot = slot;
   active.contact_id = contact_id;
   active.contact = contact;
+  if (pairs_[k].needs_shape())
+    active.shape = static_cast<int>(&contact - queries_[k].contacts.data());
 }
 
 void SceneData::compute_forces(const VectorX& z) {
@@ -225,6 +259,7 @@ void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
     const Vec3 spin = body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j);
     m.rolling = spin - spin.dot(m.normal) * m.normal;
   }
+  if (const ContactShape* gap = shape(active)) m.scale = gap->scale, m.depth = gap->depth;
   if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
 }
 
@@ -239,7 +274,14 @@ void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
     m.outer = outer;
     m.outer_rate = outer_rate;
   }
-  active.force = contact_force(pair.law, pair.friction, pair.disc_radius(), relaxation(pair), m);
+  active.force = contact_force(pair.law, pair.friction, disc_radius(active), relaxation(pair), m);
+  // The energy also changes with the shape, as the sphere moves along the shell. It depends on the
+  // sphere's center alone: that is where the force acts.
+  if (const HertzLaw* hertz = pair.law.hertz(); hertz && active.shape >= 0) {
+    const ContactShape& gap = *shape(active);
+    active.climb =
+        rotation * (active.force.elastic * gap.tilt - hertz->energy(gap.depth, 1) * gap.gradient);
+  }
   if (active.slot < 0) return;
   bristle_rates_.segment<3>(at) =
       rotation.transpose() * active.force.bristle_rate + rate_of_turning(active, z.segment<3>(at));
@@ -264,8 +306,15 @@ ContactWrench SceneData::wrench(const ActiveContact& active) const {
   const ContactForce<double>& f = active.force;
   const Vec3& normal = active.kinematics.normal;
   const double weight = active.contact.weight;
-  return {active.point, weight * (f.normal * normal + f.friction),
-          weight * f.torsion * normal + weight * f.rolling};
+  ContactWrench out{active.point, weight * (f.normal * normal + f.friction),
+                    weight * f.torsion * normal + weight * f.rolling};
+  if (active.shape >= 0) {
+    const PairState& state = states_[active.pair];
+    out.force += weight * active.climb;
+    out.moment +=
+        weight * (state.world_from_j.act(state.center) - active.point).cross(active.climb);
+  }
+  return out;
 }
 
 // Adds a contact to the forces on the joints and to the sums of its pair.
@@ -287,7 +336,11 @@ void SceneData::add_force(const ActiveContact& active) {
   const double share = weight > 0 ? 1 : weight;
   powers_.damping += weight * damping_power(f, m);
   powers_.friction += weight * friction_power(f, m);
-  powers_.elastic += share * pair.law.energy(m.depth);
+  powers_.elastic += share * pair.law.energy(m.depth, m.scale);
+  if (const ContactShape* gap = shape(active)) {
+    state.conformity = std::max(state.conformity, gap->conformity);
+    state.half_axis = std::max(state.half_axis, gap->half_axes(m.depth)[0] / pair.radius);
+  }
   if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.stretch2;
 }
 
@@ -322,19 +375,21 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     const Vec3 point = state.world_from_j.act(whole.point);
     const Vec3 normal = state.world_from_j.rotation() * whole.normal;
     Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
+    double depth = 0;  // corrected, where the shape counts
     // One without a place stands alone.
     const std::size_t first = i - begin, last = whole.group < 0 ? first + 1 : contacts.size();
     for (std::size_t k = first; k < last; ++k) {
       if (k != first && contacts[k].group != whole.group) continue;
       const ActiveContact& other = active_[begin + k];
       push += other.contact.weight * other.force.normal * other.kinematics.normal;
+      if (other.shape >= 0) depth += other.contact.weight * other.kinematics.depth;
       friction += other.contact.weight * other.force.friction;
     }
     const Vec3 relative = relative_velocity(pair, point);
     ContactRow& row = rows.emplace_back();
     write(row.point, point);
     write(row.normal, normal);
-    row.depth = whole.depth;
+    row.depth = active.shape < 0 ? whole.depth : depth;
     row.normal_force = push.dot(normal);
     write(row.friction_force, friction);
     write(row.slip_velocity, relative - relative.dot(normal) * normal);
