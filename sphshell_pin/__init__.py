@@ -45,6 +45,11 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics import SemiImplicitEuler as SemiImplicitEuler
     from sphshell_pin.dynamics import Simulation as Simulation
     from sphshell_pin.errors import SphshellError as SphshellError
+    from sphshell_pin.patches import ShellTaxels as ShellTaxels
+    from sphshell_pin.patches import TaxelGrid as TaxelGrid
+    from sphshell_pin.patches import TaxelImages as TaxelImages
+    from sphshell_pin.patches import WearMap as WearMap
+    from sphshell_pin.patches import wear_maps as wear_maps
     from sphshell_pin.shell import Shell as Shell
 
 __version__ = "0.1.0"
@@ -76,13 +81,28 @@ _HOME = {
     "Scene": "dynamics",
     "SemiImplicitEuler": "dynamics",
     "Shell": "shell",
+    "ShellTaxels": "patches",
     "Simulation": "dynamics",
     "Sphere": "contact",
     "SphshellError": "errors",
     "TableLaw": "contact",
+    "TaxelGrid": "patches",
+    "TaxelImages": "patches",
+    "WearMap": "patches",
     "contact_wrench": "contact",
+    "wear_maps": "patches",
 }
-_PARTS = ("contact", "dynamics", "errors", "robots", "scenario", "shell", "units", "view")
+_PARTS = (
+    "contact",
+    "dynamics",
+    "errors",
+    "patches",
+    "robots",
+    "scenario",
+    "shell",
+    "units",
+    "view",
+)
 
 __all__ = sorted(_HOME)  # noqa: PLE0605
 

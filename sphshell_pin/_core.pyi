@@ -108,6 +108,7 @@ def contact_force(
     relaxation: float,
 ) -> tuple[float, _Doubles, _Doubles, _Doubles]: ...
 def contact_row_type() -> Any: ...
+def patch_row_type() -> Any: ...
 
 class Pair:
     relaxation: float
@@ -232,6 +233,7 @@ class RunSettings:
         start_time: float,
         control_dt: float,
         record_dt: float,
+        patches: bool,
     ) -> None: ...
 
 class OneUser:

@@ -59,7 +59,7 @@ class ContactPair:
     shell_placement = renamed("shell_placement", "placement_j")
 
     def __post_init__(self) -> None:
-        """Raise InvalidParameter for what a contact source says too little for."""
+        """Raise InvalidParameter for what needs a sphere or a shell where there is none."""
         if self.find is None:
             return
         check_law(self.law, "at the points of a contact source")

@@ -19,13 +19,12 @@ struct LawSlopes {
   By outer_by[kMostRings - 1];
 };
 
-// Seeds: depth, relative velocity; of 8 and more, spin and stretch; of 12 and more, rolling and the
-// rings behind the first; of 5, 9 and of 12 and more, the scale, which is the last. The normal
-// needs none, as a law does not change with the axes it is written in.
-constexpr int kSpin = 4, kStretch = 5, kRolling = 8, kOuter = 11, kWide = 12;
-constexpr bool has_spin(int seeds) { return seeds >= 8; }
-constexpr bool has_scale(int seeds) { return seeds % 2 || seeds >= kWide; }
-constexpr int rings_of(int seeds) { return seeds > kWide ? (seeds - kWide) / 3 + 1 : 1; }
+// Seeds: depth, relative velocity and, of 8, spin and stretch, of 9, the scale as well, last; of
+// 12, rolling, and of more the rings behind the first. The normal needs none, as a law does not
+// change with the axes it is written in.
+constexpr int kSpin = 4, kStretch = 5, kRolling = 8, kOuter = 11;
+constexpr int rings_of(int seeds) { return seeds > kOuter ? (seeds - kOuter) / 3 + 1 : 1; }
+constexpr bool has_scale(int seeds) { return seeds > kRolling; }
 
 template <int N>
 void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
@@ -33,18 +32,18 @@ void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
     value[i] = x[i].value;
     by.depth[i] = x[i].slope[0];
     by.relative.row(i) = x[i].slope.template segment<3>(1);
-    if constexpr (has_spin(N)) {
+    if constexpr (N > kSpin) {
       by.spin[i] = x[i].slope[kSpin];
       by.stretch.row(i) = x[i].slope.template segment<3>(kStretch);
     }
-    if constexpr (N >= kWide) {
+    if constexpr (N > kOuter) {
       by.rolling.row(i) = x[i].slope.template segment<3>(kRolling);
       for (int k = 1; k < rings_of(N); ++k)
         by.outer[k - 1].row(i) = x[i].slope.template segment<3>(kOuter + 3 * (k - 1));
     }
     by.scale[i] = has_scale(N) ? x[i].slope[N - 1] : 0;
   }
-  if constexpr (!has_spin(N)) by.spin.setZero(), by.stretch.setZero();
+  if constexpr (N <= kSpin) by.spin.setZero(), by.stretch.setZero();
 }
 
 template <int N>
@@ -56,11 +55,11 @@ void differentiate(const NormalLaw& law, const FrictionLaw& friction, const Cont
   for (int i = 0; i < 3; ++i) {
     m.normal[i] = at.normal[i];
     m.relative[i] = S::seed(at.relative[i], 1 + i);
-    if constexpr (has_spin(N)) m.bristle[i] = S::seed(at.bristle[i], kStretch + i);
-    if constexpr (N >= kWide) m.rolling[i] = S::seed(at.rolling[i], kRolling + i);
+    if constexpr (N > kSpin) m.bristle[i] = S::seed(at.bristle[i], kStretch + i);
+    if constexpr (N > kOuter) m.rolling[i] = S::seed(at.rolling[i], kRolling + i);
   }
-  if constexpr (has_spin(N)) m.spin = S::seed(at.spin, kSpin);
   if constexpr (has_scale(N)) m.scale = S::seed(at.scale, N - 1);
+  if constexpr (N > kSpin) m.spin = S::seed(at.spin, kSpin);
   constexpr int most = rings_of(N) - 1;
   const int outer = std::min(most, friction.rings() - 1);
   Vector3<S> states[most + 1], rates[most + 1];
@@ -73,7 +72,7 @@ void differentiate(const NormalLaw& law, const FrictionLaw& friction, const Cont
   const ContactForce<S> f = contact_force(law, friction, site.disc_radius, relaxation, m);
   read<N>(f.normal * m.normal + f.friction, out.force, out.force_by);
   Vector3<S> moment = f.torsion * m.normal;
-  if constexpr (N > kRolling) moment += f.rolling;
+  if constexpr (N > kOuter) moment += f.rolling;
   read<N>(moment, out.moment, out.moment_by);
   read<N>(f.bristle_rate, out.rate, out.rate_by);
   for (int k = 0; k < outer; ++k) read<N>(rates[k], out.outer[k], out.outer_by[k]);
@@ -131,26 +130,23 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   const Mat3 across = Mat3::Identity() - n * n.transpose();
   const int outer = friction.rings() - 1;
   if (rolls) m.rolling = across * spin;
-  const auto differentiated = [&](auto seeds) {
-    differentiate<seeds>(law, friction, site, relaxation, m, at);
-  };
   Eigen::RowVector3d scale_by = Eigen::RowVector3d::Zero();
   if (site.shape) {
     m.scale = site.shape->scale;
     scale_by = site.shape->gradient.transpose();
   }
   if (outer > 3)
-    differentiated(std::integral_constant<int, kWide + 3 * (kMostRings - 1)>());
+    differentiate<kOuter + 3 * (kMostRings - 1) + 1>(law, friction, site, relaxation, m, at);
   else if (outer > 0)
-    differentiated(std::integral_constant<int, kWide + 9>());
+    differentiate<kOuter + 9 + 1>(law, friction, site, relaxation, m, at);
   else if (rolls)
-    differentiated(std::integral_constant<int, kWide>());
+    differentiate<kOuter + 1>(law, friction, site, relaxation, m, at);
   else if (site.shape)
-    friction.has_state() ? differentiated(std::integral_constant<int, 9>())
-                         : differentiated(std::integral_constant<int, 5>());
+    differentiate<kRolling + 1>(law, friction, site, relaxation, m, at);
+  else if (friction.has_state())
+    differentiate<kRolling>(law, friction, site, relaxation, m, at);
   else
-    friction.has_state() ? differentiated(std::integral_constant<int, 8>())
-                         : differentiated(std::integral_constant<int, 4>());
+    differentiate<kSpin>(law, friction, site, relaxation, m, at);
 
   // The turning of the normal is a rotation of all vectors of the law, and what is left of their
   // change goes through its slopes.

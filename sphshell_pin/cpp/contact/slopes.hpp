@@ -30,8 +30,8 @@ struct ContactSite {
   double disc_radius;  // that the laws take: see Pair::disc_radius [m]
   Vector6 twist;
   Vec3 stretch;                         // of the bristle [m]
+  Vec3 outer[kMostRings - 1];           // of its rings behind the first
   const ContactShape* shape = nullptr;  // of Hertz's law
-  Vec3 outer[kMostRings - 1];           // of the bristle's rings behind the first
 };
 
 struct ContactSlopes {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "contact/ball.hpp"
+#include "dynamics/patch.hpp"
 
 namespace sphshell {
 
@@ -255,11 +256,11 @@ void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
   if (pair.friction.torsional())
     m.spin =
         m.normal.dot(body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
+  if (const ContactShape* gap = shape(active)) m.scale = gap->scale, m.depth = gap->depth;
   if (pair.friction.rolls()) {
     const Vec3 spin = body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j);
     m.rolling = spin - spin.dot(m.normal) * m.normal;
   }
-  if (const ContactShape* gap = shape(active)) m.scale = gap->scale, m.depth = gap->depth;
   if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
 }
 
@@ -337,11 +338,11 @@ void SceneData::add_force(const ActiveContact& active) {
   powers_.damping += weight * damping_power(f, m);
   powers_.friction += weight * friction_power(f, m);
   powers_.elastic += share * pair.law.energy(m.depth, m.scale);
+  if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.stretch2;
   if (const ContactShape* gap = shape(active)) {
     state.conformity = std::max(state.conformity, gap->conformity);
     state.half_axis = std::max(state.half_axis, gap->half_axes(m.depth)[0] / pair.radius);
   }
-  if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.stretch2;
 }
 
 void SceneData::apply(int joint, const Vec3& point_world, const Vec3& force_world,
@@ -360,7 +361,8 @@ Vec3 SceneData::relative_velocity(const Pair& pair, const Vec3& point_world) con
 }
 
 // Contacts of one place as one, with the sum of their forces.
-void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows) {
+void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows,
+                    std::vector<PatchRow>* patches) {
   if (active_.empty()) return;
   if (!needs_velocity_) body_.kinematics(q, v);
   const auto write = [](double* to, const Vec3& x) { std::copy_n(x.data(), 3, to); };
@@ -397,6 +399,8 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     row.element = whole.element;
     row.contact_id = active.contact_id;
     row.feature = whole.feature;
+    if (patches)
+      patches->push_back(hertz_patch(pair.disc_radius(), normal, row.depth, row.normal_force));
   }
 }
 

@@ -78,8 +78,10 @@ class SceneData {
   void accept(VectorX& z);
   // Returns to the accepted state: forgets the contacts found since.
   void restart();
-  // Rows of the contacts at (q, v), where the forces were last evaluated.
-  void log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows);
+  // Rows of the contacts at (q, v), where the forces were last evaluated; with `patches` those of
+  // their patches, too.
+  void log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows,
+           std::vector<PatchRow>* patches = nullptr);
 
   // Size of z, spare slots for new contacts included; where those of joints begin.
   int bristle_size() const { return bristles_.size() + joints_.size(); }
@@ -162,8 +164,8 @@ class SceneData {
   double relaxation_ = 0;
   bool touching_ = false;
   bool needs_velocity_ = false;
-  bool several_rings_ = false;
   bool wants_second_ = false;  // derivatives of shapes
+  bool several_rings_ = false;
 };
 
 }  // namespace sphshell
