@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import HertzLaw as HertzLaw
     from sphshell_pin.contact import HuntCrossleyLaw as HuntCrossleyLaw
     from sphshell_pin.contact import ImpactLaw as ImpactLaw
+    from sphshell_pin.contact import MindlinFriction as MindlinFriction
     from sphshell_pin.contact import Sphere as Sphere
     from sphshell_pin.contact import TableLaw as TableLaw
     from sphshell_pin.contact import contact_wrench as contact_wrench
@@ -74,6 +75,7 @@ _HOME = {
     "JointIngredients": "dynamics",
     "JointFriction": "dynamics",
     "LinearlyImplicitEuler": "dynamics",
+    "MindlinFriction": "contact",
     "Result": "dynamics",
     "RungeKutta4": "dynamics",
     "Scene": "dynamics",

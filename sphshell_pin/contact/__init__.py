@@ -1,6 +1,7 @@
 """Contacts of a sphere with a shell, the laws of their forces, and their wrenches."""
 
-from sphshell_pin.contact import friction, laws, table_law
+from sphshell_pin.contact import bristle, friction, laws, table_law
+from sphshell_pin.contact.bristle import *  # noqa: F403
 from sphshell_pin.contact.friction import *  # noqa: F403
 from sphshell_pin.contact.laws import *  # noqa: F403
 from sphshell_pin.contact.normal_law import NormalLaw
@@ -18,6 +19,7 @@ __all__ = [
     "Sphere",
     "contact_wrench",
 ]
+__all__ += bristle.__all__
 __all__ += friction.__all__
 __all__ += laws.__all__
 __all__ += table_law.__all__

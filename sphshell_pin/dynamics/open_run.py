@@ -209,6 +209,7 @@ def _same_place(a: ContactPair, b: ContactPair) -> bool:
         and a.find is b.find
         and a.kind == b.kind
         and type(a.friction) is type(b.friction)
+        and (a.friction and a.friction.state_size) == (b.friction and b.friction.state_size)
         and _equal(a.placement_i, b.placement_i)
         and _equal(a.placement_j, b.placement_j)
     )

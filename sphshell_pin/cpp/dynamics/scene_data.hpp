@@ -88,6 +88,8 @@ class SceneData {
   int joint_bristles() const { return bristles_.size(); }
   // Of the last evaluate() (bristle_size) [m/s].
   const VectorX& bristle_rates() const { return bristle_rates_; }
+  // Where there are bristles of several rings, z of the last evaluate().
+  const VectorX& stretches() const { return stretches_; }
   // Bristles give way no faster than this [s]: explicit fixed steps ask for it.
   void relax_in(double time) { relaxation_ = time; }
   double relaxation(const Pair& pair) const { return std::max(relaxation_, pair.relaxation); }
@@ -159,11 +161,12 @@ class SceneData {
   std::vector<int> loaded_;  // joints that contacts act on
   Powers powers_;
   Bristles bristles_;
-  VectorX bristle_rates_, joint_stretches_;
+  VectorX bristle_rates_, joint_stretches_, stretches_;
   double relaxation_ = 0;
   bool touching_ = false;
   bool needs_velocity_ = false;
   bool wants_second_ = false;  // derivatives of shapes
+  bool several_rings_ = false;
 };
 
 }  // namespace sphshell
