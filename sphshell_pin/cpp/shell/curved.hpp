@@ -35,6 +35,8 @@ struct CubicPatch {
   Vec3 along_uu(double u, double v) const { return 2 * c20 + 6 * u * c30 + 2 * v * c21; }
   Vec3 along_uv(double u, double v) const { return c11 + 2 * u * c21 + 2 * v * c12; }
   Vec3 along_vv(double u, double v) const { return 2 * c02 + 6 * v * c03 + 2 * u * c12; }
+  // The polar form (blossom) at three points (u, v): of a part of the patch, a control point.
+  Vec3 polar(const Eigen::Vector2d& p, const Eigen::Vector2d& q, const Eigen::Vector2d& r) const;
   // A direction that leaves side k at its parameter t into the patch, tangent to it.
   Vec3 inward(int k, double t) const;
 };
