@@ -1,5 +1,7 @@
 #include "contact/cell_quadrature.hpp"
 
+#include <limits>
+
 namespace sphshell {
 namespace {
 
@@ -10,15 +12,38 @@ constexpr int kMostRootHalvings = 14;
 
 }  // namespace
 
-double Sextic::split(double t, Sextic* low, Sextic* high) const {
+void Sextic::halve(Sextic& low, Sextic& high) const {
   double work[7];
   std::copy_n(f, 7, work);
   for (int n = 0; n < 7; ++n) {
-    if (low) low->f[n] = work[0];
-    if (high) high->f[6 - n] = work[6 - n];
-    for (int i = 0; i < 6 - n; ++i) work[i] += t * (work[i + 1] - work[i]);
+    low.f[n] = work[0];
+    high.f[6 - n] = work[6 - n];
+    for (int i = 0; i < 6 - n; ++i) work[i] = (work[i] + work[i + 1]) / 2;
   }
-  return work[0];
+}
+
+// The one root between the ends, by Newton's method within what is known to hold it.
+double Sextic::root() const {
+  // In powers of t.
+  double c[7];
+  std::copy_n(f, 7, c);
+  for (int n = 1; n < 7; ++n)
+    for (int i = 6; i >= n; --i) c[i] -= c[i - 1];
+  static constexpr double kBinomial[7] = {1, 6, 15, 20, 15, 6, 1};
+  for (int i = 0; i < 7; ++i) c[i] *= kBinomial[i];
+  const bool begins_inside = f[0] < 0;
+  double a = 0, b = 1, t = f[0] / (f[0] - f[6]);
+  for (int i = 0; i < 60 && b - a > 1e-15; ++i) {
+    double value = c[6], slope = 0;
+    for (int k = 5; k >= 0; --k) slope = slope * t + value, value = value * t + c[k];
+    if (value == 0) return t;
+    ((value < 0) == begins_inside ? a : b) = t;
+    double next = t - value / slope;
+    if (!(next > a && next < b)) next = (a + b) / 2;
+    if (std::abs(next - t) < 1e-15) return next;
+    t = next;
+  }
+  return t;
 }
 
 void Sextic::roots(double begin, double end, int depth, double* out, int& count) const {
@@ -26,36 +51,12 @@ void Sextic::roots(double begin, double end, int depth, double* out, int& count)
   for (int i = 0; i < 6; ++i) changes += (f[i] < 0) != (f[i + 1] < 0);
   if (changes == 0) return;
   if (changes == 1) {
-    // One root, by false position (Illinois).
-    double a = 0, b = 1, fa = f[0], fb = f[6];
-    for (int i = 0; i < 60 && b - a > 1e-15; ++i) {
-      double t = (a * fb - b * fa) / (fb - fa);
-      t = std::clamp(t, a, b);
-      const double ft = split(t, nullptr, nullptr);
-      if (ft == 0) {
-        a = b = t;
-        break;
-      }
-      if ((ft < 0) == (fa < 0)) {
-        if (t - a < 1e-15) {
-          b = t;
-          break;
-        }
-        a = t, fa = ft, fb /= 2;
-      } else {
-        if (b - t < 1e-15) {
-          a = t;
-          break;
-        }
-        b = t, fb = ft, fa /= 2;
-      }
-    }
-    if (count < 6) out[count++] = begin + (a + b) / 2 * (end - begin);
+    if (count < 6) out[count++] = begin + root() * (end - begin);
     return;
   }
   if (depth == kMostRootHalvings) return;
   Sextic low, high;
-  split(0.5, &low, &high);
+  halve(low, high);
   const double middle = (begin + end) / 2;
   low.roots(begin, middle, depth + 1, out, count);
   high.roots(middle, end, depth + 1, out, count);

@@ -28,8 +28,8 @@ struct Sextic {
     for (double& value : f) value -= radius2;
   }
 
-  // Its value at t, by de Casteljau; the halves there, where asked for.
-  double split(double t, Sextic* low, Sextic* high) const;
+  void halve(Sextic& low, Sextic& high) const;  // by de Casteljau
+  double root() const;
   // Appends its roots between the ends in their order; at most 6.
   void roots(double begin, double end, int depth, double* out, int& count) const;
 };
@@ -63,7 +63,7 @@ class CellQuadrature {
     Vec2 a, b;
     bool is_arc;
   };
-  static constexpr int kMostPieces = 64, kMostLevels = 6;
+  static constexpr int kMostPieces = 64, kMostLevels = 12;
 
   template <class Visit>
   void part(const Part& w, int level, Visit& visit);
