@@ -1,6 +1,7 @@
 """Contacts of a sphere with a shell, the laws of their forces, and their wrenches."""
 
-from sphshell_pin.contact import friction, laws
+from sphshell_pin.contact import foundation, friction, laws
+from sphshell_pin.contact.foundation import *  # noqa: F403
 from sphshell_pin.contact.friction import *  # noqa: F403
 from sphshell_pin.contact.laws import *  # noqa: F403
 from sphshell_pin.contact.normal_law import NormalLaw
@@ -17,5 +18,6 @@ __all__ = [
     "Sphere",
     "contact_wrench",
 ]
+__all__ += foundation.__all__
 __all__ += friction.__all__
 __all__ += laws.__all__

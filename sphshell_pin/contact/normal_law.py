@@ -10,6 +10,7 @@ import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_finite, check_type
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient
 
 # Decay times that need as many steps as one period of an oscillation.
@@ -29,9 +30,23 @@ class NormalLaw(Ingredient):
         return _core.NormalLaw(self.kind, self.numbers())
 
     @property
+    def alone(self) -> _core.NormalLaw:
+        """The C++ binding, where depth and gap rate are all that is known."""
+        return self.core
+
+    @property
     def text(self) -> str:
         """Name and parameters in one line."""
         raise NotImplementedError
+
+    @property
+    def needs_shape(self) -> bool:
+        """Whether the force depends on the shell's curvature, besides depth and gap rate."""
+        return False
+
+    def on_plane(self, radius: float) -> NormalLaw:
+        """Return the law of a sphere of `radius` [m] on a plane: itself, unless it `needs_shape`."""
+        return self
 
     @property
     def has_damping(self) -> bool:
@@ -43,15 +58,15 @@ class NormalLaw(Ingredient):
 
         gap_rate = normal . relative velocity: negative while the bodies close.
         """
-        return self.core.force(check_finite("depth", depth), check_finite("gap_rate", gap_rate))
+        return self.alone.force(check_finite("depth", depth), check_finite("gap_rate", gap_rate))
 
     def normal_stiffness(self, depth: float) -> float:
         """Return the slope of the elastic force at `depth` [m], in N/m (0 where not positive)."""
-        return self.core.stiffness(check_finite("depth", depth))
+        return self.alone.stiffness(check_finite("depth", depth))
 
     def energy(self, depth: float) -> float:
         """Return the elastic energy [J] stored at `depth` [m]."""
-        return self.core.energy(check_finite("depth", depth))
+        return self.alone.energy(check_finite("depth", depth))
 
     def depth_at(self, force: float) -> float:
         """Return the depth [m] at which the elastic part alone carries `force` [N]."""
@@ -90,9 +105,17 @@ class NormalLaw(Ingredient):
         return min(times)
 
 
-def check_law(law: object) -> NormalLaw:
-    """Return `law`; raise InvalidParameter unless it is a normal law."""
-    return check_type("law", law, NormalLaw, "must be a law, for instance ImpactLaw(stiffness)")
+def check_law(law: object, shapeless: str = "") -> NormalLaw:
+    """Return `law`; raise InvalidParameter unless it is a normal law.
+
+    `shapeless` names where nothing is known about the shape of the gap; there a law that needs it
+    is refused.
+    """
+    good = check_type("law", law, NormalLaw, "must be a law, for instance ImpactLaw(stiffness)")
+    if shapeless and good.needs_shape:
+        must = f"must not need the curvature of a shell {shapeless}: take law.on_plane(radius)"
+        raise InvalidParameter("law", good, must)
+    return good
 
 
 def inverse(function: Callable[[float], float], value: float) -> float:

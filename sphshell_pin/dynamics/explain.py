@@ -212,7 +212,7 @@ def relaxation_time(pair: ContactPair, figures: PairExplanation) -> float:
     limit = figures.depth_limit_speed
     if not pair.spheres or not math.isfinite(limit):
         return LONGEST_RELAXATION
-    shortest = pair.law.contact_time(pair.least_radius, limit)
+    shortest = pair.plane_law.contact_time(pair.least_radius, limit)
     return min(0.02 * shortest, LONGEST_RELAXATION)
 
 
@@ -289,7 +289,7 @@ def _explain_pair(
         slip_mass = _mass(float(np.linalg.eigvalsh(tangent @ mobility @ tangent).max()))
         fall = math.sqrt(2 * gravity * max(gap, 0.0))
         speed = max(abs(float(touch.normal @ jacobian @ v)), fall) or DEFAULT_SPEED
-    law = pair.law
+    law = pair.plane_law
     weight = mass * gravity
     load = depth = contact_time = resting_depth = limit = math.nan
     times = []

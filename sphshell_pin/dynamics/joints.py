@@ -56,7 +56,7 @@ class JointLimits:
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a law that is none, and for an empty range."""
-        check_law(self.law)
+        check_law(self.law, "at a joint's stop")
         ends = np.asarray(self.lower, dtype=float), np.asarray(self.upper, dtype=float)
         if not np.all(ends[0] < ends[1]):
             raise InvalidParameter(

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from sphshell_pin import _core
 from sphshell_pin.contact import Friction, Method, NormalLaw, Sphere
+from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.sources import Find, checked_source
 from sphshell_pin.shell import Shell
@@ -55,6 +56,18 @@ class ContactPair:
     frame = renamed("frame", "frame_j")
     sphere_placement = renamed("sphere_placement", "placement_i")
     shell_placement = renamed("shell_placement", "placement_j")
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for a law that a contact source says too little for."""
+        if self.find is not None:
+            check_law(self.law, "at the points of a contact source")
+
+    @property
+    def plane_law(self) -> NormalLaw:
+        """The law, and of one that follows the curvature of the shell that of a plane shell."""
+        if not self.law.needs_shape:
+            return self.law
+        return self.law.on_plane(1 / sum(1 / one.radius for one in self.spheres))
 
     @property
     def kind(self) -> str:

@@ -1,6 +1,8 @@
 #include "bindings/arrays.hpp"
 #include "contact/foundation.hpp"
 
+#include <chrono>
+
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/tuple.h>
 
@@ -46,11 +48,21 @@ void bind_foundation(nanobind::module_& m) {
           "find",
           [](Foundation& self, const Shell& shell, const Vec3& center, double radius, int method,
              bool points) {
-            self.find(shell, static_cast<Method>(method), center, radius, points);
+            self.find(shell, static_cast<Method>(method), center, radius, true, points);
             return columns(self);
           },
           nb::arg("shell"), nb::arg("center"), nb::arg("radius"), nb::arg("method"),
           nb::arg("points") = false)
+      .def(
+          "cost",  // [s] of one of many calls, without what Python adds
+          [](Foundation& self, const Shell& shell, const Vec3& center, double radius, int method,
+             int calls) {
+            const auto begin = std::chrono::steady_clock::now();
+            for (int i = 0; i < calls; ++i)
+              self.find(shell, static_cast<Method>(method), center, radius, false, false);
+            const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
+            return time.count() / calls;
+          })
       .def(
           "find_on_ball",
           [](Foundation& self, double ball, const Vec3& center, double radius, bool points) {

@@ -271,21 +271,25 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
   }
   if (has_exit != has_entry) fails = true;
   if (has_exit && has_entry) fails = fails || !add_arc(exit, first_entry, w, 0);
-  if (!any) fails = !add_loop(w, any);
+  const bool looped = !any;
+  if (looped) fails = !add_loop(w, any);
   // Its sides are inside; its middle may not be.
   if (corners_inside == 3 && count_ == 3 && level < 2) fails = true;
   if (fails && level < kMostLevels) return divide(w, level, visit);
   if (!any) return;
 
-  Vec2 pole = Vec2::Zero();
-  for (int i = 0; i < count_; ++i) pole += (pieces_[i].a + pieces_[i].b) / (2 * count_);
+  // Pieces in line with the pole contribute nothing: a corner inside the ball, else a crossing.
+  Vec2 pole = pieces_[0].a;
+  for (int k = 0; k < 3; ++k)
+    if (net[k][0].squaredNorm() < radius2_) pole = w.corner[k];
+  if (corners_inside == 0 && looped) pole = (pieces_[0].a + pieces_[count_ / 2].a) / 2;
   const GaussRule rule = gauss_rule(order);
   const GaussRule along_arc = gauss_rule(std::max(order, 5));
-  // The pieces are kept from those of parts of parts by now: none are made below.
   for (int i = 0; i < count_; ++i) {
     const Piece& piece = pieces_[i];
     if (!piece.is_arc) {
-      const Vec2 d = piece.b - piece.a;
+      const Vec2 d = piece.b - piece.a, from = piece.a - pole;
+      if (std::abs(from.x() * d.y() - from.y() * d.x()) <= 1e-15) continue;
       for (int j = 0; j < rule.size; ++j)
         sector(pole, piece.a + rule.nodes[j] * d, d, rule.weights[j], rule, visit);
       continue;

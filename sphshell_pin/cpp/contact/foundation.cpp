@@ -13,13 +13,14 @@ namespace sphshell {
 namespace {
 
 // What one quadrature point adds: x relative to the center, `area` its area vector.
-void add_point(const Vec3& x, const Vec3& area, double radius2, FoundationSum& sum) {
+void add_point(const Vec3& x, const Vec3& area, double radius2, bool slopes, FoundationSum& sum) {
   const double rho2 = x.squaredNorm(), over = 1 / std::sqrt(rho2), inside = radius2 - rho2;
   const double p = inside * over / 2, size = area.norm();
   sum.force += p * area;
   sum.energy -= inside * inside / 8 * over * over * over * x.dot(area);
   sum.pressure += p * size;
   sum.first += p * size * x;
+  if (!slopes) return;
   // -p' u, with p' = -(R^2 / rho^2 + 1) / 2.
   sum.slope += area * ((radius2 * over * over + 1) / 2 * over * x).transpose();
 }
@@ -42,6 +43,7 @@ Vec3 FoundationRow::normal() const {
 Foundation::Foundation() : broad_(true) {
   rows_.reserve(16);
   points_.reserve(4096);
+  counted_.reserve(256);
 }
 Foundation::Foundation(const Foundation&) : Foundation() {}
 Foundation& Foundation::operator=(const Foundation&) {
@@ -59,9 +61,10 @@ FoundationRow& Foundation::row_of(int patch, int sheet, int element) {
 
 // Where a sheet ends the potential has, by Stokes' theorem, the line integral of q dl x u as well,
 // q = -(R^2 - rho^2)^2 / (8 rho^2).
-void Foundation::add_rim(const CubicCurve& side, double radius, FoundationRow& row, int number,
+void Foundation::add_rim(const CubicCurve& side, double radius, FoundationRow& row,
                          bool points) {
   const double radius2 = radius * radius;
+  const int number = static_cast<int>(&row - rows_.data());
   const Vec3 b0 = side.c0, b1 = b0 + side.c1 / 3, b3 = side.point(1), b2 = b3 - side.tangent(1) / 3;
   const Sextic along(b0, b1, b2, b3, radius2);
   double t[8];
@@ -99,9 +102,10 @@ void Foundation::add_rim(const CubicCurve& side, double radius, FoundationRow& r
 }
 
 void Foundation::find(const Shell& shell, Method method, const Vec3& center, double radius,
-                      bool points) {
+                      bool slopes, bool points) {
   rows_.clear();
   points_.clear();
+  counted_.clear();
   const CurvedShell* curved = method == Method::Smooth ? shell.curved() : nullptr;
   const double bulge = curved ? curved->bulge() : 0, radius2 = radius * radius;
   const LargeArray<NormalCone>& cones = curved ? curved->cones() : shell.cones();
@@ -122,10 +126,9 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
     const int patch = shell.topology().patch[facet.element];
     FoundationSum sum;
     const std::size_t first_point = points_.size();
-    double least = std::numeric_limits<double>::infinity();
     const auto visit = [&](const Vec3& x, const Vec3& area, double weight) {
       const Vec3 part = weight * area;
-      if (!flat) add_point(x, part, radius2, sum);
+      if (!flat) add_point(x, part, radius2, slopes, sum);
       if (!points) return;
       const double size = area.norm(), rho = x.norm();
       const double p = (radius2 - rho * rho) / (2 * rho);
@@ -133,7 +136,6 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
     };
     if (flat) {
       if (!add_flat_facet(corner, facet.normal, radius, sum)) continue;
-      least = closest_on_triangle(Vec3::Zero(), corner, facet.normal).point.norm();
       if (points) {
         CellQuadrature(flat_patch(corner), FacetAxes(facet), radius).run(visit);
         // The closed form is exact, its points are not: they share what is missing.
@@ -158,15 +160,11 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
     const int number = static_cast<int>(&row - rows_.data());
     for (std::size_t i = first_point; i < points_.size(); ++i) points_[i].row = number;
     row.sum.add(sum);
-    // The depth is that of the closest point; a look only where it may be deeper.
-    const double nearest = (local - middle).norm() - 1.00001 * cone.reach;
-    if (!flat && nearest < radius - row.depth) {
-      Nearest found{Feature::Face, 0, 0.0, {}};
-      if (find_nearest(facet, curved->facets()[f], curved->cells()[f], center, radius - row.depth,
-                       found))
-        least = (found.at.point - center).norm();
-    }
-    if (radius - least > row.depth) row.depth = radius - least, row.element = facet.element;
+    const double nearest = closest_on_triangle(Vec3::Zero(), corner, facet.normal).point.norm();
+    if (!flat)
+      counted_.push_back({f, number, nearest - curved->cells()[f].bulge});
+    else if (radius - nearest > row.depth)
+      row.depth = radius - nearest, row.element = facet.element;
     for (int k = 0; k < 3; ++k) {
       if (!(sheets.rim[triangle] >> k & 1)) continue;
       CubicCurve side{corner[k], corner[next_corner(k)] - corner[k], Vec3::Zero(), Vec3::Zero()};
@@ -174,10 +172,35 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
         side = curved->facets()[f].side(facet, k);
         side.c0 -= center;
       }
-      add_rim(side, radius, row, number, points);
+      add_rim(side, radius, row, points);
     }
   }
+  if (!counted_.empty()) find_depths(shell, center, radius);
   finish(shell, center, radius);
+}
+
+// The depth of a row is that of its closest point: first in the facet where it is most likely, then
+// wherever it may be deeper.
+void Foundation::find_depths(const Shell& shell, const Vec3& center, double radius) {
+  const CurvedShell& curved = *shell.curved();
+  const auto look = [&](const Counted& at) {
+    FoundationRow& row = rows_[at.row];
+    if (at.nearest >= radius - row.depth) return;
+    const Facet& facet = shell.facets()[at.facet];
+    Nearest found{Feature::Face, 0, 0.0, {}};
+    if (!find_nearest(facet, curved.facets()[at.facet], curved.cells()[at.facet], center,
+                      radius - row.depth, found))
+      return;
+    row.depth = radius - (found.at.point - center).norm();
+    row.element = facet.element;
+  };
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    const Counted* best = nullptr;
+    for (const Counted& at : counted_)
+      if (at.row == static_cast<int>(k) && (!best || at.nearest < best->nearest)) best = &at;
+    if (best) look(*best);
+  }
+  for (const Counted& at : counted_) look(at);
 }
 
 // Turns the sheets, and brings the rows into their order.

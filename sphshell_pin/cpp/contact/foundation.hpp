@@ -10,6 +10,8 @@
 
 namespace sphshell {
 
+struct CubicCurve;
+
 // A quadrature point, in the shell's frame. On a rim, where the area is zero, there is a force that
 // no pressure makes.
 struct FoundationPoint {
@@ -37,11 +39,13 @@ class Foundation {
   Foundation& operator=(const Foundation& other);
   ~Foundation();
 
-  // Rows of the patches that the ball overlaps, deepest first. Quadrature points only where
-  // `points`; their forces add up to those of the rows. The potential is
+  // Rows of the patches that the ball overlaps, in no order. Slopes of the force and quadrature
+  // points only where asked for; the forces of the points add up to those of the rows. The
+  // potential is
   //   V(c) = integral of p over the overlap of the ball and what is behind the shell,
   // the shell's sheets being oriented so that V is positive where `side` does not say it.
-  void find(const Shell& shell, Method method, const Vec3& center, double radius, bool points);
+  void find(const Shell& shell, Method method, const Vec3& center, double radius, bool slopes,
+            bool points);
   // The same for a solid ball about the origin.
   void find_on_ball(double ball, const Vec3& center, double radius, bool points);
 
@@ -49,15 +53,20 @@ class Foundation {
   const std::vector<FoundationPoint>& points() const { return points_; }
 
  private:
-  struct Facets;
+  // A curved facet that a row counts, and how near it may be [m].
+  struct Counted {
+    int facet, row;
+    double nearest;
+  };
   FoundationRow& row_of(int patch, int sheet, int element);
-  void add_rim(const struct CubicCurve& side, double radius, FoundationRow& row, int number,
-               bool points);
+  void add_rim(const CubicCurve& side, double radius, FoundationRow& row, bool points);
+  void find_depths(const Shell& shell, const Vec3& center, double radius);
   void finish(const Shell& shell, const Vec3& center, double radius);
 
   BroadPhase broad_;
   std::vector<FoundationRow> rows_;
   std::vector<FoundationPoint> points_;
+  std::vector<Counted> counted_;
 };
 
 }  // namespace sphshell

@@ -22,6 +22,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
+    if (pair.law.foundation()) foundations_.resize(pairs_.size());
     if (pair.friction.has_state()) {
       bristles_.add(k);
       if (pair.has_dn_dc()) queries_[k].want_dn_dc();
@@ -55,6 +56,7 @@ void SceneData::restart() {
 }
 
 void SceneData::want_dn_dc() {
+  wants_second_ = true;
   for (std::size_t k = 0; k < pairs_.size(); ++k)
     if (pairs_[k].has_dn_dc()) queries_[k].want_dn_dc();
 }
@@ -169,6 +171,11 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
     query.contacts.clear();
     return query.contacts;
   }
+  if (pair.law.foundation()) {
+    const bool slopes = wants_second_ || pair.friction.has_state();
+    foundations_[k].find(pair, state.center, slopes, query.contacts);
+    return query.contacts;
+  }
   if (pair.ball > 0) {
     find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
     return query.contacts;
@@ -190,6 +197,8 @@ void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int
   active.slot = slot;
   active.contact_id = contact_id;
   active.contact = contact;
+  if (pairs_[k].law.foundation())
+    active.row = static_cast<int>(&contact - queries_[k].contacts.data());
 }
 
 void SceneData::compute_forces(const VectorX& z) {
@@ -226,11 +235,45 @@ void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
   active.force = contact_force(pair.law, pair.friction, pair.disc_radius(), relaxation(pair),
                                active.kinematics);
+  if (active.row >= 0) add_foundation(active);
   if (active.slot < 0) return;
   const auto& rotation = states_[active.pair].world_from_j.rotation();
   const int at = 3 * active.slot;
   bristle_rates_.segment<3>(at) =
       rotation.transpose() * active.force.bristle_rate + rate_of_turning(active, z.segment<3>(at));
+}
+
+// The force of a row of a foundation, in place of that of its depth.
+void SceneData::add_foundation(ActiveContact& active) {
+  const Pair& pair = pairs_[active.pair];
+  const PairState& state = states_[active.pair];
+  const auto& turn = state.world_from_j.rotation();
+  const Vec3 center = state.world_from_j.act(state.center);
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
+  if (pair.needs_velocity()) {
+    velocity = turn.transpose() * relative_velocity(pair, center);
+    spin = turn.transpose() *
+           (body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
+  }
+  const FoundationForce found =
+      foundations_[active.pair].force(pair, active.row, velocity, spin);
+  const ContactKinematics<double>& m = active.kinematics;
+  ContactForce<double>& f = active.force;
+  f.elastic = found.elastic.norm();
+  f.normal = std::max(0.0, active.contact.normal.dot(found.normal));
+  const Vec3 whole = turn * (found.normal + found.friction);
+  f.friction = whole - f.normal * m.normal;
+  active.moment = turn * found.moment + (center - active.point).cross(whole);
+  active.damping = found.damping, active.sliding = found.sliding;
+  if (active.slot < 0 && !pair.friction.has_state()) return;
+  // One bristle at the center of pressure.
+  ContactForce<double> bristle;
+  bristle.normal = f.normal, bristle.slip = f.slip;
+  std::visit([&](const auto& one) { one.add(bristle, m, 2 * pair.disc_radius(), relaxation(pair)); },
+             pair.friction.law);
+  f.friction += bristle.friction, f.torsion = bristle.torsion;
+  f.bristle = bristle.bristle, f.bristle_rate = bristle.bristle_rate;
+  active.sliding = -bristle.friction.dot(f.slip) - bristle.torsion * m.spin;
 }
 
 // How fast a stretch turns with the normal, in the shell's frame.
@@ -249,7 +292,8 @@ ContactWrench SceneData::wrench(const ActiveContact& active) const {
   const ContactForce<double>& f = active.force;
   const Vec3& normal = active.kinematics.normal;
   const double weight = active.contact.weight;
-  return {active.point, weight * (f.normal * normal + f.friction), weight * f.torsion * normal};
+  return {active.point, weight * (f.normal * normal + f.friction),
+          weight * f.torsion * normal + active.moment};
 }
 
 // Adds a contact to the forces on the joints and to the sums of its pair.
@@ -269,9 +313,15 @@ void SceneData::add_force(const ActiveContact& active) {
   state.normal_force += weight * f.normal;
   // The weight of several as one is the length of the sum of their normals.
   const double share = weight > 0 ? 1 : weight;
-  powers_.damping += weight * damping_power(f, m);
-  powers_.friction += weight * friction_power(f, m);
-  powers_.elastic += share * pair.law.energy(m.depth);
+  if (active.row >= 0) {
+    powers_.damping += active.damping;
+    powers_.friction += active.sliding;
+    powers_.elastic += foundations_[active.pair].energy(pair, active.row);
+  } else {
+    powers_.damping += weight * damping_power(f, m);
+    powers_.friction += weight * friction_power(f, m);
+    powers_.elastic += share * pair.law.energy(m.depth);
+  }
   if (active.slot >= 0)
     powers_.bristles += 0.5 * share * pair.friction.bristle()->stiffness * f.bristle.squaredNorm();
 }

@@ -9,6 +9,7 @@
 #include "dynamics/bristles.hpp"
 #include "dynamics/clusters.hpp"
 #include "dynamics/contact_row.hpp"
+#include "dynamics/foundation_pair.hpp"
 #include "dynamics/joints.hpp"
 #include "dynamics/pair.hpp"
 
@@ -34,6 +35,9 @@ struct ActiveContact {
   Vec3 point;                  // in the world
   ContactKinematics<double> kinematics;  // in the world
   ContactForce<double> force;
+  int row = -1;                  // of the foundation of its pair
+  Vec3 moment = Vec3::Zero();    // of that row's pressure, beyond that of its force at the point
+  double damping = 0, sliding = 0;  // power that it loses [W]
 };
 
 // On body i, in the world; body j takes the opposite.
@@ -104,6 +108,10 @@ class SceneData {
   const std::vector<PairState>& states() const { return states_; }
   const std::vector<Excursion>& excursions() const { return excursions_; }
   const Powers& powers() const { return powers_; }
+  // Where the contact is a row of one: that foundation.
+  const FoundationPair& foundation(const ActiveContact& active) const {
+    return foundations_[active.pair];
+  }
   const std::vector<Pair>& pairs() const { return pairs_; }
   const std::vector<Cluster>& clusters() const { return clusters_; }
   const JointForces& joints() const { return joints_; }
@@ -117,6 +125,7 @@ class SceneData {
   void compute_forces(const VectorX& z);
   void compute_kinematics(ActiveContact& active, const VectorX& z);
   void compute_force(ActiveContact& active, const VectorX& z);
+  void add_foundation(ActiveContact& active);
   void add_force(const ActiveContact& active);
   void apply(int joint, const Vec3& point_world, const Vec3& force_world, const Vec3& moment_world);
   Vec3 rate_of_turning(const ActiveContact& active, const Vec3& stretch) const;
@@ -127,6 +136,7 @@ class SceneData {
   std::vector<Pair> pairs_;
   std::vector<Cluster> clusters_;
   std::vector<Query> queries_;
+  std::vector<FoundationPair> foundations_;  // beside the pairs, if any has one
   std::vector<Contact> merged_;
   std::vector<ContactTracker> trackers_;
   std::vector<PairState> states_;
@@ -140,6 +150,7 @@ class SceneData {
   double relaxation_ = 0;
   bool touching_ = false;
   bool needs_velocity_ = false;
+  bool wants_second_ = false;  // derivatives of forces
 };
 
 }  // namespace sphshell
