@@ -1,8 +1,6 @@
 #include "bindings/arrays.hpp"
 #include "contact/foundation.hpp"
 
-#include <chrono>
-
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/tuple.h>
 
@@ -12,8 +10,8 @@ namespace {
 // Of the rows: patch, element, depth, center, force, energy, slope; of the points: point, normal,
 // area, pressure, force, row.
 nb::tuple columns(const Foundation& foundation) {
-  const auto &rows = foundation.rows();
-  const auto &points = foundation.points();
+  const auto& rows = foundation.rows();
+  const auto& points = foundation.points();
   std::vector<int> patch, element, number;
   std::vector<double> depth, center, force, energy, slope, point, normal, area, pressure, push;
   for (const FoundationRow& row : rows) {
@@ -53,16 +51,6 @@ void bind_foundation(nanobind::module_& m) {
           },
           nb::arg("shell"), nb::arg("center"), nb::arg("radius"), nb::arg("method"),
           nb::arg("points") = false)
-      .def(
-          "cost",  // [s] of one of many calls, without what Python adds
-          [](Foundation& self, const Shell& shell, const Vec3& center, double radius, int method,
-             int calls) {
-            const auto begin = std::chrono::steady_clock::now();
-            for (int i = 0; i < calls; ++i)
-              self.find(shell, static_cast<Method>(method), center, radius, false, false);
-            const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
-            return time.count() / calls;
-          })
       .def(
           "find_on_ball",
           [](Foundation& self, double ball, const Vec3& center, double radius, bool points) {

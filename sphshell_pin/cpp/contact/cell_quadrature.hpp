@@ -44,9 +44,13 @@ class CellQuadrature {
  public:
   using Vec2 = Eigen::Vector2d;
 
-  // The patch is relative to the ball's center.
-  CellQuadrature(const CubicPatch& patch, const FacetAxes& axes, double radius)
-      : patch_(patch), axes_(axes), radius_(radius), radius2_(radius * radius) {}
+  // The patch is relative to the ball's center; least_order: of Gauss's rules.
+  CellQuadrature(const CubicPatch& patch, const FacetAxes& axes, double radius, int least_order)
+      : patch_(patch),
+        axes_(axes),
+        radius_(radius),
+        radius2_(radius * radius),
+        least_order_(least_order) {}
 
   // visit(x, area vector by parameters, weight) for all quadrature points.
   template <class Visit>
@@ -96,7 +100,9 @@ class CellQuadrature {
     axes_.first(gu, gv);
     return {gu, gv};
   }
-  Vec2 to_plane(const Vec2& d) const { return {axes_.a * d.x() + axes_.b * d.y(), axes_.c * d.y()}; }
+  Vec2 to_plane(const Vec2& d) const {
+    return {axes_.a * d.x() + axes_.b * d.y(), axes_.c * d.y()};
+  }
   Vec2 to_parameters(const Vec2& d) const {
     const double v = d.y() / axes_.c;
     return {(d.x() - axes_.b * v) / axes_.a, v};
@@ -114,6 +120,7 @@ class CellQuadrature {
   CubicPatch patch_;
   const FacetAxes& axes_;
   double radius_, radius2_;
+  int least_order_;
   Piece pieces_[kMostPieces];
   int count_ = 0;
 };
@@ -121,7 +128,8 @@ class CellQuadrature {
 // An arc of rho = R as a graph over its chord.
 class CellQuadrature::Arc {
  public:
-  Arc(const CellQuadrature& cell, const Vec2& a, const Vec2& b) : cell_(cell), a_(a), chord_(b - a) {
+  Arc(const CellQuadrature& cell, const Vec2& a, const Vec2& b)
+      : cell_(cell), a_(a), chord_(b - a) {
     const Vec2 chord = cell.to_plane(chord_);
     length_ = chord.norm();
     if (!(length_ > 0)) return;
@@ -176,11 +184,10 @@ void CellQuadrature::whole(const Part& w, int order, Visit& visit) {
   struct Orbit {
     double weight, a, b, c;
   };
-  static constexpr Orbit kSeven[] = {{0.225, 1. / 3, 1. / 3, 1. / 3},
-                                     {0.132394152788506181, 0.059715871789769820,
-                                      0.470142064105115090, 0.470142064105115090},
-                                     {0.125939180544827153, 0.797426985353087322,
-                                      0.101286507323456339, 0.101286507323456339}};
+  static constexpr Orbit kSeven[] = {
+      {0.225, 1. / 3, 1. / 3, 1. / 3},
+      {0.132394152788506181, 0.059715871789769820, 0.470142064105115090, 0.470142064105115090},
+      {0.125939180544827153, 0.797426985353087322, 0.101286507323456339, 0.101286507323456339}};
   static constexpr Orbit kSixteen[] = {
       {0.144315607677787168, 1. / 3, 1. / 3, 1. / 3},
       {0.095091634267284625, 0.081414823414553688, 0.459292588292723156, 0.459292588292723156},
@@ -236,7 +243,11 @@ void CellQuadrature::part(const Part& w, int level, Visit& visit) {
   if (low > 0) size = std::min(size, 2 * std::sqrt(radius2_ - low * low));
   if (size > low && level < kMostLevels) return divide(w, level, visit);
   const double ratio = size / std::max(low, 1e-3 * size);
-  const int order = ratio < 0.1 ? 3 : ratio < 0.25 ? 4 : ratio < 0.5 ? 5 : ratio < 0.8 ? 6 : 7;
+  const int order = std::max(least_order_, ratio < 0.1    ? 3
+                                           : ratio < 0.25 ? 4
+                                           : ratio < 0.5  ? 5
+                                           : ratio < 0.8  ? 6
+                                                          : 7);
   if (high2 <= radius2_) return whole(w, order, visit);
 
   count_ = 0;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "contact/cell_quadrature.hpp"
+#include "contact/tolerances.hpp"
 #include "shell/curved.hpp"
 #include "shell/sheets.hpp"
 #include "shell/triangle.hpp"
@@ -61,8 +62,7 @@ FoundationRow& Foundation::row_of(int patch, int sheet, int element) {
 
 // Where a sheet ends the potential has, by Stokes' theorem, the line integral of q dl x u as well,
 // q = -(R^2 - rho^2)^2 / (8 rho^2).
-void Foundation::add_rim(const CubicCurve& side, double radius, FoundationRow& row,
-                         bool points) {
+void Foundation::add_rim(const CubicCurve& side, double radius, FoundationRow& row, bool points) {
   const double radius2 = radius * radius;
   const int number = static_cast<int>(&row - rows_.data());
   const Vec3 b0 = side.c0, b1 = b0 + side.c1 / 3, b3 = side.point(1), b2 = b3 - side.tangent(1) / 3;
@@ -78,13 +78,14 @@ void Foundation::add_rim(const CubicCurve& side, double radius, FoundationRow& r
     const double to = t[i];
     if (inside) {
       const double length = (side.point(to) - side.point(from)).norm();
-      const double near = std::min({side.point(from).norm(), side.point((from + to) / 2).norm(),
-                                    side.point(to).norm()});
+      const double near = std::min(
+          {side.point(from).norm(), side.point((from + to) / 2).norm(), side.point(to).norm()});
       const int panels = std::clamp(static_cast<int>(std::ceil(2 * length / near)), 1, 24);
       for (int panel = 0; panel < panels; ++panel)
         for (int j = 0; j < rule.size; ++j) {
           const double s = from + (panel + rule.nodes[j]) / panels * (to - from);
-          const Vec3 x = side.point(s), d = side.tangent(s) * (rule.weights[j] * (to - from) / panels);
+          const Vec3 x = side.point(s),
+                     d = side.tangent(s) * (rule.weights[j] * (to - from) / panels);
           const double rho2 = x.squaredNorm(), rho = std::sqrt(rho2), left = radius2 - rho2;
           // g = q / rho, and g' / rho.
           const double g = -left * left / (8 * rho2 * rho);
@@ -113,6 +114,8 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
   broad_.find(shell, cones, bulge, sphere);
   const Sheets& sheets = shell.sheets();
   const Vec3 local = center - shell.origin();
+  // Friction is less smooth than pressure.
+  const int least_order = points ? 6 : 3;
   for (int f : broad_.overlapping) {
     const NormalCone& cone = cones[f];
     const Vec3 middle(cone.middle[0], cone.middle[1], cone.middle[2]);
@@ -137,7 +140,7 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
     if (flat) {
       if (!add_flat_facet(corner, facet.normal, radius, sum)) continue;
       if (points) {
-        CellQuadrature(flat_patch(corner), FacetAxes(facet), radius).run(visit);
+        CellQuadrature(flat_patch(corner), FacetAxes(facet), radius, least_order).run(visit);
         // The closed form is exact, its points are not: they share what is missing.
         double found = 0;
         for (std::size_t i = first_point; i < points_.size(); ++i)
@@ -153,8 +156,12 @@ void Foundation::find(const Shell& shell, Method method, const Vec3& center, dou
       CubicPatch relative = curved->facets()[f].patch(facet);
       relative.c00 -= center;
       const FacetAxes axes(facet);
-      CellQuadrature(relative, axes, radius).run(visit);
-      if (sum.pressure == 0) continue;
+      CellQuadrature(relative, axes, radius, least_order).run(visit);
+    }
+    // Less is round-off.
+    if (!(sum.pressure > kRoundOff * radius * radius2)) {
+      points_.erase(points_.begin() + first_point, points_.end());
+      continue;
     }
     FoundationRow& row = row_of(patch, sheets.sheet[triangle], facet.element);
     const int number = static_cast<int>(&row - rows_.data());
@@ -255,7 +262,8 @@ void Foundation::find_on_ball(double ball, const Vec3& center, double radius, bo
     sum.pressure += p * area;
     sum.first += p * area * (ball * cosine - e) * axis;
     for (int k = 0; points && k < kRound; ++k) {
-      const double turn = 2 * M_PI * (k + 0.5) / kRound, sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+      const double turn = 2 * M_PI * (k + 0.5) / kRound,
+                   sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
       const Vec3 n = cosine * axis + sine * (std::cos(turn) * across + std::sin(turn) * third);
       points_.push_back({ball * n, n, area / kRound, p, p * area / kRound * n, 0});
     }
@@ -270,8 +278,8 @@ void Foundation::find_on_ball(double ball, const Vec3& center, double radius, bo
   }
   sum.force = force * axis;
   sum.energy = energy;
-  sum.slope = slope * axis * axis.transpose() +
-              force / e * (Mat3::Identity() - axis * axis.transpose());
+  sum.slope =
+      slope * axis * axis.transpose() + force / e * (Mat3::Identity() - axis * axis.transpose());
   rows_.push_back({0, 0, 0, radius - (e - ball), center + sum.first / sum.pressure, sum});
 }
 

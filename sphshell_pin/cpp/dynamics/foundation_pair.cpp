@@ -121,17 +121,15 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
       if (friction) {
         const Dual<1> over = friction->over_speed(Dual<1>::seed(pressed.slip.squaredNorm(), 0));
         const Mat3 flat = Mat3::Identity() - n * n.transpose();
-        by_velocity +=
-            law.dissipation * over.value * pressed.slip * n.transpose() -
-            pressed.share * (over.value * flat +
-                             2 * over.slope[0] * pressed.slip * pressed.slip.transpose());
+        by_velocity += law.dissipation * over.value * pressed.slip * n.transpose() -
+                       pressed.share * (over.value * flat + 2 * over.slope[0] * pressed.slip *
+                                                                pressed.slip.transpose());
       }
     }
     by_velocity *= area * point.pressure;
     const Vec3 from = x - center_;
     const double rho = from.norm();
-    const Vec3 pressure_by =
-        (pair.radius * pair.radius / (rho * rho) + 1) / (2 * rho) * from;
+    const Vec3 pressure_by = (pair.radius * pair.radius / (rho * rho) + 1) / (2 * rho) * from;
     const Mat3 arm = cross_matrix(x), by_place = unit * pressure_by.transpose();
     out.wrench.head<3>() += point.pressure * unit;
     out.wrench.tail<3>() += point.pressure * x.cross(unit);

@@ -12,10 +12,10 @@ namespace sphshell {
 
 // What acts on the sphere at one row, in the shell's frame.
 struct FoundationForce {
-  Vec3 elastic, normal;              // elastic: through the center; normal: with damping [N]
-  Vec3 friction;                     // of what friction every point has by itself [N]
-  Vec3 moment;                       // of the normal force and that friction, about the center [N m]
-  double damping = 0, sliding = 0;   // power lost [W]
+  Vec3 elastic, normal;             // elastic: through the center; normal: with damping [N]
+  Vec3 friction;                    // of what friction every point has by itself [N]
+  Vec3 moment;                      // of the normal force and that friction, about the center [N m]
+  double damping = 0, sliding = 0;  // power lost [W]
 };
 
 class FoundationPair {

@@ -255,8 +255,7 @@ void SceneData::add_foundation(ActiveContact& active) {
     spin = turn.transpose() *
            (body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
   }
-  const FoundationForce found =
-      foundations_[active.pair].force(pair, active.row, velocity, spin);
+  const FoundationForce found = foundations_[active.pair].force(pair, active.row, velocity, spin);
   const ContactKinematics<double>& m = active.kinematics;
   ContactForce<double>& f = active.force;
   f.elastic = found.elastic.norm();
@@ -269,8 +268,9 @@ void SceneData::add_foundation(ActiveContact& active) {
   // One bristle at the center of pressure.
   ContactForce<double> bristle;
   bristle.normal = f.normal, bristle.slip = f.slip;
-  std::visit([&](const auto& one) { one.add(bristle, m, 2 * pair.disc_radius(), relaxation(pair)); },
-             pair.friction.law);
+  std::visit(
+      [&](const auto& one) { one.add(bristle, m, 2 * pair.disc_radius(), relaxation(pair)); },
+      pair.friction.law);
   f.friction += bristle.friction, f.torsion = bristle.torsion;
   f.bristle = bristle.bristle, f.bristle_rate = bristle.bristle_rate;
   active.sliding = -bristle.friction.dot(f.slip) - bristle.torsion * m.spin;
@@ -307,8 +307,13 @@ void SceneData::add_force(const ActiveContact& active) {
   apply(pair.joint_j, active.point, -on_i.force, -on_i.moment);
   PairState& state = states_[active.pair];
   if (weight > 0) ++state.count;
-  state.pieces += weight > 0 ? 1 : -1;
-  if (f.normal == 0) ++state.clamped;
+  if (active.row < 0) {
+    state.pieces += weight > 0 ? 1 : -1;
+    if (f.normal == 0) ++state.clamped;
+  } else {
+    // The force of a foundation is smooth where a patch comes or goes: no event.
+    state.pieces = 1;
+  }
   state.depth = std::max(state.depth, m.depth);
   state.normal_force += weight * f.normal;
   // The weight of several as one is the length of the sum of their normals.

@@ -35,8 +35,8 @@ struct ActiveContact {
   Vec3 point;                  // in the world
   ContactKinematics<double> kinematics;  // in the world
   ContactForce<double> force;
-  int row = -1;                  // of the foundation of its pair
-  Vec3 moment = Vec3::Zero();    // of that row's pressure, beyond that of its force at the point
+  int row = -1;                     // of the foundation of its pair
+  Vec3 moment = Vec3::Zero();       // of that row's pressure, beyond that of its force at the point
   double damping = 0, sliding = 0;  // power that it loses [W]
 };
 

@@ -25,8 +25,8 @@ Vec3 CubicPatch::polar(const Eigen::Vector2d& p, const Eigen::Vector2d& q,
   const double u = p.x(), v = p.y(), a = q.x(), b = q.y(), x = r.x(), y = r.y();
   return c00 + ((u + a + x) * c10 + (v + b + y) * c01) / 3 +
          ((u * a + u * x + a * x) * c20 + (v * b + v * y + b * y) * c02) / 3 +
-         (u * (b + y) + a * (v + y) + x * (v + b)) / 6 * c11 + u * a * x * c30 +
-         v * b * y * c03 + (u * a * y + u * b * x + v * a * x) / 3 * c21 +
+         (u * (b + y) + a * (v + y) + x * (v + b)) / 6 * c11 + u * a * x * c30 + v * b * y * c03 +
+         (u * a * y + u * b * x + v * a * x) / 3 * c21 +
          (u * b * y + v * a * y + v * b * x) / 3 * c12;
 }
 
