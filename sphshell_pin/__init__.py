@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import CoulombFriction as CoulombFriction
     from sphshell_pin.contact import Feature as Feature
     from sphshell_pin.contact import FoundationLaw as FoundationLaw
+    from sphshell_pin.contact import HertzLaw as HertzLaw
     from sphshell_pin.contact import HuntCrossleyLaw as HuntCrossleyLaw
     from sphshell_pin.contact import ImpactLaw as ImpactLaw
     from sphshell_pin.contact import Sphere as Sphere
@@ -61,6 +62,7 @@ _HOME = {
     "ForceTorqueSensor": "dynamics",
     "FoundationLaw": "contact",
     "GravityCompensation": "dynamics",
+    "HertzLaw": "contact",
     "HuntCrossleyLaw": "contact",
     "ImpactLaw": "contact",
     "Implicit": "dynamics",

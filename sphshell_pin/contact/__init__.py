@@ -1,11 +1,12 @@
 """Contacts of a sphere with a shell, the laws of their forces, and their wrenches."""
 
-from sphshell_pin.contact import foundation, friction, laws
+from sphshell_pin.contact import foundation, friction, laws, table_law
 from sphshell_pin.contact.foundation import *  # noqa: F403
 from sphshell_pin.contact.friction import *  # noqa: F403
 from sphshell_pin.contact.laws import *  # noqa: F403
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.contact.sphere import Sphere
+from sphshell_pin.contact.table_law import *  # noqa: F403
 from sphshell_pin.contact.wrench import BristleState, contact_wrench
 from sphshell_pin.shell.contact_set import ContactSet, Feature, Method
 
@@ -21,3 +22,4 @@ __all__ = [
 __all__ += foundation.__all__
 __all__ += friction.__all__
 __all__ += laws.__all__
+__all__ += table_law.__all__

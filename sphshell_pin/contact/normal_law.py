@@ -45,7 +45,7 @@ class NormalLaw(Ingredient):
         return False
 
     def on_plane(self, radius: float) -> NormalLaw:
-        """Return the law of a sphere of `radius` [m] on a plane: itself, unless it `needs_shape`."""
+        """Return the law of a sphere of `radius` [m] on a plane: itself, if it is the same."""
         return self
 
     @property

@@ -95,7 +95,7 @@ class _Contact:
             raise InvalidParameter("normal", self.normal.tolist(), "must be a unit vector")
         for name, motion in (("motion_i", motion_i), ("motion_j", motion_j)):
             check_type(name, motion, pin.Motion, "must be a pinocchio.Motion")
-        check_law(law)
+        check_law(law, "at a lone contact point")
         check_friction(friction)
         self.depth = check_finite("depth", depth)
         self.motion = motion_i - motion_j

@@ -58,8 +58,10 @@ class ContactLog(SceneContacts):
 class Event:
     """Something that happened at time `t` [s] to the pair, or the joint, called `pair`.
 
-    `kind` of a pair: "touch", "lift_off", "deep" (the depth passed half the sphere's radius) or
-    "through" (the sphere's center was pushed through the shell; it is pushed back). Of a joint:
+    `kind` of a pair: "touch", "lift_off", "deep" (the depth passed half the sphere's radius),
+    "through" (the sphere's center was pushed through the shell; it is pushed back) or
+    "beyond_hertz" (HertzLaw's theory no longer holds: the ellipse of contact is more than half as
+    long as the sphere, or the shell is a socket of nearly its radius). Of a joint:
     "stop" (it reached the end of its range), "effort_limit" (the controller's torque is cut),
     "speed_limit" (it is too fast), and "stop_left", "effort_limit_left", "speed_limit_left".
     """
@@ -349,5 +351,5 @@ def _owners(pairs: tuple[str, ...], scene: Scene) -> dict[str, tuple[str, ...]]:
     velocities = tuple(
         name for name, joint in zip(model.names, model.joints, strict=True) for _ in range(joint.nv)
     )
-    owners = [pairs] * 4 + [stops] * 2 + [velocities] * 4
+    owners = [pairs] * 5 + [stops] * 2 + [velocities] * 4
     return dict(zip(EVENT_KINDS, owners, strict=True))

@@ -8,12 +8,13 @@ from typing import ClassVar, Literal
 
 from sphshell_pin.deprecation import FormerDict
 
-# Kinds of events in the order of the compiled core; from the fifth on, of joints.
+# Kinds of events in the order of the compiled core; from "stop" on, of joints.
 EventKind = Literal[
     "touch",
     "lift_off",
     "deep",
     "through",
+    "beyond_hertz",
     "stop",
     "stop_left",
     "effort_limit",

@@ -147,10 +147,21 @@ def run_built(
         raise fault
     if interrupted:
         raise KeyboardInterrupt(f"the results are in {folder}, but not all pictures of them")
-    doubts: tuple[str, ...] = ()
+    doubts = _beyond_hertz(result)
     if stopped is None and isinstance(built.controller, Controller):
-        doubts = tuple(built.controller.doubts_after(result))
+        doubts = (*doubts, *built.controller.doubts_after(result))
     return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit, doubts)
+
+
+def _beyond_hertz(result: Result) -> tuple[str, ...]:
+    """Say of each contact when the theory of its law first ended."""
+    first = {e.pair: e.t for e in reversed(result.events) if e.kind == "beyond_hertz"}
+    return tuple(
+        f"contact '{pair}': from t = {t:.4g} s Hertz's theory does not hold: the ellipse of "
+        "contact is more than half as long as the sphere, or a socket fits the sphere closely; "
+        "make the bodies stiffer, or take a FoundationLaw"
+        for pair, t in first.items()
+    )
 
 
 def _judge(built: Built, result: Result) -> tuple[tuple[Verdict, ...], Exception | None]:

@@ -26,6 +26,9 @@ struct Contact {
   bool rim = false;  // on the border of an open sheet: there it has no sides
   // Contacts of one group >= 0 are nearly one and are shown as one, in place of the first of them.
   int group = -1;
+  // The facet that holds it, and the number of its side or corner: of shells, but for the method
+  // "elements".
+  int facet = -1, index = 0;
 };
 
 // The ball that a query looks at, in the shell's frame.

@@ -37,6 +37,7 @@ struct ContactKinematics {
   Vector3<S> normal, relative;
   S spin = S(0);
   Vector3<S> bristle = Vector3<S>::Zero();  // [m]
+  S scale = S(0);                           // of the gap, for Hertz's law [m^0.5]
 };
 
 // The friction laws. Each has its name, its parameters, and
@@ -155,7 +156,7 @@ ContactForce<S> contact_force(const NormalLaw& law, const FrictionLaw& friction,
                               double relaxation, const ContactKinematics<S>& m) {
   ContactForce<S> out;
   const S gap_rate = m.normal.dot(m.relative);
-  const NormalForce<S> push = law.force(m.depth, gap_rate);
+  const NormalForce<S> push = law.force(m.depth, gap_rate, m.scale);
   out.normal = push.total;
   out.elastic = push.elastic;
   out.slip = m.relative - gap_rate * m.normal;

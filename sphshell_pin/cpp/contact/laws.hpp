@@ -52,6 +52,7 @@ NormalForce<S> push(const S& total, const S& elastic) {
 // - force: at depth > 0 [m] and gap_rate = n . v_rel [m/s], negative while closing;
 // - energy: the potential of the elastic part [J];
 // - needs_rate: whether the force depends on gap_rate.
+// Hertz's law also gets the scale of the gap, see Hertz [m^0.5].
 
 // max(0, k depth^e - STEP(depth, 0, 0, d, c) gap_rate)
 struct ImpactLaw {
@@ -94,6 +95,34 @@ struct HuntCrossleyLaw {
 
   double energy(double depth) const {
     return stiffness * power(depth, exponent) * depth / (exponent + 1);
+  }
+};
+
+// Hertz's force between a sphere and whatever it touches, E* scale depth^1.5, with the damping of
+// Hunt and Crossley (1 - b gap_rate), or that of a viscoelastic material that relaxes in a time
+// tau, 1.5 tau E* scale depth^0.5 gap_rate (Kuwabara and Kono, Jpn. J. Appl. Phys. 26 (1987) 1230).
+struct HertzLaw {
+  static constexpr const char* kind = "hertz";
+  double modulus, dissipation, relaxation;  // E* [Pa], b [s/m], tau [s]
+  double fixed_scale;                       // whatever it touches; 0: that of the gap [m^0.5]
+
+  explicit HertzLaw(const Numbers& p)
+      : modulus(p.at(0)), dissipation(p.at(1)), relaxation(p.at(2)), fixed_scale(p.at(3)) {}
+
+  bool needs_rate() const { return dissipation > 0 || relaxation > 0; }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate, const S& scale) const {
+    using std::sqrt;
+    const S used = fixed_scale > 0 ? S(fixed_scale) : scale;
+    const S root = modulus * used * sqrt(depth), elastic = root * depth;
+    if (!needs_rate()) return {elastic, elastic};
+    return push(S(elastic - (elastic * dissipation + 1.5 * relaxation * root) * gap_rate), elastic);
+  }
+
+  double energy(double depth, double scale) const {
+    const double used = fixed_scale > 0 ? fixed_scale : scale;
+    return 0.4 * modulus * used * depth * depth * std::sqrt(depth);
   }
 };
 
@@ -212,12 +241,17 @@ struct FoundationLaw {
 
 // One of the laws.
 struct NormalLaw {
-  std::variant<ImpactLaw, HuntCrossleyLaw, TableLaw, FoundationLaw> law = ImpactLaw({0, 1, 0, 1});
+  std::variant<ImpactLaw, HuntCrossleyLaw, HertzLaw, TableLaw, FoundationLaw> law =
+      ImpactLaw({0, 1, 0, 1});
 
   bool needs_rate() const {
     return std::visit([](const auto& one) { return one.needs_rate(); }, law);
   }
-
+  // Of a force that follows the shape of the gap, else null.
+  const HertzLaw* hertz() const {
+    const HertzLaw* one = std::get_if<HertzLaw>(&law);
+    return one && one->fixed_scale == 0 ? one : nullptr;
+  }
   // Of a force that is an integral over the overlap, else null.
   const FoundationLaw* foundation() const {
     const FoundationLaw* one = std::get_if<FoundationLaw>(&law);
@@ -225,12 +259,26 @@ struct NormalLaw {
   }
 
   template <class S>
-  NormalForce<S> force(const S& depth, const S& gap_rate) const {
-    return std::visit([&](const auto& one) { return one.force(depth, gap_rate); }, law);
+  NormalForce<S> force(const S& depth, const S& gap_rate, const S& scale = S(0)) const {
+    return std::visit(
+        [&](const auto& one) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(one)>, HertzLaw>)
+            return one.force(depth, gap_rate, scale);
+          else
+            return one.force(depth, gap_rate);
+        },
+        law);
   }
 
-  double energy(double depth) const {
-    return std::visit([&](const auto& one) { return one.energy(depth); }, law);
+  double energy(double depth, double scale = 0) const {
+    return std::visit(
+        [&](const auto& one) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(one)>, HertzLaw>)
+            return one.energy(depth, scale);
+          else
+            return one.energy(depth);
+        },
+        law);
   }
 };
 

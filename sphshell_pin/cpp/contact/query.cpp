@@ -151,9 +151,9 @@ const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& center, 
   if (minima.empty()) return contacts;
   if (shell.side() != Side::Both) keep_one_side(shell, sphere, minima);
   for (const Minimum& minimum : minima) {
-    contacts.push_back(minimum.contact);
-    contacts.back().rim =
-        minimum.contact.feature != Feature::Face && feature_normal(shell, minimum).rim;
+    Contact& contact = contacts.emplace_back(minimum.contact);
+    contact.rim = contact.feature != Feature::Face && feature_normal(shell, minimum).rim;
+    contact.facet = minimum.facet, contact.index = minimum.index;
   }
   // Deepest first, saddles last: the order must not depend on the numbering of the elements.
   if (contacts.size() > 1)

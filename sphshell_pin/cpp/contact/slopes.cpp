@@ -9,7 +9,7 @@ namespace {
 struct LawSlopes {
   Vec3 force, moment, rate;  // force and moment on the sphere but for the weight
   struct By {
-    Vec3 depth, spin;
+    Vec3 depth, spin, scale;
     Mat3 relative, stretch;
   } force_by, moment_by, rate_by;
 };
@@ -20,16 +20,17 @@ void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
     value[i] = x[i].value;
     by.depth[i] = x[i].slope[0];
     by.relative.row(i) = x[i].slope.template segment<3>(1);
-    if constexpr (N == 8) {
+    if constexpr (N >= 8) {
       by.spin[i] = x[i].slope[4];
       by.stretch.row(i) = x[i].slope.template segment<3>(5);
     }
+    by.scale[i] = N % 2 ? x[i].slope[N - 1] : 0;
   }
-  if constexpr (N != 8) by.spin.setZero(), by.stretch.setZero();
+  if constexpr (N < 8) by.spin.setZero(), by.stretch.setZero();
 }
 
-// Seeds: depth, relative velocity and, of 8, spin and stretch. The normal needs none, as a law does
-// not change with the axes it is written in.
+// Seeds: depth, relative velocity; of 8 and 9, spin and stretch; of 5 and 9, the scale. The normal
+// needs none, as a law does not change with the axes it is written in.
 template <int N>
 void differentiate(const NormalLaw& law, const FrictionLaw& friction, double radius,
                    double relaxation, const ContactKinematics<double>& at, LawSlopes& out) {
@@ -39,9 +40,10 @@ void differentiate(const NormalLaw& law, const FrictionLaw& friction, double rad
   for (int i = 0; i < 3; ++i) {
     m.normal[i] = at.normal[i];
     m.relative[i] = S::seed(at.relative[i], 1 + i);
-    if constexpr (N == 8) m.bristle[i] = S::seed(at.bristle[i], 5 + i);
+    if constexpr (N >= 8) m.bristle[i] = S::seed(at.bristle[i], 5 + i);
   }
-  if constexpr (N == 8) m.spin = S::seed(at.spin, 4);
+  if constexpr (N >= 8) m.spin = S::seed(at.spin, 4);
+  if constexpr (N % 2) m.scale = S::seed(at.scale, N - 1);
   const ContactForce<S> f = contact_force(law, friction, radius, relaxation, m);
   read<N>(f.normal * m.normal + f.friction, out.force, out.force_by);
   read<N>(f.torsion * m.normal, out.moment, out.moment_by);
@@ -85,19 +87,29 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     normal_by = (contact.dn_dc - n * weight_by) / weight;
     depth_by *= std::abs(weight);
     point_by = Mat3::Identity() + n * depth_by - (site.radius - contact.depth) * normal_by;
+    if (site.shape) depth_by -= site.shape->tilt.transpose();
   }
 
   ContactKinematics<double> m;
-  m.depth = contact.depth;
+  m.depth = site.shape ? site.shape->depth : contact.depth;
   m.normal = n;
   m.relative = site.twist.head<3>() + spin.cross(point);
   m.spin = n.dot(spin);
   m.bristle = site.stretch;
   LawSlopes at;
-  if (friction.has_state())
-    differentiate<8>(law, friction, site.disc_radius, relaxation, m, at);
-  else
-    differentiate<4>(law, friction, site.disc_radius, relaxation, m, at);
+  const auto differentiated = [&](auto seeds) {
+    differentiate<seeds>(law, friction, site.disc_radius, relaxation, m, at);
+  };
+  Eigen::RowVector3d scale_by = Eigen::RowVector3d::Zero();
+  if (site.shape) {
+    m.scale = site.shape->scale;
+    scale_by = site.shape->gradient.transpose();
+    friction.has_state() ? differentiated(std::integral_constant<int, 9>())
+                         : differentiated(std::integral_constant<int, 5>());
+  } else {
+    friction.has_state() ? differentiated(std::integral_constant<int, 8>())
+                         : differentiated(std::integral_constant<int, 4>());
+  }
 
   // The turning of the normal is a rotation of all vectors of the law, and what is left of their
   // change goes through its slopes.
@@ -107,7 +119,7 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   const Eigen::RowVector3d spin_by = spin.transpose() * normal_by;
   const auto by_place = [&](const Vec3& value, const LawSlopes::By& by) -> Mat3 {
     return by.depth * depth_by + by.relative * relative_by + by.spin * spin_by +
-           by.stretch * stretch_by - cross_matrix(value) * turned_by;
+           by.stretch * stretch_by + by.scale * scale_by - cross_matrix(value) * turned_by;
   };
   const Mat3 arm = cross_matrix(point);
   const auto by_twist = [&](const LawSlopes::By& by) -> Matrix36 {
@@ -125,6 +137,24 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
                                  at.moment * weight_by + weight * by_place(at.moment, at.moment_by);
   out.by_twist.topRows<3>() = force_by_twist;
   out.by_twist.bottomRows<3>() = arm * force_by_twist + weight * by_twist(at.moment_by);
+  if (site.shape && law.hertz()) {
+    // Of the force at the sphere's center, see SceneData::compute_force.
+    const HertzLaw& hertz = *law.hertz();
+    const ContactShape& shape = *site.shape;
+    const double energy = hertz.energy(m.depth, 1);
+    const NormalForce<Dual<1>> unit =
+        hertz.force(Dual<1>::seed(m.depth, 0), Dual<1>(0), Dual<1>(1));
+    const double push = unit.elastic.value, push_by = unit.elastic.slope[0];
+    const Vec3 climb = weight * (shape.scale * push * shape.tilt - energy * shape.gradient);
+    const Mat3 by =
+        weight * (push * shape.tilt * scale_by + shape.scale * push_by * shape.tilt * depth_by +
+                  shape.scale * push * shape.tilt_by - push * shape.gradient * depth_by -
+                  energy * shape.second);
+    out.wrench.head<3>() += climb;
+    out.wrench.tail<3>() += site.place.cross(climb);
+    out.by_place.topRows<3>() += by;
+    out.by_place.bottomRows<3>() += cross_matrix(site.place) * by - cross_matrix(climb);
+  }
   if (!friction.has_state()) return;
   out.by_stretch.topRows<3>() = weight * at.force_by.stretch;
   out.by_stretch.bottomRows<3>() = weight * (arm * at.force_by.stretch + at.moment_by.stretch);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "contact/friction.hpp"
+#include "contact/hertz.hpp"
 #include "contact/query.hpp"
 
 namespace sphshell {
@@ -28,7 +29,8 @@ struct ContactSite {
   double radius;       // of the sphere [m]
   double disc_radius;  // that the laws take: see Pair::disc_radius [m]
   Vector6 twist;
-  Vec3 stretch;  // of the bristle [m]
+  Vec3 stretch;                         // of the bristle [m]
+  const ContactShape* shape = nullptr;  // of Hertz's law
 };
 
 struct ContactSlopes {

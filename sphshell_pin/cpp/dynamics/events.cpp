@@ -20,9 +20,10 @@ long count_positive(const std::vector<double>& values) {
 
 // Of a law that clamps its force at zero, less than zero where it acts. Laws are linear in the
 // rate: the force against the opposite rate is 2 elastic - unclamped.
-double clamp_gauge(const NormalLaw& law, double depth, double gap_rate, double force) {
+double clamp_gauge(const NormalLaw& law, double depth, double gap_rate, double force,
+                   double scale = 0) {
   if (force > 0) return -force;
-  const NormalForce<double> opposed = law.force(depth, -gap_rate);
+  const NormalForce<double> opposed = law.force(depth, -gap_rate, scale);
   return opposed.total - 2 * opposed.elastic;
 }
 
@@ -86,7 +87,7 @@ void Events::measure(std::size_t k, double margin, Gauges& out) {
     if (active.pair != static_cast<int>(k)) continue;
     const ContactKinematics<double>& m = active.kinematics;
     out[Clamp].push_back(
-        clamp_gauge(pair.law, m.depth, m.normal.dot(m.relative), active.force.normal));
+        clamp_gauge(pair.law, m.depth, m.normal.dot(m.relative), active.force.normal, m.scale));
   }
   for (std::vector<double>& values : out)
     std::sort(values.begin(), values.end(), std::greater<double>());

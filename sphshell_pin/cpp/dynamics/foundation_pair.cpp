@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "contact/dual.hpp"
+#include "dynamics/scene_data.hpp"
 
 namespace sphshell {
 namespace {
@@ -140,6 +141,39 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
     out.by_twist.bottomLeftCorner<3, 3>() += arm * by_velocity;
     out.by_twist.bottomRightCorner<3, 3>() -= arm * by_velocity * arm;
   }
+}
+
+// The force of a row of a foundation, in place of that of its depth.
+void SceneData::add_foundation(ActiveContact& active) {
+  const Pair& pair = pairs_[active.pair];
+  const PairState& state = states_[active.pair];
+  const auto& turn = state.world_from_j.rotation();
+  const Vec3 center = state.world_from_j.act(state.center);
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
+  if (pair.needs_velocity()) {
+    velocity = turn.transpose() * relative_velocity(pair, center);
+    spin = turn.transpose() *
+           (body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
+  }
+  const FoundationForce found = foundations_[active.pair].force(pair, active.row, velocity, spin);
+  const ContactKinematics<double>& m = active.kinematics;
+  ContactForce<double>& f = active.force;
+  f.elastic = found.elastic.norm();
+  f.normal = std::max(0.0, active.contact.normal.dot(found.normal));
+  const Vec3 whole = turn * (found.normal + found.friction);
+  f.friction = whole - f.normal * m.normal;
+  active.moment = turn * found.moment + (center - active.point).cross(whole);
+  active.damping = found.damping, active.sliding = found.sliding;
+  if (active.slot < 0 && !pair.friction.has_state()) return;
+  // One bristle at the center of pressure.
+  ContactForce<double> bristle;
+  bristle.normal = f.normal, bristle.slip = f.slip;
+  std::visit(
+      [&](const auto& one) { one.add(bristle, m, 2 * pair.disc_radius(), relaxation(pair)); },
+      pair.friction.law);
+  f.friction += bristle.friction, f.torsion = bristle.torsion;
+  f.bristle = bristle.bristle, f.bristle_rate = bristle.bristle_rate;
+  active.sliding = -bristle.friction.dot(f.slip) - bristle.torsion * m.spin;
 }
 
 }  // namespace sphshell

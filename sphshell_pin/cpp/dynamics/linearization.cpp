@@ -149,8 +149,9 @@ ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& t
   const Pair& pair = scene_.pairs()[active.pair];
   const PairState& state = scene_.states()[active.pair];
   const auto& turn = state.world_from_j.rotation();
-  ContactSite site{active.contact,     state.center, !pair.source, pair.radius,
-                   pair.disc_radius(), twist,        Vec3::Zero()};
+  ContactSite site{
+      active.contact, state.center, !pair.source,        pair.radius, scene_.disc_radius(active),
+      twist,          Vec3::Zero(), scene_.shape(active)};
   if (pair.source) site.place = site.contact.point;
   if (active.slot >= 0) site.stretch = turn.transpose() * active.kinematics.bristle;
   return site;

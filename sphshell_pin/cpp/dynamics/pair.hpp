@@ -42,6 +42,8 @@ struct Pair {
   // That of Hertz's theory: a disc of contact at a depth is as large as that of one sphere of this
   // radius on a plane [m].
   double disc_radius() const { return ball > 0 ? radius * (ball / (radius + ball)) : radius; }
+  // Whether the shape of the gap counts.
+  bool needs_shape() const { return law.hertz() != nullptr; }
   // Whether the derivative of a contact's normal is known.
   bool has_dn_dc() const { return !source && method != Method::Elements; }
 };

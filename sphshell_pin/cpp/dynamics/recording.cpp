@@ -96,6 +96,9 @@ void Recorder::add_step(const SceneData& scene, double t, double h) {
     const auto add_event = [&](Event::Kind kind) { record_.events.push_back({t, number, kind}); };
     PairStatus& status = status_[k];
     add_touch(k, {now.count > 0, now.normal_force, now.depth}, t, h, number, Event::Kind::Touch);
+    const bool beyond = now.conformity > kMostConformal || now.half_axis > kLargestEllipse;
+    if (beyond && !status.beyond_hertz) add_event(Event::Kind::BeyondHertz);
+    status.beyond_hertz = beyond;
     const double radius = scene.pairs()[k].least_radius();
     const bool through = now.pushed_through || (radius > 0 && now.depth > radius);
     if (through && !status.through) add_event(Event::Kind::Through);

@@ -13,6 +13,7 @@ struct Event {
     LiftOff,
     Deep,
     Through,
+    BeyondHertz,  // the theory of its law does not hold
     Stop,  // a joint reaches a stop, and leaves it
     StopLeft,
     EffortLimit,  // a controller's torque begins to be cut, and ends
@@ -86,7 +87,7 @@ class Recorder {
  private:
   struct PairStatus {
     double normal_force = 0;
-    bool touching = false, deep = false, through = false;
+    bool touching = false, deep = false, through = false, beyond_hertz = false;
   };
   // A pair or a stop at the end of a step.
   struct Touch {

@@ -14,6 +14,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
       pairs_(std::move(pairs)),
       clusters_(clusters_of(pairs_)),
       queries_(pairs_.size(), Query(true)),
+      shapes_(pairs_.size()),
       trackers_(pairs_.size()),
       states_(pairs_.size()),
       excursions_(pairs_.size()),
@@ -176,19 +177,49 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
     foundations_[k].find(pair, state.center, slopes, query.contacts);
     return query.contacts;
   }
-  if (pair.ball > 0) {
+  if (pair.ball > 0)
     find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
-    return query.contacts;
-  }
-  query.find(*pair.shell, state.center, pair.radius, pair.method);
+  else
+    query.find(*pair.shell, state.center, pair.radius, pair.method);
+  if (pair.needs_shape()) find_shapes(k);
   // Friction belongs to a place, and its spring should not be split and merged at every border
   // between elements: contacts that are nearly one are one. The elastic energy is that of their
   // depths' sum, off by the square of the depths' difference, 1e-4 at most.
   if (pair.friction.active() && query.contacts.size() > 1) {
     merge_groups(query.contacts, state.center, pair.radius, merged_);
+    if (pair.needs_shape()) {
+      merge_shapes(query.contacts, shapes_[k], merged_shapes_);
+      shapes_[k].swap(merged_shapes_);
+    }
     query.contacts.swap(merged_);
   }
   return query.contacts;
+}
+
+// The shapes of the gaps at a pair's contacts.
+void SceneData::find_shapes(std::size_t k) {
+  const Pair& pair = pairs_[k];
+  std::vector<ContactShape>& shapes = shapes_[k];
+  shapes.clear();
+  const std::vector<Contact>& contacts = queries_[k].contacts;
+  if (contacts.empty()) return;
+  if (pair.ball > 0 || pair.method != Method::Smooth) {
+    const double curvature = 1 / pair.radius + (pair.ball > 0 ? 1 / pair.ball : 0);
+    for (const Contact& contact : contacts) {
+      shapes.push_back(shape_of_gap(curvature * Mat3::Identity(), contact.normal, pair.radius));
+      shapes.back().depth = contact.depth;
+    }
+    return;
+  }
+  const auto at = std::find(shell_of_.begin(), shell_of_.end(), pair.shell.get());
+  const std::size_t number = at - shell_of_.begin();
+  if (at == shell_of_.end()) {
+    shell_of_.push_back(pair.shell.get());
+    curvatures_.emplace_back();
+  }
+  for (const Contact& contact : contacts)
+    shapes.push_back(curvatures_[number].shape(*pair.shell, contact, states_[k].center, pair.radius,
+                                               wants_second_));
 }
 
 void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {
@@ -199,6 +230,8 @@ void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int
   active.contact = contact;
   if (pairs_[k].law.foundation())
     active.row = static_cast<int>(&contact - queries_[k].contacts.data());
+  if (pairs_[k].needs_shape())
+    active.shape = static_cast<int>(&contact - queries_[k].contacts.data());
 }
 
 void SceneData::compute_forces(const VectorX& z) {
@@ -228,52 +261,27 @@ void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
   if (pair.friction.torsional())
     m.spin =
         m.normal.dot(body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
+  if (const ContactShape* gap = shape(active)) m.scale = gap->scale, m.depth = gap->depth;
   if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
 }
 
 void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
-  active.force = contact_force(pair.law, pair.friction, pair.disc_radius(), relaxation(pair),
+  active.force = contact_force(pair.law, pair.friction, disc_radius(active), relaxation(pair),
                                active.kinematics);
   if (active.row >= 0) add_foundation(active);
+  // The energy also changes with the shape, as the sphere moves along the shell. It depends on the
+  // sphere's center alone: that is where the force acts.
+  if (const HertzLaw* hertz = pair.law.hertz(); hertz && active.shape >= 0) {
+    const ContactShape& gap = *shape(active);
+    active.climb = states_[active.pair].world_from_j.rotation() *
+                   (active.force.elastic * gap.tilt - hertz->energy(gap.depth, 1) * gap.gradient);
+  }
   if (active.slot < 0) return;
   const auto& rotation = states_[active.pair].world_from_j.rotation();
   const int at = 3 * active.slot;
   bristle_rates_.segment<3>(at) =
       rotation.transpose() * active.force.bristle_rate + rate_of_turning(active, z.segment<3>(at));
-}
-
-// The force of a row of a foundation, in place of that of its depth.
-void SceneData::add_foundation(ActiveContact& active) {
-  const Pair& pair = pairs_[active.pair];
-  const PairState& state = states_[active.pair];
-  const auto& turn = state.world_from_j.rotation();
-  const Vec3 center = state.world_from_j.act(state.center);
-  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
-  if (pair.needs_velocity()) {
-    velocity = turn.transpose() * relative_velocity(pair, center);
-    spin = turn.transpose() *
-           (body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
-  }
-  const FoundationForce found = foundations_[active.pair].force(pair, active.row, velocity, spin);
-  const ContactKinematics<double>& m = active.kinematics;
-  ContactForce<double>& f = active.force;
-  f.elastic = found.elastic.norm();
-  f.normal = std::max(0.0, active.contact.normal.dot(found.normal));
-  const Vec3 whole = turn * (found.normal + found.friction);
-  f.friction = whole - f.normal * m.normal;
-  active.moment = turn * found.moment + (center - active.point).cross(whole);
-  active.damping = found.damping, active.sliding = found.sliding;
-  if (active.slot < 0 && !pair.friction.has_state()) return;
-  // One bristle at the center of pressure.
-  ContactForce<double> bristle;
-  bristle.normal = f.normal, bristle.slip = f.slip;
-  std::visit(
-      [&](const auto& one) { one.add(bristle, m, 2 * pair.disc_radius(), relaxation(pair)); },
-      pair.friction.law);
-  f.friction += bristle.friction, f.torsion = bristle.torsion;
-  f.bristle = bristle.bristle, f.bristle_rate = bristle.bristle_rate;
-  active.sliding = -bristle.friction.dot(f.slip) - bristle.torsion * m.spin;
 }
 
 // How fast a stretch turns with the normal, in the shell's frame.
@@ -292,8 +300,15 @@ ContactWrench SceneData::wrench(const ActiveContact& active) const {
   const ContactForce<double>& f = active.force;
   const Vec3& normal = active.kinematics.normal;
   const double weight = active.contact.weight;
-  return {active.point, weight * (f.normal * normal + f.friction),
-          weight * f.torsion * normal + active.moment};
+  ContactWrench out{active.point, weight * (f.normal * normal + f.friction),
+                    weight * f.torsion * normal + active.moment};
+  if (active.shape >= 0) {
+    const PairState& state = states_[active.pair];
+    out.force += weight * active.climb;
+    out.moment +=
+        weight * (state.world_from_j.act(state.center) - active.point).cross(active.climb);
+  }
+  return out;
 }
 
 // Adds a contact to the forces on the joints and to the sums of its pair.
@@ -325,7 +340,11 @@ void SceneData::add_force(const ActiveContact& active) {
   } else {
     powers_.damping += weight * damping_power(f, m);
     powers_.friction += weight * friction_power(f, m);
-    powers_.elastic += share * pair.law.energy(m.depth);
+    powers_.elastic += share * pair.law.energy(m.depth, m.scale);
+  }
+  if (const ContactShape* gap = shape(active)) {
+    state.conformity = std::max(state.conformity, gap->conformity);
+    state.half_axis = std::max(state.half_axis, gap->half_axes(m.depth)[0] / pair.radius);
   }
   if (active.slot >= 0)
     powers_.bristles += 0.5 * share * pair.friction.bristle()->stiffness * f.bristle.squaredNorm();
@@ -362,19 +381,21 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     const Vec3 point = state.world_from_j.act(whole.point);
     const Vec3 normal = state.world_from_j.rotation() * whole.normal;
     Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
+    double depth = 0;  // corrected, where the shape counts
     // One without a place stands alone.
     const std::size_t first = i - begin, last = whole.group < 0 ? first + 1 : contacts.size();
     for (std::size_t k = first; k < last; ++k) {
       if (k != first && contacts[k].group != whole.group) continue;
       const ActiveContact& other = active_[begin + k];
       push += other.contact.weight * other.force.normal * other.kinematics.normal;
+      if (other.shape >= 0) depth += other.contact.weight * other.kinematics.depth;
       friction += other.contact.weight * other.force.friction;
     }
     const Vec3 relative = relative_velocity(pair, point);
     ContactRow& row = rows.emplace_back();
     write(row.point, point);
     write(row.normal, normal);
-    row.depth = whole.depth;
+    row.depth = active.shape < 0 ? whole.depth : depth;
     row.normal_force = push.dot(normal);
     write(row.friction_force, friction);
     write(row.slip_velocity, relative - relative.dot(normal) * normal);

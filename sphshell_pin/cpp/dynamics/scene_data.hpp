@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "contact/curvature.hpp"
 #include "contact/tracker.hpp"
 #include "dynamics/bristles.hpp"
 #include "dynamics/clusters.hpp"
@@ -22,11 +23,15 @@ struct PairState {
   int clamped = 0;          // of contacts that the law's clamp holds at no force
   double depth = 0;         // largest [m]
   double normal_force = 0;  // sum [N]
+  // Of the shapes of gaps that were asked for: the largest conformity, and half axis over radius.
+  double conformity = -1, half_axis = 0;
   bool pushed_through = false;
   SE3 world_from_j = SE3::Identity();
   Vec3 center = Vec3::Zero();  // of the sphere, in the shell's frame [m]
 
-  void clear_sums() { count = pieces = clamped = 0, depth = normal_force = 0; }
+  void clear_sums() {
+    count = pieces = clamped = 0, depth = normal_force = 0, conformity = -1, half_axis = 0;
+  }
 };
 
 struct ActiveContact {
@@ -38,6 +43,8 @@ struct ActiveContact {
   int row = -1;                     // of the foundation of its pair
   Vec3 moment = Vec3::Zero();       // of that row's pressure, beyond that of its force at the point
   double damping = 0, sliding = 0;  // power that it loses [W]
+  int shape = -1;             // its number in those of the pair
+  Vec3 climb = Vec3::Zero();  // at the sphere's center, as its stiffness changes with the place [N]
 };
 
 // On body i, in the world; body j takes the opposite.
@@ -87,6 +94,14 @@ class SceneData {
   void relax_in(double time) { relaxation_ = time; }
   double relaxation(const Pair& pair) const { return std::max(relaxation_, pair.relaxation); }
   double least_relaxation() const { return relaxation_; }
+  // The shape of the gap, in the shell's frame, or null.
+  const ContactShape* shape(const ActiveContact& active) const {
+    return active.shape < 0 ? nullptr : &shapes_[active.pair][active.shape];
+  }
+  // See Pair::disc_radius.
+  double disc_radius(const ActiveContact& active) const {
+    return active.shape < 0 ? pairs_[active.pair].disc_radius() : shape(active)->disc_radius();
+  }
   // Contacts have dn_dc, where it is known, from the next evaluate() on.
   void want_dn_dc();
 
@@ -120,6 +135,7 @@ class SceneData {
 
  private:
   std::vector<Contact>& find_contacts(std::size_t k, bool far);
+  void find_shapes(std::size_t k);
   void evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z);
   void add_contact(std::size_t k, const Contact& contact, int slot, int contact_id);
   void compute_forces(const VectorX& z);
@@ -138,6 +154,10 @@ class SceneData {
   std::vector<Query> queries_;
   std::vector<FoundationPair> foundations_;  // beside the pairs, if any has one
   std::vector<Contact> merged_;
+  std::vector<Curvature> curvatures_;   // of the shells whose shape counts
+  std::vector<const Shell*> shell_of_;  // beside them
+  std::vector<std::vector<ContactShape>> shapes_;
+  std::vector<ContactShape> merged_shapes_;
   std::vector<ContactTracker> trackers_;
   std::vector<PairState> states_;
   std::vector<Excursion> excursions_;
@@ -150,7 +170,7 @@ class SceneData {
   double relaxation_ = 0;
   bool touching_ = false;
   bool needs_velocity_ = false;
-  bool wants_second_ = false;  // derivatives of forces
+  bool wants_second_ = false;  // derivatives of shapes and of foundations
 };
 
 }  // namespace sphshell

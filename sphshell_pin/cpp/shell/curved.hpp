@@ -19,22 +19,26 @@ struct CubicCurve {
 };
 
 // A cubic of two, in powers of u = b1 and v = b2, the barycentric coordinates of corners 1 and 2.
-struct CubicPatch {
-  Vec3 c00, c10, c01, c20, c11, c02, c30, c21, c12, c03;
+template <class Value>
+struct Cubic2 {
+  Value c00, c10, c01, c20, c11, c02, c30, c21, c12, c03;
 
-  Vec3 point(double u, double v) const {
+  Value point(double u, double v) const {
     return c00 + u * (c10 + u * (c20 + u * c30)) + v * (c01 + v * (c02 + v * c03)) +
            u * v * (c11 + u * c21 + v * c12);
   }
-  Vec3 along_u(double u, double v) const {
+  Value along_u(double u, double v) const {
     return c10 + u * (2 * c20 + 3 * u * c30) + v * (c11 + 2 * u * c21 + v * c12);
   }
-  Vec3 along_v(double u, double v) const {
+  Value along_v(double u, double v) const {
     return c01 + v * (2 * c02 + 3 * v * c03) + u * (c11 + u * c21 + 2 * v * c12);
   }
-  Vec3 along_uu(double u, double v) const { return 2 * c20 + 6 * u * c30 + 2 * v * c21; }
-  Vec3 along_uv(double u, double v) const { return c11 + 2 * u * c21 + 2 * v * c12; }
-  Vec3 along_vv(double u, double v) const { return 2 * c02 + 6 * v * c03 + 2 * u * c12; }
+  Value along_uu(double u, double v) const { return 2 * c20 + 6 * u * c30 + 2 * v * c21; }
+  Value along_uv(double u, double v) const { return c11 + 2 * u * c21 + 2 * v * c12; }
+  Value along_vv(double u, double v) const { return 2 * c02 + 6 * v * c03 + 2 * u * c12; }
+};
+
+struct CubicPatch : Cubic2<Vec3> {
   // The polar form (blossom) at three points (u, v): of a part of the patch, a control point.
   Vec3 polar(const Eigen::Vector2d& p, const Eigen::Vector2d& q, const Eigen::Vector2d& r) const;
   // A direction that leaves side k at its parameter t into the patch, tangent to it.

@@ -1,0 +1,439 @@
+#include "contact/curvature.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "contact/closest_on_cell.hpp"
+#include "contact/query.hpp"
+
+namespace sphshell {
+namespace {
+
+// Normals that differ less are one [1 - cos]: those of a smooth vertex agree to round-off.
+constexpr double kSameNormal = 1e-10;
+// Of the radius: a step of the center for second derivatives, and a distance without direction.
+constexpr double kStep = 1e-5, kNoDistance = 1e-6;
+
+Vec3 normal_of(const CubicPatch& patch, double u, double v) {
+  return patch.along_u(u, v).cross(patch.along_v(u, v)).normalized();
+}
+
+std::pair<double, double> corner_parameters(int k) {
+  return {k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
+}
+
+bool is_same(const Vec3& a, const Vec3& b) { return a.dot(b) > 1 - kSameNormal; }
+
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+// The facet and corner of a vertex at a half-edge that begins or ends there, given in facets.
+int corner_of(const Shell& shell, int half_edge, int vertex) {
+  const int facet = triangle_of(half_edge);
+  const Triangle& triangle = shell.triangles()[shell.triangle_of_facet(facet)];
+  for (int k = 0; k < 3; ++k)
+    if (triangle[k] == vertex) return 3 * facet + k;
+  return -1;
+}
+
+const Edge& edge_at(const Shell& shell, int facet, int side) {
+  const Topology& topology = shell.topology();
+  return topology.edges[topology.edge_of[3 * shell.triangle_of_facet(facet) + side]];
+}
+
+// The point of an element nearest to one that is on it but for round-off.
+std::pair<double, double> parameters_of(const CubicPatch& patch, const Facet& facet,
+                                        const Vec3& point) {
+  auto [u, v] = closest_on_facet(facet, point);
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 from = point - patch.point(u, v);
+    const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v);
+    const double a = xu.dot(xu), b = xu.dot(xv), c = xv.dot(xv), det = a * c - b * b;
+    const double gu = xu.dot(from), gv = xv.dot(from);
+    const double du = (c * gu - b * gv) / det, dv = (a * gv - b * gu) / det;
+    u += du, v += dv;
+    if (std::abs(du) + std::abs(dv) < 1e-13) break;
+  }
+  return {u, v};
+}
+
+}  // namespace
+
+Mat3 Curvature::matrix(const Tensor& t) {
+  Mat3 out;
+  out << t[0], t[3], t[4], t[3], t[1], t[5], t[4], t[5], t[2];
+  return out;
+}
+
+Eigen::Vector3d Curvature::Rise::at(double u, double v) const {
+  const double b[3] = {1 - u - v, u, v};
+  static constexpr double kBy[3][2] = {{-1, -1}, {1, 0}, {0, 1}};
+  Eigen::Vector3d out(27 * middle * b[0] * b[1] * b[2], 0, 0);
+  for (int d = 0; d < 2; ++d)
+    out[1 + d] =
+        27 * middle * (kBy[0][d] * b[1] * b[2] + b[0] * kBy[1][d] * b[2] + b[0] * b[1] * kBy[2][d]);
+  for (int k = 0; k < 3; ++k) {
+    const int n = next_corner(k);
+    const double both = b[k] * b[n], mean = 0.5 * (side[k][0] + side[k][1]);
+    const double skew = 1.5 * (side[k][1] - side[k][0]), factor = 81.0 / 4;
+    const double along = mean + skew * (b[n] - b[k]);
+    out[0] += factor * both * both * along;
+    for (int d = 0; d < 2; ++d)
+      out[1 + d] += factor * both *
+                    (2 * along * (kBy[k][d] * b[n] + b[k] * kBy[n][d]) +
+                     both * skew * (kBy[n][d] - kBy[k][d]));
+  }
+  return out;
+}
+
+Curvature::Local Curvature::Field::at(double u, double v) const {
+  Local out;
+  out << tensor.point(u, v), rise.at(u, v)[0];
+  return out;
+}
+
+Curvature::Tensor Curvature::tensor(const Mat3& m) {
+  Tensor out;
+  out << m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2);
+  return out;
+}
+
+ContactShape Curvature::shape(const Shell& shell, const Contact& contact, const Vec3& center,
+                              double radius, bool want_second) {
+  const CurvedFacet& curved = shell.curved()->facets()[contact.facet];
+  // Of a flat element nothing depends on the place.
+  if (contact.feature == Feature::Face && curved.flat) {
+    ContactShape out = shape_of_gap(Mat3::Identity() / radius, contact.normal, radius);
+    out.depth = contact.depth;
+    return out;
+  }
+  const Facet& facet = shell.facets()[contact.facet];
+  Place place{contact.facet, contact.feature, contact.index, 0, 0, curved.patch(facet)};
+  std::tie(place.u, place.v) = parameters_of(place.patch, facet, contact.point);
+  Motion motion;
+  ContactShape out = shape_at(shell, place, contact.depth, center, contact.normal, radius, motion);
+  if (!want_second || motion.normal.isZero(0)) return out;
+  const double step = kStep * radius;
+  for (int i = 0; i < 3; ++i) {
+    out.second.col(i).setZero(), out.tilt_by.col(i).setZero();
+    for (int sign : {1, -1}) {
+      const Vec3 moved = sign * step * Vec3::Unit(i);
+      Place there = place;
+      there.u += motion.parameters.row(0).dot(moved);
+      there.v += motion.parameters.row(1).dot(moved);
+      Vec3 normal = (center + moved - place.patch.point(there.u, there.v)).normalized();
+      if (normal.dot(contact.normal) < 0) normal = -normal;
+      Motion unused;
+      const ContactShape other = shape_at(shell, there, contact.depth - contact.normal.dot(moved),
+                                          center + moved, normal, radius, unused);
+      out.second.col(i) += sign / (2 * step) * other.gradient;
+      out.tilt_by.col(i) += sign / (2 * step) * other.tilt;
+    }
+  }
+  out.second = (0.5 * (out.second + out.second.transpose())).eval();
+  return out;
+}
+
+ContactShape Curvature::shape_at(const Shell& shell, const Place& place, double depth,
+                                 const Vec3& center, const Vec3& normal, double radius,
+                                 Motion& motion) {
+  const CubicPatch& patch = place.patch;
+  const double u = place.u, v = place.v;
+  const Vec3 from = center - patch.point(u, v);
+  const double distance = from.dot(normal);  // negative of a sphere that is pushed back out
+  motion.parameters.setZero(), motion.normal.setZero();
+  const bool moves = std::abs(distance) > kNoDistance * radius;
+  if (moves) {
+    Mat3 dx_dc = Mat3::Zero();
+    if (place.feature == Feature::Face) {
+      dx_dc = dx_dc_of(patch, u, v, center);
+    } else if (place.feature == Feature::Edge) {
+      const Facet& facet = shell.facets()[place.facet];
+      const double t = place.index == 0 ? u : place.index == 1 ? v : 1 - v;
+      dx_dc = dx_dc_of(shell.curved()->facets()[place.facet].side(facet, place.index), t, center);
+    }
+    Eigen::Matrix<double, 3, 2> along;
+    along << patch.along_u(u, v), patch.along_v(u, v);
+    motion.parameters = (along.transpose() * along).inverse() * along.transpose() * dx_dc;
+    motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;
+  }
+  Local local;
+  Eigen::Matrix<double, 7, 3> local_by;
+  if (place.feature == Feature::Face) {
+    const Field& f = field(shell, place.facet);
+    const double sign = normal_of(patch, u, v).dot(normal) < 0 ? -1 : 1;
+    const Eigen::Vector3d rise = f.rise.at(u, v);
+    Eigen::Matrix<double, 7, 2> by;
+    by << f.tensor.along_u(u, v), f.tensor.along_v(u, v), rise[1], rise[2];
+    local << f.tensor.point(u, v), rise[0];
+    local *= sign;
+    local_by = sign * by * motion.parameters;
+  } else {
+    local = between_walls(shell, place, normal);
+    local_by.setZero();
+    const double step = kStep * radius;
+    for (int i = 0; i < 3 && moves; ++i)
+      for (int sign : {1, -1}) {
+        Place there = place;
+        there.u += sign * step * motion.parameters(0, i);
+        there.v += sign * step * motion.parameters(1, i);
+        const Vec3 turned = (normal + sign * step * motion.normal.col(i)).normalized();
+        local_by.col(i) += sign / (2 * step) * between_walls(shell, there, turned);
+      }
+  }
+  const Mat3 curvature = matrix(local.head<6>());
+  Mat3 slope;
+  ContactShape out = shape_of_gap(curvature + Mat3::Identity() / radius, normal, radius, &slope);
+  // The slope lies in the tangent plane, which turns with the normal.
+  const Vec3 turn = 2 * slope * (curvature * normal);
+  for (int i = 0; i < 3; ++i)
+    out.gradient[i] = (slope.array() * matrix(local_by.col(i).head<6>()).array()).sum() -
+                      turn.dot(motion.normal.col(i));
+  // The rise comes on with the depth, so that a touch begins where it is found.
+  const double rise = local[6];
+  const double share = rise == 0 ? 0 : std::exp(-depth / std::abs(rise));
+  out.depth = depth + rise * (1 - share);
+  out.tilt =
+      (rise < 0 ? -share : share) * normal -
+      (1 - share * (1 + (rise == 0 ? 0 : depth / std::abs(rise)))) * local_by.row(6).transpose();
+  return out;
+}
+
+// Shepard's interpolation between the arcs from wall to wall, each weighted by the inverse square
+// of what the way over the normal is longer than the arc; along an arc by the angle.
+Curvature::Local Curvature::between_walls(const Shell& shell, const Place& place,
+                                          const Vec3& normal) {
+  walls_.clear();
+  if (place.feature == Feature::Edge)
+    find_walls_of_side(shell, place.facet, place.index,
+                       place.index == 0   ? place.u
+                       : place.index == 1 ? place.v
+                                          : 1 - place.v);
+  else
+    find_walls_of_vertex(shell, place.facet, place.index);
+  Vec3 outward = Vec3::Zero();
+  for (const auto& [a, b] : walls_) outward += a.normal + b.normal;
+  const double sign = outward.dot(normal) < 0 ? -1 : 1;
+  Local sum = Local::Zero();
+  double weights = 0;
+  for (const auto& [a, b] : walls_) {
+    const double from_a = angle_between(sign * normal, a.normal);
+    const double from_b = angle_between(sign * normal, b.normal);
+    const double apart = from_a + from_b;
+    const double detour = std::max(apart - angle_between(a.normal, b.normal), 1e-12);
+    const double share = apart > 0 ? from_a / apart : 0.5;
+    const double weight = 1 / (detour * detour);
+    sum += weight * ((1 - share) * a.local + share * b.local);
+    weights += weight;
+  }
+  return sign / weights * sum;
+}
+
+Curvature::Wall Curvature::wall(const Shell& shell, int facet, double u, double v) {
+  const CurvedFacet& curved = shell.curved()->facets()[facet];
+  const CubicPatch patch = curved.patch(shell.facets()[facet]);
+  return {curved.flat ? Local(Local::Zero()) : field(shell, facet).at(u, v),
+          normal_of(patch, u, v)};
+}
+
+void Curvature::find_walls_of_side(const Shell& shell, int facet, int side, double t) {
+  const Topology& topology = shell.topology();
+  const Edge& edge = edge_at(shell, facet, side);
+  const int first = shell.triangles()[shell.triangle_of_facet(facet)][side];
+  std::vector<Wall>::size_type count = 0;
+  Wall last;
+  for (int i = 0; i < edge.count; ++i) {
+    const int h = shell.facet_half_edge(topology.incidence[edge.begin + i]);
+    const int other = triangle_of(h), k = side_of(h);
+    const bool along = shell.triangles()[shell.triangle_of_facet(other)][k] == first;
+    const auto [u, v] = on_side(k, along ? t : 1 - t);
+    const Wall here = wall(shell, other, u, v);
+    if (count > 0 || edge.count == 1) walls_.emplace_back(count > 0 ? last : here, here);
+    last = here;
+    ++count;
+  }
+}
+
+void Curvature::find_walls_of_vertex(const Shell& shell, int facet, int corner) {
+  const Topology& topology = shell.topology();
+  const int vertex = shell.triangles()[shell.triangle_of_facet(facet)][corner];
+  const auto wall_at = [&](int c) {
+    const auto [u, v] = corner_parameters(c % 3);
+    return wall(shell, c / 3, u, v);
+  };
+  corners_.assign(1, 3 * facet + corner);
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    const int c = corners_[i];
+    for (int side : {c % 3, previous_corner(c % 3)}) {
+      const Edge& edge = edge_at(shell, c / 3, side);
+      for (int n = 0; n < edge.count; ++n) {
+        const int other =
+            corner_of(shell, shell.facet_half_edge(topology.incidence[edge.begin + n]), vertex);
+        if (std::find(corners_.begin(), corners_.end(), other) != corners_.end()) continue;
+        corners_.push_back(other);
+      }
+    }
+  }
+  // The creases that leave the vertex, each once; without one, the only wall.
+  for (int c : std::vector<int>(corners_)) {
+    const Wall here = wall_at(c);
+    for (int side : {c % 3, previous_corner(c % 3)}) {
+      const Edge& edge = edge_at(shell, c / 3, side);
+      for (int n = 0; n < edge.count; ++n) {
+        const int other =
+            corner_of(shell, shell.facet_half_edge(topology.incidence[edge.begin + n]), vertex);
+        if (other <= c) continue;
+        const Wall there = wall_at(other);
+        if (!is_same(here.normal, there.normal)) walls_.emplace_back(here, there);
+      }
+    }
+  }
+  if (walls_.empty()) walls_.emplace_back(wall_at(corners_[0]), wall_at(corners_[0]));
+}
+
+const Curvature::Field& Curvature::field(const Shell& shell, int facet) {
+  const auto found = field_of_.find(facet);
+  if (found != field_of_.end()) return fields_[found->second];
+  const Facet& flat = shell.facets()[facet];
+  const LargeArray<CurvedFacet>& cells = shell.curved()->facets();
+  const CubicPatch patch = cells[facet].patch(flat);
+  const Topology& topology = shell.topology();
+  Tensor corner[3], first[3], last[3];  // Bezier ordinates, at a third and two thirds of each side
+  for (int k = 0; k < 3; ++k) {
+    const Fan& here = fan(shell, facet, k);
+    corner[k] = here.beside_flat ? Tensor::Zero() : tensor(here.fit.tensor());
+  }
+  for (int k = 0; k < 3; ++k) {
+    const CubicCurve side = cells[facet].side(flat, k);
+    // Copies: the second one may move the first.
+    const VertexCurvature from = fan(shell, facet, k).fit;
+    const VertexCurvature to = fan(shell, facet, next_corner(k)).fit;
+    first[k] = tensor(from.tensor() + from.change(side.tangent(0)) / 3);
+    last[k] = tensor(to.tensor() - to.change(side.tangent(1)) / 3);
+    const Edge& edge = edge_at(shell, facet, k);
+    if (edge.count != 2) continue;
+    const int h = 3 * shell.triangle_of_facet(facet) + k;
+    const int other = triangle_of(shell.facet_half_edge(topology.other_half_edge(edge, h)));
+    const auto normal_at = [&](int c) {
+      const auto [u, v] = corner_parameters(c);
+      return normal_of(patch, u, v);
+    };
+    if (cells[other].flat && is_same(normal_at(k), shell.facets()[other].normal) &&
+        is_same(normal_at(next_corner(k)), shell.facets()[other].normal))
+      first[k] = last[k] = Tensor::Zero();
+  }
+  Tensor sides = Tensor::Zero();
+  for (int k = 0; k < 3; ++k) sides += first[k] + last[k];
+  const Tensor middle = sides / 4 - (corner[0] + corner[1] + corner[2]) / 6;
+  Field made;
+  Cubic2<Tensor>& out = made.tensor;
+  const Tensor &b0 = corner[0], &u1 = first[0], &u2 = last[0], &v1 = last[2], &v2 = first[2];
+  out.c00 = b0;
+  out.c10 = 3 * (u1 - b0);
+  out.c01 = 3 * (v1 - b0);
+  out.c20 = 3 * (b0 - 2 * u1 + u2);
+  out.c02 = 3 * (b0 - 2 * v1 + v2);
+  out.c11 = 6 * (b0 - u1 - v1 + middle);
+  out.c30 = corner[1] - b0 + 3 * (u1 - u2);
+  out.c03 = corner[2] - b0 + 3 * (v1 - v2);
+  out.c21 = 3 * (2 * u1 - b0 - u2 + v1 - 2 * middle + first[1]);
+  out.c12 = 3 * (2 * v1 - b0 - v2 + u1 - 2 * middle + last[1]);
+  made.rise = rise_of(shell, facet);
+  field_of_.emplace(facet, static_cast<int>(fields_.size()));
+  fields_.push_back(made);
+  return fields_.back();
+}
+
+Curvature::Rise Curvature::rise_of(const Shell& shell, int facet) {
+  const CubicPatch patch = shell.curved()->facets()[facet].patch(shell.facets()[facet]);
+  // The mean of what the fits at the corners say, each weighted by the square of its coordinate.
+  const auto beyond = [&](double u, double v) {
+    const double b[3] = {1 - u - v, u, v};
+    const Vec3 point = patch.point(u, v), normal = normal_of(patch, u, v);
+    double sum = 0, weights = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (b[k] < 1e-9) continue;
+      const Fan& at = fan(shell, facet, k);
+      sum += at.beside_flat ? 0 : b[k] * b[k] * at.fit.beyond(point, normal);
+      weights += b[k] * b[k];
+    }
+    return sum / weights;
+  };
+  Rise out;
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < 2; ++i) {
+      const auto [u, v] = on_side(k, (1 + i) / 3.0);
+      out.side[k][i] = beyond(u, v);
+    }
+  out.middle = beyond(1.0 / 3, 1.0 / 3) - out.at(1.0 / 3, 1.0 / 3)[0];
+  return out;
+}
+
+const Curvature::Fan& Curvature::fan(const Shell& shell, int facet, int corner) {
+  const auto found = fan_of_.find(3 * facet + corner);
+  if (found != fan_of_.end()) return fans_[found->second];
+  const Topology& topology = shell.topology();
+  const LargeArray<CurvedFacet>& cells = shell.curved()->facets();
+  const int vertex = shell.triangles()[shell.triangle_of_facet(facet)][corner];
+  const auto normal_at = [&](int c) {
+    const auto [u, v] = corner_parameters(c % 3);
+    return normal_of(cells[c / 3].patch(shell.facets()[c / 3]), u, v);
+  };
+  Fan out{{}, false};
+  const Vec3 normal = normal_at(3 * facet + corner);
+  corners_.assign(1, 3 * facet + corner);
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    const int c = corners_[i];
+    for (int side : {c % 3, previous_corner(c % 3)}) {
+      const Edge& edge = edge_at(shell, c / 3, side);
+      if (edge.count != 2) continue;
+      const int h = 3 * shell.triangle_of_facet(c / 3) + side;
+      const int other =
+          corner_of(shell, shell.facet_half_edge(topology.other_half_edge(edge, h)), vertex);
+      if (std::find(corners_.begin(), corners_.end(), other) != corners_.end()) continue;
+      if (!is_same(normal, normal_at(other))) continue;
+      if (cells[other / 3].flat)
+        out.beside_flat = true;
+      else
+        corners_.push_back(other);
+    }
+  }
+  std::sort(corners_.begin(), corners_.end());
+  around_.clear();
+  for (int c : corners_)
+    for (int k : {next_corner(c % 3), previous_corner(c % 3)})
+      around_.push_back({shell.facets()[c / 3].corner[k], normal_at(c / 3 * 3 + k)});
+  out.fit = fit_curvature(shell.vertices()[vertex], normal_at(corners_[0]), around_);
+  for (int c : corners_) fan_of_.emplace(c, static_cast<int>(fans_.size()));
+  fans_.push_back(out);
+  return fans_.back();
+}
+
+void merge_shapes(const std::vector<Contact>& contacts, const std::vector<ContactShape>& shapes,
+                  std::vector<ContactShape>& shown) {
+  shown.clear();
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (!leads(contacts, i)) continue;
+    shown.push_back(shapes[i]);
+    if (contacts[i].group < 0) continue;
+    ContactShape& whole = shown.back();
+    whole.scale = whole.depth = 0;
+    whole.gradient.setZero(), whole.second.setZero(), whole.tilt_by.setZero();
+    Vec3 falls = Vec3::Zero(), normal = Vec3::Zero();
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      if (contacts[k].group != contacts[i].group) continue;
+      whole.scale += contacts[k].weight * shapes[k].scale;
+      whole.gradient += contacts[k].weight * shapes[k].gradient;
+      whole.second += contacts[k].weight * shapes[k].second;
+      whole.tilt_by += contacts[k].weight * shapes[k].tilt_by;
+      whole.depth += contacts[k].weight * shapes[k].depth;
+      normal += contacts[k].weight * contacts[k].normal;
+      falls += contacts[k].weight * (contacts[k].normal + shapes[k].tilt);
+    }
+    whole.tilt = falls - normal.normalized();
+  }
+}
+
+}  // namespace sphshell

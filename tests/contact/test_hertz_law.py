@@ -1,0 +1,292 @@
+"""HertzLaw: the stiffness follows from the curvature of a tessellated shell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from tests.oracle.hertz import hertz_contact
+
+YOUNG, POISSON = 1e7, 0.3
+LAW = sp.HertzLaw(YOUNG, POISSON)
+MODULUS = YOUNG / (2 * (1 - POISSON**2))
+
+
+class Surface:
+    """Points, outward normals and principal curvatures over parameters u, v; its tessellation."""
+
+    def __init__(self, point, normal, curvatures, spans, counts, turn=False):
+        self.point, self.normal, self.curvatures = point, normal, curvatures
+        self.spans = spans
+        grid = [np.linspace(*span, n + 1) for span, n in zip(spans, counts, strict=True)]
+        u, v = (one.ravel() for one in np.meshgrid(*grid, indexing="ij"))
+        self.vertices, self.normals = point(u, v), normal(u, v)
+        rows = counts[1] + 1
+        corner = (np.arange(counts[0])[:, None] * rows + np.arange(counts[1])).ravel()
+        a, b, c, d = corner, corner + rows, corner + rows + 1, corner + 1
+        triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+        self.triangles = triangles[:, ::-1] if turn else triangles
+
+    def shell(self, *, exact=True):
+        normals = self.normals if exact else None
+        return sp.Shell(self.vertices, self.triangles, normals=normals)
+
+    @property
+    def longest_side(self):
+        corners = self.vertices[self.triangles]
+        return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
+
+    def inside(self, rng, share=0.8):
+        return [rng.uniform(*(share * np.subtract(s, np.mean(s)) + np.mean(s))) for s in self.spans]
+
+
+def torus(outer, tube, counts):
+    def point(u, v):
+        away = outer + tube * np.cos(v)
+        return np.stack([away * np.cos(u), away * np.sin(u), tube * np.sin(v)], -1)
+
+    def normal(u, v):
+        return np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], -1)
+
+    def curvatures(u, v):
+        return 1 / tube, np.cos(v) / (outer + tube * np.cos(v))
+
+    return Surface(point, normal, curvatures, ((0, 1.5), (1.8, 4.4)), counts)
+
+
+def ellipsoid(axes, counts):
+    def point(u, v):
+        return np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], -1) * axes
+
+    def normal(u, v):
+        slope = point(u, v) / np.square(axes)
+        return slope / np.linalg.norm(slope, axis=-1, keepdims=True)
+
+    def curvatures(u, v):
+        n = normal(u, v)
+        slope = np.linalg.norm(point(u, v) / np.square(axes))
+        tangent = np.linalg.svd(n[None])[2][1:]
+        return np.linalg.eigvalsh(tangent @ np.diag(1 / np.square(axes)) @ tangent.T / slope)
+
+    return Surface(point, normal, curvatures, ((0, 1.6), (-0.7, 0.7)), counts)
+
+
+def cylinder(radius, sign, counts):
+    def point(u, v):
+        return np.stack([radius * np.cos(u), radius * np.sin(u), v], -1)
+
+    def normal(u, v):
+        return sign * np.stack([np.cos(u), np.sin(u), 0 * v], -1)
+
+    curvatures = lambda u, v: (sign / radius, 0.0)  # noqa: E731
+    return Surface(point, normal, curvatures, ((0, 1.5), (-1.2, 1.2)), counts, turn=sign < 0)
+
+
+# Longest sides of 0.3 of the smallest radius of curvature, 1.
+SURFACES = {
+    "sphere": ellipsoid(np.ones(3), (8, 7)),
+    "cylinder": cylinder(1.0, 1.0, (8, 11)),
+    "inside a cylinder": cylinder(1.0, -1.0, (8, 11)),
+    "saddle of a torus": torus(3.0, 1.0, (15, 14)),
+    "ellipsoid": ellipsoid(np.array([1.5, 1.25, 1.25]), (10, 9)),
+}
+
+
+def ball_scene(shell, radius, law, gravity=(0, 0, 0), **more):
+    model = pin.Model()
+    model.gravity = pin.Motion(np.array([*gravity, 0, 0, 0]))
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, radius), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    scene.add_contact(sp.Sphere(radius, "ball"), shell, law=law, method="smooth", **more)
+    return scene
+
+
+def force_on(scene, center, quaternion=(0, 0, 0, 1)):
+    q = np.array([*center, *quaternion])
+    return scene.external_forces(q, np.zeros(6))[1]
+
+
+@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_force_of_a_coarse_tessellation_is_that_of_elliptical_hertz(name, share) -> None:
+    surface = SURFACES[name]
+    assert 0.25 < surface.longest_side < 0.345  # diagonals included
+    shell, rng = surface.shell(), np.random.default_rng(1)
+    scene = ball_scene(shell, share, LAW)
+    for _ in range(40):
+        u, v = surface.inside(rng)
+        x, n = surface.point(u, v), surface.normal(u, v)
+        low, high = surface.curvatures(u, v)
+        for depth in (0.01 * share, 0.03 * share):
+            expected, *_ = hertz_contact(
+                0.5 * (1 / share + low), 0.5 * (1 / share + high), MODULUS, depth
+            )
+            force = force_on(scene, x + (share - depth) * n)
+            assert np.isclose(force.linear @ n, expected, rtol=1e-3)
+            assert np.linalg.norm(force.linear - force.linear @ n * n) < 2e-3 * expected
+            assert np.abs(force.angular).max() < 1e-12 * expected  # through the ball's center
+
+
+def test_flat_is_the_plane() -> None:
+    vertices = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    shell = sp.Shell(vertices, [[0, 1, 2], [0, 2, 3]])
+    for radius, depth in ((0.1, 1e-3), (0.5, 1e-2)):
+        force = force_on(ball_scene(shell, radius, LAW), [0.2, 0.1, radius - depth])
+        expected = 4 / 3 * MODULUS * np.sqrt(radius) * depth**1.5
+        assert np.isclose(force.linear[2], expected, rtol=1e-12)
+        assert np.isclose(LAW.on_plane(radius).normal_force(depth), expected, rtol=1e-12)
+
+
+def test_two_balls_are_hertz_on_both_radii() -> None:
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball")
+    model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    scene.add_contact(sp.Sphere(0.1, "ball"), sp.Sphere(0.3, "universe"), law=LAW)
+    force = scene.external_forces(np.array([0, 0, 0.399]), np.zeros(3))[1].linear
+    expected = sp.ImpactLaw.hertz(0.1, YOUNG, POISSON, YOUNG, POISSON, radius_2=0.3)
+    assert np.isclose(force[2], expected.normal_force(1e-3), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid"])
+def test_without_normals_the_surface_is_met_to_a_percent(name) -> None:
+    surface = SURFACES[name]
+    shell, rng = surface.shell(exact=False), np.random.default_rng(1)
+    scene = ball_scene(shell, 0.5, LAW)
+    errors = []
+    for _ in range(40):
+        u, v = surface.inside(rng, 0.4)
+        x, n = surface.point(u, v), surface.normal(u, v)
+        low, high = surface.curvatures(u, v)
+        expected, *_ = hertz_contact(0.5 * (2 + low), 0.5 * (2 + high), MODULUS, 0.01)
+        errors.append(force_on(scene, x + 0.49 * n).linear @ n / expected - 1)
+    assert np.abs(errors).max() < 0.01
+
+
+@pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid", "inside a cylinder"])
+@pytest.mark.parametrize("friction", [None, sp.BristleFriction(0.5, 0.4, 1e4, 1.0)])
+def test_derivatives_are_those_of_the_forces(name, friction) -> None:
+    surface = SURFACES[name]
+    law = sp.HertzLaw(YOUNG, POISSON, restitution=0.8, speed=1.0)
+    scene = ball_scene(surface.shell(), 0.3, law, friction=friction)
+    u, v = (0.3 * a + 0.7 * b for a, b in surface.spans)
+    x, n = surface.point(u, v), surface.normal(u, v)
+    q = np.array([*(x + 0.297 * n), 0, 0, 0, 1])
+    motion = np.array([0.1, -0.2, 0.3, 0.4, 0.2, -0.1])
+    found, _ = scene.contact_derivatives(q, motion)
+    step, expected = 1e-6, np.zeros((6, 6))
+    for i in range(6):
+        change = step * np.eye(6)[i]
+        for sign in (1, -1):
+            moved = pin.integrate(scene.model, q, sign * change)
+            expected[:, i] += sign / (2 * step) * scene.external_forces(moved, motion)[1].vector
+    assert np.allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid"])
+def test_energy_closes_where_the_curvature_changes_along_the_path(name) -> None:
+    surface = SURFACES[name]
+    u, v = (0.5 * (a + b) for a, b in surface.spans)
+    x, n = surface.point(u, v), surface.normal(u, v)
+    along = np.cross(n, [0.3, 0.2, 1.0])
+    scene = ball_scene(surface.shell(), 0.3, LAW, gravity=-50 * n)
+    start = np.array([*(x + 0.297 * n), 0, 0, 0, 1])
+    speed = np.array([*(1.5 * along / np.linalg.norm(along)), 0, 0, 0])
+    result = sp.Simulation(scene, sp.Adaptive(rtol=1e-10, atol=1e-12)).run(start, speed, 0.1)
+    energy = result.energy
+    total = energy.kinetic + energy.potential + energy.elastic
+    assert len(result.contacts) > 100
+    assert np.ptp(total) < 1e-6 * np.ptp(energy.elastic)
+
+
+def test_force_is_continuous_over_the_edge_of_a_half_cylinder() -> None:
+    # A half cylinder on its flat side: from the bend over the edge on to the end face.
+    angle = np.linspace(0, np.pi, 13)
+    ring = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], -1)
+    vertices = np.concatenate([ring, ring + [0, 2, 0], [[0, 0, 0], [0, 2, 0]]])
+    sides = [[[k, k + 1, k + 14], [k, k + 14, k + 13]] for k in range(12)]
+    caps = [[[26, k + 1, k], [27, k + 13, k + 14]] for k in range(12)]
+    triangles = np.array([*np.concatenate(sides), *np.concatenate(caps)])[:, ::-1]
+    shell = sp.Shell(vertices, triangles)
+    scene = ball_scene(shell, 0.2, LAW)
+    edge = np.array([np.cos(1.3), 0, np.sin(1.3)])
+    turns = np.linspace(-0.3, np.pi / 2 + 0.3, 2001)
+    up = edge / np.linalg.norm(edge)
+    forces = []
+    for turn in turns:
+        away = np.clip(turn, 0, np.pi / 2)
+        direction = np.cos(away) * up - np.sin(away) * np.array([0, 1.0, 0])
+        foot = edge + np.array([0, max(-turn, 0), 0]) - max(turn - np.pi / 2, 0) * up
+        forces.append(force_on(scene, foot + 0.195 * direction).linear)
+    sizes = np.linalg.norm(forces, axis=1)
+    assert np.abs(np.diff(sizes)).max() < 2e-3 * sizes.max()
+    assert sizes[-1] > 1.01 * sizes[0]  # the flat end is stiffer than the bend
+    assert np.all(np.diff(sizes[300:-300]) >= -1e-9 * sizes.max())
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.9])
+def test_restitution_is_that_stated(restitution) -> None:
+    surface = SURFACES["ellipsoid"]
+    law = sp.HertzLaw(YOUNG, POISSON, restitution=restitution, speed=1.0)
+    u, v = (0.5 * (a + b) for a, b in surface.spans)
+    x, n = surface.point(u, v), surface.normal(u, v)
+    scene = ball_scene(surface.shell(), 0.3, law)
+    start = np.array([*(x + 0.3001 * n), 0, 0, 0, 1])
+    result = sp.Simulation(scene).run(start, np.array([*-n, 0, 0, 0]), 0.05)
+    assert np.isclose(result.v[-1][:3] @ n, restitution, rtol=2e-3)
+
+
+def test_a_loss_tangent_is_that_of_a_small_oscillation() -> None:
+    # About a depth the loss in a cycle over 2 pi times the energy at its peak.
+    tangent, frequency = 0.1, 200.0
+    law = sp.HertzLaw(YOUNG, POISSON, loss_tangent=tangent, frequency=frequency, radius=0.01)
+    depth, amplitude, omega = 1e-4, 1e-7, 2 * np.pi * frequency
+    phase = np.linspace(0, 2 * np.pi, 2000, endpoint=False)
+    rate = amplitude * omega * np.cos(phase)
+    force = [
+        law.normal_force(depth + amplitude * np.sin(a), -r)
+        for a, r in zip(phase, rate, strict=True)
+    ]
+    lost = np.mean(force * rate) * (2 * np.pi / omega)
+    stored = 0.5 * law.normal_stiffness(depth) * amplitude**2
+    assert np.isclose(lost / (2 * np.pi * stored), tangent, rtol=1e-5)
+
+
+def test_a_socket_of_nearly_the_ball_s_radius_is_beyond_hertz() -> None:
+    surface = SURFACES["inside a cylinder"]
+    u, v = 0.75, 0.0
+    x, n = surface.point(u, v), surface.normal(u, v)
+    for radius, kinds in ((0.97, {"beyond_hertz"}), (0.9, set())):
+        scene = ball_scene(surface.shell(), radius, sp.HertzLaw(1e9, POISSON))
+        start = np.array([*(x + (radius - 1e-4 * radius) * n), 0, 0, 0, 1])
+        result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).run(start, np.zeros(6), 1e-4)
+        assert {e.kind for e in result.events} - {"touch", "lift_off", "deep"} == kinds
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"young": -1.0}, r"young = -1.0 must be positive"),
+        ({"young_2": 1e9}, r"young_2, poisson_2 = .* must be given together"),
+        ({"restitution": 0.5}, r"restitution, speed = .* must be given together"),
+        (
+            {"restitution": 0.5, "speed": 1.0, "loss_tangent": 0.1, "frequency": 1.0},
+            "must not be given with a restitution",
+        ),
+    ],
+)
+def test_wrong_arguments_are_named(arguments, message) -> None:
+    with pytest.raises(sp.errors.InvalidParameter, match=message):
+        sp.HertzLaw(**{"young": 1e9, "poisson": 0.3, **arguments})
+
+
+def test_where_nothing_is_known_of_the_shell_it_is_refused() -> None:
+    with pytest.raises(sp.errors.InvalidParameter, match=r"law.on_plane\(radius\)"):
+        LAW.normal_force(1e-3)
+    still = pin.Motion.Zero()
+    with pytest.raises(sp.errors.InvalidParameter, match="at a lone contact point"):
+        sp.contact_wrench(np.zeros(3), [0, 0, 1.0], 1e-3, still, still, LAW)
