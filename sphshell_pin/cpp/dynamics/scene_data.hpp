@@ -43,7 +43,7 @@ struct ActiveContact {
   int row = -1;                     // of the foundation of its pair
   Vec3 moment = Vec3::Zero();       // of that row's pressure, beyond that of its force at the point
   double damping = 0, sliding = 0;  // power that it loses [W]
-  int shape = -1;             // its number in those of the pair
+  int shape = -1;                   // its number in those of the pair
   Vec3 climb = Vec3::Zero();  // at the sphere's center, as its stiffness changes with the place [N]
 };
 
