@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import HertzLaw as HertzLaw
     from sphshell_pin.contact import HuntCrossleyLaw as HuntCrossleyLaw
     from sphshell_pin.contact import ImpactLaw as ImpactLaw
+    from sphshell_pin.contact import MindlinFriction as MindlinFriction
     from sphshell_pin.contact import Sphere as Sphere
     from sphshell_pin.contact import TableLaw as TableLaw
     from sphshell_pin.contact import contact_wrench as contact_wrench
@@ -46,6 +47,11 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics import SemiImplicitEuler as SemiImplicitEuler
     from sphshell_pin.dynamics import Simulation as Simulation
     from sphshell_pin.errors import SphshellError as SphshellError
+    from sphshell_pin.patches import ShellTaxels as ShellTaxels
+    from sphshell_pin.patches import TaxelGrid as TaxelGrid
+    from sphshell_pin.patches import TaxelImages as TaxelImages
+    from sphshell_pin.patches import WearMap as WearMap
+    from sphshell_pin.patches import wear_maps as wear_maps
     from sphshell_pin.shell import Shell as Shell
 
 __version__ = "0.1.0"
@@ -72,19 +78,35 @@ _HOME = {
     "JointIngredients": "dynamics",
     "JointFriction": "dynamics",
     "LinearlyImplicitEuler": "dynamics",
+    "MindlinFriction": "contact",
     "Result": "dynamics",
     "RungeKutta4": "dynamics",
     "Scene": "dynamics",
     "SemiImplicitEuler": "dynamics",
     "Shell": "shell",
+    "ShellTaxels": "patches",
     "Simulation": "dynamics",
     "Sphere": "contact",
     "SphshellError": "errors",
     "TableLaw": "contact",
+    "TaxelGrid": "patches",
+    "TaxelImages": "patches",
+    "WearMap": "patches",
     "contact_wrench": "contact",
     "foundation_pressure": "contact",
+    "wear_maps": "patches",
 }
-_PARTS = ("contact", "dynamics", "errors", "robots", "scenario", "shell", "units", "view")
+_PARTS = (
+    "contact",
+    "dynamics",
+    "errors",
+    "patches",
+    "robots",
+    "scenario",
+    "shell",
+    "units",
+    "view",
+)
 
 __all__ = sorted(_HOME)  # noqa: PLE0605
 

@@ -103,6 +103,8 @@ class FrictionLaw:
     def kinds() -> list[str]: ...
     @property
     def has_state(self) -> bool: ...
+    @property
+    def torsional(self) -> bool: ...
     def coefficient(self, speed: float) -> float: ...
 
 def contact_force(
@@ -112,11 +114,13 @@ def contact_force(
     normal: _Doubles,
     relative: _Doubles,
     spin: float,
+    rolling: _Doubles,
     bristle: _Doubles,
     radius: float,
     relaxation: float,
-) -> tuple[float, _Doubles, float, _Doubles]: ...
+) -> tuple[float, _Doubles, _Doubles, _Doubles]: ...
 def contact_row_type() -> Any: ...
+def patch_row_type() -> Any: ...
 
 class Pair:
     relaxation: float
@@ -241,6 +245,7 @@ class RunSettings:
         start_time: float,
         control_dt: float,
         record_dt: float,
+        patches: bool,
     ) -> None: ...
 
 class OneUser:

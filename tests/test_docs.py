@@ -191,6 +191,6 @@ def test_no_page_is_an_orphan():
                 linked.add((page.parent / link.partition("#")[0]).resolve())
     start = ROOT / "docs" / "index.md"  # of the site
     assert {page for page in PAGES if ROOT / "docs" in page.parents} - {start} <= linked
-    pictures = set((ROOT / "docs" / "pictures").iterdir())
+    pictures = {path for path in (ROOT / "docs" / "pictures").rglob("*") if path.is_file()}
     assert pictures <= linked
     assert all(picture.stat().st_size < 400_000 for picture in pictures)

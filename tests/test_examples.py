@@ -33,6 +33,7 @@ def test_every_example_is_tested():
         "01_ball_on_a_surface",
         "02_own_loop",
         "03_parameter_study",
+        "04_taxels_on_a_crease",
     }
 
 
@@ -71,3 +72,11 @@ def test_a_parameter_study(run):
     np.testing.assert_allclose(peaks, np.sqrt(k * mass), rtol=0.03)
     durations = [one.contact_time for one in names["study"]]
     np.testing.assert_allclose(durations, np.pi * np.sqrt(mass / k), rtol=0.03)
+
+
+def test_taxels_on_a_crease(run):
+    names = run("04_taxels_on_a_crease", ["taxels.npz", "taxels.png"])
+    force = names["pressed"].max()
+    assert np.abs(names["felt"] - names["pressed"]).max() < 1e-12 * force
+    assert np.abs(names["images"].outside).max() < 1e-12 * force
+    assert len(names["two"]) > 10

@@ -110,6 +110,7 @@ LAYERS = (
     ("shell",),
     ("contact",),
     ("dynamics",),
+    ("patches",),
     ("sphshell_pin",),  # its public names are those of the folders above
     ("scenario",),
     ("plot", "view"),
@@ -117,7 +118,12 @@ LAYERS = (
     ("cli",),
 )
 LEVEL = {folder: k for k, folders in enumerate(LAYERS) for folder in folders}
-PICTURES = "sphshell_pin.dynamics.result"  # results offer their own
+# These offer pictures of themselves.
+PICTURES = (
+    "sphshell_pin.dynamics.result",
+    "sphshell_pin.patches.taxels",
+    "sphshell_pin.patches.wear",
+)
 
 
 def imports_of(file: Path, modules: set[str]) -> set[str]:
@@ -148,7 +154,8 @@ def graph() -> dict[str, set[str]]:
     }
     modules = {name.removesuffix(".__init__"): file for name, file in files.items()}
     edges = {name: imports_of(file, set(modules)) - {name} for name, file in modules.items()}
-    edges[PICTURES] = {name for name in edges[PICTURES] if level(name) <= level(PICTURES)}
+    for owner in PICTURES:
+        edges[owner] = {name for name in edges[owner] if level(name) <= level(owner)}
     return edges
 
 

@@ -106,6 +106,8 @@ VALUES = {
     "length": 0.02,
     "size": [0.1, 0.2, 0.3],
     "radii": [0.1, 0.2, 0.3],
+    "young": 1e9,
+    "poisson": 0.3,
     "young_1": 1e9,
     "poisson_1": 0.3,
     "young_2": 1e9,

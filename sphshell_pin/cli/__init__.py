@@ -1,7 +1,11 @@
 """The command line: parses, calls, prints. Each module holds a group of commands."""
 
 # Imported for their commands, in the order of the help.
-from sphshell_pin.cli import new, running, view, files, sweep, report, check_robot, listing  # noqa: F401, I001
+# isort: off
+from sphshell_pin.cli import new, running, view, taxels, files, sweep, report  # noqa: F401
+from sphshell_pin.cli import check_robot, listing  # noqa: F401
+
+# isort: on
 from sphshell_pin.cli.app import app, main
 
 __all__ = ["app", "main"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,6 +23,13 @@ def report(
     peers: Annotated[
         bool, typer.Option("--peers", help="The same scenes in other engines, too.")
     ] = False,
+    validation: Annotated[
+        bool,
+        typer.Option(
+            "--validation",
+            help="Against published experiments instead; --quick leaves out the slow cases.",
+        ),
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder of the page and its tables.")] = Path(
         "results/report"
     ),
@@ -34,21 +42,25 @@ def report(
 
     Example: sphshell-pin report --quick
     """
+    if validation and peers:
+        raise typer.BadParameter("--validation runs no other engines: leave out --peers")
     with faults(context):
         from rich.progress import TextColumn, TimeElapsedColumn
 
         from sphshell_pin.study.report import PAGE, make_report
+        from sphshell_pin.study.validation import make_validation
 
         # Without --out: the folder is no part of what was measured.
-        command = ["sphshell-pin report", *["--quick"] * quick, *["--peers"] * peers]
+        flags = {"--quick": quick, "--peers": peers, "--validation": validation}
+        command = " ".join(["sphshell-pin report", *(name for name, on in flags.items() if on)])
+        make = make_validation if validation else functools.partial(make_report, with_peers=peers)
         bar = progress_bar(TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn())
         with bar:
             task = bar.add_task("report", total=1.0)
-            made = make_report(
+            made = make(
                 out,
                 quick=quick,
-                with_peers=peers,
-                command=" ".join(command),
+                command=command,
                 tell=lambda title, share: bar.update(task, description=title, completed=share),
             )
         _print(made)

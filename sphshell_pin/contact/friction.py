@@ -13,10 +13,7 @@ from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient, parameter
 
-__all__ = ["BristleFriction", "CoulombFriction", "Friction"]
-
-# Bristles stick below this part of Stribeck's speed: almost nothing moves.
-STICKING_SHARE = 0.01
+__all__ = ["CoulombFriction", "Friction"]
 
 
 class Friction(Ingredient):
@@ -38,14 +35,25 @@ class Friction(Ingredient):
         return self.core.has_state
 
     @property
+    def state_size(self) -> int:
+        """How many numbers the state of a contact has."""
+        return 3 * self.has_state
+
+    @property
     def sticking_speed(self) -> float:
         """Slip speed [m/s] below which a contact sticks."""
         raise NotImplementedError
 
-    def slip_time(self, mass: float, load: float) -> float:
+    @property
+    def needs_radius(self) -> bool:
+        """Whether the forces depend on the radius of the sphere."""
+        return self.core.torsional
+
+    def slip_time(self, mass: float, load: float, disc: float) -> float:
         """Return the time scale [s] of slow slip of `mass` [kg] along the surface under `load` [N].
 
         20 times its decay where friction acts like a damper; half a period where like a spring.
+        `disc` [m] is the radius of the disc of contact under this load.
         """
         raise NotImplementedError
 
@@ -55,7 +63,9 @@ class Friction(Ingredient):
 
 
 @dataclass(frozen=True)
-class _Coefficients(Friction):
+class Coefficients(Friction):
+    """What the laws share that have two coefficients."""
+
     mu_static: float = parameter(
         at_least=0, label="static friction", help="coefficient at rest or nearly so"
     )
@@ -83,7 +93,7 @@ class NoFriction(Ingredient, kind="none", of=Friction):
 
 
 @dataclass(frozen=True)
-class CoulombFriction(_Coefficients, kind="coulomb"):
+class CoulombFriction(Coefficients, kind="coulomb"):
     """Coulomb friction regularized over two slip speeds, as ADAMS has it; its defaults are ADAMS's.
 
     The force opposes the slip velocity with mu(s) N: mu rises from 0 at rest to `mu_static` at
@@ -145,81 +155,16 @@ class CoulombFriction(_Coefficients, kind="coulomb"):
         """Slip speed [m/s] below which a contact creeps."""
         return self.v_static
 
-    def slip_time(self, mass: float, load: float) -> float:
+    def slip_time(self, mass: float, load: float, disc: float) -> float:
         """Return 20 times the decay of a slip below `v_static` [s]."""
         if not self.mu_static or not load > 0:
             return math.inf
         return DECAYS_PER_PERIOD * mass * self.v_static / (1.5 * self.mu_static * load)
 
 
-@dataclass(frozen=True)
-class BristleFriction(_Coefficients, kind="bristle"):
-    """Friction that sticks: an elastic, perfectly plastic spring between sphere and shell.
-
-    Below the limit mu N the tangential force is that of a spring of `stiffness` [N/m] with
-    `damping` [N s/m], stretched since the touch, and nothing creeps; at the limit the sphere
-    slides, with mu = mu_dynamic + (mu_static - mu_dynamic) exp(-(slip / v_stribeck)^2). The stretch
-    belongs to the contact, in the shell's frame, and goes with it over elements and smooth edges.
-
-    `torsional`: the contact also resists a spin about its normal, as a soft finger does, up to the
-    moment 3 pi / 16 mu N a of Hertz's pressure, a = sqrt(radius depth); force and moment share the
-    limit, (force / mu N)^2 + (moment / limit)^2 <= 1.
-
-    Sources: Dupont, Hayward, Armstrong, Altpeter, IEEE Trans. Automatic Control 47 (2002) 787;
-    Howe and Cutkosky, Int. J. Robotics Research 15 (1996) 557; Johnson, Contact Mechanics, 1985.
-    """
-
-    stiffness: float = parameter(
-        above=0,
-        unit="N/m",
-        label="bristle stiffness",
-        help="k of the spring: at the limit it has given way by mu_static N / k",
-    )
-    damping: float = parameter(
-        0.0,
-        at_least=0,
-        unit="N s/m",
-        label="bristle damping",
-        help="c beside the spring: about `sqrt(k m)`, with the mass m along the surface",
-    )
-    v_stribeck: float = parameter(
-        0.01,
-        above=0,
-        unit="m/s",
-        label="Stribeck speed",
-        help="slip speed at which mu has come down from `mu_static` by 63 % of the way to "
-        "`mu_dynamic`",
-    )
-    torsional: bool = parameter(
-        False, help="True: also against spin about the normal, as a soft finger"
-    )
-
-    @property
-    def text(self) -> str:
-        """Parameters in one line."""
-        spin = ", and against spin" if self.torsional else ""
-        return (
-            f"coefficient {self.mu_static:g} at rest, {self.mu_dynamic:g} beyond "
-            f"{self.v_stribeck:g} m/s; sticks with {self.stiffness:.4g} N/m, damping "
-            f"{self.damping:.4g} N s/m{spin}; the stretch is a state of the contact"
-        )
-
-    @property
-    def sticking_speed(self) -> float:
-        """Slip speed [m/s] below which almost nothing moves."""
-        return STICKING_SHARE * self.v_stribeck
-
-    def slip_time(self, mass: float, load: float) -> float:
-        """Return half a period of the spring, or 20 times its decay if that is shorter [s]."""
-        times = [math.pi * math.sqrt(mass / self.stiffness)]
-        if self.damping:
-            times.append(DECAYS_PER_PERIOD * mass / self.damping)
-        return min(times)
-
-
 def check_friction(friction: object) -> Friction | None:
     """Return `friction`; raise InvalidParameter unless it is a friction law, or None."""
     if friction is None:
         return None
-    kinds = "a CoulombFriction, a BristleFriction or None"
+    kinds = "a CoulombFriction, a BristleFriction, a MindlinFriction or None"
     return check_type("friction", friction, Friction, f"must be {kinds}")

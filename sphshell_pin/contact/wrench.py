@@ -14,29 +14,32 @@ from sphshell_pin.checks import (
     check_type,
     check_vector,
 )
-from sphshell_pin.contact.friction import BristleFriction, Friction, check_friction
+from sphshell_pin.contact.friction import Friction, check_friction
 from sphshell_pin.contact.normal_law import NormalLaw, check_law
 from sphshell_pin.errors import InvalidParameter
 
 Array = NDArray[np.float64]
 
 # Of force, moment and rate where nothing touches.
-_NOTHING = (0.0, np.zeros(3), 0.0, np.zeros(3))
+_NOTHING = (0.0, np.zeros(3), np.zeros(3), np.zeros(3))
 
 
 class BristleState:
-    """The memory of one contact with BristleFriction, for `contact_wrench`.
+    """The memory of one contact with BristleFriction or MindlinFriction, for `contact_wrench`.
 
     Evaluations do not change it; `advance` moves it on, once for each accepted step. `radius` [m]
-    of the sphere is needed by torsional friction; in `relaxation` [s] the bristle gives way beyond
-    its limit. It can be copied and pickled.
+    of the sphere is needed by torsional and by Mindlin's friction; in `relaxation` [s] the bristle
+    gives way beyond its limit. It can be copied and pickled.
     """
 
     def __init__(self, radius: float = 0.0, relaxation: float = 2e-5) -> None:
         self.radius = check_not_negative("radius", radius, "m")
         self.relaxation = check_positive("relaxation", relaxation, "s")
         self.stretch_world: Array = np.zeros(3)
-        """Of the bristle (3,) [m]; zero without contact."""
+        """Of the bristle (3,) [m]; zero without contact.
+
+        Of MindlinFriction the stretch it would have if the disc of contact had a radius of 1 m.
+        """
         self._normal: Array | None = None
 
     def advance(
@@ -47,7 +50,7 @@ class BristleState:
         motion_i: pin.Motion,
         motion_j: pin.Motion,
         law: NormalLaw,
-        friction: BristleFriction,
+        friction: Friction,
         *,
         dt: float,
     ) -> None:
@@ -103,17 +106,19 @@ class _Contact:
 
     def force(
         self, stretch: Array, radius: float, relaxation: float
-    ) -> tuple[float, Array, float, Array]:
-        """Return push [N], friction [N], moment about the normal [N m], bristle rate [m/s]."""
+    ) -> tuple[float, Array, Array, Array]:
+        """Return push [N], friction [N], moment [N m], bristle rate [m/s]."""
         if self.depth <= 0:
             return _NOTHING
+        spin = float(self.normal @ self.motion.angular)
         return _core.contact_force(
             self.law.core,
             None if self.friction is None else self.friction.core,
             self.depth,
             self.normal,
             self.motion.linear + np.cross(self.motion.angular, self.point),
-            float(self.normal @ self.motion.angular),
+            spin,
+            self.motion.angular - spin * self.normal,
             stretch,
             radius,
             relaxation,
@@ -137,24 +142,29 @@ def contact_wrench(
     frame, about the world origin (data.oMi[j].act(data.v[j])). Both wrenches are pinocchio.Force
     in the world about the world origin, equal and opposite.
 
-    A BristleFriction needs a `state`, which holds its stretch (else InvalidParameter); call
-    `state.advance` once a step.
+    A BristleFriction or MindlinFriction needs a `state`, which holds its stretch (else
+    InvalidParameter); call `state.advance` once a step.
     """
     contact = _Contact(point, normal, depth, motion_i, motion_j, law, friction)
-    if not isinstance(friction, BristleFriction):
-        push, drag, torsion, _ = contact.force(np.zeros(3), 0.0, 1.0)
+    if friction is None or not friction.has_state:
+        push, drag, moment, _ = contact.force(np.zeros(3), 0.0, 1.0)
     else:
-        without = "must be a BristleState, which holds the stretch of BristleFriction"
         if not isinstance(state, BristleState):
-            raise InvalidParameter("state", state, without)
-        if friction.torsional and not state.radius:
-            raise InvalidParameter(
-                "state.radius", 0.0, "must be the sphere's, of torsional friction"
+            without = (
+                f"must be a BristleState, which holds the stretch of {type(friction).__name__}"
             )
+            raise InvalidParameter("state", state, without)
+        if friction.state_size > len(state.stretch_world):
+            raise InvalidParameter(
+                "rings", friction.state_size // 3, "must be 1: a BristleState has one"
+            )
+        if friction.needs_radius and not state.radius:
+            kind = "torsional" if friction.core.torsional else "Mindlin's"
+            raise InvalidParameter("state.radius", 0.0, f"must be the sphere's, of {kind} friction")
         stretch = state.stretch_at(contact)
-        push, drag, torsion, _ = contact.force(stretch, state.radius, state.relaxation)
+        push, drag, moment, _ = contact.force(stretch, state.radius, state.relaxation)
     force = push * contact.normal + drag
-    wrench = pin.Force(force, np.cross(contact.point, force) + torsion * contact.normal)
+    wrench = pin.Force(force, np.cross(contact.point, force) + moment)
     return wrench, -wrench
 
 
@@ -162,6 +172,6 @@ def _with_normal(stretch: Array, before: Array, contact: _Contact) -> Array:
     """Turn a stretch by the smallest rotation from the normal `before` to that of `contact`."""
     turn = pin.Quaternion.FromTwoVectors(before, contact.normal).matrix()
     turned = np.asarray(turn @ stretch)
-    if isinstance(contact.friction, BristleFriction) and contact.friction.torsional:
+    if contact.friction is not None and contact.friction.core.torsional:
         return turned
     return turned - (turned @ contact.normal) * contact.normal

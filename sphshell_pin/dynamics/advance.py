@@ -6,7 +6,7 @@ import math
 import signal
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from types import FrameType
 from typing import TypeAlias
 
@@ -25,6 +25,7 @@ from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callabl
 from sphshell_pin.dynamics.explain import DEFAULT_SPEED, explain_pairs, relaxation_time, weakness
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.dynamics.models import find_joint
+from sphshell_pin.dynamics.patches import check_record
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.scene import Scene
@@ -56,6 +57,7 @@ def start_run(
     record_dt: float | None,
     t0: float,
     sensors: SensorSet,
+    record: Collection[str] = (),
     warn: bool = True,
 ) -> _core.Simulation:
     """Check the arguments of Simulation.run and return the compiled run at its start.
@@ -69,7 +71,9 @@ def start_run(
     if warn and isinstance(controller, Controller):
         for doubt in controller.doubts(scene, q):
             warnings.warn(doubt, SetupWarning, stacklevel=3)
-    settings = run_settings(scene, integrator, duration, hold, record_dt=record_dt, t0=t0)
+    settings = run_settings(
+        scene, integrator, duration, hold, record_dt=record_dt, record=record, t0=t0
+    )
     pairs = core_pairs(scene, q, v, warn=warn)
     joints = scene.joints.to_core(scene.model)
     core = _core.Simulation(
@@ -88,6 +92,7 @@ def run_settings(
     hold: float,
     *,
     record_dt: float | None,
+    record: Collection[str] = (),
     t0: float,
 ) -> _core.RunSettings:
     """Check and collect the settings of a compiled run; torques are held for `hold` [s]."""
@@ -100,9 +105,9 @@ def run_settings(
             f"must be small enough to count steps of {dt or 1e-6!r} s",
         )
     check_moved_mass(scene.model)
-    record = 0.0
+    every = 0.0
     if record_dt is not None:
-        record = min(check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
+        every = min(check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
     return _core.RunSettings(
         integrator=integrator.kind,
         dt=dt,
@@ -111,7 +116,8 @@ def run_settings(
         duration=duration,
         start_time=t0,
         control_dt=hold,
-        record_dt=record,
+        record_dt=every,
+        patches=check_record(record),
     )
 
 

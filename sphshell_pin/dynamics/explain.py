@@ -302,7 +302,7 @@ def _explain_pair(
         if pair.spheres:
             limit = math.sqrt(2 * law.energy(pair.least_radius) / mass)
     if pair.friction is not None and math.isfinite(slip_mass):
-        times.append(pair.friction.slip_time(slip_mass, load))
+        times.append(pair.friction.slip_time(slip_mass, load, _disc(pair, max(depth, -gap))))
     return PairExplanation(
         name=pair.name,
         modelled=_ingredients(pair),
@@ -316,6 +316,12 @@ def _explain_pair(
         shortest_time=min(times, default=math.inf),
         group=pair.group,
     )
+
+
+def _disc(pair: ContactPair, depth: float) -> float:
+    """Return the radius [m] of the disc of contact at this depth, nan of a source."""
+    curvature = sum(1 / one.radius for one in pair.spheres)
+    return math.sqrt(depth / curvature) if curvature and depth > 0 else math.nan
 
 
 def _mass(mobility: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,6 +48,7 @@ def roll_out(
     control_dt: float | None,
     vary: Mapping[str, object] | None,
     record_dt: float | None,
+    record: Collection[str] = (),
     progress: Callable[[float], object] | None,
     t0: float,
     sensors: SensorSet,
@@ -60,7 +61,11 @@ def roll_out(
     starts = _states(scene, q0s, v0s, vary, controller)
     # Start and end are rows whatever the time between rows.
     rows = record_dt if record_dt is not None else (duration or None)
-    settings = {0.0: run_settings(scene, integrator, duration, 0.0, record_dt=rows, t0=t0)}
+
+    def settings_of(scene: Scene, hold: float) -> _core.RunSettings:
+        return run_settings(scene, integrator, duration, hold, record_dt=rows, record=record, t0=t0)
+
+    settings = {0.0: settings_of(scene, 0.0)}
     controllers = _one_each(controller, len(starts))
     _check_controllers(scene, integrator, controllers, control_dt, starts, sensors)
     variations = Variations(scene, VariedSensors.others(vary), len(starts))
@@ -72,7 +77,7 @@ def roll_out(
         varied = variations.scene(run)
         bound, hold = bind_controller(varied, integrator, controllers[run], control_dt, q0, sensors)
         if hold not in settings:
-            settings[hold] = run_settings(varied, integrator, duration, hold, record_dt=rows, t0=t0)
+            settings[hold] = settings_of(varied, hold)
         # The rollout warns of a weak law when a sphere has gone through.
         pairs = core_pairs(varied, q0, v0, warn=False)
         core.add(pairs, joints, bound, q0, v0, settings[hold], varied_sensors.core(run))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import NoReturn
 
 import numpy as np
@@ -58,6 +59,7 @@ class OpenRun:
         control_dt: float | None = None,
         *,
         record_dt: float,
+        record: Collection[str] = (),
         t0: float = 0.0,
     ) -> None:
         self.simulation = simulation
@@ -74,6 +76,7 @@ class OpenRun:
             controller,
             control_dt,
             record_dt=record_dt,
+            record=record,
             t0=t0,
             sensors=self._sensors,
             warn=False,
@@ -206,6 +209,7 @@ def _same_place(a: ContactPair, b: ContactPair) -> bool:
         and a.find is b.find
         and a.kind == b.kind
         and type(a.friction) is type(b.friction)
+        and (a.friction and a.friction.state_size) == (b.friction and b.friction.state_size)
         and _equal(a.placement_i, b.placement_i)
         and _equal(a.placement_j, b.placement_j)
     )

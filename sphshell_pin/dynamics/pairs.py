@@ -11,10 +11,11 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin import _core
-from sphshell_pin.contact import Friction, Method, NormalLaw, Sphere
+from sphshell_pin.contact import Friction, Method, MindlinFriction, NormalLaw, Sphere
 from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.sources import Find, checked_source
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
 
 
@@ -58,9 +59,13 @@ class ContactPair:
     shell_placement = renamed("shell_placement", "placement_j")
 
     def __post_init__(self) -> None:
-        """Raise InvalidParameter for a law that a contact source says too little for."""
-        if self.find is not None:
-            check_law(self.law, "at the points of a contact source")
+        """Raise InvalidParameter for what needs a sphere or a shell where there is none."""
+        if self.find is None:
+            return
+        check_law(self.law, "at the points of a contact source")
+        if isinstance(self.friction, MindlinFriction):
+            must = "needs a sphere, and a contact source has none: take a BristleFriction"
+            raise InvalidParameter("friction", self.friction.kind, must)
 
     @property
     def plane_law(self) -> NormalLaw:

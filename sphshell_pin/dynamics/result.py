@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import read_only
+from sphshell_pin.dynamics.patches import PATCH, Patches, patch_columns, patches_of
 from sphshell_pin.dynamics.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.dynamics.scene_contacts import Columns, SceneContacts, columns
 from sphshell_pin.dynamics.sensor_log import SensorLog, joined_logs, sensor_columns, split_logs
-from sphshell_pin.errors import MissingExtra
+from sphshell_pin.errors import MissingExtra, ResultError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -141,7 +142,8 @@ class Result:
     pairs; `contacts` the contact log; `events` in order of time; `energy` the audit; `stats`
     its cost, and figures of each pair over all steps; `scene` that ran
     (None after load); `origin` the scenario it came from (None without one); `sensors` the readings
-    of each sensor by its name.
+    of each sensor by its name; `patch_rows` the patches of the contacts, None where they were not
+    recorded (see `patches`).
     """
 
     t: Array
@@ -155,6 +157,7 @@ class Result:
     scene: Scene | None = None
     origin: Origin | None = None
     sensors: Mapping[str, SensorLog] = field(default_factory=dict)
+    patch_rows: Patches | None = None
 
     @classmethod
     def from_blocks(
@@ -190,7 +193,25 @@ class Result:
             stats=stats,
             scene=scene,
             sensors=sensors.logs(whole),
+            patch_rows=patches_of(whole["patches"]) if "patches" in whole else None,
         )
+
+    @property
+    def patches(self) -> Patches:
+        """The patch of each contact of `contacts`, in the same order: a structured array (m,).
+
+        Its fields: `half_axes` (2,) a >= b [m], `axis_world` (3,) direction of a, `peak_pressure`
+        and `mean_pressure` [Pa], `approach` [m].
+
+        Raises ResultError where they were not recorded.
+        """
+        if self.patch_rows is None:
+            raise ResultError(
+                "the result",
+                "has no patches, as the run was not asked for them: "
+                "run(..., record=('patch',)), or record = ['patch'] in [run] of the scenario",
+            )
+        return self.patch_rows
 
     def save(self, path: str | PathLike[str], *, home: str | PathLike[str] | None = None) -> Path:
         """Write everything but the scene to a compressed .npz file, whole or not at all.
@@ -198,7 +219,12 @@ class Result:
         The path of a scenario is written relative to the folder `home`, where the results will stay
         (default: that of `path`).
         """
-        from sphshell_pin.dynamics.result_file import SENSOR_ARRAYS, origin_in_file, write_result
+        from sphshell_pin.dynamics.result_file import (
+            PATCH_ARRAYS,
+            SENSOR_ARRAYS,
+            origin_in_file,
+            write_result,
+        )
 
         target = Path(path)
         arrays: Columns = {"t": self.t, "q": self.q, "v": self.v}
@@ -218,6 +244,9 @@ class Result:
         if self.sensors:
             header["sensors"] = {name: log.columns for name, log in self.sensors.items()}
             arrays |= dict(zip(SENSOR_ARRAYS, joined_logs(self.sensors), strict=True))
+        if self.patch_rows is not None:
+            for name in PATCH_ARRAYS:
+                arrays[name] = self.patch_rows[name.removeprefix("patches.")]
         write_result(target, header, arrays)
         return target
 
@@ -237,6 +266,12 @@ class Result:
         header, arrays = read_result(path, max_size)
         log = {f.name: arrays[f"contacts.{f.name}"] for f in fields(ContactLog)}
         energy = {f.name: arrays[f"energy.{f.name}"] for f in fields(EnergyAudit)}
+        patches = None
+        if "patches.approach" in arrays:
+            patches = np.empty(len(log["row"]), PATCH)
+            for name in PATCH.names or ():
+                patches[name] = arrays[f"patches.{name}"]
+            read_only(patches)
         origin = None
         if header.origin is not None:
             origin = Origin(header.origin.found_from(Path(path).parent), header.origin.settings)
@@ -256,6 +291,7 @@ class Result:
             )
             if header.sensors
             else {},
+            patch_rows=patches,
         )
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -284,11 +320,15 @@ class Result:
             ("slip_velocity", "m/s", log.slip_velocity_world),
         ):
             columns |= {f"{label}_{a} [{unit}]": vectors[:, i] for i, a in enumerate("xyz")}
-        return columns | {
-            "element": log.element,
-            "feature": log.feature,
-            "number": log.contact_id,
-        }
+        return (
+            columns
+            | {
+                "element": log.element,
+                "feature": log.feature,
+                "number": log.contact_id,
+            }
+            | ({} if self.patch_rows is None else patch_columns(self.patch_rows))
+        )
 
     def sensor_columns(self) -> dict[str, Array]:
         """Return the readings of all sensors as columns, units in the names (for CSV, tables).

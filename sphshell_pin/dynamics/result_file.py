@@ -63,7 +63,16 @@ SENSOR_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
 }
 """The same of a run with sensors; other files have none of them."""
 
-_IN_FILE = {name: name for name in ARRAYS | SENSOR_ARRAYS}
+PATCH_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
+    "patches.half_axes": (FLOAT, ("m", 2)),
+    "patches.axis_world": (FLOAT, ("m", 3)),
+    "patches.peak_pressure": (FLOAT, ("m",)),
+    "patches.mean_pressure": (FLOAT, ("m",)),
+    "patches.approach": (FLOAT, ("m",)),
+}
+"""The same of a run that recorded patches."""
+
+_IN_FILE = {name: name for name in ARRAYS | SENSOR_ARRAYS | PATCH_ARRAYS}
 _IN_FILE["contacts.contact_id"] = "contacts.number"
 
 
@@ -147,6 +156,7 @@ def _read(
     files = {one.filename: one for one in archive.infolist()}
     shapes: dict[str, tuple[int, ...]] = {}
     arrays_in = ARRAYS | (SENSOR_ARRAYS if "sensors.t.npy" in files else {})
+    arrays_in |= PATCH_ARRAYS if "patches.approach.npy" in files else {}
     parts = {"header": "header.npy"} | {name: f"{_IN_FILE[name]}.npy" for name in arrays_in}
     for name, part in parts.items():
         if part not in files:
@@ -200,7 +210,7 @@ def _check_shapes(
     shapes: dict[str, tuple[int, ...]],
     arrays: Mapping[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]],
 ) -> None:
-    sizes: dict[str | int, tuple[int, str]] = {3: (3, "")}
+    sizes: dict[str | int, tuple[int, str]] = {2: (2, ""), 3: (3, "")}
     for name, (_, wanted) in arrays.items():
         shape = shapes[name]
         called = f"({', '.join(map(str, wanted))}{',' * (len(wanted) == 1)})"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 from numpy.typing import ArrayLike
 
@@ -58,6 +58,7 @@ class Simulation:
         control_dt: float | None = None,
         *,
         record_dt: float | None = None,
+        record: Collection[str] = (),
         progress: Callable[[float], object] | None = None,
         t0: float = 0.0,
     ) -> Result:
@@ -70,7 +71,8 @@ class Simulation:
         nearby: a callable with a memory needs control_dt. So does one with a fifth argument
         `sensors`: it gets the latest reading of each sensor by name. Rows are recorded every
         `record_dt` [s] (default: every step); `progress` is called a few times a second with the
-        share done. The same input gives the same bits.
+        share done. The same input gives the same bits. With `record=("patch",)` the patch of each
+        recorded contact is kept, too: `Result.patches`.
 
         A law that cannot stop its sphere earns a WeakLawWarning, a path off its shell a
         SetupWarning.
@@ -88,6 +90,7 @@ class Simulation:
             controller,
             control_dt,
             record_dt=record_dt,
+            record=record,
             t0=t0,
             sensors=sensors,
         )
@@ -122,6 +125,7 @@ class Simulation:
         control_dt: float | None = None,
         vary: Mapping[str, object] | None = None,
         record_dt: float | None = None,
+        record: Collection[str] = (),
         progress: Callable[[float], object] | None = None,
         t0: float = 0.0,
     ) -> Rollout:
@@ -142,6 +146,7 @@ class Simulation:
             the shell in its frame (n pinocchio.SE3), "sensors.NAME.FIELD" (n numbers), such as the
             seed of a sensor's noise
         record_dt : between recorded rows [s]; unless given only start and end are recorded
+        record : as of `run`
         progress : called a few times a second with the share of the runs that are done
 
         Returns
@@ -167,6 +172,7 @@ class Simulation:
             control_dt=control_dt,
             vary=vary,
             record_dt=record_dt,
+            record=record,
             progress=progress,
             t0=t0,
             sensors=SensorSet(self.sensors, self.scene),

@@ -16,6 +16,8 @@ from sphshell_pin.plot.on_shell import (
     group_paths,
     shell_axes,
 )
+from sphshell_pin.plot.patches import COLORS as PATCH_COLORS
+from sphshell_pin.plot.patches import draw_patches, patches_of, peak_pressure
 from sphshell_pin.view.contact_path import FloatArray
 
 if TYPE_CHECKING:
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
     from sphshell_pin.dynamics.result import Result
     from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.patches.placed import PlacedPatches
     from sphshell_pin.shell.shell import Shell
 
 QUANTITIES = {
@@ -41,7 +44,8 @@ MISSED = 0.15  # share of the impulse, time or peak between the recorded rows th
 class _View:
     """One picture: a shell, what its elements took (m,), and what is seen along `normal` (3,).
 
-    That are the contacts' `paths`, (k, 3) each, and by name where a pair touched first (3,) [m].
+    That are the contacts' `paths`, (k, 3) each, by name where a pair touched first (3,) [m], and
+    the patches, if they were recorded.
     """
 
     shell: Shell
@@ -50,6 +54,7 @@ class _View:
     starts: dict[str, FloatArray]
     normal: FloatArray
     title: str
+    patches: PlacedPatches | None = None
 
 
 def plot_contact_map(
@@ -59,7 +64,8 @@ def plot_contact_map(
 
     "impulse" is the normal force over time [N s], "time" the time in contact [s], "peak" the
     largest normal force [N] of each element, as the recorded rows have them. The dark line is the
-    path of the contact, the dot its first touch. A shell that is touched from opposite sides has
+    path of the contact, the dot its first touch; of recorded patches some are drawn, true to size
+    and colored by their peak pressure. A shell that is touched from opposite sides has
     two pictures; of one much larger than the path the part about the path is shown.
 
     `scene` is by default the scene that ran. Raises NameNotFound for another quantity, ResultError
@@ -71,7 +77,11 @@ def plot_contact_map(
     if scene is None:
         raise ResultError("the result", "has no scene to draw a map of: give scene=...")
     groups = [group for group in group_paths(result, scene) if group.shell is not None]
-    views = [view for group in groups for view in _views(result, group, quantity)][:MOST_VIEWS]
+    views = [
+        view
+        for group in groups
+        for view in _views(result, group, quantity, patches_of(result, scene, group))
+    ][:MOST_VIEWS]
     if not views:
         reason = "No shell was touched." if len(result.contacts.t) else NO_CONTACT
         return only_say("Contact map", reason)
@@ -86,6 +96,12 @@ def plot_contact_map(
     factor, unit = reading_unit(largest, base)
     scale = ScalarMappable(Normalize(0.0, largest * factor or 1.0), colormaps[COLORS])
     axes = shell_axes(figure, len(views))
+    peaks = [
+        peak_pressure(view.patches).max(initial=0.0) for view in views if view.patches is not None
+    ]
+    pressure = ScalarMappable(
+        Normalize(0.0, max(peaks, default=0.0) * 1e-6 or 1.0), colormaps[PATCH_COLORS]
+    )
     for axis, view in zip(axes, views, strict=True):
         touched = element_corners(view.shell)[view.values > 0.0].reshape(-1, 3)
         near = np.vstack((touched, *view.paths))
@@ -97,10 +113,14 @@ def plot_contact_map(
             marker = {"marker": "o", "markersize": 2.0} if len(line.T) == 1 else {}
             axis.plot(*line, color="white", linewidth=2.6, solid_capstyle="round", zorder=3)
             axis.plot(*line, color=INK, linewidth=1.1, solid_capstyle="round", zorder=4, **marker)
+        if view.patches is not None:
+            draw_patches(picture, view.patches, view.normal, pressure)
         for name, start in view.starts.items():
             picture.mark_start(start, name if len(result.pairs) > 1 else "")
         axis.set_title(view.title, fontsize=10)
     figure.colorbar(scale, ax=axes, label=f"{label} [{unit}{after}]", shrink=0.8)
+    if peaks:
+        figure.colorbar(pressure, ax=axes, label="peak pressure of patches [MPa]", shrink=0.8)
     figure.suptitle(f"Contact map{_caution(result, groups, quantity)}", fontsize=12)
     return figure
 
@@ -148,7 +168,9 @@ def _caution(result: Result, groups: list[PathGroup], quantity: str) -> str:
     return f"\nthe recorded rows hold {seen / done:.0%} of it: record more often (record_dt)"
 
 
-def _views(result: Result, group: PathGroup, quantity: str) -> list[_View]:
+def _views(
+    result: Result, group: PathGroup, quantity: str, patches: PlacedPatches | None
+) -> list[_View]:
     """Return the pictures of one shell: one, or two if it is touched from opposite sides."""
     shell = group.shell
     assert shell is not None
@@ -179,5 +201,6 @@ def _views(result: Result, group: PathGroup, quantity: str) -> list[_View]:
         # Of a sheet without thickness both sides are the same elements.
         behind = (side * facing < BEHIND) if shell.is_closed else np.zeros(len(values), bool)
         shown = np.where(behind, 0.0, values)
-        views.append(_View(shell, shown, paths, starts, side * first, shell.name + where))
+        title = shell.name + where
+        views.append(_View(shell, shown, paths, starts, side * first, title, patches))
     return views

@@ -13,6 +13,7 @@ from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative, check_vector
 from sphshell_pin.dynamics.busy import one_at_a_time
 from sphshell_pin.dynamics.open_run import OpenRun, contacts_of
+from sphshell_pin.dynamics.patches import Patches
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
@@ -90,6 +91,11 @@ class LiveRun:
     def contacts(self) -> SceneContacts:
         """The contacts at `q`, `v`, with their forces."""
         return contacts_of(self._row)
+
+    @property
+    def patches(self) -> Patches | None:
+        """The patches of `contacts`, None unless the scenario records them."""
+        return self._row.patch_rows
 
     @property
     def residual(self) -> float:
@@ -253,6 +259,7 @@ def _open_run(built: Built, q: Array, v: Array, t: float) -> OpenRun:
         built.controller,
         built.scenario.run.control_dt,
         record_dt=ROW_DT,
+        record=built.scenario.run.record,
         t0=t,
     )
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.dynamics.patches import Patches
 from sphshell_pin.dynamics.result import Origin, Result
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
@@ -120,6 +121,14 @@ class Replay:
     def contacts(self) -> SceneContacts:
         """The contacts of the row that is shown."""
         return self.result.contacts.at_row(self._row)
+
+    @property
+    def patches(self) -> Patches | None:
+        """The patches of `contacts`, None where they were not recorded."""
+        if self.result.patch_rows is None:
+            return None
+        first, last = np.searchsorted(self.result.contacts.row, (self._row, self._row + 1))
+        return self.result.patch_rows[first:last]
 
     @property
     def residual(self) -> float:

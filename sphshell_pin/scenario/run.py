@@ -48,6 +48,8 @@ RESULTS = (
     "energy.png",
     "contact_path.png",
     "contact_map.png",
+    "wear.npz",
+    "wear.png",
     "sensors.png",
     RECORDING,
 )
@@ -188,6 +190,7 @@ def simulate(
                 built.controller,
                 run.control_dt,
                 record_dt=run.record_dt,
+                record=run.record,
                 progress=progress,
             )
     except (Interrupted, SimulationDiverged) as error:
@@ -249,8 +252,15 @@ def _draw(built: Built, result: Result, desk: Path, notes: list[str], *, recordi
         view = result.view(built.scene, built.visual_model, speed=speed, title=title)
         view.save(desk / RECORDING)
 
+    def write_wear() -> None:
+        if scenario.run.wear is not None:
+            from sphshell_pin.patches.wear import save_wear, wear_maps
+
+            save_wear(wear_maps(result, scenario.run.wear, built.scene), desk)
+
     writers: dict[str, Callable[[], object]] = {
         "figures": lambda: result.save_figures(desk, built.scene),
+        "wear": write_wear,
         RECORDING: write_recording,
     }
     for what, write in writers.items():

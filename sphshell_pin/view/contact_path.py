@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -20,7 +20,10 @@ LARGEST = 1e15  # beyond this, [m] or [N], nothing can be drawn
 
 @dataclass(frozen=True)
 class ContactRows:
-    """Some rows of a contact log, world frame [m], [N]; `pair` (k,) indexes the scene's pairs."""
+    """Some rows of a contact log, world frame [m], [N]; `pair` (k,) indexes the scene's pairs.
+
+    `patches` (k,) are those of the contacts, None where they were not recorded.
+    """
 
     row: IndexArray
     pair: IndexArray
@@ -28,15 +31,17 @@ class ContactRows:
     normal_world: FloatArray
     normal_force: FloatArray
     friction_force_world: FloatArray
+    patches: NDArray[Any] | None = None
 
     @classmethod
-    def of(cls, log: ContactLog) -> ContactRows:
-        """Take the columns of a Result's contact log, ordered by row.
+    def of(cls, log: ContactLog, patches: NDArray[Any] | None = None) -> ContactRows:
+        """Take the columns of a Result's contact log, and its patches, ordered by row.
 
         The end of a run that diverged may hold numbers no picture can show: they are left out.
         """
         order = np.argsort(np.asarray(log.row), kind="stable")
-        rows = cls(*(np.asarray(getattr(log, column.name))[order] for column in fields(cls)))
+        columns = {name: np.asarray(getattr(log, name))[order] for name in _COLUMNS}
+        rows = cls(**columns, patches=None if patches is None else patches[order])
         vectors = (rows.point_world, rows.normal_world, rows.friction_force_world)
         sound = np.abs(rows.normal_force) < LARGEST
         for vector in vectors:
@@ -45,12 +50,17 @@ class ContactRows:
 
     def select(self, chosen: slice | IndexArray | NDArray[np.bool_]) -> ContactRows:
         """Return the entries that `chosen`, a slice, mask or indices, picks."""
-        return ContactRows(*(getattr(self, column.name)[chosen] for column in fields(self)))
+        columns = {name: getattr(self, name)[chosen] for name in _COLUMNS}
+        patches = None if self.patches is None else self.patches[chosen]
+        return ContactRows(**columns, patches=patches)
 
     def at(self, row: int) -> ContactRows:
         """Return the contacts of the recorded `row`."""
         first, last = np.searchsorted(self.row, (row, row + 1))
         return self.select(slice(int(first), int(last)))
+
+
+_COLUMNS = tuple(column.name for column in fields(ContactRows) if column.name != "patches")
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from sphshell_pin.view.nodes import (
     show,
     triangle_mesh,
 )
+from sphshell_pin.view.patches import PatchPool, PatchRows, PatchScale
 from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot, check_geometry_model
 from sphshell_pin.view.surface import tube
 
@@ -54,7 +55,7 @@ class Display:
     a page is served as `meshcat.Visualizer()` does. `view` places the camera and sets the sizes of
     arrows and points; without one it is chosen for the neutral configuration. `arrows` shows
     normal and friction force apart ("components") or their sum ("total"); at most `pool` contacts
-    at a time. `arrow_scale` may be set at any time.
+    at a time. `arrow_scale` and `patch_scale` may be set at any time.
 
     Raises MissingExtra without meshcat, InvalidParameter for a geometry model that does not fit.
     """
@@ -88,6 +89,9 @@ class Display:
         self._draw_spheres()
         self._visual_model = visual_model
         self._robot = self._make_robot(visual_model)
+        self.patch_scale = PatchScale(1.0)
+        self._pool = pool
+        self._patches: PatchPool | None = None  # until there are some
         self._arrows = ArrowPool(
             self.visualizer["contacts"], pool, 0.0026 * self.view.distance, arrows
         )
@@ -95,8 +99,16 @@ class Display:
         look(self.visualizer, self.view)
         self.update(neutral)
 
-    def update(self, q: ArrayLike, contacts: ContactColumns | None = None) -> None:
-        """Show configuration `q` (nq,) and `contacts` (of `scene.contacts`, or None for none)."""
+    def update(
+        self,
+        q: ArrayLike,
+        contacts: ContactColumns | None = None,
+        patches: PatchRows | None = None,
+    ) -> None:
+        """Show configuration `q` (nq,) and `contacts` (of `scene.contacts`, or None for none).
+
+        `patches` (k,) of the contacts are drawn in place of the contact points.
+        """
         configuration = np.asarray(q, dtype=float)
         if configuration.shape != (self._model.nq,):
             raise InvalidParameter(
@@ -109,6 +121,12 @@ class Display:
         for ball in self._spheres.values():
             ball.update(self._data)
         self._arrows.update(contacts, self.arrow_scale)
+        if patches is None:
+            return
+        if self._patches is None:
+            self._patches = PatchPool(self.visualizer["pressure"], self._pool)
+            self.show("points", "points" not in self._hidden)
+        self._patches.update(contacts, patches, self.patch_scale)
 
     @property
     def data(self) -> pin.Data:
@@ -129,6 +147,11 @@ class Display:
         if "distance" in self._hidden:
             return None
         return range_text(self.largest_distance)
+
+    @property
+    def draws_patches(self) -> bool:
+        """Whether patches were given to `update`."""
+        return self._patches is not None
 
     @property
     def trail_width(self) -> float:
@@ -187,7 +210,9 @@ class Display:
         if part == "arrows":
             self._arrows.show_arrows(on)
         elif part == "points":
-            self._arrows.show_points(on)
+            self._arrows.show_points(on and self._patches is None)
+            if self._patches is not None:
+                show(self.visualizer["pressure"], on)
         elif part in ("robot", "spheres"):
             show(self.visualizer[part], on)
         else:

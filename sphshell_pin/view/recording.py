@@ -27,6 +27,8 @@ from sphshell_pin.view.display import TRAIL_COLOR, Display, choose_view
 from sphshell_pin.view.distance import RAMP, Coloring, check_coloring
 from sphshell_pin.view.nodes import FloatArray, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
+from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
+from sphshell_pin.view.patches import PatchScale
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -104,7 +106,7 @@ def render_recording(
     count = len(sound) if sound.all() else int(np.argmin(sound))
     if not count:
         raise InvalidParameter("result", "0 rows", "must hold at least one row of finite q")
-    contacts = ContactRows.of(result.contacts)
+    contacts = ContactRows.of(result.contacts, result.patch_rows)
     contacts = contacts.select(contacts.row < count)
     rows, times = choose_rows(np.asarray(result.t)[:count], contacts, fps, speed)
     shown = contacts.select(np.isin(contacts.row, rows))
@@ -132,16 +134,19 @@ def render_recording(
     )
     if color != "surface":
         display.show(color, True)
+    if shown.patches is not None:
+        display.patch_scale = PatchScale.of(shown.patches, view.distance)
     for frame, row in enumerate(rows):
         window.frame = frame
-        display.update(result.q[row], contacts.at(int(row)))
+        now = contacts.at(int(row))
+        display.update(result.q[row], now, now.patches)
     window.frame = None
     trailed = _draw_trails(display, window, result, speed)
 
     return render_page(
         window.commands(times),
         title,
-        _legend(scene, scale, arrows, shown, trailed) + _color_keys(display),
+        _legend(scene, scale, arrows, shown, trailed) + _color_keys(display, shown),
         {"start": float(result.t[0]), "speed": float(speed), "digits": _digits(speed, fps)},
     )
 
@@ -276,16 +281,21 @@ def _legend(
     if scale.cuts(_forces(shown, arrows)):
         cut = f"arrows longer than {scale.longest * 1e3:.0f} mm are cut"
         legend.append(("transparent", cut))
-    legend.append((_css(POINT_COLOR), "contact point"))
+    if shown.patches is None:
+        legend.append((_css(POINT_COLOR), "contact point"))
     if trailed:
         legend.append((_css(TRAIL_COLOR), "path on the shell"))
     return legend
 
 
-def _color_keys(display: Display) -> list[tuple[str, str]]:
-    """Return the legend of the colors of shells."""
-    meaning = display.coloring
-    return [] if meaning is None else [(f"linear-gradient(90deg, {', '.join(RAMP)})", meaning)]
+def _color_keys(display: Display, shown: ContactRows) -> list[tuple[str, str]]:
+    """Return the legend of the colors of shells and patches."""
+    keys: list[tuple[tuple[str, ...], str]] = []
+    if display.coloring is not None:
+        keys.append((RAMP, display.coloring))
+    if shown.patches is not None and len(shown.row):
+        keys.append((PRESSURE_RAMP, str(display.patch_scale)))
+    return [(f"linear-gradient(90deg, {', '.join(ramp)})", meaning) for ramp, meaning in keys]
 
 
 def _css(color: int) -> str:

@@ -47,8 +47,25 @@ FRICTIONS = {
     "coulomb": CoulombFriction(0.3, 0.1, 0.1, 1.0),
     "bristle": BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05),
     "soft finger": BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05, torsional=True),
+    "mindlin": BristleFriction.mindlin(
+        0.5,
+        0.3,
+        5e3,
+        0.3,
+        2e4,
+        0.45,
+        v_stribeck=0.05,
+        damping_time=3e-3,
+        torsional=True,
+        rolling=0.1,
+        rolling_speed=0.2,
+    ),
+    "rings": BristleFriction.mindlin(0.5, 0.3, 5e3, 0.3, v_stribeck=0.05, torsional=True, rings=3),
+    "many rings": BristleFriction.mindlin(
+        0.5, 0.3, 5e3, 0.3, damping_time=1e-3, rolling=0.1, rings=7
+    ),
 }
-BRISTLES = ["bristle", "soft finger"]
+BRISTLES = ["bristle", "soft finger", "mindlin", "rings", "many rings"]
 
 
 def differences(
@@ -71,11 +88,13 @@ def generalised_force(scene: Scene, q: Array, v: Array) -> Array:
     return total
 
 
-def assert_close(got: Array, expected: Array, tolerance: float = 1e-6) -> None:
+def assert_close(
+    got: Array, expected: Array, tolerance: float = 1e-6, rounding: float = 0.0
+) -> None:
     """Each column right to the tolerance of its own size, or of a hundredth of the whole's."""
     sizes = np.abs(expected).max(axis=0) + 1e-2 * np.abs(expected).max()
     assert got.shape == expected.shape
-    assert (np.abs(got - expected).max(axis=0) <= tolerance * sizes).all()
+    assert (np.abs(got - expected).max(axis=0) <= tolerance * sizes + rounding).all()
 
 
 def assert_derivatives(scene: Scene, q: Array, v: Array, step: float = 1e-6) -> None:
@@ -103,7 +122,9 @@ def assert_rate_jacobian(
     if len(z) == 0:
         return
     assert_close(got[nv:, :nv], by_q[nv:], turning)
-    assert_close(got[nv:, nv : 2 * nv], by_v[nv:])
+    # Far over the limit a stretch gives way at a rate that is large against what differences it.
+    rounding = 50 * np.finfo(float).eps * np.abs(core.rates(q, v, z, tau)[nv:]).max() / step
+    assert_close(got[nv:, nv : 2 * nv], by_v[nv:], rounding=rounding)
     step = 1e-4 * np.abs(z).max()
     moves = step * np.eye(len(z))
     changes = [core.rates(q, v, z + u, tau) - core.rates(q, v, z - u, tau) for u in moves]
@@ -325,8 +346,15 @@ def test_at_rest_by_default() -> None:
 
 def stretched(scene: Scene, size: float) -> Array:
     z = np.zeros(scene.core.bristle_size)
-    z[:9] = size * np.random.default_rng(2).normal(size=9)
+    # Of three contacts, where there is room for four.
+    filled = len(z) // 4 * 3
+    z[:filled] = size * np.random.default_rng(2).normal(size=filled)
     return z
+
+
+def left_out(friction: str, stretch: float) -> float:
+    """Tolerance of the rates' change with q on curved shells; those of rings are smaller."""
+    return stretch * (30 if "rings" in friction else 1)
 
 
 # 1e-2 m of stretch are far over the limit, so that the sphere slides.
@@ -345,14 +373,16 @@ class TestRatesOfBristles:
         """About an edge normals turn fast, and how their turning changes is left out."""
         scene, q, v = three_contacts(friction)
         z = stretched(scene, stretch)
-        assert_rate_jacobian(scene, q, v, z, step=1e-7, turning=stretch)
+        assert_rate_jacobian(scene, q, v, z, step=1e-7, turning=left_out(friction, stretch))
 
     def test_on_curved_surfaces(self, friction: str, stretch: float) -> None:
         for name, surface in SURFACES.items():
             scene = free_ball(shell_of(name, 0.6), friction=friction)
             q = turned(free_q(surface.probes(1, 0.04, seed=3)[0][0]), 1)
             v = 0.3 * np.random.default_rng(3).normal(size=6)
-            assert_rate_jacobian(scene, q, v, stretched(scene, stretch), turning=stretch)
+            assert_rate_jacobian(
+                scene, q, v, stretched(scene, stretch), turning=left_out(friction, stretch)
+            )
 
 
 def test_pairs_add_up() -> None:

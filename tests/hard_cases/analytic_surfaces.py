@@ -12,13 +12,14 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ellipk
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks import rolling
 from sphshell_pin.benchmarks.swing import ball_model, downward_crossings, mean_period
 from sphshell_pin.dynamics import Result
 from tests.hard_cases import surfaces
 from tests.hard_cases.balls import (
+    BALL,
     GRAVITY,
     MASS,
     PRECISE,
@@ -31,7 +32,6 @@ from tests.hard_cases.balls import (
     scene_of,
     spring,
     state,
-    velocities,
 )
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
@@ -44,28 +44,17 @@ def period_along_x(result: Result, velocity: Array, periods: int) -> float:
     return mean_period(result.t, result.q[:, 0], velocity[:, 0], periods)
 
 
-def pendulum(angle: float, stretch: float) -> float:
-    """Return 4 sqrt((R - r + depth) / g) K(sin(angle / 2)) [s]."""
-    arm = BOWL - RADIUS + stretch
-    return 4 * math.sqrt(arm / GRAVITY) * float(ellipk(math.sin(angle / 2) ** 2))
-
-
 @case("rolls in a bowl")
 def rolling_bowl() -> Verdicts:
     for degrees in (2, 40):
         angle = math.radians(degrees)
-        depth = MASS * GRAVITY * math.cos(angle) / STIFF
-        reach = BOWL - RADIUS + depth
-        center = reach * np.array([math.sin(angle), 0.0, -math.cos(angle)])
-        q0, v0 = state(center, STILL, STILL)
-        b = beta(depth)
-        rough = pendulum(angle, depth) * math.sqrt(1 + b)
         shell = surfaces.sphere(BOWL)
-        scene = scene_of(shell, spring(), bristle(1.0))
-        result = sp.Simulation(scene, PRECISE).run(q0, v0, 2.35 * rough, record_dt=1e-3)
-        seen = period_along_x(result, velocities(result), 2)
+        run = rolling.in_bowl(BALL, shell, BOWL, angle, stiffness=STIFF)
+        start = run.result.q[0, :3]
         smooth = scene_of(shell, spring(), model=ball_model())
-        slides = sp.Simulation(smooth, PRECISE).run(center, None, 2.35 * rough, record_dt=1e-3)
+        slides = sp.Simulation(smooth, PRECISE).run(
+            start, None, 2.35 * run.expected, record_dt=1e-3
+        )
         without = period_along_x(slides, slides.v, 2)
         tried = f"swing from {degrees} deg, R = 4 r"
         yield compare(
@@ -73,57 +62,39 @@ def rolling_bowl() -> Verdicts:
             tried,
             "4 sqrt((1 + b) (R - r + depth) / g) K(sin(A / 2)); A -> 0: "
             "2 pi sqrt(7 (R - r) / (5 g))",
-            rough,
-            seen,
+            run.expected,
+            run.period,
             1e-5,
         )
         yield compare(
             "(rolling / frictionless period)^2",
             tried,
             "1 + b, 7/5",
-            1 + b,
-            (seen / without) ** 2,
+            1 + beta(MASS * GRAVITY * math.cos(angle) / STIFF),
+            (run.period / without) ** 2,
             1e-5,
         )
 
 
-ORBIT, VERTICAL_PERIODS = 40.0, 3
+ORBIT = 40.0
 
 
 @case("rolls in a vertical cylinder")
 def cylinder() -> Verdicts:
-    """The ball does not run down: it bobs at sqrt(2/7) of its orbit.
-
-    The spin about the normal is turned by the orbit: r w_r' = orbit z', so that
-    (1 + b) z'' = -g - b orbit r w_r (Routh, *Rigid Dynamics* II; Gualtieri et al.,
-    "Golfer's dilemma", Am. J. Phys. 74 (2006) 497).
-    """
-    depth = MASS * (surfaces.CYLINDER - RADIUS) * ORBIT**2 / (STIFF - MASS * ORBIT**2)
-    out, b = surfaces.CYLINDER - RADIUS + depth, beta(depth)
-    expected = math.sqrt(b / (1 + b))
-    swing = GRAVITY / (b * ORBIT**2)
-    q0, v0 = state(
-        [out, 0.0, swing], [0.0, out * ORBIT, 0.0], [0.0, 0.0, -out * ORBIT / (RADIUS - depth)]
-    )
-    scene = scene_of(surfaces.cylinder(), spring(), bristle(1.5))
-    duration = (VERTICAL_PERIODS + 0.4) * 2 * math.pi / (ORBIT * expected)
-    result = sp.Simulation(scene, PRECISE).run(q0, v0, duration, record_dt=1e-3)
-    speed = velocities(result)
-    period = mean_period(result.t, result.q[:, 2], speed[:, 2], VERTICAL_PERIODS)
-    angle = np.unwrap(np.arctan2(result.q[:, 1], result.q[:, 0]))
-    orbit = (angle[-1] - angle[0]) / (result.t[-1] - result.t[0])
-    around = np.linalg.norm(speed[:, :2], axis=1)
+    """The ball does not run down: it bobs at sqrt(2/7) of its orbit."""
+    run = rolling.in_cylinder(BALL, surfaces.cylinder(), surfaces.CYLINDER, ORBIT, stiffness=STIFF)
     tried = f"R = 3 r, orbit {ORBIT:g} rad/s, three vertical periods"
     yield compare(
         "vertical / orbit frequency",
         tried,
         "sqrt(b / (1 + b)), sqrt(2/7)",
-        expected,
-        2 * math.pi / (period * orbit),
+        run.expected,
+        run.ratio,
         1e-5,
     )
-    yield at_most("loss of orbit speed", tried, "0", 1 - around[-1] / around[0], 1e-5)
-    yield compare("lowest point", tried, "-m g / (b orbit^2)", -swing, result.q[:, 2].min(), 1e-4)
+    yield at_most("loss of orbit speed", tried, "0", run.lost, 1e-5)
+    lowest = run.result.q[:, 2].min()
+    yield compare("lowest point", tried, "-m g / (b orbit^2)", -run.swing, lowest, 1e-4)
 
 
 @case("leaves a dome")

@@ -7,85 +7,42 @@ I = 2/5 m r^2.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks.rolling import PRECISE, RATIO, Ball, state, turned, velocities
 from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
 from sphshell_pin.dynamics import Result
-from tests import models
 
+__all__ = [
+    "BALL", "GRAVITY", "INERTIA", "MASS", "PRECISE", "RADIUS", "RATIO", "STIFF", "beta", "bristle",
+    "center_at", "event_times", "free_ball", "scene_of", "spins", "spring", "state", "tilted",
+    "turned", "velocities",
+]  # fmt: skip
 Array = NDArray[np.float64]
-INERTIA = 0.4 * MASS * RADIUS**2
-# What runs the cases that are about the physics and not about a stepper.
-PRECISE = sp.Adaptive(1e-8)
+BALL = Ball(MASS, RADIUS)
+INERTIA = BALL.inertia
 # Stiffness of contacts whose depth should not count [N/m], and of bristles.
 STIFF = 1e7
-# Damping of springs, as a part of the critical one: their oscillation at the start dies out.
-RATIO = 0.5
-
-
-def beta(depth: float = 0.0) -> float:
-    """Return I / (m (r - depth)^2), 2/5 for depth 0."""
-    return INERTIA / (MASS * (RADIUS - depth) ** 2)
+# What the module of these runs knows of any ball, for this one.
+beta, free_ball, scene_of = BALL.beta, BALL.model, BALL.scene
 
 
 def spring(stiffness: float = STIFF, ratio: float = RATIO) -> sp.ImpactLaw:
     """Linear spring and dashpot; the dashpot is at its full strength almost from the touch on."""
-    return sp.ImpactLaw(stiffness, 1.0, 2 * ratio * math.sqrt(stiffness * MASS), 1e-10)
+    return BALL.spring(stiffness, ratio)
 
 
-def bristle(mu: float, stiffness: float = STIFF, mass: float = 2 / 7 * MASS) -> sp.BristleFriction:
+def bristle(mu: float, stiffness: float = STIFF, mass: float | None = None) -> sp.BristleFriction:
     """Bristles of one coefficient; `mass` [kg] that they move: of a round ball 2/7 of its own."""
-    return sp.BristleFriction(mu, mu, stiffness, 2 * RATIO * math.sqrt(stiffness * mass))
-
-
-def free_ball(gravity: float = GRAVITY) -> pin.Model:
-    """Ball on a free-flyer."""
-    return models.ball(gravity, MASS, RADIUS)
-
-
-def scene_of(
-    shell: sp.Shell,
-    law: sp.ImpactLaw | sp.HuntCrossleyLaw,
-    friction: sp.BristleFriction | sp.CoulombFriction | None = None,
-    *,
-    model: pin.Model | None = None,
-    frame: str = "universe",
-    placement: pin.SE3 | None = None,
-) -> sp.Scene:
-    """Return the ball, on a free-flyer unless `model` is given, and a shell."""
-    scene = sp.Scene(free_ball() if model is None else model)
-    scene.add_contact(sp.Sphere(RADIUS, "ball"), shell, frame, placement, law, friction)
-    return scene
+    return BALL.bristle(mu, stiffness, mass)
 
 
 def tilted(angle: float) -> pin.SE3:
     """Return the placement of a slope that falls along +x by `angle` [rad]."""
     return pin.SE3(pin.utils.rotate("y", angle), np.zeros(3))
-
-
-def state(
-    center: Array | list[float], velocity: Array | list[float], spin: Array | list[float]
-) -> tuple[Array, Array]:
-    """Return q0, v0 of the unturned free ball; all in the world, [m], [m/s], [rad/s]."""
-    return models.free_q(np.asarray(center)), np.concatenate([velocity, spin]).astype(float)
-
-
-def turned(quaternions: Array, vectors: Array) -> Array:
-    """Turn vectors (n, 3) by unit quaternions x y z w (n, 4)."""
-    axis, cosine = quaternions[:, :3], quaternions[:, 3:]
-    across = 2 * np.cross(axis, vectors)
-    out: Array = vectors + cosine * across + np.cross(axis, across)
-    return out
-
-
-def velocities(result: Result) -> Array:
-    """Return the velocity (n, 3) of the free ball's center in the world [m/s]."""
-    return turned(result.q[:, 3:7], result.v[:, :3])
 
 
 def spins(result: Result) -> Array:

@@ -27,6 +27,7 @@ class BallPlayer:
     """A ball held up by a spring, without friction; x, y and z are free."""
 
     title = "A ball on a plate"
+    patches = None
     visual_model = None
     start = 0.0
     duration = None

@@ -125,6 +125,7 @@ def a_result(t, q, rows=(), pairs=("tip",), **energy):
         stats=RunStats(),
         scene=None,
         origin=None,
+        patch_rows=None,
         sensors={},
     )
 

@@ -65,6 +65,7 @@ def test_a_sphere_that_changes_size_is_drawn_anew_and_nothing_else_is():
 def test_a_trail_grows_on_its_shell_and_moves_with_it():
     model = ball_model()
     player = SimpleNamespace(
+        patches=None,
         scene=SimpleNamespace(
             model=model, pairs=(contact_pair(model, "ball", 0.05, plate(), "table"),)
         ),

@@ -43,17 +43,20 @@ void bind_contact(nb::module_& m) {
            [](const NormalLaw& law, double depth) { return depth > 0 ? law.energy(depth) : 0.0; });
   bind_family<FrictionLaw>(m, "FrictionLaw")
       .def_prop_ro("has_state", &FrictionLaw::has_state)
+      .def_prop_ro("torsional", &FrictionLaw::torsional)
       .def("coefficient", &FrictionLaw::coefficient, nb::arg("speed"));
   m.def(
       "contact_force",
       [](const NormalLaw& law, const FrictionLaw* friction, double depth, const Vec3& normal,
-         const Vec3& relative, double spin, const Vec3& bristle, double radius, double relaxation) {
-        const ContactKinematics<double> kinematics{depth, normal, relative, spin, bristle};
+         const Vec3& relative, double spin, const Vec3& rolling, const Vec3& bristle, double radius,
+         double relaxation) {
+        const ContactKinematics<double> kinematics{depth, normal, relative, spin, bristle, rolling};
         const ContactForce<double> f = contact_force(law, friction ? *friction : FrictionLaw(),
                                                      radius, relaxation, kinematics);
-        return nb::make_tuple(f.normal, f.friction, f.torsion, f.bristle_rate);
+        const Vec3 moment = f.torsion * normal + f.rolling;
+        return nb::make_tuple(f.normal, f.friction, moment, f.bristle_rate);
       },
       nb::arg("law"), nb::arg("friction").none(), nb::arg("depth"), nb::arg("normal"),
-      nb::arg("relative"), nb::arg("spin"), nb::arg("bristle"), nb::arg("radius"),
-      nb::arg("relaxation"));
+      nb::arg("relative"), nb::arg("spin"), nb::arg("rolling"), nb::arg("bristle"),
+      nb::arg("radius"), nb::arg("relaxation"));
 }

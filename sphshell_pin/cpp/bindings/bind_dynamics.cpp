@@ -170,7 +170,8 @@ void bind_dynamics(nanobind::module_& m) {
            nb::arg("shell").none(), nb::arg("source").none(), nb::arg("method"), nb::arg("law"),
            nb::arg("friction").none());
 
-  m.def("contact_row_type", &contact_row_type);
+  m.def("contact_row_type", [] { return row_type<ContactRow>(kContactRowFields); });
+  m.def("patch_row_type", [] { return row_type<PatchRow>(kPatchRowFields); });
 
   nb::class_<JointEffects>(m, "JointEffects")
       .def(
@@ -302,15 +303,18 @@ void bind_dynamics(nanobind::module_& m) {
       .def(
           "__init__",
           [](RunSettings* self, std::string integrator, double dt, double rtol, double atol,
-             double duration, double start_time, double control_dt, double record_dt) {
+             double duration, double start_time, double control_dt, double record_dt,
+             bool patches) {
             new (self) RunSettings{{std::move(integrator), dt, rtol, atol},
                                    duration,
                                    start_time,
                                    control_dt,
-                                   record_dt};
+                                   record_dt,
+                                   patches};
           },
           nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"), nb::arg("atol"),
-          nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"));
+          nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"),
+          nb::arg("patches"));
 
   nb::class_<OneUser>(m, "OneUser").def(nb::init<std::string>(), nb::arg("what"));
   // Entered and left in one instruction of Python each, so that Ctrl-C cannot come between.

@@ -2,16 +2,10 @@
 
 namespace sphshell {
 
-Array<std::uint8_t> to_bytes(std::vector<ContactRow> rows) {
-  auto* kept = new std::vector<ContactRow>(std::move(rows));
-  nb::capsule owner(kept,
-                    [](void* p) noexcept { delete static_cast<std::vector<ContactRow>*>(p); });
-  return Array<std::uint8_t>(kept->data(), {kept->size() * sizeof(ContactRow)}, owner);
-}
-
-nb::dict contact_row_type() {
+nb::dict row_type(const RowField* fields, std::size_t count, std::size_t size) {
   nb::list names, formats, offsets;
-  for (const RowField& field : kContactRowFields) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const RowField& field = fields[i];
     names.append(field.name);
     formats.append(field.size == 1 ? nb::object(nb::str(field.type))
                                    : nb::make_tuple(field.type, field.size));
@@ -21,7 +15,7 @@ nb::dict contact_row_type() {
   out["names"] = names;
   out["formats"] = formats;
   out["offsets"] = offsets;
-  out["itemsize"] = sizeof(ContactRow);
+  out["itemsize"] = size;
   return out;
 }
 
@@ -41,6 +35,7 @@ nb::dict to_dict(Record record, int nq, int nv) {
   out["energy"] = to_array(std::move(record.energy), {n, std::size_t(Record::kEnergies)});
   out["contact_row"] = to_array(std::move(record.contact_row));
   out["contacts"] = to_bytes(std::move(record.contacts));
+  if (record.patches) out["patches"] = to_bytes(std::move(*record.patches));
   out["event_t"] = to_array(std::move(event_t));
   out["event_pair"] = to_array(std::move(event_pair));
   out["event_kind"] = to_array(std::move(event_kind));

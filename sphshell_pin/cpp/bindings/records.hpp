@@ -3,6 +3,7 @@
 
 #include <nanobind/nanobind.h>
 
+#include <utility>
 #include <vector>
 
 #include "bindings/arrays.hpp"
@@ -10,10 +11,19 @@
 
 namespace sphshell {
 
-// The memory of rows; NumPy's view of it with contact_row_type() has named fields.
-Array<std::uint8_t> to_bytes(std::vector<ContactRow> rows);
-// Arguments of numpy.dtype.
-nb::dict contact_row_type();
+// The memory of rows; NumPy's view of it with row_type() of their fields has named fields.
+template <class Row>
+Array<std::uint8_t> to_bytes(std::vector<Row> rows) {
+  auto* kept = new std::vector<Row>(std::move(rows));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Row>*>(p); });
+  return Array<std::uint8_t>(kept->data(), {kept->size() * sizeof(Row)}, owner);
+}
+// Arguments of numpy.dtype, of a row of `size` [B].
+nb::dict row_type(const RowField* fields, std::size_t count, std::size_t size);
+template <class Row, std::size_t count>
+nb::dict row_type(const RowField (&fields)[count]) {
+  return row_type(fields, count, sizeof(Row));
+}
 nb::dict to_dict(Record record, int nq, int nv);
 nb::dict to_dict(const Counts& counts);
 // (pair, depth [m]), or None.

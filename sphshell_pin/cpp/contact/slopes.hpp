@@ -30,6 +30,7 @@ struct ContactSite {
   double disc_radius;  // that the laws take: see Pair::disc_radius [m]
   Vector6 twist;
   Vec3 stretch;                         // of the bristle [m]
+  Vec3 outer[kMostRings - 1];           // of its rings behind the first
   const ContactShape* shape = nullptr;  // of Hertz's law
 };
 
@@ -41,6 +42,14 @@ struct ContactSlopes {
   Mat3 rate_by_place;  // of the bristle's rate
   Matrix36 rate_by_twist;
   Mat3 rate_by_stretch;
+  // The same of the rings of a bristle behind the first.
+  struct Ring {
+    Matrix63 by_stretch;
+    Mat3 rate_by_place;
+    Matrix36 rate_by_twist;
+    Mat3 first_by_stretch;  // of the first ring's rate
+    Mat3 rate_by_first, rate_by_outer[kMostRings - 1];
+  } outer[kMostRings - 1];
 };
 
 // Exact, but that the contact's turn is held where the bristle turns with the normal: what that

@@ -32,25 +32,26 @@ Bristles::Bristles(std::vector<int> groups)
     : groups_(std::move(groups)),
       known_(groups_.size()),
       pools_(groups_.empty() ? 0 : static_cast<std::size_t>(groups_.back()) + 1),
-      has_(groups_.size(), 0) {}
+      rings_(groups_.size(), 0) {}
 
-void Bristles::add(std::size_t k) {
-  has_[k] = 1;
+void Bristles::add(std::size_t k, int rings) {
+  rings_[k] = rings;
   Pool& pool = pools_[groups_[k]];
+  pool.rings = std::max(pool.rings, rings);
   pool.shared = pool.count > 0;
   pool.count = std::min(pool.count + kSpare, kMostSpare);
   pool.taken.reserve(kMostSpare);
   size_ = 0;
   for (Pool& one : pools_) {
     one.first = size_;
-    size_ += one.count;
+    size_ += one.count * one.rings;
   }
 }
 
 int Bristles::slot(std::size_t k, int place) {
-  if (!has_[k]) return -1;
+  if (!rings_[k]) return -1;
   const Known& known = known_[k];
-  if (place < known.count) return known.first + place;
+  if (place < known.count) return known.first + place * rings_[k];
   Pool& pool = pools_[groups_[k]];
   int spare = place - known.count;
   if (pool.shared) {
@@ -59,7 +60,7 @@ int Bristles::slot(std::size_t k, int place) {
     spare = static_cast<int>(at - pool.taken.begin());
     if (at == pool.taken.end() && spare < pool.count) pool.taken.push_back(contact);
   }
-  return spare < pool.count ? pool.first + spare : -1;
+  return spare < pool.count ? pool.first + spare * pool.rings : -1;
 }
 
 void Bristles::restart() {
@@ -71,17 +72,18 @@ void Bristles::assign_none(std::size_t k) { close(k, stretches_.size()); }
 // The stretches from `begin` on are those of pair k; behind the last pair of a group come its spare
 // slots.
 void Bristles::close(std::size_t k, std::size_t begin) {
-  known_[k] = {static_cast<int>(begin), static_cast<int>(stretches_.size() - begin)};
+  const std::size_t slots = stretches_.size() - begin;
+  known_[k] = {static_cast<int>(begin), static_cast<int>(slots) / std::max(rings_[k], 1)};
   if (k + 1 < groups_.size() && groups_[k + 1] == groups_[k]) return;
   Pool& pool = pools_[groups_[k]];
   pool.first = static_cast<int>(stretches_.size());
   pool.taken.clear();
-  stretches_.resize(stretches_.size() + pool.count, Vec3::Zero());
+  stretches_.resize(stretches_.size() + pool.count * pool.rings, Vec3::Zero());
 }
 
-Vec3 Bristles::stretch(std::size_t k, int place, const VectorX& z) {
+Vec3 Bristles::stretch(std::size_t k, int place, int ring, const VectorX& z) {
   const int at = slot(k, place);
-  return at < 0 ? Vec3::Zero() : Vec3(z.segment<3>(3 * at));
+  return at < 0 ? Vec3::Zero() : Vec3(z.segment<3>(3 * (at + ring)));
 }
 
 void Bristles::assign(std::size_t k, const std::vector<Contact>& contacts,
@@ -89,15 +91,17 @@ void Bristles::assign(std::size_t k, const std::vector<Contact>& contacts,
                       bool torsional, bool turned) {
   const auto& places = tracker.places();
   const int known = static_cast<int>(tracker.known());
+  const int rings = rings_[k];
   const std::size_t begin = stretches_.size();
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    Vec3 x = stretch(k, at[i], z);
-    const Vec3& normal = contacts[i].normal;
-    if (!turned) x = Eigen::Quaterniond::FromTwoVectors(places[at[i]].normal, normal) * x;
-    stretches_.push_back(torsional ? x : flattened(x, normal));
-  }
-  const auto add = [&](std::size_t i, const Vec3& x) {
-    stretches_[begin + i] += torsional ? x : flattened(x, contacts[i].normal);
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    for (int ring = 0; ring < rings; ++ring) {
+      Vec3 x = stretch(k, at[i], ring, z);
+      const Vec3& normal = contacts[i].normal;
+      if (!turned) x = Eigen::Quaterniond::FromTwoVectors(places[at[i]].normal, normal) * x;
+      stretches_.push_back(torsional ? x : flattened(x, normal));
+    }
+  const auto add = [&](std::size_t i, int ring, const Vec3& x) {
+    stretches_[begin + i * rings + ring] += torsional ? x : flattened(x, contacts[i].normal);
   };
   used_.clear();
   const auto is_used = [&](int place) {
@@ -117,9 +121,11 @@ void Bristles::assign(std::size_t k, const std::vector<Contact>& contacts,
     const int parent = minimum_near(point, [&](int p) { return p < known; });
     if (minimum < 0 || parent < 0) continue;
     used_.push_back(at[minimum]);
-    const Vec3 x = stretches_[begin + parent];
-    add(saddle, x);
-    add(static_cast<std::size_t>(minimum), x);
+    for (int ring = 0; ring < rings; ++ring) {
+      const Vec3 x = stretches_[begin + parent * rings + ring];
+      add(saddle, ring, x);
+      add(static_cast<std::size_t>(minimum), ring, x);
+    }
   }
   // A minimum and a saddle merge and end: the next contact takes over their stretch.
   for (int saddle = 0; saddle < known; ++saddle) {
@@ -131,7 +137,9 @@ void Bristles::assign(std::size_t k, const std::vector<Contact>& contacts,
     const int successor = minimum_near(point, [](int) { return true; });
     if (minimum < 0 || successor < 0) continue;
     used_.push_back(minimum);
-    add(static_cast<std::size_t>(successor), stretch(k, minimum, z) - stretch(k, saddle, z));
+    for (int ring = 0; ring < rings; ++ring)
+      add(static_cast<std::size_t>(successor), ring,
+          stretch(k, minimum, ring, z) - stretch(k, saddle, ring, z));
   }
   close(k, begin);
 }

@@ -15,7 +15,16 @@ struct ContactRow {
   Feature feature;
 };
 
-// The fields of a ContactRow; Python's structured type is made of them.
+// The patch of a ContactRow by Hertz's geometry, where a run is asked for patches; nan where the
+// geometry of the contact is unknown. At a saddle the pressures are negative, as its force is.
+struct PatchRow {
+  double half_axes[2];                  // a >= b [m]
+  double axis[3];                       // unit, direction of a in the world
+  double peak_pressure, mean_pressure;  // [Pa]
+  double approach;                      // [m]
+};
+
+// The fields of a row; Python's structured type is made of them.
 struct RowField {
   const char* name;
   const char* type;  // NumPy's
@@ -33,6 +42,13 @@ inline constexpr RowField kContactRowFields[] = {
     {"element", "i4", 1, offsetof(ContactRow, element)},
     {"feature", "u1", 1, offsetof(ContactRow, feature)},
     {"contact_id", "i4", 1, offsetof(ContactRow, contact_id)},
+};
+inline constexpr RowField kPatchRowFields[] = {
+    {"half_axes", "f8", 2, offsetof(PatchRow, half_axes)},
+    {"axis_world", "f8", 3, offsetof(PatchRow, axis)},
+    {"peak_pressure", "f8", 1, offsetof(PatchRow, peak_pressure)},
+    {"mean_pressure", "f8", 1, offsetof(PatchRow, mean_pressure)},
+    {"approach", "f8", 1, offsetof(PatchRow, approach)},
 };
 
 }  // namespace sphshell

@@ -78,6 +78,18 @@ double FoundationPair::energy(const Pair& pair, std::size_t i) const {
   return law.modulus / law.thickness * foundation_.rows()[i].sum.energy;
 }
 
+PatchRow FoundationPair::patch(const Pair& pair, const Vec3& normal_world, double depth,
+                               double force) const {
+  const FoundationLaw& law = *pair.law.foundation();
+  const double radius = pair.disc_radius(), a2 = std::max(0.0, (2 * radius - depth) * depth);
+  const double near = pair.radius - depth, a = std::sqrt(a2);
+  const double peak = law.modulus / law.thickness * (pair.radius + near) * depth / (2 * near);
+  PatchRow out{{a, a}, {}, peak, force / (M_PI * a2), depth};
+  const Vec3 axis = normal_world.unitOrthogonal();
+  std::copy_n(axis.data(), 3, out.axis);
+  return out;
+}
+
 // Where a bristle acts, the row is taken for a spring of its stiffness at its present force. The
 // quadrature points stay where they are on the shell: there the pressure follows the center, and
 // the border of the overlap adds nothing, as it bears no pressure.
@@ -144,7 +156,7 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
 }
 
 // The force of a row of a foundation, in place of that of its depth.
-void SceneData::add_foundation(ActiveContact& active) {
+void SceneData::add_foundation(ActiveContact& active, const ContactKinematics<double>& m) {
   const Pair& pair = pairs_[active.pair];
   const PairState& state = states_[active.pair];
   const auto& turn = state.world_from_j.rotation();
@@ -156,7 +168,6 @@ void SceneData::add_foundation(ActiveContact& active) {
            (body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
   }
   const FoundationForce found = foundations_[active.pair].force(pair, active.row, velocity, spin);
-  const ContactKinematics<double>& m = active.kinematics;
   ContactForce<double>& f = active.force;
   f.elastic = found.elastic.norm();
   f.normal = std::max(0.0, active.contact.normal.dot(found.normal));
@@ -164,16 +175,17 @@ void SceneData::add_foundation(ActiveContact& active) {
   f.friction = whole - f.normal * m.normal;
   active.moment = turn * found.moment + (center - active.point).cross(whole);
   active.damping = found.damping, active.sliding = found.sliding;
-  if (active.slot < 0 && !pair.friction.has_state()) return;
-  // One bristle at the center of pressure.
+  if (!pair.friction.has_state()) return;
+  // One bristle at the center of pressure, on a disc as large as that of a plane.
   ContactForce<double> bristle;
   bristle.normal = f.normal, bristle.slip = f.slip;
   std::visit(
       [&](const auto& one) { one.add(bristle, m, 2 * pair.disc_radius(), relaxation(pair)); },
       pair.friction.law);
-  f.friction += bristle.friction, f.torsion = bristle.torsion;
-  f.bristle = bristle.bristle, f.bristle_rate = bristle.bristle_rate;
-  active.sliding = -bristle.friction.dot(f.slip) - bristle.torsion * m.spin;
+  active.sliding = friction_power(bristle, m);
+  bristle.elastic = f.elastic;
+  bristle.friction += f.friction;
+  f = bristle;
 }
 
 }  // namespace sphshell

@@ -6,6 +6,7 @@
 
 #include "contact/foundation.hpp"
 #include "contact/slopes.hpp"
+#include "dynamics/contact_row.hpp"
 #include "dynamics/pair.hpp"
 
 namespace sphshell {
@@ -28,6 +29,9 @@ class FoundationPair {
   FoundationForce force(const Pair& pair, std::size_t i, const Vec3& velocity,
                         const Vec3& spin) const;
   double energy(const Pair& pair, std::size_t i) const;  // [J]
+
+  // A disc as large as that of a plane at this depth, with the pressure of the closest point.
+  PatchRow patch(const Pair& pair, const Vec3& normal_world, double depth, double force) const;
 
   // As contact_slopes(), for row i.
   void slopes(const Pair& pair, std::size_t i, double relaxation, const ContactSite& site,

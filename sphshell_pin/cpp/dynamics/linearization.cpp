@@ -59,7 +59,7 @@ void Linearization::rates(const VectorX& q, const VectorX& v, const VectorX& z, 
     column = column_;
   };
   for (const ActiveContact& active : scene_.active())
-    for (int i = 0; i < 3 && active.slot >= 0; ++i) pass_through_inertia(3 * active.slot + i);
+    for (int i = 0; i < 3 * rings_of(active); ++i) pass_through_inertia(3 * active.slot + i);
   for (Eigen::Index i = scene_.joint_bristles(); i < z.size(); ++i) pass_through_inertia(i);
 }
 
@@ -143,6 +143,28 @@ void Linearization::add_bristle(const ActiveContact& active, const ContactSite& 
     jacobian.block<1, 3>(k, 2 * nv + z) += axis.transpose() * slopes_.by_stretch;
   }
   rate.middleCols<3>(2 * nv + z) = slopes_.rate_by_stretch;
+  const int outer = rings_of(active) - 1;
+  for (int r = 0; r < outer; ++r) {
+    const ContactSlopes::Ring& ring = slopes_.outer[r];
+    const Eigen::Index own = 2 * nv + z + 3 * (r + 1);
+    const Matrix36 by_displacement = ring.rate_by_place * displacement_at(site.place);
+    auto ring_rate = jacobian.middleRows<3>(nv + z + 3 * (r + 1));
+    for (int m = 0; m < chain.size(); ++m) {
+      const int k = chain.velocity(m);
+      const auto axis = chain.axes().col(m);
+      ring_rate.col(k) += by_displacement * axis + ring.rate_by_twist * chain.twist_by_q().col(m);
+      ring_rate.col(nv + k) += ring.rate_by_twist * axis;
+      jacobian.block<1, 3>(k, own) += axis.transpose() * ring.by_stretch;
+    }
+    rate.middleCols<3>(own) = ring.first_by_stretch;
+    ring_rate.middleCols<3>(2 * nv + z) = ring.rate_by_first;
+    for (int i = 0; i < outer; ++i)
+      ring_rate.middleCols<3>(2 * nv + z + 3 * (i + 1)) = ring.rate_by_outer[i];
+  }
+}
+
+int Linearization::rings_of(const ActiveContact& active) const {
+  return active.slot < 0 ? 0 : scene_.pairs()[active.pair].friction.rings();
 }
 
 ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& twist) const {
@@ -150,10 +172,12 @@ ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& t
   const PairState& state = scene_.states()[active.pair];
   const auto& turn = state.world_from_j.rotation();
   ContactSite site{
-      active.contact, state.center, !pair.source,        pair.radius, scene_.disc_radius(active),
-      twist,          Vec3::Zero(), scene_.shape(active)};
+      active.contact, state.center, !pair.source, pair.radius,         scene_.disc_radius(active),
+      twist,          Vec3::Zero(), {},           scene_.shape(active)};
   if (pair.source) site.place = site.contact.point;
   if (active.slot >= 0) site.stretch = turn.transpose() * active.kinematics.bristle;
+  for (int i = 1; i < rings_of(active); ++i)
+    site.outer[i - 1] = scene_.stretches().segment<3>(3 * (active.slot + i));
   return site;
 }
 

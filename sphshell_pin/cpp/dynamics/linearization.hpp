@@ -38,6 +38,7 @@ class Linearization {
   void add_joints(const VectorX& q, const VectorX& v, const VectorX& z, MatrixX& jacobian);
   void add_bristle(const ActiveContact& active, const ContactSite& site, const Chain& chain,
                    MatrixX& jacobian);
+  int rings_of(const ActiveContact& active) const;  // 0 without a bristle
   ContactSite site_of(const ActiveContact& active, const Vector6& twist) const;
 
   SceneData& scene_;

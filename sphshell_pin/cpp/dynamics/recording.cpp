@@ -6,7 +6,7 @@
 
 namespace sphshell {
 
-Recorder::Recorder(const SceneData& scene, double start, double end, double record_dt)
+Recorder::Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches)
     : start_(start),
       end_(end),
       record_dt_(record_dt),
@@ -15,12 +15,17 @@ Recorder::Recorder(const SceneData& scene, double start, double end, double reco
   const JointEffects* joints = scene.joints().effects();
   if (joints) limits_.resize(std::max(joints->most_effort.size(), joints->speed.size()));
   limit_status_.resize(limits_.size());
+  if (patches) record_.patches.emplace();
 }
 
-Record Recorder::take() { return std::exchange(record_, {}); }
+Record Recorder::take() {
+  Record next;
+  if (record_.patches) next.patches.emplace();
+  return std::exchange(record_, std::move(next));
+}
 
 Record Recorder::snapshot(SceneData& scene, const State& state) {
-  Record recorded = std::exchange(record_, {});
+  Record recorded = take();
   const long rows = std::exchange(rows_, 0);
   add_row(scene, state);
   rows_ = rows;
@@ -52,7 +57,7 @@ void Recorder::add_rows(SceneData& scene, const Chart& chart, const Stepper& ste
 }
 
 void Recorder::add_row(SceneData& scene, const State& state) {
-  scene.log(state.q, state.v, record_.contacts);
+  scene.log(state.q, state.v, record_.contacts, record_.patches ? &*record_.patches : nullptr);
   record_.contact_row.resize(record_.contacts.size(), double(rows_));
   record_.t.push_back(state.t);
   record_.q.insert(record_.q.end(), state.q.begin(), state.q.end());

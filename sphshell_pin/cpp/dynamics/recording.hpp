@@ -1,6 +1,7 @@
 // What a run keeps: rows of the motion, events, and figures of each pair.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "dynamics/integrators/stepper.hpp"
@@ -54,7 +55,8 @@ struct Record {
   static constexpr int kEnergies = 6;  // kinetic, potential, elastic, damping, friction, control
   std::vector<double> t, q, v, energy;
   std::vector<ContactRow> contacts;
-  std::vector<double> contact_row;  // the recorded row of each contact
+  std::optional<std::vector<PatchRow>> patches;  // of the contacts, where they are asked for
+  std::vector<double> contact_row;               // the recorded row of each contact
   std::vector<Event> events;
   SensorRows sensors;
 };
@@ -62,7 +64,7 @@ struct Record {
 class Recorder {
  public:
   // Rows every `record_dt` from `start` to `end` [s], and at `end`; 0: at the end of every step.
-  Recorder(const SceneData& scene, double start, double end, double record_dt);
+  Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches);
 
   // The scene's last evaluate() was at the state.
   void add_row(SceneData& scene, const State& state);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "contact/ball.hpp"
+#include "dynamics/patch.hpp"
 
 namespace sphshell {
 
@@ -25,7 +26,8 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
     if (pair.law.foundation()) foundations_.resize(pairs_.size());
     if (pair.friction.has_state()) {
-      bristles_.add(k);
+      bristles_.add(k, pair.friction.rings());
+      several_rings_ = several_rings_ || pair.friction.rings() > 1;
       if (pair.has_dn_dc()) queries_[k].want_dn_dc();
     }
     for (int j : {pair.joint_i, pair.joint_j}) {
@@ -240,6 +242,7 @@ void SceneData::compute_forces(const VectorX& z) {
   bristle_rates_.tail(joints_.size()) = joints_.rates();
   touching_ = !active_.empty();
   if (!touching_) return;
+  if (several_rings_) stretches_ = z;
   for (int j : loaded_) external_[j].setZero();
   for (PairState& state : states_) state.clear_sums();
   for (ActiveContact& active : active_) {
@@ -262,26 +265,39 @@ void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
     m.spin =
         m.normal.dot(body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
   if (const ContactShape* gap = shape(active)) m.scale = gap->scale, m.depth = gap->depth;
+  if (pair.friction.rolls()) {
+    const Vec3 spin = body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j);
+    m.rolling = spin - spin.dot(m.normal) * m.normal;
+  }
   if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
 }
 
 void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   const Pair& pair = pairs_[active.pair];
-  active.force = contact_force(pair.law, pair.friction, disc_radius(active), relaxation(pair),
-                               active.kinematics);
-  if (active.row >= 0) add_foundation(active);
+  const auto& rotation = states_[active.pair].world_from_j.rotation();
+  const int at = 3 * active.slot, rings = active.slot >= 0 ? pair.friction.rings() : 1;
+  Vec3 outer[kMostRings - 1], outer_rate[kMostRings - 1];
+  ContactKinematics<double> m = active.kinematics;
+  if (rings > 1) {
+    for (int i = 1; i < rings; ++i) outer[i - 1] = rotation * z.segment<3>(at + 3 * i);
+    m.outer = outer;
+    m.outer_rate = outer_rate;
+  }
+  active.force = contact_force(pair.law, pair.friction, disc_radius(active), relaxation(pair), m);
+  if (active.row >= 0) add_foundation(active, m);
   // The energy also changes with the shape, as the sphere moves along the shell. It depends on the
   // sphere's center alone: that is where the force acts.
   if (const HertzLaw* hertz = pair.law.hertz(); hertz && active.shape >= 0) {
     const ContactShape& gap = *shape(active);
-    active.climb = states_[active.pair].world_from_j.rotation() *
-                   (active.force.elastic * gap.tilt - hertz->energy(gap.depth, 1) * gap.gradient);
+    active.climb =
+        rotation * (active.force.elastic * gap.tilt - hertz->energy(gap.depth, 1) * gap.gradient);
   }
   if (active.slot < 0) return;
-  const auto& rotation = states_[active.pair].world_from_j.rotation();
-  const int at = 3 * active.slot;
   bristle_rates_.segment<3>(at) =
       rotation.transpose() * active.force.bristle_rate + rate_of_turning(active, z.segment<3>(at));
+  for (int i = 1; i < rings; ++i)
+    bristle_rates_.segment<3>(at + 3 * i) = rotation.transpose() * outer_rate[i - 1] +
+                                            rate_of_turning(active, z.segment<3>(at + 3 * i));
 }
 
 // How fast a stretch turns with the normal, in the shell's frame.
@@ -301,7 +317,7 @@ ContactWrench SceneData::wrench(const ActiveContact& active) const {
   const Vec3& normal = active.kinematics.normal;
   const double weight = active.contact.weight;
   ContactWrench out{active.point, weight * (f.normal * normal + f.friction),
-                    weight * f.torsion * normal + active.moment};
+                    weight * f.torsion * normal + weight * f.rolling + active.moment};
   if (active.shape >= 0) {
     const PairState& state = states_[active.pair];
     out.force += weight * active.climb;
@@ -342,12 +358,11 @@ void SceneData::add_force(const ActiveContact& active) {
     powers_.friction += weight * friction_power(f, m);
     powers_.elastic += share * pair.law.energy(m.depth, m.scale);
   }
+  if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.stretch2;
   if (const ContactShape* gap = shape(active)) {
     state.conformity = std::max(state.conformity, gap->conformity);
     state.half_axis = std::max(state.half_axis, gap->half_axes(m.depth)[0] / pair.radius);
   }
-  if (active.slot >= 0)
-    powers_.bristles += 0.5 * share * pair.friction.bristle()->stiffness * f.bristle.squaredNorm();
 }
 
 void SceneData::apply(int joint, const Vec3& point_world, const Vec3& force_world,
@@ -366,7 +381,8 @@ Vec3 SceneData::relative_velocity(const Pair& pair, const Vec3& point_world) con
 }
 
 // Contacts of one place as one, with the sum of their forces.
-void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows) {
+void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows,
+                    std::vector<PatchRow>* patches) {
   if (active_.empty()) return;
   if (!needs_velocity_) body_.kinematics(q, v);
   const auto write = [](double* to, const Vec3& x) { std::copy_n(x.data(), 3, to); };
@@ -403,6 +419,11 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     row.element = whole.element;
     row.contact_id = active.contact_id;
     row.feature = whole.feature;
+    if (patches)
+      patches->push_back(
+          active.row >= 0
+              ? foundations_[active.pair].patch(pair, normal, row.depth, row.normal_force)
+              : hertz_patch(pair.disc_radius(), normal, row.depth, row.normal_force));
   }
 }
 

@@ -82,14 +82,18 @@ class SceneData {
   void accept(VectorX& z);
   // Returns to the accepted state: forgets the contacts found since.
   void restart();
-  // Rows of the contacts at (q, v), where the forces were last evaluated.
-  void log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows);
+  // Rows of the contacts at (q, v), where the forces were last evaluated; with `patches` those of
+  // their patches, too.
+  void log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows,
+           std::vector<PatchRow>* patches = nullptr);
 
   // Size of z, spare slots for new contacts included; where those of joints begin.
   int bristle_size() const { return bristles_.size() + joints_.size(); }
   int joint_bristles() const { return bristles_.size(); }
   // Of the last evaluate() (bristle_size) [m/s].
   const VectorX& bristle_rates() const { return bristle_rates_; }
+  // Where there are bristles of several rings, z of the last evaluate().
+  const VectorX& stretches() const { return stretches_; }
   // Bristles give way no faster than this [s]: explicit fixed steps ask for it.
   void relax_in(double time) { relaxation_ = time; }
   double relaxation(const Pair& pair) const { return std::max(relaxation_, pair.relaxation); }
@@ -141,7 +145,7 @@ class SceneData {
   void compute_forces(const VectorX& z);
   void compute_kinematics(ActiveContact& active, const VectorX& z);
   void compute_force(ActiveContact& active, const VectorX& z);
-  void add_foundation(ActiveContact& active);
+  void add_foundation(ActiveContact& active, const ContactKinematics<double>& m);
   void add_force(const ActiveContact& active);
   void apply(int joint, const Vec3& point_world, const Vec3& force_world, const Vec3& moment_world);
   Vec3 rate_of_turning(const ActiveContact& active, const Vec3& stretch) const;
@@ -166,11 +170,12 @@ class SceneData {
   std::vector<int> loaded_;  // joints that contacts act on
   Powers powers_;
   Bristles bristles_;
-  VectorX bristle_rates_, joint_stretches_;
+  VectorX bristle_rates_, joint_stretches_, stretches_;
   double relaxation_ = 0;
   bool touching_ = false;
   bool needs_velocity_ = false;
   bool wants_second_ = false;  // derivatives of shapes and of foundations
+  bool several_rings_ = false;
 };
 
 }  // namespace sphshell

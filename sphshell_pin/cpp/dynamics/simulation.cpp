@@ -48,7 +48,7 @@ Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
       stepping_(
           scene_, *this, settings_,
           state_at(settings_.start_time, std::move(q0), std::move(v0), scene_.bristle_size())),
-      recorder_(scene_, settings_.start_time, end(), settings_.record_dt),
+      recorder_(scene_, settings_.start_time, end(), settings_.record_dt, settings_.patches),
       tau_(VectorX::Zero(model.nv)),
       cut_(static_cast<std::size_t>(model.nv), 0),
       next_control_(settings_.start_time) {

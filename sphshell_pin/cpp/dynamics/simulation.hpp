@@ -19,6 +19,7 @@ struct RunSettings : StepSettings {
   double duration = 0, start_time = 0;  // [s]
   double control_dt = 0;  // hold the torques this long [s]; 0: evaluate at every stage
   double record_dt = 0;   // between recorded rows [s]; 0: every step
+  bool patches = false;   // record those of contacts
 };
 
 // A sphere that starts too deep in a shell for its contacts to be trusted.

@@ -156,7 +156,9 @@ Stepping::Made Stepping::make_controlled(double end) {
   active_->complete(chart_, next_);
   if (after_event_)
     for (const ActiveContact& active : scene_.active())
-      if (active.slot >= 0 && scene_.is_new(active)) next_.z.segment<3>(3 * active.slot).setZero();
+      if (active.slot >= 0 && scene_.is_new(active))
+        next_.z.segment(3 * active.slot, 3 * scene_.pairs()[active.pair].friction.rings())
+            .setZero();
   // PI control (Gustafsson 1991).
   double factor = 0.9 * std::pow(std::max(error, 1e-10), -0.7 / order) *
                   std::pow(std::max(last_error_, 1e-10), 0.4 / order);
@@ -219,11 +221,16 @@ double Stepping::error_norm() const {
   for (const ActiveContact& active : scene_.active()) {
     // A contact that begins at the end of the step is not stretched yet.
     if (active.slot < 0 || scene_.is_new(active)) continue;
-    const BristleFriction& friction = *scene_.pairs()[active.pair].friction.bristle();
-    const Vec3 z = y.segment<3>(2 * nv + 3 * active.slot);
-    const double limit = friction.mu_static * active.force.normal / friction.stiffness;
-    const double e = error.segment<3>(2 * nv + 3 * active.slot).norm();
-    worst = std::max(worst, e / (1e-6 * atol + rtol * (z.norm() + limit)));
+    const FrictionLaw& friction = scene_.pairs()[active.pair].friction;
+    const double stiffness = active.force.stiffness;
+    const double limit = friction.sticking()->mu_static * active.force.normal / stiffness;
+    for (int i = 0; i < friction.rings(); ++i) {
+      const auto stretch = [&](const VectorX& z) {
+        return friction.stretch(z.segment<3>(2 * nv + 3 * (active.slot + i)), active.contact.normal,
+                                stiffness);
+      };
+      worst = std::max(worst, stretch(error) / (1e-6 * atol + rtol * (stretch(y) + limit)));
+    }
   }
   const int first = 2 * nv + scene_.joint_bristles();
   for (int i = 0; i < scene_.joints().size(); ++i) {

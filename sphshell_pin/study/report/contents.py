@@ -60,7 +60,7 @@ class Finding:
         """Whether the aim is met; None without an aim. NaN does not meet any."""
         if self.aim is None:
             return None
-        return self.value <= self.aim if self.sense == "<=" else self.value >= self.aim
+        return bool(self.value <= self.aim if self.sense == "<=" else self.value >= self.aim)
 
     @property
     def text(self) -> str:

@@ -8,7 +8,7 @@ import json
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -20,7 +20,7 @@ from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.study.report import forces, hard_cases, integrators, peers, queries, steps
 from sphshell_pin.study.report.contents import Column, Progress, Section, Table, findings_table
 from sphshell_pin.study.report.machine import describe
-from sphshell_pin.study.report.page import render
+from sphshell_pin.study.report.page import SPEED, Heading, render
 
 PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
 _OWN = (".csv", ".png")
@@ -62,6 +62,7 @@ class Report:
 
     sections: list[Section]
     machine: dict[str, str]
+    heading: Heading = SPEED
 
     @property
     def failed(self) -> list[Section]:
@@ -76,11 +77,14 @@ def make_report(
     with_peers: bool = False,
     command: str = "",
     tell: Tell | None = None,
+    parts: Sequence[Part] | None = None,
+    heading: Heading = SPEED,
 ) -> Report:
     """Measure everything, then write the page and its tables to the folder `out`.
 
     An error of one section is stated in that section. Nothing is written before all is measured, so
-    that an interrupted run leaves what was there. `tell` is called with the progress.
+    that an interrupted run leaves what was there. `tell` is called with the progress. `parts` take
+    the place of all that is measured else, under their own `heading`.
 
     Raises
     ------
@@ -91,7 +95,11 @@ def make_report(
     """
     new_figure(1.0, 1.0)  # raises now what would be raised at the end
     with _report_folder(out) as place:
-        report = _measure(quick, with_peers, command, tell)
+        if parts is None:
+            parts = (*PARTS, PEERS) if with_peers else PARTS
+        report = dataclasses.replace(_measure(parts, quick, command, tell), heading=heading)
+        if heading is SPEED and not with_peers:
+            report.sections.append(peers.left_out())
         _write(report, out, place)
     return report
 
@@ -109,10 +117,9 @@ def _report_folder(out: Path) -> Iterator[AtomicFolder]:
         yield place
 
 
-def _measure(quick: bool, with_peers: bool, command: str, tell: Tell | None) -> Report:
+def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell | None) -> Report:
     begin = time.perf_counter()
     machine = describe(command)
-    parts = (*PARTS, PEERS) if with_peers else PARTS
     whole = sum(part.seconds[not quick] for part in parts)
     sections, done = [], 0.0
     for part in parts:
@@ -127,8 +134,6 @@ def _measure(quick: bool, with_peers: bool, command: str, tell: Tell | None) -> 
         progress(0.0)
         sections.append(measured(part, quick=quick, progress=progress))
         done += share
-    if not with_peers:
-        sections.append(peers.left_out())
     machine["measured in"] = f"{time.perf_counter() - begin:.0f} s{', quick' if quick else ''}"
     return Report(sections, machine)
 
@@ -159,7 +164,7 @@ def _write(report: Report, out: Path, place: AtomicFolder) -> None:
     files = {name: text.encode() for name, text in texts.items()}
     files |= {f"{picture.name}.png": picture.png for picture in pictures}
     files[DATA] = json_text(report, sorted(files)).encode()
-    files[PAGE] = render(report.sections, report.machine).encode()
+    files[PAGE] = render(report.sections, report.machine, report.heading).encode()
     try:
         desk = place.desk()
         for name, content in files.items():

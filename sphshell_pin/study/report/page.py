@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from string import Template
@@ -10,10 +11,25 @@ from string import Template
 from sphshell_pin.study.report.contents import Finding, Picture, Section, Table, findings_table
 
 TEMPLATE = Path(__file__).with_name("page.html")
-TITLE = "sphshell_pin: speed against error"
 
 
-def render(sections: list[Section], machine: dict[str, str]) -> str:
+@dataclass(frozen=True)
+class Heading:
+    """The title of a page and the text below it."""
+
+    title: str
+    text: str
+
+
+SPEED = Heading(
+    "sphshell_pin: speed against error",
+    "Contact of spheres with CAD surfaces, measured on this machine in one run. Figures are "
+    "medians; ratios are taken round by round, of contestants that take turns on one core, and are "
+    "shown with their quartiles. Aims are those of the design.",
+)
+
+
+def render(sections: list[Section], machine: dict[str, str], heading: Heading = SPEED) -> str:
     """Return the page."""
     findings = [f for section in sections for f in section.findings]
     judged = [f.met for f in findings if f.met is not None]
@@ -23,7 +39,8 @@ def render(sections: list[Section], machine: dict[str, str]) -> str:
         tally += f" {failed} section{'s' * (failed > 1)} could not be measured."
     missing = '<span class="missed"> not measured</span>'
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
-        title=escape(TITLE),
+        title=escape(heading.title),
+        introduction=escape(heading.text),
         tally=tally,
         cards="".join(_card(f) for f in findings if f.headline),
         links="".join(

@@ -405,4 +405,5 @@ class Live:
             "scale": str(self.picture.arrow_scale),
             "cut": self.picture.cut,
             "coloring": self.picture.display.coloring,
+            "pressure": self.picture.pressure,
         }

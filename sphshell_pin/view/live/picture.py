@@ -24,6 +24,7 @@ from sphshell_pin.view.nodes import (
     set_object,
     show,
 )
+from sphshell_pin.view.patches import PatchRows, PatchScale
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -74,6 +75,12 @@ class Picture:
         """What the length of an arrow means now."""
         return self.display.arrow_scale
 
+    @property
+    def pressure(self) -> str | None:
+        """What the colors and sizes of patches mean; None without any in the picture."""
+        shown = self.shown["points"] and self.display.draws_patches
+        return str(self.display.patch_scale) if shown else None
+
     def update(self, player: Player, push: PushShown | None) -> None:
         """Show the state of `player`, and a `push` on a body."""
         if player.scene.pairs is not self._pairs:
@@ -85,7 +92,9 @@ class Picture:
         contacts = player.contacts
         scale = self._scale.update(contacts)
         self.display.arrow_scale = scale
-        self.display.update(player.q, contacts)
+        if player.patches is not None:
+            self.display.patch_scale = self._scale.of_patches(player.patches)
+        self.display.update(player.q, contacts, player.patches)
         if self.shown["cones"]:
             self._cones.update(contacts, self._pairs, scale)
         if self.shown["trails"]:
@@ -190,6 +199,7 @@ class _Scale:
 
     def __init__(self, scene: Scene, view: View) -> None:
         radii = [one.radius for pair in scene.pairs for one in pair.spheres]
+        self._size = view.distance
         self._length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
         self.factor = 1.0
         self.forget()
@@ -198,6 +208,14 @@ class _Scale:
         """Choose the scale again."""
         self._seen: list[float] = []
         self._found = ArrowScale.from_forces(np.zeros(0), self._length)
+        self._patches: list[PatchRows] = []
+        self._patch_scale = PatchScale(1.0)
+
+    def of_patches(self, patches: PatchRows) -> PatchScale:
+        if len(self._patches) < FRAMES_TO_SCALE and len(patches):
+            self._patches.append(patches)
+            self._patch_scale = PatchScale.of(np.concatenate(self._patches), self._size)
+        return self._patch_scale
 
     def update(self, contacts: SceneContacts) -> ArrowScale:
         if len(self._seen) < FRAMES_TO_SCALE and len(contacts):

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene import Scene, SceneContacts
     from sphshell_pin.scenario.knobs import Knob
     from sphshell_pin.scenario.player import Rows
+    from sphshell_pin.view.patches import PatchRows
 
 
 class Player(Protocol):
@@ -47,6 +48,10 @@ class Player(Protocol):
     @property
     def contacts(self) -> SceneContacts:
         """The contacts at this state."""
+
+    @property
+    def patches(self) -> PatchRows | None:
+        """The patches of `contacts`, None where they are not recorded."""
 
     @property
     def residual(self) -> float:

@@ -72,7 +72,8 @@ function greet(data) {
     return;
   }
   hello = data;
-  element("ramp-swatch").style.background = `linear-gradient(90deg, ${data.ramp.join(", ")})`;
+  for (const [name, ramp] of [["ramp", data.ramp], ["pressure", data.pressure_ramp]])
+    element(`${name}-swatch`).style.background = `linear-gradient(90deg, ${ramp.join(", ")})`;
   document.title = data.title;
   element("title").textContent = data.title;
   element("title").title = data.title;
@@ -155,6 +156,8 @@ function show(data) {
   element("run-word").textContent = data.running ? "Pause" : "Run";
   element("scale").textContent = data.scale;
   element("cut").hidden = !data.cut;
+  element("pressure").hidden = !data.pressure;
+  element("pressure").lastChild.textContent = data.pressure ?? "";
   element("coloring").hidden = !data.coloring;
   element("coloring").lastChild.textContent = data.coloring ?? "";
   sliders.speed.follow(data.speed);

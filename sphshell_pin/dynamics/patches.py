@@ -1,0 +1,49 @@
+"""The patches in which bodies touch, as runs record them where they are asked to."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin import _core
+from sphshell_pin.checks import read_only
+from sphshell_pin.errors import InvalidParameter
+
+RECORDED = ("patch",)
+"""What a run records only where it is asked to."""
+
+PATCH = np.dtype(_core.patch_row_type())
+"""One patch: `half_axes` (2,) a >= b [m], `axis_world` (3,) the direction of a, `peak_pressure` and
+`mean_pressure` [Pa], `approach` [m]. Numbers are nan where a contact's geometry is unknown."""
+
+Patches = NDArray[Any]  # (m,) of PATCH
+
+
+def check_record(record: Collection[str]) -> bool:
+    """Return whether `record` asks for patches; InvalidParameter if it asks for something else."""
+    if isinstance(record, str) or not isinstance(record, Collection):
+        raise InvalidParameter("record", record, "must be a list of names, such as ['patch']")
+    for name in record:
+        if name not in RECORDED:
+            valid = " or ".join(f"'{one}'" for one in RECORDED)
+            raise InvalidParameter("record", name, f"must be {valid}")
+    return "patch" in record
+
+
+def patches_of(rows: NDArray[np.uint8]) -> Patches:
+    """Return the patches in the memory of the core's rows, read-only."""
+    return read_only(np.frombuffer(rows, PATCH))
+
+
+def patch_columns(patches: Patches) -> dict[str, NDArray[np.float64]]:
+    """Return patches as named scalar columns, units in the names (for CSV, tables)."""
+    columns = {
+        "half_axis_a [m]": patches["half_axes"][:, 0],
+        "half_axis_b [m]": patches["half_axes"][:, 1],
+    }
+    columns |= {f"patch_axis_{a} [1]": patches["axis_world"][:, i] for i, a in enumerate("xyz")}
+    pressures = {f"{n} [Pa]": patches[n] for n in ("peak_pressure", "mean_pressure")}
+    return columns | pressures | {"approach [m]": patches["approach"]}

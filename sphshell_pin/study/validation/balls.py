@@ -1,0 +1,132 @@
+"""Free balls that collide: what the cases of impacts share. No gravity; all in the world frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+import sphshell_pin as sp
+from sphshell_pin.contact.friction import Friction
+from sphshell_pin.contact.normal_law import NormalLaw
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.study.validation.cases import Array
+
+GAP = 1e-3  # before the touch, over the radius
+PRECISE = 1e-9
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A solid ball: its radius [m], density [kg/m^3], velocity [m/s] and spin [rad/s] (3,)."""
+
+    radius: float
+    density: float
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def mass(self) -> float:
+        """Its mass [kg]."""
+        return 4 / 3 * math.pi * self.radius**3 * self.density
+
+
+@dataclass(frozen=True)
+class Impact:
+    """A collision: of each ball the velocity [m/s] and spin [rad/s] (n, 3) after it, and more.
+
+    `duration` [s] is from touch to lift-off, `t` (n,) [s] since the touch, `depth` [m] and `force`
+    [N] are those of the contact at its recorded rows, `result` is the run.
+    """
+
+    velocities: Array
+    spins: Array
+    duration: float
+    t: Array
+    depth: Array
+    force: Array
+    result: Result
+
+
+def plane(half: float) -> sp.Shell:
+    """Return a flat square z = 0 with sides of twice `half` [m]."""
+    corners = [[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]]
+    return sp.Shell(corners, [[0, 1, 2, 3]])
+
+
+def on_plane(
+    ball: Ball, law: NormalLaw, friction: Friction | None = None, *, rows: int = 0
+) -> Impact:
+    """Shoot the ball down at the plane z = 0; `rows` of the contact are recorded."""
+    model = _free([ball])
+    scene = sp.Scene(model)
+    shell = plane(20 * ball.radius)
+    scene.add_contact(sp.Sphere(ball.radius, "ball0"), shell, law=law, friction=friction)
+    height = ball.radius * (1 + GAP)
+    return _run(scene, [ball], [(0.0, 0.0, height)], law, ball.mass, -ball.velocity[2], rows)
+
+
+def head_on(
+    first: Ball, second: Ball, law: NormalLaw, friction: Friction | None = None, *, rows: int = 0
+) -> Impact:
+    """Let two balls collide along z, the first from above; `rows` of the contact are recorded."""
+    scene = sp.Scene(_free([first, second]))
+    balls = sp.Sphere(first.radius, "ball0"), sp.Sphere(second.radius, "ball1")
+    scene.add_contact(*balls, law=law, friction=friction)
+    away = (first.radius + second.radius) + GAP * min(first.radius, second.radius)
+    mass = first.mass * second.mass / (first.mass + second.mass)
+    speed = second.velocity[2] - first.velocity[2]
+    centers = [(0.0, 0.0, away), (0.0, 0.0, 0.0)]
+    return _run(scene, [first, second], centers, law, mass, speed, rows)
+
+
+def _free(balls: list[Ball]) -> pin.Model:
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    for k, ball in enumerate(balls):
+        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), f"free{k}")
+        inertia = pin.Inertia.FromSphere(ball.mass, ball.radius)
+        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+        model.addFrame(pin.Frame(f"ball{k}", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    return model
+
+
+def _run(
+    scene: sp.Scene,
+    balls: list[Ball],
+    centers: list[tuple[float, float, float]],
+    law: NormalLaw,
+    mass: float,
+    speed: float,
+    rows: int,
+) -> Impact:
+    gap = GAP * min(ball.radius for ball in balls)
+    expected = law.contact_time(law.depth_of(0.5 * mass * speed**2), speed)
+    # A lossy impact lasts longer than the undamped one, without end where nothing comes back.
+    duration = gap / speed + 4 * expected
+    q0 = np.concatenate([[*center, 0, 0, 0, 1] for center in centers])
+    v0 = np.concatenate([[*ball.velocity, *ball.spin] for ball in balls])
+    every = expected / rows if rows else duration / 50
+    result = sp.Simulation(scene, sp.Adaptive(PRECISE)).run(q0, v0, duration, record_dt=every)
+    times = {kind: [e.t for e in result.events if e.kind == kind] for kind in ("touch", "lift_off")}
+    (touch,), (left,) = times["touch"], times["lift_off"]
+    q, v = result.q[-1], result.v[-1]
+    turns = [
+        pin.Quaternion(*q[[7 * k + 6, 7 * k + 3, 7 * k + 4, 7 * k + 5]]) for k in range(len(balls))
+    ]
+    log = result.contacts
+    return Impact(
+        velocities=np.array(
+            [R.toRotationMatrix() @ v[6 * k : 6 * k + 3] for k, R in enumerate(turns)]
+        ),
+        spins=np.array(
+            [R.toRotationMatrix() @ v[6 * k + 3 : 6 * k + 6] for k, R in enumerate(turns)]
+        ),
+        duration=left - touch,
+        t=log.t - touch,
+        depth=log.depth,
+        force=log.normal_force,
+        result=result,
+    )

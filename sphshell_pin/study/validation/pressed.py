@@ -1,0 +1,65 @@
+"""Balls pressed together at rest."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+
+import sphshell_pin as sp
+from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.study.validation.cases import Outcome, case, read
+from sphshell_pin.study.validation.pictures import Panel, draw
+
+RADIUS, YOUNG, POISSON = 0.05, 2e10, 0.3
+
+
+@case(
+    "ssnv104",
+    "Two balls pressed together (Code_Aster SSNV104)",
+    source="Code_Aster, validation manual V6.04.104, SSNV104: contact of two spheres, "
+    "https://docaster-en-codeaster-doc-4113bb35b8213385c636b94f1536856d7f617.gitlab.io/manuals/"
+    "man_v/v6/v6.04.104/Solution_de_r_f_rence.html.",
+    setting="Radius 50 mm each, E 20 GPa, Poisson's ratio 0.3, approach 4 mm.",
+    bound="One part in ten thousand: the manual's figures have that many digits.",
+    leaves_out="A contact that is not small beside the ball: its radius is a fifth of the ball's. "
+    "The manual takes the same theory for its reference.",
+    files=("ssnv104",),
+)
+def two_balls() -> Outcome:
+    """Press two balls together, and compare pressure and radius of the contact."""
+    data = read("ssnv104")
+    law = sp.ImpactLaw.hertz(RADIUS, YOUNG, POISSON, YOUNG, POISSON, radius_2=RADIUS)
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "lift")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, RADIUS), pin.SE3.Identity())
+    model.addFrame(pin.Frame("upper", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    scene.add_contact(sp.Sphere(RADIUS, "upper"), sp.Sphere(RADIUS, "universe"), law=law)
+
+    def pressed(approach: float) -> tuple[float, float]:
+        """Return peak pressure [Pa] and radius [m] of the contact."""
+        seen = scene.contacts(np.array([2 * RADIUS - approach]), np.zeros(1))
+        radius = math.sqrt(RADIUS / 2 * float(seen.depth[0]))
+        return 1.5 * float(seen.normal_force[0]) / (math.pi * radius**2), radius
+
+    peak, radius = pressed(4e-3)
+    there = {name: float(data[name][0]) for name in ("pressure", "radius")}
+    apart = abs(peak / there["pressure"] - 1), abs(radius / there["radius"] - 1)
+    findings = [
+        Finding("pressure", "peak pressure, relative", apart[0], aim=1e-4, headline=True),
+        Finding("radius", "radius of the contact, relative", apart[1], aim=1e-4),
+    ]
+    approaches = np.linspace(1e-5, 5e-3, 60)
+    ours = np.array([pressed(one) for one in approaches])
+    curves = (
+        ("peak pressure [MPa]", 1e-6 * there["pressure"], 1e-6 * ours[:, 0]),
+        ("radius of the contact [mm]", 1e3 * there["radius"], 1e3 * ours[:, 1]),
+    )
+    x = 1e3 * approaches
+    panels = [
+        Panel("approach [mm]", label, [("Code_Aster", [4.0], [value])], [("ours", x, line)])
+        for label, value, line in curves
+    ]
+    return Outcome(findings, [draw("ssnv104", panels, "Peak pressure and radius of the contact.")])

@@ -1,0 +1,264 @@
+"""Balls that roll on a turntable, in a golf cup and on a curved track: closed forms, experiments.
+
+The runs are those of the hard cases (benchmarks/rolling.py), with other balls.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+
+import sphshell_pin as sp
+from sphshell_pin.benchmarks.rolling import Ball, in_bowl, in_cylinder, on_turntable, velocities
+from sphshell_pin.benchmarks.swing import GRAVITY
+from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.study.validation.balls import plane
+from sphshell_pin.study.validation.cases import Outcome, case, read
+from sphshell_pin.study.validation.pictures import Panel, Series, draw
+
+WOOD = 1e10  # Young's modulus [Pa]
+RESISTANCE = 0.005
+SHARE = 3e-5  # depth under the weight, over the radius: it does not count
+FILE = "rolling_balls"
+CLOSED = "The law has no scatter: 1e-4 is asked."
+
+
+def published(of: str) -> dict[str, float]:
+    """Return the published figures of one of the cases, by their names."""
+    data = read(FILE).where("case", of)
+    return dict(zip(data.texts("quantity"), data["value"].tolist(), strict=True))
+
+
+def wall(radius: float, angle: float, length: float, columns: int, rows: int = 1) -> sp.Shell:
+    """Return the inside of a cylinder of `radius` and `length` [m] about y, `angle` [rad] from -z.
+
+    It goes to both sides; with pi it is closed.
+    """
+    turn = np.linspace(-angle, angle, columns + 1)[: columns + (angle < math.pi)]
+    inward = np.stack([-np.sin(turn), np.zeros(turn.size), np.cos(turn)], axis=1)
+    along = np.linspace(-length / 2, length / 2, rows + 1)
+    vertices = [-radius * inward + [0.0, y, 0.0] for y in along]
+    k, line = np.arange(columns), turn.size * np.arange(rows)[:, None]
+    a, b = line + k, line + (k + 1) % turn.size
+    elements = np.stack([a, b, b + turn.size, a + turn.size], axis=-1).reshape(-1, 4)
+    normals = np.concatenate([inward] * (rows + 1))
+    return sp.Shell(np.concatenate(vertices), elements, normals=normals)
+
+
+@case(
+    "turntable",
+    "A ball on a turntable",
+    source="W. Weckesser, Am. J. Phys. 65 (1997) 736, "
+    "http://www.warrenweckesser.net/pubs/AJP_BallRolling.pdf; experiment: lecture demonstration "
+    "D5-21 of the University of Maryland, http://jedlik.phy.bme.hu/~hartlein/physics.umd.edu/"
+    "deptinfo/facilities/lecdem/d5-21.htm.",
+    setting="Three solid balls, of 5, 10 and 40 mm radius and 2, 50 and 900 g, that start rolling "
+    "at different places and speeds on tables of 20, 33.3 and 78 rpm. Stiff springs and "
+    "bristles.",
+    bound=CLOSED,
+    leaves_out="Rolling resistance and a table out of level, which let the orbits of an experiment "
+    "drift.",
+    files=(FILE,),
+)
+def turntable() -> Outcome:
+    """Roll three balls two orbits each."""
+    ratio = published("turntable")["ratio"]
+    shell, ratios, misses = plane(1.0), [], []
+    ours: list[Series] = []
+    theory: list[Series] = []
+    for mass, radius, rpm, place, velocity in (
+        (0.002, 0.005, 20.0, (0.1, 0.0), (0.0, 0.05)),
+        (0.050, 0.010, 100 / 3, (0.0, -0.05), (0.15, 0.0)),
+        (0.900, 0.040, 78.0, (-0.1, 0.1), (0.0, 0.2)),
+    ):
+        turn = 2 * math.pi * rpm / 60
+        stiffness = mass * GRAVITY / (SHARE * radius)
+        run = on_turntable(
+            Ball(mass, radius), shell, turn, place=place, velocity=velocity,
+            stiffness=stiffness, bristles=stiffness,
+        )  # fmt: skip
+        ratios.append(run.ratio)
+        # The velocity turns at `pace`: the center of the circle is at its left, v / pace away.
+        pace = ratio * turn
+        center = np.array(place) + np.array([-velocity[1], velocity[0]]) / pace
+        size = math.hypot(*velocity) / pace
+        path = run.result.q[:, :2]
+        away = np.linalg.norm(path - center, axis=1)
+        misses.append(np.abs(away / size - 1).max())
+        around = np.linspace(0, 2 * math.pi, 181)
+        ours.append((f"ours, {radius * 1e3:g} mm, {rpm:.3g} rpm", *(1e3 * path.T)))
+        circle = center[:, None] + size * np.array([np.cos(around), np.sin(around)])
+        theory.append(("circles at 2/7" if not theory else "_circle", *(1e3 * circle)))
+    findings = [
+        Finding(
+            "ratio",
+            "orbit over table, largest error relative to 2/7",
+            max(abs(seen / ratio - 1) for seen in ratios),
+            aim=1e-4,
+            headline=True,
+        ),
+        Finding(
+            "circle",
+            "largest distance of a path from its circle, over the radius",
+            max(misses),
+            aim=1e-4,
+        ),
+    ]
+    panel = Panel("x [mm]", "y [mm]", (), ours, theory, equal=True)
+    caption = "Paths of three balls on a turntable; the circles are those of the closed form."
+    return Outcome(findings, [draw("turntable", [panel], caption)])
+
+
+@case(
+    "golf_ball",
+    "A golf ball that rolls into the cup and out again",
+    source="M. Gualtieri et al., Golfer's dilemma, Am. J. Phys. 74 (2006) 497-501; sizes: "
+    "http://demonstrations.wolfram.com/RollingBallInsideACylinder/; experiments: Gutterballs and "
+    "rolling down the tubes, Am. J. Phys. 89 (2021) 459, https://pubs.aip.org/aapt/ajp/"
+    "article-abstract/89/5/459/1057354/.",
+    setting="Ball and cup of 21 and 54 mm radius, 46 g; the ball comes over the rim level, "
+    "touching the wall, and goes round at 30 rad/s. Stiff springs and bristles.",
+    bound=CLOSED,
+    leaves_out="Rolling and spinning resistance: a real ball loses height at every turn. The fall "
+    "over the rim, before the ball rolls on the wall.",
+    files=(FILE,),
+)
+def golf_ball() -> Outcome:
+    """Roll the ball three times down and up again."""
+    given = published("cylinder")
+    radius, cup, orbit = given["ball radius [m]"], given["cup radius [m]"], 30.0
+    upright = pin.SE3(pin.utils.rotate("x", math.pi / 2), np.zeros(3))
+    shell = wall(cup, math.pi, 0.2, columns=60, rows=30).transformed(upright)
+    run = in_cylinder(Ball(0.046, radius), shell, cup, orbit, stiffness=1e6)
+    t, height = run.result.t, run.result.q[:, 2] - run.swing
+    exact = run.swing * (np.cos(run.expected * orbit * t) - 1)
+    findings = [
+        Finding(
+            "ratio",
+            "frequency of bobbing over that of the orbit, error relative to sqrt(2/7)",
+            abs(run.ratio / given["ratio"] - 1),
+            aim=1e-4,
+            headline=True,
+        ),
+        Finding(
+            "height",
+            "height, largest distance from the closed form, over the depth of the fall",
+            float(np.abs(height - exact).max()) / (2 * run.swing),
+            aim=1e-3,
+        ),
+        Finding("lost", "speed around that is lost in three swings", abs(run.lost), aim=1e-4),
+    ]
+    panels = [
+        Panel(
+            "time [s]",
+            "height over the rim [mm]",
+            (),
+            [("ours", t, 1e3 * height)],
+            [("closed form", t, 1e3 * exact)],
+        ),
+    ]
+    caption = "The height of the ball's center over three swings, in six turns."
+    return Outcome(findings, [draw("golf_ball", panels, caption)])
+
+
+@case(
+    "curved_track",
+    "A ball that swings on a curved track",
+    source="L. Minkin and D. Sikes, Coefficient of rolling friction - Lab experiment, Am. J. Phys. "
+    "86 (2018) 77-78, https://pubs.aip.org/aapt/ajp/article/86/1/77/1045848/.",
+    setting="Track of 0.57 m radius, from rest at 0.15 m along it. The ball's size was not read: "
+    "a radius of 12.7 mm is taken; the normal force over the weight does not depend on it, and the "
+    "closed form of the period has it.",
+    bound="The published force has two digits: 0.005 of 0.97. The closed form of the period has no "
+    "scatter, that of the amplitudes is to second order in the angle: 1e-3. How linear: 1 %.",
+    leaves_out="The measured coefficient was not read: what is compared of the damping is its law, "
+    "amplitudes that fall off linearly, with a coefficient of 0.005. Air, and a coefficient that "
+    "changes with speed.",
+    files=(FILE,),
+)
+def curved_track() -> Outcome:
+    """Swing without rolling resistance, and compare force and period; then with it."""
+    given = published("track")
+    bend, angle = given["radius [m]"], given["displacement [m]"] / given["radius [m]"]
+    ball = Ball(0.067, 0.0127)
+    shell = wall(bend, 1.5 * angle, 0.05, columns=40)
+    run = in_bowl(ball, shell, bend, angle, stiffness=1e6)
+    result, weight = run.result, ball.mass * GRAVITY
+    force = result.contacts.normal_force / weight
+    turning = np.argmin(np.abs(result.t - run.expected / 2))
+    tilt = np.arctan2(result.q[:, 0], -result.q[:, 2])
+    # cos from gravity, and m v^2 / arm of the fall, of which rolling takes b / (1 + b).
+    b = ball.beta()
+    exact = np.cos(tilt) + 2 / (1 + b) * (np.cos(tilt) - math.cos(angle))
+    speed = np.linalg.norm(velocities(result), axis=1)
+    resisting = sp.BristleFriction.mindlin(
+        1.0, None, WOOD, 0.3, damping_time=1e-4, rolling=RESISTANCE
+    )
+    damped = in_bowl(ball, shell, bend, angle, stiffness=1e6, friction=resisting, periods=4).result
+    place = bend * np.arctan2(damped.q[:, 0], -damped.q[:, 2])
+    turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(place))))
+    heights, count = np.abs(place[turns]), np.arange(1, turns.size + 1)
+    line = np.polynomial.Polynomial.fit(count, heights, 1).convert()
+    swings = [angle]
+    for _ in turns:
+        # The work of the resistance for each radian, to second order of the angle.
+        swings.append(swings[-1] - 2 * RESISTANCE * (1 + 10 / 21 * (swings[-1] - RESISTANCE) ** 2))
+    expected = bend * np.array(swings[1:])
+    findings = [
+        Finding(
+            "force",
+            "normal force over weight where the ball turns, relative to the published one",
+            abs(force[turning] / given["normal force over weight"] - 1),
+            aim=0.005 / given["normal force over weight"],
+            headline=True,
+        ),
+        Finding(
+            "period", "period, relative to the closed form", abs(run.period / run.expected - 1),
+            aim=1e-4,
+        ),
+        Finding(
+            "forces",
+            "normal force over weight on the way, largest distance from the closed form",
+            float(np.abs(force - exact)[20:].max()),
+            aim=1e-3,
+        ),
+        Finding(
+            "linear",
+            "amplitudes with rolling resistance, largest distance from a straight line, over the "
+            "first",
+            float(np.abs(heights - line(count)).max() / heights[0]),
+            aim=0.01,
+        ),
+        Finding(
+            "loss",
+            "amplitudes with rolling resistance, largest distance from the closed form, over the "
+            "first",
+            float(np.abs(heights - expected).max() / heights[0]),
+            aim=1e-3,
+        ),
+    ]  # fmt: skip
+    panels = [
+        Panel(
+            "time [s]",
+            "place along the track [m]",
+            [("published start", [0.0], [given["displacement [m]"]])],
+            [("ours", result.t, bend * tilt), ("ours, rolling resistance", damped.t, place)],
+            [("closed form of amplitudes", damped.t[turns], expected)],
+        ),
+        Panel(
+            "time [s]",
+            "normal force / weight",
+            [("published, at the start", [0.0], [given["normal force over weight"]])],
+            [("ours", result.t[1:], force[1:])],
+            [("closed form", result.t, exact)],
+        ),
+    ]
+    bottom = float(exact[np.argmax(speed)])
+    notes = [
+        "The paper takes the force as constant, as it is 3 % less than the weight where the ball "
+        f"turns. At the bottom, where the ball is fastest, it is {bottom:.3f} of the weight."
+    ]
+    caption = "The swing, and the normal force on the way."
+    return Outcome(findings, [draw("curved_track", panels, caption)], notes=notes)

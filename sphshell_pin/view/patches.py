@@ -1,0 +1,158 @@
+"""Patches of contacts: ellipses colored by pressure, a fixed pool of nodes that only ever move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.view.arrows import ContactColumns
+from sphshell_pin.view.nodes import (
+    HIDDEN_SCALE,
+    FloatArray,
+    Move,
+    material,
+    mover,
+    pose,
+    set_object,
+    triangle_mesh,
+    typed_array,
+)
+
+if TYPE_CHECKING:
+    from meshcat import Visualizer
+
+RAMP = ("#0d0887", "#6a00a8", "#b12a90", "#e16462", "#fca636", "#f0f921")
+"""From no pressure to the largest: colors of matplotlib's plasma, evenly spaced."""
+LEVELS = 8
+"""Peak pressures that differ in color: the page cannot change the colors of a mesh in a film."""
+SEEN = 0.014  # half axis of the largest patch in the picture, over its size, at least
+
+PatchRows = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class PatchScale:
+    """`pressure` [Pa] has the last color; patches are drawn `factor` times their size."""
+
+    pressure: float
+    factor: float = 1.0
+
+    @classmethod
+    def of(cls, patches: PatchRows, size: float) -> PatchScale:
+        """Choose the scale for `patches` (k,) in a picture of this size [m].
+
+        A peak far above the rest would leave no color for the rest: the pressure is 1.6 times the
+        median at most.
+        """
+        pressure = patches["peak_pressure"]
+        sound = np.isfinite(pressure) & (pressure > 0.0)
+        if not sound.any():
+            return cls(1.0)
+        largest = min(float(pressure[sound].max()), 1.6 * float(np.median(pressure[sound])))
+        half = float(np.median(patches["half_axes"][sound, 0]))
+        return cls(largest, _factor(SEEN * size / half))
+
+    def __str__(self) -> str:
+        """As a legend shows it."""
+        larger = "" if self.factor == 1.0 else f", drawn {self.factor:g} x larger"
+        return f"pressure of patches: 0 to {self.pressure * 1e-6:.3g} MPa{larger}"
+
+
+def _factor(least: float) -> float:
+    """Return the smallest of 1, 2, 5, 10, 20, ... that is not below `least`."""
+    if not least > 1.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(next(k * power for k in (1, 2, 5, 10) if k * power >= least * (1 - 1e-9)))
+
+
+class PatchPool:
+    """`size` patches below `visualizer`, each of them in LEVELS colors, all hidden at first."""
+
+    def __init__(self, visualizer: Visualizer, size: int) -> None:
+        self.size = size
+        self._moves: list[list[Move]] = []
+        meshes = [_disc(level / LEVELS) for level in range(1, LEVELS + 1)]
+        for index in range(size):
+            moves = []
+            for level, mesh in enumerate(meshes):
+                node = visualizer[f"patch_{index}_{level}"]
+                look = material(
+                    "MeshBasic",
+                    0xFFFFFF,
+                    vertexColors=True,
+                    depthTest=False,
+                    depthWrite=False,
+                    transparent=True,
+                )
+                set_object(node, mesh, look, order=9)
+                moves.append(mover(node))
+            self._moves.append(moves)
+        self._hidden = pose(np.eye(3), np.zeros(3), HIDDEN_SCALE)
+
+    def update(
+        self, contacts: ContactColumns | None, patches: PatchRows, scale: PatchScale
+    ) -> None:
+        """Show `patches` (k,) of `contacts` at `scale`: the largest forces, if there are many."""
+        count = 0 if contacts is None else len(contacts.normal_force)
+        order = np.arange(count)
+        if contacts is not None and count > self.size:
+            order = np.sort(np.argsort(-contacts.normal_force, kind="stable")[: self.size])
+        for slot, moves in enumerate(self._moves):
+            level, matrix = -1, self._hidden
+            if contacts is not None and slot < count:
+                k = int(order[slot])
+                level, matrix = self._place(contacts, k, patches[k], scale)
+            # The others wait where it is: else they would sweep across the picture when shown.
+            waiting = matrix.copy()
+            waiting[:3, :3] = self._hidden[:3, :3]
+            for number, move in enumerate(moves):
+                move(matrix if number == level else waiting)
+
+    def _place(
+        self, contacts: ContactColumns, k: int, patch: np.void, scale: PatchScale
+    ) -> tuple[int, FloatArray]:
+        normal, axis = contacts.normal_world[k], patch["axis_world"]
+        a, b = patch["half_axes"] * scale.factor
+        share = patch["peak_pressure"] / scale.pressure
+        # At saddles the pressure is negative, unknown ones are nan.
+        if not (share > 0.0 and b > 0.0 and np.isfinite(share)):
+            return -1, self._hidden
+        turn = np.stack([axis, np.cross(normal, axis), normal], axis=1)
+        level = min(LEVELS, max(1, int(np.ceil(share * LEVELS)))) - 1
+        return level, pose(turn, contacts.point_world[k], np.array([a, b, b]))
+
+
+def _disc(level: float, rings: int = 10, sectors: int = 40) -> dict[str, Any]:
+    """Return a unit disc in the plane z = 0 with the colors of Hertz's pressure, `level` its peak.
+
+    Its rim is dark, so that it is seen on any surface.
+    """
+    radius = np.append(np.linspace(0.0, 1.0, rings + 1), 1.06)
+    share = level * np.sqrt(np.maximum(0.0, 1.0 - radius**2))
+    color = ramp_colors(share)
+    color[-1] = 0.15
+    angle = 2.0 * np.pi * np.arange(sectors) / sectors
+    around = np.stack([np.cos(angle), np.sin(angle), np.zeros(sectors)], axis=1)
+    vertices = (radius[:, None, None] * around).reshape(-1, 3)
+    ring, sector = np.meshgrid(np.arange(len(radius) - 1), np.arange(sectors), indexing="ij")
+    first, beside = sector + sectors * ring, (sector + 1) % sectors + sectors * ring
+    triangles = np.concatenate(
+        [
+            np.stack([first, first + sectors, beside + sectors], axis=-1).reshape(-1, 3),
+            np.stack([first, beside + sectors, beside], axis=-1).reshape(-1, 3),
+        ]
+    )
+    mesh = triangle_mesh(vertices, triangles.astype(np.int32))
+    mesh["data"]["attributes"]["color"] = typed_array(np.repeat(color, sectors, axis=0))
+    return mesh
+
+
+def ramp_colors(share: FloatArray) -> FloatArray:
+    """Return colors (n, 3) from 0 to 1 for shares (n,) of the largest pressure."""
+    stops = np.array([[int(name[k : k + 2], 16) for k in (1, 3, 5)] for name in RAMP]) / 255.0
+    at = np.linspace(0.0, 1.0, len(RAMP))
+    return np.stack([np.interp(share, at, stops[:, k]) for k in range(3)], axis=1)

@@ -1,0 +1,353 @@
+"""MindlinFriction: stiffness of two elastic bodies, energy, torsion, rolling, oblique impacts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.errors import InvalidParameter, ScenarioError
+from sphshell_pin.scenario import build
+from tests import meshes, models
+from tests.scenario import files
+
+R = 0.02
+RUBBER, STEEL = (4e6, 0.48), (2.1e11, 0.3)
+UP, ALONG = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+LAW = sp.ImpactLaw.hertz(R, *RUBBER, *STEEL)
+STICKS = sp.BristleFriction.mindlin(1e3, None, *RUBBER, *STEEL, torsional=True)
+
+
+def shear(young: float, poisson: float) -> float:
+    return young / (2 * (1 + poisson))
+
+
+# Johnson 1985, ch. 7.
+G_STAR = 1 / ((2 - RUBBER[1]) / shear(*RUBBER) + (2 - STEEL[1]) / shear(*STEEL))
+G_TWIST = 1 / (1 / shear(*RUBBER) + 1 / shear(*STEEL))
+
+
+def disc(depth: float) -> float:
+    return math.sqrt(R * depth)
+
+
+def test_stiffness_of_equal_bodies() -> None:
+    """Of one material 8 G* a is 4 G a / (2 - nu), and 16/3 G a^3 of two is 8/3 of one's."""
+    one = sp.BristleFriction.mindlin(0.5, 0.4, *RUBBER)
+    both = sp.BristleFriction.mindlin(0.5, 0.4, *RUBBER, *RUBBER)
+    for law in (one, both):
+        assert law.tangential_stiffness(0.01) == pytest.approx(
+            4 * shear(*RUBBER) * 0.01 / (2 - RUBBER[1]), rel=1e-14
+        )
+        assert law.torsional_stiffness(0.01) == pytest.approx(
+            8 / 3 * shear(*RUBBER) * 0.01**3, rel=1e-14
+        )
+    assert STICKS.tangential_stiffness(0.01) == pytest.approx(8 * G_STAR * 0.01, rel=1e-14)
+    assert STICKS.torsional_stiffness(0.01) == pytest.approx(16 / 3 * G_TWIST * 1e-6, rel=1e-14)
+
+
+def after(depth: float, motion: pin.Motion, time: float) -> tuple[pin.Force, pin.Force]:
+    """Wrenches after a motion at constant depth, from a touch that carries nothing."""
+    state, still = sp.BristleState(R), pin.Motion.Zero()
+    point = np.zeros(3)
+    state.advance(point, UP, depth, still, still, LAW, STICKS, dt=0.0)
+    for _ in range(10):
+        state.advance(point, UP, depth, motion, still, LAW, STICKS, dt=time / 10)
+    return sp.contact_wrench(point, UP, depth, still, still, LAW, STICKS, state)
+
+
+@pytest.mark.parametrize("depth", [1e-8, 1e-5, 1e-3])
+def test_slope_of_load_and_displacement(depth: float) -> None:
+    shift = 1e-3 * depth
+    on_i, on_j = after(depth, pin.Motion(shift / 0.1 * ALONG, np.zeros(3)), 0.1)
+    assert -on_i.linear[0] / shift == pytest.approx(8 * G_STAR * disc(depth), rel=1e-12)
+    assert on_i.linear + on_j.linear == pytest.approx(np.zeros(3), abs=0)
+
+
+@pytest.mark.parametrize("depth", [1e-8, 1e-5, 1e-3])
+def test_slope_of_torque_and_twist(depth: float) -> None:
+    on_i, _ = after(depth, pin.Motion(np.zeros(3), 1e-2 * UP), 0.1)
+    assert -on_i.angular[2] / 1e-3 == pytest.approx(16 / 3 * G_TWIST * disc(depth) ** 3, rel=1e-12)
+
+
+def held_ball(joint: pin.JointModel, depth: float, friction, inertia: pin.Inertia) -> sp.Scene:
+    """A ball at a constant depth in a plate, on a joint along or about an axis."""
+    model = models.empty(0.0)
+    place = pin.SE3(np.eye(3), np.array([0.0, 0.0, R - depth]))
+    models.add_body(model, "ball", joint, placement=place, inertia=inertia)
+    scene = sp.Scene(model)
+    quad = sp.Shell([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
+    scene.add_contact(sp.Sphere(R, "ball"), quad, law=LAW, friction=friction)
+    return scene
+
+
+@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-10), sp.Implicit(1e-8)], ids=str)
+@pytest.mark.parametrize("twist", [False, True])
+@pytest.mark.parametrize("rings", [1, 5])
+def test_a_ball_swings_on_its_bristle(rings: int, twist: bool, integrator) -> None:  # type: ignore[no-untyped-def]
+    depth, inertia = 1e-3, pin.Inertia.FromSphere(1.0, R)
+    friction = replace(STICKS, rings=rings)
+    stiffness = STICKS.tangential_stiffness(disc(depth)) / inertia.mass
+    if twist:
+        stiffness = STICKS.torsional_stiffness(disc(depth)) / inertia.inertia[2, 2]
+    period = 2 * math.pi / math.sqrt(stiffness)
+    scene = held_ball(pin.JointModelRZ() if twist else pin.JointModelPX(), depth, friction, inertia)
+    run = sp.Simulation(scene, integrator).run([0.0], [1e-3], 3 * period, record_dt=period / 8)
+    exact = 1e-3 * np.cos(2 * math.pi * run.t / period)
+    assert run.v[:, 0] == pytest.approx(exact, abs=1e-9)
+    assert np.abs(run.energy.friction_loss).max() < 1e-6 * run.energy.exchanged
+
+
+def test_damping_scales_with_the_stiffness() -> None:
+    """With damping_time = 2 zeta / omega a motion at omega is damped by zeta."""
+    depth, zeta = 1e-3, 0.2
+    omega = math.sqrt(STICKS.tangential_stiffness(disc(depth)))
+    friction = sp.BristleFriction.mindlin(1e3, None, *RUBBER, *STEEL, damping_time=2 * zeta / omega)
+    scene = held_ball(pin.JointModelPX(), depth, friction, pin.Inertia.FromSphere(1.0, R))
+    run = sp.Simulation(scene, sp.Adaptive(1e-9)).run([0.0], [1e-3], 3 / omega)
+    fast = omega * math.sqrt(1 - zeta**2)
+    exact = np.exp(-zeta * omega * run.t) / fast * np.sin(fast * run.t)
+    assert run.q[:, 0] == pytest.approx(1e-3 * exact, abs=1e-8 / omega)
+
+
+# The ball of models.ball, r 50 mm, 1 kg: some 5 mm deep.
+SOFT = (1e6, 0.4)
+DEEP_LAW = sp.ImpactLaw.hertz(0.05, *SOFT, *SOFT)
+
+
+@pytest.mark.parametrize(("rings", "bound"), [(2, 0.08), (4, 0.025), (8, 0.007)])
+def test_loading_curve_of_mindlin(rings: int, bound: float) -> None:
+    """At constant load F = mu N (1 - (1 - s / s_0)^1.5), s_0 = 3 mu N / (2 k).
+
+    A mass comes in at a speed and stops where the curve has taken its energy, at 0.8 s_0.
+    """
+    depth = 1e-3
+    friction = sp.BristleFriction.mindlin(0.5, None, *RUBBER, *STEEL, rings=rings)
+    limit = 0.5 * LAW.normal_force(depth)
+    s_0 = 1.5 * limit / friction.tangential_stiffness(disc(depth))
+    taken = limit * s_0 * (0.8 + 0.4 * (0.2**2.5 - 1))
+    scene = held_ball(pin.JointModelPX(), depth, friction, pin.Inertia.FromSphere(1.0, R))
+    speed = math.sqrt(2 * taken)
+    run = sp.Simulation(scene, sp.Adaptive(1e-9)).run([0.0], [speed], 4 * s_0 / speed)
+    assert run.q.max() == pytest.approx(0.8 * s_0, rel=bound)
+    force = run.contacts.friction_force_world[:, 0]
+    before = run.t <= run.t[np.argmax(run.q)]
+    exact = -limit * (1 - (1 - np.minimum(run.q[before, 0] / s_0, 1)) ** 1.5)
+    assert force[before] == pytest.approx(exact, abs=bound * limit)
+
+
+def test_spheres_that_were_stated_together_have_rings_of_their_own() -> None:
+    """Two spheres of one entry share the room for new contacts: as if they were stated apart."""
+    ends = []
+    for together in (True, False):
+        scene = sp.Scene(models.ball())
+        friction = sp.BristleFriction.mindlin(0.3, None, *SOFT, rings=4, torsional=True)
+        spheres = [sp.Sphere(0.02, "ball", offset=(x, 0.0, -0.03)) for x in (-0.02, 0.02)]
+        if together:
+            scene.add_contacts(spheres, models.plate(), law=DEEP_LAW, friction=friction)
+        else:
+            for one in spheres:
+                scene.add_contact(one, models.plate(), law=DEEP_LAW, friction=friction)
+        run = sp.Simulation(scene, sp.RungeKutta4(1e-4)).run(
+            models.free_q([0, 0, 0.055]), [0.3, 0.1, -0.5, 1.0, 2.0, 3.0], 0.2
+        )
+        assert run.stats.pairs[scene.pairs[0].name].touches > 0
+        ends.append(np.concatenate([run.q[-1], run.v[-1]]))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-10)
+
+
+def test_rings_are_whole_numbers() -> None:
+    for wrong in (0, 9, 2.0, True):
+        with pytest.raises(
+            InvalidParameter, match=r"rings = .* must be a whole number in \[1, 8\]"
+        ):
+            replace(STICKS, rings=wrong)
+
+
+def test_a_run_goes_on_with_as_many_rings() -> None:
+    def scene(**more: float) -> sp.Scene:
+        friction = replace(STICKS, **more)  # type: ignore[arg-type]
+        return models.on_plate(models.ball(), DEEP_LAW, friction)
+
+    now = scene(rings=2)
+    run = OpenRun(sp.Simulation(now, sp.Adaptive()), models.free_q([0, 0, 0.045]), record_dt=0.01)
+    changed = now.with_pairs((replace(now.pairs[0], friction=replace(STICKS, rings=3)),))
+    assert not run.change(changed)
+    changed = now.with_pairs((replace(now.pairs[0], friction=replace(STICKS, rings=2, young=5e6)),))
+    assert run.change(changed)
+    assert len(run.advance(0.05).t) > 1
+
+
+@pytest.mark.parametrize(("integrator", "order"), [(sp.SemiImplicitEuler, 1), (sp.RungeKutta4, 4)])
+@pytest.mark.parametrize("parts", [False, True])
+@pytest.mark.parametrize("rings", [1, 3])
+def test_order_of_convergence(integrator, order: int, parts: bool, rings: int) -> None:  # type: ignore[no-untyped-def]
+    """The ball sticks, spins and rolls while the depth grows, or falls, all the time."""
+    friction = sp.BristleFriction.mindlin(
+        5.0, None, *SOFT, torsional=True, damping_time=1e-3, rolling=0.01, rolling_speed=10.0,
+        rings=rings,
+    )  # fmt: skip
+    scene = models.on_plate(models.ball(gravity=0.0), DEEP_LAW, friction)
+    depth = 0.008 if parts else 0.003
+    v = np.array([0.02, -0.03, 0.05 if parts else -0.5, 0.3, 0.2, 1.0])
+    ends = []
+    for steps in (40, 80, 160) if order == 1 else (20, 40, 80):
+        run = sp.Simulation(scene, integrator(0.006 / steps)).run(
+            models.free_q([0, 0, 0.05 - depth]), v, 0.006, record_dt=0.006 / steps
+        )
+        heights = np.diff(run.q[:, 2])
+        assert (heights > 0).all() if parts else (heights < 0).all()
+        assert run.contacts.friction_force_world[-1, :2].any()
+        ends.append(np.concatenate([run.q[-1], run.v[-1]]))
+    errors = [np.linalg.norm(b - a) for a, b in pairwise(ends)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    [sp.SemiImplicitEuler(1e-4), sp.RungeKutta4(1e-4), sp.LinearlyImplicitEuler(1e-3),
+     sp.Adaptive(), sp.Implicit()],
+    ids=str,
+)  # fmt: skip
+def test_nothing_creeps_on_a_slope(integrator) -> None:  # type: ignore[no-untyped-def]
+    angle = math.radians(10)
+    model = models.empty()
+    model.gravity.linear = 9.81 * np.array([math.sin(angle), 0.0, -math.cos(angle)])
+    models.add_body(model, "ball", pin.JointModelTranslation())
+    law = sp.ImpactLaw.hertz(0.05, *SOFT, *SOFT, restitution=0.1, speed=0.1)
+    friction = sp.BristleFriction.mindlin(0.5, 0.4, *SOFT, damping_time=0.01)
+    scene = models.on_plate(model, law, friction)
+    start = [0.0, 0.0, 0.05 - law.depth_at(9.81 * math.cos(angle))]
+    run = sp.Simulation(scene, integrator).run(start, duration=4.0, record_dt=1.0)
+    assert np.abs(run.v[-1]).max() < 1e-8
+    force = run.contacts.friction_force_world[-1]
+    assert force[0] == pytest.approx(-9.81 * math.sin(angle), rel=1e-5)
+    depth = law.depth_at(9.81 * math.cos(angle))
+    stretch = 9.81 * math.sin(angle) / friction.tangential_stiffness(math.sqrt(0.05 * depth))
+    assert run.q[-1, 0] == pytest.approx(stretch, rel=1e-3)
+
+
+@pytest.mark.parametrize("rings", [1, 4])
+def test_a_spin_dies_out_at_the_moment_limit(rings: int) -> None:
+    """M = 3 pi / 16 mu N a."""
+    depth = 1e-3
+    friction = sp.BristleFriction.mindlin(0.4, None, *RUBBER, *STEEL, torsional=True, rings=rings)
+    inertia = pin.Inertia.FromSphere(1.0, R)
+    scene = held_ball(pin.JointModelRZ(), depth, friction, inertia)
+    moment = 3 * math.pi / 16 * 0.4 * LAW.normal_force(depth) * disc(depth)
+    rate = moment / inertia.inertia[2, 2]
+    run = sp.Simulation(scene, sp.Adaptive(1e-8)).run([0.0], [0.1 * rate], 0.08, record_dt=1e-3)
+    late = run.t > 0.02
+    slope = np.polyfit(run.t[late], run.v[late, 0], 1)[0]
+    assert slope == pytest.approx(-rate, rel=1e-6)
+
+
+class TestRolling:
+    COEFFICIENT = 0.02
+
+    def rolling(
+        self, slope: float, speed: float, duration: float, rolling_speed: float
+    ) -> sp.Result:
+        model = models.ball()
+        model.gravity.linear = 9.81 * np.array([math.sin(slope), 0.0, -math.cos(slope)])
+        law = sp.ImpactLaw.hertz(0.05, 1e9, 0.3, 1e9, 0.3, restitution=0.1, speed=0.1)
+        friction = sp.BristleFriction.mindlin(
+            0.5, None, 1e9, 0.3, rolling=self.COEFFICIENT, rolling_speed=rolling_speed
+        )
+        scene = models.on_plate(model, law, friction)
+        q = models.free_q([-0.3, 0, 0.05 - law.depth_at(9.81 * math.cos(slope))])
+        return sp.Simulation(scene, sp.Implicit()).run(
+            q, [speed, 0, 0, 0, speed / 0.05, 0], duration, record_dt=duration / 10
+        )
+
+    def test_it_slows_a_ball_down(self) -> None:
+        """a = 5/7 c g: the moment c r N acts about the contact point."""
+        run = self.rolling(0.0, 0.5, 1.0, 1e-3)
+        x = run.q[:, 0] + 0.3
+        exact = 0.5 * run.t - 0.5 * 5 / 7 * self.COEFFICIENT * 9.81 * run.t**2
+        assert x == pytest.approx(exact, abs=1e-4)
+        assert np.abs(run.energy.residual).max() < 1e-6 * run.energy.exchanged
+
+    def test_it_creeps_below_its_speed(self) -> None:
+        """On a slope of half the coefficient the ball creeps, at x (3 - x^2) / 2 = 1/2."""
+        slope = math.atan(self.COEFFICIENT / 2)
+        run = self.rolling(slope, 0.0, 1.0, 0.01)
+        roots = np.roots([-0.5, 0.0, 1.5, -0.5])
+        share = float(roots[(roots > 0) & (roots < 1)][0].real)
+        assert run.q[-1, 0] - run.q[-2, 0] == pytest.approx(0.1 * share * 0.01, rel=1e-3)
+
+
+@pytest.mark.parametrize("rings", [1, 3])
+def test_friction_is_continuous_over_a_groove(rings: int) -> None:
+    """Where contacts split and merge; and friction gives nothing back."""
+    shell = sp.Shell(*meshes.v_groove(math.radians(5), size=2.0, cells=6))
+    scene = sp.Scene(models.ball(radius=0.1))
+    law = sp.HuntCrossleyLaw(3e5, 1.5, 0.5)
+    friction = sp.BristleFriction.mindlin(
+        0.4, 0.3, 1e6, 0.4, torsional=True, damping_time=1e-4, rings=rings
+    )
+    scene.add_contact(sp.Sphere(0.1, "ball"), shell, law=law, friction=friction)
+    height = 0.1 / math.cos(math.radians(5)) + 0.02 * math.tan(math.radians(5)) - 5e-4
+    jumps = []
+    for record_dt in (2e-4, 2.5e-5):
+        run = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
+            models.free_q([-0.02, 0.1, height]), [0.4, 0.03, -0.035, 0, 2, 5.0], 0.1,
+            record_dt=record_dt,
+        )  # fmt: skip
+        assert np.bincount(run.contacts.row).max() > 1
+        force = np.zeros((len(run.t), 3))
+        np.add.at(force, run.contacts.row, run.contacts.friction_force_world)
+        jumps.append(np.linalg.norm(np.diff(force[5:], axis=0), axis=1).max())
+        assert np.abs(run.energy.residual).max() < 1e-6 * run.energy.exchanged
+    assert jumps[1] < 0.4 * jumps[0]
+
+
+def test_a_scenario_states_it(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    stated = 'friction = { type = "mindlin", mu_static = 0.5, mu_dynamic = 0.4, young = 5e6, '
+    stated += "poisson = 0.48, young_2 = 2.1e11, poisson_2 = 0.3, torsional = true, rings = 4 }"
+    text = files.DROP.replace("damping = 20.0 }", "damping = 20.0 }\n" + stated)
+    built = build(files.write(tmp_path, text), {"contact.ball-plate.friction.young": "6e6"})
+    (pair,) = built.scene.pairs
+    materials = 6e6, 0.48, 2.1e11, 0.3
+    assert pair.friction == sp.BristleFriction.mindlin(
+        0.5, 0.4, *materials, torsional=True, rings=4
+    )
+    with pytest.raises(ScenarioError, match=r"rings"):
+        build(files.write(tmp_path, text.replace("rings = 4", "rings = 9")), {})
+
+
+def test_a_source_has_no_radius() -> None:
+    scene = sp.Scene(models.ball())
+    with pytest.raises(InvalidParameter, match="needs a sphere, and a contact source has none"):
+        scene.add_contact_source(lambda i, j: ([], [], []), "ball", "universe", LAW, STICKS)
+
+
+def test_a_wrench_needs_the_radius() -> None:
+    still = pin.Motion.Zero()
+    with pytest.raises(InvalidParameter, match="must be a BristleState, which holds"):
+        sp.contact_wrench(np.zeros(3), UP, 1e-4, still, still, LAW, STICKS)
+    with pytest.raises(InvalidParameter, match=r"rings = 2 must be 1"):
+        sp.contact_wrench(
+            np.zeros(3), UP, 1e-4, still, still, LAW, replace(STICKS, rings=2), sp.BristleState(R)
+        )
+    plain = sp.BristleFriction.mindlin(0.5, 0.4, *RUBBER)
+    with pytest.raises(InvalidParameter, match="must be the sphere's, of Mindlin's friction"):
+        sp.contact_wrench(np.zeros(3), UP, 1e-4, still, still, LAW, plain, sp.BristleState())
+
+
+def test_time_scales_follow_the_stiffness_under_load() -> None:
+    depth = 1e-3
+    inertia = pin.Inertia.FromSphere(1.0, R)
+    scene = held_ball(pin.JointModelTranslation(), depth, STICKS, inertia)
+    figures = scene.explain(np.zeros(3)).pairs[0]
+    assert "Mindlin, coefficient 1000 at rest" in "".join(figures.modelled)
+    deepest = max(depth, figures.impact_depth)
+    half = math.pi / math.sqrt(STICKS.tangential_stiffness(disc(deepest)))
+    assert figures.shortest_time <= half
+    assert STICKS.slip_time(1.0, 1.0, disc(deepest)) == pytest.approx(half)

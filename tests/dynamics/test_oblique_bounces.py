@@ -1,0 +1,100 @@
+"""Oblique impacts with MindlinFriction against theory: Maw, Barber and Fawcett; gross sliding."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from tests.bounces import bounce
+from tests.oracle import oblique
+
+ALUMINA_GLASS = (380e9, 0.23, 70e9, 0.25)
+BALL, DENSITY, MU, SPEED = 2.5e-3, 4000.0, 0.092, 3.9
+ELASTIC = sp.ImpactLaw.hertz(BALL, *ALUMINA_GLASS)
+KHARAZ = sp.BristleFriction.mindlin(MU, None, *ALUMINA_GLASS)
+KAPPA = oblique.kappa(*ALUMINA_GLASS)
+
+
+def thrown(degrees: float, speed: float = SPEED, law=ELASTIC, friction=KHARAZ, **more):  # type: ignore[no-untyped-def]
+    return bounce(math.radians(degrees), speed, BALL, DENSITY, law, friction, **more)
+
+
+@pytest.mark.parametrize("degrees", [5, 10, 20, 28, 40])
+@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8), sp.Implicit(1e-6)], ids=str)
+def test_audit_of_an_oblique_bounce(degrees: float, integrator) -> None:  # type: ignore[no-untyped-def]
+    energy = thrown(degrees, integrator=integrator).result.energy
+    bound = 1e-8 if isinstance(integrator, sp.Adaptive) else 1e-6
+    assert np.abs(energy.residual).max() < bound * energy.exchanged
+    assert np.diff(energy.friction_loss).min() > -bound * energy.exchanged
+
+
+@pytest.mark.parametrize("degrees", [5, 10, 15, 20, 25, 28])
+def test_oblique_bounce_against_the_theory(degrees: float) -> None:
+    """Speeds at which the depth, which theory neglects, is 2e-4 and 3e-5 of the radius."""
+    psi = KAPPA * math.tan(math.radians(degrees)) / MU
+    theory = oblique.rigid_disc(np.array([psi]), KAPPA)[0] / psi
+    slow, slower = thrown(degrees, 0.039), thrown(degrees, 0.0039)
+    assert slow.tangential == pytest.approx(slower.tangential, abs=1e-3)
+    assert slow.slip == pytest.approx(slower.slip, abs=1e-3)
+    assert slower.tangential == pytest.approx(1 + 2 / 7 * (theory - 1), abs=1e-4)
+    assert slower.normal == pytest.approx(1.0, abs=1e-8)
+
+
+def test_what_micro_slip_adds() -> None:
+    """The figures of docs/laws.md: v_t' / v_t of Kharaz's ball, against Maw et al.'s theory."""
+    degrees = np.array([2.0, 5, 10, 15, 20, 25, 30])
+    psi = KAPPA * np.tan(np.radians(degrees)) / MU
+    ratios = [
+        1 + 2 / 7 * (theory(psi, KAPPA, steps=10_000) - psi) / psi
+        for theory in (oblique.rigid_disc, oblique.micro_slip)
+    ]
+    assert ratios[0] == pytest.approx([0.877, 0.860, 0.710, 0.630, 0.618, 0.636, 0.681], abs=1e-3)
+    assert ratios[1] == pytest.approx([0.774, 0.736, 0.637, 0.590, 0.592, 0.622, 0.681], abs=1e-3)
+
+
+@pytest.mark.parametrize("rings", [1, 2, 8])
+def test_rings_against_the_theory(rings: int) -> None:
+    degrees = np.array([5, 10, 20, 28])
+    psi = KAPPA * np.tan(np.radians(degrees)) / MU
+    theory = 1 + 2 / 7 * (oblique.rings(psi, KAPPA, rings, steps=20_000) / psi - 1)
+    friction = replace(KHARAZ, rings=rings)
+    runs = [thrown(one, 0.0039, friction=friction) for one in degrees]
+    assert [one.tangential for one in runs] == pytest.approx(theory, abs=1e-4)
+    for one in runs:
+        energy = one.result.energy
+        assert np.abs(energy.residual).max() < 1e-8 * energy.exchanged
+        assert np.diff(energy.friction_loss).min() > -1e-8 * energy.exchanged
+
+
+def test_rings_converge_to_micro_slip() -> None:
+    """The figures of docs/laws.md: rms of v_t' / v_t against Maw et al.'s theory."""
+    psi = KAPPA * np.tan(np.radians([2.0, 5, 10, 15, 20, 25, 30, 40, 60, 80])) / MU
+    exact = oblique.micro_slip(psi, KAPPA, steps=20_000)
+    errors = [
+        2 / 7 * (oblique.rings(psi, KAPPA, n, steps=20_000) - exact) / psi for n in (1, 2, 4, 8)
+    ]
+    rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
+    assert rms == pytest.approx([0.0581, 0.0333, 0.0158, 0.0073], abs=1e-4)
+
+
+@pytest.mark.parametrize("restitution", [1.0, 0.98])
+@pytest.mark.parametrize("degrees", [35, 50, 70, 85])
+def test_gross_sliding(degrees: float, restitution: float) -> None:
+    """v_t' = v_t - mu (1 + e) v_n; the spin has the arm r - depth of the contact point."""
+    law = sp.ImpactLaw.hertz(BALL, *ALUMINA_GLASS, restitution=restitution, speed=SPEED)
+    out = thrown(degrees, law=law)
+    down = SPEED * math.cos(math.radians(degrees))
+    along = SPEED * math.sin(math.radians(degrees))
+    lost = MU * (1 + out.normal) * down
+    assert out.tangential == pytest.approx(1 - lost / along, abs=1e-6)
+    assert out.spin == pytest.approx(2.5 * lost / BALL, rel=6e-3)
+    if restitution == 1.0:
+        # The impulse-weighted depth of an elastic impact: B(2/5, 3/2) / (5/2) of the largest.
+        beta = math.gamma(0.4) * math.gamma(1.5) / math.gamma(1.9)
+        mass = DENSITY * 4 / 3 * math.pi * BALL**3
+        mean = beta / 2.5 * ELASTIC.depth_of(0.5 * mass * down**2)
+        assert out.spin == pytest.approx(2.5 * lost * (BALL - mean) / BALL**2, rel=1e-6)

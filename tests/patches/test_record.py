@@ -1,0 +1,88 @@
+"""Recorded patches: what they are, where they are asked for, and where not."""
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.errors import InvalidParameter, ResultError
+from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider
+
+
+def test_a_ball_on_a_plane_has_the_patch_of_hertz():
+    result = slide()
+    patches, log = result.patches, result.contacts
+    assert len(patches) == len(log) == 51
+    # Johnson 4.2: a^2 = R depth, p0 = 3 N / (2 pi a^2).
+    a = np.sqrt(RADIUS * log.depth)
+    np.testing.assert_allclose(patches["half_axes"], np.stack([a, a], axis=1), rtol=1e-12)
+    np.testing.assert_allclose(
+        patches["peak_pressure"], 1.5 * log.normal_force / (np.pi * a * a), rtol=1e-12
+    )
+    np.testing.assert_allclose(patches["mean_pressure"] * 1.5, patches["peak_pressure"])
+    np.testing.assert_allclose(patches["approach"], log.depth)
+    assert np.abs((patches["axis_world"] * log.normal_world).sum(axis=1)).max() < 1e-15
+    assert not patches.flags.writeable
+
+
+def test_other_numbers_are_the_same_without_patches():
+    scene = sp.Scene(slider())
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), plate(), law=LAW, name="tip")
+    simulation, q0 = sp.Simulation(scene), [0.0, 0.0, RADIUS - pressed(20.0)]
+    asked = simulation.run(q0, [0.1, 0, 0], 0.02, record=["patch"])
+    not_asked = simulation.run(q0, [0.1, 0, 0], 0.02)
+    assert np.array_equal(asked.q, not_asked.q)
+    assert np.array_equal(asked.contacts.normal_force, not_asked.contacts.normal_force)
+    assert not_asked.patch_rows is None
+    with pytest.raises(ResultError, match=r"record=\('patch',\)"):
+        not_asked.patches  # noqa: B018
+
+
+def test_files_keep_them(tmp_path):
+    result = slide()
+    result.save(tmp_path / "run.npz")
+    again = sp.Result.load(tmp_path / "run.npz")
+    assert (again.patches == result.patches).all()
+    assert again.contact_columns()["peak_pressure [Pa]"][7] == result.patches["peak_pressure"][7]
+
+
+def test_a_file_with_too_few_patches_is_refused(tmp_path):
+    slide().save(tmp_path / "run.npz")
+    with np.load(tmp_path / "run.npz") as file:
+        arrays = dict(file)
+    arrays["patches.approach"] = arrays["patches.approach"][:-1]
+    np.savez(tmp_path / "short.npz", **arrays)
+    with pytest.raises(ResultError, match=r"'patches\.approach' has the shape \(50,\)"):
+        sp.Result.load(tmp_path / "short.npz")
+
+
+def test_open_runs_and_rollouts_record_them():
+    scene = sp.Scene(slider())
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), plate(), law=LAW, name="tip")
+    simulation, q0 = sp.Simulation(scene), [0.0, 0.0, RADIUS - pressed()]
+    run = OpenRun(simulation, q0, record_dt=1e-3, record=("patch",))
+    assert len(run.snapshot().patches) == 1
+    assert len(run.advance(0.01).patches) == 11
+    assert len(run.advance(0.0).patches) == 0
+    rollout = simulation.rollout([q0, q0], duration=0.01, record=("patch",))
+    assert len(rollout[1].patches) == len(rollout[1].contacts) == 2
+
+
+def test_a_contact_of_unknown_geometry_has_no_patch():
+    def find(pose_i, pose_j):
+        return np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), np.array([1e-4])
+
+    scene = sp.Scene(slider())
+    scene.add_contact_source(find, "ball", "universe", law=LAW, name="own")
+    result = sp.Simulation(scene, sp.RungeKutta4(1e-4)).run(
+        np.zeros(3), None, 1e-3, record=["patch"]
+    )
+    assert np.isnan(result.patches["half_axes"]).all()
+    assert np.isnan(result.patches["peak_pressure"]).all()
+
+
+@pytest.mark.parametrize("record", ["patch", ["pitch"], 3])
+def test_what_cannot_be_recorded_is_refused(record):
+    scene = sp.Scene(slider())
+    with pytest.raises(InvalidParameter, match="record"):
+        sp.Simulation(scene).run(np.zeros(3), record=record)

@@ -1,0 +1,147 @@
+"""Taxels: sums are exact, shares are those of Hertz's pressure, images move with the body."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
+from sphshell_pin.patches import ShellTaxels, TaxelGrid, TaxelImages
+from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider, total_force
+
+DOWN = (0.0, 0.0, -1.0)
+
+
+@pytest.fixture(scope="module")
+def slid():
+    return slide()
+
+
+@pytest.mark.parametrize(
+    "grid",
+    [
+        TaxelGrid("tip", (8, 8), axis=DOWN, extent=(0.5, 0.5)),
+        TaxelGrid("tip", (16, 32), extent=(np.pi, 2 * np.pi)),  # all of the sphere, a pole below
+        TaxelGrid("tip", (1, 1), axis=(1, 0, 0), extent=(np.pi, 2 * np.pi)),
+        TaxelGrid("tip", (5, 9), axis=(0.1, 0.07, -1), up=(1, 1, 0), extent=(0.5, 0.7)),
+    ],
+)
+def test_forces_add_up(slid, grid):
+    images = grid.images(slid)
+    assert images.forces.shape == (51, *grid.shape)
+    force = total_force(slid)
+    np.testing.assert_allclose(
+        images.forces.sum(axis=(1, 2)) + images.outside, force, rtol=1e-12, atol=0
+    )
+    # All of the patch is on these grids: the integrals themselves must add up.
+    assert np.abs(images.outside).max() < 1e-12 * force.max()
+    assert images.forces.min() > -1e-12 * force.max()
+
+
+def test_shares_are_those_of_the_pressure(slid):
+    grid = TaxelGrid("tip", (5, 9), axis=(0.1, 0.07, -1), up=(1, 1, 0), extent=(0.3, 0.3))
+    row, n = 10, 1200
+    images = grid.images(slid)
+    a = slid.patches["half_axes"][row, 0]
+    at = (np.arange(n) + 0.5) / n * 2 - 1
+    x, y = np.meshgrid(at, at)
+    load = np.sqrt(np.maximum(0.0, 1 - x * x - y * y))
+    load *= total_force(slid)[row] / load.sum()
+    arc = np.hypot(x, y) * a / RADIUS
+    sides = np.sinc(arc / np.pi) * a / RADIUS
+    place = np.stack([x * sides, y * sides, -np.cos(arc)], axis=-1)
+    frame = np.array([(0.1, 0.07, -1.0), (1.0, 1.0, 0.0)])
+    axis = frame[0] / np.linalg.norm(frame[0])
+    up = frame[1] - axis * (axis @ frame[1])
+    up /= np.linalg.norm(up)
+    latitude = np.arcsin(place @ up)
+    longitude = np.arctan2(place @ np.cross(up, axis), place @ axis)
+    expected = np.histogram2d(
+        latitude.ravel(),
+        longitude.ravel(),
+        [np.linspace(-0.15, 0.15, 6), np.linspace(-0.15, 0.15, 10)],
+        weights=load.ravel(),
+    )[0]
+    assert images.outside[row] > 1.0  # part of the patch lies beside the grid
+    np.testing.assert_allclose(images.forces[row], expected, atol=2e-3 * expected.max())
+
+
+def test_images_are_those_of_the_turned_body():
+    turned = pin.SE3(pin.utils.rotate("x", 2.0) @ pin.utils.rotate("z", 0.7), np.zeros(3))
+    scene = sp.Scene(slider(placement=turned))
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), plate(), law=LAW, name="tip")
+    at = turned.actInv(np.array([0.0, 0.0, RADIUS - pressed()]))
+    result = sp.Simulation(scene).run(at, duration=1e-4, record=("patch",))
+    axis = turned.rotation.T @ np.array(DOWN)
+    images = TaxelGrid("tip", (3, 3), axis=tuple(axis), extent=(0.1, 0.1)).images(result)
+    force = images.forces[0]
+    assert force[1, 1] == force.max() > 0.1
+    np.testing.assert_allclose(force, force[::-1, ::-1], rtol=1e-9)
+
+
+def test_both_of_two_spheres_feel_it():
+    model = slider()
+    model.addFrame(pin.Frame("ground", 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), sp.Sphere(0.02, "ground"), law=LAW, name="tip")
+    scene.add_contact(
+        sp.Sphere(0.02, "ground"), plate(height=lambda x, y: -0.03), law=LAW, name="below"
+    )
+    q0 = [0.0, 0.0, 0.03 - pressed()]
+    result = sp.Simulation(scene).run(q0, duration=1e-4, record=("patch",))
+    own = np.asarray(result.contacts.pair) == 0
+    force = result.contacts.normal_force[own][0]
+    above = TaxelGrid("tip", (4, 4), axis=DOWN, extent=(0.8, 0.8)).images(result)
+    below = TaxelGrid("below", (4, 4), axis=(0, 0, 1), extent=(0.8, 0.8)).images(result)
+    assert above.forces[0].sum() == pytest.approx(force, rel=1e-12)
+    assert below.forces[0].sum() == pytest.approx(force, rel=1e-12)
+
+
+def test_elements_share_a_patch():
+    result = slide(plate(0.02, 40))
+    images = ShellTaxels("tip").images(result)
+    force = total_force(result)
+    assert images.forces.shape == (51, 1600)
+    np.testing.assert_allclose(images.forces.sum(axis=1) + images.outside, force, rtol=1e-12)
+    assert np.abs(images.outside).max() < 1e-12 * force.max()
+    # Elements of 1 mm, half axes a little less: the first contact is a corner of four.
+    np.testing.assert_allclose(np.sort(images.forces[0])[-4:], force[0] / 4, rtol=1e-9)
+
+
+def test_what_lies_beyond_a_border_is_outside():
+    shell = plate(0.01)  # the ball starts on its border
+    result = slide(shell, duration=1e-4)
+    images = ShellTaxels("tip").images(result)
+    assert images.outside[0] == pytest.approx(0.5 * total_force(result)[0], rel=1e-6)
+
+
+def test_arrays_are_saved(tmp_path, slid):
+    images = TaxelGrid("tip", (4, 4), axis=DOWN).images(slid)
+    with np.load(images.save(tmp_path / "taxels.npz")) as file:
+        assert np.array_equal(file["forces"], images.forces)
+        assert np.array_equal(file["t"], slid.t)
+
+
+def test_films(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    t = np.linspace(0.0, 0.05, 51)
+    images = TaxelImages(t, np.random.default_rng(0).random((51, 4, 6)), np.zeros(51))
+    film = images.save_film(tmp_path / "taxels.gif", fps=20, speed=0.1)
+    with image.open(film) as opened:
+        assert opened.n_frames == 11
+        assert opened.width * 4 == opened.height * 6
+    with pytest.raises(InvalidParameter, match=r"\.gif or \.mp4"):
+        images.save_film(tmp_path / "taxels.avi")
+
+
+def test_mistakes(slid):
+    with pytest.raises(InvalidParameter, match="shape"):
+        TaxelGrid("tip", (0, 4))
+    with pytest.raises(InvalidParameter, match="extent"):
+        TaxelGrid("tip", (4, 4), extent=(4.0, 1.0))
+    with pytest.raises(InvalidParameter, match="parallel"):
+        TaxelGrid("tip", (4, 4), axis=(0, 0, 1), up=(0, 0, 2))
+    with pytest.raises(NameNotFound, match="tip"):
+        TaxelGrid("finger", (4, 4)).images(slid)
+    with pytest.raises(ResultError, match="no CAD faces"):
+        ShellTaxels("tip", "faces").images(slid)

@@ -1,0 +1,87 @@
+"""The cases of the validation: each error figure within its bound, or with its physics named."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from sphshell_pin.cli import app
+from sphshell_pin.errors import NameNotFound, ResultError
+from sphshell_pin.study.report import PAGE
+from sphshell_pin.study.report.contents import Finding, Picture
+from sphshell_pin.study.validation import Outcome, cases, collect, make_validation
+
+pytest.importorskip("matplotlib")
+DOCS = Path(__file__).parents[2] / "docs"
+CASES = [pytest.param(one, id=one.key, marks=[pytest.mark.slow] * one.slow) for one in collect()]
+
+
+@pytest.mark.parametrize("one", CASES)
+def test_case(one):
+    found = one.run()
+    assert found.findings
+    assert found.pictures
+    assert all(math.isfinite(finding.value) for finding in found.findings)
+    assert [(f.what, f.text, f.aim_text) for f in found.unexplained] == []
+    # An explanation of a figure that is within its bound is out of date.
+    out = {finding.key for finding in found.findings if finding.met is False}
+    assert set(found.explained) <= out
+
+
+@pytest.mark.parametrize("one", collect(), ids=lambda one: one.key)
+def test_case_states_its_source(one):
+    assert "http" in one.source
+    assert all(text.strip() for text in one.texts.values())
+    assert all(cases.read(name).origin for name in one.files)
+
+
+def test_page_of_the_docs_has_every_case():
+    text = (DOCS / "validation.md").read_text(encoding="utf-8")
+    for one in collect():
+        assert f"## {one.title}" in text, "run python docs/site/validation.py"
+        assert one.source in text, "run python docs/site/validation.py"
+
+
+def outcome(value: float, explained: dict[str, str]) -> Outcome:
+    finding = Finding("error", "error of force", value, aim=1.0, headline=True)
+    return Outcome([finding], [Picture("x", b"png", "x", "x")], explained=explained)
+
+
+def test_command(tmp_path, monkeypatch):
+    """It writes the page; a figure that is out stands with its explanation."""
+    ran = {"here": outcome(0.5, {}), "far": outcome(2.0, {"error": "Balls have hair."})}
+    made = [
+        cases.Case(key, f"Case {key}", "S, https://x", "P", "B", "L", (), lambda key=key: ran[key])
+        for key in ran
+    ]
+    monkeypatch.setattr(cases, "collect", lambda quick: made)
+    done = CliRunner().invoke(app, ["report", "--validation", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    text = (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert "against published experiments" in text
+    assert "1 of 2 aims are met" in text
+    assert "Out of bounds: error of force. Balls have hair." in text
+    assert "Source: S, https://x" in text
+
+
+def test_other_engines_are_not_asked():
+    done = CliRunner().invoke(app, ["report", "--validation", "--peers"])
+    assert done.exit_code == 2
+    assert "leave out --peers" in done.output
+
+
+def test_without_a_checkout_it_says_what_it_needs(tmp_path, monkeypatch):
+    monkeypatch.setattr(cases, "DATA", Path("nowhere"))
+    with pytest.raises(ResultError, match="run the validation from a checkout"):
+        make_validation(tmp_path)
+
+
+def test_data_file():
+    data = cases.read("chung_ooi_1")
+    assert "doi" in data.origin
+    assert len(data.where("series", "depth")["x"]) == 15
+    with pytest.raises(NameNotFound, match="series, x, force"):
+        data["y"]
