@@ -39,6 +39,10 @@ def test_plane_law() -> None:
     assert law.depth_at(law.normal_force(7e-4)) == pytest.approx(7e-4)
     with pytest.raises(InvalidParameter, match="on_plane"):
         LAW.normal_force(1e-3)
+    # Beyond the radius it only says that it cannot stop the sphere.
+    assert law.depth_of(10 * law.energy(0.01)) > 0.01
+    assert law.depth_at(10 * law.normal_force(0.01)) > 0.01
+    assert 0 < law.contact_time(0.05, 1.0) < 1
     damped = DAMPED.on_plane(1.0)
     assert damped.normal_force(0.1, -0.5) == pytest.approx(1.1 * damped.normal_force(0.1))
 
