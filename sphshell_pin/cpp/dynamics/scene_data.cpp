@@ -24,6 +24,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
+    if (pair.law.foundation()) foundations_.resize(pairs_.size());
     if (pair.friction.has_state()) {
       bristles_.add(k, pair.friction.rings());
       several_rings_ = several_rings_ || pair.friction.rings() > 1;
@@ -173,6 +174,11 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
     query.contacts.clear();
     return query.contacts;
   }
+  if (pair.law.foundation()) {
+    const bool slopes = wants_second_ || pair.friction.has_state();
+    foundations_[k].find(pair, state.center, slopes, query.contacts);
+    return query.contacts;
+  }
   if (pair.ball > 0)
     find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
   else
@@ -222,6 +228,8 @@ void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int
   active.slot = slot;
   active.contact_id = contact_id;
   active.contact = contact;
+  if (pairs_[k].law.foundation())
+    active.row = static_cast<int>(&contact - queries_[k].contacts.data());
   if (pairs_[k].needs_shape())
     active.shape = static_cast<int>(&contact - queries_[k].contacts.data());
 }
@@ -274,6 +282,7 @@ void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
     m.outer_rate = outer_rate;
   }
   active.force = contact_force(pair.law, pair.friction, disc_radius(active), relaxation(pair), m);
+  if (active.row >= 0) add_foundation(active, m);
   // The energy also changes with the shape, as the sphere moves along the shell. It depends on the
   // sphere's center alone: that is where the force acts.
   if (const HertzLaw* hertz = pair.law.hertz(); hertz && active.shape >= 0) {
@@ -306,7 +315,7 @@ ContactWrench SceneData::wrench(const ActiveContact& active) const {
   const Vec3& normal = active.kinematics.normal;
   const double weight = active.contact.weight;
   ContactWrench out{active.point, weight * (f.normal * normal + f.friction),
-                    weight * f.torsion * normal + weight * f.rolling};
+                    weight * f.torsion * normal + weight * f.rolling + active.moment};
   if (active.shape >= 0) {
     const PairState& state = states_[active.pair];
     out.force += weight * active.climb;
@@ -327,15 +336,26 @@ void SceneData::add_force(const ActiveContact& active) {
   apply(pair.joint_j, active.point, -on_i.force, -on_i.moment);
   PairState& state = states_[active.pair];
   if (weight > 0) ++state.count;
-  state.pieces += weight > 0 ? 1 : -1;
-  if (f.normal == 0) ++state.clamped;
+  if (active.row < 0) {
+    state.pieces += weight > 0 ? 1 : -1;
+    if (f.normal == 0) ++state.clamped;
+  } else {
+    // The force of a foundation is smooth where a patch comes or goes: no event.
+    state.pieces = 1;
+  }
   state.depth = std::max(state.depth, m.depth);
   state.normal_force += weight * f.normal;
   // The weight of several as one is the length of the sum of their normals.
   const double share = weight > 0 ? 1 : weight;
-  powers_.damping += weight * damping_power(f, m);
-  powers_.friction += weight * friction_power(f, m);
-  powers_.elastic += share * pair.law.energy(m.depth, m.scale);
+  if (active.row >= 0) {
+    powers_.damping += active.damping;
+    powers_.friction += active.sliding;
+    powers_.elastic += foundations_[active.pair].energy(pair, active.row);
+  } else {
+    powers_.damping += weight * damping_power(f, m);
+    powers_.friction += weight * friction_power(f, m);
+    powers_.elastic += share * pair.law.energy(m.depth, m.scale);
+  }
   if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.stretch2;
   if (const ContactShape* gap = shape(active)) {
     state.conformity = std::max(state.conformity, gap->conformity);
@@ -400,6 +420,11 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     if (!patches) continue;
     if (pair.source) {
       patches->push_back(unknown_patch(row.depth));
+      continue;
+    }
+    if (active.row >= 0) {
+      patches->push_back(
+          foundations_[active.pair].patch(pair, normal, row.depth, row.normal_force));
       continue;
     }
     const ContactShape gap =
