@@ -1,0 +1,114 @@
+"""A finger pad against a plate: what measurements say, and what two laws make of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import sphshell_pin as sp
+from sphshell_pin.study.report.contents import Finding
+from sphshell_pin.study.validation.balls import plane
+from sphshell_pin.study.validation.cases import Outcome, case, read
+from sphshell_pin.study.validation.ellipses import Touch, press
+from sphshell_pin.study.validation.pictures import Panel, draw
+
+RADIUS, MODULUS, POISSON, THICKNESS = 8e-3, 1e5, 0.49, 4e-3  # all cancel in what is compared
+BOUND = 0.05
+LAYER = (
+    "FoundationLaw takes the pad for a thin layer whose points give way alone, so that the force "
+    "grows as approach^2. A pad is thick against the contact: its tissue hangs together, as in "
+    "Hertz's half-space."
+)
+BONE = (
+    "Hertz's half-space has no bone. Under larger forces the contact is wide against the tissue "
+    "over the bone, and the pressure follows the local compression."
+)
+
+
+def exponent(touches: list[Touch]) -> float:
+    """Return n of approach ~ force^n, from the first contact to the last."""
+    first, last = touches[0], touches[-1]
+    return float(np.log(last.approach / first.approach) / np.log(last.force / first.force))
+
+
+@case(
+    "finger_pad",
+    "A finger pad against a plate: exponent and shape of the pressure",
+    source="D. T. V. Pawluk and R. D. Howe, Dynamic Contact of the Human Fingerpad Against a Flat "
+    "Surface, J. Biomech. Eng. 121 (1999) 605-611, https://doi.org/10.1115/1.2800860; "
+    "https://koreascience.kr/article/JAKO200111919995062.page (2001).",
+    setting="FoundationLaw and HertzLaw of a ball on a plate, approaches from 0.1 to 5 % of the "
+    "radius. Radius, modulus and thickness cancel in both figures, so that there is nothing to "
+    "tune; published curves with modulus and thickness could not be read.",
+    bound="The papers state both without scatter; 5 % is asked.",
+    leaves_out="The shape and the layers of a pad, its viscosity, its stiffening: the force of "
+    "Pawluk and Howe grows exponentially with displacement.",
+    files=("finger_pad",),
+)
+def finger_pad() -> Outcome:
+    """Compare how displacement grows with force, and the largest pressure with the mean one."""
+    data = read("finger_pad")
+    published = dict(zip(data.texts("quantity"), data["value"].tolist(), strict=True))
+    plate, approaches = plane(1.0), RADIUS * np.geomspace(1e-3, 5e-2, 9)
+    laws = {
+        "FoundationLaw": sp.FoundationLaw(MODULUS, THICKNESS),
+        "HertzLaw": sp.HertzLaw(MODULUS, POISSON),
+    }
+    touches = {
+        name: [press(RADIUS, plate, law, approach) for approach in approaches]
+        for name, law in laws.items()
+    }
+    findings = []
+    for name, found in touches.items():
+        last = found[-1]
+        ratio = last.pressure * np.pi * last.a * last.b / last.force
+        findings += [
+            Finding(
+                f"{name}_shape",
+                f"{name}: largest over mean pressure, relative to that of a paraboloid",
+                abs(ratio / published["peak_over_mean"] - 1),
+                aim=BOUND,
+                headline=name == "FoundationLaw",
+            ),
+            Finding(
+                f"{name}_exponent",
+                f"{name}: exponent of displacement over force, relative to the measured 2/3",
+                abs(exponent(found) / published["displacement_exponent"] - 1),
+                aim=BOUND,
+            ),
+        ]
+    x = np.linspace(-1, 1, 201)
+    # The definition of FoundationLaw on a plane, at the largest approach.
+    height = RADIUS - approaches[-1]
+    from_center = np.hypot(height, x * np.sqrt(RADIUS**2 - height**2))
+    pressure = (RADIUS**2 / from_center - from_center) / (RADIUS**2 / height - height)
+    power = published["displacement_exponent"]
+    panels = [
+        Panel(
+            "place / half width of the contact",
+            "pressure / largest",
+            (),
+            [("FoundationLaw", x, pressure), ("HertzLaw", x, np.sqrt(1 - x**2))],
+            [("paraboloid, as measured", x, 1 - x**2)],
+        ),
+        Panel(
+            "force / largest",
+            "displacement / largest",
+            (),
+            [
+                (
+                    name,
+                    [one.force / found[-1].force for one in found],
+                    [one.approach / found[-1].approach for one in found],
+                )
+                for name, found in touches.items()
+            ],
+            [("power of 2/3, as measured", line := np.geomspace(1e-3, 1, 9), line**power)],
+            logarithmic=True,
+        ),
+    ]
+    caption = "Pressure over the contact, and displacement against force, of the two laws."
+    return Outcome(
+        findings,
+        [draw("finger_pad", panels, caption)],
+        explained={"FoundationLaw_exponent": LAYER, "HertzLaw_shape": BONE},
+    )
