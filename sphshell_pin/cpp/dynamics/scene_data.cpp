@@ -24,6 +24,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
+    if (pair.law.foundation()) foundations_.resize(pairs_.size());
     if (pair.friction.has_state()) {
       bristles_.add(k, pair.friction.rings());
       several_rings_ = several_rings_ || pair.friction.rings() > 1;
@@ -173,6 +174,11 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
     query.contacts.clear();
     return query.contacts;
   }
+  if (pair.law.foundation()) {
+    const bool slopes = wants_second_ || pair.friction.has_state();
+    foundations_[k].find(pair, state.center, slopes, query.contacts);
+    return query.contacts;
+  }
   if (pair.ball > 0)
     find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
   else
@@ -194,18 +200,17 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
 
 // The shapes of the gaps at a pair's contacts.
 void SceneData::find_shapes(std::size_t k) {
+  shapes_[k].clear();
+  for (const Contact& contact : queries_[k].contacts) shapes_[k].push_back(find_shape(k, contact));
+}
+
+ContactShape SceneData::find_shape(std::size_t k, const Contact& contact) {
   const Pair& pair = pairs_[k];
-  std::vector<ContactShape>& shapes = shapes_[k];
-  shapes.clear();
-  const std::vector<Contact>& contacts = queries_[k].contacts;
-  if (contacts.empty()) return;
   if (pair.ball > 0 || pair.method != Method::Smooth) {
     const double curvature = 1 / pair.radius + (pair.ball > 0 ? 1 / pair.ball : 0);
-    for (const Contact& contact : contacts) {
-      shapes.push_back(shape_of_gap(curvature * Mat3::Identity(), contact.normal, pair.radius));
-      shapes.back().depth = contact.depth;
-    }
-    return;
+    ContactShape out = shape_of_gap(curvature * Mat3::Identity(), contact.normal, pair.radius);
+    out.depth = contact.depth;
+    return out;
   }
   const auto at = std::find(shell_of_.begin(), shell_of_.end(), pair.shell.get());
   const std::size_t number = at - shell_of_.begin();
@@ -213,9 +218,8 @@ void SceneData::find_shapes(std::size_t k) {
     shell_of_.push_back(pair.shell.get());
     curvatures_.emplace_back();
   }
-  for (const Contact& contact : contacts)
-    shapes.push_back(curvatures_[number].shape(*pair.shell, contact, states_[k].center, pair.radius,
-                                               wants_second_));
+  return curvatures_[number].shape(*pair.shell, contact, states_[k].center, pair.radius,
+                                   wants_second_);
 }
 
 void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {
@@ -224,6 +228,8 @@ void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int
   active.slot = slot;
   active.contact_id = contact_id;
   active.contact = contact;
+  if (pairs_[k].law.foundation())
+    active.row = static_cast<int>(&contact - queries_[k].contacts.data());
   if (pairs_[k].needs_shape())
     active.shape = static_cast<int>(&contact - queries_[k].contacts.data());
 }
@@ -276,6 +282,7 @@ void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
     m.outer_rate = outer_rate;
   }
   active.force = contact_force(pair.law, pair.friction, disc_radius(active), relaxation(pair), m);
+  if (active.row >= 0) add_foundation(active, m);
   // The energy also changes with the shape, as the sphere moves along the shell. It depends on the
   // sphere's center alone: that is where the force acts.
   if (const HertzLaw* hertz = pair.law.hertz(); hertz && active.shape >= 0) {
@@ -308,7 +315,7 @@ ContactWrench SceneData::wrench(const ActiveContact& active) const {
   const Vec3& normal = active.kinematics.normal;
   const double weight = active.contact.weight;
   ContactWrench out{active.point, weight * (f.normal * normal + f.friction),
-                    weight * f.torsion * normal + weight * f.rolling};
+                    weight * f.torsion * normal + weight * f.rolling + active.moment};
   if (active.shape >= 0) {
     const PairState& state = states_[active.pair];
     out.force += weight * active.climb;
@@ -329,15 +336,26 @@ void SceneData::add_force(const ActiveContact& active) {
   apply(pair.joint_j, active.point, -on_i.force, -on_i.moment);
   PairState& state = states_[active.pair];
   if (weight > 0) ++state.count;
-  state.pieces += weight > 0 ? 1 : -1;
-  if (f.normal == 0) ++state.clamped;
+  if (active.row < 0) {
+    state.pieces += weight > 0 ? 1 : -1;
+    if (f.normal == 0) ++state.clamped;
+  } else {
+    // The force of a foundation is smooth where a patch comes or goes: no event.
+    state.pieces = 1;
+  }
   state.depth = std::max(state.depth, m.depth);
   state.normal_force += weight * f.normal;
   // The weight of several as one is the length of the sum of their normals.
   const double share = weight > 0 ? 1 : weight;
-  powers_.damping += weight * damping_power(f, m);
-  powers_.friction += weight * friction_power(f, m);
-  powers_.elastic += share * pair.law.energy(m.depth, m.scale);
+  if (active.row >= 0) {
+    powers_.damping += active.damping;
+    powers_.friction += active.sliding;
+    powers_.elastic += foundations_[active.pair].energy(pair, active.row);
+  } else {
+    powers_.damping += weight * damping_power(f, m);
+    powers_.friction += weight * friction_power(f, m);
+    powers_.elastic += share * pair.law.energy(m.depth, m.scale);
+  }
   if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.stretch2;
   if (const ContactShape* gap = shape(active)) {
     state.conformity = std::max(state.conformity, gap->conformity);
@@ -399,8 +417,20 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     row.element = whole.element;
     row.contact_id = active.contact_id;
     row.feature = whole.feature;
-    if (patches)
-      patches->push_back(hertz_patch(pair.disc_radius(), normal, row.depth, row.normal_force));
+    if (!patches) continue;
+    if (pair.source) {
+      patches->push_back(unknown_patch(row.depth));
+      continue;
+    }
+    if (active.row >= 0) {
+      patches->push_back(
+          foundations_[active.pair].patch(pair, normal, row.depth, row.normal_force));
+      continue;
+    }
+    const ContactShape gap =
+        active.shape < 0 ? find_shape(active.pair, active.contact) : *shape(active);
+    patches->push_back(
+        hertz_patch(gap, state.world_from_j.rotation(), row.depth, row.normal_force));
   }
 }
 

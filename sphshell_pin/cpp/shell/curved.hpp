@@ -39,6 +39,8 @@ struct Cubic2 {
 };
 
 struct CubicPatch : Cubic2<Vec3> {
+  // The polar form (blossom) at three points (u, v): of a part of the patch, a control point.
+  Vec3 polar(const Eigen::Vector2d& p, const Eigen::Vector2d& q, const Eigen::Vector2d& r) const;
   // A direction that leaves side k at its parameter t into the patch, tangent to it.
   Vec3 inward(int k, double t) const;
 };
@@ -121,6 +123,8 @@ class CurvedShell {
   const LargeArray<CellBounds>& cells() const { return cells_; }
   double bulge() const { return bulge_; }  // the largest of them [m]
   const Tangents& tangents() const { return tangents_; }
+  // Whether the normals are the surface's own, and not estimated.
+  bool exact() const { return exact_; }
   // Per corner: its normal was set aside, as a crease that the elements show divides its fan.
   const std::vector<char>& divided() const { return divided_; }
   int creases() const { return creases_; }  // edges that became creases so
@@ -145,6 +149,7 @@ class CurvedShell {
   LargeArray<CellBounds> cells_;
   Tangents tangents_;
   double bulge_ = 0;
+  bool exact_;
 };
 
 }  // namespace sphshell
