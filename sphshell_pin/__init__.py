@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import ContactSet as ContactSet
     from sphshell_pin.contact import CoulombFriction as CoulombFriction
     from sphshell_pin.contact import Feature as Feature
+    from sphshell_pin.contact import FoundationLaw as FoundationLaw
     from sphshell_pin.contact import HertzLaw as HertzLaw
     from sphshell_pin.contact import HuntCrossleyLaw as HuntCrossleyLaw
     from sphshell_pin.contact import ImpactLaw as ImpactLaw
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import Sphere as Sphere
     from sphshell_pin.contact import TableLaw as TableLaw
     from sphshell_pin.contact import contact_wrench as contact_wrench
+    from sphshell_pin.contact import foundation_pressure as foundation_pressure
     from sphshell_pin.dynamics import Adaptive as Adaptive
     from sphshell_pin.dynamics import CartesianImpedance as CartesianImpedance
     from sphshell_pin.dynamics import ContactSwitch as ContactSwitch
@@ -64,6 +66,7 @@ _HOME = {
     "CoulombFriction": "contact",
     "Feature": "contact",
     "ForceTorqueSensor": "dynamics",
+    "FoundationLaw": "contact",
     "GravityCompensation": "dynamics",
     "HertzLaw": "contact",
     "HuntCrossleyLaw": "contact",
@@ -90,6 +93,7 @@ _HOME = {
     "TaxelImages": "patches",
     "WearMap": "patches",
     "contact_wrench": "contact",
+    "foundation_pressure": "contact",
     "wear_maps": "patches",
 }
 _PARTS = (

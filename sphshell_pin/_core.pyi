@@ -75,6 +75,18 @@ class Shell:
     @property
     def triangle_normals(self) -> _Doubles: ...
 
+_FoundationRows = tuple[_Ints, _Ints, _Doubles, _Doubles, _Doubles, _Doubles, _Doubles]
+_FoundationPoints = tuple[_Doubles, _Doubles, _Doubles, _Doubles, _Doubles, _Ints]
+
+class Foundation:
+    def __init__(self) -> None: ...
+    def find(
+        self, shell: Shell, center: _Doubles, radius: float, method: int, points: bool = False
+    ) -> tuple[_FoundationRows, _FoundationPoints]: ...
+    def find_on_ball(
+        self, ball: float, center: _Doubles, radius: float, points: bool = False
+    ) -> tuple[_FoundationRows, _FoundationPoints]: ...
+
 class NormalLaw:
     def __init__(self, kind: str, numbers: Sequence[float]) -> None: ...
     @staticmethod

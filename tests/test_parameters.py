@@ -112,6 +112,8 @@ VALUES = {
     "poisson_1": 0.3,
     "young_2": 1e9,
     "poisson_2": 0.3,
+    "modulus": 1e6,
+    "thickness": 1e-3,
     "mu_static": 0.3,
     "mu_dynamic": 0.1,
     "kp": 1.0,

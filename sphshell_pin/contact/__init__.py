@@ -1,7 +1,8 @@
 """Contacts of a sphere with a shell, the laws of their forces, and their wrenches."""
 
-from sphshell_pin.contact import bristle, friction, laws, table_law
+from sphshell_pin.contact import bristle, foundation, friction, laws, table_law
 from sphshell_pin.contact.bristle import *  # noqa: F403
+from sphshell_pin.contact.foundation import *  # noqa: F403
 from sphshell_pin.contact.friction import *  # noqa: F403
 from sphshell_pin.contact.laws import *  # noqa: F403
 from sphshell_pin.contact.normal_law import NormalLaw
@@ -20,6 +21,7 @@ __all__ = [
     "contact_wrench",
 ]
 __all__ += bristle.__all__
+__all__ += foundation.__all__
 __all__ += friction.__all__
 __all__ += laws.__all__
 __all__ += table_law.__all__

@@ -43,16 +43,6 @@ struct Expansion {
 
 double outside(double u, double v) { return std::max({-u, -v, u + v - 1}); }
 
-// The polar form (blossom) of a patch at three points.
-Vec3 polar(const CubicPatch& c, const Vec2& p, const Vec2& q, const Vec2& r) {
-  const double u = p.x(), v = p.y(), a = q.x(), b = q.y(), x = r.x(), y = r.y();
-  return c.c00 + ((u + a + x) * c.c10 + (v + b + y) * c.c01) / 3 +
-         ((u * a + u * x + a * x) * c.c20 + (v * b + v * y + b * y) * c.c02) / 3 +
-         (u * (b + y) + a * (v + y) + x * (v + b)) / 6 * c.c11 + u * a * x * c.c30 +
-         v * b * y * c.c03 + (u * a * y + u * b * x + v * a * x) / 3 * c.c21 +
-         (u * b * y + v * a * y + v * b * x) / 3 * c.c12;
-}
-
 // A lower bound of |x|^2 over a part of a patch: the least of its 28 coefficients in Bernstein's
 // form, of degree 6.
 double least2_of(const CubicPatch& patch, const Vec2 (&corner)[3]) {
@@ -63,7 +53,7 @@ double least2_of(const CubicPatch& patch, const Vec2 (&corner)[3]) {
   for (int i = 0; i < 4; ++i)
     for (int j = 0; i + j < 4; ++j) {
       const auto pick = [&](int n) { return corner[n < i ? 1 : n < i + j ? 2 : 0]; };
-      net[i][j] = kWeight3[i][j] * polar(patch, pick(0), pick(1), pick(2));
+      net[i][j] = kWeight3[i][j] * patch.polar(pick(0), pick(1), pick(2));
     }
   for (int i = 0; i < 4; ++i)
     for (int j = 0; i + j < 4; ++j)

@@ -216,9 +216,33 @@ struct TableLaw {
   }
 };
 
+// The elastic foundation of contact/foundation.hpp; with a radius that of a ball on a plane, where
+// the depth is all that counts.
+struct FoundationLaw {
+  static constexpr const char* kind = "foundation";
+  double modulus, thickness, dissipation, radius;  // [Pa], [m], [s/m], [m]
+
+  explicit FoundationLaw(const Numbers& p)
+      : modulus(p.at(0)), thickness(p.at(1)), dissipation(p.at(2)), radius(p.at(3)) {}
+
+  bool needs_rate() const { return dissipation > 0; }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+    const S elastic = modulus / thickness * M_PI * depth * depth * (radius - depth / 3);
+    if (!needs_rate()) return {elastic, elastic};
+    return push(S(elastic - elastic * dissipation * gap_rate), elastic);
+  }
+
+  double energy(double depth) const {
+    return modulus / thickness * M_PI * depth * depth * depth * (radius / 3 - depth / 12);
+  }
+};
+
 // One of the laws.
 struct NormalLaw {
-  std::variant<ImpactLaw, HuntCrossleyLaw, HertzLaw, TableLaw> law = ImpactLaw({0, 1, 0, 1});
+  std::variant<ImpactLaw, HuntCrossleyLaw, HertzLaw, TableLaw, FoundationLaw> law =
+      ImpactLaw({0, 1, 0, 1});
 
   bool needs_rate() const {
     return std::visit([](const auto& one) { return one.needs_rate(); }, law);
@@ -227,6 +251,11 @@ struct NormalLaw {
   const HertzLaw* hertz() const {
     const HertzLaw* one = std::get_if<HertzLaw>(&law);
     return one && one->fixed_scale == 0 ? one : nullptr;
+  }
+  // Of a force that is an integral over the overlap, else null.
+  const FoundationLaw* foundation() const {
+    const FoundationLaw* one = std::get_if<FoundationLaw>(&law);
+    return one && one->radius == 0 ? one : nullptr;
   }
 
   template <class S>

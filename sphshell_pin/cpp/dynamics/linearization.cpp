@@ -102,7 +102,12 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
     Sum sum{Vector6::Zero(), Matrix6::Zero(), Matrix6::Zero()};
     for (next = first; next < active.size() && active[next].pair == p; ++next) {
       const ContactSite site = site_of(active[next], chain.twist());
-      contact_slopes(pair.law, pair.friction, scene_.relaxation(pair), site, slopes_);
+      if (active[next].row >= 0)
+        scene_.foundation(active[next])
+            .slopes(pair, active[next].row, scene_.relaxation(pair), site,
+                    active[next].force.normal, slopes_);
+      else
+        contact_slopes(pair.law, pair.friction, scene_.relaxation(pair), site, slopes_);
       sum.wrench += slopes_.wrench;
       sum.by_displacement += slopes_.by_place * displacement_at(site.place);
       sum.by_twist += slopes_.by_twist;

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "contact/ball.hpp"
-#include "dynamics/patch.hpp"
 
 namespace sphshell {
 
@@ -24,6 +23,7 @@ SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     needs_velocity_ = needs_velocity_ || pair.needs_velocity();
+    if (pair.law.foundation()) foundations_.resize(pairs_.size());
     if (pair.friction.has_state()) {
       bristles_.add(k, pair.friction.rings());
       several_rings_ = several_rings_ || pair.friction.rings() > 1;
@@ -173,6 +173,11 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
     query.contacts.clear();
     return query.contacts;
   }
+  if (pair.law.foundation()) {
+    const bool slopes = wants_second_ || pair.friction.has_state();
+    foundations_[k].find(pair, state.center, slopes, query.contacts);
+    return query.contacts;
+  }
   if (pair.ball > 0)
     find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
   else
@@ -222,6 +227,8 @@ void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int
   active.slot = slot;
   active.contact_id = contact_id;
   active.contact = contact;
+  if (pairs_[k].law.foundation())
+    active.row = static_cast<int>(&contact - queries_[k].contacts.data());
   if (pairs_[k].needs_shape())
     active.shape = static_cast<int>(&contact - queries_[k].contacts.data());
 }
@@ -274,6 +281,7 @@ void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
     m.outer_rate = outer_rate;
   }
   active.force = contact_force(pair.law, pair.friction, disc_radius(active), relaxation(pair), m);
+  if (active.row >= 0) add_foundation(active, m);
   // The energy also changes with the shape, as the sphere moves along the shell. It depends on the
   // sphere's center alone: that is where the force acts.
   if (const HertzLaw* hertz = pair.law.hertz(); hertz && active.shape >= 0) {
@@ -306,7 +314,7 @@ ContactWrench SceneData::wrench(const ActiveContact& active) const {
   const Vec3& normal = active.kinematics.normal;
   const double weight = active.contact.weight;
   ContactWrench out{active.point, weight * (f.normal * normal + f.friction),
-                    weight * f.torsion * normal + weight * f.rolling};
+                    weight * f.torsion * normal + weight * f.rolling + active.moment};
   if (active.shape >= 0) {
     const PairState& state = states_[active.pair];
     out.force += weight * active.climb;
@@ -327,15 +335,26 @@ void SceneData::add_force(const ActiveContact& active) {
   apply(pair.joint_j, active.point, -on_i.force, -on_i.moment);
   PairState& state = states_[active.pair];
   if (weight > 0) ++state.count;
-  state.pieces += weight > 0 ? 1 : -1;
-  if (f.normal == 0) ++state.clamped;
+  if (active.row < 0) {
+    state.pieces += weight > 0 ? 1 : -1;
+    if (f.normal == 0) ++state.clamped;
+  } else {
+    // The force of a foundation is smooth where a patch comes or goes: no event.
+    state.pieces = 1;
+  }
   state.depth = std::max(state.depth, m.depth);
   state.normal_force += weight * f.normal;
   // The weight of several as one is the length of the sum of their normals.
   const double share = weight > 0 ? 1 : weight;
-  powers_.damping += weight * damping_power(f, m);
-  powers_.friction += weight * friction_power(f, m);
-  powers_.elastic += share * pair.law.energy(m.depth, m.scale);
+  if (active.row >= 0) {
+    powers_.damping += active.damping;
+    powers_.friction += active.sliding;
+    powers_.elastic += foundations_[active.pair].energy(pair, active.row);
+  } else {
+    powers_.damping += weight * damping_power(f, m);
+    powers_.friction += weight * friction_power(f, m);
+    powers_.elastic += share * pair.law.energy(m.depth, m.scale);
+  }
   if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.stretch2;
   if (const ContactShape* gap = shape(active)) {
     state.conformity = std::max(state.conformity, gap->conformity);
@@ -356,57 +375,6 @@ void SceneData::apply(int joint, const Vec3& point_world, const Vec3& force_worl
 Vec3 SceneData::relative_velocity(const Pair& pair, const Vec3& point_world) const {
   return body_.velocity_at(pair.joint_i, point_world) -
          body_.velocity_at(pair.joint_j, point_world);
-}
-
-// Contacts of one place as one, with the sum of their forces.
-void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows,
-                    std::vector<PatchRow>* patches) {
-  if (active_.empty()) return;
-  if (!needs_velocity_) body_.kinematics(q, v);
-  const auto write = [](double* to, const Vec3& x) { std::copy_n(x.data(), 3, to); };
-  for (std::size_t i = 0, begin = 0; i < active_.size(); ++i) {
-    const ActiveContact& active = active_[i];
-    if (i > 0 && active.pair != active_[i - 1].pair) begin = i;
-    const std::vector<Contact>& contacts = queries_[active.pair].contacts;
-    if (!leads(contacts, i - begin)) continue;
-    const Pair& pair = pairs_[active.pair];
-    const PairState& state = states_[active.pair];
-    const Contact whole = whole_of(contacts, i - begin, state.center, pair.radius);
-    const Vec3 point = state.world_from_j.act(whole.point);
-    const Vec3 normal = state.world_from_j.rotation() * whole.normal;
-    Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
-    double depth = 0;  // corrected, where the shape counts
-    // One without a place stands alone.
-    const std::size_t first = i - begin, last = whole.group < 0 ? first + 1 : contacts.size();
-    for (std::size_t k = first; k < last; ++k) {
-      if (k != first && contacts[k].group != whole.group) continue;
-      const ActiveContact& other = active_[begin + k];
-      push += other.contact.weight * other.force.normal * other.kinematics.normal;
-      if (other.shape >= 0) depth += other.contact.weight * other.kinematics.depth;
-      friction += other.contact.weight * other.force.friction;
-    }
-    const Vec3 relative = relative_velocity(pair, point);
-    ContactRow& row = rows.emplace_back();
-    write(row.point, point);
-    write(row.normal, normal);
-    row.depth = active.shape < 0 ? whole.depth : depth;
-    row.normal_force = push.dot(normal);
-    write(row.friction_force, friction);
-    write(row.slip_velocity, relative - relative.dot(normal) * normal);
-    row.pair = active.pair;
-    row.element = whole.element;
-    row.contact_id = active.contact_id;
-    row.feature = whole.feature;
-    if (!patches) continue;
-    if (pair.source) {
-      patches->push_back(unknown_patch(row.depth));
-      continue;
-    }
-    const ContactShape gap =
-        active.shape < 0 ? find_shape(active.pair, active.contact) : *shape(active);
-    patches->push_back(
-        hertz_patch(gap, state.world_from_j.rotation(), row.depth, row.normal_force));
-  }
 }
 
 const VectorX& SceneData::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {

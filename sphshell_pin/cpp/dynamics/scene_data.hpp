@@ -10,6 +10,7 @@
 #include "dynamics/bristles.hpp"
 #include "dynamics/clusters.hpp"
 #include "dynamics/contact_row.hpp"
+#include "dynamics/foundation_pair.hpp"
 #include "dynamics/joints.hpp"
 #include "dynamics/pair.hpp"
 
@@ -39,7 +40,10 @@ struct ActiveContact {
   Vec3 point;                  // in the world
   ContactKinematics<double> kinematics;  // in the world
   ContactForce<double> force;
-  int shape = -1;             // its number in those of the pair
+  int row = -1;                     // of the foundation of its pair
+  Vec3 moment = Vec3::Zero();       // of that row's pressure, beyond that of its force at the point
+  double damping = 0, sliding = 0;  // power that it loses [W]
+  int shape = -1;                   // its number in those of the pair
   Vec3 climb = Vec3::Zero();  // at the sphere's center, as its stiffness changes with the place [N]
 };
 
@@ -123,6 +127,10 @@ class SceneData {
   const std::vector<PairState>& states() const { return states_; }
   const std::vector<Excursion>& excursions() const { return excursions_; }
   const Powers& powers() const { return powers_; }
+  // Where the contact is a row of one: that foundation.
+  const FoundationPair& foundation(const ActiveContact& active) const {
+    return foundations_[active.pair];
+  }
   const std::vector<Pair>& pairs() const { return pairs_; }
   const std::vector<Cluster>& clusters() const { return clusters_; }
   const JointForces& joints() const { return joints_; }
@@ -133,11 +141,13 @@ class SceneData {
   std::vector<Contact>& find_contacts(std::size_t k, bool far);
   void find_shapes(std::size_t k);
   ContactShape find_shape(std::size_t k, const Contact& contact);
+  PatchRow patch_of(const ActiveContact& active, const ContactRow& row);
   void evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z);
   void add_contact(std::size_t k, const Contact& contact, int slot, int contact_id);
   void compute_forces(const VectorX& z);
   void compute_kinematics(ActiveContact& active, const VectorX& z);
   void compute_force(ActiveContact& active, const VectorX& z);
+  void add_foundation(ActiveContact& active, const ContactKinematics<double>& m);
   void add_force(const ActiveContact& active);
   void apply(int joint, const Vec3& point_world, const Vec3& force_world, const Vec3& moment_world);
   Vec3 rate_of_turning(const ActiveContact& active, const Vec3& stretch) const;
@@ -148,6 +158,7 @@ class SceneData {
   std::vector<Pair> pairs_;
   std::vector<Cluster> clusters_;
   std::vector<Query> queries_;
+  std::vector<FoundationPair> foundations_;  // beside the pairs, if any has one
   std::vector<Contact> merged_;
   std::vector<Curvature> curvatures_;   // of the shells whose shape counts
   std::vector<const Shell*> shell_of_;  // beside them
@@ -165,7 +176,7 @@ class SceneData {
   double relaxation_ = 0;
   bool touching_ = false;
   bool needs_velocity_ = false;
-  bool wants_second_ = false;  // derivatives of shapes
+  bool wants_second_ = false;  // derivatives of shapes and of foundations
   bool several_rings_ = false;
 };
 

@@ -39,6 +39,8 @@ struct Cubic2 {
 };
 
 struct CubicPatch : Cubic2<Vec3> {
+  // The polar form (blossom) at three points (u, v): of a part of the patch, a control point.
+  Vec3 polar(const Eigen::Vector2d& p, const Eigen::Vector2d& q, const Eigen::Vector2d& r) const;
   // A direction that leaves side k at its parameter t into the patch, tangent to it.
   Vec3 inward(int k, double t) const;
 };

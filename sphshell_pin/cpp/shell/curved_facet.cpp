@@ -20,6 +20,16 @@ Vec3 CubicPatch::inward(int k, double t) const {
   }
 }
 
+Vec3 CubicPatch::polar(const Eigen::Vector2d& p, const Eigen::Vector2d& q,
+                       const Eigen::Vector2d& r) const {
+  const double u = p.x(), v = p.y(), a = q.x(), b = q.y(), x = r.x(), y = r.y();
+  return c00 + ((u + a + x) * c10 + (v + b + y) * c01) / 3 +
+         ((u * a + u * x + a * x) * c20 + (v * b + v * y + b * y) * c02) / 3 +
+         (u * (b + y) + a * (v + y) + x * (v + b)) / 6 * c11 + u * a * x * c30 + v * b * y * c03 +
+         (u * a * y + u * b * x + v * a * x) / 3 * c21 +
+         (u * b * y + v * a * y + v * b * x) / 3 * c12;
+}
+
 Vec3 CurvedFacet::control_offset(int k, int i) const {
   // 2^exponent, by its bits: it is far from the ends of the range.
   const std::uint64_t bits = static_cast<std::uint64_t>(exponent_[k] + 1023) << 52;

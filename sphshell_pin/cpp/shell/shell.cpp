@@ -9,6 +9,7 @@
 #include "shell/curved.hpp"
 #include "shell/free_memory.hpp"
 #include "shell/in_parallel.hpp"
+#include "shell/sheets.hpp"
 #include "shell/triangle.hpp"
 
 namespace sphshell {
@@ -193,6 +194,11 @@ std::size_t Shell::bytes() const {
   return curved + bvh_.bytes() + facets_.size() * (sizeof(Facet) + sizeof(NormalCone)) +
          vertices_.size() * sizeof(Vec3) + topology_.incidence.size() * 2 * sizeof(int) +
          topology_.edges.size() * sizeof(Edge) + topology_.face_normal.size() * sizeof(Vec3);
+}
+
+const Sheets& Shell::sheets() const {
+  std::call_once(sheets_found_, [&] { sheets_ = std::make_shared<const Sheets>(topology_); });
+  return *sheets_;
 }
 
 }  // namespace sphshell

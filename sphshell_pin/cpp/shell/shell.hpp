@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "shell/bvh.hpp"
@@ -58,6 +59,7 @@ struct SurfacePoint {
 };
 
 class CurvedShell;
+struct Sheets;
 class Tangents;
 
 class Shell {
@@ -92,6 +94,9 @@ class Shell {
   void curve(std::vector<Vec3> normals, bool exact, const std::vector<std::uint8_t>& straight = {});
   const CurvedShell* curved() const { return curved_.get(); }
 
+  // Its sheets, found at first use.
+  const Sheets& sheets() const;
+
   double size() const { return size_; }  // box diagonal [m]
 
   // For the rare edge with more than two facets: its half-edges in facet numbering.
@@ -119,6 +124,8 @@ class Shell {
   LargeArray<NormalCone> cones_;
   double size_;
   std::shared_ptr<const CurvedShell> curved_;
+  mutable std::once_flag sheets_found_;
+  mutable std::shared_ptr<const Sheets> sheets_;
 };
 
 }  // namespace sphshell

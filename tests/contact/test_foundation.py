@@ -1,0 +1,257 @@
+"""FoundationLaw's integrals against its definition, closed forms, and its own potential."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sphshell_pin import Shell, _core
+from tests import meshes
+from tests.contact.smooth.surfaces import SURFACES, shell_of, side_of
+from tests.contact.smooth.test_sweeps_edges import edged
+from tests.oracle import foundation as oracle
+
+METHODS = {"facets": 0, "smooth": 2}
+
+
+def foundation(shell, center, radius=1.0, method="smooth", points=False):
+    """Columns of the rows and of the quadrature points, for a modulus / thickness of one."""
+    core = shell.core_for(method)
+    place = np.asarray(center, dtype=float)
+    return _core.Foundation().find(core, place, radius, METHODS[method], points)
+
+
+def total(shell, center, radius=1.0, method="smooth"):
+    """Force, energy and derivative of the force."""
+    rows, _ = foundation(shell, center, radius, method)
+    return rows[4].sum(axis=0), rows[5].sum(), rows[6].sum(axis=0)
+
+
+def plane_force(radius, depth):
+    return np.pi * depth**2 * (radius - depth / 3)
+
+
+PLATES = {
+    "two triangles": lambda: meshes.grid_plate(1, 1, size=4.0),
+    "random": lambda: meshes.random_plate(400, seed=3, size=4.0),
+    "slivers": lambda: meshes.random_plate(300, seed=5, size=4.0, slivers=True),
+}
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+@pytest.mark.parametrize("plate", list(PLATES))
+def test_on_a_plane(plate: str, method: str) -> None:
+    """kappa times the volume of the cap, however the plane is divided."""
+    shell = Shell(*PLATES[plate]())
+    for depth in (0.01, 0.1, 0.5, 0.9):
+        force, energy, slope = total(shell, [0.013, 0.021, 1 - depth], method=method)
+        exact = plane_force(1.0, depth)
+        assert force == pytest.approx([0, 0, exact], rel=1e-12, abs=1e-12 * exact)
+        stored = np.pi * (depth**3 / 3 - depth**4 / 12)
+        assert energy == pytest.approx(stored, rel=1e-10 / depth)
+        stiffness = np.pi * (2 * depth - depth**2)
+        assert slope == pytest.approx(np.diag([0, 0, -stiffness]), abs=1e-11 * stiffness)
+
+
+def test_scales_with_the_radius() -> None:
+    small = Shell(PLATES["random"]()[0] * 1e-3, PLATES["random"]()[1])
+    force, _, _ = total(small, [1e-5, 2e-5, 0.9e-3], radius=1e-3)
+    assert force[2] == pytest.approx(plane_force(1e-3, 1e-4), rel=1e-12)
+
+
+@pytest.mark.parametrize("ball", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("depth", [0.02, 0.3, 0.55])
+def test_on_a_sphere(ball: float, depth: float) -> None:
+    """Against the integral over the lens of overlap."""
+    apart = ball + 1.0 - depth
+    found, points = _core.Foundation().find_on_ball(ball, np.array([0, 0, apart]), 1.0, True)
+    assert found[5] == pytest.approx([oracle.energy_in_ball(ball, apart, 1.0)], rel=1e-12)
+    force = -oracle.slope(lambda x: oracle.energy_in_ball(ball, x, 1.0), apart, 1e-3)
+    assert found[4] == pytest.approx(np.array([[0, 0, force]]), rel=1e-11, abs=1e-11 * force)
+    assert points[4].sum(axis=0) == pytest.approx(found[4][0], rel=1e-12, abs=1e-14)
+
+    def force_at(x):
+        return _core.Foundation().find_on_ball(ball, x, 1.0)[0][4][0]
+
+    center, steps = np.array([0, 0, apart]), 1e-5 * np.eye(3)
+    slope = np.array([(force_at(center + h) - force_at(center - h)) / 2e-5 for h in steps]).T
+    assert found[6][0] == pytest.approx(slope, abs=1e-8 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("depth", [0.01, 0.3])
+def test_order_on_a_dome(depth: float) -> None:
+    """Meshes of half the size have at most a quarter of the error, down to 1e-9."""
+    rng = np.random.default_rng(0)
+    out = rng.normal(size=(6, 3))
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    force = -oracle.slope(lambda x: oracle.energy_in_ball(4.0, x, 1.0), 5 - depth, 1e-3)
+    errors = []
+    for h in (0.6, 0.3, 0.15):
+        found = [total(shell_of("dome", h), (5 - depth) * n)[0] for n in out]
+        errors.append(max(np.linalg.norm(f / force - n) for f, n in zip(found, out, strict=True)))
+    assert errors[1] <= 1e-5
+    assert errors[1] <= max(errors[0] / 4, 1e-9)
+    assert errors[2] <= max(errors[1] / 4, 1e-9)
+
+
+@cache
+def socket(size: float, level: int) -> Shell:
+    vertices, elements = meshes.icosphere(level, 1.0)
+    return Shell(vertices * size, elements, normals=vertices, side="inside")
+
+
+@pytest.mark.parametrize("size", [1.01, 1.1, 1.5])
+def test_in_a_socket(size: float) -> None:
+    """A ball in a conforming cavity: where Hertz's theory ends."""
+    off = size - 1 + 0.1
+    force = -oracle.slope(lambda x: oracle.energy_in_socket(size, x, 1.0), off, 1e-3)
+    stored = oracle.energy_in_socket(size, off, 1.0)
+    errors = []
+    for level in (2, 3, 4):
+        found, energy, _ = total(socket(size, level), [0.0, 0.6 * off, -0.8 * off])
+        errors.append(np.linalg.norm(found - force * np.array([0, 0.6, -0.8])) / abs(force))
+    assert energy == pytest.approx(stored, rel=1e-7)
+    assert errors[0] <= 1e-3
+    assert errors[1] <= errors[0] / 4
+    assert errors[2] <= 1e-7
+
+
+def test_round_a_cube() -> None:
+    """Creases and corners of a solid, outside it and with the center inside."""
+    shell = Shell(*meshes.cube(2.0), side="outside")
+    centers = [
+        (1.2, 0.3, -0.1),
+        (1.4, 1.3, 0.2),
+        (1.3, 1.2, 1.35),
+        (0.8, 0.7, 0.9),
+        (0.1, 0.2, 0.9),
+    ]
+    for center in np.array(centers):
+        exact = oracle.energy_in_box(-np.ones(3), np.ones(3), center, 1.0)
+        assert total(shell, center)[1] == pytest.approx(exact, rel=2e-3)
+
+
+BORDERS = ["can", "cup", "lens", "tube", "cap", "wave", "gutter", "sheet", "l plate", "cube", "box"]
+
+
+@pytest.mark.parametrize("kind", [*BORDERS, "cone", "dome", "bowl", "torus inside", "wavy above"])
+def test_force_and_slope_are_derivatives(kind: str) -> None:
+    """On curved shells, over creases, borders and holes, as deep as half the radius."""
+    rng = np.random.default_rng(1)
+    if kind in SURFACES:
+        shell = shell_of(kind, 0.6)
+        centers = np.concatenate([SURFACES[kind].probes(6, d, seed=3)[0] for d in (0.04, 0.4)])
+    else:
+        shell = edged(kind)
+        ends = shell.vertices[rng.choice(shell.edge_vertices[shell.edge_class > 0], 12)]
+        out = rng.normal(size=(12, 3))
+        out *= (rng.uniform(0.5, 0.95, 12) / np.linalg.norm(out, axis=1))[:, None]
+        centers = ends[:, 0] + rng.uniform(size=(12, 1)) * (ends[:, 1] - ends[:, 0]) + out
+    for center in centers:
+        force, energy, slope = total(shell, center)
+        if energy < 1e-6:
+            continue
+        step = 1e-5
+        ends = [(total(shell, center + h), total(shell, center - h)) for h in step * np.eye(3)]
+        falls = [(behind[1] - ahead[1]) / (2 * step) for ahead, behind in ends]
+        turns = np.array([(ahead[0] - behind[0]) / (2 * step) for ahead, behind in ends]).T
+        assert np.linalg.norm(force - falls) <= 3e-6 * np.linalg.norm(force), center
+        assert np.abs(slope - turns).max() <= 3e-6 * np.abs(slope).max(), center
+
+
+def test_hole_and_thin_wall() -> None:
+    """A plate with a hole, and both faces of a thin one: V is additive, so nothing is special."""
+    vertices, elements = meshes.grid_plate(6, 6, size=4.0)
+    inner = (np.abs(vertices[elements].mean(axis=1)[:, :2]) < 0.7).all(axis=1)
+    center = np.array([0.05, 0.1, 0.9])
+    whole = total(Shell(vertices, elements), center)
+    ring = total(Shell(vertices, elements[~inner]), center)
+    plug = total(Shell(vertices, elements[inner]), center)
+    for all_, part, rest in zip(whole, ring, plug, strict=True):
+        assert part + rest == pytest.approx(all_, abs=1e-9 * np.abs(all_).max())
+    thin = Shell(*_slab(0.05), side="outside")
+    force, energy, _ = total(thin, [0.0, 0.0, 0.025 + 0.8])
+    below = plane_force(1.0, 0.15)
+    assert force[2] == pytest.approx(plane_force(1.0, 0.2) - below, rel=1e-12)
+    assert energy > 0
+
+
+def _slab(thickness: float):
+    vertices, elements = meshes.cube(4.0)
+    return vertices * [1.0, 1.0, thickness / 4.0], elements
+
+
+@pytest.mark.parametrize("kind", ["dome", "cube", "sheet", "random"])
+def test_points_add_up(kind: str) -> None:
+    """Forces of the quadrature points, their patches' and the whole."""
+    center = np.array([1.9, 1.2, 0.85])
+    if kind == "dome":
+        shell, center = shell_of("dome", 0.6), np.array([1.0, 2.0, 4.3])
+    elif kind == "random":
+        shell, center = Shell(*PLATES["random"]()), np.array([0.1, 0.2, 0.9])
+    else:
+        shell = edged(kind)
+        center = np.array([2.3, 2.2, 2.6]) if kind == "cube" else center
+    rows, (points, normals, areas, pressures, forces, row) = foundation(shell, center, points=True)
+    force = rows[4].sum(axis=0)
+    assert np.linalg.norm(forces.sum(axis=0) - force) <= 1e-13 * np.linalg.norm(force)
+    for k, one in enumerate(rows[4]):
+        assert np.abs(forces[row == k].sum(axis=0) - one).max() <= 1e-13 * np.linalg.norm(force)
+    pressed = areas > 0
+    rho = np.linalg.norm(points - center, axis=1)
+    assert pressures[pressed] == pytest.approx(oracle.pressure(rho[pressed], 1.0), rel=1e-9)
+    each = (areas * pressures)[:, None] * normals
+    assert forces[pressed] == pytest.approx(each[pressed], abs=1e-15)
+    # The potential depends on the center alone: on closed shells there is no moment about it.
+    if kind in ("dome", "cube"):
+        moment = np.cross(points - center, forces).sum(axis=0)
+        assert np.linalg.norm(moment) <= 1e-6 * np.linalg.norm(force)
+
+
+def test_rows_are_patches() -> None:
+    """One per face that is overlapped, with its depth and its center of pressure."""
+    shell = edged("box")
+    center = np.array([-1.1, 0.2, -1.3])
+    (patch, _, depth, at, force, _, _), _ = foundation(shell, center)
+    assert len(set(patch)) == 2
+    order = np.argsort(depth)[::-1]
+    assert depth[order] == pytest.approx([0.3, 0.1], abs=1e-12)
+    assert force[order] == pytest.approx(
+        np.array([[0, 0, plane_force(1.0, 0.3)], [plane_force(1.0, 0.1), 0, 0]]), abs=1e-9
+    )
+    assert at[order] == pytest.approx(np.array([[-1.1, 0.2, -2.0], [-2.0, 0.2, -1.3]]), abs=1e-9)
+
+
+def test_over_a_convex_crease() -> None:
+    """Slid over the edge of a block at a constant overlap: no peak beyond that of the two walls,
+    no dip below what the wall gives that it leaves."""
+    shell = Shell(*meshes.cube(4.0), side="outside")
+    depth = 0.1
+    turn = np.linspace(-0.4, np.pi / 2 + 0.4, 60)
+    # At a constant distance from the block, round its edge.
+    corner = np.array([2.0, 0.3, 2.0])
+    arc = np.clip(turn, 0, np.pi / 2)
+    path = corner + 0.9 * np.stack([np.sin(arc), 0 * arc, np.cos(arc)], axis=1)
+    path[:, 0] += np.minimum(turn, 0) * 2
+    path[:, 2] -= np.maximum(turn - np.pi / 2, 0) * 2
+    size = [np.linalg.norm(total(shell, center)[0]) for center in path]
+    wall = plane_force(1.0, depth)
+    assert size[0] == pytest.approx(wall, rel=1e-9)
+    assert size[-1] == pytest.approx(wall, rel=1e-9)
+    assert max(size) <= wall * (1 + 1e-9)
+
+
+def test_tessellation_does_not_count() -> None:
+    """The same wavy sheet in elements of 0.6, 0.3 and 0.15."""
+    centers, _ = SURFACES["wavy above"].probes(6, 0.1, seed=2)
+    forces = [
+        np.array([total(shell_of("wavy above", h), c)[0] for c in centers])
+        for h in (0.6, 0.3, 0.15)
+    ]
+    size = np.linalg.norm(forces[2], axis=1)
+    coarse, fine = (np.linalg.norm(f - forces[2], axis=1) / size for f in forces[:2])
+    ratio = side_of("wavy above", 0.6) / side_of("wavy above", 0.3)
+    assert coarse.max() <= 3e-3
+    assert fine.max() <= coarse.max() / ratio**2

@@ -1,0 +1,240 @@
+"""FoundationLaw in scenes: wrenches, friction by points, energy, derivatives, files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter
+from tests import meshes
+from tests.contact.smooth.surfaces import shell_of
+from tests.contact.smooth.test_sweeps_edges import edged
+from tests.dynamics.test_contact_derivatives import assert_derivatives, assert_rate_jacobian
+from tests.models import ball, free_q, two_free_bodies, two_free_state
+
+KAPPA = 2e4  # modulus / thickness [Pa/m]
+LAW = sp.FoundationLaw(1e4, 0.5)
+DAMPED = sp.FoundationLaw(1e4, 0.5, dissipation=0.2)
+COULOMB = sp.CoulombFriction(0.3, 0.1, 0.1, 1.0)
+BRISTLE = sp.BristleFriction(0.5, 0.3, 1e4, 30.0, 0.05)
+
+
+def free_ball(shell, law=LAW, friction=None, *, gravity=0.0, mass=10.0, radius=1.0):
+    """Free ball on a fixed shell."""
+    scene = sp.Scene(ball(gravity, mass, radius))
+    scene.add_contact(
+        sphere=sp.Sphere(radius, frame="ball"), shell=shell, law=law, friction=friction, name="b"
+    )
+    return scene
+
+
+def test_plane_law() -> None:
+    """What the depth alone says: on a plane."""
+    law = sp.FoundationLaw(1e6, 5e-3).on_plane(0.01)
+    assert law.normal_force(1e-3) == pytest.approx(2e8 * np.pi * 1e-6 * (0.01 - 1e-3 / 3))
+    stored = np.trapezoid([law.normal_force(d) for d in np.linspace(0, 1e-3, 2001)], dx=5e-7)
+    assert law.energy(1e-3) == pytest.approx(stored, rel=1e-6)
+    assert law.depth_at(law.normal_force(7e-4)) == pytest.approx(7e-4)
+    with pytest.raises(InvalidParameter, match="on_plane"):
+        LAW.normal_force(1e-3)
+    damped = DAMPED.on_plane(1.0)
+    assert damped.normal_force(0.1, -0.5) == pytest.approx(1.1 * damped.normal_force(0.1))
+
+
+def test_pressure_adds_up_to_the_contact() -> None:
+    shell = edged("cube")
+    center = np.array([2.3, 2.2, 2.6])
+    points, forces, pressures, areas = sp.foundation_pressure(shell, center, 1.0, LAW)
+    on_ball = free_ball(shell).external_forces(free_q(center))[1]
+    assert np.abs(forces.sum(axis=0) - on_ball.linear).max() <= 1e-12 * np.abs(forces).sum()
+    assert np.linalg.norm(on_ball.angular) <= 1e-12 * np.linalg.norm(on_ball.linear)
+    assert points.shape == forces.shape
+    assert pressures.shape == areas.shape == (len(points),)
+    with pytest.raises(InvalidParameter, match="FoundationLaw"):
+        sp.foundation_pressure(shell, center, 1.0, sp.ImpactLaw(1e4))  # type: ignore[arg-type]
+
+
+def test_rows_add_up() -> None:
+    """One row for each patch, which together are the pair's wrench."""
+    scene = free_ball(edged("box"), DAMPED, COULOMB)
+    q, v = free_q([-1.1, 0.2, -1.3]), np.array([0.3, -0.2, 0.1, 0.5, -0.4, 2.0])
+    contacts = scene.contacts(q, v)
+    assert len(contacts) == 2
+    force = (contacts.normal_force[:, None] * contacts.normal_world).sum(axis=0)
+    force += contacts.friction_force_world.sum(axis=0)
+    total = scene.external_forces(q, v)[1]
+    assert total.linear == pytest.approx(force, rel=1e-12)
+    assert contacts.depth == pytest.approx([0.3, 0.1]) or contacts.depth == pytest.approx(
+        [0.1, 0.3]
+    )
+
+
+def test_action_and_reaction() -> None:
+    scene = two_free_bodies(sp.FoundationLaw(1e6, 0.05, 0.3), COULOMB)
+    q, v = two_free_state()
+    data = scene.model.createData()
+    pin.forwardKinematics(scene.model, data, q)
+    forces = scene.external_forces(q, v)
+    both = sum((data.oMi[j].act(forces[j]).vector for j in (1, 2)), np.zeros(6))
+    assert np.abs(both).max() <= 1e-12 * np.abs(forces[1].vector).max()
+
+
+@pytest.mark.parametrize("spin", [0.05, 0.5, 5.0])
+def test_spinning_ball_feels_a_moment(spin: float) -> None:
+    """Friction of every point by its own speed: the integral over the disc of overlap."""
+    depth = 0.1
+    scene = free_ball(sp.Shell(*meshes.grid_plate(5, 5, size=4.0)), LAW, COULOMB)
+    force = scene.external_forces(free_q([0.1, 0.2, 1 - depth]), np.array([0, 0, 0, 0, 0, spin]))[1]
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    rim = np.sqrt(2 * depth - depth**2)
+    r, w = rim * (1 + nodes) / 2, weights * rim / 2
+    rho = np.hypot(r, 1 - depth)
+    pressed = KAPPA * (1 - rho**2) / (2 * rho) * 2 * np.pi * r
+    moment = w @ (pressed * r * [COULOMB.coefficient(spin * s) for s in r])
+    assert force.angular == pytest.approx([0, 0, -moment], rel=3e-3, abs=1e-2 * moment)
+    assert np.linalg.norm(force.linear[:2]) <= 2e-3 * COULOMB.mu_static * force.linear[2]
+
+
+def test_local_dissipation() -> None:
+    """A ball that comes down without turning: p (1 - b gap_rate) everywhere; no pull."""
+    scene = free_ball(sp.Shell(*meshes.grid_plate(3, 3, size=4.0)), DAMPED)
+    q, still = free_q([0.1, 0.2, 0.9]), np.zeros(6)
+    elastic = scene.external_forces(q, still)[1].linear[2]
+    for speed, share in ((-0.5, 1.1), (0.5, 0.9), (20.0, 0.0)):
+        v = np.array([0, 0, speed, 0, 0, 0])
+        assert scene.external_forces(q, v)[1].linear[2] == pytest.approx(
+            share * elastic, abs=1e-9 * elastic
+        )
+
+
+PLACES = {
+    "dome": lambda: (shell_of("dome", 0.6), [1.0, 2.0, 4.3]),
+    "cube": lambda: (edged("cube"), [2.3, 2.2, 2.6]),
+    "border": lambda: (edged("cap"), [1.9, 0.3, 0.5]),
+}
+
+
+@pytest.mark.parametrize("friction", [None, COULOMB], ids=["free", "coulomb"])
+@pytest.mark.parametrize("law", [LAW, DAMPED], ids=["elastic", "damped"])
+@pytest.mark.parametrize("place", list(PLACES))
+def test_derivatives(place: str, law: sp.FoundationLaw, friction) -> None:
+    shell, center = PLACES[place]()
+    scene = free_ball(shell, law, friction, gravity=9.81)
+    rng = np.random.default_rng(2)
+    q = pin.integrate(scene.model, free_q(center), np.r_[np.zeros(3), rng.normal(size=3)])
+    assert_derivatives(scene, q, 0.3 * rng.normal(size=6), step=1e-5)
+
+
+def test_derivatives_between_moving_bodies() -> None:
+    scene = two_free_bodies(sp.FoundationLaw(1e6, 0.05, 0.3), COULOMB)
+    assert_derivatives(scene, *two_free_state())
+
+
+def test_bristle_holds_at_the_center_of_pressure() -> None:
+    """Its rates and derivatives, but for the small turn of the center of pressure."""
+    scene = free_ball(sp.Shell(*meshes.grid_plate(3, 3, size=4.0)), LAW, BRISTLE)
+    q, v = free_q([0.1, 0.2, 0.9]), np.array([0.02, 0.01, -0.1, 0.01, 0.02, 0.1])
+    z = np.zeros(scene.core.bristle_size)
+    z[:3] = [1e-3, -2e-3, 0]
+    assert_rate_jacobian(scene, q, v, z)
+
+
+def drop(scene, q, v, duration, **options):
+    integrator = sp.Adaptive(rtol=1e-9, atol=1e-11, **options)
+    return sp.Simulation(scene, integrator).run(q, v, duration)
+
+
+def test_energy_in_a_socket() -> None:
+    """Bouncing round in a conforming, tessellated cavity."""
+    vertices, elements = meshes.icosphere(3, 1.0)
+    shell = sp.Shell(1.1 * vertices, elements, normals=vertices, side="inside")
+    scene = free_ball(shell, sp.FoundationLaw(1e5, 0.5), gravity=9.81)
+    result = drop(scene, free_q([0.02, 0.01, 0.0]), np.array([0.5, -0.3, 0, 0, 0, 0]), 1.0)
+    assert result.stats.pairs["b"].max_depth > 0.005
+    assert np.abs(result.energy.residual).max() <= 1e-6 * np.ptp(result.energy.kinetic)
+
+
+@pytest.mark.parametrize("method", ["smooth", "facets"])
+def test_energy_over_a_crease(method: str) -> None:
+    """Sliding over the edge of a block, and over the border of a sheet."""
+    for shell in (edged("cube"), edged("sheet")):
+        height = 2.0 if shell.side == "outside" else 0.0
+        scene = sp.Scene(ball(9.81, 10.0, 1.0))
+        scene.add_contact(
+            sphere=sp.Sphere(1.0, frame="ball"), shell=shell, law=LAW, method=method, name="b"
+        )
+        q = free_q([1.2, 0.3, height + 0.95])
+        result = drop(scene, q, np.array([1.5, 0.1, 0, 0, 0, 0]), 0.8)
+        assert result.q[-1, 0] > 2.2
+        assert np.abs(result.energy.residual).max() <= 1e-6 * np.ptp(result.energy.kinetic)
+
+
+def test_energy_with_friction() -> None:
+    """What damping and friction take is what is missing."""
+    scene = free_ball(edged("cube"), DAMPED, COULOMB, gravity=9.81)
+    result = drop(scene, free_q([1.5, 0.3, 3.1]), np.array([1.0, 0.1, 0, 0, 1.0, 3.0]), 0.8)
+    energy = result.energy
+    assert energy.friction_loss[-1] > 0.01 * np.ptp(energy.kinetic)
+    assert np.abs(energy.residual).max() <= 1e-6 * np.ptp(energy.kinetic)
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        sp.Implicit(rtol=1e-6, atol=1e-8),
+        sp.LinearlyImplicitEuler(1e-4),
+        sp.SemiImplicitEuler(1e-4),
+        sp.RungeKutta4(1e-4),
+    ],
+    ids=lambda one: type(one).__name__,
+)
+@pytest.mark.parametrize("friction", [COULOMB, BRISTLE], ids=["coulomb", "bristle"])
+def test_every_integrator_comes_to_rest(integrator, friction) -> None:
+    """At the depth where the foundation carries the weight."""
+    law = sp.FoundationLaw(1e4, 0.5, dissipation=3.0)
+    scene = free_ball(sp.Shell(*meshes.grid_plate(3, 3, size=4.0)), law, friction, gravity=9.81)
+    result = sp.Simulation(scene, integrator).run(
+        free_q([0.1, 0.2, 0.97]), np.zeros(6), 2.0, record_dt=0.01
+    )
+    depth = law.on_plane(1.0).depth_at(98.1)
+    assert 1 - result.q[-1, 2] == pytest.approx(depth, rel=2e-2)
+    assert np.abs(result.energy.residual).max() <= 1e-2 * np.ptp(result.energy.kinetic) + 1e-4
+
+
+def test_implicit_takes_few_steps() -> None:
+    """Stiff contact: steps are not bound by its stiffness, as its derivative is exact."""
+    law = sp.FoundationLaw(1e9, 0.5, dissipation=0.5)
+    scene = free_ball(sp.Shell(*meshes.grid_plate(3, 3, size=4.0)), law, COULOMB, gravity=9.81)
+    depth = law.on_plane(1.0).depth_at(98.1)
+    q, v = free_q([0.1, 0.2, 1 - 1.01 * depth]), np.array([0.5, 0, 0, 0, 0, 0])
+    steps = [
+        sp.Simulation(scene, kind(rtol=1e-4, atol=1e-6)).run(q, v, 1.0).stats.steps
+        for kind in (sp.Implicit, sp.Adaptive)
+    ]
+    assert steps[0] < 0.7 * steps[1]
+
+
+def test_two_spheres() -> None:
+    model = ball(0.0, 10.0, 1.0)
+    scene = sp.Scene(model)
+    scene.add_contact(
+        sphere=sp.Sphere(1.0, frame="ball"),
+        shell=sp.Sphere(2.0, frame="universe"),
+        law=LAW,
+        friction=COULOMB,
+        name="b",
+    )
+    q, v = free_q([0.0, 1.7, 2.35]), np.array([0.3, 0.1, -0.2, 0.4, 0.3, 2.0])
+    scene.replace_pair("b", friction=None)
+    assert_derivatives(scene, q, v, step=1e-5)
+    result = drop(scene, free_q([0.2, 0.1, 3.2]), np.array([0, 0, -2.0, 0, 0, 0]), 1.0)
+    assert result.stats.pairs["b"].max_depth > 0.1
+    assert np.abs(result.energy.residual).max() <= 1e-6 * np.ptp(result.energy.kinetic)
+
+
+def test_contact_sources_are_refused() -> None:
+    scene = sp.Scene(ball())
+    with pytest.raises(InvalidParameter, match="contact source"):
+        scene.add_contact_source(lambda i, j: None, "ball", "universe", LAW)  # type: ignore
