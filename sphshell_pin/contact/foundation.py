@@ -100,6 +100,18 @@ class _OnPlane(FoundationLaw):
     def alone(self) -> _core.NormalLaw:
         return self.core
 
+    # Deeper than the radius the closed form ends; what cannot stop the sphere comes out deeper.
+    def depth_at(self, force: float) -> float:
+        most = self.normal_force(self.radius)
+        return super().depth_at(force) if force <= most else self.radius * force / most
+
+    def depth_of(self, energy: float) -> float:
+        most = self.energy(self.radius)
+        return super().depth_of(energy) if energy <= most else self.radius * energy / most
+
+    def contact_time(self, depth: float, speed: float) -> float:
+        return super().contact_time(min(depth, self.radius), speed)
+
     def decay_time(self, mass: float, depth: float) -> float:
         damping = self.normal_force(depth) * self.dissipation
         return mass / damping if damping else math.inf

@@ -7,12 +7,14 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.errors import InvalidParameter, ScenarioError
+from sphshell_pin.scenario import build
 from tests import meshes
 from tests.contact.smooth.surfaces import shell_of
 from tests.contact.smooth.test_sweeps_edges import edged
 from tests.dynamics.test_contact_derivatives import assert_derivatives, assert_rate_jacobian
 from tests.models import ball, free_q, two_free_bodies, two_free_state
+from tests.scenario.files import DROP, write
 
 KAPPA = 2e4  # modulus / thickness [Pa/m]
 LAW = sp.FoundationLaw(1e4, 0.5)
@@ -39,6 +41,10 @@ def test_plane_law() -> None:
     assert law.depth_at(law.normal_force(7e-4)) == pytest.approx(7e-4)
     with pytest.raises(InvalidParameter, match="on_plane"):
         LAW.normal_force(1e-3)
+    # Beyond the radius it only says that it cannot stop the sphere.
+    assert law.depth_of(10 * law.energy(0.01)) > 0.01
+    assert law.depth_at(10 * law.normal_force(0.01)) > 0.01
+    assert 0 < law.contact_time(0.05, 1.0) < 1
     damped = DAMPED.on_plane(1.0)
     assert damped.normal_force(0.1, -0.5) == pytest.approx(1.1 * damped.normal_force(0.1))
 
@@ -238,3 +244,13 @@ def test_contact_sources_are_refused() -> None:
     scene = sp.Scene(ball())
     with pytest.raises(InvalidParameter, match="contact source"):
         scene.add_contact_source(lambda i, j: None, "ball", "universe", LAW)  # type: ignore
+
+
+def test_in_a_scenario_file(tmp_path) -> None:
+    law = 'law = { type = "foundation", modulus = 1e6, thickness = 5e-3, dissipation = 1.0 }'
+    given = next(line for line in DROP.splitlines() if line.startswith("law"))
+    built = build(write(tmp_path, DROP.replace(given, law)))
+    assert built.scene.pairs[0].law == sp.FoundationLaw(1e6, 5e-3, dissipation=1.0)
+    assert "elastic foundation" in str(built.scene.explain(built.q0, np.zeros(6)))
+    with pytest.raises(ScenarioError, match="thickness"):
+        build(write(tmp_path, DROP.replace(given, 'law = { type = "foundation", modulus = 1 }')))

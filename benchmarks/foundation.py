@@ -1,0 +1,78 @@
+"""Cost of an elastic foundation's query and force against a point contact's, on 200 k triangles.
+
+python -m sphshell_pin.benchmarks.foundation
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+
+import sphshell_pin as sp
+from sphshell_pin.benchmarks.surfaces import touching_centers, wavy_sheet
+from sphshell_pin.benchmarks.timing import machine, median_us, one_core, ratio, take_turns
+
+DT, STEPS, CELLS, RADIUS = 1e-6, 2000, 316, 0.012
+POINT = sp.ImpactLaw(1e6, 1.5)
+PAD = sp.FoundationLaw(1e7, 5e-3)
+FRICTION = sp.CoulombFriction(0.3, 0.2, 0.01, 0.1)
+
+
+def heavy_ball() -> pin.Model:
+    """Return a free ball that no force moves noticeably."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(10.0, 1.0), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    model.gravity.setZero()
+    return model
+
+
+def runner(
+    shell: sp.Shell, center: np.ndarray, law: sp.ImpactLaw | sp.FoundationLaw, friction: bool
+) -> Callable[[], float]:
+    """Seconds per step of a ball that creeps over the shell."""
+    scene = sp.Scene(heavy_ball())
+    used = FRICTION if friction else None
+    scene.add_contact(sphere=sp.Sphere(RADIUS, "ball"), shell=shell, law=law, friction=used)
+    simulation = sp.Simulation(scene, sp.SemiImplicitEuler(DT))
+    q, v = np.r_[center, 0, 0, 0, 1.0], np.r_[1e-3, 5e-4, 0, 0, 0, 1.0]
+
+    def run() -> float:
+        result = simulation.run(q, v, STEPS * DT, record_dt=STEPS * DT)
+        return float(result.stats.wall_time) / STEPS
+
+    return run
+
+
+def main() -> None:
+    """Print the cost of one query with its force, without the rest of a step, and its ratio."""
+    one_core()
+    print(machine())
+    for size in (1.0, 0.4):
+        shell = sp.Shell(*wavy_sheet(CELLS, size))
+        for depth in (1e-4, 5e-4):
+            center = touching_centers(1, size, RADIUS, depth)[0]
+            cases = {
+                "nothing touched": runner(shell, center + [0, 0, 1.0], POINT, False),
+                "point": runner(shell, center, POINT, False),
+                "foundation": runner(shell, center, PAD, False),
+                "point, friction": runner(shell, center, POINT, True),
+                "foundation, friction": runner(shell, center, PAD, True),
+            }
+            times = take_turns(cases, 15)
+            bare = times.pop("nothing touched")
+            side = size / CELLS / np.sqrt(2 * RADIUS * depth)
+            print(
+                f"{len(shell.elements)} triangles, side / radius of the patch {side:.2f}, "
+                f"depth / radius {depth / RADIUS:.3f}"
+            )
+            for name, taken in times.items():
+                against = times["point, friction" if "friction" in name else "point"] - bare
+                print(f"  {name:24s} {median_us(taken - bare)}  {ratio(taken - bare, against)} x")
+
+
+if __name__ == "__main__":
+    main()
