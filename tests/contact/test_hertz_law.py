@@ -153,7 +153,7 @@ def test_two_balls_are_hertz_on_both_radii() -> None:
 
 
 @pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid"])
-def test_without_normals_the_surface_is_met_to_a_percent(name) -> None:
+def test_without_normals_the_surface_is_nearly_met(name) -> None:
     surface = SURFACES[name]
     shell, rng = surface.shell(exact=False), np.random.default_rng(1)
     scene = ball_scene(shell, 0.5, LAW)
@@ -164,7 +164,7 @@ def test_without_normals_the_surface_is_met_to_a_percent(name) -> None:
         low, high = surface.curvatures(u, v)
         expected, *_ = hertz_contact(0.5 * (2 + low), 0.5 * (2 + high), MODULUS, 0.01)
         errors.append(force_on(scene, x + 0.49 * n).linear @ n / expected - 1)
-    assert np.abs(errors).max() < 0.01
+    assert np.abs(errors).max() < 3e-3
 
 
 @pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid", "inside a cylinder"])
@@ -260,7 +260,7 @@ def test_a_socket_of_nearly_the_ball_s_radius_is_beyond_hertz() -> None:
     surface = SURFACES["inside a cylinder"]
     u, v = 0.75, 0.0
     x, n = surface.point(u, v), surface.normal(u, v)
-    for radius, kinds in ((0.97, {"beyond_hertz"}), (0.9, set())):
+    for radius, kinds in ((0.995, {"beyond_hertz"}), (0.97, set())):
         scene = ball_scene(surface.shell(), radius, sp.HertzLaw(1e9, POISSON))
         start = np.array([*(x + (radius - 1e-4 * radius) * n), 0, 0, 0, 1])
         result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).run(start, np.zeros(6), 1e-4)

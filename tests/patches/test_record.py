@@ -6,6 +6,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.dynamics.open_run import OpenRun
 from sphshell_pin.errors import InvalidParameter, ResultError
+from tests.oracle.hertz import hertz_contact
 from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider
 
 
@@ -86,3 +87,29 @@ def test_what_cannot_be_recorded_is_refused(record):
     scene = sp.Scene(slider())
     with pytest.raises(InvalidParameter, match="record"):
         sp.Simulation(scene).run(np.zeros(3), record=record)
+
+
+@pytest.mark.parametrize("law", [sp.HertzLaw(1e7, 0.3), LAW], ids=["hertz", "impact"])
+def test_a_ball_on_a_cylinder_has_an_elliptical_patch(law):
+    radius = 0.03
+    angle, z = np.meshgrid(np.linspace(-0.9, 0.9, 7), np.linspace(-0.02, 0.02, 5), indexing="ij")
+    across = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1).reshape(-1, 3)
+    corner = (np.arange(6)[:, None] * 5 + np.arange(4)).ravel()
+    shell = sp.Shell(
+        radius * across + np.array([0.0, 0.0, 1.0]) * z.reshape(-1, 1),
+        np.stack([corner, corner + 5, corner + 6, corner + 1], axis=1),
+        normals=across,
+    )
+    scene = sp.Scene(slider())
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), shell, law=law, name="tip")
+    away = np.array([np.cos(0.2), np.sin(0.2), 0.0])
+    q0 = (radius + RADIUS - 2e-4) * away + np.array([0.0, 0.0, 3e-3])
+    result = sp.Simulation(scene).run(q0, duration=1e-5, record=("patch",))
+    patch, log = result.patches[0], result.contacts
+    _, a, b, _ = hertz_contact(0.5 / RADIUS, 0.5 / RADIUS + 0.5 / radius, 1.0, patch["approach"])
+    # HertzLaw corrects what the elements leave of the cylinder.
+    assert patch["approach"] == pytest.approx(2e-4, rel=1e-3 if law is not LAW else 2e-2)
+    np.testing.assert_allclose(patch["half_axes"], [a, b], rtol=2e-3)
+    assert abs(patch["axis_world"][2]) == pytest.approx(1.0, abs=1e-6)
+    peak = 1.5 * log.normal_force[0] / (np.pi * patch["half_axes"].prod())
+    assert patch["peak_pressure"] == pytest.approx(peak, rel=1e-12)

@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <tuple>
 
 #include "contact/closest_on_cell.hpp"
 #include "contact/query.hpp"
@@ -12,6 +14,9 @@ namespace {
 
 // Normals that differ less are one [1 - cos]: those of a smooth vertex agree to round-off.
 constexpr double kSameNormal = 1e-10;
+// Elements whose normals turn this much more than their neighbors' belong to another surface, such
+// as a fillet.
+constexpr double kJump = 1.5;
 // Of the radius: a step of the center for second derivatives, and a distance without direction.
 constexpr double kStep = 1e-5, kNoDistance = 1e-6;
 
@@ -38,9 +43,61 @@ int corner_of(const Shell& shell, int half_edge, int vertex) {
   return -1;
 }
 
+// Whether two half-edges of one edge, given in facets, begin at its other ends.
+bool is_reversed(const Shell& shell, int half_edge, int other) {
+  return shell.triangles()[shell.triangle_of_facet(triangle_of(half_edge))][side_of(half_edge)] !=
+         shell.triangles()[shell.triangle_of_facet(triangle_of(other))][side_of(other)];
+}
+
 const Edge& edge_at(const Shell& shell, int facet, int side) {
   const Topology& topology = shell.topology();
   return topology.edges[topology.edge_of[3 * shell.triangle_of_facet(facet) + side]];
+}
+
+int vertex_of(const Shell& shell, int corner) {
+  return shell.triangles()[shell.triangle_of_facet(corner / 3)][corner % 3];
+}
+
+Vec3 normal_at(const Shell& shell, int corner) {
+  const auto [u, v] = corner_parameters(corner % 3);
+  const int facet = corner / 3;
+  return normal_of(shell.curved()->facets()[facet].patch(shell.facets()[facet]), u, v);
+}
+
+// How fast the normals of an element turn: the most along a side [1/m].
+double bend_of(const Shell& shell, int facet) {
+  if (shell.curved()->facets()[facet].flat) return 0;
+  const Facet& flat = shell.facets()[facet];
+  const Vec3 normal[3] = {normal_at(shell, 3 * facet), normal_at(shell, 3 * facet + 1),
+                          normal_at(shell, 3 * facet + 2)};
+  double most = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int n = next_corner(k);
+    most =
+        std::max(most, (normal[n] - normal[k]).norm() / (flat.corner[n] - flat.corner[k]).norm());
+  }
+  return most;
+}
+
+// Whether two neighbors are of surfaces with other curvatures.
+bool is_jump(const Shell& shell, int facet, int other) {
+  const double a = bend_of(shell, facet), b = bend_of(shell, other);
+  return std::max(a, b) > kJump * std::min(a, b);
+}
+
+// The half-edge, given in facets, of the neighbor that an element is joined to smoothly over a
+// side; -1: there is none.
+int joined_over(const Shell& shell, int facet, int side) {
+  const Edge& edge = edge_at(shell, facet, side);
+  if (edge.count != 2) return -1;
+  const int h = 3 * shell.triangle_of_facet(facet) + side;
+  const int other = shell.facet_half_edge(shell.topology().other_half_edge(edge, h));
+  for (int k : {side, next_corner(side)}) {
+    const int corner = 3 * facet + k;
+    const int beside = corner_of(shell, other, vertex_of(shell, corner));
+    if (!is_same(normal_at(shell, corner), normal_at(shell, beside))) return -1;
+  }
+  return other;
 }
 
 // The point of an element nearest to one that is on it but for round-off.
@@ -76,16 +133,26 @@ Eigen::Vector3d Curvature::Rise::at(double u, double v) const {
         27 * middle * (kBy[0][d] * b[1] * b[2] + b[0] * kBy[1][d] * b[2] + b[0] * b[1] * kBy[2][d]);
   for (int k = 0; k < 3; ++k) {
     const int n = next_corner(k);
-    const double both = b[k] * b[n], mean = 0.5 * (side[k][0] + side[k][1]);
-    const double skew = 1.5 * (side[k][1] - side[k][0]), factor = 81.0 / 4;
-    const double along = mean + skew * (b[n] - b[k]);
-    out[0] += factor * both * both * along;
-    for (int d = 0; d < 2; ++d)
-      out[1 + d] += factor * both *
-                    (2 * along * (kBy[k][d] * b[n] + b[k] * kBy[n][d]) +
-                     both * skew * (kBy[n][d] - kBy[k][d]));
+    const double both = b[k] * b[n], along = b[n] - b[k];
+    const double even = even_[k][0] + both * even_[k][1], odd = odd_[k][0] + both * odd_[k][1];
+    out[0] += both * (even + along * odd);
+    for (int d = 0; d < 2; ++d) {
+      const double both_by = kBy[k][d] * b[n] + b[k] * kBy[n][d];
+      out[1 + d] +=
+          both_by * (even + along * odd) +
+          both * (both_by * (even_[k][1] + along * odd_[k][1]) + (kBy[n][d] - kBy[k][d]) * odd);
+    }
   }
   return out;
+}
+
+// The product of both coordinates is 0.16 at the outer two of the points, 0.24 at the others.
+void Curvature::Rise::set_side(int k, const double (&at)[4]) {
+  const double outer = 0.5 * (at[0] + at[3]) / 0.16, inner = 0.5 * (at[1] + at[2]) / 0.24;
+  even_[k][1] = (inner - outer) / 0.08, even_[k][0] = outer - 0.16 * even_[k][1];
+  const double apart = 0.5 * (at[3] - at[0]) / (0.16 * 0.6);
+  const double near = 0.5 * (at[2] - at[1]) / (0.24 * 0.2);
+  odd_[k][1] = (near - apart) / 0.08, odd_[k][0] = apart - 0.16 * odd_[k][1];
 }
 
 Curvature::Local Curvature::Field::at(double u, double v) const {
@@ -293,40 +360,50 @@ void Curvature::find_walls_of_vertex(const Shell& shell, int facet, int corner) 
   if (walls_.empty()) walls_.emplace_back(wall_at(corners_[0]), wall_at(corners_[0]));
 }
 
+// The tensors at a third and two thirds of a side, as the fits of the element say.
+std::pair<Curvature::Tensor, Curvature::Tensor> Curvature::along_side(const Shell& shell, int facet,
+                                                                      int side) {
+  const CurvedFacet& curved = shell.curved()->facets()[facet];
+  if (curved.flat) return {Tensor::Zero(), Tensor::Zero()};
+  const CubicCurve curve = curved.side(shell.facets()[facet], side);
+  // Copies: the second one may move the first.
+  const VertexCurvature from = fan(shell, facet, side).fit;
+  const VertexCurvature to = fan(shell, facet, next_corner(side)).fit;
+  return {tensor(from.tensor() + from.change(curve.tangent(0)) / 3),
+          tensor(to.tensor() - to.change(curve.tangent(1)) / 3)};
+}
+
+// Where two surfaces of other curvatures meet smoothly, the flatter one's holds on their border: it
+// has the larger elements. The half-edge, given in facets, whose element says what holds.
+int Curvature::owner_of_side(const Shell& shell, int facet, int side) {
+  const int other = joined_over(shell, facet, side);
+  if (other < 0 || !is_jump(shell, facet, triangle_of(other))) return 3 * facet + side;
+  const auto here = along_side(shell, facet, side);
+  const auto there = along_side(shell, triangle_of(other), side_of(other));
+  return there.first.squaredNorm() + there.second.squaredNorm() <
+                 here.first.squaredNorm() + here.second.squaredNorm()
+             ? other
+             : 3 * facet + side;
+}
+
 const Curvature::Field& Curvature::field(const Shell& shell, int facet) {
   const auto found = field_of_.find(facet);
   if (found != field_of_.end()) return fields_[found->second];
-  const Facet& flat = shell.facets()[facet];
-  const LargeArray<CurvedFacet>& cells = shell.curved()->facets();
-  const CubicPatch patch = cells[facet].patch(flat);
-  const Topology& topology = shell.topology();
-  Tensor corner[3], first[3], last[3];  // Bezier ordinates, at a third and two thirds of each side
+  // Bezier ordinates: at the corners, at a third and two thirds of each side, in the middle.
+  Tensor corner[3], first[3], last[3];
+  Tensor middle = Tensor::Zero();
   for (int k = 0; k < 3; ++k) {
     const Fan& here = fan(shell, facet, k);
-    corner[k] = here.beside_flat ? Tensor::Zero() : tensor(here.fit.tensor());
+    corner[k] = here.tensor;
+    middle -= tensor(here.fit.tensor()) / 6;
+    std::tie(first[k], last[k]) = along_side(shell, facet, k);
+    middle += (first[k] + last[k]) / 4;
+    const int owner = owner_of_side(shell, facet, k);
+    if (owner != 3 * facet + k) {
+      std::tie(first[k], last[k]) = along_side(shell, triangle_of(owner), side_of(owner));
+      if (is_reversed(shell, 3 * facet + k, owner)) std::swap(first[k], last[k]);
+    }
   }
-  for (int k = 0; k < 3; ++k) {
-    const CubicCurve side = cells[facet].side(flat, k);
-    // Copies: the second one may move the first.
-    const VertexCurvature from = fan(shell, facet, k).fit;
-    const VertexCurvature to = fan(shell, facet, next_corner(k)).fit;
-    first[k] = tensor(from.tensor() + from.change(side.tangent(0)) / 3);
-    last[k] = tensor(to.tensor() - to.change(side.tangent(1)) / 3);
-    const Edge& edge = edge_at(shell, facet, k);
-    if (edge.count != 2) continue;
-    const int h = 3 * shell.triangle_of_facet(facet) + k;
-    const int other = triangle_of(shell.facet_half_edge(topology.other_half_edge(edge, h)));
-    const auto normal_at = [&](int c) {
-      const auto [u, v] = corner_parameters(c);
-      return normal_of(patch, u, v);
-    };
-    if (cells[other].flat && is_same(normal_at(k), shell.facets()[other].normal) &&
-        is_same(normal_at(next_corner(k)), shell.facets()[other].normal))
-      first[k] = last[k] = Tensor::Zero();
-  }
-  Tensor sides = Tensor::Zero();
-  for (int k = 0; k < 3; ++k) sides += first[k] + last[k];
-  const Tensor middle = sides / 4 - (corner[0] + corner[1] + corner[2]) / 6;
   Field made;
   Cubic2<Tensor>& out = made.tensor;
   const Tensor &b0 = corner[0], &u1 = first[0], &u2 = last[0], &v1 = last[2], &v2 = first[2];
@@ -346,69 +423,113 @@ const Curvature::Field& Curvature::field(const Shell& shell, int facet) {
   return fields_.back();
 }
 
+// How far beyond a point of an element the surface lies, along the normal there: the mean of what
+// the fits at the corners say, each weighted by the square of its coordinate.
+double Curvature::beyond(const Shell& shell, int facet, double u, double v) {
+  const CurvedFacet& curved = shell.curved()->facets()[facet];
+  if (curved.flat) return 0;
+  const CubicPatch patch = curved.patch(shell.facets()[facet]);
+  const double b[3] = {1 - u - v, u, v};
+  const Vec3 point = patch.point(u, v), normal = normal_of(patch, u, v);
+  double sum = 0, weights = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (b[k] < 1e-9) continue;
+    sum += b[k] * b[k] * fan(shell, facet, k).fit.beyond(point, normal);
+    weights += b[k] * b[k];
+  }
+  return sum / weights;
+}
+
 Curvature::Rise Curvature::rise_of(const Shell& shell, int facet) {
-  const CubicPatch patch = shell.curved()->facets()[facet].patch(shell.facets()[facet]);
-  // The mean of what the fits at the corners say, each weighted by the square of its coordinate.
-  const auto beyond = [&](double u, double v) {
-    const double b[3] = {1 - u - v, u, v};
-    const Vec3 point = patch.point(u, v), normal = normal_of(patch, u, v);
-    double sum = 0, weights = 0;
-    for (int k = 0; k < 3; ++k) {
-      if (b[k] < 1e-9) continue;
-      const Fan& at = fan(shell, facet, k);
-      sum += at.beside_flat ? 0 : b[k] * b[k] * at.fit.beyond(point, normal);
-      weights += b[k] * b[k];
-    }
-    return sum / weights;
-  };
   Rise out;
-  for (int k = 0; k < 3; ++k)
-    for (int i = 0; i < 2; ++i) {
-      const auto [u, v] = on_side(k, (1 + i) / 3.0);
-      out.side[k][i] = beyond(u, v);
+  for (int k = 0; k < 3; ++k) {
+    const int owner = owner_of_side(shell, facet, k);
+    const bool reversed = is_reversed(shell, 3 * facet + k, owner);
+    double at[4];
+    for (int i = 0; i < 4; ++i) {
+      const auto [u, v] = on_side(side_of(owner), 0.2 * (1 + (reversed ? 3 - i : i)));
+      at[i] = beyond(shell, triangle_of(owner), u, v);
     }
-  out.middle = beyond(1.0 / 3, 1.0 / 3) - out.at(1.0 / 3, 1.0 / 3)[0];
+    out.set_side(k, at);
+  }
+  out.middle = beyond(shell, facet, 1.0 / 3, 1.0 / 3) - out.at(1.0 / 3, 1.0 / 3)[0];
   return out;
 }
 
-const Curvature::Fan& Curvature::fan(const Shell& shell, int facet, int corner) {
-  const auto found = fan_of_.find(3 * facet + corner);
-  if (found != fan_of_.end()) return fans_[found->second];
+// The corners of elements that are joined smoothly at a vertex, in ascending order; `all`: those of
+// other curvatures as well.
+void Curvature::collect_fan(const Shell& shell, int corner, bool all, std::vector<int>& corners) {
   const Topology& topology = shell.topology();
-  const LargeArray<CurvedFacet>& cells = shell.curved()->facets();
-  const int vertex = shell.triangles()[shell.triangle_of_facet(facet)][corner];
-  const auto normal_at = [&](int c) {
-    const auto [u, v] = corner_parameters(c % 3);
-    return normal_of(cells[c / 3].patch(shell.facets()[c / 3]), u, v);
-  };
-  Fan out{{}, false};
-  const Vec3 normal = normal_at(3 * facet + corner);
-  corners_.assign(1, 3 * facet + corner);
-  for (std::size_t i = 0; i < corners_.size(); ++i) {
-    const int c = corners_[i];
+  const int vertex = vertex_of(shell, corner);
+  const Vec3 normal = normal_at(shell, corner);
+  corners.assign(1, corner);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const int c = corners[i];
     for (int side : {c % 3, previous_corner(c % 3)}) {
       const Edge& edge = edge_at(shell, c / 3, side);
       if (edge.count != 2) continue;
       const int h = 3 * shell.triangle_of_facet(c / 3) + side;
       const int other =
           corner_of(shell, shell.facet_half_edge(topology.other_half_edge(edge, h)), vertex);
-      if (std::find(corners_.begin(), corners_.end(), other) != corners_.end()) continue;
-      if (!is_same(normal, normal_at(other))) continue;
-      if (cells[other / 3].flat)
-        out.beside_flat = true;
-      else
-        corners_.push_back(other);
+      if (std::find(corners.begin(), corners.end(), other) != corners.end()) continue;
+      if (!is_same(normal, normal_at(shell, other))) continue;
+      if (all || !is_jump(shell, c / 3, other / 3)) corners.push_back(other);
     }
   }
-  std::sort(corners_.begin(), corners_.end());
+  std::sort(corners.begin(), corners.end());
+}
+
+const Curvature::Fan& Curvature::fan(const Shell& shell, int facet, int corner) {
+  const auto found = fan_of_.find(3 * facet + corner);
+  if (found != fan_of_.end()) return fans_[found->second];
+  // All parts of the fan, each of one surface; the flattest one's curvature holds at the vertex.
+  std::vector<int> all;
+  collect_fan(shell, 3 * facet + corner, true, all);
+  const std::size_t first = fans_.size();
+  Tensor flattest = Tensor::Constant(std::numeric_limits<double>::infinity());
+  for (int c : all) {
+    if (fan_of_.count(c)) continue;
+    const VertexCurvature fit = fit_at(shell, c);
+    for (int one : corners_) fan_of_.emplace(one, static_cast<int>(fans_.size()));
+    fans_.push_back({fit, Tensor::Zero()});
+    const Tensor bend = tensor(fit.tensor());
+    if (bend.squaredNorm() < flattest.squaredNorm()) flattest = bend;
+  }
+  for (std::size_t i = first; i < fans_.size(); ++i) fans_[i].tensor = flattest;
+  return fans_[fan_of_.at(3 * facet + corner)];
+}
+
+// Leaves the corners of its part of the fan in corners_.
+VertexCurvature Curvature::fit_at(const Shell& shell, int corner) {
+  collect_fan(shell, corner, false, corners_);
+  const int first = corners_[0];
+  const bool exact = shell.curved()->exact();
   around_.clear();
-  for (int c : corners_)
-    for (int k : {next_corner(c % 3), previous_corner(c % 3)})
-      around_.push_back({shell.facets()[c / 3].corner[k], normal_at(c / 3 * 3 + k)});
-  out.fit = fit_curvature(shell.vertices()[vertex], normal_at(corners_[0]), around_);
-  for (int c : corners_) fan_of_.emplace(c, static_cast<int>(fans_.size()));
-  fans_.push_back(out);
-  return fans_.back();
+  const auto add_around = [&](const std::vector<int>& corners) {
+    for (int c : corners)
+      for (int k : {next_corner(c % 3), previous_corner(c % 3)})
+        around_.push_back({shell.facets()[c / 3].corner[k], normal_at(shell, c / 3 * 3 + k)});
+  };
+  if (!shell.curved()->facets()[corner / 3].flat) add_around(corners_);
+  if (!exact && !around_.empty()) {
+    // Positions alone take more of them: the neighbors of neighbors, each once.
+    for (int c : corners_)
+      for (int k : {next_corner(c % 3), previous_corner(c % 3)}) {
+        collect_fan(shell, c / 3 * 3 + k, false, beside_);
+        add_around(beside_);
+      }
+    const auto before = [](const OrientedPoint& a, const OrientedPoint& b) {
+      return std::lexicographical_compare(a.point.data(), a.point.data() + 3, b.point.data(),
+                                          b.point.data() + 3);
+    };
+    const auto same = [](const OrientedPoint& a, const OrientedPoint& b) {
+      return a.point == b.point;
+    };
+    std::sort(around_.begin(), around_.end(), before);
+    around_.erase(std::unique(around_.begin(), around_.end(), same), around_.end());
+  }
+  return fit_curvature(shell.facets()[first / 3].corner[first % 3], normal_at(shell, first),
+                       around_, exact);
 }
 
 void merge_shapes(const std::vector<Contact>& contacts, const std::vector<ContactShape>& shapes,

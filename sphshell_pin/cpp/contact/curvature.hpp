@@ -32,13 +32,18 @@ class Curvature {
   // element's normal [m].
   using Local = Eigen::Matrix<double, 7, 1>;
 
-  // How far the surface lies beyond an element: zero with its slopes at the corners, and as the
-  // fits at both ends say at two points of each side, and in the middle.
-  struct Rise {
-    double side[3][2] = {{0, 0}, {0, 0}, {0, 0}}, middle = 0;
+  // How far the surface lies beyond an element: zero at the corners, and as the fits at both ends
+  // say at four points of each side, and in the middle.
+  class Rise {
+   public:
+    double middle = 0;  // beyond what the sides give there
 
+    void set_side(int k, const double (&at)[4]);
     // Value and derivatives by u and v.
     Eigen::Vector3d at(double u, double v) const;
+
+   private:
+    double even_[3][2] = {}, odd_[3][2] = {};
   };
   struct Field {
     Cubic2<Tensor> tensor;
@@ -47,10 +52,10 @@ class Curvature {
     Local at(double u, double v) const;
   };
 
-  // Of one fan of smoothly joined curved elements at a vertex.
+  // Of the elements of one surface that are joined smoothly at a vertex.
   struct Fan {
     VertexCurvature fit;
-    bool beside_flat;
+    Tensor tensor;  // that holds at the vertex, where others are joined to them
   };
   // One wall at a crease, where the contact is.
   struct Wall {
@@ -80,6 +85,11 @@ class Curvature {
   Wall wall(const Shell& shell, int facet, double u, double v);
   const Field& field(const Shell& shell, int facet);
   const Fan& fan(const Shell& shell, int facet, int corner);
+  VertexCurvature fit_at(const Shell& shell, int corner);
+  static void collect_fan(const Shell& shell, int corner, bool all, std::vector<int>& corners);
+  int owner_of_side(const Shell& shell, int facet, int side);
+  std::pair<Tensor, Tensor> along_side(const Shell& shell, int facet, int side);
+  double beyond(const Shell& shell, int facet, double u, double v);
 
   static Mat3 matrix(const Tensor& t);
   static Tensor tensor(const Mat3& m);
@@ -88,7 +98,7 @@ class Curvature {
   std::vector<Fan> fans_;
   std::vector<Field> fields_;
   std::vector<std::pair<Wall, Wall>> walls_;  // those that meet at a crease
-  std::vector<int> corners_;
+  std::vector<int> corners_, beside_;
   std::vector<OrientedPoint> around_;
 };
 

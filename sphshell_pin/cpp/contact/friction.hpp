@@ -225,7 +225,8 @@ struct MindlinFriction : Sticking {
            double relaxation) const {
     using std::sqrt;
     if (rolling > 0) add_rolling(out, m, radius);
-    const S a = sqrt(S(radius * m.depth));
+    // On an ellipse, that of the disc of the same normal stiffness.
+    const S a = m.scale > 0 ? S(0.75 * m.scale * sqrt(m.depth)) : S(sqrt(radius * m.depth));
     if (!(a > 0)) return;
     const Vector3<S>& n = m.normal;
     const S growth = -0.5 * n.dot(m.relative) / m.depth;  // a' / a

@@ -49,7 +49,7 @@ ContactShape shape_of_gap(const Eigen::Matrix3d& gap, const Eigen::Vector3d& nor
 
 // Sockets that conform more than this are taken as this: the ellipse is no longer small against
 // them, and Hertz's theory ends.
-constexpr double kMostConformal = 0.95;
+constexpr double kMostConformal = 0.99;
 // The longer half axis over the sphere's radius from which on Hertz's theory is in doubt.
 constexpr double kLargestEllipse = 0.5;
 

@@ -1,23 +1,28 @@
 // The ellipse in which two bodies touch, by Hertz's geometry (Johnson, Contact Mechanics, 4.2).
 #pragma once
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
+#include "contact/hertz.hpp"
 #include "dynamics/contact_row.hpp"
 
 namespace sphshell {
 
-// Of a sphere of `radius` [m] on a plane; 0: nothing is known of the bodies. `normal`: unit.
-inline PatchRow hertz_patch(double radius, const Vec3& normal, double depth, double force) {
+// Where nothing is known of the bodies.
+inline PatchRow unknown_patch(double depth) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  return {{nan, nan}, {nan, nan, nan}, nan, nan, depth};
+}
+
+// Of a gap of this shape; `rotation` is that of the shell in the world.
+inline PatchRow hertz_patch(const ContactShape& gap, const Eigen::Matrix3d& rotation, double depth,
+                            double force) {
   constexpr double kPi = 3.14159265358979323846;
-  const double a =
-      radius > 0 ? std::sqrt(radius * depth) : std::numeric_limits<double>::quiet_NaN();
-  const Vec3 axis = normal.unitOrthogonal();
-  const double mean = force / (kPi * a * a);
-  PatchRow out{{a, a}, {}, 1.5 * mean, mean, depth};
+  const Eigen::Vector2d half = gap.half_axes(depth);
+  const Eigen::Vector3d axis = rotation * gap.axis;
+  const double mean = force / (kPi * half[0] * half[1]);
+  PatchRow out{{half[0], half[1]}, {}, 1.5 * mean, mean, depth};
   std::copy_n(axis.data(), 3, out.axis);
   return out;
 }

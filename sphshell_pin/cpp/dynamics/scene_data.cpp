@@ -200,18 +200,17 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
 
 // The shapes of the gaps at a pair's contacts.
 void SceneData::find_shapes(std::size_t k) {
+  shapes_[k].clear();
+  for (const Contact& contact : queries_[k].contacts) shapes_[k].push_back(find_shape(k, contact));
+}
+
+ContactShape SceneData::find_shape(std::size_t k, const Contact& contact) {
   const Pair& pair = pairs_[k];
-  std::vector<ContactShape>& shapes = shapes_[k];
-  shapes.clear();
-  const std::vector<Contact>& contacts = queries_[k].contacts;
-  if (contacts.empty()) return;
   if (pair.ball > 0 || pair.method != Method::Smooth) {
     const double curvature = 1 / pair.radius + (pair.ball > 0 ? 1 / pair.ball : 0);
-    for (const Contact& contact : contacts) {
-      shapes.push_back(shape_of_gap(curvature * Mat3::Identity(), contact.normal, pair.radius));
-      shapes.back().depth = contact.depth;
-    }
-    return;
+    ContactShape out = shape_of_gap(curvature * Mat3::Identity(), contact.normal, pair.radius);
+    out.depth = contact.depth;
+    return out;
   }
   const auto at = std::find(shell_of_.begin(), shell_of_.end(), pair.shell.get());
   const std::size_t number = at - shell_of_.begin();
@@ -219,9 +218,8 @@ void SceneData::find_shapes(std::size_t k) {
     shell_of_.push_back(pair.shell.get());
     curvatures_.emplace_back();
   }
-  for (const Contact& contact : contacts)
-    shapes.push_back(curvatures_[number].shape(*pair.shell, contact, states_[k].center, pair.radius,
-                                               wants_second_));
+  return curvatures_[number].shape(*pair.shell, contact, states_[k].center, pair.radius,
+                                   wants_second_);
 }
 
 void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {
@@ -419,11 +417,20 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     row.element = whole.element;
     row.contact_id = active.contact_id;
     row.feature = whole.feature;
-    if (patches)
+    if (!patches) continue;
+    if (pair.source) {
+      patches->push_back(unknown_patch(row.depth));
+      continue;
+    }
+    if (active.row >= 0) {
       patches->push_back(
-          active.row >= 0
-              ? foundations_[active.pair].patch(pair, normal, row.depth, row.normal_force)
-              : hertz_patch(pair.disc_radius(), normal, row.depth, row.normal_force));
+          foundations_[active.pair].patch(pair, normal, row.depth, row.normal_force));
+      continue;
+    }
+    const ContactShape gap =
+        active.shape < 0 ? find_shape(active.pair, active.contact) : *shape(active);
+    patches->push_back(
+        hertz_patch(gap, state.world_from_j.rotation(), row.depth, row.normal_force));
   }
 }
 

@@ -227,6 +227,7 @@ SharedNormals::SharedNormals(const Shell& shell, const std::vector<Vec3>& normal
 CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact,
                          const std::vector<std::uint8_t>& straight) {
   const bool given = !normals.empty();
+  exact_ = given;
   if (!given) normals = estimate_normals(shell);
   divided_.assign(normals.size(), 0);
   if (!exact) {

@@ -123,6 +123,8 @@ class CurvedShell {
   const LargeArray<CellBounds>& cells() const { return cells_; }
   double bulge() const { return bulge_; }  // the largest of them [m]
   const Tangents& tangents() const { return tangents_; }
+  // Whether the normals are the surface's own, and not estimated.
+  bool exact() const { return exact_; }
   // Per corner: its normal was set aside, as a crease that the elements show divides its fan.
   const std::vector<char>& divided() const { return divided_; }
   int creases() const { return creases_; }  // edges that became creases so
@@ -147,6 +149,7 @@ class CurvedShell {
   LargeArray<CellBounds> cells_;
   Tangents tangents_;
   double bulge_ = 0;
+  bool exact_;
 };
 
 }  // namespace sphshell

@@ -6,11 +6,12 @@
 namespace sphshell {
 namespace {
 
-// z = sum of c_i x^m y^n z^k: the quadric, then cubics, then quartics.
-constexpr int kTerms = VertexCurvature::kTerms, kQuadric = 6;
+// z = sum of c_i x^m y^n z^k: the quadric, then cubics, quartics, and last a tilt.
+constexpr int kTerms = VertexCurvature::kTerms, kQuadric = 6, kCorrections = 9;
 constexpr int kPowers[kTerms][3] = {{2, 0, 0}, {1, 1, 0}, {0, 2, 0}, {1, 0, 1}, {0, 1, 1},
                                     {0, 0, 2}, {3, 0, 0}, {2, 1, 0}, {1, 2, 0}, {0, 3, 0},
-                                    {4, 0, 0}, {3, 1, 0}, {2, 2, 0}, {1, 3, 0}, {0, 4, 0}};
+                                    {4, 0, 0}, {3, 1, 0}, {2, 2, 0}, {1, 3, 0}, {0, 4, 0},
+                                    {1, 0, 0}, {0, 1, 0}};
 // Weights of the squares of coefficients beside those of residuals, both of points at a unit
 // distance: of what is no quadric, and of what the points do not determine.
 constexpr double kCorrection = 1e-4, kUndetermined = 1e-12;
@@ -86,10 +87,11 @@ double VertexCurvature::beyond(const Vec3& point, const Vec3& direction) const {
 }
 
 VertexCurvature fit_curvature(const Vec3& origin, const Vec3& normal,
-                              const std::vector<OrientedPoint>& around) {
+                              const std::vector<OrientedPoint>& around, bool exact) {
   VertexCurvature out{
       origin, normal.unitOrthogonal(), {}, normal, {1, 1, 1}, Row::Zero(), {0, 0, 0}, {0, 0, 0, 0}};
   out.north = normal.cross(out.east);
+  if (around.empty()) return out;
   // Axes along which the points spread, each with a scale of its own: elements may be long.
   Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
   for (const OrientedPoint& p : around) {
@@ -97,7 +99,7 @@ VertexCurvature fit_curvature(const Vec3& origin, const Vec3& normal,
     spread += flat * flat.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(spread / double(around.size()));
-  if (around.empty() || !(axes.eigenvalues()[1] > 0)) return out;
+  if (!(axes.eigenvalues()[1] > 0)) return out;
   const Eigen::Vector2d long_axis = axes.eigenvectors().col(1);
   out.east = (long_axis[0] * out.east + long_axis[1] * out.north).normalized();
   out.north = normal.cross(out.east);
@@ -119,7 +121,7 @@ VertexCurvature fit_curvature(const Vec3& origin, const Vec3& normal,
     if (!(apart2 > 0)) continue;
     add(powers.terms(), x[2], 1 / (apart2 * apart2));
     const double up = normal.dot(p.normal);
-    if (up < kMostLean) continue;
+    if (!exact || up < kMostLean) continue;
     const double slope[2] = {-out.east.dot(p.normal) / up * sx / sz,
                              -out.north.dot(p.normal) / up * sy / sz};
     for (int k = 0; k < 2; ++k)
@@ -127,7 +129,8 @@ VertexCurvature fit_curvature(const Vec3& origin, const Vec3& normal,
   }
   square = square.selfadjointView<Eigen::Lower>();
   square.diagonal().array() += kUndetermined * square.diagonal().maxCoeff();
-  square.diagonal().tail<kTerms - kQuadric>().array() += kCorrection;
+  square.diagonal().segment<kCorrections>(kQuadric).array() += kCorrection;
+  if (exact) square.diagonal().tail<2>().array() += 1 / kUndetermined;
   const Row c = square.ldlt().solve(along);
   if (!c.allFinite()) return out;
   out.terms = c;

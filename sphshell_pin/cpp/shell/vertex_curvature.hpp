@@ -9,7 +9,7 @@ namespace sphshell {
 
 // The surface about a vertex.
 struct VertexCurvature {
-  static constexpr int kTerms = 15;
+  static constexpr int kTerms = 17;
   using Terms = Eigen::Matrix<double, kTerms, 1>;
 
   Vec3 origin, east, north, normal;  // an orthonormal frame
@@ -31,8 +31,10 @@ struct OrientedPoint {
 };
 
 // Least squares of an implicit quadric with cubic and quartic corrections; these are held small, so
-// that quadrics are exact and few neighbors suffice. Zero where nothing is around.
+// that quadrics are exact and few neighbors suffice. Zero where nothing is around. `exact`: the
+// normals are the surface's own; else only the positions count, and those beyond the nearest
+// neighbors are needed as well.
 VertexCurvature fit_curvature(const Vec3& origin, const Vec3& normal,
-                              const std::vector<OrientedPoint>& around);
+                              const std::vector<OrientedPoint>& around, bool exact);
 
 }  // namespace sphshell

@@ -57,7 +57,7 @@ def plane(half: float) -> sp.Shell:
 
 
 def on_plane(
-    ball: Ball, law: NormalLaw, friction: Friction | None = None, *, rows: int = 0
+    ball: Ball, law: sp.HertzLaw, friction: Friction | None = None, *, rows: int = 0
 ) -> Impact:
     """Shoot the ball down at the plane z = 0; `rows` of the contact are recorded."""
     model = _free([ball])
@@ -65,11 +65,12 @@ def on_plane(
     shell = plane(20 * ball.radius)
     scene.add_contact(sp.Sphere(ball.radius, "ball0"), shell, law=law, friction=friction)
     height = ball.radius * (1 + GAP)
-    return _run(scene, [ball], [(0.0, 0.0, height)], law, ball.mass, -ball.velocity[2], rows)
+    plain, speed = law.on_plane(ball.radius), -ball.velocity[2]
+    return _run(scene, [ball], [(0.0, 0.0, height)], plain, ball.mass, speed, rows)
 
 
 def head_on(
-    first: Ball, second: Ball, law: NormalLaw, friction: Friction | None = None, *, rows: int = 0
+    first: Ball, second: Ball, law: sp.HertzLaw, friction: Friction | None = None, *, rows: int = 0
 ) -> Impact:
     """Let two balls collide along z, the first from above; `rows` of the contact are recorded."""
     scene = sp.Scene(_free([first, second]))
@@ -79,7 +80,8 @@ def head_on(
     mass = first.mass * second.mass / (first.mass + second.mass)
     speed = second.velocity[2] - first.velocity[2]
     centers = [(0.0, 0.0, away), (0.0, 0.0, 0.0)]
-    return _run(scene, [first, second], centers, law, mass, speed, rows)
+    plain = law.on_plane(first.radius * second.radius / (first.radius + second.radius))
+    return _run(scene, [first, second], centers, plain, mass, speed, rows)
 
 
 def _free(balls: list[Ball]) -> pin.Model:
@@ -97,13 +99,14 @@ def _run(
     scene: sp.Scene,
     balls: list[Ball],
     centers: list[tuple[float, float, float]],
-    law: NormalLaw,
+    plain: NormalLaw,
     mass: float,
     speed: float,
     rows: int,
 ) -> Impact:
+    """Run until well after lift-off; `plain` is the law of a ball on a plane as stiff as these."""
     gap = GAP * min(ball.radius for ball in balls)
-    expected = law.contact_time(law.depth_of(0.5 * mass * speed**2), speed)
+    expected = plain.contact_time(plain.depth_of(0.5 * mass * speed**2), speed)
     # A lossy impact lasts longer than the undamped one, without end where nothing comes back.
     duration = gap / speed + 4 * expected
     q0 = np.concatenate([[*center, 0, 0, 0, 1] for center in centers])

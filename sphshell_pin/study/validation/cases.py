@@ -26,7 +26,7 @@ from sphshell_pin.study.report.page import Heading
 
 Array = NDArray[np.float64]
 
-MODULES = ("kharaz", "chung_ooi_normal", "chung_ooi_spin", "pressed", "cam", "rolling")
+MODULES = ("kharaz", "chung_ooi_normal", "chung_ooi_spin", "pressed", "ellipses", "cam", "rolling")
 """In the order of the page."""
 HEADING = Heading(
     "sphshell_pin: against published experiments",

@@ -93,7 +93,7 @@ def _rms(errors: Array) -> float:
 )
 def spheres() -> Outcome:
     """Run test 1."""
-    law = sp.ImpactLaw.hertz(0.01, 4.8e10, 0.2, 4.8e10, 0.2, radius_2=0.01)
+    law = sp.HertzLaw(4.8e10, 0.2)
     down, up = Ball(0.01, 2800.0, (0, 0, -10.0)), Ball(0.01, 2800.0, (0, 0, 10.0))
     return _outcome("chung_ooi_1", read("chung_ooi_1"), head_on(down, up, law, rows=200))
 
@@ -110,7 +110,7 @@ def spheres() -> Outcome:
 )
 def plane() -> Outcome:
     """Run test 2."""
-    law = sp.ImpactLaw.hertz(0.1, 7e10, 0.3, RIGID, 0.3)
+    law = sp.HertzLaw(7e10, 0.3, RIGID, 0.3)
     return _outcome(
         "chung_ooi_2", read("chung_ooi_2"), on_plane(Ball(0.1, 2699.0, (0, 0, -0.2)), law, rows=200)
     )
@@ -141,7 +141,7 @@ def restitution() -> Outcome:
     ):
         back = []
         for stated in STATED:
-            law = sp.ImpactLaw.hertz(2.5e-3, young, poisson, RIGID, poisson, stated, 3.9)
+            law = sp.HertzLaw(young, poisson, RIGID, poisson, stated, 3.9)
             seen = on_plane(Ball(2.5e-3, density, (0, 0, -3.9)), law)
             back.append(float(seen.velocities[0, 2]) / 3.9)
         findings.append(

@@ -118,8 +118,8 @@ SPINNING = (
     "ratio 0.33, density 2700 kg/m^3; nylon: 2.5 GPa, 0.4, 1000 kg/m^3"
 )
 DAMPED = (
-    "Damping along the plane, which the benchmark's codes have without stating it here: at a "
-    "restitution of 0.5 along the normal it decides how far a patch swings back that sticks. "
+    "Damping along the plane: what was read of the benchmark does not state it, but its curves "
+    "have it. At a restitution of 0.5 it decides how far a patch swings back that sticks. "
 )
 HOW_MUCH = (
     "Integrated by itself, Tsuji's dashpot along the plane, of the same ratio as along the normal, "

@@ -61,7 +61,7 @@ def with_micro_slip(setting: Setting, quantity: str, angles: Array) -> Array:
     normal, along = SPEED * np.cos(radians), SPEED * np.sin(radians)
     back = setting.restitution or 1.0
     stiffness = maw.kappa(*setting.materials)
-    dissipation = getattr(setting.laws(1.0)[0], "dissipation", 0.0)
+    dissipation = setting.laws(1.0)[0].dissipation
     incident = along / (setting.mu * normal)
     patch = setting.mu * normal * maw.recoil(incident, stiffness, dissipation)
     tangential = along + (patch - along) / maw.MOBILITY

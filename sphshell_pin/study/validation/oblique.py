@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 import sphshell_pin as sp
 from sphshell_pin.contact.friction import Friction
-from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.study.validation.balls import Ball, Impact, head_on, on_plane
 from sphshell_pin.study.validation.cases import Array
 
@@ -45,10 +44,10 @@ class Setting:
         other = self.poisson if self.poisson_2 is None else self.poisson_2
         return self.young, self.poisson, self.young_2, other
 
-    def laws(self, speed: float) -> tuple[NormalLaw, Friction]:
+    def laws(self, speed: float) -> tuple[sp.HertzLaw, Friction]:
         """Return the law along the normal and that of friction at a normal `speed` [m/s]."""
         damping = (self.restitution, speed) if self.restitution is not None else (None, None)
-        law = sp.ImpactLaw.hertz(self.radius, *self.materials, *damping, radius_2=self.radius_2)
+        law = sp.HertzLaw(*self.materials, *damping)
         return law, sp.BristleFriction.mindlin(self.mu, None, *self.materials, rings=self.rings)
 
     def impact(self, normal: float, tangential: float, spin: float = 0.0) -> Rebound:
