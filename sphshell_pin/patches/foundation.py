@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.patches.placed import Array, PlacedPatches
+from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on
+from sphshell_pin.patches.sampling import Grid, divide
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.pairs import ContactPair
@@ -27,34 +27,37 @@ def has_foundation(pair: ContactPair) -> bool:
 
 
 def foundation_loads(
-    result: Result, scene: Scene, index: int, joint: int, placement: pin.SE3
-) -> Iterator[tuple[int, Array, Array]]:
-    """Yield of each row in which pair `index` touches where it presses, and how hard.
+    result: Result, scene: Scene, index: int, resolution: float
+) -> Iterator[tuple[int, float, Array, Longs, Array]]:
+    """Yield of each contact of pair `index` where it presses on the shell, and how hard.
 
-    They are the row's number, points (n, 3) in the frame at `placement` in a joint, and loads (n,)
-    [N] that add up to the recorded normal forces: damping is shared out as the elastic pressure is.
+    They are its row, its normal force [N], points (n, 3) in the shell's frame, the shell's triangle
+    (n,) of each, and loads (n,) [N] that add up to the force: those on pieces of the shell no
+    longer than `resolution` [m], or than an eighth of a half axis. There are none where the overlap
+    is smaller than a piece. Damping is shared out as the elastic pressure is.
     """
-    foundation_pressure = import_module("sphshell_pin.contact.foundation").foundation_pressure
     pair = scene.pairs[index]
-    assert pair.shell is not None
-    assert pair.sphere is not None
-    log = result.contacts
-    own = np.asarray(log.pair) == index
-    forces = np.bincount(log.row[own], log.normal_force[own], len(result.t))
-    model, data = scene.model, scene.model.createData()
-    for row in np.unique(log.row[own]):
-        pin.forwardKinematics(model, data, np.asarray(result.q[row], dtype=float))
-        shell = data.oMi[pair.joint_j] * pair.placement_j
-        center = shell.actInv((data.oMi[pair.joint_i] * pair.placement_i).translation)
-        points, _, pressures, areas = foundation_pressure(
-            pair.shell, center, pair.sphere.radius, pair.law, pair.method
-        )
-        loads = pressures * areas
-        if not loads.sum() > 0.0:
-            continue
-        move = (data.oMi[joint] * placement).actInv(shell)
-        seen = points @ move.rotation.T + move.translation
-        yield int(row), seen, loads * (forces[row] / loads.sum())
+    shell = pair.shell
+    assert shell is not None
+    patches = patches_on(result, scene, [index], pair.joint_j, pair.placement_j)
+    overlap = overlap_of(result, scene, patches)
+    if overlap is None:
+        return
+    reach = 2.0 * float(patches.half_axes.max())
+    fine = min(resolution, float(np.median(patches.half_axes[:, 1])) / 8.0)
+    samples = divide(shell, patches.points, reach + fine, fine, curved=pair.method == "smooth")
+    grid = Grid(samples.points, reach)
+    part = np.asarray(shell.element_patch)[np.asarray(shell.triangle_element)[samples.triangle]]
+    for k, point in enumerate(patches.points):
+        near = grid.within(point - reach, point + reach)
+        near = near[part[near] == shell.element_patch[patches.element[k]]]
+        loads = overlap.stroke(samples.points[near], k, k, reach, 1.0, 1.0) * samples.areas[near]
+        pressed = loads > 0.0
+        near, loads = near[pressed], loads[pressed]
+        force = float(patches.force[k])
+        if len(loads):
+            loads *= force / loads.sum()
+        yield int(patches.row[k]), force, samples.points[near], samples.triangle[near], loads
 
 
 @dataclass(frozen=True)

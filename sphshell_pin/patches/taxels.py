@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.atomic import atomic_file
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 # share of the larger half axis of the smallest of the larger patches.
 _CHORD = 1e-3
 _MOST_CUTS = 32
+_PER_TAXEL = 8  # pieces of an overlap along the side of a taxel
 _FACING = 0.5  # cosine between a contact's normal and that of an element that shares its load
 
 
@@ -151,12 +153,17 @@ class TaxelGrid:
             sides = np.where(np.isin(patches.pair, sorted(on_j)), 1.0, -1.0)
             places = sides[:, None] * patches.normals
             self._add_ellipses(forces, outside, patches, places, own.radius)
+        model, data = scene.model, scene.model.createData()
+        fine = own.radius * min(np.array(self.extent) / self.shape) / _PER_TAXEL
         for k in sorted({k for k, _ in alike} - set(pairs)):
-            found = foundation_loads(result, scene, k, own.joint, own.placement)
-            for row, points, loads in found:
-                i, j, on_grid = self._cells(points)
+            shell = scene.pairs[k]
+            for row, force, points, _, loads in foundation_loads(result, scene, k, fine):
+                pin.forwardKinematics(model, data, np.asarray(result.q[row], dtype=float))
+                ball = data.oMi[own.joint] * own.placement
+                move = ball.actInv(data.oMi[shell.joint_j] * shell.placement_j)
+                i, j, on_grid = self._cells(points @ move.rotation.T + move.translation)
                 np.add.at(forces[row], (i[on_grid], j[on_grid]), loads[on_grid])
-                outside[row] += loads[~on_grid].sum()
+                outside[row] += force - loads[on_grid].sum()
         return TaxelImages(result.t, read_only(forces), read_only(outside))
 
     def _cells(self, points: Array) -> tuple[Longs, Longs, NDArray[np.bool_]]:
@@ -260,13 +267,10 @@ class ShellTaxels:
             loads = patches.force[k] * np.abs(load_in_polygons(u))
             np.add.at(forces[row], owner[near], loads)
             outside[row] += patches.force[k] - loads.sum()
-        taxel = np.arange(count) if self.of == "elements" else np.asarray(shell.element_face)
         for k in sorted(set(alike) - set(pairs)):
-            method = scene.pairs[k].method
-            found = foundation_loads(result, scene, k, pair.joint_j, pair.placement_j)
-            for row, points, loads in found:
-                at = taxel[shell.closest_points(points, method=method).elements]
-                np.add.at(forces[row], at, loads)
+            for row, force, _, triangles, loads in foundation_loads(result, scene, k, np.inf):
+                np.add.at(forces[row], owner[triangles], loads)
+                outside[row] += force - loads.sum()
         return TaxelImages(result.t, read_only(forces), read_only(outside))
 
 

@@ -249,8 +249,7 @@ def deposit(
         if work == 0.0:
             continue
         half = 0.5 * (patches.half_axes[i] + patches.half_axes[j])
-        normal = patches.normals[i] + patches.normals[j]
-        normal /= np.linalg.norm(normal)
+        normal = _unit(patches.normals[i] + patches.normals[j], patches.normals[i])
         a, b = patches.points[i], patches.points[j]
         # An overlap is no ellipse about the contact: it may reach farther.
         whole = overlap is not None and overlap.holds[i]
@@ -281,9 +280,14 @@ def _axes(patches: PlacedPatches, i: int, j: int, normal: Array) -> Array:
     # Axes have no sign.
     other = patches.axes[j] * (1.0 if patches.axes[i] @ patches.axes[j] >= 0.0 else -1.0)
     axis = patches.axes[i] + other
-    axis -= normal * (normal @ axis)
-    axis /= np.linalg.norm(axis)
+    axis = _unit(axis - normal * (normal @ axis), np.cross(normal, patches.axes[i]))
     return np.stack([axis, np.cross(normal, axis)], axis=1)
+
+
+def _unit(vector: Array, other: Array) -> Array:
+    """Return the direction of `vector`, or that of `other` where it has none."""
+    chosen = vector if np.linalg.norm(vector) > 1e-9 else other
+    return np.asarray(chosen / np.linalg.norm(chosen))
 
 
 def _nearest(points: Array, place: Array) -> int:

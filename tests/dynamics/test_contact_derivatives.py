@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sphshell_pin import (
     BristleFriction,
     CoulombFriction,
+    HertzLaw,
     HuntCrossleyLaw,
     ImpactLaw,
     Scene,
@@ -383,6 +384,20 @@ class TestRatesOfBristles:
             assert_rate_jacobian(
                 scene, q, v, stretched(scene, stretch), turning=left_out(friction, stretch)
             )
+
+
+@pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
+def test_friction_on_the_ellipses_of_hertz(friction: str) -> None:
+    """Mindlin's disc follows the curvature of the shell, with its slopes."""
+    law = HertzLaw(1e5, 0.3, restitution=0.8, speed=1.0)
+    for name in ("dome", "torus inside", "wavy above"):
+        scene = Scene(ball(radius=1.0))
+        sphere = Sphere(1.0, frame="ball")
+        scene.add_contact(sphere, shell_of(name, 0.6), law=law, friction=FRICTIONS[friction])
+        q = turned(free_q(SURFACES[name].probes(1, 0.04, seed=3)[0][0]), 1)
+        v = 0.3 * np.random.default_rng(3).normal(size=6)
+        assert_derivatives(scene, q, v)
+        assert_rate_jacobian(scene, q, v, stretched(scene, 1e-4), turning=1e-2)
 
 
 def test_pairs_add_up() -> None:

@@ -111,18 +111,22 @@ bool CellQuadrature::root_towards(const Vec2& from, const Vec2& direction, const
     if (across > 0) most = std::min(most, (to.x() * d.y() - to.y() * d.x()) / across);
   }
   if (!(most > 0) || !std::isfinite(most)) return false;
-  double a = 0, b = most * (1 + 1e-12), fa = level_at(from), fb = level_at(from + b * direction);
+  const Vec2 along = to_plane(direction);
+  double a = 0, b = most * (1 + 1e-12), fa, fb, value = 0;
+  gradient(from, &fa), gradient(from + b * direction, &fb);
   if (!(fa < 0) || !(fb >= 0)) return false;
+  // rho^2 is nearly a parabola: sqrt's guess, then Newton's method between the ends.
+  double t = b * std::sqrt(-fa / (fb - fa));
   for (int i = 0; i < 60 && b - a > 1e-14 * most; ++i) {
-    double t = i % 3 == 2 ? (a + b) / 2 : (a * fb - b * fa) / (fb - fa);
-    if (!(t > a && t < b)) t = (a + b) / 2;
-    const double ft = level_at(from + t * direction);
-    if (ft < 0)
-      a = t, fa = ft;
-    else
-      b = t, fb = ft;
-    if (ft == 0) break;
+    const double slope = 2 * gradient(from + t * direction, &value).dot(along);
+    (value < 0 ? a : b) = t;
+    double next = t - value / slope;
+    if (!(next > a && next < b)) next = (a + b) / 2;
+    const bool last = std::abs(next - t) < 1e-9 * most;
+    t = next;
+    if (last) break;
   }
+  b = t;
   out = from + b * direction;
   return true;
 }

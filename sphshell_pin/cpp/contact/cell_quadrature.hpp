@@ -90,14 +90,12 @@ class CellQuadrature {
       at(pole + rule.nodes[i] * from, weight * rule.nodes[i] * rule.weights[i], visit);
   }
 
-  // Of rho^2 - R^2 over the parameters, and its gradient in right-angled axes.
-  double level_at(const Vec2& w) const {
-    return patch_.point(w.x(), w.y()).squaredNorm() - radius2_;
-  }
-  Vec2 gradient(const Vec2& w) const {
+  // Of rho^2 - R^2 over the parameters: half its gradient in right-angled axes, and itself.
+  Vec2 gradient(const Vec2& w, double* value = nullptr) const {
     const Vec3 x = patch_.point(w.x(), w.y());
     double gu = x.dot(patch_.along_u(w.x(), w.y())), gv = x.dot(patch_.along_v(w.x(), w.y()));
     axes_.first(gu, gv);
+    if (value) *value = x.squaredNorm() - radius2_;
     return {gu, gv};
   }
   Vec2 to_plane(const Vec2& d) const {
@@ -150,11 +148,12 @@ class CellQuadrature::Arc {
     Vec2 w, g;
     for (int i = 0; i < 12; ++i) {
       w = a_ + t * chord_ + s * out_parameters_;
-      g = cell_.gradient(w);
-      const double step = cell_.level_at(w) / (2 * g.dot(out_));
+      double value;
+      g = cell_.gradient(w, &value);
+      const double step = value / (2 * g.dot(out_));
       if (!(std::abs(step) < length_)) break;
       s -= step;
-      if (std::abs(step) < 1e-9 * length_) break;
+      if (std::abs(step) < 1e-7 * length_) break;
     }
     w = a_ + t * chord_ + s * out_parameters_;
     const double slope = -g.dot(chord_plane_) / g.dot(out_);
@@ -219,15 +218,29 @@ void CellQuadrature::whole(const Part& w, int order, Visit& visit) {
 template <class Visit>
 void CellQuadrature::part(const Part& w, int level, Visit& visit) {
   // Its control points: of the three sides, each from its corner on, and the middle one.
-  Vec3 net[3][4];
-  for (int k = 0; k < 3; ++k) {
-    const Vec2 &p = w.corner[k], &q = w.corner[next_corner(k)];
-    net[k][0] = patch_.polar(p, p, p);
-    net[k][1] = patch_.polar(p, p, q);
-    net[k][2] = patch_.polar(p, q, q);
+  Vec3 net[3][4], middle;
+  if (level == 0) {
+    const CubicPatch& c = patch_;
+    net[0][0] = c.c00;
+    net[0][1] = c.c00 + c.c10 / 3;
+    net[0][2] = c.c00 + (2 * c.c10 + c.c20) / 3;
+    net[1][0] = c.c00 + c.c10 + c.c20 + c.c30;
+    net[1][1] = c.c00 + (2 * c.c10 + c.c01 + c.c20 + c.c11 + c.c21) / 3;
+    net[1][2] = c.c00 + (c.c10 + 2 * c.c01 + c.c02 + c.c11 + c.c12) / 3;
+    net[2][0] = c.c00 + c.c01 + c.c02 + c.c03;
+    net[2][1] = c.c00 + (2 * c.c01 + c.c02) / 3;
+    net[2][2] = c.c00 + c.c01 / 3;
+    middle = c.c00 + (c.c10 + c.c01) / 3 + c.c11 / 6;
+  } else {
+    for (int k = 0; k < 3; ++k) {
+      const Vec2 &p = w.corner[k], &q = w.corner[next_corner(k)];
+      net[k][0] = patch_.polar(p, p, p);
+      net[k][1] = patch_.polar(p, p, q);
+      net[k][2] = patch_.polar(p, q, q);
+    }
+    middle = patch_.polar(w.corner[0], w.corner[1], w.corner[2]);
   }
   for (int k = 0; k < 3; ++k) net[k][3] = net[next_corner(k)][0];
-  const Vec3 middle = patch_.polar(w.corner[0], w.corner[1], w.corner[2]);
   const Vec3 towards = (net[0][0] + net[1][0] + net[2][0]).normalized();
   double low = middle.dot(towards), high2 = middle.squaredNorm(), size2 = 0;
   for (int k = 0; k < 3; ++k) {

@@ -194,12 +194,15 @@ void Foundation::find_depths(const Shell& shell, const Vec3& center, double radi
     FoundationRow& row = rows_[at.row];
     if (at.nearest >= radius - row.depth) return;
     const Facet& facet = shell.facets()[at.facet];
+    const CurvedFacet& bent = curved.facets()[at.facet];
     Nearest found{Feature::Face, 0, 0.0, {}};
-    if (!find_nearest(facet, curved.facets()[at.facet], curved.cells()[at.facet], center,
-                      radius - row.depth, found))
+    const auto start = closest_on_facet(facet, center);
+    if (!find_minimum(bent.patch(facet), center, start, found.at) &&
+        !find_nearest(facet, bent, curved.cells()[at.facet], center, radius - row.depth, found))
       return;
-    row.depth = radius - (found.at.point - center).norm();
-    row.element = facet.element;
+    const double depth = radius - (found.at.point - center).norm();
+    if (depth <= row.depth) return;
+    row.depth = depth, row.element = facet.element;
   };
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     const Counted* best = nullptr;

@@ -110,6 +110,14 @@ struct Sticking {
 
   double coefficient(double speed) const { return stribeck(speed * speed); }
 
+  // Radius of the disc of contact; on an ellipse of Hertz's law, that of the disc of the same
+  // normal stiffness.
+  template <class S>
+  static S disc(const ContactKinematics<S>& m, double radius) {
+    using std::sqrt;
+    return m.scale > 0 ? S(0.75 * m.scale * sqrt(m.depth)) : S(sqrt(radius * m.depth));
+  }
+
   // On which a spin about the normal is a slip, for a disc of contact of radius a.
   template <class S>
   static S arm_of(const S& a) {
@@ -142,11 +150,10 @@ struct BristleFriction : Sticking {
   template <class S>
   void add(ContactForce<S>& out, const ContactKinematics<S>& m, double radius,
            double relaxation) const {
-    using std::sqrt;
     Vector3<S> w = out.slip;
     S arm(0);
     if (torsional) {
-      arm = arm_of(S(sqrt(radius * m.depth)));
+      arm = arm_of(disc(m, radius));
       w += arm * m.spin * m.normal;
     }
     const S limit = stribeck(S(w.squaredNorm())) * out.normal;
@@ -223,10 +230,8 @@ struct MindlinFriction : Sticking {
   template <class S>
   void add(ContactForce<S>& out, const ContactKinematics<S>& m, double radius,
            double relaxation) const {
-    using std::sqrt;
     if (rolling > 0) add_rolling(out, m, radius);
-    // On an ellipse, that of the disc of the same normal stiffness.
-    const S a = m.scale > 0 ? S(0.75 * m.scale * sqrt(m.depth)) : S(sqrt(radius * m.depth));
+    const S a = disc(m, radius);
     if (!(a > 0)) return;
     const Vector3<S>& n = m.normal;
     const S growth = -0.5 * n.dot(m.relative) / m.depth;  // a' / a
@@ -286,9 +291,11 @@ struct MindlinFriction : Sticking {
   template <class S>
   void add_rolling(ContactForce<S>& out, const ContactKinematics<S>& m, double radius) const {
     using std::sqrt;
-    const S x2 = m.rolling.squaredNorm() * (radius * radius / (rolling_speed * rolling_speed));
+    // That of a ball on a plane with the same disc of contact.
+    const S r = m.scale > 0 ? S(0.5625 * m.scale * m.scale) : S(radius);
+    const S x2 = m.rolling.squaredNorm() * (r * r / (rolling_speed * rolling_speed));
     const S share = x2 < 1 ? S((3 - x2) / 2) : S(1 / sqrt(x2));
-    out.rolling = -(rolling * radius * radius / rolling_speed) * out.normal * share * m.rolling;
+    out.rolling = -(rolling / rolling_speed) * r * r * out.normal * share * m.rolling;
   }
 };
 

@@ -1,8 +1,10 @@
 #include "dynamics/foundation_pair.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 
 #include "contact/dual.hpp"
+#include "dynamics/patch.hpp"
 #include "dynamics/scene_data.hpp"
 
 namespace sphshell {
@@ -78,14 +80,38 @@ double FoundationPair::energy(const Pair& pair, std::size_t i) const {
   return law.modulus / law.thickness * foundation_.rows()[i].sum.energy;
 }
 
-PatchRow FoundationPair::patch(const Pair& pair, const Vec3& normal_world, double depth,
+// An ellipse has half axes of 2 sqrt(moment / area).
+PatchRow FoundationPair::patch(const Pair& pair, std::size_t i, const Mat3& rotation,
                                double force) const {
-  const FoundationLaw& law = *pair.law.foundation();
-  const double radius = pair.disc_radius(), a2 = std::max(0.0, (2 * radius - depth) * depth);
-  const double near = pair.radius - depth, a = std::sqrt(a2);
-  const double peak = law.modulus / law.thickness * (pair.radius + near) * depth / (2 * near);
-  PatchRow out{{a, a}, {}, peak, force / (M_PI * a2), depth};
-  const Vec3 axis = normal_world.unitOrthogonal();
+  Foundation found;
+  if (pair.ball > 0)
+    found.find_on_ball(pair.ball, center_, pair.radius, true);
+  else
+    found.find(*pair.shell, pair.method, center_, pair.radius, false, true);
+  const int number = static_cast<int>(i);
+  const FoundationRow& row = found.rows()[i];
+  double area = 0, peak = 0;
+  Vec3 middle = Vec3::Zero(), push = Vec3::Zero();
+  for (const FoundationPoint& one : found.points()) {
+    if (one.row != number) continue;
+    area += one.area, middle += one.area * one.point, push += one.force;
+    peak = std::max(peak, one.pressure);
+  }
+  if (!(area > 0)) return unknown_patch(row.depth);
+  middle /= area;
+  const Vec3 normal = row.normal(), east = normal.unitOrthogonal(), north = normal.cross(east);
+  Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
+  for (const FoundationPoint& one : found.points()) {
+    if (one.row != number) continue;
+    const Eigen::Vector2d away(east.dot(one.point - middle), north.dot(one.point - middle));
+    moments += one.area * away * away.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solved(moments / area);
+  const Eigen::Vector2d half = 2 * solved.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Eigen::Vector2d longer = solved.eigenvectors().col(1);
+  const Vec3 axis = rotation * (longer[0] * east + longer[1] * north);
+  // Damping is shared out as the elastic pressure is.
+  PatchRow out{{half[1], half[0]}, {}, peak * force / push.norm(), force / area, row.depth};
   std::copy_n(axis.data(), 3, out.axis);
   return out;
 }

@@ -30,8 +30,9 @@ class FoundationPair {
                         const Vec3& spin) const;
   double energy(const Pair& pair, std::size_t i) const;  // [J]
 
-  // A disc as large as that of a plane at this depth, with the pressure of the closest point.
-  PatchRow patch(const Pair& pair, const Vec3& normal_world, double depth, double force) const;
+  // Of row i: the ellipse with the area's second moments, and the pressures under `force` [N];
+  // `rotation` is that of the shell in the world.
+  PatchRow patch(const Pair& pair, std::size_t i, const Mat3& rotation, double force) const;
 
   // As contact_slopes(), for row i.
   void slopes(const Pair& pair, std::size_t i, double relaxation, const ContactSite& site,

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "contact/ball.hpp"
-#include "dynamics/patch.hpp"
 
 namespace sphshell {
 
@@ -376,62 +375,6 @@ void SceneData::apply(int joint, const Vec3& point_world, const Vec3& force_worl
 Vec3 SceneData::relative_velocity(const Pair& pair, const Vec3& point_world) const {
   return body_.velocity_at(pair.joint_i, point_world) -
          body_.velocity_at(pair.joint_j, point_world);
-}
-
-// Contacts of one place as one, with the sum of their forces.
-void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows,
-                    std::vector<PatchRow>* patches) {
-  if (active_.empty()) return;
-  if (!needs_velocity_) body_.kinematics(q, v);
-  const auto write = [](double* to, const Vec3& x) { std::copy_n(x.data(), 3, to); };
-  for (std::size_t i = 0, begin = 0; i < active_.size(); ++i) {
-    const ActiveContact& active = active_[i];
-    if (i > 0 && active.pair != active_[i - 1].pair) begin = i;
-    const std::vector<Contact>& contacts = queries_[active.pair].contacts;
-    if (!leads(contacts, i - begin)) continue;
-    const Pair& pair = pairs_[active.pair];
-    const PairState& state = states_[active.pair];
-    const Contact whole = whole_of(contacts, i - begin, state.center, pair.radius);
-    const Vec3 point = state.world_from_j.act(whole.point);
-    const Vec3 normal = state.world_from_j.rotation() * whole.normal;
-    Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
-    double depth = 0;  // corrected, where the shape counts
-    // One without a place stands alone.
-    const std::size_t first = i - begin, last = whole.group < 0 ? first + 1 : contacts.size();
-    for (std::size_t k = first; k < last; ++k) {
-      if (k != first && contacts[k].group != whole.group) continue;
-      const ActiveContact& other = active_[begin + k];
-      push += other.contact.weight * other.force.normal * other.kinematics.normal;
-      if (other.shape >= 0) depth += other.contact.weight * other.kinematics.depth;
-      friction += other.contact.weight * other.force.friction;
-    }
-    const Vec3 relative = relative_velocity(pair, point);
-    ContactRow& row = rows.emplace_back();
-    write(row.point, point);
-    write(row.normal, normal);
-    row.depth = active.shape < 0 ? whole.depth : depth;
-    row.normal_force = push.dot(normal);
-    write(row.friction_force, friction);
-    write(row.slip_velocity, relative - relative.dot(normal) * normal);
-    row.pair = active.pair;
-    row.element = whole.element;
-    row.contact_id = active.contact_id;
-    row.feature = whole.feature;
-    if (!patches) continue;
-    if (pair.source) {
-      patches->push_back(unknown_patch(row.depth));
-      continue;
-    }
-    if (active.row >= 0) {
-      patches->push_back(
-          foundations_[active.pair].patch(pair, normal, row.depth, row.normal_force));
-      continue;
-    }
-    const ContactShape gap =
-        active.shape < 0 ? find_shape(active.pair, active.contact) : *shape(active);
-    patches->push_back(
-        hertz_patch(gap, state.world_from_j.rotation(), row.depth, row.normal_force));
-  }
 }
 
 const VectorX& SceneData::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {

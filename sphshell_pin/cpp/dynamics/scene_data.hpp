@@ -141,6 +141,7 @@ class SceneData {
   std::vector<Contact>& find_contacts(std::size_t k, bool far);
   void find_shapes(std::size_t k);
   ContactShape find_shape(std::size_t k, const Contact& contact);
+  PatchRow patch_of(const ActiveContact& active, const ContactRow& row);
   void evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z);
   void add_contact(std::size_t k, const Contact& contact, int slot, int contact_id);
   void compute_forces(const VectorX& z);
