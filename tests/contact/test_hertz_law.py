@@ -290,3 +290,38 @@ def test_where_nothing_is_known_of_the_shell_it_is_refused() -> None:
     still = pin.Motion.Zero()
     with pytest.raises(sp.errors.InvalidParameter, match="at a lone contact point"):
         sp.contact_wrench(np.zeros(3), [0, 0, 1.0], 1e-3, still, still, LAW)
+
+
+def test_a_vertex_is_like_what_is_beside_it() -> None:
+    # A ball that is large against the shell rests on vertices, where elements bend too little.
+    surface = cylinder(1.0, 1.0, (8, 10))
+    scene = ball_scene(surface.shell(), 200.0, LAW)
+    u, v = 0.75, 0.0  # of a vertex
+    sizes = []
+    for away in (0.0, 1e-6):
+        x, n = surface.point(u + away, v + away), surface.normal(u + away, v + away)
+        sizes.append(np.linalg.norm(force_on(scene, x + (200 - 1e-3) * n).linear))
+    assert np.isclose(*sizes, rtol=1e-5)
+    expected, *_ = hertz_contact(0.5 / 200, 0.5 * (1 + 1 / 200), MODULUS, 1e-3)
+    assert np.isclose(sizes[0], expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+@pytest.mark.parametrize("name", SURFACES)
+def test_ellipse_and_pressure_are_recorded(name, share) -> None:
+    surface = SURFACES[name]
+    scene = ball_scene(surface.shell(), share, LAW)
+    u, v = (0.37 * a + 0.63 * b for a, b in surface.spans)
+    x, n = surface.point(u, v), surface.normal(u, v)
+    depth = 0.02 * share
+    low, high = surface.curvatures(u, v)
+    _, *expected = hertz_contact(0.5 * (1 / share + low), 0.5 * (1 / share + high), MODULUS, depth)
+    start = np.array([*(x + (share - depth) * n), 0, 0, 0, 1])
+    run = sp.Simulation(scene, sp.SemiImplicitEuler(1e-9))
+    patch = run.run(start, np.zeros(6), 1e-9, record=("patch",)).patches[0]
+    found = [*patch["half_axes"], patch["peak_pressure"]]
+    assert np.allclose(found, expected, rtol=2e-3)
+    if name not in ("sphere", "ellipsoid"):
+        direction = surface.point(u, v + 1e-6) - x  # along the meridian or the axis
+        axis = patch["axis_world"] @ direction / np.linalg.norm(direction)
+        assert min(abs(abs(axis) - 1), abs(axis)) < 1e-3

@@ -330,21 +330,21 @@ void Curvature::find_walls_of_vertex(const Shell& shell, int facet, int corner) 
     const auto [u, v] = corner_parameters(c % 3);
     return wall(shell, c / 3, u, v);
   };
-  corners_.assign(1, 3 * facet + corner);
-  for (std::size_t i = 0; i < corners_.size(); ++i) {
-    const int c = corners_[i];
+  std::vector<int> corners(1, 3 * facet + corner);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const int c = corners[i];
     for (int side : {c % 3, previous_corner(c % 3)}) {
       const Edge& edge = edge_at(shell, c / 3, side);
       for (int n = 0; n < edge.count; ++n) {
         const int other =
             corner_of(shell, shell.facet_half_edge(topology.incidence[edge.begin + n]), vertex);
-        if (std::find(corners_.begin(), corners_.end(), other) != corners_.end()) continue;
-        corners_.push_back(other);
+        if (std::find(corners.begin(), corners.end(), other) != corners.end()) continue;
+        corners.push_back(other);
       }
     }
   }
   // The creases that leave the vertex, each once; without one, the only wall.
-  for (int c : std::vector<int>(corners_)) {
+  for (int c : corners) {
     const Wall here = wall_at(c);
     for (int side : {c % 3, previous_corner(c % 3)}) {
       const Edge& edge = edge_at(shell, c / 3, side);
@@ -357,7 +357,7 @@ void Curvature::find_walls_of_vertex(const Shell& shell, int facet, int corner) 
       }
     }
   }
-  if (walls_.empty()) walls_.emplace_back(wall_at(corners_[0]), wall_at(corners_[0]));
+  if (walls_.empty()) walls_.emplace_back(wall_at(corners[0]), wall_at(corners[0]));
 }
 
 // The tensors at a third and two thirds of a side, as the fits of the element say.

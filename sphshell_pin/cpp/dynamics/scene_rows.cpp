@@ -37,7 +37,7 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     ContactRow& row = rows.emplace_back();
     write(row.point, point);
     write(row.normal, normal);
-    row.depth = active.shape < 0 ? whole.depth : depth;
+    row.depth = active.shape < 0 ? whole.depth : whole.group < 0 ? active.kinematics.depth : depth;
     row.normal_force = push.dot(normal);
     write(row.friction_force, friction);
     write(row.slip_velocity, relative - relative.dot(normal) * normal);
