@@ -100,8 +100,9 @@ class NormalLaw(Ingredient):
         """
         depth = self.depth_of(0.5 * mass * speed**2)
         times = [self.contact_time(depth, speed), DECAYS_PER_PERIOD * self.decay_time(mass, depth)]
-        if load > 0:
-            times.append(math.pi * math.sqrt(mass / self.normal_stiffness(self.depth_at(load))))
+        stiffness = self.normal_stiffness(self.depth_at(load)) if load > 0 else 0.0
+        if stiffness > 0:  # not of a law that cannot carry the load
+            times.append(math.pi * math.sqrt(mass / stiffness))
         return min(times)
 
 

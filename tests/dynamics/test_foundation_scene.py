@@ -254,3 +254,16 @@ def test_in_a_scenario_file(tmp_path) -> None:
     assert "elastic foundation" in str(built.scene.explain(built.q0, np.zeros(6)))
     with pytest.raises(ScenarioError, match="thickness"):
         build(write(tmp_path, DROP.replace(given, 'law = { type = "foundation", modulus = 1 }')))
+
+
+def test_a_foundation_that_cannot_carry_its_load_says_so() -> None:
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1000.0, 0.05), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    plate = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    shell = sp.Shell(plate, [[0, 1, 2], [0, 2, 3]])
+    scene.add_contact(sp.Sphere(0.05, "ball"), shell, law=sp.FoundationLaw(1e4, 5e-3))
+    with pytest.warns(sp.errors.WeakLawWarning, match="cannot stop the sphere"):
+        sp.Simulation(scene).run(np.array([0, 0, 0.06, 0, 0, 0, 1]), np.zeros(6), 0.01)
