@@ -16,7 +16,7 @@ constexpr int kPowers[kTerms][3] = {{2, 0, 0}, {1, 1, 0}, {0, 2, 0}, {1, 0, 1}, 
 // distance: of what is no quadric, and of what the points do not determine.
 constexpr double kCorrection = 1e-4, kUndetermined = 1e-12;
 // Normals that lean more tell nothing about a height.
-constexpr double kMostLean = 0.2;
+constexpr double kMostTilted = 0.2;
 
 using Row = VertexCurvature::Terms;
 using Square = Eigen::Matrix<double, kTerms, kTerms>;
@@ -121,7 +121,7 @@ VertexCurvature fit_curvature(const Vec3& origin, const Vec3& normal,
     if (!(apart2 > 0)) continue;
     add(powers.terms(), x[2], 1 / (apart2 * apart2));
     const double up = normal.dot(p.normal);
-    if (!exact || up < kMostLean) continue;
+    if (!exact || up < kMostTilted) continue;
     const double slope[2] = {-out.east.dot(p.normal) / up * sx / sz,
                              -out.north.dot(p.normal) / up * sy / sz};
     for (int k = 0; k < 2; ++k)
