@@ -274,7 +274,7 @@ void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   const auto& rotation = states_[active.pair].world_from_j.rotation();
   const int at = 3 * active.slot, rings = active.slot >= 0 ? pair.friction.rings() : 1;
   Vec3 outer[kMostRings - 1], outer_rate[kMostRings - 1];
-  ContactKinematics<double> m = active.kinematics;
+  ContactKinematics<double>& m = active.kinematics;
   if (rings > 1) {
     for (int i = 1; i < rings; ++i) outer[i - 1] = rotation * z.segment<3>(at + 3 * i);
     m.outer = outer;
@@ -282,6 +282,7 @@ void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
   }
   active.force = contact_force(pair.law, pair.friction, disc_radius(active), relaxation(pair), m);
   if (active.row >= 0) add_foundation(active, m);
+  m.outer = nullptr, m.outer_rate = nullptr;  // not beyond this evaluation
   // The energy also changes with the shape, as the sphere moves along the shell. It depends on the
   // sphere's center alone: that is where the force acts.
   if (const HertzLaw* hertz = pair.law.hertz(); hertz && active.shape >= 0) {
