@@ -1,6 +1,6 @@
 """Cost of an elastic foundation's query and force against a point contact's, on 200 k triangles.
 
-python -m sphshell_pin.benchmarks.foundation
+python -m benchmarks.foundation
 """
 
 from __future__ import annotations

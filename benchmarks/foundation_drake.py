@@ -1,6 +1,6 @@
 """FoundationLaw against Drake's hydroelastic contact: force, area and time on the same scenes.
 
-    python -m sphshell_pin.benchmarks.foundation_drake --drake PYTHON
+    python -m benchmarks.foundation_drake --drake PYTHON
 
 PYTHON is an interpreter that has Drake (`pip install drake`); it runs this file as a script. A
 compliant ball touches a rigid box: its face, its edge, its corner. Drake's pressure is E (1 -
