@@ -17,6 +17,9 @@ constexpr double kSameNormal = 1e-10;
 // Elements whose normals turn this much more than their neighbors' belong to another surface, such
 // as a fillet.
 constexpr double kJump = 1.5;
+// What elements leave of a surface that they resolve is a small share of their own bulge: more is
+// noise.
+constexpr double kLargestRise = 0.1;
 // Of the radius: a step of the center for second derivatives, and a distance without direction.
 constexpr double kStep = 1e-5, kNoDistance = 1e-6;
 
@@ -441,18 +444,25 @@ double Curvature::beyond(const Shell& shell, int facet, double u, double v) {
 }
 
 Curvature::Rise Curvature::rise_of(const Shell& shell, int facet) {
+  const LargeArray<CurvedFacet>& cells = shell.curved()->facets();
+  const double bulge = cells[facet].bulge;
   Rise out;
   for (int k = 0; k < 3; ++k) {
     const int owner = owner_of_side(shell, facet, k);
     const bool reversed = is_reversed(shell, 3 * facet + k, owner);
+    const int other = joined_over(shell, facet, k);
+    const double most =
+        kLargestRise * std::min(bulge, other < 0 ? bulge : cells[triangle_of(other)].bulge);
     double at[4];
     for (int i = 0; i < 4; ++i) {
       const auto [u, v] = on_side(side_of(owner), 0.2 * (1 + (reversed ? 3 - i : i)));
-      at[i] = beyond(shell, triangle_of(owner), u, v);
+      at[i] = std::clamp(beyond(shell, triangle_of(owner), u, v), -most, most);
     }
     out.set_side(k, at);
   }
-  out.middle = beyond(shell, facet, 1.0 / 3, 1.0 / 3) - out.at(1.0 / 3, 1.0 / 3)[0];
+  const double middle = beyond(shell, facet, 1.0 / 3, 1.0 / 3);
+  out.middle =
+      std::clamp(middle, -kLargestRise * bulge, kLargestRise * bulge) - out.at(1.0 / 3, 1.0 / 3)[0];
   return out;
 }
 
