@@ -211,14 +211,10 @@ ContactShape SceneData::find_shape(std::size_t k, const Contact& contact) {
     out.depth = contact.depth;
     return out;
   }
-  const auto at = std::find(shell_of_.begin(), shell_of_.end(), pair.shell.get());
-  const std::size_t number = at - shell_of_.begin();
-  if (at == shell_of_.end()) {
-    shell_of_.push_back(pair.shell.get());
-    curvatures_.emplace_back();
-  }
-  return curvatures_[number].shape(*pair.shell, contact, states_[k].center, pair.radius,
-                                   wants_second_);
+  const auto at = std::find_if(curvatures_.begin(), curvatures_.end(),
+                               [&](const Curvature& one) { return one.is_of(*pair.shell); });
+  Curvature& curvature = at == curvatures_.end() ? curvatures_.emplace_back(*pair.shell) : *at;
+  return curvature.shape(contact, states_[k].center, pair.radius, wants_second_);
 }
 
 void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {

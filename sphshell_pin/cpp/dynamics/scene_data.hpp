@@ -160,8 +160,7 @@ class SceneData {
   std::vector<Query> queries_;
   std::vector<FoundationPair> foundations_;  // beside the pairs, if any has one
   std::vector<Contact> merged_;
-  std::vector<Curvature> curvatures_;   // of the shells whose shape counts
-  std::vector<const Shell*> shell_of_;  // beside them
+  std::vector<Curvature> curvatures_;  // of the shells whose shape counts
   std::vector<std::vector<ContactShape>> shapes_;
   std::vector<ContactShape> merged_shapes_;
   std::vector<ContactTracker> trackers_;
