@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pinocchio as pin
     from matplotlib.figure import Figure
 
+    from sphshell_pin.dynamics.sensitivities import Sensitivities
     from sphshell_pin.dynamics.sensors import SensorSet
     from sphshell_pin.view.recording import RecordingView
 
@@ -158,6 +159,13 @@ class Result:
     origin: Origin | None = None
     sensors: Mapping[str, SensorLog] = field(default_factory=dict)
     patch_rows: Patches | None = None
+    sensitivity_rows: Sensitivities | None = None
+
+    @property
+    def sensitivities(self) -> Sensitivities | None:
+        """How the rows change with parameters and the start; None where this was not asked for."""
+        rows = self.sensitivity_rows
+        return None if rows is None else replace(rows, result=self)
 
     @classmethod
     def from_blocks(
