@@ -131,5 +131,5 @@ def _print(first: str, other: Difference) -> None:
 
 
 def _shown(value: object) -> str:
-    text = "-" if value is None else str(value)
+    text = "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
     return text if len(text) <= 40 else f"{text[:37]}..."

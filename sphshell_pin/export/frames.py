@@ -78,7 +78,7 @@ class Frames:
                 moving[joint] = Moving(frame.name, joint, place)
             else:
                 fixed.append(_hung(frame.name, joint, place, moving))
-        taken = {WORLD, *(one.name for one in (*moving.values(), *fixed))}
+        taken = {WORLD, *(one.name for one in moving.values()), *(one.name for one in fixed)}
         spheres: dict[str, str] = {}
         others: dict[str, str] = {}
         shells: dict[tuple[int, int, bytes], str] = {}

@@ -108,7 +108,7 @@ def write_mcap(
                 writer.add_message(channels[topic], logged, data, published, counts[topic])
                 if progress is not None and topic == "/tf":
                     progress(counts[topic] / run.count)
-            writer.finish()
+            writer.finish()  # type: ignore[no-untyped-call]
     except OSError as error:
         raise ResultError(path, f"cannot be written: {error.strerror or error}") from error
     return path

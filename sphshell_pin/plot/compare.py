@@ -39,12 +39,13 @@ def plot_compare(comparison: Comparison) -> Figure:
         drawn: dict[str, Curve | CurveDifference] = {
             run.label: run.curves[name] for run in comparison.runs if name in run.curves
         }
-        _draw(over, name.rpartition(".")[2].replace("_", " "), drawn, comparison)
+        _draw(over, _quantity(name), drawn, comparison)
         over.set_title(name, fontsize=10, loc="left")
         away = {o.label: one for o in comparison.others for one in o.curves if one.name == name}
         _draw(beside, "difference", {**away}, comparison)
         beside.set_title(f"{name}, less that of {first.label}", fontsize=10, loc="left")
     finish_axis(axes[0, 0], legend=bool(names))
+    figure.align_ylabels()
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     more = f" ({count(left_out, 'curve', 'curves')} left out)" if left_out else ""
@@ -87,6 +88,11 @@ def _chosen(comparison: Comparison) -> tuple[list[str], int]:
     trajectories = joints or [name for name in paths if name in moves]
     names += trajectories[:MOST_TRAJECTORIES]
     return names, len(moves) - sum(name in moves for name in names)
+
+
+def _quantity(name: str) -> str:
+    kind, _, rest = name.partition(".")
+    return "position" if kind == "q" else rest.rpartition(".")[2].replace("_", " ")
 
 
 def _draw(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.dynamics.pair_series import PairSeries
 from sphshell_pin.dynamics.result import Result
@@ -202,7 +202,7 @@ def tables_of(comparison: Comparison) -> dict[str, Table]:
     named = dict.fromkeys(
         (name, unit) for run in comparison.runs for name, (_, unit) in run.figures.items()
     )
-    figures: dict[str, list[object]] = {
+    figures: dict[str, ArrayLike] = {
         "figure": [name for name, _ in named],
         "unit": [unit for _, unit in named],
         first.label: [first.figures.get(name, (math.nan,))[0] for name, _ in named],
@@ -215,18 +215,16 @@ def tables_of(comparison: Comparison) -> dict[str, Table]:
                 getattr(found[name], title) if name in found else math.nan for name, _ in named
             ]
     curves = [(other.label, one) for other in comparison.others for one in other.curves]
-    return {
-        "figures": figures,
-        "curves": {
-            "curve": [one.name for _, one in curves],
-            "unit": [one.unit for _, one in curves],
-            "run": [label for label, _ in curves],
-            "largest difference": [one.largest for _, one in curves],
-            column("at", "s"): [one.at for _, one in curves],
-            "rms difference": [one.rms for _, one in curves],
-            "largest over range": [one.of_range for _, one in curves],
-        },
+    beside: Table = {
+        "curve": [one.name for _, one in curves],
+        "unit": [one.unit for _, one in curves],
+        "run": [label for label, _ in curves],
+        "largest difference": [one.largest for _, one in curves],
+        column("at", "s"): [one.at for _, one in curves],
+        "rms difference": [one.rms for _, one in curves],
+        "largest over range": [one.of_range for _, one in curves],
     }
+    return {"figures": figures, "curves": beside}
 
 
 def _difference(first: Measured, other: Measured) -> Difference:
