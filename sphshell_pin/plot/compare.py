@@ -24,8 +24,8 @@ COLORS = ("#d4202a", "#2f6fde", "#2a9d5c", "#f08a00", "#8a4fbf", "#0f9aa8")
 def plot_compare(comparison: Comparison) -> Figure:
     """Return a Figure of all runs: each curve over time, and beside it what is off the first.
 
-    Drawn are normal force and depth of the pairs with the largest forces, and the joints that
-    differ most; where no joint moves, the paths of these pairs' spheres.
+    Drawn are normal force and depth of the pairs with the largest forces, and of the joints that
+    move and the paths of these pairs' spheres those which differ most, as a share of their range.
 
     Raises MissingExtra without matplotlib.
     """
@@ -71,23 +71,20 @@ def _chosen(comparison: Comparison) -> tuple[list[str], int]:
         for name in sorted(peaks, key=lambda name: -peaks[name])[:MOST_PAIRS]
     ]
     names = [f"pairs.{pair}.{what}" for pair in pairs for what in ("normal_force", "depth")]
-    away = {
-        name: max(
-            (
-                one.largest
-                for other in comparison.others
-                for one in other.curves
-                if one.name == name
-            ),
-            default=0.0,
-        )
-        for name in moves
-    }
-    joints = sorted((n for n in moves if n.startswith("q.")), key=lambda name: -away[name])
-    paths = [f"sphere.{pair}.{axis}" for pair in pairs for axis in "xyz"]
-    trajectories = joints or [name for name in paths if name in moves]
-    names += trajectories[:MOST_TRAJECTORIES]
+    away = dict.fromkeys(moves, 0.0)
+    for other in comparison.others:
+        for one in other.curves:
+            if one.name in away:
+                away[one.name] = max(away[one.name], one.largest / _range(every[one.name]))
+    paths = {f"sphere.{pair}.{axis}" for pair in pairs for axis in "xyz"}
+    trajectories = [name for name in moves if name.startswith("q.") or name in paths]
+    names += sorted(trajectories, key=lambda name: -away[name])[:MOST_TRAJECTORIES]
     return names, len(moves) - sum(name in moves for name in names)
+
+
+def _range(curves: list[Curve]) -> float:
+    """Return the range of `curves` together, above zero."""
+    return float(np.ptp(np.concatenate([one.values for one in curves])))
 
 
 def _quantity(name: str) -> str:
