@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import read_only
-from sphshell_pin.dynamics import result_columns
 from sphshell_pin.dynamics.patches import PATCH, Patches, patches_of
 from sphshell_pin.dynamics.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene import Scene
@@ -314,19 +313,27 @@ class Result:
         and the largest depth, zero without contact. `scene` names the joints (default: the one that
         ran); without any, coordinates are q.0, q.1, ... without units.
         """
-        return result_columns.row_columns(self, self.scene if scene is None else scene)
+        from sphshell_pin.dynamics.result_columns import row_columns
+
+        return row_columns(self, self.scene if scene is None else scene)
 
     def contact_columns(self) -> dict[str, ArrayLike]:
         """Return the contact log as named scalar columns, units in the names (for CSV, tables)."""
-        return result_columns.contact_columns(self)
+        from sphshell_pin.dynamics.result_columns import contact_columns
+
+        return contact_columns(self)
 
     def event_columns(self) -> dict[str, ArrayLike]:
         """Return the events as named columns (for CSV, tables)."""
-        return result_columns.event_columns(self)
+        from sphshell_pin.dynamics.result_columns import event_columns
+
+        return event_columns(self)
 
     def energy_columns(self) -> dict[str, Array]:
         """Return the energy audit, and its residual, as named columns (for CSV, tables)."""
-        return result_columns.energy_columns(self)
+        from sphshell_pin.dynamics.result_columns import energy_columns
+
+        return energy_columns(self)
 
     def sensor_columns(self) -> dict[str, Array]:
         """Return the readings of all sensors as columns, units in the names (for CSV, tables).

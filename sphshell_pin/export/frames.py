@@ -42,13 +42,15 @@ class Frames:
 
     `moving`: one for each moving joint that carries something, in the world; `fixed`: all others,
     in one of those or in the world. `spheres`, `other_spheres` name the frames of the spheres by
-    the name of their pair, `shells` those of the shells by `shell_key`.
+    the name of their pair, `shells` those of the shells by `shell_key`; `contacts` are names for
+    frames of the contacts of each pair.
     """
 
     moving: tuple[Moving, ...]
     fixed: tuple[Fixed, ...]
     spheres: dict[str, str]
     other_spheres: dict[str, str]
+    contacts: dict[str, str]
     shells: dict[tuple[int, int, bytes], str]
 
     def on(self, joint: int) -> tuple[str, pin.SE3]:
@@ -81,8 +83,10 @@ class Frames:
         taken = {WORLD, *(one.name for one in moving.values()), *(one.name for one in fixed)}
         spheres: dict[str, str] = {}
         others: dict[str, str] = {}
+        contacts: dict[str, str] = {}
         shells: dict[tuple[int, int, bytes], str] = {}
         for pair in scene.pairs:
+            contacts[pair.name] = _free(f"contact/{pair.name}", taken)
             if pair.sphere is not None:
                 name = spheres[pair.name] = _free(f"sphere/{pair.name}", taken)
                 fixed.append(_hung(name, pair.joint_i, pair.placement_i, moving))
@@ -92,7 +96,7 @@ class Frames:
             if pair.shell is not None and shell_key(pair) not in shells:
                 name = shells[shell_key(pair)] = _free(f"shell/{pair.shell.name}", taken)
                 fixed.append(_hung(name, pair.joint_j, pair.placement_j, moving))
-        return cls(tuple(moving.values()), tuple(fixed), spheres, others, shells)
+        return cls(tuple(moving.values()), tuple(fixed), spheres, others, contacts, shells)
 
 
 def shell_key(pair: ContactPair) -> tuple[int, int, bytes]:

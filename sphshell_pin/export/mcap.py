@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields
 from importlib import metadata
 from os import PathLike
@@ -154,7 +154,9 @@ class _Run:
         self.touched = sorted({int(k) for k in result.contacts.pair})
         length = _ARROW * least_radius(scene)
         self.scale = ArrowScale.from_forces(largest_force(result.contacts), length)
-        self.topics = _topics(result)
+        self.topics = _topics("contacts", [result.pairs[k] for k in self.touched], ["markers"])
+        self.sensors = _topics("sensors", result.sensors)
+        self.twists = _topics("twists", [one.name for one in self.frames.moving])
 
     def about(self, command: str) -> dict[str, str]:
         """Return what the file says of itself."""
@@ -238,7 +240,7 @@ class _Run:
                 twist = place.actInv(data.v[j])
                 parts.append(
                     (
-                        f"/twists/{_token(name)}",
+                        self.twists[name],
                         "geometry_msgs/TwistStamped",
                         {
                             "header": _header(stamp, name),
@@ -269,7 +271,7 @@ class _Run:
         own, placed = contacts.pair == index, self.scene.pairs[index]
         center = (data.oMi[placed.joint_i] * placed.placement_i).translation
         torque = np.cross(contacts.point_world[own] - center, contacts.force_world[own]).sum(axis=0)
-        frame = f"contact/{pair.name}"
+        frame = self.frames.contacts[pair.name]
         moved.append(_transform(stamp, WORLD, frame, pin.SE3(np.eye(3), center)))
         topic = self.topics[pair.name]
         slip = np.linalg.norm(contacts.slip_velocity_world[own], axis=1)
@@ -297,7 +299,7 @@ class _Run:
 
     def _readings(self, name: str, log: SensorLog) -> Iterator[_Sent]:
         """Yield the readings when they arrived; they are published when they were taken."""
-        topic = f"/sensors/{_token(name)}"
+        topic = self.sensors[name]
         arrived, taken = (_nanoseconds(t, self.start).tolist() for t in (log.t, log.sampled))
         columns = [quantity_of(column)[0] for column in log.columns]
         wrench = [f"{part}_{axis}" for part in ("force", "torque") for axis in "xyz"]
@@ -364,15 +366,15 @@ def _stated_frames(result: Result, scene: Scene) -> dict[str, str]:
     }
 
 
-def _topics(result: Result) -> dict[str, str]:
-    """Return the topic of each pair that touched: ROS 2 allows letters, digits and underscores."""
-    topics: dict[str, str] = {}
-    for index in sorted({int(k) for k in result.contacts.pair}):
-        name = result.pairs[index]
-        topic, k = f"/contacts/{_token(name)}", 2
-        while topic in topics.values() or topic == "/contacts/markers":
-            topic, k = f"/contacts/{_token(name)}_{k}", k + 1
-        topics[name] = topic
+def _topics(above: str, names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
+    """Return a topic of its own for each of `names`: ROS 2 allows letters, digits, underscores."""
+    used, topics = set(taken), {}
+    for name in names:
+        token, k = _token(name), 2
+        while token in used:
+            token, k = f"{_token(name)}_{k}", k + 1
+        used.add(token)
+        topics[name] = f"/{above}/{token}"
     return topics
 
 

@@ -18,15 +18,13 @@ from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.scenario.figures import (
     JOINT_FIGURES,
-    PAIR_FIGURES,
+    PAIR_UNITS,
     SENSOR_FIGURES,
     measure_energy,
 )
 from sphshell_pin.tables import Table, column, quantity_of
 
 Array = NDArray[np.float64]
-
-_PAIR_UNITS = {"impulse": "N s", "peak_force_time": "s"} | PAIR_FIGURES
 
 
 @dataclass(frozen=True)
@@ -279,7 +277,7 @@ def _figures(result: Result, titles: list[str], count: int) -> dict[str, tuple[f
     found: dict[str, tuple[float, str]] = {}
     for name, pair in result.stats.pairs.items():
         for one in fields(PairFigures):
-            found[f"pairs.{name}.{one.name}"] = getattr(pair, one.name), _PAIR_UNITS[one.name]
+            found[f"pairs.{name}.{one.name}"] = getattr(pair, one.name), PAIR_UNITS[one.name]
     for name, joint in result.stats.joints.items():
         for figure, unit in JOINT_FIGURES.items():
             found[f"joints.{name}.{figure}"] = getattr(joint, figure), unit

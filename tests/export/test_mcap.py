@@ -375,3 +375,13 @@ def test_without_the_package_the_extra_is_named(finger, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     with pytest.raises(MissingExtra, match=r"sphshell-pin\[mcap\]"):
         finger[0].to_mcap(tmp_path / "x.mcap")
+
+
+def test_names_that_ros_2_does_not_allow_or_that_coincide_get_their_own_topics():
+    topics = exporting._topics("sensors", ["a-b", "a_b", "1 µ", "markers"], ["markers"])
+    assert list(topics.values()) == [
+        "/sensors/a_b",
+        "/sensors/a_b_2",
+        "/sensors/_1__",
+        "/sensors/markers_2",
+    ]
