@@ -38,9 +38,9 @@ class Moving:
 
 @dataclass(frozen=True)
 class Frames:
-    """The frames of a scene that carry something.
+    """The frames of a scene.
 
-    `moving`: one for each moving joint that carries something, in the world; `fixed`: all others,
+    `moving`: one for each moving joint, in the world; `fixed`: all others,
     in one of those or in the world. `spheres`, `other_spheres` name the frames of the spheres by
     the name of their pair, `shells` those of the shells by `shell_key`; `contacts` are names for
     frames of the contacts of each pair.
@@ -55,17 +55,16 @@ class Frames:
 
     def on(self, joint: int) -> tuple[str, pin.SE3]:
         """Return the frame that moves with `joint`, and where it is in the joint."""
-        for one in self.moving:
-            if one.joint == joint:
-                return one.name, one.placement
-        return WORLD, pin.SE3.Identity()
+        one = next((one for one in self.moving if one.joint == joint), None)
+        return (WORLD, pin.SE3.Identity()) if one is None else (one.name, one.placement)
 
     @classmethod
     def of(cls, scene: Scene, also: Iterable[str] = ()) -> Frames:
         """Return the frames of the links, spheres and shells of `scene`, and those called `also`.
 
-        A joint's first link stands for all that is fixed to it. Spheres are called sphere/PAIR,
-        the second of a pair sphere/PAIR/other, shells shell/NAME, with a number if names repeat.
+        A joint's first link stands for all that is fixed to it, its own frame where it has none.
+        Spheres are called sphere/PAIR, the second of a pair sphere/PAIR/other, shells shell/NAME,
+        with a number if names repeat.
         """
         model = scene.model
         named = {name for pair in scene.pairs for name in (pair.frame_i, pair.frame_j)}
@@ -81,6 +80,11 @@ class Frames:
             else:
                 fixed.append(_hung(frame.name, joint, place, moving))
         taken = {WORLD, *(one.name for one in moving.values()), *(one.name for one in fixed)}
+        # A joint that carries nothing itself may carry other joints.
+        for joint in range(1, model.njoints):
+            if joint not in moving:
+                name = _free(model.names[joint], taken)
+                moving[joint] = Moving(name, joint, pin.SE3.Identity())
         spheres: dict[str, str] = {}
         others: dict[str, str] = {}
         contacts: dict[str, str] = {}

@@ -114,7 +114,7 @@ def contact_markers(
             ("friction", FRICTION_COLOR, contacts.friction_force_world[k]),
         ):
             length = float(np.linalg.norm(force)) * scale.metres_per_newton
-            if not length > 0.0:
+            if not 0.0 < length < np.inf:
                 continue
             way = force * (scale.metres_per_newton * min(1.0, scale.longest / length))
             ends = np.array([point, point + way])

@@ -69,3 +69,19 @@ def turntable_run():
     q0 = np.array([1.0, 0.0, 0.05, 0.01, 0.0201, 0.0, 0.0, 0.0, 1.0])
     v0 = np.array([3.0, 0.1, 0.0, 0.0, 0.5, 0.0, 0.0])
     return sp.Simulation(scene, sp.RungeKutta4(1e-4)).run(q0, v0, 0.05, record_dt=1e-3)
+
+
+def linkless_run():
+    """A ball on two joints of which the first has no link, at rest beside a plate."""
+    model = pin.Model()
+    away = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([0.1, 0.0, 0.3]))
+    moves = model.addJoint(0, pin.JointModelTranslation(), away, "moves")
+    turns = model.addJoint(moves, pin.JointModelSpherical(), away, "turns")
+    model.appendBodyToJoint(turns, pin.Inertia.FromSphere(0.05, 0.02), pin.SE3.Identity())
+    model.addBodyFrame("moves", turns, pin.SE3.Identity(), 0)  # the link is called as the joint
+    scene = sp.Scene(model)
+    law = sp.HuntCrossleyLaw(1e6, 1.5, dissipation=2.0)
+    scene.add_contact(sp.Sphere(0.02, "moves"), sp.Shell(*WALL), law=law, name="ball")
+    q0 = np.array([0.01, 0.02, 0.03, 0.0, 0.0, 0.0, 1.0])
+    v0 = np.array([0.1, 0.2, 0.3, 1.0, 2.0, 3.0])
+    return sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(q0, v0, 0.01, record_dt=1e-3)

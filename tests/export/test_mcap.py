@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
 from sphshell_pin.export import mcap as exporting
-from tests.export.runs import finger_run, turntable_run
+from tests.export.runs import finger_run, linkless_run, turntable_run
 
 START = 1_800_000_000_123_456_789
 
@@ -244,6 +244,29 @@ def test_joints_without_end_and_free_bodies(table):
     np.testing.assert_array_equal(ball, result.q[:, 2:5])
     assert "/contacts/_1st_ball_disc/wrench" in read.topics
     assert read.metadata["sphshell_pin"]["contact 1st ball/disc"] == "/contacts/_1st_ball_disc"
+
+
+def test_a_joint_without_a_link_has_its_own_frame(tmp_path):
+    result = linkless_run()
+    read = Read(result.to_mcap(tmp_path / "run.mcap"))
+    model = result.scene.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, result.q[-1], result.v[-1])
+    found = poses(read, -1)
+    assert near(found["moves"], data.oMi[2])
+    assert near(found["moves-2"], data.oMi[1])
+    np.testing.assert_array_equal(
+        read.numbers("/twists/moves_2", "twist", "linear"), result.v[:, :3]
+    )
+    twist = read.topics["/twists/moves"][-1].twist
+    angular = [twist.angular.x, twist.angular.y, twist.angular.z]
+    np.testing.assert_array_equal(angular, data.v[2].angular)
+    rods = [one for one in read.topics["/bodies"][0].markers if one.type == 5]
+    (rod,) = rods  # none from the world to a body that flies
+    assert rod.header.frame_id == "moves-2"
+    ends = [[p.x, p.y, p.z] for p in rod.points]
+    np.testing.assert_array_equal(ends, [np.zeros(3), model.jointPlacements[2].translation])
+    assert "/contacts/markers" not in read.topics
 
 
 def test_shells_and_spheres_are_drawn_once(table):
