@@ -27,6 +27,8 @@ HEAVY = (
     "tornado",
     "zmq",
     "OCP",
+    "mcap",
+    "pyarrow",
 )
 
 
@@ -113,7 +115,7 @@ LAYERS = (
     ("patches",),
     ("sphshell_pin",),  # its public names are those of the folders above
     ("scenario",),
-    ("plot", "view"),
+    ("plot", "view", "export"),
     ("study", "testing"),
     ("cli",),
 )
