@@ -119,12 +119,12 @@ def _draw_histogram(axis: Axes, values: FloatArray, figure: str) -> None:
     finish_axis(axis, legend=True)
 
 
-def _bins(values: FloatArray) -> FloatArray | int:
+def _bins(values: FloatArray) -> list[float] | int:
     """Return the edges of bins: one for each of a few whole numbers, else evenly spaced."""
     low, high = float(values.min()), float(values.max())
     if np.all(values == np.round(values)) and high - low < _MOST_BINS:
-        return np.arange(low - 0.5, high + 1.0)
-    edges = np.histogram_bin_edges(values, "auto") if high > low else np.empty(0)
+        return [float(one) for one in np.arange(low - 0.5, high + 1.0)]
+    edges = [float(one) for one in np.histogram_bin_edges(values, "auto")]
     return edges if len(edges) <= _MOST_BINS + 1 else _MOST_BINS
 
 

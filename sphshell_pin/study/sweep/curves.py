@@ -140,7 +140,8 @@ def _measure(built: Built, result: Result, name: str, times: FloatArray) -> Floa
     t = np.asarray(result.t, dtype=float)
     # The last row may miss the end of the grid by the rounding of its steps.
     ends = np.isclose(times, t[-1], rtol=1e-9, atol=0.0)
-    return np.interp(np.where(ends, t[-1], times), t, values, left=np.nan, right=np.nan)
+    at = np.where(ends, t[-1], times)
+    return np.asarray(np.interp(at, t, values, left=np.nan, right=np.nan))
 
 
 def _coordinates(built: Built) -> dict[str, tuple[str, int]]:

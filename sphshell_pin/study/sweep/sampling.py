@@ -141,9 +141,8 @@ def _check(sample: str | None, n: int | None, seed: int, indices: bool, tornado:
         raise InvalidParameter(
             "n", None, f"with sample = {sample}: the number of points", "must be given"
         )
-    for name, value, least in (("n", n, 2), ("seed", seed, 0)):
-        whole = isinstance(value, int) and not isinstance(value, bool)
-        if not (name == "n" and value is None) and not (whole and value >= least):
+    for name, value, least in (("n", 2 if n is None else n, 2), ("seed", seed, 0)):
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
             raise InvalidParameter(name, value, f"must be a whole number, {least} or more")
     if indices and sample != "sobol":
         raise InvalidParameter("indices", True, "the points of a sequence: sample = sobol", "need")

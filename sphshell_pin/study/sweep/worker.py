@@ -136,8 +136,9 @@ def _try_run(job: Job, run: Run) -> Outcome:
     if stopped is not None:
         return Outcome(run.number, FAILED, _sentence(stopped, path), {})
     status, error, figures = _measure(job, built, result)
-    recorded = job.curves is not None and run.recorded and status == DONE
-    curves = job.curves.of(built, result) if recorded else b""
+    curves = b""
+    if job.curves is not None and run.recorded and status == DONE:
+        curves = job.curves.of(built, result)
     return Outcome(run.number, status, error, figures, curves=curves)
 
 
