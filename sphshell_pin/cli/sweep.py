@@ -54,14 +54,14 @@ def sweep(
         list[str] | None,
         typer.Option(
             metavar="'KEY=DISTRIBUTION'",
-            help="An uncertain input: normal(mean,deviation), uniform(low,high) or "
-            "lognormal(median,factor): 68 % from median / factor to median * factor.",
+            help="An uncertain input: normal(mean, deviation), uniform(low, high) or "
+            "lognormal(median, factor): 68 % from median / factor to median * factor.",
         ),
     ] = None,
     sample: Annotated[
         str | None,
         typer.Option(
-            metavar="sobol|lhs", help="Draw points of all inputs: Sobol sequence, Latin hypercube."
+            metavar="KIND", help="Points: sobol (a Sobol sequence) or lhs (a Latin hypercube)."
         ),
     ] = None,
     n: Annotated[
