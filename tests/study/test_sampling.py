@@ -181,6 +181,18 @@ def test_what_no_run_can_have_is_told_beforehand(scenario, dist, kind, words):
         plan_sweep(scenario, dist=dist, sample="lhs", n=64)
 
 
+def test_whole_numbers_have_no_distribution(tmp_path):
+    path = write(tmp_path)
+    friction = 'friction = { type = "mindlin", mu_static = 0.3, mu_dynamic = 0.2, young = 1e9, '
+    text = path.read_text().replace(
+        'shell = "plate"', f'shell = "plate"\n{friction}poisson = 0.3, rings = 2 }}'
+    )
+    path.write_text(text)
+    words = r"8 points of 8 .* valid integer.*give whole numbers by vary"
+    with pytest.raises(InvalidParameter, match=words):
+        plan_sweep(path, dist={"contact.friction.rings": "uniform(1,3)"}, sample="lhs", n=8)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

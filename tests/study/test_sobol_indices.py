@@ -67,8 +67,8 @@ def test_intervals_cover_95_percent_where_the_points_are_random():
         values = ishigami(np.stack([a, b, *swaps], axis=1).reshape(-1, 3))
         found = sobol_indices(table_of(design, values), "f")
         hits.append([covers(found, "first", FIRST), covers(found, "total", TOTAL)])
-    # 1800 intervals; those of a table are not independent of each other: 0.95 +- 4 * 0.0126.
-    assert 0.90 < np.mean(hits) < 1.0
+    # 1800 intervals; if those of a table all hit or missed together: 0.95 +- 2.4 * 0.0126.
+    assert 0.92 < np.mean(hits) < 0.98
 
 
 def test_a_constant_figure_has_no_indices():

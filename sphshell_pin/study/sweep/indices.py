@@ -94,7 +94,7 @@ def sobol_indices(
     the total index adds all that it causes together with others. Estimators: Saltelli et al.
     (2010) and Jansen (1999) [scipy.stats.sobol_indices]; intervals: percentiles of a bootstrap
     over the points. They take the points for independent: those of a Sobol sequence are more
-    evenly spread, so that the intervals rather cover too much.
+    evenly spread, so that the intervals are usually wider than need be.
 
     Parameters
     ----------

@@ -218,12 +218,17 @@ def _check_runs(
             digests.append(digest_settings(one))
             names |= files_of(one)
     if faults:
+        advice = (
+            "take a distribution that does not reach it: lognormal(median,factor) is positive, "
+            "uniform(low,high) has two ends"
+        )
+        if _is_whole(scenario, faults[0].key, path):
+            advice = "give whole numbers by vary, a distribution has others"
         raise InvalidParameter(
             "dist",
             len(faults),
-            f"points of {len(runs)} have a value that is not allowed; the first: {faults[0]}; take "
-            "a distribution that does not reach it: lognormal(median,factor) is positive, "
-            "uniform(low,high) has two ends",
+            f"points of {len(runs)} have a value that is not allowed; the first: {faults[0]}; "
+            f"{advice}",
             f"does not fit: {len(faults)}",
         )
     return digests, names
@@ -247,6 +252,14 @@ def _check_keys(axes: Iterable[Axis], changes: Mapping[str, str], path: Path, wo
             raise InvalidParameter(word, key, f"is given twice: {more}")
         if whole in map(full_name, changes):
             raise InvalidParameter(word, key, "is set as well: leave one of the two out")
+
+
+def _is_whole(scenario: Scenario, key: str, path: Path) -> bool:
+    try:
+        value = look_up(scenario, key, path).value
+    except ScenarioError:
+        return False
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _unit(scenario: Scenario, key: str, path: Path) -> str:
