@@ -28,6 +28,8 @@ HEAVY = (
     "tornado",
     "zmq",
     "OCP",
+    "mcap",
+    "pyarrow",
 )
 
 
@@ -114,7 +116,7 @@ LAYERS = (
     ("patches",),
     ("sphshell_pin",),  # its public names are those of the folders above
     ("scenario",),
-    ("plot", "view"),
+    ("plot", "view", "export"),
     ("study", "testing"),
     ("cli",),
 )
