@@ -104,7 +104,7 @@ kills: $(VENV)/.test ## kill runs at every system call and at random times, fill
 sweep-survival: $(VENV)/.test ## 500 runs five ways, workers killed and the sweep resumed: same bytes
 	$(BIN)/python -m tests.study.sweep_survival
 
-sampling-survival: $(VENV)/.test ## 4096 sampled runs and Ishigami's indices, killed and resumed
+sampling-survival: $(VENV)/.test ## 4096 sampled runs, Ishigami's indices, killed and resumed: 10 minutes
 	$(BIN)/python -m tests.study.sampling_survival
 
 sanitize: $(VENV)/.test ## run tests with checks of memory, undefined behavior and data races
