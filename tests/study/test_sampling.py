@@ -358,3 +358,14 @@ def test_failed_runs_are_left_out_of_quantiles_and_refused_by_indices(scenario):
         "Sobol indices of the others would be wrong",
     ):
         sobol_indices(table, "figures.depth")
+
+
+def test_curves_are_read_back_from_hdf5(scenario):
+    h5py = pytest.importorskip("h5py")
+    plan = plan_sweep(scenario, **SOBOL, n=2, bands=[DEPTH])
+    report = run_plan(plan, workers=0, out=scenario.parent / "curves.h5")
+    with h5py.File(report.curves_out) as file:
+        rows = file["sweep"][()]
+    for name in report.curves.columns:
+        np.testing.assert_array_equal(rows[name], report.curves[name])
+    assert len(rows) == 2 * 11
