@@ -24,6 +24,7 @@ HEAVY = (
     "typer",
     "rich",
     "pandas",
+    "scipy",
     "tornado",
     "zmq",
     "OCP",
