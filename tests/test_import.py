@@ -27,6 +27,8 @@ HEAVY = (
     "tornado",
     "zmq",
     "OCP",
+    "crocoddyl",
+    "casadi",
 )
 
 
@@ -110,6 +112,7 @@ LAYERS = (
     ("shell",),
     ("contact",),
     ("dynamics",),
+    ("adapters",),
     ("patches",),
     ("sphshell_pin",),  # its public names are those of the folders above
     ("scenario",),

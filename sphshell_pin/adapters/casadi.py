@@ -9,7 +9,7 @@ Keep the object (here `f`) as long as an expression or a solver uses it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.adapters.evaluator import check_without_history
-from sphshell_pin.checks import check_names, check_type
+from sphshell_pin.checks import check_type
 from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.errors import MissingExtra
 

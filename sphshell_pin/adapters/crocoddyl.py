@@ -125,8 +125,8 @@ class _DynamicsData(crocoddyl.DifferentialActionDataAbstract):
         # These share the memory that Crocoddyl reads and writes.
         self.acceleration, self.tau = self.xout, self.actuation.tau
         full = model._full
-        self.by_state = self.Fx if full else np.zeros((nv, 2 * nv), order="F")
-        self.by_tau = self.Fu if full else np.zeros((nv, nv), order="F")
+        self.by_state = _matrix(self.Fx if full else np.zeros((nv, 2 * nv), order="F"), nv)
+        self.by_tau = _matrix(self.Fu if full else np.zeros((nv, nv), order="F"), nv)
         self.forces = np.zeros((pairs, 4))
         self.forces_by_state = np.zeros((pairs, 4, 2 * nv))
         self.no_torque, self.unused = np.zeros(nv), np.zeros(nv)
@@ -194,7 +194,7 @@ class _ForceData(crocoddyl.ResidualDataAbstract):
     ) -> None:
         super().__init__(model, collector)
         self.model = model
-        self.residual, self.by_state = self.r, self.Rx
+        self.residual, self.by_state = self.r, _matrix(self.Rx, model.nr)
 
     def follow(self, data: _DynamicsData) -> None:
         """Read the forces of a node."""
@@ -260,9 +260,8 @@ class FrameResidual(crocoddyl.ResidualModelAbstract):
     def calcDiff(self, data: _FrameData, x: Array, u: Array | None = None) -> None:
         """Compute its derivatives."""
         frame = pin.ReferenceFrame.LOCAL if self.nr == 6 else pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        jacobian = pin.computeFrameJacobian(
-            self._model, data.pinocchio, data.q, self.frame, frame
-        )
+        found = pin.computeFrameJacobian(self._model, data.pinocchio, data.q, self.frame, frame)
+        jacobian = _matrix(found, 6)
         data.by_q[:] = pin.Jlog6(data.error) @ jacobian if self.nr == 6 else jacobian[:3]
 
 
@@ -272,9 +271,15 @@ class _FrameData(crocoddyl.ResidualDataAbstract):
     def __init__(self, model: FrameResidual, collector: crocoddyl.DataCollectorAbstract) -> None:
         super().__init__(model, collector)
         self.pinocchio = model._model.createData()
-        self.residual, self.by_q = self.r, self.Rx[:, : model.state.nv]
+        self.residual = self.r
+        self.by_q = _matrix(self.Rx, model.nr)[:, : model.state.nv]
         self.q = model.scene.neutral
         self.error = pin.SE3.Identity()
+
+
+def _matrix(array: Array, rows: int) -> Array:
+    """Return a view of a matrix with `rows`; of one row or column, bindings make it flat."""
+    return array.reshape((rows, -1), order="F")
 
 
 def _check_state(scene: Scene, state: crocoddyl.StateMultibody) -> None:
@@ -289,17 +294,16 @@ def _check_state(scene: Scene, state: crocoddyl.StateMultibody) -> None:
 def _check_costs(scene: Scene, costs: crocoddyl.CostModelSum) -> None:
     for name, item in costs.costs.todict().items():
         residual = item.cost.residual
-        kind = type(residual)
+        kind, where = type(residual), f"costs['{name}']"
         if isinstance(residual, ContactForceResidual) and residual.scene is not scene:
-            raise InvalidParameter(
-                "costs", costs, f"must have forces of the model's own scene, '{name}' has another"
-            )
+            raise InvalidParameter(where, kind.__name__, "must be of the same scene")
         safe = kind.__name__ in ("ResidualModelState", "ResidualModelControl")
         if kind.__module__.split(".")[0] == "crocoddyl" and not safe:
+            # Its own text would read the model.
             raise InvalidParameter(
-                "costs",
-                costs,
-                f"must not have {kind.__name__} ('{name}'): Crocoddyl's wheels are built for "
-                "Pinocchio 4.0 and misread the models of 4.1; take a FrameResidual or a residual "
-                "of your own",
+                where,
+                kind.__name__,
+                "must not be used: Crocoddyl's wheels are built for Pinocchio 4.0 and misread the "
+                "models of 4.1; take a FrameResidual of sphshell_pin.adapters.crocoddyl, or a "
+                "residual of your own",
             )

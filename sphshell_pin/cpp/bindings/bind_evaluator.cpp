@@ -8,7 +8,8 @@
 
 #include <nanobind/eigen/dense.h>
 
-namespace sphshell {
+// Names of its own, as files may be compiled together.
+namespace sphshell::evaluator {
 namespace {
 
 using Out = Eigen::Ref<VectorX>;
@@ -84,10 +85,10 @@ void differentiate_into(Evaluations& self, const VectorX& q, const VectorX& v, c
 }
 
 }  // namespace
-}  // namespace sphshell
+}  // namespace sphshell::evaluator
 
 void bind_evaluator(nanobind::module_& m) {
-  using namespace sphshell;
+  using namespace sphshell::evaluator;
   m.def("evaluate_into", &evaluate_into, nb::arg("scene"), nb::arg("q"), nb::arg("v"),
         nb::arg("tau"), nb::arg("acceleration").noconvert(), nb::arg("forces").noconvert());
   m.def("differentiate_into", &differentiate_into, nb::arg("scene"), nb::arg("q"), nb::arg("v"),
