@@ -164,9 +164,8 @@ def main() -> None:
             plan = solve_rigid(names, rigid, Path(folder))
             rows += [("rigid contact", scene, plan)]
             rows += [("rigid contact, replayed without friction", smooth, plan)]
-        print(
-            "| model | iterations | CPU time | torques: force, place | with gains: force, place |"
-        )
+        print("| contact | iterations | CPU time | force | place | force, gains | place, gains |")
+        print("|---|---|---|---|---|---|---|")
         for title, replayed_in, plan in rows:
             print(
                 f"| {title} | {plan['iterations']} | {plan['seconds']:.2f} s "

@@ -1,9 +1,9 @@
 # %% [markdown]
 """A Panda draws a circle on a propeller blade with 5 N, by torques that an optimizer finds.
 
-Differential dynamic programming, Crocoddyl's, finds joint torques of the scene that the scenario
-`fingertip_on_blade` simulates: a CAD surface, a rubber-like tip, friction. It gets the derivatives of
-motion and contact force from the scene. The torques are then replayed in a simulation.
+Differential dynamic programming, Crocoddyl's, finds the joint torques. The scene is that of the
+scenario `fingertip_on_blade`: a CAD surface, a rubber-like tip, friction; it gives the optimizer
+the derivatives of motion and contact force. The torques are then replayed in simulations.
 """
 
 # %%

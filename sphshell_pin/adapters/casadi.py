@@ -44,8 +44,7 @@ class _SceneFunction(casadi.Callback):
     """A function of q, v and tau (nv,) each.
 
     CasADi knows no manifolds. Its q is the displacement from `q0` (nq,) in the tangent space:
-    Pinocchio's is pinocchio.integrate(model, q0, q). Where each joint is prismatic, or revolute with
-    one coordinate, and q0 is neutral (the default), the two are equal.
+    Pinocchio's is pinocchio.integrate(model, q0, q).
     """
 
     _outputs: tuple[str, ...]

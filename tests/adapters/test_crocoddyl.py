@@ -34,9 +34,7 @@ def plate(bend: float = 0.0) -> sp.Shell:
     return sp.Shell(points, quads)
 
 
-def arm_on_moving_plate(
-    friction: sp.CoulombFriction | None = SLIDING,
-) -> tuple[sp.Scene, np.ndarray]:
+def arm_on_moving_plate() -> tuple[sp.Scene, np.ndarray]:
     """Return an arm whose tip touches a plate that slides and turns, and a state."""
     model = pin.Model()
     parent = 0
@@ -62,7 +60,7 @@ def arm_on_moving_plate(
         "plate",
         pin.SE3(tilt, tip_in_plate - tilt @ [0.02, 0.01, 0.0213]),
         law=LAW,
-        friction=friction,
+        friction=SLIDING,
         name="touch",
     )
     assert 5e-5 < scene.contacts(q).depth.max() < 1e-3
@@ -297,7 +295,7 @@ def test_wrong_arguments_get_a_sentence():
     costs = crocoddyl.CostModelSum(state)
     with pytest.raises(InvalidParameter, match=r"crocoddyl.StateMultibody\(scene.model\)"):
         ContactDynamics(other, state, actuation, costs)
-    with pytest.raises(InvalidParameter, match="must be a sphshell_pin.Scene"):
+    with pytest.raises(InvalidParameter, match=r"must be a sphshell_pin\.Scene"):
         ContactDynamics(scene.model, state, actuation, costs)
     with pytest.raises(NameNotFound, match="touch"):
         ContactForceResidual(scene, state, "tuch", 1.0)
@@ -318,7 +316,7 @@ def test_a_force_of_another_scene_is_refused():
     costs = crocoddyl.CostModelSum(state)
     force = ContactForceResidual(other, state, "touch", 1.0)
     costs.addCost("force", crocoddyl.CostModelResidual(state, force), 1.0)
-    with pytest.raises(InvalidParameter, match="'force'.*same scene"):
+    with pytest.raises(InvalidParameter, match=r"'force'.*same scene"):
         ContactDynamics(scene, state, crocoddyl.ActuationModelFull(state), costs)
 
 
