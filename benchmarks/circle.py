@@ -33,8 +33,6 @@ Names = dict[str, Any]
 
 def solve(names: Names) -> dict[str, Any]:
     """Solve the example's problem again, and measure where the time goes."""
-    import crocoddyl
-
     from sphshell_pin.adapters import crocoddyl as adapter
 
     core = Clock()
@@ -43,11 +41,11 @@ def solve(names: Names) -> dict[str, Any]:
     methods = [(evaluator, "calc", core), (evaluator, "calc_diff", core)]
     for kind in (adapter.ContactDynamics, adapter.ContactForceResidual, adapter.FrameResidual):
         methods += [(kind, "calc", everything), (kind, "calcDiff", everything)]
-    plain = run(names, crocoddyl)
+    plain = run(names)
     kept = [(owner, name, getattr(owner, name)) for owner, name, _ in methods]
     for owner, name, clock in methods:
         setattr(owner, name, clock.timed(getattr(owner, name)))
-    timed = run(names, crocoddyl)
+    timed = run(names)
     for owner, name, method in kept:
         setattr(owner, name, method)
     models = everything.seconds / timed["seconds"]
@@ -59,9 +57,27 @@ def solve(names: Names) -> dict[str, Any]:
     return plain
 
 
-def run(names: Names, crocoddyl: Any) -> dict[str, Any]:
+def with_euler(folder: Path) -> Names:
+    """Run the example with semi-implicit Euler steps of 1 ms."""
+    text = EXAMPLE.read_text(encoding="utf-8")
+    for old, new in (
+        (
+            "IntegratedActionModelRK(dynamics, crocoddyl.RKType.four, dt)",
+            "IntegratedActionModelEuler(dynamics, dt)",
+        ),
+        ("sp.RungeKutta4(dt)", "sp.SemiImplicitEuler(dt)"),
+        ("dt, duration = 2e-3", "dt, duration = 1e-3"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    script = folder / "euler.py"
+    script.write_text(text, encoding="utf-8")
+    return runpy.run_path(str(script))
+
+
+def run(names: Names) -> dict[str, Any]:
     """Solve from the first guess."""
-    solver = crocoddyl.SolverFDDP(names["problem"])
+    solver = type(names["solver"])(names["problem"])
     solver.th_stop = names["solver"].th_stop
     begun = time.process_time()
     solver.solve(names["guess"], names["weights"][:-1], 100)
@@ -157,20 +173,24 @@ def main() -> None:
         os.chdir(folder)
         names = runpy.run_path(str(EXAMPLE))
         scene = names["scene"]
+        euler = with_euler(Path(folder))
         smooth = copy(scene)
         smooth.replace_pair("tip-blade", friction=None)
-        rows = [("this package", scene, solve(names))]
+        rows = [
+            ("this package", names, scene, solve(names)),
+            ("this package, Euler, 1 ms", euler, euler["scene"], run(euler)),
+        ]
         if rigid:
             plan = solve_rigid(names, rigid, Path(folder))
-            rows += [("rigid contact", scene, plan)]
-            rows += [("rigid contact, replayed without friction", smooth, plan)]
+            rows += [("rigid", names, scene, plan)]
+            rows += [("rigid, replayed without friction", names, smooth, plan)]
         print("| contact | iterations | CPU time | force | place | force, gains | place, gains |")
         print("|---|---|---|---|---|---|---|")
-        for title, replayed_in, plan in rows:
+        for title, used, replayed_in, plan in rows:
             print(
                 f"| {title} | {plan['iterations']} | {plan['seconds']:.2f} s "
-                f"| {replay(names, replayed_in, plan, False)} "
-                f"| {replay(names, replayed_in, plan, True)} |"
+                f"| {replay(used, replayed_in, plan, False)} "
+                f"| {replay(used, replayed_in, plan, True)} |"
             )
 
 

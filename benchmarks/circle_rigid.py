@@ -62,7 +62,7 @@ def main(problem_file: str, solution_file: str) -> None:
             add("force", 1e2, reference)
             add("torques", 1e-3, crocoddyl.ResidualModelControl(state, p["weights"][k]))
         placement = pin.SE3(p["hand"], center)
-        add("hand", 1e4, crocoddyl.ResidualModelFramePlacement(state, hand, placement, 7))
+        add("hand", 1e5, crocoddyl.ResidualModelFramePlacement(state, hand, placement, 7))
         add("state", 1.0, crocoddyl.ResidualModelState(state, p["guess"][k], 7), smooth)
         dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(
             state, actuation, contacts, costs, 0.0, True

@@ -90,7 +90,7 @@ def node(k):
         costs.addCost(name, crocoddyl.CostModelResidual(*parts), weight)
 
     add("force", 1e2, ContactForceResidual(scene, state, pair.name, force))
-    add("hand", 1e4, FrameResidual(scene, state, pair.frame_i, placements[k]))
+    add("hand", 1e5, FrameResidual(scene, state, pair.frame_i, placements[k]))
     add("state", 1.0, crocoddyl.ResidualModelState(state, guess[k]), smooth)
     if k < steps:
         add("torques", 1e-3, crocoddyl.ResidualModelControl(state, weights[k]))
@@ -103,9 +103,8 @@ def node(k):
 problem = crocoddyl.ShootingProblem(guess[0], [node(k) for k in range(steps)], node(steps))
 solver = crocoddyl.SolverFDDP(problem)
 solver.th_stop = 1e-6
-converged = solver.solve(guess, weights[:-1], 20)
-torques = np.array(solver.us)
-planned = np.array(solver.xs)
+converged = solver.solve(guess, weights[:-1], 50)
+torques, planned = np.array(solver.us), np.array(solver.xs)
 print(f"{'converged' if converged else 'stopped'} after {solver.iter} iterations")
 
 # %% [markdown]
@@ -142,27 +141,16 @@ for kind, result in replays.items():
 
 # %%
 replay = replays["adaptive"]
-places = np.array([pin.SE3(placement).translation for placement in placements])
-drawn = np.full((len(replay.t), 3), np.nan)
-drawn[replay.contacts.row] = replay.contacts.point_world
-tangent = world_from_blade.rotation @ np.column_stack((along, np.cross(normal, along)))
-center = world_from_blade.act(middle.points[0])
+across = np.cross(normal, along)
+axes = world_from_blade.rotation @ np.column_stack((along, across))
+origin = world_from_blade.act(middle.points[0])
+wanted = touched.points @ world_from_blade.rotation.T + world_from_blade.translation
 figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained")
-left.plot(
-    *(
-        1e3
-        * (
-            world_from_blade.rotation @ touched.points.T
-            + world_from_blade.translation[:, None]
-            - center[:, None]
-        ).T
-        @ tangent
-    ).T,
-    lw=4,
-    alpha=0.3,
-    label="wanted",
-)
-left.plot(*(1e3 * (drawn - center) @ tangent).T, "k", lw=1, label="drawn")
+for points, style in (
+    (wanted, {"lw": 5, "alpha": 0.3, "label": "wanted"}),
+    (replay.contacts.point_world, {"color": "k", "lw": 1, "label": "drawn"}),
+):
+    left.plot(*(1e3 * (points - origin) @ axes).T, **style)
 left.set(aspect="equal", xlabel="along the blade [mm]", ylabel="across [mm]")
 left.legend(loc="center")
 right.axhspan(0.99 * force, 1.01 * force, alpha=0.2, label="1 % of 5 N")

@@ -20,7 +20,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from sphshell_pin.adapters.evaluator import Evaluator, check_without_history
+from sphshell_pin.adapters.evaluator import FORCES, Evaluator, check_without_history
 from sphshell_pin.checks import check_type, check_vector
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.models import find_frame
@@ -127,8 +127,8 @@ class _DynamicsData(crocoddyl.DifferentialActionDataAbstract):
         full = model._full
         self.by_state = _matrix(self.Fx if full else np.zeros((nv, 2 * nv), order="F"), nv)
         self.by_tau = _matrix(self.Fu if full else np.zeros((nv, nv), order="F"), nv)
-        self.forces = np.zeros((pairs, 4))
-        self.forces_by_state = np.zeros((pairs, 4, 2 * nv))
+        self.forces = np.zeros((FORCES * pairs, 1))
+        self.forces_by_state = np.zeros((FORCES * pairs, 2 * nv))
         self.no_torque, self.unused = np.zeros(nv), np.zeros(nv)
         for cost in self.costs.costs.todict().values():
             if isinstance(cost.residual, _ForceData):
@@ -162,7 +162,6 @@ class ContactForceResidual(crocoddyl.ResidualModelAbstract):
         super().__init__(state, size, state.nv if nu is None else nu, True, True, False)
         self.scene = scene
         self.pair = scene.pair(pair).name
-        self._columns = slice(0, 1) if size == 1 else slice(1, 4)
 
     @property
     def reference(self) -> Array:
@@ -198,9 +197,10 @@ class _ForceData(crocoddyl.ResidualDataAbstract):
 
     def follow(self, data: _DynamicsData) -> None:
         """Read the forces of a node."""
-        row = [pair.name for pair in self.model.scene.pairs].index(self.model.pair)
-        self.force = data.forces[row, self.model._columns]
-        self.force_by_state = data.forces_by_state[row, self.model._columns]
+        names = [pair.name for pair in self.model.scene.pairs]
+        first = FORCES * names.index(self.model.pair)
+        rows = slice(first, first + 1) if self.model.nr == 1 else slice(first + 1, first + FORCES)
+        self.force, self.force_by_state = data.forces[rows, 0], data.forces_by_state[rows]
 
 
 class FrameResidual(crocoddyl.ResidualModelAbstract):

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin import _core
 from sphshell_pin.checks import check_type
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.errors import InvalidParameter
 
 Array = NDArray[np.float64]
+
+FORCES = 4
+"""Numbers of a pair: its normal force [N], and its force on the sphere in the world [N]."""
 
 
 def check_without_history(scene: Scene, without_history: bool) -> None:
@@ -31,44 +34,20 @@ def check_without_history(scene: Scene, without_history: bool) -> None:
 
 
 class Evaluator:
-    """Evaluates a scene into arrays that its user owns.
+    """Evaluates a scene into arrays of its user, without checking them.
 
-    Forces are one row per pair: the sum of `normal_force` over the pair's contacts [N], and the
-    three components of the sum of `force_world` [N].
+    The forces of a pair are sums over its contacts. Bristles are unstretched.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._data = scene.model.createData()
-        self._none = np.zeros(scene.core.bristle_size)
+        self._core = scene.core
 
     def calc(self, q: Array, v: Array, tau: Array, acceleration: Array, forces: Array) -> None:
-        """Fill acceleration (nv,) and forces (pairs, 4)."""
-        acceleration[:] = self._scene.core.rates(q, v, self._none, tau)[: len(v)]
-        forces[:] = self._forces(q, v)
+        """Fill acceleration (nv,) and forces (FORCES pairs, 1)."""
+        _core.evaluate_into(self._core, q, v, tau, acceleration, forces)
 
     def calc_diff(
         self, q: Array, v: Array, tau: Array, by_state: Array, by_tau: Array, forces_by_state: Array
     ) -> None:
-        """Fill by_state (nv, 2 nv), by_tau (nv, nv) and forces_by_state (pairs, 4, 2 nv)."""
-        nv = len(v)
-        by_state[:] = self._scene.core.rate_jacobian(q, v, self._none, tau)[:nv, : 2 * nv]
-        by_tau[:] = pin.computeMinverse(self._scene.model, self._data, q)
-        forces_by_state[:] = 0.0
-        if not len(self._scene.contacts(q, v)):
-            return
-        step = 1e-7
-        for k, e in enumerate(step * np.eye(nv)):
-            ends = (
-                [self._forces(pin.integrate(self._scene.model, q, s * e), v) for s in (1, -1)],
-                [self._forces(q, v + s * 1e2 * e) for s in (1, -1)],
-            )
-            forces_by_state[:, :, k] = (ends[0][0] - ends[0][1]) / (2 * step)
-            forces_by_state[:, :, nv + k] = (ends[1][0] - ends[1][1]) / (2e2 * step)
-
-    def _forces(self, q: Array, v: Array) -> Array:
-        contacts = self._scene.contacts(q, v)
-        out = np.zeros((len(self._scene.pairs), 4))
-        np.add.at(out[:, 0], contacts.pair, contacts.normal_force)
-        np.add.at(out[:, 1:], contacts.pair, contacts.force_world)
-        return out
+        """Fill by_state (nv, 2 nv), by_tau (nv, nv), forces_by_state (FORCES pairs, 2 nv)."""
+        _core.differentiate_into(self._core, q, v, tau, by_state, by_tau, forces_by_state)

@@ -88,6 +88,7 @@ void differentiate_into(Evaluations& self, const VectorX& q, const VectorX& v, c
 }  // namespace sphshell::evaluator
 
 void bind_evaluator(nanobind::module_& m) {
+  using namespace sphshell;
   using namespace sphshell::evaluator;
   m.def("evaluate_into", &evaluate_into, nb::arg("scene"), nb::arg("q"), nb::arg("v"),
         nb::arg("tau"), nb::arg("acceleration").noconvert(), nb::arg("forces").noconvert());
