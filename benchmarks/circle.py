@@ -37,9 +37,9 @@ def solve(names: Names) -> dict[str, Any]:
 
     core = Clock()
     everything = Clock()
-    evaluator = adapter.Evaluator
+    evaluator = adapter.StepEvaluator
     methods = [(evaluator, "calc", core), (evaluator, "calc_diff", core)]
-    for kind in (adapter.ContactDynamics, adapter.ContactForceResidual, adapter.FrameResidual):
+    for kind in (adapter.ContactStep, adapter.ContactForceResidual, adapter.FrameResidual):
         methods += [(kind, "calc", everything), (kind, "calcDiff", everything)]
     plain = run(names)
     kept = [(owner, name, getattr(owner, name)) for owner, name, _ in methods]
@@ -61,10 +61,6 @@ def with_euler(folder: Path) -> Names:
     """Run the example with semi-implicit Euler steps of 1 ms."""
     text = EXAMPLE.read_text(encoding="utf-8")
     for old, new in (
-        (
-            "IntegratedActionModelRK(dynamics, crocoddyl.RKType.four, dt)",
-            "IntegratedActionModelEuler(dynamics, dt)",
-        ),
         ("sp.RungeKutta4(dt)", "sp.SemiImplicitEuler(dt)"),
         ("dt, duration = 2e-3", "dt, duration = 1e-3"),
     ):

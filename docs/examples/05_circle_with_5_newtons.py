@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.adapters.crocoddyl import ContactDynamics, ContactForceResidual, FrameResidual
+from sphshell_pin.adapters.crocoddyl import ContactForceResidual, ContactStep, FrameResidual
 from sphshell_pin.scenario import build
 
 built = build("fingertip_on_blade")
@@ -72,10 +72,11 @@ guess = [np.concatenate(state) for state in zip(qs, vs, strict=True)]
 weights = [pin.computeGeneralizedGravity(model, data, q) for q in qs]
 
 # %% [markdown]
-# One node of the problem for each step, integrated with the Runge-Kutta method of order 4. The
+# One node of the problem for each step of a simulation, by the Runge-Kutta method of order 4. The
 # costs: 5 N, the hand's placement, and a little for speed and torques.
 
 # %%
+simulation = sp.Simulation(scene, sp.RungeKutta4(dt))
 state = crocoddyl.StateMultibody(model)
 actuation = crocoddyl.ActuationModelFull(state)
 smooth = crocoddyl.ActivationModelWeightedQuad(np.repeat([1e-3, 1.0], model.nv))
@@ -94,10 +95,7 @@ def node(k):
     add("state", 1.0, crocoddyl.ResidualModelState(state, guess[k]), smooth)
     if k < steps:
         add("torques", 1e-3, crocoddyl.ResidualModelControl(state, weights[k]))
-    dynamics = ContactDynamics(scene, state, actuation, costs)
-    if k == steps:
-        return crocoddyl.IntegratedActionModelEuler(dynamics, 0.0)
-    return crocoddyl.IntegratedActionModelRK(dynamics, crocoddyl.RKType.four, dt)
+    return ContactStep(simulation, state, actuation, costs)
 
 
 problem = crocoddyl.ShootingProblem(guess[0], [node(k) for k in range(steps)], node(steps))
@@ -108,8 +106,8 @@ torques, planned = np.array(solver.us), np.array(solver.xs)
 print(f"{'converged' if converged else 'stopped'} after {solver.iter} iterations")
 
 # %% [markdown]
-# The same torques in simulations: with the method of the optimizer, which makes the same steps, and
-# with steps as short as an error of 1e-8 demands.
+# The same torques in simulations: in that of the optimizer, and with steps as short as an error of
+# 1e-8 demands.
 
 
 # %%
@@ -124,8 +122,8 @@ def force_of(result):
 
 
 replays = {}
-for integrator in (sp.RungeKutta4(dt), sp.Adaptive(1e-8)):
-    replays[integrator.kind] = sp.Simulation(scene, integrator).run(
+for one in (simulation, sp.Simulation(scene, sp.Adaptive(1e-8))):
+    replays[one.integrator.kind] = one.run(
         planned[0, : model.nq],
         planned[0, model.nq :],
         duration,

@@ -86,7 +86,7 @@ class _SceneFunction(casadi.Callback):
             self._last = key, found
         return self._last[1]
 
-    def size_in(self, i: int) -> int:
+    def length_of(self, i: int) -> int:
         """Return the size of an input."""
         return len(self.parameters) if i == 3 else int(self._model.nv)
 
@@ -124,7 +124,7 @@ class _SceneFunction(casadi.Callback):
 
     def get_sparsity_in(self, i: int) -> casadi.Sparsity:
         """Return the size of an input."""
-        return casadi.Sparsity.dense(self.size_in(i), 1)
+        return casadi.Sparsity.dense(self.length_of(i), 1)
 
     def get_sparsity_out(self, i: int) -> casadi.Sparsity:
         """Return the size of an output."""
@@ -165,7 +165,7 @@ class _Jacobian(casadi.Callback):
         super().__init__()
         self._function = function
         self._inames, self._onames = list(inames), list(onames)
-        self._sizes = [function.size_in(i) for i in range(function.get_n_in())]
+        self._sizes = [function.length_of(i) for i in range(function.get_n_in())]
         self.construct(name, opts)
 
     def get_n_in(self) -> int:

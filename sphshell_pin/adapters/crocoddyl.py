@@ -5,10 +5,10 @@
     costs = crocoddyl.CostModelSum(state)
     force = ContactForceResidual(scene, state, "tip-blade", 5.0)
     costs.addCost("force", crocoddyl.CostModelResidual(state, force), 1.0)
-    dynamics = ContactDynamics(scene, state, actuation, costs)
-    model = crocoddyl.IntegratedActionModelEuler(dynamics, 1e-3)
+    model = ContactStep(Simulation(scene, RungeKutta4(1e-3)), state, actuation, costs)
 
-Such a model goes into crocoddyl.ShootingProblem like Crocoddyl's own.
+Such a model goes into crocoddyl.ShootingProblem like Crocoddyl's own. ContactDynamics is a scene
+without a time step, for Crocoddyl's integrators.
 """
 
 # Crocoddyl calls methods by these names.
@@ -20,9 +20,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from sphshell_pin.adapters.evaluator import FORCES, Evaluator, check_without_history
-from sphshell_pin.checks import check_type, check_vector
-from sphshell_pin.dynamics import Scene
+from sphshell_pin.adapters.evaluator import (
+    FORCES,
+    Evaluator,
+    StepEvaluator,
+    check_fixed_step,
+    check_without_history,
+)
+from sphshell_pin.checks import check_placement, check_type, check_vector
+from sphshell_pin.dynamics import Scene, Simulation
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import InvalidParameter, MissingExtra
 
@@ -33,7 +39,7 @@ except ModuleNotFoundError as missing:
         raise
     raise MissingExtra("crocoddyl", "crocoddyl", "sphshell_pin.adapters.crocoddyl") from missing
 
-__all__ = ["ContactDynamics", "ContactForceResidual", "FrameResidual"]
+__all__ = ["ContactDynamics", "ContactForceResidual", "ContactStep", "FrameResidual"]
 
 Array = NDArray[np.float64]
 
@@ -111,12 +117,101 @@ class ContactDynamics(crocoddyl.DifferentialActionModelAbstract):
         self.costs.calcDiff(data.costs, x, u)
 
 
-class _DynamicsData(crocoddyl.DifferentialActionDataAbstract):
+class ContactStep(crocoddyl.ActionModelAbstract):
+    """A step of a simulation under held torques, with Crocoddyl's costs: a node by itself.
+
+    It makes the steps of `simulation`, with any integrator of a fixed dt, such as
+    LinearlyImplicitEuler. The costs of a node are dt times those at its start, without controls
+    (as of a last node) those. The whole step is one call of the compiled core: it takes about half
+    the time of crocoddyl.IntegratedActionModelRK of a ContactDynamics.
+
+    Arguments, costs and errors as of ContactDynamics; InvalidParameter for an integrator with error
+    control, too.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        state: crocoddyl.StateMultibody,
+        actuation: crocoddyl.ActuationModelAbstract,
+        costs: crocoddyl.CostModelSum,
+        *,
+        without_history: bool = False,
+    ) -> None:
+        check_type("simulation", simulation, Simulation, "must be a sphshell_pin.Simulation")
+        self.scene = scene = simulation.scene
+        check_without_history(scene, without_history)
+        _check_state(scene, state)
+        _check_costs(scene, costs)
+        self.dt = check_fixed_step(simulation)
+        super().__init__(state, actuation.nu, costs.nr)
+        self.simulation = simulation
+        self.actuation = actuation
+        self.costs = costs
+        self._nq = scene.model.nq
+        self._full = isinstance(actuation, crocoddyl.ActuationModelFull)
+
+    def createData(self) -> _StepData:
+        """Return the memory of one node."""
+        return _StepData(self)
+
+    def calc(self, data: _StepData, x: Array, u: Array | None = None) -> None:
+        """Compute the next state, forces and costs; without u, as of a last node, it stays."""
+        q, v = x[: self._nq], x[self._nq :]
+        if u is None:
+            data.last.calc(q, v, data.no_torque, data.unused, data.forces)
+            data.following[:] = x
+            self.costs.calc(data.costs, x)
+            data.cost = data.costs.cost
+            return
+        if not self._full:
+            self.actuation.calc(data.actuation, x, u)
+        tau = u if self._full else data.tau
+        data.evaluator.calc(q, v, tau, data.following, data.forces)
+        self.costs.calc(data.costs, x, u)
+        data.cost = self.dt * data.costs.cost
+
+    def calcDiff(self, data: _StepData, x: Array, u: Array | None = None) -> None:
+        """Compute the derivatives of what `calc` has computed last."""
+        q, v = x[: self._nq], x[self._nq :]
+        if u is None:
+            data.last.calc_diff(q, v, data.no_torque, *data.last_slopes, data.forces_by_state)
+            self.costs.calcDiff(data.costs, x)
+            return
+        slopes = data.by_state, data.by_tau, data.forces_by_state
+        data.evaluator.calc_diff(q, v, u if self._full else data.tau, *slopes)
+        if not self._full:
+            self.actuation.calcDiff(data.actuation, x, u)
+            data.Fx[:] = data.by_state + data.by_tau @ data.actuation.dtau_dx
+            data.Fu[:] = data.by_tau @ data.actuation.dtau_du
+        self.costs.calcDiff(data.costs, x, u)
+        for slope in data.cost_slopes:
+            np.multiply(slope, self.dt, out=slope)
+
+
+class _Forces:
+    """Forces of a scene at one state, for the residuals of a cost."""
+
+    def __init__(self, scene: Scene, nv: int) -> None:
+        rows = FORCES * len(scene.pairs)
+        self.forces = np.zeros((rows, 1))
+        self.forces_by_state = np.zeros((rows, 2 * nv))
+        self.no_torque, self.unused = np.zeros(nv), np.zeros(nv)
+
+    def lead(self, costs: crocoddyl.CostDataSum) -> None:
+        """Let the residuals read these forces."""
+        for cost in costs.costs.todict().values():
+            if isinstance(cost.residual, _ForceData):
+                cost.residual.follow(self)
+
+
+class _DynamicsData(crocoddyl.DifferentialActionDataAbstract, _Forces):
     """The memory of one node of a ContactDynamics."""
 
     def __init__(self, model: ContactDynamics) -> None:
-        super().__init__(model)
-        nv, pairs = model.state.nv, len(model.scene.pairs)
+        crocoddyl.DifferentialActionDataAbstract.__init__(self, model)
+        nv = model.state.nv
+        _Forces.__init__(self, model.scene, nv)
         self.evaluator = Evaluator(model.scene)
         self.actuation = model.actuation.createData()
         self.collector = crocoddyl.DataCollectorActuation(self.actuation)
@@ -127,12 +222,29 @@ class _DynamicsData(crocoddyl.DifferentialActionDataAbstract):
         full = model._full
         self.by_state = _matrix(self.Fx if full else np.zeros((nv, 2 * nv), order="F"), nv)
         self.by_tau = _matrix(self.Fu if full else np.zeros((nv, nv), order="F"), nv)
-        self.forces = np.zeros((FORCES * pairs, 1))
-        self.forces_by_state = np.zeros((FORCES * pairs, 2 * nv))
-        self.no_torque, self.unused = np.zeros(nv), np.zeros(nv)
-        for cost in self.costs.costs.todict().values():
-            if isinstance(cost.residual, _ForceData):
-                cost.residual.follow(self)
+        self.lead(self.costs)
+
+
+class _StepData(crocoddyl.ActionDataAbstract, _Forces):
+    """The memory of one node of a ContactStep."""
+
+    def __init__(self, model: ContactStep) -> None:
+        crocoddyl.ActionDataAbstract.__init__(self, model)
+        nv = model.state.nv
+        _Forces.__init__(self, model.scene, nv)
+        self.evaluator, self.last = StepEvaluator(model.simulation), Evaluator(model.scene)
+        self.last_slopes = np.zeros((nv, 2 * nv), order="F"), np.zeros((nv, nv), order="F")
+        self.actuation = model.actuation.createData()
+        self.collector = crocoddyl.DataCollectorActuation(self.actuation)
+        self.costs = model.costs.createData(self.collector)
+        self.costs.shareMemory(self)
+        # These share the memory that Crocoddyl reads and writes.
+        self.following, self.tau = self.xnext, self.actuation.tau
+        full = model._full
+        self.by_state = _matrix(self.Fx if full else np.zeros((2 * nv, 2 * nv), order="F"), 2 * nv)
+        self.by_tau = _matrix(self.Fu if full else np.zeros((2 * nv, nv), order="F"), 2 * nv)
+        self.cost_slopes = self.Lx, self.Lu, self.Lxx, self.Lxu, self.Luu
+        self.lead(self.costs)
 
 
 class ContactForceResidual(crocoddyl.ResidualModelAbstract):
@@ -145,7 +257,7 @@ class ContactForceResidual(crocoddyl.ResidualModelAbstract):
 
     Where nothing touches, the force and its derivatives are zero: what is to find a contact needs a
     cost besides, such as a FrameResidual, that leads there. The residual works in the costs of a
-    ContactDynamics of the same scene.
+    ContactDynamics or ContactStep of the same scene.
     """
 
     def __init__(
@@ -195,7 +307,7 @@ class _ForceData(crocoddyl.ResidualDataAbstract):
         self.model = model
         self.residual, self.by_state = self.r, _matrix(self.Rx, model.nr)
 
-    def follow(self, data: _DynamicsData) -> None:
+    def follow(self, data: _Forces) -> None:
         """Read the forces of a node."""
         names = [pair.name for pair in self.model.scene.pairs]
         first = FORCES * names.index(self.model.pair)
@@ -236,11 +348,11 @@ class FrameResidual(crocoddyl.ResidualModelAbstract):
 
     @reference.setter
     def reference(self, reference: ArrayLike | pin.SE3) -> None:
-        if self.nr == 6:
-            check_type("reference", reference, pin.SE3, "must be a pinocchio.SE3, as before")
-            self._reference, self._inverse = pin.SE3(reference), reference.inverse()
-        else:
+        if self.nr == 3:
             self._reference = check_vector("reference", reference, 3, " [m]")
+            return
+        placement = check_placement("reference", reference)
+        self._reference, self._inverse = placement, placement.inverse()
 
     def createData(self, collector: crocoddyl.DataCollectorAbstract) -> _FrameData:
         """Return the memory of one node."""
@@ -248,8 +360,7 @@ class FrameResidual(crocoddyl.ResidualModelAbstract):
 
     def calc(self, data: _FrameData, x: Array, u: Array | None = None) -> None:
         """Compute the residual."""
-        data.q = x[: self._nq]
-        pin.forwardKinematics(self._model, data.pinocchio, data.q)
+        pin.forwardKinematics(self._model, data.pinocchio, x[: self._nq])
         placement = pin.updateFramePlacement(self._model, data.pinocchio, self.frame)
         if self.nr == 6:
             data.error = self._inverse * placement
@@ -260,7 +371,8 @@ class FrameResidual(crocoddyl.ResidualModelAbstract):
     def calcDiff(self, data: _FrameData, x: Array, u: Array | None = None) -> None:
         """Compute its derivatives."""
         frame = pin.ReferenceFrame.LOCAL if self.nr == 6 else pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        found = pin.computeFrameJacobian(self._model, data.pinocchio, data.q, self.frame, frame)
+        q = x[: self._nq]
+        found = pin.computeFrameJacobian(self._model, data.pinocchio, q, self.frame, frame)
         jacobian = _matrix(found, 6)
         data.by_q[:] = pin.Jlog6(data.error) @ jacobian if self.nr == 6 else jacobian[:3]
 
@@ -273,7 +385,6 @@ class _FrameData(crocoddyl.ResidualDataAbstract):
         self.pinocchio = model._model.createData()
         self.residual = self.r
         self.by_q = _matrix(self.Rx, model.nr)[:, : model.state.nv]
-        self.q = model.scene.neutral
         self.error = pin.SE3.Identity()
 
 

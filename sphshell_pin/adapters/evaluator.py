@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_type
-from sphshell_pin.dynamics import Scene
+from sphshell_pin.dynamics import Scene, Simulation
+from sphshell_pin.dynamics.advance import step_of
 from sphshell_pin.errors import InvalidParameter
 
 Array = NDArray[np.float64]
@@ -33,6 +34,18 @@ def check_without_history(scene: Scene, without_history: bool) -> None:
     )
 
 
+def check_fixed_step(simulation: Simulation) -> float:
+    """Return the dt of a simulation [s]; raise InvalidParameter for one with error control."""
+    if dt := step_of(simulation.integrator):
+        return dt
+    raise InvalidParameter(
+        "integrator",
+        simulation.integrator,
+        "must have a fixed step: SemiImplicitEuler(dt), RungeKutta4(dt) or "
+        "LinearlyImplicitEuler(dt)",
+    )
+
+
 class Evaluator:
     """Evaluates a scene into arrays of its user, without checking them.
 
@@ -51,3 +64,22 @@ class Evaluator:
     ) -> None:
         """Fill by_state (nv, 2 nv), by_tau (nv, nv), forces_by_state (FORCES pairs, 2 nv)."""
         _core.differentiate_into(self._core, q, v, tau, by_state, by_tau, forces_by_state)
+
+
+class StepEvaluator:
+    """The same of a fixed step of a simulation; forces are those where it begins."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._core = simulation.scene.core
+        self._step = simulation.integrator.kind, step_of(simulation.integrator)
+
+    def calc(self, q: Array, v: Array, tau: Array, following: Array, forces: Array) -> None:
+        """Fill following (nq + nv,) and forces (FORCES pairs, 1)."""
+        _core.step_into(self._core, *self._step, q, v, tau, following, forces)
+
+    def calc_diff(
+        self, q: Array, v: Array, tau: Array, by_state: Array, by_tau: Array, forces_by_state: Array
+    ) -> None:
+        """Fill by_state (2 nv, 2 nv), by_tau (2 nv, nv), forces_by_state (FORCES pairs, 2 nv)."""
+        slopes = by_state, by_tau, forces_by_state
+        _core.differentiate_step_into(self._core, *self._step, q, v, tau, *slopes)

@@ -17,6 +17,7 @@ crocoddyl = pytest.importorskip("crocoddyl")
 from sphshell_pin.adapters.crocoddyl import (  # noqa: E402
     ContactDynamics,
     ContactForceResidual,
+    ContactStep,
     FrameResidual,
 )
 
@@ -89,6 +90,11 @@ def pressed(scene: sp.Scene, q: np.ndarray, v: list[float]) -> tuple[sp.Scene, n
 
 def dynamics(scene: sp.Scene, actuation: str = "Full", frame: str = "tip") -> ContactDynamics:
     """Return a model with every residual of the adapter."""
+    return ContactDynamics(scene, *parts(scene, actuation, frame))
+
+
+def parts(scene: sp.Scene, actuation: str = "Full", frame: str = "tip"):
+    """Return state, actuation, and costs with every residual of the adapter."""
     state = crocoddyl.StateMultibody(scene.model)
     kind = getattr(crocoddyl, f"ActuationModel{actuation}")
     actuated = kind(state)
@@ -106,7 +112,7 @@ def dynamics(scene: sp.Scene, actuation: str = "Full", frame: str = "tip") -> Co
         residuals["control"] = crocoddyl.ResidualModelControl(state, nu)
     for name, residual in residuals.items():
         costs.addCost(name, crocoddyl.CostModelResidual(state, residual), 1.0)
-    return ContactDynamics(scene, state, actuated, costs)
+    return state, actuated, costs
 
 
 CASES = {
@@ -126,11 +132,24 @@ def differences(f, state, x: np.ndarray, step: float = 1e-6) -> np.ndarray:
     return np.transpose(columns)
 
 
+KINDS = {
+    "dynamics": None,
+    "euler": sp.SemiImplicitEuler(1e-4),
+    "runge-kutta": sp.RungeKutta4(1e-4),
+    "implicit": sp.LinearlyImplicitEuler(1e-3),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("case", CASES)
-def test_derivatives_are_those_of_differences(case):
+def test_derivatives_are_those_of_differences(case, kind):
     make, actuation, frame = CASES[case]
     scene, x = make()
-    model = dynamics(scene, actuation, frame)
+    if KINDS[kind] is None:
+        model = dynamics(scene, actuation, frame)
+    else:
+        simulation = sp.Simulation(scene, KINDS[kind])
+        model = ContactStep(simulation, *parts(scene, actuation, frame))
     u = np.linspace(-1.0, 2.0, model.nu)
     data, other = model.createData(), model.createData()
     model.calc(data, x, u)
@@ -140,20 +159,22 @@ def test_derivatives_are_those_of_differences(case):
         model.calc(other, x, u)
         return np.array(what(other), dtype=float)
 
-    def acceleration(data):
-        return data.xout
+    def out(data):
+        """Return the acceleration, or the displacement to the next state."""
+        return data.xout if KINDS[kind] is None else model.state.diff(x, data.xnext)
 
     def close(got, expected):
         np.testing.assert_allclose(got, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
-    close(data.Fx, differences(lambda x: at(acceleration, x), model.state, x))
+    # The displacement is from x, the derivative in the tangent space at the end.
+    end = np.eye(len(data.Fx))
+    if KINDS[kind] is not None:
+        _, end = model.state.Jdiff(x, data.xnext)
+    close(end @ data.Fx, differences(lambda x: at(out, x), model.state, x))
     if model.nu:
-        step = 1e-3
-        by_u = [
-            (at(acceleration, u=u + e) - at(acceleration, u=u - e)) / (2 * step)
-            for e in step * np.eye(model.nu)
-        ]
-        close(data.Fu, np.transpose(by_u))
+        step = 1e-2
+        by_u = [(at(out, u=u + e) - at(out, u=u - e)) / (2 * step) for e in step * np.eye(model.nu)]
+        close(end @ data.Fu, np.transpose(by_u))
     for name in ("normal", "world", "place", "placement"):
         residual = data.costs.costs[name].residual
         expected = differences(
@@ -206,20 +227,30 @@ def test_a_reference_can_be_changed():
         residual.reference = [1.0, 2.0]
 
 
+def euler(scene, dt):
+    return crocoddyl.IntegratedActionModelEuler(dynamics(scene), dt)
+
+
+def runge_kutta(scene, dt):
+    return crocoddyl.IntegratedActionModelRK(dynamics(scene), crocoddyl.RKType.four, dt)
+
+
+def implicit(scene, dt):
+    return ContactStep(sp.Simulation(scene, sp.LinearlyImplicitEuler(dt)), *parts(scene))
+
+
 @pytest.mark.parametrize(
     ("integrator", "wrap"),
     [
-        (sp.SemiImplicitEuler, crocoddyl.IntegratedActionModelEuler),
-        (
-            sp.RungeKutta4,
-            lambda model, dt: crocoddyl.IntegratedActionModelRK(model, crocoddyl.RKType.four, dt),
-        ),
+        (sp.SemiImplicitEuler, euler),
+        (sp.RungeKutta4, runge_kutta),
+        (sp.LinearlyImplicitEuler, implicit),
     ],
 )
 def test_its_steps_are_those_of_a_simulation(integrator, wrap):
     scene, x = arm_on_moving_plate()
     dt, steps, nq = 1e-4, 50, scene.model.nq
-    model = wrap(dynamics(scene), dt)
+    model = wrap(scene, dt)
     data = model.createData()
     torque = np.array([0.1, -2.0, -1.0, 0.3, 0.2])
     result = sp.Simulation(scene, integrator(dt)).run(
@@ -274,6 +305,32 @@ def test_a_solver_presses_with_a_force_within_bounds_of_its_motor():
     )
     contacts = scene.contacts(result.q[-1], result.v[-1])
     assert contacts.normal_force.sum() == pytest.approx(5.0, rel=0.01)
+
+
+def test_a_step_has_the_costs_of_its_start():
+    """dt times them, and without controls them, as of a last node; it then stays."""
+    scene, x = arm_on_moving_plate()
+    dt = 1e-3
+    whole, step = dynamics(scene), implicit(scene, dt)
+    u = np.linspace(-1.0, 1.0, whole.nu)
+    expected, data = whole.createData(), step.createData()
+    for controls, weight in (((u,), dt), ((), 1.0)):
+        for model, memory in ((whole, expected), (step, data)):
+            model.calc(memory, x, *controls)
+            model.calcDiff(memory, x, *controls)
+        np.testing.assert_allclose(data.cost, weight * expected.cost, rtol=1e-14)
+        for name in ("Lx", "Lxx", "Lu", "Luu") if controls else ("Lx", "Lxx"):
+            got, wanted = getattr(data, name), getattr(expected, name)
+            np.testing.assert_allclose(got, weight * np.array(wanted), rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(data.xnext, x)
+
+
+def test_a_step_needs_a_fixed_length():
+    scene, _ = free_ball()
+    with pytest.raises(InvalidParameter, match=r"RungeKutta4\(dt\)"):
+        ContactStep(sp.Simulation(scene, sp.Adaptive()), *parts(scene, "Full", "ball"))
+    with pytest.raises(InvalidParameter, match=r"must be a sphshell_pin\.Simulation"):
+        ContactStep(scene, *parts(scene, "Full", "ball"))
 
 
 def test_bristles_are_refused_unless_told_otherwise():
