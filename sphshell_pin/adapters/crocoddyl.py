@@ -20,6 +20,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from sphshell_pin import _core
 from sphshell_pin.adapters.evaluator import (
     FORCES,
     Evaluator,
@@ -29,7 +30,6 @@ from sphshell_pin.adapters.evaluator import (
 )
 from sphshell_pin.checks import check_placement, check_type, check_vector
 from sphshell_pin.dynamics import Scene, Simulation
-from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import InvalidParameter, MissingExtra
 
 try:
@@ -336,9 +336,10 @@ class FrameResidual(crocoddyl.ResidualModelAbstract):
         size = 6 if isinstance(reference, pin.SE3) else 3
         super().__init__(state, size, state.nv if nu is None else nu, True, False, False)
         self.scene = scene
-        self.frame = find_frame(scene.model, frame, "frame")
-        self._model = scene.model
+        self.frame = frame
+        self._joint, self._placement = scene.frame_in_joint(frame)
         self._nq = scene.model.nq
+        self._scene = scene.core
         self.reference = reference
 
     @property
@@ -350,9 +351,10 @@ class FrameResidual(crocoddyl.ResidualModelAbstract):
     def reference(self, reference: ArrayLike | pin.SE3) -> None:
         if self.nr == 3:
             self._reference = check_vector("reference", reference, 3, " [m]")
-            return
-        placement = check_placement("reference", reference)
-        self._reference, self._inverse = placement, placement.inverse()
+            placement = pin.SE3(np.eye(3), self._reference)
+        else:
+            self._reference = placement = check_placement("reference", reference)
+        self._frame = _core.Frame(self._joint, self._placement.homogeneous, placement.homogeneous)
 
     def createData(self, collector: crocoddyl.DataCollectorAbstract) -> _FrameData:
         """Return the memory of one node."""
@@ -360,21 +362,11 @@ class FrameResidual(crocoddyl.ResidualModelAbstract):
 
     def calc(self, data: _FrameData, x: Array, u: Array | None = None) -> None:
         """Compute the residual."""
-        pin.forwardKinematics(self._model, data.pinocchio, x[: self._nq])
-        placement = pin.updateFramePlacement(self._model, data.pinocchio, self.frame)
-        if self.nr == 6:
-            data.error = self._inverse * placement
-            data.residual[:] = pin.log6(data.error).vector
-        else:
-            data.residual[:] = placement.translation - self._reference
+        _core.frame_into(self._scene, self._frame, x[: self._nq], data.residual)
 
     def calcDiff(self, data: _FrameData, x: Array, u: Array | None = None) -> None:
         """Compute its derivatives."""
-        frame = pin.ReferenceFrame.LOCAL if self.nr == 6 else pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        q = x[: self._nq]
-        found = pin.computeFrameJacobian(self._model, data.pinocchio, q, self.frame, frame)
-        jacobian = _matrix(found, 6)
-        data.by_q[:] = pin.Jlog6(data.error) @ jacobian if self.nr == 6 else jacobian[:3]
+        _core.differentiate_frame_into(self._scene, self._frame, x[: self._nq], data.by_q)
 
 
 class _FrameData(crocoddyl.ResidualDataAbstract):
@@ -382,10 +374,8 @@ class _FrameData(crocoddyl.ResidualDataAbstract):
 
     def __init__(self, model: FrameResidual, collector: crocoddyl.DataCollectorAbstract) -> None:
         super().__init__(model, collector)
-        self.pinocchio = model._model.createData()
         self.residual = self.r
         self.by_q = _matrix(self.Rx, model.nr)[:, : model.state.nv]
-        self.error = pin.SE3.Identity()
 
 
 def _matrix(array: Array, rows: int) -> Array:

@@ -4,7 +4,10 @@
 #include <string>
 #include <vector>
 
+#include <pinocchio/spatial.hpp>
+
 #include "bindings/evaluations.hpp"
+#include "dynamics/chain.hpp"
 #include "dynamics/contact_row.hpp"
 #include "dynamics/derivatives/step_slopes.hpp"
 #include "dynamics/integrators/table.hpp"
@@ -192,6 +195,61 @@ void differentiate_step_into(Evaluations& self, const std::string& integrator, d
   });
 }
 
+// A frame of the model, at `placement` in a joint, against a reference in the world.
+struct Frame {
+  int joint;
+  pinocchio::SE3 placement, reference;
+
+  Frame(int joint, const Eigen::Matrix4d& placement, const Eigen::Matrix4d& reference)
+      : joint(joint), placement(placement), reference(reference) {}
+
+  // Where it is, when the joints' placements and, with `axes`, their axes have been computed.
+  pinocchio::SE3 place(Multibody& body, const VectorX& q, bool axes) const {
+    if (joint > 0) body.need(joint);
+    if (axes) {
+      body.want_derivatives();
+      body.place_axes(q);
+    } else {
+      body.kinematics(q);
+    }
+    return body.world_from(joint, placement);
+  }
+};
+
+// Fills residual: (3), the place against that of the reference, or (6), log6 of the placement in
+// the reference.
+void frame_into(Evaluations& self, const Frame& frame, const VectorX& q, Out residual) {
+  self.at(q, VectorX::Zero(self.model().nv), [&](SceneData& scene, auto&&) {
+    const pinocchio::SE3 world_from_frame = frame.place(scene.body(), q, false);
+    if (residual.size() == 3)
+      residual = world_from_frame.translation() - frame.reference.translation();
+    else
+      residual = pinocchio::log6(frame.reference.actInv(world_from_frame)).toVector();
+  });
+}
+
+// Fills by_q (3 or 6, nv), in the tangent space of q.
+void differentiate_frame_into(Evaluations& self, const Frame& frame, const VectorX& q,
+                              Columns by_q) {
+  const VectorX v = VectorX::Zero(self.model().nv);
+  check_count("columns of by_q", by_q.cols(), v.size());
+  self.at(q, v, [&](SceneData& scene, auto&&) {
+    const Multibody& body = scene.body();
+    const pinocchio::SE3 world_from_frame = frame.place(scene.body(), q, true);
+    Chain chain(body.model(), 0, frame.joint);
+    // Twists in the frame.
+    chain.place(body, world_from_frame, v);
+    Matrix6 slope = Matrix6::Identity();
+    if (by_q.rows() == 3)
+      slope.topLeftCorner<3, 3>() = world_from_frame.rotation();
+    else
+      pinocchio::Jlog6(frame.reference.actInv(world_from_frame), slope);
+    by_q.setZero();
+    for (int k = 0; k < chain.size(); ++k)
+      by_q.col(chain.velocity(k)) += slope.topRows(by_q.rows()) * chain.axes().col(k);
+  });
+}
+
 }  // namespace
 }  // namespace sphshell::evaluator
 
@@ -203,6 +261,13 @@ void bind_evaluator(nanobind::module_& m) {
   m.def("differentiate_into", &differentiate_into, nb::arg("scene"), nb::arg("q"), nb::arg("v"),
         nb::arg("tau"), nb::arg("by_state").noconvert(), nb::arg("by_tau").noconvert(),
         nb::arg("forces_by_state").noconvert());
+  nb::class_<Frame>(m, "Frame")
+      .def(nb::init<int, const Eigen::Matrix4d&, const Eigen::Matrix4d&>(), nb::arg("joint"),
+           nb::arg("placement"), nb::arg("reference"));
+  m.def("frame_into", &frame_into, nb::arg("scene"), nb::arg("frame"), nb::arg("q"),
+        nb::arg("residual").noconvert());
+  m.def("differentiate_frame_into", &differentiate_frame_into, nb::arg("scene"), nb::arg("frame"),
+        nb::arg("q"), nb::arg("by_q").noconvert());
   m.def("step_into", &step_into, nb::arg("scene"), nb::arg("integrator"), nb::arg("dt"),
         nb::arg("q"), nb::arg("v"), nb::arg("tau"), nb::arg("next").noconvert(),
         nb::arg("forces").noconvert());
