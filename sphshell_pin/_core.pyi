@@ -150,6 +150,17 @@ class JointEffects:
         self, v: int, limit: float, stiffness: float, damping: float, relaxation: float
     ) -> None: ...
 
+class Parameter:
+    def __init__(
+        self,
+        pair: int,
+        kind: int,
+        axis: int = 0,
+        less: Pair | None = None,
+        more: Pair | None = None,
+        step: float = 0.0,
+    ) -> None: ...
+
 class _Evaluations:
     def __init__(
         self, model: pin.Model, pairs: Sequence[Pair], joints: JointEffects | None = None
@@ -158,6 +169,26 @@ class _Evaluations:
     def external_forces(self, q: _Doubles, v: _Doubles) -> pin.StdVec_Force: ...
     def contacts(self, q: _Doubles, v: _Doubles) -> NDArray[np.uint8]: ...
     def contact_derivatives(self, q: _Doubles, v: _Doubles) -> tuple[_Doubles, _Doubles]: ...
+    def dynamics_derivatives(
+        self,
+        q: _Doubles,
+        v: _Doubles,
+        tau: _Doubles,
+        parameters: Sequence[Parameter],
+        repeat: int = 1,
+    ) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles, _Doubles]: ...
+    def contact_force_derivatives(
+        self, q: _Doubles, v: _Doubles, parameters: Sequence[Parameter]
+    ) -> tuple[NDArray[np.uint8], _Doubles, _Doubles, _Doubles]: ...
+    def step_derivatives(
+        self,
+        integrator: str,
+        dt: float,
+        q: _Doubles,
+        v: _Doubles,
+        tau: _Doubles,
+        parameters: Sequence[Parameter],
+    ) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles, _Doubles]: ...
 
 class SceneState(_Evaluations):
     def copy(self) -> SceneState: ...
@@ -268,6 +299,8 @@ class Simulation:
         settings: RunSettings,
         sensors: Sequence[Sensor],
     ) -> None: ...
+    def differentiate(self, parameters: Sequence[Parameter], by_q0: bool, by_v0: bool) -> None: ...
+    def take_sensitivities(self) -> dict[str, _Doubles]: ...
     def advance(self, wall_seconds: float, until: float = ...) -> int: ...
     def deep_start(self) -> tuple[int, float] | None: ...
     def change(
@@ -365,3 +398,42 @@ def mend_components(nodes: int, pairs: _Ints) -> _Ints: ...
 def mend_nesting(
     vertices: _Doubles, triangles: _Ints, component: _Ints, queries: _Doubles, closed: _Bytes
 ) -> _Ints: ...
+def evaluate_into(
+    scene: Scene, q: _Doubles, v: _Doubles, tau: _Doubles, acceleration: _Doubles, forces: _Doubles
+) -> None: ...
+def differentiate_into(
+    scene: Scene,
+    q: _Doubles,
+    v: _Doubles,
+    tau: _Doubles,
+    by_state: _Doubles,
+    by_tau: _Doubles,
+    forces_by_state: _Doubles,
+) -> None: ...
+def step_into(
+    scene: Scene,
+    integrator: str,
+    dt: float,
+    q: _Doubles,
+    v: _Doubles,
+    tau: _Doubles,
+    next: _Doubles,
+    forces: _Doubles,
+) -> None: ...
+def differentiate_step_into(
+    scene: Scene,
+    integrator: str,
+    dt: float,
+    q: _Doubles,
+    v: _Doubles,
+    tau: _Doubles,
+    by_state: _Doubles,
+    by_tau: _Doubles,
+    forces_by_state: _Doubles,
+) -> None: ...
+
+class Frame:
+    def __init__(self, joint: int, placement: _Doubles, reference: _Doubles) -> None: ...
+
+def frame_into(scene: Scene, frame: Frame, q: _Doubles, residual: _Doubles) -> None: ...
+def differentiate_frame_into(scene: Scene, frame: Frame, q: _Doubles, by_q: _Doubles) -> None: ...

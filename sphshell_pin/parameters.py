@@ -97,6 +97,13 @@ def parameter(
     return field(default=default, metadata=metadata)
 
 
+def same_parameter(kind: type, name: str, **changed: str) -> Any:
+    """Return the field of a dataclass that is the parameter `name` of `kind`, but for `changed`."""
+    (source,) = (one for one in dataclasses.fields(kind) if one.name == name)
+    about = dataclasses.replace(source.metadata[_KEY], **changed)
+    return field(default=source.default, metadata={**source.metadata, _KEY: about})
+
+
 def parameters_of(kind: object) -> dict[str, Parameter]:
     """Return the parameters of a dataclass or of one of its objects, by name; {} of others."""
     if not dataclasses.is_dataclass(kind):

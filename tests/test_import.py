@@ -29,6 +29,8 @@ HEAVY = (
     "OCP",
     "crocoddyl",
     "casadi",
+    "mcap",
+    "pyarrow",
 )
 
 
@@ -116,7 +118,7 @@ LAYERS = (
     ("patches",),
     ("sphshell_pin",),  # its public names are those of the folders above
     ("scenario",),
-    ("plot", "view"),
+    ("plot", "view", "export"),
     ("study", "testing"),
     ("cli",),
 )

@@ -233,6 +233,6 @@ def test_a_good_wheel_passes_its_check(tmp_path, check_contents):
 
 @pytest.mark.parametrize("what", BAD)
 def test_a_wheel_is_refused_with(what, tmp_path, check_contents):
-    change, told = BAD[what]
+    change, said = BAD[what]
     faults = check_contents(pack(tmp_path / "bad.whl", {**GOOD, **change}))
-    assert any(told in fault for fault in faults), faults
+    assert any(said in fault for fault in faults), faults

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 from sphshell_pin.checks import check_not_negative, check_type
 from sphshell_pin.contact.friction import Coefficients
+from sphshell_pin.contact.materials import TwoMaterials
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import parameter
@@ -119,7 +119,7 @@ class BristleFriction(Coefficients, kind="bristle"):
 
 
 @dataclass(frozen=True)
-class MindlinFriction(Coefficients, kind="mindlin"):
+class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
     """Friction that sticks with the stiffness of two elastic bodies, after Mindlin.
 
     As BristleFriction, but the spring follows from the materials and the present disc of contact,
@@ -138,26 +138,6 @@ class MindlinFriction(Coefficients, kind="mindlin"):
     Materials 24 (1996) 229.
     """
 
-    young: float = parameter(
-        above=0, unit="Pa", label="Young's modulus", help="Young's modulus of the sphere"
-    )
-    poisson: float = parameter(
-        above=-1, at_most=0.5, label="Poisson's ratio", help="Poisson's ratio of the sphere"
-    )
-    young_2: float | None = parameter(
-        None,
-        above=0,
-        unit="Pa",
-        label="Young's modulus 2",
-        help="Young's modulus of the shell; without it that of the sphere",
-    )
-    poisson_2: float | None = parameter(
-        None,
-        above=-1,
-        at_most=0.5,
-        label="Poisson's ratio 2",
-        help="Poisson's ratio of the shell; without it that of the sphere",
-    )
     v_stribeck: float = parameter(
         0.01,
         above=0,
@@ -205,22 +185,13 @@ class MindlinFriction(Coefficients, kind="mindlin"):
         if isinstance(self.rings, bool) or not 1 <= self.rings <= MOST_RINGS:
             raise InvalidParameter("rings", self.rings, must)
 
-    @cached_property
-    def _moduli(self) -> tuple[float, float]:
-        """8 G* and 16/3 G [Pa]."""
-        young = self.young, self.young if self.young_2 is None else self.young_2
-        poisson = self.poisson, self.poisson if self.poisson_2 is None else self.poisson_2
-        softness = [2 * (1 + nu) / e for e, nu in zip(young, poisson, strict=True)]
-        tangential = sum((2 - nu) * s for s, nu in zip(softness, poisson, strict=True))
-        return 8 / tangential, 16 / 3 / sum(softness)
-
     def tangential_stiffness(self, disc: float) -> float:
         """Return 8 G* a [N/m] on a disc of contact of the radius a = `disc` [m]."""
-        return self._moduli[0] * check_not_negative("disc", disc, "m")
+        return self._shear_moduli[0] * check_not_negative("disc", disc, "m")
 
     def torsional_stiffness(self, disc: float) -> float:
         """Return 16/3 G a^3 [N m/rad] on a disc of contact of the radius a = `disc` [m]."""
-        return self._moduli[1] * check_not_negative("disc", disc, "m") ** 3
+        return self._shear_moduli[1] * check_not_negative("disc", disc, "m") ** 3
 
     @property
     def state_size(self) -> int:
@@ -236,7 +207,7 @@ class MindlinFriction(Coefficients, kind="mindlin"):
         """Return the parameters as the compiled core takes them, moduli for the materials."""
         names = ["v_stribeck", "damping_time", "torsional", "rolling", "rolling_speed", "rings"]
         more = [float(getattr(self, name)) for name in names]
-        return [self.mu_static, self.mu_dynamic, *self._moduli, *more]
+        return [self.mu_static, self.mu_dynamic, *self._shear_moduli, *more]
 
     @property
     def text(self) -> str:
@@ -249,9 +220,9 @@ class MindlinFriction(Coefficients, kind="mindlin"):
             )
         return (
             f"Mindlin, coefficient {self.mu_static:g} at rest, {self.mu_dynamic:g} beyond "
-            f"{self.v_stribeck:g} m/s; sticks with {self._moduli[0]:.4g} N/m per m of the disc's "
-            f"radius, damping time {self.damping_time:g} s{spin}{rolling}; the force is a state of "
-            "the contact"
+            f"{self.v_stribeck:g} m/s; sticks with {self._shear_moduli[0]:.4g} N/m per m of the "
+            f"disc's radius, damping time {self.damping_time:g} s{spin}{rolling}; the force is a "
+            "state of the contact"
         )
 
     @property
@@ -261,7 +232,7 @@ class MindlinFriction(Coefficients, kind="mindlin"):
 
     def slip_time(self, mass: float, load: float, disc: float) -> float:
         """Return half a period of the spring, or 20 times its decay if that is shorter [s]."""
-        stiffness = self._moduli[0] * disc
+        stiffness = self._shear_moduli[0] * disc
         times = [_spring_time(mass, stiffness, self.damping_time * stiffness)]
         if self.rolling and load > 0:
             decay = mass * self.rolling_speed / (1.5 * self.rolling * load)

@@ -164,9 +164,13 @@ class JointIngredients:
             if ends is not None and "limits" in wanted:
                 given = law
                 if given is None and inertia is not None:
-                    highest = float(speed.max()) if speed is not None else _SPEED[_slides(joint)]
+                    highest = (
+                        float(speed.max()) if speed is not None else _SPEED[joint_slides(joint)]
+                    )
                     load = float(effort.max()) if effort is not None else 0.0
-                    given = _default_stop(float(inertia[at].max()), highest, load, _slides(joint))
+                    given = _default_stop(
+                        float(inertia[at].max()), highest, load, joint_slides(joint)
+                    )
                 if given is not None:
                     found["limits"][name] = JointLimits(_short(ends[0]), _short(ends[1]), given)
         return cls(**{one: found[one] for one in wanted})  # type: ignore[arg-type]  # each its own
@@ -245,7 +249,7 @@ class JointIngredients:
                 raise InvalidParameter(
                     f"friction.{name}", dry, f"needs a joint with one velocity, not {joint.nv}"
                 )
-            stiffness = dry.stiffness or dry.torque / _STICK_DEPTH[_slides(joint)]
+            stiffness = dry.stiffness or dry.torque / _STICK_DEPTH[joint_slides(joint)]
             damping = dry.damping
             if damping is None:
                 critical = 2 * math.sqrt(stiffness * float(inertia[joint.idx_v]))
@@ -263,7 +267,7 @@ class JointIngredients:
             out[names[dry.index]] = math.pi * math.sqrt(float(inertia[dry.index]) / dry.stiffness)
         for name, _, in_v, *_, law in self._stops(model):
             mass, joint = float(inertia[in_v]), find_joint(model, name)
-            speed = float(self.speed.get(name, _SPEED[_slides(joint)]))
+            speed = float(self.speed.get(name, _SPEED[joint_slides(joint)]))
             time = law.contact_time(law.depth_of(0.5 * mass * speed**2), speed)
             out[name] = min(time, out.get(name, math.inf))
         return out
@@ -373,7 +377,8 @@ def _plain(joint: pin.JointModel) -> bool:
     return bool(joint.nq == joint.nv and kind.startswith(_PLAIN))
 
 
-def _slides(joint: pin.JointModel) -> bool:
+def joint_slides(joint: pin.JointModel) -> bool:
+    """Whether the joint's numbers are lengths, not angles."""
     kind = joint.shortname()
     return bool(kind.startswith(("JointModelP", "JointModelTranslation")))
 

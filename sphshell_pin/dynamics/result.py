@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import read_only
-from sphshell_pin.dynamics.patches import PATCH, Patches, patch_columns, patches_of
+from sphshell_pin.dynamics.patches import PATCH, Patches, patches_of
 from sphshell_pin.dynamics.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.dynamics.scene_contacts import Columns, SceneContacts, columns
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pinocchio as pin
     from matplotlib.figure import Figure
 
+    from sphshell_pin.dynamics.sensitivities import Sensitivities
     from sphshell_pin.dynamics.sensors import SensorSet
     from sphshell_pin.view.recording import RecordingView
 
@@ -158,6 +159,13 @@ class Result:
     origin: Origin | None = None
     sensors: Mapping[str, SensorLog] = field(default_factory=dict)
     patch_rows: Patches | None = None
+    sensitivity_rows: Sensitivities | None = None
+
+    @property
+    def sensitivities(self) -> Sensitivities | None:
+        """How the rows change with parameters and the start; None where this was not asked for."""
+        rows = self.sensitivity_rows
+        return None if rows is None else replace(rows, result=self)
 
     @classmethod
     def from_blocks(
@@ -305,30 +313,35 @@ class Result:
             raise MissingExtra("pandas", "tables", "Result.to_dataframe") from None
         return pandas.DataFrame(self.contact_columns())
 
+    def row_columns(self, scene: Scene | None = None) -> dict[str, ArrayLike]:
+        """Return the rows as named scalar columns, units in the names (for CSV, tables).
+
+        They are t, q and v by joint (q.JOINT, and q.JOINT.0, ... of a joint with several numbers),
+        and of each pair the sum of the normal forces, the total force on the sphere in the world
+        and the largest depth, zero without contact. `scene` names the joints (default: the one that
+        ran); without any, coordinates are q.0, q.1, ... without units.
+        """
+        from sphshell_pin.dynamics.result_columns import row_columns
+
+        return row_columns(self, self.scene if scene is None else scene)
+
     def contact_columns(self) -> dict[str, ArrayLike]:
         """Return the contact log as named scalar columns, units in the names (for CSV, tables)."""
-        log = self.contacts
-        columns: dict[str, ArrayLike] = {"t [s]": log.t, "pair": [self.pairs[i] for i in log.pair]}
-        for label, unit, vectors in (
-            ("point", "m", log.point_world),
-            ("normal", "1", log.normal_world),
-        ):
-            columns |= {f"{label}_{a} [{unit}]": vectors[:, i] for i, a in enumerate("xyz")}
-        columns |= {"depth [m]": log.depth, "normal_force [N]": log.normal_force}
-        for label, unit, vectors in (
-            ("friction_force", "N", log.friction_force_world),
-            ("slip_velocity", "m/s", log.slip_velocity_world),
-        ):
-            columns |= {f"{label}_{a} [{unit}]": vectors[:, i] for i, a in enumerate("xyz")}
-        return (
-            columns
-            | {
-                "element": log.element,
-                "feature": log.feature,
-                "number": log.contact_id,
-            }
-            | ({} if self.patch_rows is None else patch_columns(self.patch_rows))
-        )
+        from sphshell_pin.dynamics.result_columns import contact_columns
+
+        return contact_columns(self)
+
+    def event_columns(self) -> dict[str, ArrayLike]:
+        """Return the events as named columns (for CSV, tables)."""
+        from sphshell_pin.dynamics.result_columns import event_columns
+
+        return event_columns(self)
+
+    def energy_columns(self) -> dict[str, Array]:
+        """Return the energy audit, and its residual, as named columns (for CSV, tables)."""
+        from sphshell_pin.dynamics.result_columns import energy_columns
+
+        return energy_columns(self)
 
     def sensor_columns(self) -> dict[str, Array]:
         """Return the readings of all sensors as columns, units in the names (for CSV, tables).
@@ -336,6 +349,22 @@ class Result:
         One row for each time at which a reading arrived; nan where another sensor has none.
         """
         return sensor_columns(self.sensors)
+
+    def to_mcap(
+        self, path: str | PathLike[str], scene: Scene | None = None, *, start: int = 0
+    ) -> Path:
+        """Write the run as an MCAP file of ROS 2 messages, for Foxglove, RViz and rosbag2.
+
+        `scene` is what moved (default: the one that ran, or that of the scenario the result came
+        from), `start` the time stamp of t = 0 [ns since 1970]. The topics are those of the page
+        "Out to other tools" (docs/export.md); the file is written whole or not at all.
+
+        Raises ResultError without a scene, for a time before 1970 and where the file cannot be
+        written, MissingExtra without mcap.
+        """
+        from sphshell_pin.export.mcap import write_mcap
+
+        return write_mcap(path, self, scene, start=start)
 
     def plot(self, kind: str = "overview", scene: Scene | None = None) -> Figure:
         """Return a figure, which a notebook shows.

@@ -40,14 +40,16 @@ class SceneState:
     ) -> None:
         self._scene = scene
         self._pairs = scene.pairs
+        self.start = scene.check_state(scene.neutral if q is None else q, v)
+        """Where it began: q (nq,), v (nv,)."""
         cores = [pair.to_core() for pair in scene.pairs]
         if any(pair.friction and pair.friction.has_state for pair in scene.pairs):
-            figures = explain_pairs(scene, *scene.check_state(scene.neutral if q is None else q, v))
+            figures = explain_pairs(scene, *self.start)
             for pair, core, figure in zip(scene.pairs, cores, figures, strict=True):
                 core.relaxation = relaxation_time(pair, figure)
         self._core = _core.SceneState(scene.model, cores, scene.joints.to_core(scene.model))
         if q is not None:
-            self._core.advance(*scene.check_state(q, v), 0.0)
+            self._core.advance(*self.start, 0.0)
 
     def advance(self, q: ArrayLike, v: ArrayLike, dt: float) -> None:
         """Move on to q (nq,), v (nv,), the end of an accepted step of `dt` >= 0 [s].

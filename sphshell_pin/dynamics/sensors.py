@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sphshell_pin import _core
 from sphshell_pin.checks import check_name, check_type
 from sphshell_pin.dynamics.beyond import beyond, frames_beyond
+from sphshell_pin.dynamics.joints import joint_slides
 from sphshell_pin.dynamics.models import find_frame, find_joint
 from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.dynamics.scene_contacts import Columns
@@ -177,7 +178,7 @@ class JointTorqueSensor(_Analog, kind="joint-torque"):
 
     def columns(self, scene: Scene) -> tuple[str, ...]:
         """Return the names of the values of a reading, with their units."""
-        slides = find_joint(scene.model, self.joint).shortname().startswith("JointModelP")
+        slides = joint_slides(find_joint(scene.model, self.joint))
         return ("force [N]" if slides else "torque [N m]",)
 
     def _measured(self, scene: Scene) -> _core.Sensor:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
@@ -12,13 +13,17 @@ from sphshell_pin.dynamics.advance import (
     advance,
     result_of,
     start_run,
+    step_of,
     why_ended,
 )
+from sphshell_pin.dynamics.derivatives import StepDerivatives, step_derivatives
 from sphshell_pin.dynamics.integrators import Adaptive, Integrator
 from sphshell_pin.dynamics.many_runs import roll_out
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.rollout import Rollout
 from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.dynamics.scene_state import SceneState
+from sphshell_pin.dynamics.sensitivities import Asked
 from sphshell_pin.dynamics.sensors import Sensor, SensorSet, check_sensors
 from sphshell_pin.errors import Interrupted, InvalidParameter, SimulationDiverged
 
@@ -59,6 +64,7 @@ class Simulation:
         *,
         record_dt: float | None = None,
         record: Collection[str] = (),
+        sensitivities: Collection[str] = (),
         progress: Callable[[float], object] | None = None,
         t0: float = 0.0,
     ) -> Result:
@@ -74,6 +80,13 @@ class Simulation:
         share done. The same input gives the same bits. With `record=("patch",)` the patch of each
         recorded contact is kept, too: `Result.patches`.
 
+        `sensitivities` names what the rows are differentiated by: parameters as in
+        `Scene.dynamics_derivatives`, "q0" and "v0" (nv columns each); `Result.sensitivities` then
+        has the derivatives of q, v, forces and depths. Of fixed steps they are those of the steps
+        that are made, of the other integrators those of the motion; stretches of bristles begin
+        with their touch. A controller is then asked at states nearby as well, so that one with a
+        memory, or that reads sensors, cannot be taken.
+
         A law that cannot stop its sphere earns a WeakLawWarning, a path off its shell a
         SetupWarning.
 
@@ -81,6 +94,7 @@ class Simulation:
         deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.
         """
         sensors = SensorSet(self.sensors, self.scene)
+        asked = None if sensitivities == () else Asked(self.scene, sensitivities, controller)
         core = start_run(
             self.scene,
             self.integrator,
@@ -94,6 +108,8 @@ class Simulation:
             t0=t0,
             sensors=sensors,
         )
+        if asked:
+            asked.begin(core)
         ctrl_c = CtrlC()
 
         def glance() -> None:
@@ -109,10 +125,40 @@ class Simulation:
             result = result_of(self.scene, self.integrator, core, core.take(), sensors)
             raise Interrupted(core.time, result) from None
         result = result_of(self.scene, self.integrator, core, core.take(), sensors)
+        if asked:
+            result = replace(result, sensitivity_rows=asked.rows(core))
         reason = why_ended(status, core, self.scene)
         if reason is not None:
             raise SimulationDiverged(core.time, reason, result)
         return result
+
+    def step_derivatives(
+        self,
+        q: ArrayLike,
+        v: ArrayLike | None = None,
+        tau: ArrayLike | None = None,
+        *,
+        parameters: Collection[str] = (),
+        state: SceneState | None = None,
+    ) -> StepDerivatives:
+        """Return where one fixed step from q (nq,), v (nv,) leads, and its derivatives.
+
+        The torques tau (nv,) are held over the step (zero unless given). `parameters` and `state`
+        as in `Scene.dynamics_derivatives`. They are the derivatives of what the step computes, not
+        of the motion that it approximates.
+
+        Raises InvalidParameter for an integrator whose steps have no fixed length.
+        """
+        dt = step_of(self.integrator)
+        if dt == 0:
+            raise InvalidParameter(
+                "integrator",
+                self.integrator,
+                "has no fixed step to differentiate: take SemiImplicitEuler(dt), RungeKutta4(dt) "
+                "or LinearlyImplicitEuler(dt)",
+            )
+        at = self.scene.place(q, v, tau, parameters, state)
+        return step_derivatives(self.integrator.kind, dt, at)
 
     def rollout(
         self,

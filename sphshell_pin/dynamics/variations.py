@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeGuard
+from typing import TYPE_CHECKING, TypeGuard
 
 import pinocchio as pin
 
@@ -12,9 +12,12 @@ from sphshell_pin.checks import as_floats, check_finite, check_placement, check_
 from sphshell_pin.contact import Sphere
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
-from sphshell_pin.dynamics.scene import ContactPair, Scene
+from sphshell_pin.dynamics.pairs import ContactPair
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.parameters import parameters_of
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.scene import Scene
 
 # Changes a pair to one value.
 _Change = Callable[[ContactPair, object], ContactPair]
@@ -102,6 +105,11 @@ def _names_of(scene: Scene) -> dict[str, tuple[int, _Change, tuple[int, ...] | N
         if pair.shell is not None:
             out[f"{pair.name}.placement"] = k, _set_placement, None
     return out
+
+
+def numbers_of(scene: Scene) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of what may vary in numbers alone, by name: () or (3,)."""
+    return {name: shape for name, (_, _, shape) in _names_of(scene).items() if shape is not None}
 
 
 def _values(

@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sphshell_pin.dynamics.pair_series import PairSeries
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.plot.contact_map import QUANTITIES, plot_contact_map
 from sphshell_pin.plot.contact_path import plot_contact_path
@@ -19,7 +20,7 @@ from sphshell_pin.plot.over_time import (
     plot_overview,
 )
 from sphshell_pin.plot.sensors import plot_sensors
-from sphshell_pin.plot.series import MOST_POINTS, PairSeries
+from sphshell_pin.plot.series import MOST_POINTS
 
 if TYPE_CHECKING:
     from os import PathLike

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sphshell_pin.dynamics.pair_series import PairSeries
 from sphshell_pin.plot.figure import (
     NO_CONTACT,
     count,
@@ -14,7 +15,7 @@ from sphshell_pin.plot.figure import (
     new_figure,
     say,
 )
-from sphshell_pin.plot.series import FloatArray, PairSeries, thinned
+from sphshell_pin.plot.series import FloatArray, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.plot.figure import finish_axis, new_figure, say
-from sphshell_pin.scenario.figures import PAIR_FIGURES, RUN_FIGURES
+from sphshell_pin.scenario.figures import PAIR_UNITS, RUN_FIGURES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,7 +22,6 @@ MOST_PANELS = 6
 MOST_CURVES = 12
 # Values that grow by one factor, to this accuracy, get a logarithmic axis.
 _EVEN = 1e-3
-_UNITS = {"impulse": "N s", "peak_force_time": "s"} | PAIR_FIGURES
 
 
 def plot_sweep(table: pd.DataFrame, figure: str) -> Figure:
@@ -174,5 +173,5 @@ def _grows_by_a_factor(values: FloatArray) -> bool:
 
 def _label(figure: str) -> str:
     last = figure.rpartition(".")[2]
-    unit = _UNITS.get(last, "") if figure.startswith("pairs.") else RUN_FIGURES.get(figure, "")
+    unit = PAIR_UNITS.get(last, "") if figure.startswith("pairs.") else RUN_FIGURES.get(figure, "")
     return f"{last.replace('_', ' ')} [{unit}]" if unit else last.replace("_", " ")

@@ -21,6 +21,8 @@ PAIR_FIGURES = {
     "max_depth": "m",
     "max_depth_time": "s",
 }
+PAIR_UNITS = {"impulse": "N s", "peak_force_time": "s"} | PAIR_FIGURES
+"""Of all figures of a pair in `RunStats`."""
 JOINT_FIGURES = {
     "stop_time": "s",
     "stops": "",

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import hashlib
 import json
-import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -32,6 +30,7 @@ from sphshell_pin.scenario.audit import audit_cad as compare_with_cad
 from sphshell_pin.scenario.build import Built, build
 from sphshell_pin.scenario.figures import Verdict, check_expectations, judge, measure_energy
 from sphshell_pin.scenario.reading import shipped_scenarios
+from sphshell_pin.tables import csv_text
 
 RECORDING = "recording.html"
 SUMMARY = "summary.json"
@@ -285,21 +284,12 @@ def write_contacts(
 ) -> None:
     """Write the contact log of `result` as comma-separated values, one row for each contact."""
     columns = result.contact_columns() | ({} if audit is None else audit.columns())
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(zip(*(np.asarray(one).tolist() for one in columns.values()), strict=True))
+    Path(path).write_text(csv_text(columns), encoding="utf-8", newline="")
 
 
 def write_sensors(path: str | PathLike[str], result: Result) -> None:
     """Write the readings of the sensors as comma-separated values, one row for each time."""
-    columns = result.sensor_columns()
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        for row in zip(*(one.tolist() for one in columns.values()), strict=True):
-            # nan: no reading
-            writer.writerow(["" if math.isnan(one) else one for one in row])
+    Path(path).write_text(csv_text(result.sensor_columns()), encoding="utf-8", newline="")
 
 
 def _write_summary(

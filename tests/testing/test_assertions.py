@@ -300,13 +300,13 @@ def test_a_second_contact_that_is_swallowed_is_told() -> None:
     below, elements = meshes.grid_plate(4, 4)
     both = np.concatenate([below, below + np.array([0.0, 0.0, 0.2])])
     sheets = Shell(both, np.concatenate([elements, elements + len(below)]))
-    for shell, place, radius, told in (
+    for shell, place, radius, message in (
         (GROOVE, [0.0, 0.3, 0.75], 0.6, r"deep at its inside, but no contact"),
         (sheets, [0.01, 0.02, 0.09], 0.15, r"deep in a piece of \d+ triangles, but no contact"),
     ):
         assert len(shell.contacts(place, radius, "facets")) == 2
         assert_no_contact_missed(shell, radius, [place])
-        with pytest.raises(AssertionError, match=told):
+        with pytest.raises(AssertionError, match=message):
             assert_no_contact_missed(Swallows(shell, range(0)), radius, [place])
 
 

@@ -54,7 +54,7 @@ def test_a_late_browser_gets_all_rows_and_the_newest_state():
     panel.publish({"t": 5}, [[5, [1.0], [0.1]]], clear=True)
     rows, state = map(json.loads, panel.news(number)[1])
     assert rows == {"type": "rows", "clear": True, "rows": [[5, [1.0], [0.1]]]}
-    # Whoever comes now is not told what was cleared.
+    # A page that connects now does not get the rows that were cleared.
     assert json.loads(panel.news(0)[1][1])["rows"] == [[5, [1.0], [0.1]]]
 
 

@@ -148,7 +148,7 @@ void bind_evaluations(nb::class_<T>& bound) {
            })
       .def("contact_derivatives", [](T& self, const VectorX& q, const VectorX& v) {
         return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
-          Linearization linearization(scene);
+          Linearization& linearization = evaluate.linearization();
           evaluate();
           MatrixX by_q, by_v;
           linearization.forces(q, v, by_q, by_v);
@@ -159,6 +159,9 @@ void bind_evaluations(nb::class_<T>& bound) {
 
 }  // namespace
 }  // namespace sphshell
+
+void bind_derivatives(nanobind::module_& m, nanobind::class_<sphshell::Evaluations>& scene,
+                      nanobind::class_<sphshell::OwnState>& state);
 
 void bind_dynamics(nanobind::module_& m) {
   using namespace sphshell;
@@ -230,10 +233,10 @@ void bind_dynamics(nanobind::module_& m) {
           "rate_jacobian",
           [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
              const VectorX& tau, int repeat) {
-            return self.at(q, v, [&](SceneData& scene, auto&&) {
+            return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
               check_count("z", z.size(), scene.bristle_size());
               check_count("tau", tau.size(), v.size());
-              Linearization linearization(scene);
+              Linearization& linearization = evaluate.linearization();
               scene.restart();
               scene.evaluate(q, v, z);
               MatrixX jacobian;
@@ -255,6 +258,7 @@ void bind_dynamics(nanobind::module_& m) {
           nb::arg("model"), nb::arg("pairs"), nb::arg("joints") = nb::none())
       .def("copy", [](const OwnState& self) { return new OwnState(self); })
       .def("advance", &OwnState::advance, nb::arg("q"), nb::arg("v"), nb::arg("dt"));
+  bind_derivatives(m, scene, state);
 
   nb::class_<Controller>(m, "Controller");
   nb::class_<GravityCompensation, Controller>(m, "GravityCompensation")
@@ -340,6 +344,18 @@ void bind_dynamics(nanobind::module_& m) {
           nb::arg("model"), nb::arg("pairs"), nb::arg("joints").none(),
           nb::arg("controller").none(), nb::arg("q0"), nb::arg("v0"), nb::arg("settings"),
           nb::arg("sensors"))
+      .def(
+          "differentiate",
+          [](Run& self, const std::vector<const Parameter*>& parameters, bool by_q0, bool by_v0) {
+            const Use use(self.user, "differentiate");
+            self.simulation.differentiate({copies(parameters), by_q0, by_v0});
+          },
+          nb::arg("parameters"), nb::arg("by_q0"), nb::arg("by_v0"))
+      .def("take_sensitivities",
+           [](Run& self) {
+             const Use use(self.user, "take");
+             return to_dict(self.simulation.take_sensitivities());
+           })
       .def(
           "advance",
           [](Run& self, double wall_seconds, double until) {

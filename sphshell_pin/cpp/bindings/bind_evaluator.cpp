@@ -27,12 +27,6 @@ using Rows = Eigen::Ref<RowMajor>;
 
 constexpr int kForce = 4;  // numbers of a pair: normal force, force in the world
 
-// Evaluates at q, v with bristles unstretched.
-void evaluate(SceneData& scene, const VectorX& q, const VectorX& v) {
-  scene.restart();
-  scene.evaluate(q, v, VectorX::Zero(scene.bristle_size()));
-}
-
 void check_forces(const SceneData& scene, const Rows& forces, Eigen::Index columns) {
   check_count("rows of forces", forces.rows(),
               kForce * static_cast<Eigen::Index>(scene.pairs().size()));
@@ -82,10 +76,10 @@ void sum_slopes(Linearization& linearization, SceneData& scene, const VectorX& q
 // Fills acceleration (nv), and the forces.
 void evaluate_into(Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& tau,
                    Out acceleration, Rows forces) {
-  self.at(q, v, [&](SceneData& scene, auto&&) {
+  self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
     check_count("tau", tau.size(), v.size());
     check_count("acceleration", acceleration.size(), v.size());
-    evaluate(scene, q, v);
+    evaluate();
     acceleration = scene.acceleration(q, v, tau);
     sum_forces(scene, q, v, forces);
   });
@@ -94,14 +88,14 @@ void evaluate_into(Evaluations& self, const VectorX& q, const VectorX& v, const 
 // Fills by_state (nv, 2 nv), by_tau (nv, nv), and those of the forces.
 void differentiate_into(Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& tau,
                         Columns by_state, Columns by_tau, Rows forces_by_state) {
-  self.at(q, v, [&](SceneData& scene, auto&&) {
+  self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
     const Eigen::Index nv = v.size();
     check_count("tau", tau.size(), nv);
     check_slopes(by_state, by_tau, nv, nv);
-    Linearization linearization(scene);
-    evaluate(scene, q, v);
+    Linearization& linearization = evaluate.linearization();
+    evaluate();
     MatrixX jacobian;
-    linearization.rates(q, v, VectorX::Zero(scene.bristle_size()), tau, jacobian);
+    linearization.rates(q, v, self.bristles(scene), tau, jacobian);
     by_state = jacobian.topLeftCorner(nv, 2 * nv);
     by_tau = linearization.inverse_mass();
     sum_slopes(linearization, scene, q, v, forces_by_state);
@@ -203,24 +197,16 @@ struct Frame {
   Frame(int joint, const Eigen::Matrix4d& placement, const Eigen::Matrix4d& reference)
       : joint(joint), placement(placement), reference(reference) {}
 
-  // Where it is, when the joints' placements and, with `axes`, their axes have been computed.
-  pinocchio::SE3 place(Multibody& body, const VectorX& q, bool axes) const {
-    if (joint > 0) body.need(joint);
-    if (axes) {
-      body.want_derivatives();
-      body.place_axes(q);
-    } else {
-      body.kinematics(q);
-    }
-    return body.world_from(joint, placement);
-  }
+  pinocchio::SE3 place(const Multibody& body) const { return body.world_from(joint, placement); }
 };
 
 // Fills residual: (3), the place against that of the reference, or (6), log6 of the placement in
 // the reference.
 void frame_into(Evaluations& self, const Frame& frame, const VectorX& q, Out residual) {
   self.at(q, VectorX::Zero(self.model().nv), [&](SceneData& scene, auto&&) {
-    const pinocchio::SE3 world_from_frame = frame.place(scene.body(), q, false);
+    scene.body().need(frame.joint);
+    scene.body().kinematics(q);
+    const pinocchio::SE3 world_from_frame = frame.place(scene.body());
     if (residual.size() == 3)
       residual = world_from_frame.translation() - frame.reference.translation();
     else
@@ -233,9 +219,12 @@ void differentiate_frame_into(Evaluations& self, const Frame& frame, const Vecto
                               Columns by_q) {
   const VectorX v = VectorX::Zero(self.model().nv);
   check_count("columns of by_q", by_q.cols(), v.size());
-  self.at(q, v, [&](SceneData& scene, auto&&) {
-    const Multibody& body = scene.body();
-    const pinocchio::SE3 world_from_frame = frame.place(scene.body(), q, true);
+  self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
+    Multibody& body = scene.body();
+    evaluate.linearization();  // prepares the axes
+    body.need(frame.joint);
+    body.place_axes(q);
+    const pinocchio::SE3 world_from_frame = frame.place(body);
     Chain chain(body.model(), 0, frame.joint);
     // Twists in the frame.
     chain.place(body, world_from_frame, v);

@@ -15,6 +15,14 @@ inline void check_state(const SceneData& scene, const VectorX& q, const VectorX&
   check_count("v", v.size(), scene.body().model().nv);
 }
 
+// What a state answers at (q, v): its forces, when it is called.
+struct Evaluate {
+  SceneState& state;
+  const VectorX &q, &v;
+  void operator()() const { state.evaluate(q, v); }
+  Linearization& linearization() const { return state.linearization(); }
+};
+
 // A call has a state to itself: while its contact source runs, another thread, or the source
 // itself, may begin another. The interpreter's lock guards the fields.
 class Evaluations {
@@ -25,7 +33,7 @@ class Evaluations {
   Evaluations(const Evaluations&) = delete;
   Evaluations& operator=(const Evaluations&) = delete;
 
-  // work(scene, evaluate) at a state whose sizes are checked; evaluate() computes its forces.
+  // work(scene, evaluate) at a state whose sizes are checked.
   template <class Work>
   auto at(const VectorX& q, const VectorX& v, Work&& work) {
     check_state(first_.scene(), q, v);
@@ -37,10 +45,13 @@ class Evaluations {
       idle_.pop_back();
     }
     const GiveBack give_back{idle_, state};
-    return work(state->scene(), [&] { state->evaluate(q, v); });
+    return work(state->scene(), Evaluate{*state, q, v});
   }
 
+  const pinocchio::Model& model() const { return first_.scene().body().model(); }
   int bristle_size() const { return first_.scene().bristle_size(); }
+  // Unstretched.
+  VectorX bristles(const SceneData& scene) const { return VectorX::Zero(scene.bristle_size()); }
 
   // Those at work are not among them: what holds them is alive.
   template <class Visit>
@@ -77,8 +88,9 @@ struct OwnState {
   auto at(const VectorX& q, const VectorX& v, Work&& work) {
     const Use use(user, "evaluation");
     check_state(state.scene(), q, v);
-    return work(state.scene(), [&] { state.evaluate(q, v); });
+    return work(state.scene(), Evaluate{state, q, v});
   }
+  VectorX bristles(const SceneData&) const { return state.bristles(); }
   void advance(const VectorX& q, const VectorX& v, double dt) {
     const Use use(user, "advance");
     check_state(state.scene(), q, v);

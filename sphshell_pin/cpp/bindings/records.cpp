@@ -46,6 +46,16 @@ nb::dict to_dict(Record record, int nq, int nv) {
   return out;
 }
 
+nb::dict to_dict(SensitivityRecord record) {
+  nb::dict out;
+  out["q"] = to_array(std::move(record.q));
+  out["v"] = to_array(std::move(record.v));
+  out["force_world"] = to_array(std::move(record.force_world));
+  out["normal_force"] = to_array(std::move(record.normal_force));
+  out["depth"] = to_array(std::move(record.depth));
+  return out;
+}
+
 nb::dict to_dict(const Counts& counts) {
   nb::dict out;
   out["steps"] = counts.steps;

@@ -25,6 +25,7 @@ nb::dict row_type(const RowField (&fields)[count]) {
   return row_type(fields, count, sizeof(Row));
 }
 nb::dict to_dict(Record record, int nq, int nv);
+nb::dict to_dict(SensitivityRecord record);
 nb::dict to_dict(const Counts& counts);
 // (pair, depth [m]), or None.
 nb::object to_python(const std::optional<DeepStart>& start);

@@ -118,6 +118,8 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     point_by = Mat3::Identity() + n * depth_by - (site.radius - contact.depth) * normal_by;
     if (site.shape) depth_by -= site.shape->tilt.transpose();
   }
+  out.depth_by_place = depth_by;
+  out.normal_by_place = normal_by;
 
   ContactKinematics<double> m;
   m.depth = site.shape ? site.shape->depth : contact.depth;
@@ -176,6 +178,8 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
   out.by_place.topRows<3>() = force_by_place;
   out.by_place.bottomRows<3>() = arm * force_by_place - cross_matrix(force) * point_by +
                                  at.moment * weight_by + weight * by_place(at.moment, at.moment_by);
+  out.by_depth.head<3>() = weight * at.force_by.depth;
+  out.by_depth.tail<3>() = weight * (arm * at.force_by.depth + at.moment_by.depth);
   out.by_twist.topRows<3>() = force_by_twist;
   out.by_twist.bottomRows<3>() = arm * force_by_twist + weight * by_twist(at.moment_by);
   if (site.shape && law.hertz()) {
@@ -195,6 +199,9 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     out.wrench.tail<3>() += site.place.cross(climb);
     out.by_place.topRows<3>() += by;
     out.by_place.bottomRows<3>() += cross_matrix(site.place) * by - cross_matrix(climb);
+    const Vec3 by_depth = weight * (shape.scale * push_by * shape.tilt - push * shape.gradient);
+    out.by_depth.head<3>() += by_depth;
+    out.by_depth.tail<3>() += site.place.cross(by_depth);
   }
   if (!friction.has_state()) return;
   const auto by_stretch = [&](const Mat3& force, const Mat3& moment) -> Matrix63 {
@@ -204,6 +211,8 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     return all;
   };
   out.by_stretch = by_stretch(at.force_by.stretch, at.moment_by.stretch);
+  out.rate = at.rate;
+  out.rate_by_depth = at.rate_by.depth;
   out.rate_by_place = by_place(at.rate, at.rate_by);
   out.rate_by_twist = by_twist(at.rate_by);
   out.rate_by_stretch = at.rate_by.stretch;
@@ -214,6 +223,8 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     ContactSlopes::Ring& ring = out.outer[k];
     const LawSlopes::By& by = at.outer_by[k];
     ring.by_stretch = by_stretch(at.force_by.outer[k], at.moment_by.outer[k]);
+    ring.rate = at.outer[k];
+    ring.rate_by_depth = by.depth;
     ring.rate_by_place = by_place(at.outer[k], by);
     ring.rate_by_twist = by_twist(by);
     ring.first_by_stretch = at.rate_by.outer[k];

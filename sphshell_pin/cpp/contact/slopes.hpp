@@ -35,15 +35,20 @@ struct ContactSite {
 };
 
 struct ContactSlopes {
+  Eigen::RowVector3d depth_by_place;
+  Mat3 normal_by_place;
   Vector6 wrench;     // on the sphere's body
   Matrix63 by_place;  // of the wrench
   Matrix6 by_twist;
+  Vector6 by_depth;  // where the contact stays where it is
   Matrix63 by_stretch;
-  Mat3 rate_by_place;  // of the bristle's rate
+  Vec3 rate, rate_by_depth;  // of the bristle; without its turning with the normal
+  Mat3 rate_by_place;
   Matrix36 rate_by_twist;
   Mat3 rate_by_stretch;
   // The same of the rings of a bristle behind the first.
   struct Ring {
+    Vec3 rate, rate_by_depth;
     Matrix63 by_stretch;
     Mat3 rate_by_place;
     Matrix36 rate_by_twist;

@@ -144,6 +144,8 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
     out.wrench << force, center_.cross(force);
     out.by_place << slope, cross_matrix(center_) * slope - cross_matrix(force);
     out.by_twist.setZero();
+    out.depth_by_place = -site.contact.normal.transpose();
+    out.normal_by_place = site.contact.dn_dc;
   }
   const CoulombFriction* friction = sliding_friction(pair);
   for (const FoundationPoint& point : foundation_.points()) {

@@ -36,7 +36,7 @@ struct DryFriction {
 struct JointEffects {
   std::vector<JointStop> stops;
   std::vector<DryFriction> friction;
-  VectorX damping;        // (nv) [N m s/rad or N s/m], or empty
+  VectorX damping;                           // (nv) [N m s/rad or N s/m], or empty
   VectorX least_effort, most_effort, speed;  // (nv), infinite where there is no limit, or empty
 };
 

@@ -41,6 +41,7 @@ void Linearization::rates(const VectorX& q, const VectorX& v, const VectorX& z, 
   auto by_q = jacobian.topLeftCorner(nv, nv), by_v = jacobian.block(0, nv, nv, nv);
   force_ = tau;
   const bool joints_act = scene_.joints().act(), any = scene_.touching() || joints_act;
+  by_parameters_.setZero(nv + z.size(), static_cast<Eigen::Index>(parameters_.size()));
   if (any) add_contacts(q, v, &jacobian);
   if (joints_act) add_joints(q, v, z, jacobian);
   // These forces are torques like others: their derivatives pass through the inertia.
@@ -51,6 +52,8 @@ void Linearization::rates(const VectorX& q, const VectorX& v, const VectorX& z, 
       by_q.col(m) += by_q_(k, m) * inverse_mass_.col(k);
       by_v.col(m) += by_v_(k, m) * inverse_mass_.col(k);
     }
+  if (!parameters_.empty())
+    by_parameters_.topRows(nv) = (inverse_mass_ * by_parameters_.topRows(nv)).eval();
   // What was written as generalized forces by z.
   const auto pass_through_inertia = [&](Eigen::Index z) {
     auto column = jacobian.col(2 * nv + z).head(nv);
@@ -102,16 +105,12 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
     Sum sum{Vector6::Zero(), Matrix6::Zero(), Matrix6::Zero()};
     for (next = first; next < active.size() && active[next].pair == p; ++next) {
       const ContactSite site = site_of(active[next], chain.twist());
-      if (active[next].row >= 0)
-        scene_.foundation(active[next])
-            .slopes(pair, active[next].row, scene_.relaxation(pair), site,
-                    active[next].force.normal, slopes_);
-      else
-        contact_slopes(pair.law, pair.friction, scene_.relaxation(pair), site, slopes_);
+      find_slopes(active[next], site);
       sum.wrench += slopes_.wrench;
       sum.by_displacement += slopes_.by_place * displacement_at(site.place);
       sum.by_twist += slopes_.by_twist;
       if (jacobian && active[next].slot >= 0) add_bristle(active[next], site, chain, *jacobian);
+      if (jacobian) add_parameters(active[next], site, chain);
     }
     chain.add_force(sum.wrench, force_, by_q_);
     for (int m = 0; m < chain.size(); ++m) {
@@ -127,6 +126,15 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
       is_loaded_[column] = 1;
     }
   }
+}
+
+void Linearization::find_slopes(const ActiveContact& active, const ContactSite& site) {
+  const Pair& pair = scene_.pairs()[active.pair];
+  if (active.row >= 0)
+    scene_.foundation(active).slopes(pair, active.row, scene_.relaxation(pair), site,
+                                     active.force.normal, slopes_);
+  else
+    contact_slopes(pair.law, pair.friction, scene_.relaxation(pair), site, slopes_);
 }
 
 void Linearization::add_bristle(const ActiveContact& active, const ContactSite& site,

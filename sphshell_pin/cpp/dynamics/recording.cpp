@@ -27,8 +27,9 @@ Record Recorder::take() {
 Record Recorder::snapshot(SceneData& scene, const State& state) {
   Record recorded = take();
   const long rows = std::exchange(rows_, 0);
+  RowFollower* follower = std::exchange(follower_, nullptr);
   add_row(scene, state);
-  rows_ = rows;
+  rows_ = rows, follower_ = follower;
   return std::exchange(record_, std::move(recorded));
 }
 
@@ -39,10 +40,11 @@ void Recorder::add_rows(SceneData& scene, const Chart& chart, const Stepper& ste
     const double last = end_ - 1e-9 * record_dt_;
     bool moved = false;
     for (; due() < to.t && due() < last; ++next_row_) {
-      stepper.interpolate((due() - from.t) / (to.t - from.t), y_);
+      const double share = (due() - from.t) / (to.t - from.t);
+      stepper.interpolate(share, y_);
       chart.finish(due(), y_, between_);
       scene.evaluate(between_.q, between_.v, between_.z, true);
-      add_row(scene, between_);
+      add_row(scene, between_, share);
       moved = true;
     }
     if (moved) {
@@ -56,7 +58,7 @@ void Recorder::add_rows(SceneData& scene, const Chart& chart, const Stepper& ste
   add_row(scene, to);
 }
 
-void Recorder::add_row(SceneData& scene, const State& state) {
+void Recorder::add_row(SceneData& scene, const State& state, double share) {
   scene.log(state.q, state.v, record_.contacts, record_.patches ? &*record_.patches : nullptr);
   record_.contact_row.resize(record_.contacts.size(), double(rows_));
   record_.t.push_back(state.t);
@@ -69,6 +71,7 @@ void Recorder::add_row(SceneData& scene, const State& state) {
   for (double e : {kinetic, potential, powers.elastic + powers.bristles, ledger.damping,
                    ledger.friction - powers.bristles, ledger.control})
     record_.energy.push_back(e);
+  if (follower_) follower_->add_row(state, share);
   ++rows_;
 }
 

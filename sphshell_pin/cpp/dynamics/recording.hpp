@@ -15,7 +15,7 @@ struct Event {
     Deep,
     Through,
     BeyondHertz,  // the theory of its law does not hold
-    Stop,  // a joint reaches a stop, and leaves it
+    Stop,         // a joint reaches a stop, and leaves it
     StopLeft,
     EffortLimit,  // a controller's torque begins to be cut, and ends
     EffortLimitLeft,
@@ -61,13 +61,29 @@ struct Record {
   SensorRows sensors;
 };
 
+// Of each recorded row, in rows of one number a column: changes of q and v; of each of its contacts
+// those of the force on the sphere (three rows), the normal force and the depth.
+struct SensitivityRecord {
+  std::vector<double> q, v, force_world, normal_force, depth;
+};
+
+// Records something more of each row.
+class RowFollower {
+ public:
+  virtual ~RowFollower() = default;
+  // `share`: where in the step under way the state is; the scene's last evaluate() was there.
+  virtual void add_row(const State& state, double share) = 0;
+};
+
 class Recorder {
  public:
   // Rows every `record_dt` from `start` to `end` [s], and at `end`; 0: at the end of every step.
   Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches);
 
-  // The scene's last evaluate() was at the state.
-  void add_row(SceneData& scene, const State& state);
+  void set_follower(RowFollower* follower) { follower_ = follower; }
+
+  // The scene's last evaluate() was at the state; `share`: see RowFollower.
+  void add_row(SceneData& scene, const State& state, double share = 1);
   // The rows due in the last step of `stepper`, which is from `from` to `to`, and at its end.
   // Leaves the forces evaluated at `to`.
   void add_rows(SceneData& scene, const Chart& chart, const Stepper& stepper, const State& from,
@@ -114,6 +130,7 @@ class Recorder {
   long rows_ = 0, next_row_ = 1;
   State between_;
   VectorX y_;
+  RowFollower* follower_ = nullptr;
 };
 
 }  // namespace sphshell

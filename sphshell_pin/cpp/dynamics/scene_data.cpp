@@ -138,16 +138,38 @@ void SceneData::accept(VectorX& z) {
       active_[next++].contact_id = tracker.places()[i].number;
   }
   if (!bristles_.any()) return;
-  joint_stretches_ = z.tail(joints_.size());
-  bristles_.end(z);
-  z.conservativeResize(bristle_size());
-  z.tail(joints_.size()) = joint_stretches_;
+  end_bristles(bristles_, z);
   // From now on, the place of a contact is its place in the list.
   for (std::size_t i = 0, place = 0; i < active_.size(); ++i) {
     place = i > 0 && active_[i].pair == active_[i - 1].pair ? place + 1 : 0;
     active_[i].slot = bristles_.slot(active_[i].pair, static_cast<int>(place));
   }
   compute_forces(z);
+}
+
+void SceneData::reorder_bristles(VectorX& z) {
+  if (!bristles_.any()) return;
+  Bristles bristles = bristles_;
+  bristles.begin();
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    const Pair& pair = pairs_[k];
+    std::vector<Contact>& contacts = queries_[k].contacts;
+    if (!pair.friction.has_state() || (contacts.empty() && trackers_[k].places().empty())) {
+      bristles.assign_none(k);
+      continue;
+    }
+    const std::vector<int>& at = trackers_[k].match(contacts, states_[k].center, pair.radius);
+    bristles.assign(k, contacts, at, trackers_[k], z, pair.friction.torsional(), pair.has_dn_dc());
+  }
+  end_bristles(bristles, z);
+}
+
+// Stretches of joints stay behind those of contacts.
+void SceneData::end_bristles(Bristles& bristles, VectorX& z) const {
+  const VectorX joints = z.tail(joints_.size());
+  bristles.end(z);
+  z.conservativeResize(bristles.size() + joints.size());
+  z.tail(joints.size()) = joints;
 }
 
 std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
@@ -200,11 +222,11 @@ std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
 // The shapes of the gaps at a pair's contacts.
 void SceneData::find_shapes(std::size_t k) {
   shapes_[k].clear();
-  for (const Contact& contact : queries_[k].contacts) shapes_[k].push_back(find_shape(k, contact));
+  for (const Contact& contact : queries_[k].contacts)
+    shapes_[k].push_back(shape_of(k, pairs_[k], contact));
 }
 
-ContactShape SceneData::find_shape(std::size_t k, const Contact& contact) {
-  const Pair& pair = pairs_[k];
+ContactShape SceneData::shape_of(std::size_t k, const Pair& pair, const Contact& contact) {
   if (pair.ball > 0 || pair.method != Method::Smooth) {
     const double curvature = 1 / pair.radius + (pair.ball > 0 ? 1 / pair.ball : 0);
     ContactShape out = shape_of_gap(curvature * Mat3::Identity(), contact.normal, pair.radius);

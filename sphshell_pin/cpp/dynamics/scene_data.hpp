@@ -80,12 +80,16 @@ class SceneData {
   // Makes the state of the last evaluate() the one from which contacts and bristles go on. Slots
   // are assigned anew: z is put in their order.
   void accept(VectorX& z);
+  // What accept() makes of z, without accepting anything.
+  void reorder_bristles(VectorX& z);
   // Returns to the accepted state: forgets the contacts found since.
   void restart();
   // Rows of the contacts at (q, v), where the forces were last evaluated; with `patches` those of
   // their patches, too.
   void log(const VectorX& q, const VectorX& v, std::vector<ContactRow>& rows,
            std::vector<PatchRow>* patches = nullptr);
+  // The row of each active contact among those of log(), and how many there are.
+  int rows_of_contacts(std::vector<int>& rows) const;
 
   // Size of z, spare slots for new contacts included; where those of joints begin.
   int bristle_size() const { return bristles_.size() + joints_.size(); }
@@ -106,6 +110,8 @@ class SceneData {
   double disc_radius(const ActiveContact& active) const {
     return active.shape < 0 ? pairs_[active.pair].disc_radius() : shape(active)->disc_radius();
   }
+  // What shape() would be of a pair that differs from pair k by its radii.
+  ContactShape shape_of(std::size_t k, const Pair& pair, const Contact& contact);
   // Contacts have dn_dc, where it is known, from the next evaluate() on.
   void want_dn_dc();
 
@@ -140,8 +146,8 @@ class SceneData {
  private:
   std::vector<Contact>& find_contacts(std::size_t k, bool far);
   void find_shapes(std::size_t k);
-  ContactShape find_shape(std::size_t k, const Contact& contact);
   PatchRow patch_of(const ActiveContact& active, const ContactRow& row);
+  void end_bristles(Bristles& bristles, VectorX& z) const;
   void evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z);
   void add_contact(std::size_t k, const Contact& contact, int slot, int contact_id);
   void compute_forces(const VectorX& z);
@@ -171,7 +177,7 @@ class SceneData {
   std::vector<int> loaded_;  // joints that contacts act on
   Powers powers_;
   Bristles bristles_;
-  VectorX bristle_rates_, joint_stretches_, stretches_;
+  VectorX bristle_rates_, stretches_;
   double relaxation_ = 0;
   bool touching_ = false;
   bool needs_velocity_ = false;

@@ -49,6 +49,21 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
   }
 }
 
+int SceneData::rows_of_contacts(std::vector<int>& rows) const {
+  rows.assign(active_.size(), -1);
+  int count = 0;
+  for (std::size_t i = 0, begin = 0; i < active_.size(); ++i) {
+    if (i > 0 && active_[i].pair != active_[i - 1].pair) begin = i;
+    const std::vector<Contact>& contacts = queries_[active_[i].pair].contacts;
+    if (!leads(contacts, i - begin)) continue;
+    const int group = contacts[i - begin].group;
+    for (std::size_t k = i - begin; k < contacts.size(); ++k)
+      if (begin + k == i || (group >= 0 && contacts[k].group == group)) rows[begin + k] = count;
+    ++count;
+  }
+  return count;
+}
+
 PatchRow SceneData::patch_of(const ActiveContact& active, const ContactRow& row) {
   const Pair& pair = pairs_[active.pair];
   if (pair.source) return unknown_patch(row.depth);
@@ -56,7 +71,7 @@ PatchRow SceneData::patch_of(const ActiveContact& active, const ContactRow& row)
   if (active.row >= 0)
     return foundations_[active.pair].patch(pair, active.row, rotation, row.normal_force);
   const ContactShape gap =
-      active.shape < 0 ? find_shape(active.pair, active.contact) : *shape(active);
+      active.shape < 0 ? shape_of(active.pair, pair, active.contact) : *shape(active);
   return hertz_patch(gap, rotation, row.depth, row.normal_force);
 }
 

@@ -1,10 +1,11 @@
 // A scene along a motion that somebody else integrates.
 #pragma once
 
+#include <optional>
 #include <utility>
 #include <vector>
 
-#include "dynamics/scene_data.hpp"
+#include "dynamics/linearization.hpp"
 
 namespace sphshell {
 
@@ -15,6 +16,9 @@ class SceneState {
   SceneState(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints)
       : scene_(model, std::move(pairs), std::move(joints)),
         z_(VectorX::Zero(scene_.bristle_size())) {}
+  SceneState(const SceneState& other)
+      : scene_(other.scene_), q_(other.q_), z_(other.z_), begun_(other.begun_) {}
+  SceneState& operator=(const SceneState&) = delete;
 
   // Forces at (q, v), with the memory as it is: they do not change it.
   void evaluate(const VectorX& q, const VectorX& v) {
@@ -36,6 +40,12 @@ class SceneState {
     begun_ = true;
   }
 
+  // Made when it is first asked for.
+  Linearization& linearization() {
+    if (!linearization_) linearization_.emplace(scene_);
+    return *linearization_;
+  }
+
   SceneData& scene() { return scene_; }
   const SceneData& scene() const { return scene_; }
   const VectorX& bristles() const { return z_; }
@@ -44,6 +54,7 @@ class SceneState {
   SceneData scene_;
   VectorX q_, z_;
   bool begun_ = false;
+  std::optional<Linearization> linearization_;
 };
 
 }  // namespace sphshell

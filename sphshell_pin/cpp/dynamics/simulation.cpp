@@ -63,6 +63,12 @@ Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
   }
 }
 
+void Simulation::differentiate(SensitivitySettings settings) {
+  if (!settings.any()) return;
+  sensitivities_ = std::make_unique<Sensitivities>(scene_, std::move(settings));
+  recorder_.set_follower(sensitivities_.get());
+}
+
 std::optional<DeepStart> Simulation::deep_start() {
   if (!started_) start();
   for (std::size_t k = 0; k < scene_.pairs().size(); ++k) {
@@ -141,9 +147,10 @@ Simulation::Status Simulation::step() {
     if (!make_controlled(end)) status = Status::Stuck;
   } else {
     kink_ = kInfinity;
-    if (!stepping_.fine() && stepping_.make_fixed(end))
+    if (!stepping_.fine() && stepping_.make_fixed(end)) {
+      if (sensitivities_) differentiate_step();
       accept();
-    else
+    } else
       status = replace_fixed_step(end);
     if (status == Status::Running && time() < end) return is_finite() ? status : Status::Diverged;
     fine_steps_ = 0;
@@ -177,6 +184,7 @@ bool Simulation::make_controlled(double end) {
     case Stepping::Made::Step:
       break;
   }
+  if (sensitivities_) differentiate_step();
   if (settings_.dt == 0) {
     if (sensors_) {
       const KeptCuts kept(cut_);
@@ -191,12 +199,20 @@ bool Simulation::make_controlled(double end) {
   return true;
 }
 
+void Simulation::differentiate_step() {
+  const KeptCuts kept(cut_);
+  sensitivities_->step(stepping_.chart(), stepping_.stepper(), stepping_.state(), stepping_.next());
+}
+
 void Simulation::accept() {
   const double before = time();
   if (sensors_ && settings_.dt > 0) {
     const KeptCuts kept(cut_);
     sensors_->add_fixed(scene_, *this, stepping_.state(), stepping_.next(), settings_.dt, push_);
   }
+  if (sensitivities_)
+    sensitivities_->accept(stepping_.state(), stepping_.next(),
+                           (settings_.dt == 0 || stepping_.fine()) && stepping_.at_event());
   stepping_.accept();
   recorder_.add_step(scene_, time(), time() - before);
   recorder_.add_limits(scene_, v(), cut_, time(), time() - before);
@@ -214,6 +230,15 @@ void Simulation::hold_torques() {
   if (time() + hair < next_control_) return;
   while (next_control_ <= time() + hair)
     next_control_ = settings_.start_time + double(++controls_) * settings_.control_dt;
+  if (sensitivities_) {
+    const KeptCuts kept(cut_);
+    sensitivities_->hold(
+        [this](double t, const VectorX& q, const VectorX& v) -> const VectorX& {
+          command(t, q, v);
+          return tau_;
+        },
+        stepping_.state());
+  }
   command(time(), q(), v());
   if (sensors_) sensors_->jump();
 }

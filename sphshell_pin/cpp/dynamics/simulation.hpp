@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynamics/controllers.hpp"
+#include "dynamics/derivatives/sensitivities.hpp"
 #include "dynamics/push.hpp"
 #include "dynamics/recording.hpp"
 #include "dynamics/sensors.hpp"
@@ -50,6 +51,13 @@ class Simulation : private Torques {
   Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
              RunSettings settings, std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
              std::vector<Sensor> sensors = {});
+
+  // Before the start: what is recorded changes with these by so much. The controller is then asked
+  // at other states, too.
+  void differentiate(SensitivitySettings settings);
+  SensitivityRecord take_sensitivities() {
+    return sensitivities_ ? sensitivities_->take() : SensitivityRecord();
+  }
 
   // The first pair whose sphere is deeper than half its radius (of two spheres, the smaller) at the
   // start, or inside a closed one-sided shell on the wrong side, however far.
@@ -105,6 +113,7 @@ class Simulation : private Torques {
   Status step();
   Status replace_fixed_step(double end);
   bool make_controlled(double end);
+  void differentiate_step();
   void accept();
   void hold_torques();
   void command(double t, const VectorX& q, const VectorX& v);
@@ -119,7 +128,8 @@ class Simulation : private Torques {
   Stepping stepping_;
   Recorder recorder_;
   Push push_;
-  std::unique_ptr<Sensors> sensors_;  // null where there are none
+  std::unique_ptr<Sensors> sensors_;              // null where there are none
+  std::unique_ptr<Sensitivities> sensitivities_;  // null unless asked for
   VectorX tau_;
   std::vector<char> cut_;  // torques that were cut to their limit, when last computed
   long grid_ = 0, grid_steps_ = 0,

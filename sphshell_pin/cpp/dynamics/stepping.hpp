@@ -38,6 +38,9 @@ class Stepping {
   const State& next() const { return next_; }
   const Stepper& stepper() const { return *active_; }
   const Chart& chart() const { return chart_; }
+  Chart& chart() { return chart_; }
+  // Whether the controlled step that was made ends at an event.
+  bool at_event() const { return after_event_; }
   // Steps of the fixed length are replaced by controlled ones where a sphere moves too far.
   bool fine() const { return active_ != stepper_.get(); }
   void set_fine(bool fine);

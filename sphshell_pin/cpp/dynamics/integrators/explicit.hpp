@@ -13,6 +13,7 @@ class SemiImplicitEuler : public Stepper {
  public:
   void begin(Chart& chart) override;
   void step(Chart& chart, double h, State& out) override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
   bool leaves_work() const override { return true; }
 };
 
@@ -41,6 +42,7 @@ class ExplicitRungeKutta : public Stepper {
 class RungeKutta4 : public ExplicitRungeKutta {
  public:
   RungeKutta4();
+  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
 };
 
 // Order 5 with an estimate of order 4 (Dormand and Prince, J. Comput. Appl. Math. 6, 1980), dense

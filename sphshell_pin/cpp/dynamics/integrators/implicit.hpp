@@ -19,6 +19,7 @@ class ImplicitStepper : public Stepper {
   void factorize(double gamma_h);
   // In place; work is no part of the system.
   void solve(VectorX& x);
+  MatrixX solved(const MatrixX& columns) const { return lu_.solve(columns); }
 
   VectorX rate_of_time_;
 
@@ -39,6 +40,7 @@ class LinearlyImplicitEuler : public ImplicitStepper {
  public:
   using ImplicitStepper::ImplicitStepper;
   void step(Chart& chart, double h, State& out) override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
   bool leaves_work() const override { return true; }
 };
 

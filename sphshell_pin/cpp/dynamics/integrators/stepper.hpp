@@ -5,6 +5,9 @@
 
 namespace sphshell {
 
+class StepSlopes;
+struct Tangent;
+
 class Stepper {
  public:
   virtual ~Stepper() = default;
@@ -25,6 +28,9 @@ class Stepper {
   const VectorX& rate() const { return rate_; }
   // y within the last step, at the share theta of it, or a little beyond.
   virtual void interpolate(double /*theta*/, VectorX& /*y*/) const {}
+  // Moves changes of the origin to the end of the last step, of h; by default along the dense
+  // output.
+  virtual void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const;
   // True where the loop adds up the work of contacts, by the trapezoidal rule.
   virtual bool leaves_work() const { return false; }
   // True where no stiffness limits the step.

@@ -1,0 +1,146 @@
+"""The command export: a finished run in the formats of other tools."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sphshell_pin.cli.app import app, faults, progress_bar
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.scenario.replay import Replay
+
+FORMATS = ("mcap", "csv", "parquet")
+
+
+@app.command()
+def export(
+    *,
+    context: typer.Context,
+    run: Annotated[Path, typer.Argument(help="A finished run: its run.npz or results folder.")],
+    to: Annotated[
+        str, typer.Option(metavar="FORMAT", help="mcap (ROS 2 messages), csv or parquet (tables).")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="The .mcap file, or the folder of the tables; by default beside the run: "
+            "RUN.mcap, RUN_csv, RUN_parquet."
+        ),
+    ] = None,
+    start: Annotated[
+        str,
+        typer.Option(
+            metavar="TIME",
+            help="Of mcap: when t = 0 was, in seconds since 1970, or as 2026-11-22T21:00:00Z.",
+        ),
+    ] = "0",
+    of: Annotated[
+        str | None,
+        typer.Option("--scenario", help="Scenario that the run is from, where it is not found."),
+    ] = None,
+) -> None:
+    """Write a finished run as messages for Foxglove, RViz and Rerun, or as tables.
+
+    An MCAP file has joint states, transforms, wrenches, contacts, energies and sensors as ROS 2
+    messages, and needs no ROS. Tables are rows, contacts, events, energy and sensors.
+
+    Example: sphshell-pin export results/fingertip_on_blade --to mcap
+    """
+    with faults(context):
+        from sphshell_pin.errors import InvalidParameter
+        from sphshell_pin.scenario.replay import Replay
+
+        if to not in FORMATS:
+            must = f"must be one of {', '.join(FORMATS)}"
+            if to == "rrd":
+                must += "; Rerun's viewer opens .mcap files"
+            raise InvalidParameter("--to", to, must)
+        begin = nanoseconds(start)
+        words = ["export", str(run), "--to", to]
+        words += [] if out is None else ["--out", str(out)]
+        words += ["--start", start] if begin else []
+        words += [] if of is None else ["--scenario", of]
+        command = shlex.join(["sphshell-pin", *words])
+        if to == "mcap":
+            replay = Replay(file_of(run), of)
+            files = [_write_mcap(out or beside(run, ".mcap"), replay, begin, command)]
+        else:
+            from sphshell_pin.export.tables import write_tables
+
+            result, scene = with_scene(run, of)
+            place = out or beside(run, f"_{to}")
+            files = write_tables(place, result, scene, format=to, command=command)  # type: ignore[arg-type]
+        for file in files:
+            typer.echo(file)
+
+
+def file_of(run: Path) -> Path:
+    """Return the file of a run: `run` itself, or that in the results folder `run`."""
+    return run / "run.npz" if run.is_dir() else run
+
+
+def beside(run: Path, ending: str) -> Path:
+    """Return the path beside a run's folder, or beside its file, that has its name and `ending`."""
+    if run.name == "run.npz":
+        run = run.parent
+    run = run if run.name else run.absolute()  # "." has no name
+    named = run if run.is_dir() else run.with_suffix("")
+    return named.with_name(named.name + ending)
+
+
+def nanoseconds(text: str) -> int:
+    """Return the time that --start states, in nanoseconds since 1970."""
+    from datetime import UTC, datetime, timedelta
+    from decimal import Decimal, InvalidOperation
+
+    from sphshell_pin.errors import InvalidParameter
+
+    try:
+        return round(Decimal(text) * 10**9)
+    except (InvalidOperation, OverflowError, ValueError):
+        pass
+    try:
+        time = datetime.fromisoformat(text)
+    except ValueError:
+        must = "must be seconds since 1970, or a date such as 2026-11-22T21:00:00Z"
+        raise InvalidParameter("--start", text, must) from None
+    since = (time if time.tzinfo else time.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
+    return (since // timedelta(microseconds=1)) * 1000
+
+
+def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | None]:
+    """Return a run and its scene; without one, say that joints have numbers instead of names."""
+    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.errors import ResultError
+    from sphshell_pin.scenario.replay import Replay
+
+    try:
+        replay = Replay(file_of(run), scenario)
+        return replay.result, replay.scene
+    except ResultError as fault:
+        if scenario is not None:
+            raise
+        result = Result.load(file_of(run))
+        typer.echo(f"warning: joints have numbers instead of names: {fault}", err=True)
+        return result, None
+
+
+def _write_mcap(place: Path, replay: Replay, start: int, command: str) -> Path:
+    from sphshell_pin.export.mcap import write_mcap
+
+    with progress_bar() as bar:
+        task = bar.add_task(place.name, total=1.0)
+        return write_mcap(
+            place,
+            replay.result,
+            replay.scene,
+            start=start,
+            command=command,
+            progress=lambda share: bar.update(task, completed=share),
+        )

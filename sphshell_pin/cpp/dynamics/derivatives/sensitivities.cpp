@@ -1,0 +1,129 @@
+#include "dynamics/derivatives/sensitivities.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "dynamics/integrators/stepper.hpp"
+
+namespace sphshell {
+namespace {
+
+// A contact that begins at the end of a step is not deeper there than by this share of its motion.
+constexpr double kJustBegun = 1e-2;
+// Stretches are differenced by this share of their size.
+constexpr double kStretchDifference = 1e-4;
+
+// The change of what has `slopes` by (u, v, z, parameters).
+MatrixX applied(const MatrixX& slopes, const Tangent& by, Eigen::Index parameters) {
+  const Eigen::Index nv = by.q.rows(), nz = by.z.rows();
+  MatrixX out = slopes.leftCols(nv) * by.q + slopes.middleCols(nv, nv) * by.v;
+  out.noalias() += slopes.middleCols(2 * nv, nz) * by.z;
+  out.leftCols(parameters) += slopes.rightCols(parameters);
+  return out;
+}
+
+void append(std::vector<double>& to, const MatrixX& rows) {
+  for (Eigen::Index i = 0; i < rows.rows(); ++i)
+    for (Eigen::Index k = 0; k < rows.cols(); ++k) to.push_back(rows(i, k));
+}
+
+}  // namespace
+
+Sensitivities::Sensitivities(SceneData& scene, SensitivitySettings settings)
+    : scene_(scene), slopes_(scene, std::move(settings.parameters)), by_v0_(settings.by_v0) {
+  const Eigen::Index nv = scene.body().model().nv, nz = scene.bristle_size();
+  const auto first = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
+  const Eigen::Index last = first + (settings.by_q0 ? nv : 0);
+  columns_ = last + (settings.by_v0 ? nv : 0);
+  now_ = {MatrixX::Zero(nv, columns_), MatrixX::Zero(nv, columns_), MatrixX::Zero(nz, columns_)};
+  if (settings.by_q0) now_.q.middleCols(first, nv).setIdentity();
+  if (settings.by_v0) now_.v.middleCols(last, nv).setIdentity();
+  torque_.setZero(nv, columns_);
+}
+
+void Sensitivities::hold(const TorqueAt& torque, const State& state) {
+  const MatrixX& slopes = slopes_.torque_slopes(torque, state.t, state.q, state.v, state.z);
+  torque_ = applied(slopes, now_, 0);
+}
+
+void Sensitivities::step(Chart& chart, const Stepper& stepper, const State& from, const State& to) {
+  next_ = now_;
+  chart_ = &chart, stepper_ = &stepper, h_ = to.t - from.t;
+  slopes_.carry(chart, stepper, h_, torque_, next_);
+  scene_.restart();
+  scene_.evaluate(to.q, to.v, to.z);
+}
+
+void Sensitivities::accept(const State& from, const State& to, bool located) {
+  chart_ = nullptr;
+  std::swap(now_, next_);
+  if (now_.z.rows() == 0) return;
+  if (located) begin_contacts(to, to.t - from.t);
+  reorder_bristles(to.z);
+}
+
+// The time of a touch changes with the parameters. A stretch that begins there with a rate jumps
+// from no change to that rate times the time by which it begins earlier.
+void Sensitivities::begin_contacts(const State& to, double h) {
+  const std::vector<ActiveContact>& active = scene_.active();
+  const auto is_new = [&](const ActiveContact& one) { return one.slot >= 0 && scene_.is_new(one); };
+  if (std::none_of(active.begin(), active.end(), is_new)) return;
+  slopes_.linearization().contact_forces(to.q, to.v, contacts_);
+  std::vector<int> row_of;
+  scene_.rows_of_contacts(row_of);
+  const auto parameters = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
+  const MatrixX depth_by = applied(contacts_.depth, now_, parameters);
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    if (!is_new(active[i])) continue;
+    const double rate = contacts_.depth.row(row_of[i]).head(to.v.size()).dot(to.v);
+    if (!(rate > 0) || active[i].contact.depth > kJustBegun * rate * h) continue;
+    const int rings = scene_.pairs()[active[i].pair].friction.rings();
+    const Eigen::Index at = 3 * active[i].slot, size = 3 * rings;
+    now_.z.middleRows(at, size) =
+        scene_.bristle_rates().segment(at, size) * (depth_by.row(row_of[i]) / rate);
+  }
+}
+
+// What SceneData::accept() makes of the stretches, of their changes.
+void Sensitivities::reorder_bristles(const VectorX& z) {
+  VectorX moved;
+  const double size = z.cwiseAbs().maxCoeff();
+  MatrixX out;
+  for (Eigen::Index k = 0; k < columns_; ++k) {
+    const VectorX column = now_.z.col(k);
+    const double change = column.cwiseAbs().maxCoeff();
+    const double share = size > 0 && change > 0 ? kStretchDifference * size / change : 1;
+    VectorX sum;
+    for (const double sign : {1.0, -1.0}) {
+      moved = z + sign * share * column;
+      scene_.reorder_bristles(moved);
+      if (sign > 0)
+        sum = moved;
+      else
+        sum -= moved;
+    }
+    if (k == 0) out.resize(sum.size(), columns_);
+    out.col(k) = sum / (2 * share);
+  }
+  now_.z = out;
+}
+
+void Sensitivities::add_row(const State& state, double share) {
+  const Tangent* at = chart_ ? &next_ : &now_;
+  if (chart_ && share < 1) {
+    slopes_.along(*chart_, *stepper_, h_, share, torque_, now_, between_);
+    scene_.restart();
+    scene_.evaluate(state.q, state.v, state.z, true);
+    at = &between_;
+  }
+  append(record_.q, at->q);
+  append(record_.v, at->v);
+  const auto parameters = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
+  slopes_.linearization().contact_forces(state.q, state.v, contacts_);
+  append(record_.force_world, applied(contacts_.force_world, *at, parameters));
+  append(record_.normal_force, applied(contacts_.normal_force, *at, parameters));
+  append(record_.depth, applied(contacts_.depth, *at, parameters));
+}
+
+}  // namespace sphshell

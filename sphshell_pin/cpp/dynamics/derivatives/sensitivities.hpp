@@ -1,0 +1,54 @@
+// How the motion of a run changes with parameters and with its start.
+#pragma once
+
+#include <vector>
+
+#include "dynamics/derivatives/step_slopes.hpp"
+#include "dynamics/recording.hpp"
+
+namespace sphshell {
+
+struct SensitivitySettings {
+  std::vector<Parameter> parameters;
+  bool by_q0 = false, by_v0 = false;
+
+  bool any() const { return !parameters.empty() || by_q0 || by_v0; }
+};
+
+// Follows a run step by step. A change has a column: those of the parameters, of q0 in its tangent
+// space, of v0.
+class Sensitivities : public RowFollower {
+ public:
+  Sensitivities(SceneData& scene, SensitivitySettings settings);
+
+  // The torques that are held from now on are those of a controller at this state.
+  void hold(const TorqueAt& torque, const State& state);
+  // A step was made to `to`, where it leaves the scene evaluated.
+  void step(Chart& chart, const Stepper& stepper, const State& from, const State& to);
+  // The step is accepted next; `located`: contacts that are new in it began at its end.
+  void accept(const State& from, const State& to, bool located);
+  // A row of what is recorded. Leaves the scene evaluated there.
+  void add_row(const State& state, double share) override;
+
+  // Hands over what was recorded since the last call.
+  SensitivityRecord take() { return std::exchange(record_, {}); }
+  Eigen::Index columns() const { return columns_; }
+
+ private:
+  void begin_contacts(const State& to, double h);
+  void reorder_bristles(const VectorX& z);
+
+  SceneData& scene_;
+  StepSlopes slopes_;
+  Eigen::Index columns_;
+  bool by_v0_;
+  Tangent now_, next_, between_;  // at the state; at the end of the step that was made
+  MatrixX torque_, forces_;
+  ContactForceSlopes contacts_;
+  Chart* chart_ = nullptr;  // of the step that was made, until it is accepted
+  const Stepper* stepper_ = nullptr;
+  double h_ = 0;
+  SensitivityRecord record_;
+};
+
+}  // namespace sphshell

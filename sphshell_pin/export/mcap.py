@@ -1,0 +1,390 @@
+"""A result as an MCAP file of ROS 2 messages; the page docs/export.md lists the topics."""
+
+from __future__ import annotations
+
+import heapq
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields
+from importlib import metadata
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.atomic import atomic_file
+from sphshell_pin.checks import check_type
+from sphshell_pin.dynamics.pair_series import PairSeries
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.dynamics.scene_contacts import SceneContacts
+from sphshell_pin.dynamics.sensor_log import SensorLog
+from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.export.cdr import Message, encode
+from sphshell_pin.export.frames import WORLD, Frames, quaternion
+from sphshell_pin.export.markers import (
+    ROD,
+    body_markers,
+    contact_markers,
+    least_radius,
+    shell_markers,
+    stamp_of,
+)
+from sphshell_pin.export.messages import full_name, schema_of
+from sphshell_pin.tables import quantity_of
+from sphshell_pin.view.arrows import ArrowScale, largest_force
+
+Array = NDArray[np.float64]
+
+_ARROW = 8.0  # length of a usual force's arrow, in radii of the smallest sphere
+_INFO, _WARN = 20, 30  # of rcl_interfaces/Log
+_USUAL = ("touch", "lift_off")
+_LAST = (1 << 31) * 10**9  # ROS 2 has the seconds in 31 bits
+
+# As rosbag2 writes it: `ros2 bag play` offers the last message to those who come later, too.
+_FOREVER = "    sec: 9223372036\n    nsec: 854775807\n"
+_LATCHED = (
+    "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n"
+    f"  deadline:\n{_FOREVER}  lifespan:\n{_FOREVER}"
+    f"  liveliness: 1\n  liveliness_lease_duration:\n{_FOREVER}"
+    "  avoid_ros_namespace_conventions: false\n"
+)
+
+
+class _Sent(NamedTuple):
+    """A message of the type `kind` on `topic`; times [ns]."""
+
+    logged: int
+    published: int
+    topic: str
+    kind: str
+    message: Message
+    latched: bool = False
+
+
+def write_mcap(
+    path: str | PathLike[str],
+    result: Result,
+    scene: Scene | None = None,
+    *,
+    start: int = 0,
+    command: str = "",
+    progress: Callable[[float], object] | None = None,
+) -> Path:
+    """Write `result` as an MCAP file; see `Result.to_mcap`.
+
+    `command` goes into its metadata; `progress` gets the share that is done.
+    """
+    try:
+        from mcap.writer import Writer
+    except ImportError:
+        raise MissingExtra("mcap", "mcap", "Result.to_mcap") from None
+    run = _Run(result, scene_of(result, scene), start)
+    path = Path(path)
+    try:
+        with atomic_file(path) as stream:
+            writer = Writer(stream)
+            writer.start(profile="ros2", library=f"sphshell_pin {_version('sphshell-pin')}")
+            writer.add_metadata("sphshell_pin", run.about(command))
+            if result.origin is not None:
+                data = json.dumps(result.origin.settings, indent=1).encode()
+                writer.add_attachment(run.first, run.first, "settings.json", "text/json", data)
+            channels: dict[str, int] = {}
+            schemas: dict[str, int] = {}
+            counts: dict[str, int] = {}
+            for logged, published, topic, kind, message, latched in run.messages():
+                if topic not in channels:
+                    if kind not in schemas:
+                        text = schema_of(kind).encode()
+                        schemas[kind] = writer.register_schema(full_name(kind), "ros2msg", text)
+                    told = {"offered_qos_profiles": _LATCHED} if latched else {}
+                    channels[topic] = writer.register_channel(topic, "cdr", schemas[kind], told)
+                counts[topic] = counts.get(topic, -1) + 1
+                data = encode(kind, message)
+                writer.add_message(channels[topic], logged, data, published, counts[topic])
+                if progress is not None and topic == "/tf":
+                    progress(counts[topic] / run.count)
+            writer.finish()  # type: ignore[no-untyped-call]
+    except OSError as error:
+        raise ResultError(path, f"cannot be written: {error.strerror or error}") from error
+    return path
+
+
+def scene_of(result: Result, scene: Scene | None) -> Scene:
+    """Return the scene in which `result` moved: `scene`, the one that ran, or its scenario's.
+
+    Raises ResultError where there is none, or where it has other coordinates or contacts.
+    """
+    scene = result.scene if scene is None else scene
+    if scene is None:
+        from sphshell_pin.scenario.replay import Replay
+
+        return Replay(result).scene
+    ran, now = (result.q.shape[1], result.v.shape[1]), (scene.model.nq, scene.model.nv)
+    pairs = tuple(pair.name for pair in scene.pairs)
+    if ran != now or pairs != tuple(result.pairs):
+        raise ResultError(
+            "the result",
+            f"is of another scene: it has nq, nv = {ran} and the contacts {result.pairs}, the "
+            f"scene nq, nv = {now} and {pairs}",
+        )
+    return scene
+
+
+class _Run:
+    """A result in its scene, as messages in the order of time."""
+
+    def __init__(self, result: Result, scene: Scene, start: int) -> None:
+        check_type("start", start, int, "must be a whole number of nanoseconds since 1970")
+        self.result, self.scene, self.start = result, scene, start
+        # A run that diverged is written up to where its numbers end.
+        state = np.hstack((result.q, result.v))
+        unsound = np.flatnonzero(~np.isfinite(state).all(axis=1))
+        self.count = int(unsound[0]) if len(unsound) else len(state)
+        if not self.count:
+            raise ResultError("the result", "has no row of finite numbers to write")
+        self.times = _nanoseconds(result.t[: self.count], start)
+        self.first = int(self.times[0])
+        self.stated = _stated_frames(result, scene)
+        self.frames = Frames.of(scene, self.stated.values())
+        self.touched = sorted({int(k) for k in result.contacts.pair})
+        length = _ARROW * least_radius(scene)
+        self.scale = ArrowScale.from_forces(largest_force(result.contacts), length)
+        self.topics = _topics("contacts", [result.pairs[k] for k in self.touched], ["markers"])
+        self.sensors = _topics("sensors", result.sensors)
+        self.twists = _topics("twists", [one.name for one in self.frames.moving])
+
+    def about(self, command: str) -> dict[str, str]:
+        """Return what the file says of itself."""
+        result, stats = self.result, self.result.stats
+        packages = ("sphshell-pin", "pin", "coal", "numpy", "mcap")
+        said = {f"version.{name}": _version(name) for name in packages}
+        said |= {
+            "scenario": "" if result.origin is None else result.origin.scenario,
+            "command": command,
+            "start [ns]": str(self.start),
+            "integrator": stats.integrator,
+            "dt [s]": repr(stats.dt),
+            "arrows [m/N]": repr(self.scale.metres_per_newton),
+            "longest arrow [m]": repr(self.scale.longest),
+        }
+        said |= {f"contact {name}": topic for name, topic in self.topics.items()}
+        return {name: text for name, text in said.items() if text}
+
+    def messages(self) -> Iterator[_Sent]:
+        """Yield all messages in the order of their times."""
+        rows, events = self._rows(), self._events()
+        sensors = (self._readings(name, log) for name, log in self.result.sensors.items())
+        yield from self._first()
+        yield from heapq.merge(rows, events, *sensors, key=lambda one: one.logged)
+
+    def _first(self) -> Iterator[_Sent]:
+        """Yield what does not change, once."""
+        t, stamp = self.first, _split(self.first)
+        static = [
+            _transform(stamp, one.parent, one.name, one.placement) for one in self.frames.fixed
+        ]
+        for topic, kind, message in (
+            ("/tf_static", "tf2_msgs/TFMessage", {"transforms": static}),
+            (
+                "/shells",
+                "visualization_msgs/MarkerArray",
+                shell_markers(self.scene, self.frames, stamp),
+            ),
+            (
+                "/bodies",
+                "visualization_msgs/MarkerArray",
+                body_markers(self.scene, self.frames, stamp),
+            ),
+        ):
+            yield _Sent(t, t, topic, kind, message, latched=True)
+
+    def _rows(self) -> Iterator[_Sent]:
+        result, model = self.result, self.scene.model
+        data = model.createData()
+        plain = [j for j in range(1, model.njoints) if model.joints[j].nv == 1 and _own(model, j)]
+        several = [j for j in range(1, model.njoints) if model.joints[j].nv > 1]
+        series = {k: PairSeries.of(result, k) for k in self.touched}
+        energy = {f.name: getattr(result.energy, f.name) for f in fields(result.energy)}
+        energy["residual"] = result.energy.residual
+        size = ROD * least_radius(self.scene)
+        drawn = False
+        for row in range(self.count):
+            t = int(self.times[row])
+            stamp, q, v = _split(t), result.q[row], result.v[row]
+            contacts = result.contacts.at_row(row)
+            pin.forwardKinematics(model, data, q, v)
+            moved = [
+                _transform(stamp, WORLD, one.name, data.oMi[one.joint] * one.placement)
+                for one in self.frames.moving
+            ]
+            parts: list[tuple[str, str, Message]] = []
+            for k, pair in series.items():
+                parts += self._pair(k, pair, row, contacts, data, moved)
+            if moved:
+                parts.append(("/tf", "tf2_msgs/TFMessage", {"transforms": moved}))
+            if plain:
+                state = {
+                    "header": _header(stamp, ""),
+                    "name": [model.names[j] for j in plain],
+                    "position": [_position(model.joints[j], q) for j in plain],
+                    "velocity": [float(v[model.joints[j].idx_v]) for j in plain],
+                }
+                parts.append(("/joint_states", "sensor_msgs/JointState", state))
+            for j in several:
+                name, place = self.frames.on(j)
+                twist = place.actInv(data.v[j])
+                parts.append(
+                    (
+                        self.twists[name],
+                        "geometry_msgs/TwistStamped",
+                        {
+                            "header": _header(stamp, name),
+                            "twist": {"linear": twist.linear, "angular": twist.angular},
+                        },
+                    )
+                )
+            if len(contacts) or drawn:
+                marked = contact_markers(contacts, result.pairs, self.scale, size, stamp)
+                parts.append(("/contacts/markers", "visualization_msgs/MarkerArray", marked))
+                drawn = bool(len(contacts))
+            for name, values in energy.items():
+                parts.append((f"/energy/{name}", _FLOAT, {"data": values[row]}))
+            for topic, kind, message in parts:
+                yield _Sent(t, t, topic, kind, message)
+
+    def _pair(
+        self,
+        index: int,
+        pair: PairSeries,
+        row: int,
+        contacts: SceneContacts,
+        data: pin.Data,
+        moved: list[Message],
+    ) -> Iterator[tuple[str, str, Message]]:
+        """Yield what one pair exerts in a row; add the frame of its wrench to `moved`."""
+        stamp = _split(int(self.times[row]))
+        own, placed = contacts.pair == index, self.scene.pairs[index]
+        center = (data.oMi[placed.joint_i] * placed.placement_i).translation
+        torque = np.cross(contacts.point_world[own] - center, contacts.force_world[own]).sum(axis=0)
+        frame = self.frames.contacts[pair.name]
+        moved.append(_transform(stamp, WORLD, frame, pin.SE3(np.eye(3), center)))
+        topic = self.topics[pair.name]
+        slip = np.linalg.norm(contacts.slip_velocity_world[own], axis=1)
+        wrench = {"force": pair.force_world[row], "torque": torque}
+        yield (
+            f"{topic}/wrench",
+            "geometry_msgs/WrenchStamped",
+            {"header": _header(stamp, frame), "wrench": wrench},
+        )
+        yield f"{topic}/normal_force", _FLOAT, {"data": pair.normal[row]}
+        yield f"{topic}/depth", _FLOAT, {"data": pair.depth[row]}
+        yield f"{topic}/slip", _FLOAT, {"data": slip.max(initial=0.0)}
+
+    def _events(self) -> Iterator[_Sent]:
+        for event in self.result.events:
+            t = int(_nanoseconds(np.array([event.t]), self.start)[0])
+            usual = event.kind in _USUAL or event.kind.endswith("_left")
+            said = {
+                "stamp": stamp_of(_split(t)),
+                "level": _INFO if usual else _WARN,
+                "name": event.pair,
+                "msg": event.kind,
+            }
+            yield _Sent(t, t, "/events", "rcl_interfaces/Log", said)
+
+    def _readings(self, name: str, log: SensorLog) -> Iterator[_Sent]:
+        """Yield the readings when they arrived; they are published when they were taken."""
+        topic = self.sensors[name]
+        arrived, taken = (_nanoseconds(t, self.start).tolist() for t in (log.t, log.sampled))
+        columns = [quantity_of(column)[0] for column in log.columns]
+        wrench = [f"{part}_{axis}" for part in ("force", "torque") for axis in "xyz"]
+        for t, sampled, values in zip(arrived, taken, log.values, strict=True):
+            if columns == wrench:
+                header = _header(_split(sampled), self.stated.get(name, name))
+                read = {"header": header, "wrench": {"force": values[:3], "torque": values[3:]}}
+                yield _Sent(t, sampled, topic, "geometry_msgs/WrenchStamped", read)
+            elif columns == ["closed"]:
+                yield _Sent(t, sampled, topic, "std_msgs/Bool", {"data": values[0] > 0})
+            else:
+                for column, value in zip(columns, values, strict=True):
+                    yield _Sent(t, sampled, f"{topic}/{_token(column)}", _FLOAT, {"data": value})
+
+
+_FLOAT = "std_msgs/Float64"
+
+
+def _nanoseconds(t: Array, start: int) -> NDArray[np.int64]:
+    """Return the time stamps of the times `t` [s]: whole nanoseconds since 1970."""
+    low, high = (start + round(float(one) * 1e9) for one in (t.min(initial=0), t.max(initial=0)))
+    if len(t) and not (low >= 0 and high < _LAST):
+        raise ResultError(
+            "the result",
+            f"has times from {t.min():.6g} to {t.max():.6g} s, which with start = {start} ns are "
+            "not all from 1970 to 2038, as ROS 2 has them: give another start",
+        )
+    return start + np.rint(t * 1e9).astype(np.int64)
+
+
+def _split(t: int) -> tuple[int, int]:
+    return divmod(t, 10**9)
+
+
+def _header(stamp: tuple[int, int], frame: str) -> Message:
+    return {"stamp": stamp_of(stamp), "frame_id": frame}
+
+
+def _transform(stamp: tuple[int, int], parent: str, name: str, place: pin.SE3) -> Message:
+    transform = {"translation": place.translation, "rotation": quaternion(place.rotation)}
+    return {"header": _header(stamp, parent), "child_frame_id": name, "transform": transform}
+
+
+def _own(model: pin.Model, joint: int) -> bool:
+    """Whether a joint has a coordinate of its own, and follows no other one."""
+    return bool(model.joints[joint].shortname() != "JointModelMimic")
+
+
+def _position(joint: pin.JointModel, q: Array) -> float:
+    """Return a joint's angle [rad] or length [m]; one that turns without end from -pi to pi."""
+    at = joint.idx_q
+    return float(q[at] if joint.nq == 1 else np.arctan2(q[at + 1], q[at]))
+
+
+def _stated_frames(result: Result, scene: Scene) -> dict[str, str]:
+    """Return the frames of the sensors, as far as the settings of the scenario say them."""
+    settings = {} if result.origin is None else result.origin.settings
+    stated = settings.get("sensor")
+    known = {frame.name for frame in scene.model.frames}
+    return {
+        str(one["name"]): str(one["frame"])
+        for one in (stated if isinstance(stated, list) else ())
+        if isinstance(one, dict) and one.get("frame") in known and one.get("name") in result.sensors
+    }
+
+
+def _topics(above: str, names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
+    """Return a topic of its own for each of `names`: ROS 2 allows letters, digits, underscores."""
+    used, topics = set(taken), {}
+    for name in names:
+        token, k = _token(name), 2
+        while token in used:
+            token, k = f"{_token(name)}_{k}", k + 1
+        used.add(token)
+        topics[name] = f"/{above}/{token}"
+    return topics
+
+
+def _token(name: str) -> str:
+    token = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return f"_{token}" if token[:1].isdigit() else token
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return ""

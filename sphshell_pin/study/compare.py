@@ -1,0 +1,359 @@
+"""Results over each other: figures, curves over time and settings, with their differences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from sphshell_pin.dynamics.pair_series import PairSeries
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.result_columns import coordinates
+from sphshell_pin.dynamics.run_stats import PairFigures
+from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.scenario.figures import (
+    JOINT_FIGURES,
+    PAIR_UNITS,
+    SENSOR_FIGURES,
+    measure_energy,
+)
+from sphshell_pin.tables import Table, column, quantity_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A quantity over time: `t` (n,) [s] and `values` (n,) in `unit`, linear in between."""
+
+    t: Array
+    values: Array
+    unit: str
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A run as it is compared: `figures` (value, unit) and `curves` by name, `settings` by key.
+
+    `parts` are its contacts, joints and sensors, `span` the times of its first and last row [s].
+    """
+
+    label: str
+    parts: tuple[str, ...]
+    span: tuple[float, float]
+    figures: Mapping[str, tuple[float, str]]
+    curves: Mapping[str, Curve]
+    settings: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class FigureDifference:
+    """A figure of the first run and of another one; `relative` is nan where the first is 0."""
+
+    name: str
+    unit: str
+    first: float
+    other: float
+
+    @property
+    def absolute(self) -> float:
+        """The other less the first, in `unit`."""
+        return self.other - self.first
+
+    @property
+    def same(self) -> bool:
+        """Whether the two are equal to the last bit, or both not known."""
+        return self.first == self.other or (math.isnan(self.first) and math.isnan(self.other))
+
+    @property
+    def relative(self) -> float:
+        """`absolute` over the size of the first."""
+        return self.absolute / abs(self.first) if self.first else float("nan")
+
+
+@dataclass(frozen=True)
+class CurveDifference:
+    """What a curve of another run is away from that of the first, over the time that both have.
+
+    `t` (k,) [s] are the recorded times of either, `values` (k,) the difference there, linear in
+    between as both curves are: `largest` is its largest size, at time `at` [s], `rms` the root of
+    its mean square over time. `of_range` is `largest` over the range of the first curve in that
+    time, nan where this is constant.
+    """
+
+    name: str
+    unit: str
+    t: Array
+    values: Array
+    of_range: float
+
+    @property
+    def largest(self) -> float:
+        """The largest size of the difference, in `unit`."""
+        return float(np.abs(self.values).max())
+
+    @property
+    def at(self) -> float:
+        """When it is largest [s]."""
+        return float(self.t[np.abs(self.values).argmax()])
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square over time, exact for what is linear between the times."""
+        a, b, step = self.values[:-1], self.values[1:], np.diff(self.t)
+        time = float(self.t[-1] - self.t[0])
+        if not time > 0.0:
+            return self.largest
+        return float(np.sqrt(((a * a + a * b + b * b) * step).sum() / (3.0 * time)))
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One run beside the first: figures and curves of both, by name.
+
+    `settings` are those of the scenarios that differ: key, of the first, of the other.
+    `only_first`, `only_other` are the parts that one alone has, `span` the time that both have [s],
+    None without any.
+    """
+
+    label: str
+    figures: tuple[FigureDifference, ...]
+    curves: tuple[CurveDifference, ...]
+    settings: tuple[tuple[str, object, object], ...]
+    only_first: tuple[str, ...]
+    only_other: tuple[str, ...]
+    span: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two or more runs, each of `others` beside the first of `runs`."""
+
+    runs: tuple[Measured, ...]
+    others: tuple[Difference, ...]
+
+
+def compare(runs: Sequence[Measured]) -> Comparison:
+    """Compare each of `runs` with the first.
+
+    Curves are compared at the recorded times of both runs, within the time that both have; between
+    its rows a curve is taken as linear. Pairs, joints and sensors are those of the same name.
+
+    Raises
+    ------
+    InvalidParameter
+        There are fewer than two.
+    ResultError
+        Two runs have no contact, joint or sensor of the same name: they are of different models.
+    """
+    if len(runs) < 2:
+        raise InvalidParameter("runs", len(runs), "must be two at least")
+    return Comparison(tuple(runs), tuple(_difference(runs[0], other) for other in runs[1:]))
+
+
+def measured(label: str, result: Result, scene: Scene | None) -> Measured:
+    """Return what of `result` is compared; without a `scene` joints have numbers as names.
+
+    The figures are those of its pairs, joints, sensors, energy and cost, and the last position; the
+    curves normal force, friction and depth of each pair, the positions of joints with one number,
+    and the path of each sphere in the world. A run that diverged is compared up to where it did.
+
+    Raises ResultError where no row has finite numbers.
+    """
+    state = np.hstack((result.q, result.v))
+    unsound = np.flatnonzero(~np.isfinite(state).all(axis=1))
+    count = int(unsound[0]) if len(unsound) else len(state)
+    if not count:
+        raise ResultError(label, "has no row of finite numbers to compare")
+    if scene is None:
+        titles = [f"q.{k}" for k in range(result.q.shape[1])]
+        joints = [f"coordinate {title}" for title in titles]
+    else:
+        titles = coordinates(scene.model)[0]
+        joints = [f"joint {name}" for name in list(scene.model.names)[1:]]
+    parts = [f"contact {name}" for name in result.pairs]
+    parts += joints + [f"sensor {name}" for name in result.sensors]
+    t = result.t[:count]
+    settings = {} if result.origin is None else dict(_flat(result.origin.settings))
+    return Measured(
+        label,
+        tuple(parts),
+        (float(t[0]), float(t[-1])),
+        _figures(result, titles, count),
+        _curves(result, titles, scene, count),
+        settings,
+    )
+
+
+def tables_of(comparison: Comparison) -> dict[str, Table]:
+    """Return the tables of a comparison by their names: all figures, and all curves.
+
+    figures: one row a figure, and for each other run its value and its differences. curves: one row
+    a curve of another run.
+    """
+    first = comparison.runs[0]
+    named = dict.fromkeys(
+        (name, unit) for run in comparison.runs for name, (_, unit) in run.figures.items()
+    )
+    figures: dict[str, ArrayLike] = {
+        "figure": [name for name, _ in named],
+        "unit": [unit for _, unit in named],
+        first.label: [first.figures.get(name, (math.nan,))[0] for name, _ in named],
+    }
+    for run, other in zip(comparison.runs[1:], comparison.others, strict=True):
+        found = {one.name: one for one in other.figures}
+        figures[run.label] = [run.figures.get(name, (math.nan,))[0] for name, _ in named]
+        for title in ("absolute", "relative"):
+            figures[f"{run.label}: {title} difference"] = [
+                getattr(found[name], title) if name in found else math.nan for name, _ in named
+            ]
+    curves = [(other.label, one) for other in comparison.others for one in other.curves]
+    beside: Table = {
+        "curve": [one.name for _, one in curves],
+        "unit": [one.unit for _, one in curves],
+        "run": [label for label, _ in curves],
+        "largest difference": [one.largest for _, one in curves],
+        column("at", "s"): [one.at for _, one in curves],
+        "rms difference": [one.rms for _, one in curves],
+        "largest over range": [one.of_range for _, one in curves],
+    }
+    return {"figures": figures, "curves": beside}
+
+
+def _difference(first: Measured, other: Measured) -> Difference:
+    if not set(first.parts) & set(other.parts):
+        has = (f"{one.label} has {', '.join(one.parts[:6]) or 'none'}" for one in (first, other))
+        raise ResultError(
+            other.label,
+            f"has no contact, joint or sensor in common with {first.label}, so that nothing can be "
+            f"compared: {'; '.join(has)}",
+        )
+    begin, end = max(first.span[0], other.span[0]), min(first.span[1], other.span[1])
+    span = (begin, end) if begin <= end else None
+    keys = dict.fromkeys((*first.settings, *other.settings))
+    settings = [(key, first.settings.get(key), other.settings.get(key)) for key in keys]
+    return Difference(
+        other.label,
+        tuple(
+            FigureDifference(name, unit, value, other.figures[name][0])
+            for name, (value, unit) in first.figures.items()
+            if name in other.figures
+        ),
+        tuple(
+            _curve_difference(name, curve, other.curves[name], span)
+            for name, curve in first.curves.items()
+            if name in other.curves and span is not None
+        ),
+        tuple(one for one in settings if one[1] != one[2]),
+        tuple(part for part in first.parts if part not in other.parts),
+        tuple(part for part in other.parts if part not in first.parts),
+        span,
+    )
+
+
+def _curve_difference(
+    name: str, first: Curve, other: Curve, span: tuple[float, float]
+) -> CurveDifference:
+    t = np.union1d(first.t, other.t)
+    t = np.unique(np.clip(t, *span))
+    a, b = (np.interp(t, one.t, one.values) for one in (first, other))
+    extent = float(np.ptp(a))
+    values = b - a
+    return CurveDifference(
+        name,
+        first.unit,
+        t,
+        values,
+        float(np.abs(values).max()) / extent if extent else float("nan"),
+    )
+
+
+def _figures(result: Result, titles: list[str], count: int) -> dict[str, tuple[float, str]]:
+    found: dict[str, tuple[float, str]] = {}
+    for name, pair in result.stats.pairs.items():
+        for one in fields(PairFigures):
+            found[f"pairs.{name}.{one.name}"] = getattr(pair, one.name), PAIR_UNITS[one.name]
+    for name, joint in result.stats.joints.items():
+        for figure, unit in JOINT_FIGURES.items():
+            found[f"joints.{name}.{figure}"] = getattr(joint, figure), unit
+    for name, log in result.sensors.items():
+        for title, values in zip(log.columns, log.values.T, strict=True):
+            if len(values):
+                label, unit = quantity_of(title)
+                for figure in SENSOR_FIGURES:
+                    value = values[-1] if figure == "last" else getattr(values, figure)()
+                    found[f"sensors.{name}.{label}.{figure}"] = float(value), unit
+    energy = measure_energy(result)
+    units = {"exchanged": "J", "residual": "J", "relative_residual": ""}
+    found |= {f"energy.{name}": (value, units[name]) for name, value in energy.items()}
+    found["stats.steps"] = float(result.stats.steps), ""
+    found["stats.duration"] = result.stats.duration, "s"
+    for title, value in zip(titles, result.q[count - 1], strict=True):
+        name, unit = quantity_of(title)
+        found[f"final.{name}"] = float(value), unit
+    return found
+
+
+def _curves(result: Result, titles: list[str], scene: Scene | None, count: int) -> dict[str, Curve]:
+    t = result.t[:count]
+    found: dict[str, Curve] = {}
+    for index, name in enumerate(result.pairs):
+        pair = PairSeries.of(result, index)
+        for what, values, unit in (
+            ("normal_force", pair.normal, "N"),
+            ("friction_force", pair.friction, "N"),
+            ("depth", pair.depth, "m"),
+        ):
+            found[f"pairs.{name}.{what}"] = Curve(t, values[:count], unit)
+    if scene is None:
+        positions = dict(zip(titles, result.q.T, strict=True))
+        return found | {name: Curve(t, q[:count], "") for name, q in positions.items()}
+    model = scene.model
+    for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
+        if joint.nv != 1 or joint.shortname() == "JointModelMimic":
+            continue
+        q = result.q[:count, joint.idx_q]
+        if joint.nq == 2:  # cosine and sine
+            q = np.unwrap(np.arctan2(result.q[:count, joint.idx_q + 1], q))
+        unit = "rad" if joint.nq == 2 else quantity_of(titles[joint.idx_q])[1]
+        found[f"q.{name}"] = Curve(t, q, unit)
+    for name, path in _paths(result, scene, count).items():
+        for axis, values in zip("xyz", path.T, strict=True):
+            found[f"sphere.{name}.{axis}"] = Curve(t, values, "m")
+    return found
+
+
+def _paths(result: Result, scene: Scene, count: int) -> dict[str, Array]:
+    """Return where the center of each pair's sphere is in the world, (count, 3) [m]."""
+    model, data = scene.model, scene.model.createData()
+    carried = [pair for pair in scene.pairs if pair.sphere is not None]
+    joints = sorted({pair.joint_i for pair in carried})
+    turned, moved = np.empty((count, len(joints), 3, 3)), np.empty((count, len(joints), 3))
+    for row, q in enumerate(result.q[:count]):
+        pin.forwardKinematics(model, data, q)
+        for k, joint in enumerate(joints):
+            turned[row, k], moved[row, k] = data.oMi[joint].rotation, data.oMi[joint].translation
+    at = {joint: k for k, joint in enumerate(joints)}
+    return {
+        pair.name: turned[:, at[pair.joint_i]] @ pair.placement_i.translation
+        + moved[:, at[pair.joint_i]]
+        for pair in carried
+    }
+
+
+def _flat(value: object, key: str = "") -> Iterator[tuple[str, object]]:
+    """Yield the dotted key and the value of each setting; items of lists by name or number."""
+    if isinstance(value, dict):
+        for name, one in value.items():
+            yield from _flat(one, f"{key}.{name}" if key else str(name))
+    elif isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
+        for number, one in enumerate(value):
+            name = one.get("name") or one.get("label") or number
+            yield from _flat(one, f"{key}.{name}")
+    else:
+        yield key, value

@@ -1,0 +1,99 @@
+"""The command export: files beside the run, times as people write them, one sentence a fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from typer.testing import CliRunner
+
+import sphshell_pin as sp
+from sphshell_pin.cli import app
+from sphshell_pin.cli.export import beside, nanoseconds
+from sphshell_pin.errors import InvalidParameter
+from tests.scenario.files import write
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, [str(one) for one in arguments])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs")
+    told = call("run", write(folder), "--out", folder / "drop", "--no-recording")
+    assert told.exit_code == 0, told.output
+    return folder
+
+
+def test_files_are_written_beside_the_run(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    told = call("export", "drop", "--to", "mcap", "--start", "2026-11-22T21:00:00.5Z")
+    assert (told.exit_code, told.stdout) == (0, "drop.mcap\n"), told.output
+    with open("drop.mcap", "rb") as stream:
+        reader = make_reader(stream)
+        assert reader.get_summary().statistics.message_start_time == 1795381200_500_000_000
+        about = next(reader.iter_metadata()).metadata
+    command = "sphshell-pin export drop --to mcap --start 2026-11-22T21:00:00.5Z"
+    assert about["command"] == command
+    assert Path(about["scenario"]).name == "drop.toml"
+    for format in ("csv", "parquet"):
+        told = call("export", "drop/run.npz", "--to", format)
+        assert told.exit_code == 0, told.output
+        assert told.stdout.split()[0] == f"drop_{format}/rows.{format}"
+    assert "q.root_joint.2 [m]" in Path("drop_csv/rows.csv").read_text().partition("\n")[0]
+
+
+def test_names_of_what_is_written(tmp_path, monkeypatch):
+    (tmp_path / "runs" / "a.b").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "runs")
+    assert beside(Path("a.b"), ".mcap") == Path("a.b.mcap")
+    assert beside(Path("a.b/run.npz"), "_csv") == Path("a.b_csv")
+    assert beside(Path("one.npz"), "_csv") == Path("one_csv")
+    assert beside(Path(), ".mcap") == tmp_path / "runs.mcap"
+
+
+def test_times_are_exact():
+    assert nanoseconds("0") == 0
+    assert nanoseconds("1800000000.123456789") == 1_800_000_000_123_456_789
+    assert nanoseconds("1970-01-01T01:00:00+01:00") == 0
+    assert nanoseconds("1970-01-02") == 86_400 * 10**9
+    for wrong in ("now", "nan", "1970-13-01"):
+        with pytest.raises(InvalidParameter, match="seconds since 1970"):
+            nanoseconds(wrong)
+
+
+def test_faults(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(folder)
+    damaged = tmp_path / "damaged.npz"
+    damaged.write_bytes(Path("drop/run.npz").read_bytes()[:5000])
+    for arguments, words in (
+        (["drop", "--to", "rrd"], "Rerun's viewer opens .mcap files"),
+        (["drop", "--to", "bag"], "must be one of mcap, csv, parquet"),
+        (["drop", "--to", "mcap", "--start", "soon"], "--start"),
+        (["drop", "--to", "mcap", "--start", "-1"], "give another start"),
+        (["none", "--to", "csv"], "none: cannot read the results"),
+        ([damaged, "--to", "csv"], "damaged.npz: is not a file that Result.save wrote"),
+        (["drop", "--to", "csv", "--scenario", "gear_contact"], "its model had nq = 7"),
+        (["drop", "--to", "mcap", "--out", "drop.toml/x.mcap"], "cannot be written"),
+    ):
+        told = call("export", *arguments)
+        assert (told.exit_code, told.stderr.count("\n")) == (2, 1), told.output
+        assert words in told.stderr
+        assert told.stdout == ""
+
+
+def test_without_a_scenario_a_run_has_numbered_joints(folder, tmp_path):
+    run = tmp_path / "own.npz"
+    replace(sp.Result.load(folder / "drop" / "run.npz"), origin=None).save(run)
+    told = call("export", run, "--to", "csv")
+    assert told.exit_code == 0
+    assert "warning: joints have numbers instead of names" in told.stderr
+    assert (tmp_path / "own_csv" / "rows.csv").read_text().startswith("t [s],q.0,q.1")
+    told = call("export", run, "--to", "mcap")
+    assert told.exit_code == 2
+    assert "give its scenario with --scenario" in told.stderr
+    told = call("export", run, "--to", "mcap", "--scenario", folder / "drop.toml")
+    assert (told.exit_code, told.stdout.strip()) == (0, str(tmp_path / "own.mcap"))

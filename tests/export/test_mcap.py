@@ -1,0 +1,410 @@
+"""MCAP files read back by the library's own reader and by another one: every number, every time."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import defaultdict
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
+from sphshell_pin.export import mcap as exporting
+from tests.export.runs import finger_run, linkless_run, turntable_run
+
+START = 1_800_000_000_123_456_789
+
+
+class Read:
+    """A file as the library's own reader has it: messages and log times by topic."""
+
+    def __init__(self, path):
+        self.path = path
+        self.topics, self.times, self.published = defaultdict(list), defaultdict(list), {}
+        self.order = []
+        with open(path, "rb") as stream:
+            reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+            self.summary, self.header = reader.get_summary(), reader.get_header()
+            self.metadata = {one.name: one.metadata for one in reader.iter_metadata()}
+            self.attachments = {one.name: one.data for one in reader.iter_attachments()}
+            every = reader.iter_decoded_messages(log_time_order=False)
+            for _, channel, message, decoded in every:
+                self.topics[channel.topic].append(decoded)
+                self.times[channel.topic].append(message.log_time)
+                self.published.setdefault(channel.topic, []).append(message.publish_time)
+                self.order.append(message.log_time)
+
+    def numbers(self, topic, *fields):
+        """The numbers of a field, by message."""
+        found = []
+        for value in self.topics[topic]:
+            for field in fields:
+                value = getattr(value, field)  # noqa: PLW2901
+            found.append([value.x, value.y, value.z] if hasattr(value, "x") else value)
+        return np.array(found)
+
+
+@pytest.fixture(scope="module")
+def finger(tmp_path_factory):
+    result = finger_run()
+    return result, Read(result.to_mcap(tmp_path_factory.mktemp("f") / "finger.mcap", start=START))
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    result = turntable_run()
+    return result, Read(result.to_mcap(tmp_path_factory.mktemp("t") / "table.mcap"))
+
+
+def nanoseconds(t, start=START):
+    return [start + round(float(one) * 1e9) for one in t]
+
+
+def test_the_numbers_of_rows_are_those_of_the_result(finger):
+    result, read = finger
+    joints = read.topics["/joint_states"]
+    assert joints[0].name == list(result.scene.model.names)[1:]
+    np.testing.assert_array_equal([one.position for one in joints], result.q)
+    np.testing.assert_array_equal([one.velocity for one in joints], result.v)
+    assert all(len(one.effort) == 0 for one in joints)
+    for part in ("kinetic", "potential", "elastic", "damping_loss", "control_work", "residual"):
+        values = getattr(result.energy, part)
+        np.testing.assert_array_equal(read.numbers(f"/energy/{part}", "data"), values)
+    rows = result.row_columns()
+    for topic, column in (("normal_force", "normal_force [N]"), ("depth", "depth [m]")):
+        np.testing.assert_array_equal(
+            read.numbers(f"/contacts/tip_wall/{topic}", "data"), rows[f"pairs.tip-wall.{column}"]
+        )
+    assert max(rows["pairs.tip-wall.normal_force [N]"]) > 0.1
+
+
+def test_wrenches_are_about_the_center_of_the_sphere_in_the_axes_of_the_world(finger):
+    result, read = finger
+    force = np.column_stack([result.row_columns()[f"pairs.tip-wall.force_{a} [N]"] for a in "xyz"])
+    topic = "/contacts/tip_wall/wrench"
+    np.testing.assert_array_equal(read.numbers(topic, "wrench", "force"), force)
+    assert {one.header.frame_id for one in read.topics[topic]} == {"contact/tip-wall"}
+    torque = read.numbers(topic, "wrench", "torque")
+    slips = read.numbers("/contacts/tip_wall/slip", "data")
+    place = {
+        one.header.stamp.sec * 10**9 + one.header.stamp.nanosec: one.transform
+        for message in read.topics["/tf"]
+        for one in message.transforms
+        if one.child_frame_id == "contact/tip-wall"
+    }
+    for row, t in enumerate(read.times[topic]):
+        contacts = result.contacts.at_row(row)
+        at = place[t].translation
+        arms = contacts.point_world - [at.x, at.y, at.z]
+        own = np.cross(arms, contacts.force_world).sum(axis=0)
+        np.testing.assert_allclose(torque[row], own, rtol=0, atol=1e-15)
+        r = place[t].rotation
+        assert (r.x, r.y, r.z, r.w) == (0, 0, 0, 1)
+        np.testing.assert_allclose(np.linalg.norm(arms, axis=1), 0.010 - contacts.depth, rtol=1e-9)
+        speeds = np.linalg.norm(contacts.slip_velocity_world, axis=1)
+        assert slips[row] == speeds.max(initial=0)
+
+
+def test_markers_are_at_the_contacts_and_disappear_with_them(finger):
+    result, read = finger
+    log = result.contacts
+    points, arrows = [], []
+    for message in read.topics["/contacts/markers"]:
+        assert message.markers[0].action == 3  # all that was drawn before goes
+        for one in message.markers[1:]:
+            assert one.header.frame_id == "universe"
+            where = [[p.x, p.y, p.z] for p in one.points]
+            if one.type == 7:
+                points += where
+            else:
+                arrows.append((one.ns, where))
+    np.testing.assert_array_equal(points, log.point_world)
+    normal = np.array([ends for name, ends in arrows if name == "normal/tip-wall"])
+    assert len(normal) == np.count_nonzero(log.normal_force)
+    way = normal[:, 1] - normal[:, 0]
+    length = np.linalg.norm(way, axis=1)
+    about = read.metadata["sphshell_pin"]
+    wanted = np.minimum(
+        log.normal_force * float(about["arrows [m/N]"]), float(about["longest arrow [m]"])
+    )
+    np.testing.assert_allclose(length, wanted, rtol=1e-12)
+    np.testing.assert_allclose(way / length[:, None], log.normal_world, atol=1e-12)
+    touching = np.unique(log.row)
+    drawn = len(read.topics["/contacts/markers"])
+    ends = np.count_nonzero(np.diff(touching) > 1) + (touching[-1] < len(result.t) - 1)
+    assert drawn == len(touching) + ends
+
+
+def test_times_are_whole_nanoseconds_in_order(finger):
+    result, read = finger
+    wanted = nanoseconds(result.t)
+    for topic in ("/joint_states", "/tf", "/energy/kinetic"):
+        assert read.times[topic] == wanted
+    assert [
+        one.header.stamp.sec * 10**9 + one.header.stamp.nanosec
+        for one in read.topics["/joint_states"]
+    ] == wanted
+    assert read.order == sorted(read.order)
+    assert read.summary.statistics.message_start_time == wanted[0]
+    for topic in ("/tf_static", "/shells", "/bodies"):
+        assert read.times[topic] == wanted[:1]
+
+
+def test_readings_of_sensors_when_they_arrived(finger):
+    result, read = finger
+    log = result.sensors["fingertip"]
+    topic = "/sensors/fingertip"
+    np.testing.assert_array_equal(read.numbers(topic, "wrench", "force"), log.values[:, :3])
+    np.testing.assert_array_equal(read.numbers(topic, "wrench", "torque"), log.values[:, 3:])
+    assert read.times[topic] == nanoseconds(log.t)
+    assert read.published[topic] == nanoseconds(log.sampled)
+    knuckle = result.sensors["knuckle"].values[:, 0]
+    np.testing.assert_array_equal(read.numbers("/sensors/knuckle/torque", "data"), knuckle)
+    closed = read.numbers("/sensors/touch", "data")
+    assert closed.dtype == bool
+    np.testing.assert_array_equal(closed, result.sensors["touch"].values[:, 0] > 0)
+    assert closed.any()
+
+
+def test_events_are_log_messages(finger):
+    result, read = finger
+    assert result.events
+    said = [(one.name, one.msg) for one in read.topics["/events"]]
+    assert said == [(event.pair, event.kind) for event in result.events]
+    assert read.times["/events"] == nanoseconds([event.t for event in result.events])
+
+
+def poses(read, row):
+    """Where every frame is in the world, from /tf and /tf_static alone."""
+    stated = {
+        one.child_frame_id: (one.header.frame_id, one.transform)
+        for message in (read.topics["/tf_static"][0], read.topics["/tf"][row])
+        for one in message.transforms
+    }
+
+    def pose(name):
+        if name == "universe":
+            return pin.SE3.Identity()
+        parent, at = stated[name]
+        turn = pin.Quaternion(at.rotation.w, at.rotation.x, at.rotation.y, at.rotation.z)
+        move = np.array([at.translation.x, at.translation.y, at.translation.z])
+        return pose(parent) * pin.SE3(turn.matrix(), move)
+
+    return {name: pose(name) for name in stated}
+
+
+@pytest.mark.parametrize("run", ["finger", "table"])
+def test_frames_are_where_pinocchio_has_them(run, request):
+    result, read = request.getfixturevalue(run)
+    model, scene = result.scene.model, result.scene
+    data = model.createData()
+    for row in (0, len(result.t) // 2, len(result.t) - 1):
+        pin.framesForwardKinematics(model, data, result.q[row])
+        found = poses(read, row)
+        for index, frame in enumerate(model.frames):
+            if frame.type == pin.FrameType.BODY:
+                assert near(found[frame.name], data.oMf[index]), frame.name
+        for pair in scene.pairs:
+            center = data.oMi[pair.joint_i] * pair.placement_i
+            assert near(found[f"sphere/{pair.name}"], center)
+    shells = {name for name in found if name.startswith("shell/")}
+    assert shells == ({"shell/wall", "shell/wall-2"} if run == "finger" else {"shell/disc"})
+    for name, pair in zip(sorted(shells), scene.pairs, strict=True):
+        assert near(found[name], data.oMi[pair.joint_j] * pair.placement_j)
+
+
+def near(one, other):
+    """Whether two poses are equal but for the rounding of quaternions."""
+    return np.abs(one.homogeneous - other.homogeneous).max() < 2e-15
+
+
+def test_joints_without_end_and_free_bodies(table):
+    result, read = table
+    states = read.topics["/joint_states"]
+    assert {tuple(one.name) for one in states} == {("axle",)}
+    angles = [one.position[0] for one in states]
+    np.testing.assert_array_equal(angles, np.arctan2(result.q[:, 1], result.q[:, 0]))
+    np.testing.assert_array_equal(read.numbers("/twists/ball", "twist", "linear"), result.v[:, 1:4])
+    angular = read.numbers("/twists/ball", "twist", "angular")
+    np.testing.assert_array_equal(angular, result.v[:, 4:])
+    ball = [
+        [one.transform.translation.x, one.transform.translation.y, one.transform.translation.z]
+        for message in read.topics["/tf"]
+        for one in message.transforms
+        if one.child_frame_id == "ball"
+    ]
+    np.testing.assert_array_equal(ball, result.q[:, 2:5])
+    assert "/contacts/_1st_ball_disc/wrench" in read.topics
+    assert read.metadata["sphshell_pin"]["contact 1st ball/disc"] == "/contacts/_1st_ball_disc"
+
+
+def test_a_joint_without_a_link_has_its_own_frame(tmp_path):
+    result = linkless_run()
+    read = Read(result.to_mcap(tmp_path / "run.mcap"))
+    model = result.scene.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, result.q[-1], result.v[-1])
+    found = poses(read, -1)
+    assert near(found["moves"], data.oMi[2])
+    assert near(found["moves-2"], data.oMi[1])
+    np.testing.assert_array_equal(
+        read.numbers("/twists/moves_2", "twist", "linear"), result.v[:, :3]
+    )
+    twist = read.topics["/twists/moves"][-1].twist
+    angular = [twist.angular.x, twist.angular.y, twist.angular.z]
+    np.testing.assert_array_equal(angular, data.v[2].angular)
+    rods = [one for one in read.topics["/bodies"][0].markers if one.type == 5]
+    (rod,) = rods  # none from the world to a body that flies
+    assert rod.header.frame_id == "moves-2"
+    ends = [[p.x, p.y, p.z] for p in rod.points]
+    np.testing.assert_array_equal(ends, [np.zeros(3), model.jointPlacements[2].translation])
+    assert "/contacts/markers" not in read.topics
+
+
+def test_shells_and_spheres_are_drawn_once(table):
+    _, read = table
+    (shells,), (bodies,) = read.topics["/shells"], read.topics["/bodies"]
+    (shell,) = shells.markers
+    corners = np.array([[p.x, p.y, p.z] for p in shell.points]).reshape(-1, 3, 3)
+    edges = corners[:, 1:] - corners[:, :1]
+    area = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum()
+    assert area == pytest.approx(0.04, rel=1e-12)
+    assert (shell.type, shell.frame_locked, shell.header.frame_id) == (11, True, "shell/disc")
+    ball = bodies.markers[0]
+    assert (ball.header.frame_id, ball.type) == ("sphere/1st ball/disc", 2)
+    assert (ball.scale.x, ball.scale.y, ball.scale.z) == (0.04, 0.04, 0.04)
+    latched = {"/tf_static", "/shells", "/bodies"}
+    channels = read.summary.channels.values()
+    assert {one.topic for one in channels if "offered_qos_profiles" in one.metadata} == latched
+
+
+def same(one, other):
+    """Compare messages of two readers, field by field."""
+    if hasattr(one, "__slots__"):
+        return all(same(getattr(one, name), getattr(other, name)) for name in one.__slots__)
+    if isinstance(one, list | tuple | bytes) or hasattr(one, "typecode"):
+        return len(one) == len(other) and all(map(same, one, other))
+    return one == other or np.isnan([one, other]).all()
+
+
+@pytest.mark.parametrize("run", ["finger", "table"])
+def test_an_independent_reader_reads_the_same(run, request):
+    """rosbags reads by the schemas of the file, and by its own definitions of ROS 2's messages."""
+    _, read = request.getfixturevalue(run)
+    jazzy = get_typestore(Stores.ROS2_JAZZY)
+    seen = defaultdict(int)
+    with AnyReader([read.path]) as reader:
+        for connection, time, raw in reader.messages():
+            k = seen[connection.topic]
+            seen[connection.topic] += 1
+            own = read.topics[connection.topic][k]
+            assert read.times[connection.topic][k] == time
+            message = reader.deserialize(raw, connection.msgtype)
+            assert same(own, message), (connection.topic, k)
+            assert same(own, jazzy.deserialize_cdr(raw, connection.msgtype))
+            assert bytes(jazzy.serialize_cdr(message, connection.msgtype)) == bytes(raw)
+    assert seen == {topic: len(messages) for topic, messages in read.topics.items()}
+
+
+def test_the_file_says_where_it_comes_from(finger, tmp_path):
+    result, read = finger
+    assert read.header.profile == "ros2"
+    about = read.metadata["sphshell_pin"]
+    assert about["version.sphshell-pin"] == sp.__version__
+    assert about["start [ns]"] == str(START)
+    assert about["integrator"] == "RungeKutta4"
+    settings = {"run": {"dt": 1e-4}, "sensor": [{"name": "fingertip", "frame": "tip"}]}
+    origin = sp.dynamics.result.Origin("some/finger.toml", settings)
+    path = tmp_path / "finger.mcap"
+    exporting.write_mcap(path, replace(result, origin=origin), command="sphshell-pin export x")
+    read = Read(path)
+    assert read.metadata["sphshell_pin"]["scenario"] == "some/finger.toml"
+    assert read.metadata["sphshell_pin"]["command"] == "sphshell-pin export x"
+    assert json.loads(read.attachments["settings.json"]) == settings
+    assert read.topics["/sensors/fingertip"][0].header.frame_id == "tip"
+
+
+def test_the_same_run_gives_the_same_bytes(finger, tmp_path):
+    result, read = finger
+    again = result.to_mcap(tmp_path / "again.mcap", start=START)
+    assert again.read_bytes() == read.path.read_bytes()
+
+
+def test_a_run_that_diverged_is_written_up_to_there(finger, tmp_path):
+    result, _ = finger
+    q = result.q.copy()
+    q[20:] = np.nan
+    read = Read(replace(result, q=q).to_mcap(tmp_path / "part.mcap"))
+    assert read.times["/tf"] == nanoseconds(result.t[:20], 0)
+    with pytest.raises(ResultError, match="no row of finite numbers"):
+        replace(result, q=np.full_like(q, np.nan)).to_mcap(tmp_path / "none.mcap")
+    assert not (tmp_path / "none.mcap").exists()
+
+
+def test_times_that_ros_2_does_not_have_are_refused(finger, tmp_path):
+    result, _ = finger
+    path = tmp_path / "early.mcap"
+    early = replace(result, t=result.t - 0.02)
+    with pytest.raises(ResultError, match=r"from -0\.02 to 0\.06 s.*give another start"):
+        early.to_mcap(path)
+    with pytest.raises(ResultError, match="from 1970 to 2038"):
+        result.to_mcap(path, start=2**31 * 10**9 - 1)
+    with pytest.raises(InvalidParameter, match="nanoseconds since 1970"):
+        result.to_mcap(path, start=1.5)
+    assert not path.exists()
+    assert Read(early.to_mcap(path, start=20_000_000)).times["/tf"][0] == 0
+
+
+def test_the_file_is_written_whole_or_not_at_all(finger, tmp_path, monkeypatch):
+    result, _ = finger
+    path = tmp_path / "run.mcap"
+    before = result.to_mcap(path).read_bytes()
+    calls = iter(range(100))
+
+    def fails(kind, message):
+        if next(calls) == 99:
+            raise OSError(28, "No space left on device")
+        return b"\x00\x01\x00\x00"
+
+    monkeypatch.setattr(exporting, "encode", fails)
+    with pytest.raises(ResultError, match="No space left"):
+        result.to_mcap(path)
+    assert path.read_bytes() == before
+    assert [one.name for one in tmp_path.iterdir()] == ["run.mcap"]
+    with pytest.raises(ResultError, match="cannot be written"):
+        result.to_mcap(tmp_path / "no" / "such" / "run.mcap")
+
+
+def test_a_scene_of_another_run_is_refused(finger, table, tmp_path):
+    result, _ = finger
+    with pytest.raises(ResultError, match="of another scene"):
+        result.to_mcap(tmp_path / "x.mcap", table[0].scene)
+    loaded = sp.Result.load(result.save(tmp_path / "run.npz"))
+    with pytest.raises(ResultError, match="which scene it came from"):
+        loaded.to_mcap(tmp_path / "x.mcap")
+    path = loaded.to_mcap(tmp_path / "x.mcap", result.scene, start=START)
+    assert path.read_bytes() == finger[1].path.read_bytes()
+
+
+def test_without_the_package_the_extra_is_named(finger, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mcap.writer", None)
+    with pytest.raises(MissingExtra, match=r"sphshell-pin\[mcap\]"):
+        finger[0].to_mcap(tmp_path / "x.mcap")
+
+
+def test_names_that_ros_2_does_not_allow_or_that_coincide_get_their_own_topics():
+    topics = exporting._topics("sensors", ["a-b", "a_b", "1 µ", "markers"], ["markers"])
+    assert list(topics.values()) == [
+        "/sensors/a_b",
+        "/sensors/a_b_2",
+        "/sensors/_1__",
+        "/sensors/markers_2",
+    ]

@@ -1,0 +1,218 @@
+"""Runs over each other: differences against closed forms, names matched, times interpolated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import sphshell_pin as sp
+from sphshell_pin.cli import app
+from sphshell_pin.dynamics.result import Origin
+from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.plot.compare import plot_compare
+from sphshell_pin.study.compare import Curve, Measured, compare, measured, tables_of
+from tests.export.runs import finger_run, turntable_run
+from tests.scenario.files import DROP, write
+
+
+@pytest.fixture(scope="module")
+def finger():
+    return finger_run()
+
+
+@pytest.fixture(scope="module")
+def table():
+    return turntable_run()
+
+
+def run(label, t, values, figures=None, parts=("contact a",)):
+    t = np.asarray(t, dtype=float)
+    curve = Curve(t, np.asarray(values, dtype=float), "N")
+    figures = {name: (value, "N") for name, value in (figures or {}).items()}
+    return Measured(label, parts, (t[0], t[-1]), figures, {"force": curve}, {})
+
+
+def test_curves_on_different_times_are_compared_as_lines():
+    """Between the rows |t| and a constant differ linearly: extremes and mean square are exact."""
+    first = run("first", [-1, 0, 2], [1, 0, 2])
+    other = run("other", [-0.5, 0.7, 3], [0.25, 0.25, 0.25])
+    (curve,) = compare([first, other]).others[0].curves
+    assert compare([first, other]).others[0].span == (-0.5, 2)
+    np.testing.assert_array_equal(curve.t, [-0.5, 0, 0.7, 2])
+    np.testing.assert_allclose(curve.values, [-0.25, 0.25, -0.45, -1.75], atol=1e-15)
+    assert (curve.largest, curve.at) == (1.75, 2)
+    # The integral of (0.25 - |t|)^2 from -0.5 to 2, over its length.
+    square = (0.25**3 + 0.25**3) / 3 + (0.25**3 + 1.75**3) / 3
+    assert curve.rms == pytest.approx(np.sqrt(square / 2.5), rel=1e-14)
+    assert curve.of_range == pytest.approx(1.75 / 2)
+
+
+def test_figures_have_absolute_and_relative_differences():
+    first = run("first", [0, 1], [0, 0], {"peak": -2.0, "zero": 0.0, "nan": np.nan})
+    other = run("other", [0, 1], [0, 0], {"peak": -1.5, "zero": 1.0, "nan": np.nan})
+    peak, zero, unknown = compare([first, other]).others[0].figures
+    assert (peak.absolute, peak.relative, peak.same) == (0.5, 0.25, False)
+    assert zero.absolute == 1.0
+    assert np.isnan(zero.relative)
+    assert unknown.same
+
+
+def test_runs_without_common_time_have_no_curves():
+    early, late = run("early", [0, 1], [0, 1]), run("late", [2, 3], [0, 1])
+    other = compare([early, late]).others[0]
+    assert (other.span, other.curves) == (None, ())
+    instant = compare([early, run("late", [1, 2], [3, 4])]).others[0]
+    assert instant.span == (1, 1)
+    assert (instant.curves[0].largest, instant.curves[0].rms) == (2, 2)
+
+
+def test_what_one_run_alone_has_is_listed():
+    first = run("first", [0, 1], [0, 1], {"x": 1.0}, parts=("contact a", "joint b"))
+    other = run("other", [0, 1], [0, 1], {"y": 1.0}, parts=("sensor c", "contact a"))
+    found = compare([first, other]).others[0]
+    assert (found.only_first, found.only_other) == (("joint b",), ("sensor c",))
+    assert found.figures == ()
+    with pytest.raises(ResultError, match=r"nothing can be compared: first has contact a.*joint z"):
+        compare([first, run("alien", [0, 1], [0, 1], parts=("joint z",))])
+    with pytest.raises(InvalidParameter, match="two at least"):
+        compare([first])
+
+
+def test_a_run_equals_itself_and_others_are_beside_the_first(finger):
+    one = measured("one", finger, finger.scene)
+    slower = replace(finger, t=2 * finger.t, q=finger.q)
+    other = measured("slower", slower, finger.scene)
+    same, late = compare([one, one, other]).others
+    assert all(figure.same for figure in same.figures)
+    assert not any(curve.values.any() for curve in same.curves)
+    assert {curve.name for curve in same.curves} >= {
+        "q.knuckle",
+        "pairs.tip-wall.depth",
+        "sphere.tip-wall.x",
+    }
+    knuckle = next(curve for curve in late.curves if curve.name == "q.knuckle")
+    k = list(finger.scene.model.names).index("knuckle") - 1
+    np.testing.assert_allclose(
+        knuckle.values,
+        np.interp(knuckle.t, 2 * finger.t, finger.q[:, k])
+        - np.interp(knuckle.t, finger.t, finger.q[:, k]),
+        atol=1e-15,
+    )
+
+
+def test_paths_and_angles_of_a_free_ball_and_a_turntable(table):
+    curves = measured("table", table, table.scene).curves
+    path = np.column_stack([curves[f"sphere.1st ball/disc.{axis}"].values for axis in "xyz"])
+    np.testing.assert_allclose(path, table.q[:, 2:5], rtol=0, atol=1e-16)
+    turned = np.unwrap(np.arctan2(table.q[:, 1], table.q[:, 0]))
+    np.testing.assert_array_equal(curves["q.axle"].values, turned)
+    assert "q.ball_moves" not in curves
+    assert measured("x", table, None).curves["q.8"].values[0] == 1.0
+
+
+def test_settings_that_differ_are_listed_by_their_keys(finger):
+    contact = {"name": "tip", "law": {"stiffness": 1e6, "exponent": 1.5}}
+    settings = {"run": {"dt": 1e-4}, "contact": [contact], "gravity": [0, 0, -9.81]}
+    other = {**settings, "contact": [{**contact, "law": {"stiffness": 2e6, "exponent": 1.5}}]}
+    runs = [
+        measured(label, replace(finger, origin=Origin("x", stated)), finger.scene)
+        for label, stated in (("a", settings), ("b", other))
+    ]
+    assert compare(runs).others[0].settings == (("contact.tip.law.stiffness", 1e6, 2e6),)
+
+
+def test_tables_have_every_run(finger):
+    one = measured("one", finger, finger.scene)
+    tables = tables_of(compare([one, replace(one, label="two"), replace(one, label="three")]))
+    figures = tables["figures"]
+    assert figures["one"] == figures["two"] == figures["three"]
+    assert set(figures["two: absolute difference"]) == {0.0}
+    assert set(tables["curves"]["run"]) == {"two", "three"}
+    assert len({len(column) for column in figures.values()}) == 1
+
+
+def test_a_diverged_run_is_compared_up_to_there(finger):
+    q = finger.q.copy()
+    q[10:] = np.inf
+    part = measured("part", replace(finger, q=q), finger.scene)
+    assert part.span == (0, finger.t[9])
+    with pytest.raises(ResultError, match="no row of finite numbers"):
+        measured("none", replace(finger, q=np.full_like(q, np.nan)), finger.scene)
+
+
+def test_the_picture_has_every_run_and_its_difference(finger, table):
+    one = measured("one", finger, finger.scene)
+    figure = plot_compare(compare([one, measured("two", finger, finger.scene)]))
+    titles = [axis.get_title(loc="left") for axis in figure.axes]
+    assert titles[:2] == [
+        "pairs.tip-wall.normal_force",
+        "pairs.tip-wall.normal_force, less that of one",
+    ]
+    assert [line.get_label() for line in figure.axes[0].lines] == ["one", "two"]
+    assert [line.get_label() for line in figure.axes[1].lines] == ["two"]
+    assert "force [N]" in figure.axes[0].get_ylabel()
+    still = run("still", [0, 1], [0, 0])
+    plot_compare(compare([still, still]))
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, [str(one) for one in arguments])
+
+
+def drop(folder, name, **changes):
+    out = folder / name
+    set_ = [f"--set={key.replace('__', '.')}={value}" for key, value in changes.items()]
+    told = call("run", write(folder), "--out", out, "--no-recording", *set_)
+    assert told.exit_code == 0, told.output
+    return out
+
+
+def test_the_command_prints_differences_and_writes_them(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    soft = drop(tmp_path, "soft")
+    stiff = drop(tmp_path, "stiff", run__dt="5e-5", run__duration="0.04")
+    told = call("compare", soft, stiff / "run.npz", "--out", tmp_path / "both")
+    assert told.exit_code == 0, told.output
+    for words in ("stiff beside soft", "run.duration", "pairs.ball-plate.peak_force [N]", " %"):
+        assert words in told.output
+    assert {one.name for one in (tmp_path / "both").iterdir()} == {
+        "figures.csv",
+        "curves.csv",
+        "compare.png",
+    }
+    head, *lines = (tmp_path / "both" / "figures.csv").read_text().splitlines()
+    assert head == "figure,unit,soft,stiff,stiff: absolute difference,stiff: relative difference"
+    peaks = [
+        sp.Result.load(one / "run.npz").stats.pairs["ball-plate"].peak_force
+        for one in (soft, stiff)
+    ]
+    (line,) = (one for one in lines if one.startswith("pairs.ball-plate.peak_force,"))
+    assert [float(one) for one in line.split(",")[2:4]] == peaks
+    told = call("compare", soft, soft, "--out", tmp_path / "same", "--no-picture")
+    assert told.exit_code == 0
+    assert "equal to the last bit" in told.output
+    assert "figure" not in told.output.partition("equal to")[0]
+
+
+def test_faults_of_compare(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    soft = drop(tmp_path, "soft")
+    told = call("compare", soft)
+    assert told.exit_code == 2
+    assert "two at least" in told.stderr
+    told = call("compare", soft, tmp_path / "none")
+    assert (told.exit_code, told.stderr.count("\n")) == (2, 1)
+    assert "none" in told.stderr
+    (tmp_path / "bad.npz").write_bytes((soft / "run.npz").read_bytes()[:2000])
+    told = call("compare", soft, tmp_path / "bad.npz")
+    assert (told.exit_code, told.stderr.count("\n")) == (2, 1)
+    assert "bad.npz: is not a file that Result.save wrote" in told.stderr
+    other = DROP.replace("ball-plate", "elsewhere")
+    assert call("run", write(tmp_path, other), "--out", "other", "--no-recording").exit_code == 0
+    told = call("compare", soft, "other", "--out", "x", "--no-picture")
+    assert told.exit_code == 0
+    assert "in soft alone: contact ball-plate" in told.output
+    assert "in other alone: contact elsewhere" in told.output
