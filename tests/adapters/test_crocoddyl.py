@@ -80,6 +80,20 @@ def free_ball() -> tuple[sp.Scene, np.ndarray]:
     return pressed(scene, q, [0.2, -0.1, 0.05, 1.0, -2.0, 0.5])
 
 
+def ball_in_a_corner(joints: sp.JointIngredients | None = None) -> tuple[sp.Scene, np.ndarray]:
+    """Return a ball on slides that presses into two walls, and a state."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "slides")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.3, 0.02), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model, joints=joints)
+    upright = pin.SE3(pin.rpy.rpyToMatrix(0.0, np.pi / 2, 0.0), np.zeros(3))
+    ball = sp.Sphere(0.02, "ball")
+    scene.add_contact(ball, plate(), placement=upright, law=LAW, friction=SLIDING, name="wall")
+    scene.add_contact(ball, plate(), law=LAW, friction=SLIDING, name="touch")
+    return scene, np.array([0.02 - 3e-4, 0.03, 0.02 - 2e-4, 0.05, 0.1, -0.05])
+
+
 def pressed(scene: sp.Scene, q: np.ndarray, v: list[float]) -> tuple[sp.Scene, np.ndarray]:
     """Return the scene and the state, where there is a force and friction."""
     contacts = scene.contacts(q, v)
@@ -117,6 +131,7 @@ def parts(scene: sp.Scene, actuation: str = "Full", frame: str = "tip"):
 
 CASES = {
     "arm": (arm_on_moving_plate, "Full", "tip"),
+    "corner": (ball_in_a_corner, "Full", "ball"),
     "ball": (free_ball, "Full", "ball"),
     "ball-without-motors": (free_ball, "FloatingBase", "ball"),
 }
@@ -199,6 +214,38 @@ def test_forces_are_those_of_the_scene():
     model.calc(last, x)
     model.calcDiff(last, x)
     np.testing.assert_array_equal(last.costs.costs["world"].residual.r, wanted)
+
+
+@pytest.mark.parametrize("joints", [None, sp.JointIngredients(damping={"slides": 7.0})])
+def test_forces_of_several_pairs_and_of_joints(joints):
+    """Each pair has its own force; the acceleration is ABA's with the scene's forces."""
+    scene, x = ball_in_a_corner(joints)
+    q, v = x[:3], x[3:]
+    state, actuation, costs = parts(scene, "Full", "ball")
+    force = ContactForceResidual(scene, state, "wall", [0.0, 0.0, 0.0])
+    costs.addCost("wall", crocoddyl.CostModelResidual(state, force), 1.0)
+    model = ContactDynamics(scene, state, actuation, costs)
+    data = model.createData()
+    tau = np.array([1.0, 2.0, 3.0])
+    model.calc(data, x, tau)
+    contacts = scene.contacts(q, v)
+    assert sorted(contacts.pair) == [0, 1]
+    for name, pair in (("wall", 0), ("touch", 1)):
+        row = contacts.force_world[contacts.pair == pair][0]
+        residual = data.costs.costs["world" if name == "touch" else name].residual
+        reference = np.array([1.0, 0.5, 2.0]) if name == "touch" else np.zeros(3)
+        np.testing.assert_allclose(residual.r, row - reference, rtol=1e-14)
+    total = tau + scene.joint_forces(q, v)
+    fext = scene.external_forces(q, v)
+    expected = pin.aba(scene.model, scene.model.createData(), q, v, total, fext)
+    np.testing.assert_allclose(data.xout, expected, rtol=1e-12)
+
+
+def test_dry_friction_of_joints_is_refused_as_bristles_are():
+    dry = sp.JointIngredients(friction={"slides": sp.JointFriction(1.0)})
+    scene, _ = ball_in_a_corner(dry)
+    with pytest.raises(InvalidParameter, match="dry friction in its joints"):
+        dynamics(scene, "Full", "ball")
 
 
 def test_where_nothing_touches_forces_and_derivatives_are_zero():
