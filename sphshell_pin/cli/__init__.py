@@ -3,7 +3,7 @@
 # Imported for their commands, in the order of the help.
 # isort: off
 from sphshell_pin.cli import new, running, view, taxels, files, sweep, report  # noqa: F401
-from sphshell_pin.cli import check_robot, listing  # noqa: F401
+from sphshell_pin.cli import fit, check_robot, listing  # noqa: F401
 
 # isort: on
 from sphshell_pin.cli.app import app, main
