@@ -43,7 +43,8 @@ def fit(
         typer.Option(
             "--param",
             metavar="KEY[=LO:HI]",
-            help="What is fitted, in this range if it is given; may be given several times.",
+            help="What is fitted, in this range if it is given; may be given several times. "
+            "KEY+KEY: one value for both.",
         ),
     ],
     experiment: Annotated[
@@ -95,7 +96,7 @@ def fit(
         path = find_scenario(scenario)
         # Where no value can be written, it is said before the runs.
         free = free_parameters(wanted, read_scenario(path, changes), path)
-        check_places(path, [one.key for one in free], changes)
+        check_places(path, [key for one in free for key in one.keys], changes)
         with _bar() as progress:
             found = fit_scenario(
                 scenario,

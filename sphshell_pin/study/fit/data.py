@@ -279,12 +279,10 @@ def _read_csv(path: Path) -> _Table:
                 continue
             value = _number(cell)
             if value is None or not math.isfinite(value):
-                raise DataError(
-                    source,
-                    f"'{cell.strip()}' in column '{head[i]}' is not a finite number; leave the "
-                    "cell empty where nothing was measured",
-                    number,
-                )
+                reason = f"'{cell.strip()}' in column '{head[i]}' is not a finite number"
+                if head[i].partition(" ")[0] != TIME:
+                    reason += "; leave the cell empty where nothing was measured"
+                raise DataError(source, reason, number)
             values[k, i] = value
     return _Table(source, dict(zip(head, values.T, strict=True)), numbers[1:])
 

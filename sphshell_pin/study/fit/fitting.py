@@ -100,7 +100,7 @@ def _trials(
         experiment = one if isinstance(one, Experiment) else Experiment(one)
         texts = {key: str(value) for key, value in experiment.changes.items()}
         for key, text in texts.items():
-            if key in (parameter.key for parameter in free):
+            if any(key in one.keys for one in free):
                 raise InvalidParameter(key, text, "is fitted, so no experiment can set it")
         scenario = change_scenario(base, texts, path) if texts else base
         check_knobs(scenario, path, ranges=False)
@@ -117,12 +117,14 @@ def _trials(
         trials.append(ready(built, read))
     for name in sigma or {}:
         if name not in used:
-            raise InvalidParameter(
-                f"sigma of '{name}'", name, f"names no column; there are: {', '.join(sorted(used))}"
-            )
+            must = f"names no column; there are: {', '.join(sorted(used))}"
+            raise InvalidParameter("sigma", name, must, given=f"of '{name}'")
     size = sum(trial.size for trial in trials)
     if size <= len(free):
         raise InvalidParameter(
-            "data", size, f"values are too few for {len(free)} parameters: they need more"
+            "data",
+            size,
+            f"must be more than parameters, of which there are {len(free)}",
+            given=f"with {size} value{'s' * (size != 1)}",
         )
     return trials

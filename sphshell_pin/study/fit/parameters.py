@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +19,14 @@ from sphshell_pin.scenario.schema import Scenario
 Range = tuple[float, float]
 Wanted = Iterable[str] | Mapping[str, Range | None]
 
+TIE = "+"
 # Tables of which no number is a property of what was measured.
 _NOT_MEASURED = ("run", "knob", "figures", "expect")
 
 
 @dataclass(frozen=True)
 class Free:
-    """A number of a scenario that is fitted.
+    """A number of a scenario that is fitted; `others` are keys that always have its value, too.
 
     The search moves x: the logarithm of the value of one that must be positive (`log`), else the
     value over `scale`. `low` and `high` bound the value.
@@ -38,8 +39,17 @@ class Free:
     high: float
     log: bool
     scale: float = 1.0
-    ranged: bool = False
-    """Whether the caller gave the bounds."""
+    others: tuple[str, ...] = ()
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """All keys that have the value."""
+        return (self.key, *self.others)
+
+    @property
+    def name(self) -> str:
+        """The keys as the caller gives them."""
+        return TIE.join(self.keys)
 
     def to_x(self, value: float) -> float:
         """Return x at a value."""
@@ -73,8 +83,8 @@ def free_parameters(wanted: Wanted, scenario: Scenario, path: Path) -> tuple[Fre
     ranges = dict(wanted) if isinstance(wanted, Mapping) else dict.fromkeys(wanted)
     if not ranges:
         raise InvalidParameter("parameters", [], "must name at least one key of the scenario")
-    free = [_free(key, span, scenario, path) for key, span in ranges.items()]
-    keys = [one.key for one in free]
+    free = [_tied(key, span, scenario, path) for key, span in ranges.items()]
+    keys = [key for one in free for key in one.keys]
     for key in keys:
         if keys.count(key) > 1:
             raise InvalidParameter("parameters", key, "is given twice")
@@ -99,6 +109,17 @@ def _parse_range(text: str, span: str) -> Range:
     except ValueError:
         raise InvalidParameter("--param", text, "must be KEY or KEY=LO:HI") from None
     return low, high
+
+
+def _tied(key: str, span: Range | None, scenario: Scenario, path: Path) -> Free:
+    """Return the parameter of "KEY" or "KEY+KEY": one value for all, within the bounds of all."""
+    first, *others = (_free(one.strip(), span, scenario, path) for one in key.split(TIE))
+    for one in others:
+        if one.unit != first.unit:
+            must = f"must have one unit to have one value: [{first.unit}] and [{one.unit}]"
+            raise InvalidParameter("parameters", key, must)
+    low, high = max(one.low for one in (first, *others)), min(one.high for one in (first, *others))
+    return replace(first, low=low, high=high, others=tuple(one.key for one in others))
 
 
 def _free(key: str, span: Range | None, scenario: Scenario, path: Path) -> Free:
@@ -146,7 +167,7 @@ def _free(key: str, span: Range | None, scenario: Scenario, path: Path) -> Free:
             f"must not start at 0, which says nothing of its order of magnitude: give a start by "
             f"--set {key}=VALUE, or a range, {key}=LO:HI",
         )
-    return Free(found.key, about.unit, value, low, high, log, scale, span is not None)
+    return Free(found.key, about.unit, value, low, high, log, scale)
 
 
 def _bounds(about: Parameter) -> Range:

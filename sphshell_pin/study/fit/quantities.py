@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.scenario.build import Built
 
@@ -36,8 +37,8 @@ def quantities_of(built: Built) -> dict[str, Quantity]:
     """Return what can be measured of the runs of a scenario, by name.
 
     `q.JOINT`, `v.JOINT` (`q.JOINT.0`, ... where a joint has several), `pairs.PAIR.normal_force`,
-    `.force_x` and on, `.friction_force_x` and on, `.depth`, `frames.FRAME.x` and on (the position
-    in the world), `SENSOR.COLUMN`.
+    `.force_x` and on, `.friction_force_x` and on, `.depth`, `SENSOR.COLUMN`; of each frame, along
+    the axes of the world, `frames.FRAME.x` (position), `.vx` (velocity), `.wx` (angular velocity).
     """
     return {
         one.name: one
@@ -159,25 +160,30 @@ def _reading(sensor: str, column: int) -> Callable[[Result, Array], Array]:
 
 
 def _of_frames(built: Built) -> list[Quantity]:
-    return [
-        Quantity(f"frames.{name}.{axis}", "m", _at_rows(_position(built.scene.model, k, i)))
-        for name, k in _frames(built.scene.model).items()
-        for i, axis in enumerate("xyz")
-    ]
+    model, out = built.scene.model, []
+    for name in dict.fromkeys(frame.name for frame in model.frames[1:]):
+        frame = find_frame(model, name)
+        for part, unit in (("", "m"), ("v", "m/s"), ("w", "rad/s")):
+            for axis in range(3):
+                label = f"frames.{name}.{part}{'xyz'[axis]}"
+                out.append(Quantity(label, unit, _at_rows(_motion(model, frame, part, axis))))
+    return out
 
 
-def _frames(model: pin.Model) -> dict[str, int]:
-    from sphshell_pin.dynamics.models import find_frame
+def _motion(model: pin.Model, frame: int, part: str, axis: int) -> Callable[[Result], Array]:
+    """Return position ("") or velocity ("v", "w") of a frame, along an axis of the world."""
 
-    return {frame.name: find_frame(model, frame.name) for frame in model.frames[1:]}
-
-
-def _position(model: pin.Model, frame: int, axis: int) -> Callable[[Result], Array]:
     def of(result: Result) -> Array:
         data, out = model.createData(), np.zeros(len(result.t))
-        for row, q in enumerate(result.q):
-            pin.forwardKinematics(model, data, q)
-            out[row] = pin.updateFramePlacement(model, data, frame).translation[axis]
+        aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        for row, (q, v) in enumerate(zip(result.q, result.v, strict=True)):
+            pin.forwardKinematics(model, data, q, v)
+            if part:
+                velocity = pin.getFrameVelocity(model, data, frame, aligned)
+                vector = velocity.linear if part == "v" else velocity.angular
+            else:
+                vector = pin.updateFramePlacement(model, data, frame).translation
+            out[row] = vector[axis]
         return out
 
     return of

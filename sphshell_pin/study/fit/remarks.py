@@ -58,7 +58,7 @@ def _undetermined(fitted: Sequence[Fitted], free: Sequence[Free], spread: Spread
         if math.isinf(one.low) and math.isinf(one.high):
             why = "a change of it changes nothing that was measured"
         elif free[k].log or one.low <= 0.0 <= one.high:
-            why = f"they do not tell it from 0; its interval ends at {one.high:.4g} {one.unit}"
+            why = f"they do not tell it from 0, and allow up to {one.high:.4g} {one.unit}"
             if free[k].log:
                 why = f"its interval, {one.low:.4g} to {one.high:.4g} {one.unit}".rstrip()
                 why += ", leaves its order of magnitude open"
@@ -79,11 +79,11 @@ def _combination(
         ratio = float(vector[k] / vector[largest])
         # x is the logarithm of the value, or the value over its scale.
         share = ratio if free[k].log else ratio * free[k].scale / (abs(fitted[k].value) or 1.0)
-        parts.append(f"{fitted[k].key} by {share:+.2g} %")
+        parts.append(f"{fitted[k].key} changes by {share:+.2g} %")
     names = " and ".join(fitted[k].key for k in members)
     return (
-        f"the data do not determine {names} separately: they stay the same if "
-        f"{', '.join(parts)} change together"
+        f"the data do not determine {names} separately: runs stay as they are if "
+        f"{' and '.join(parts)}"
     )
 
 

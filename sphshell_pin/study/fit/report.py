@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.atomic import write_whole
 from sphshell_pin.scenario.reading import find_scenario
+from sphshell_pin.study.fit.parameters import TIE
 from sphshell_pin.study.fit.writing import scenario_text
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 class Fitted:
     """A fitted parameter: `value`, and the interval from `low` to `high`, in its `unit`.
 
-    The interval is infinite for a parameter that the data do not determine, and nan for one whose
+    `key` of several keys with one value is "KEY+KEY". The interval is infinite for a parameter that the data do not determine, and nan for one whose
     value stands `at_bound`.
     """
 
@@ -128,7 +129,9 @@ class Fit:
         written.
         """
         source = find_scenario(self.scenario)
-        texts = {one.key: file_number(one.value) for one in self.parameters}
+        texts = {
+            key: file_number(one.value) for one in self.parameters for key in one.key.split(TIE)
+        }
         text = scenario_text(source, {**(changes or {}), **texts}, Path(path).parent)
         return write_whole(path, text.encode())
 

@@ -92,7 +92,11 @@ class Runs:
 
     def result(self, trial: Trial, x: Array) -> sp.Result:
         """Return the result of one experiment at x."""
-        texts = {one.key: one.text(value) for one, value in zip(self.free, x.tolist(), strict=True)}
+        texts = {
+            key: one.text(value)
+            for one, value in zip(self.free, x.tolist(), strict=True)
+            for key in one.keys
+        }
         # The user's own functions are loaded anew: what they remember must not reach another run.
         before = replace(trial.built, functions={}) if trial.built.functions else trial.built
         with warnings.catch_warnings():

@@ -302,9 +302,9 @@ def _fitted(one: Free, x: float, half: float, *, at_bound: bool) -> Fitted:
     """
     value = float(one.text(x))
     if at_bound:
-        return Fitted(one.key, one.unit, one.start, value, math.nan, math.nan, True, True)
+        return Fitted(one.name, one.unit, one.start, value, math.nan, math.nan, True, True)
     if math.isinf(half):
-        return Fitted(one.key, one.unit, one.start, value, -math.inf, math.inf, False)
+        return Fitted(one.name, one.unit, one.start, value, -math.inf, math.inf, False)
     low, high = one.to_value(x - half), one.to_value(x + half)
     reaches_low, reaches_high = low <= one.low, high >= one.high
     if one.log:
@@ -315,7 +315,7 @@ def _fitted(one: Free, x: float, half: float, *, at_bound: bool) -> Fitted:
         determined = True
     determined = determined and not (reaches_low and reaches_high)
     return Fitted(
-        one.key, one.unit, one.start, value, max(low, one.low), min(high, one.high), determined
+        one.name, one.unit, one.start, value, max(low, one.low), min(high, one.high), determined
     )
 
 

@@ -44,7 +44,7 @@ def factor_to_si(name: str, given: str | None, unit: str) -> float:
         if unit in ("", "1"):
             return 1.0
         raise InvalidParameter(
-            f"column '{name}'", name, f"needs its unit in the header: '{name} [{unit}]'", given=""
+            "column", name, f"needs its unit in the header: '{name} [{unit}]'", given=f"'{name}'"
         )
     if given.strip() not in known:
         valid = [one for one in known if one]

@@ -36,17 +36,32 @@ def scenario_text(source: Path, changes: Mapping[str, str], folder: Path) -> str
     ScenarioError
         The file does not state a value, and there is no place for it in the tables that it has.
     """
-    text = source.read_text(encoding="utf-8")
-    for key, value in changes.items():
-        text = _with_value(text, source, key, value)
+    text = _with_values(source.read_text(encoding="utf-8"), source, changes)
     return _from_folder(text, source, folder)
+
+
+def _with_values(text: str, source: Path, changes: Mapping[str, str]) -> str:
+    waiting = dict(changes)
+    while waiting:
+        fault: ScenarioError | None = None
+        for key, value in list(waiting.items()):
+            try:
+                text = _with_value(text, source, key, value)
+            except ScenarioError as now:
+                fault = fault or now
+                continue
+            del waiting[key]
+            # Another one may have waited for this: mu_dynamic must not exceed mu_static.
+            break
+        else:
+            assert fault is not None
+            raise fault
+    return text
 
 
 def check_places(source: Path, keys: Iterable[str], changes: Mapping[str, str]) -> None:
     """Raise ScenarioError for a key of which `scenario_text` could not write a number."""
-    text = source.read_text(encoding="utf-8")
-    for key, value in changes.items():
-        text = _with_value(text, source, key, value)
+    text = _with_values(source.read_text(encoding="utf-8"), source, changes)
     for key in keys:
         scenario = parse_scenario(text, source)
         number = float(look_up(scenario, key, source).value)
@@ -73,6 +88,10 @@ def _with_value(text: str, source: Path, key: str, value: str) -> str:
     for candidate in _candidates(text, key, written):
         if _parsed(candidate, source) == wanted:
             return candidate
+    whole, _, index = key.rpartition(".")
+    if index.isdecimal() and isinstance(found := look_up(wanted, whole, source).value, list):
+        # One number of a list that the file leaves at its default: state the list.
+        return _with_value(text, source, whole, json.dumps(found))
     raise ScenarioError(
         source, key, "the file has no place for this value: state the key in it first", value
     )
@@ -83,6 +102,7 @@ def _candidates(text: str, key: str, value: str) -> Iterator[str]:
         for found in re.finditer(pattern, text):
             yield text[: found.start()] + value + text[found.end() :]
     last = key.rpartition(".")[2]
+    yield f"{last} = {value}\n{text}"
     for found in _BRACE.finditer(text):
         yield f"{text[: found.end()]} {last} = {value},{text[found.end() :]}"
     for found in _HEAD.finditer(text):
