@@ -79,7 +79,10 @@ rtol = 1e-6
 DURATION = 4e-5
 points = read("kharaz").where("reading", "kratos")
 experiments = []
-for quantity, column in (("restitution", "frames.ball.vx [m/s]"), ("spin", "frames.ball.wy [rad/s]")):
+for quantity, column in (
+    ("restitution", "frames.ball.vx [m/s]"),
+    ("spin", "frames.ball.wy [rad/s]"),
+):
     chosen = points.where("quantity", quantity)
     for angle, value in zip(chosen["angle"], chosen["value"], strict=True):
         along, down = SPEED * sin(radians(angle)), SPEED * cos(radians(angle))

@@ -21,6 +21,8 @@ _SAME = 1e-6
 _FINER = 8
 # A grid of times may be so much finer than the steps between them.
 _FINEST = 16
+# So many rows for each time at most.
+_MOST_ROWS = 64
 
 
 @dataclass(frozen=True)
@@ -55,13 +57,16 @@ def row_step(t: Array) -> float:
     steps = steps[steps > 0.0]
     if not len(steps):
         return 0.0
+    least = float(t[-1]) / max(_MOST_ROWS * len(t), 1000)
     for parts in range(1, _FINEST + 1):
         step = float(steps.min()) / parts
+        if step < least:
+            break
         # The last one defines the step more exactly than the shortest does.
         step = float(t[-1]) / round(float(t[-1]) / step)
         if np.abs(t / step - np.rint(t / step)).max() < _SAME * len(t):
             return step
-    return float(np.median(steps)) / _FINER
+    return max(float(np.median(steps)) / _FINER, least)
 
 
 def _at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:

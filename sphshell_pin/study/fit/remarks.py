@@ -48,8 +48,8 @@ def _undetermined(fitted: Sequence[Fitted], free: Sequence[Free], spread: Spread
     together: set[int] = set()
     for direction in spread.blind:
         members = np.flatnonzero(np.abs(direction) > 0.01 * np.abs(direction).max())
-        lost = [k for k in members.tolist() if not fitted[k].determined]
-        if len(lost) > 1:
+        lost = [k for k in members.tolist() if math.isinf(spread.deviations[k])]
+        if len(lost) > 1 and not together.issuperset(lost):
             together |= set(lost)
             out.append(_combination(lost, direction, fitted, free))
     for k, one in enumerate(fitted):

@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 class Fitted:
     """A fitted parameter: `value`, and the interval from `low` to `high`, in its `unit`.
 
-    `key` of several keys with one value is "KEY+KEY". The interval is infinite for a parameter that the data do not determine, and nan for one whose
-    value stands `at_bound`.
+    `key` of several keys with one value is "KEY+KEY". The interval is infinite for a parameter of
+    which the data say nothing, and nan for one that its bound holds off the data: `at_bound`.
     """
 
     key: str

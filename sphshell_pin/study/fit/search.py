@@ -107,14 +107,16 @@ class Search:
     def report(self, scenario: str, level: float) -> Fit:
         """Return the fit at the values found."""
         jacobian, error = self._final_slopes()
-        held = (self.x <= self.low) | (self.x >= self.high)
-        spread = _with_held(spread_of(jacobian[:, ~held], error[:, ~held]), held)
-        dof = len(self.measured) - int((~held).sum())
+        dof = len(self.measured) - len(self.free)
         factor = student_factor(dof, level)
+        spread = spread_of(jacobian, error)
+        middle, held = self._beyond(jacobian, factor * spread.deviations)
+        if held.any():
+            spread = _with_held(spread_of(jacobian[:, ~held], error[:, ~held]), held)
         fitted = tuple(
-            _fitted(one, x, factor * deviation, at_bound=bool(bound))
-            for one, x, deviation, bound in zip(
-                self.free, self.x.tolist(), spread.deviations.tolist(), held, strict=True
+            _fitted(one, x, (center - half, center + half), held=bool(bound))
+            for one, x, center, half, bound in zip(
+                self.free, self.x.tolist(), middle, factor * spread.deviations, held, strict=True
             )
         )
         series = self._series()
@@ -147,6 +149,21 @@ class Search:
         sigma = self._estimated_sigma()
         weighted = (self.measured - values) / sigma
         return float(np.sum(np.log(sigma)) + 0.5 * weighted @ weighted)
+
+    def _beyond(self, jacobian: Array, half: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the middles (p,) of the intervals, and which parameters the bounds hold.
+
+        Of a value at a bound the middle is where the residuals would be least without it. Where an
+        interval of `half` width about it does not reach the bound, the bound speaks against the
+        data: the value is held there.
+        """
+        at_bound = (self.x <= self.low) | (self.x >= self.high)
+        if not at_bound.any():
+            return self.x, at_bound
+        step = np.linalg.lstsq(jacobian, self._residuals(self.x), rcond=None)[0]
+        middle = np.where(at_bound, self.x + step, self.x)
+        held = at_bound & ((middle + half < self.low) | (middle - half > self.high))
+        return np.where(held, self.x, middle), held
 
     def _minimize(self, until: float = 1.0) -> None:
         """Make the residuals least, those `until` a part of each experiment's time."""
@@ -194,21 +211,21 @@ class Search:
     def _final_slopes(self) -> tuple[Array, Array]:
         """Return the weighted slopes (N, p) at the solution and their error.
 
-        A column's step is halved as long as that brings differences over one step and over twice
-        the step nearer to each other. Where the error is one of truncation, what they differ by is
-        three times the error of the shorter step; where it is one of rounding, it is more than it.
+        The error is by how much differences over one step and over twice the step differ, and a
+        column's step is halved as long as that makes it less. An error of truncation is a third of
+        it; one of rounding, of which neither difference knows the other's, is about that much.
         """
         slopes, errors = [], []
         for k in range(len(self.x)):
             step = central_step(self.runs.tolerance)
             near = self._slope(k, step)
-            error = (near - self._slope(k, 2.0 * step)) / 3.0
+            error = near - self._slope(k, 2.0 * step)
             for _ in range(_MOST_HALVINGS):
                 if np.linalg.norm(error) <= _SMALL_ERROR * np.linalg.norm(near):
                     break
                 step *= 0.5
                 nearer = self._slope(k, step)
-                less = (nearer - near) / 3.0
+                less = nearer - near
                 if not np.linalg.norm(less) < np.linalg.norm(error):
                     break
                 near, error = nearer, less
@@ -294,29 +311,23 @@ def _with_held(spread: Spread, held: NDArray[np.bool_]) -> Spread:
     return Spread(covariance, blind)
 
 
-def _fitted(one: Free, x: float, half: float, *, at_bound: bool) -> Fitted:
-    """Return a parameter with its interval, x - half to x + half.
+def _fitted(one: Free, x: float, span: tuple[float, float], *, held: bool) -> Fitted:
+    """Return a parameter with its interval, `span` of x.
 
     It is not determined if that interval leaves its order of magnitude open: if it reaches from one
     bound to the other, or, for one that is not negative, to 0 by its slope at the value.
     """
-    value = float(one.text(x))
-    if at_bound:
+    value, low, high = float(one.text(x)), -math.inf, math.inf
+    if held:
         return Fitted(one.name, one.unit, one.start, value, math.nan, math.nan, True, True)
-    if math.isinf(half):
-        return Fitted(one.name, one.unit, one.start, value, -math.inf, math.inf, False)
-    low, high = one.to_value(x - half), one.to_value(x + half)
-    reaches_low, reaches_high = low <= one.low, high >= one.high
-    if one.log:
-        determined = half < 1.0
-    elif one.low == 0.0:
-        determined = low > 0.0
-    else:
-        determined = True
-    determined = determined and not (reaches_low and reaches_high)
-    return Fitted(
-        one.name, one.unit, one.start, value, max(low, one.low), min(high, one.high), determined
-    )
+    if math.isinf(span[0]):
+        return Fitted(one.name, one.unit, one.start, value, low, high, False)
+    low, high = map(one.to_value, span)
+    # One that must be positive is searched by its logarithm: its relative deviation is that of x.
+    from_zero = 0.5 * (span[1] - span[0]) < 1.0 if one.log else one.low != 0.0 or low > 0.0
+    determined = from_zero and not (low <= one.low and high >= one.high)
+    low, high = max(low, one.low), min(high, one.high)
+    return Fitted(one.name, one.unit, one.start, value, low, high, determined)
 
 
 def _scipy_optimize() -> ModuleType:

@@ -18,7 +18,7 @@ FALSE_ALARM = 0.01
 class Spread:
     """Of p parameters x: `covariance` (p, p), infinite on the diagonal of undetermined ones.
 
-    `blind` (k, p) are unit vectors along which the data say nothing.
+    `blind` (k, p) are changes of x, of length 1, along which the data say nothing.
     """
 
     covariance: Array
@@ -44,17 +44,18 @@ class Spread:
 def spread_of(jacobian: Array, error: Array) -> Spread:
     """Return what the Jacobian (N, p) of weighted residuals determines; `error` is its own error.
 
-    All columns are brought to one length before, which leaves the condition about as good as any
-    lengths can (van der Sluis, Numer. Math. 14 (1969) 14). By Weyl's theorem a singular value
-    below the norm of the error cannot be told from 0: the data say nothing along its vector. By
-    Wedin's theorem such vectors are known to an angle of the error over the gap to the other
-    singular values; a parameter that takes part in one by more than that is not determined.
+    A column that is not longer than twice its error says nothing of its parameter. The others are
+    brought to one length, which leaves the condition about as good as any lengths can (van der
+    Sluis, Numer. Math. 14 (1969) 14). By Weyl's theorem a singular value below the norm of the
+    error cannot be told from 0: the data say nothing along its vector. By Wedin's theorem such
+    vectors are known to an angle of the error over the gap to the other singular values; a
+    parameter that takes part in one by more than that is not determined.
 
     Source of both: Stewart and Sun, Matrix Perturbation Theory (1990), IV.4 and V.4.
     """
     count = jacobian.shape[1]
     lengths = np.linalg.norm(jacobian, axis=0)
-    felt = lengths > np.linalg.norm(error, axis=0)
+    felt = lengths > 2.0 * np.linalg.norm(error, axis=0)
     covariance = np.zeros((count, count))
     blind = np.eye(count)[~felt]
     if felt.any():
