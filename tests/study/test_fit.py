@@ -145,6 +145,7 @@ def test_what_no_column_feels_is_told(bounce):
     assert found.remarks == (
         f"the data do not determine {FRICTION}: a change of it changes nothing that was measured",
     )
+    assert found[FRICTION].value == found[FRICTION].start
     assert np.isnan(found.correlation[0, 1])
 
 

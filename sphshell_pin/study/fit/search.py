@@ -26,9 +26,13 @@ Progress = Callable[[int, float], object]
 _MOST_ROUNDS = 6
 _SAME_SIGMA = 0.02
 # Of a slope: an error that no longer matters, and how often its step is halved to come to it.
-_SMALL_ERROR, _MOST_HALVINGS = 1e-3, 8
+_SMALL_ERROR, _MOST_HALVINGS = 0.01, 8
 # Parts of the experiments' time that are fitted one after the other where all at once fail.
 _STAGES = (0.125, 0.25, 0.5)
+# A value feels the parameters if its slope is so large a part of the largest.
+_FELT = 1e-3
+# How far the first step may go in x.
+_FIRST_STEP = 0.5
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,7 @@ class Search:
             best = self.x, self.sigma, self.converged, self._scatter()
             self.x, self.sigma = start, sigma
             for part in _STAGES:
-                self._minimize(until=part)
+                self._minimize(self._until(part))
             self._settle()
             if not self._scatter() < best[-1]:
                 self.x, self.sigma, self.converged, _ = best
@@ -113,6 +117,7 @@ class Search:
         middle, held = self._beyond(jacobian, factor * spread.deviations)
         if held.any():
             spread = _with_held(spread_of(jacobian[:, ~held], error[:, ~held]), held)
+        self._leave_unfelt(spread)
         fitted = tuple(
             _fitted(one, x, (center - half, center + half), held=bool(bound))
             for one, x, center, half, bound in zip(
@@ -150,6 +155,14 @@ class Search:
         weighted = (self.measured - values) / sigma
         return float(np.sum(np.log(sigma)) + 0.5 * weighted @ weighted)
 
+    def _leave_unfelt(self, spread: Spread) -> None:
+        """Put parameters that change nothing that was measured back to where they started."""
+        unfelt = (np.abs(spread.blind) == 1.0).any(axis=0)
+        start = np.array([one.to_x(one.start) for one in self.free])
+        x = np.where(unfelt, start, self.x)
+        if unfelt.any() and self.runs.predict(x) is not None:
+            self.x = x
+
     def _beyond(self, jacobian: Array, half: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return the middles (p,) of the intervals, and which parameters the bounds hold.
 
@@ -165,35 +178,50 @@ class Search:
         held = at_bound & ((middle + half < self.low) | (middle - half > self.high))
         return np.where(held, self.x, middle), held
 
-    def _minimize(self, until: float = 1.0) -> None:
-        """Make the residuals least, those `until` a part of each experiment's time."""
+    def _until(self, share: float) -> Array:
+        """Return 1 for the first values that feel the parameters, a `share` of them, and 0 (N,).
+
+        Values before these are taken, too: the parameters do nothing to them.
+        """
+        slopes = self._slopes(self.x)
+        felt = np.linalg.norm(slopes, axis=1)
+        use = np.zeros(len(felt))
+        for trial in self.runs.trials:
+            parts = [part for part in self.parts if part.trial is trial]
+            times = np.concatenate([part.t[felt[part.at] > _FELT * felt.max()] for part in parts])
+            if len(times):
+                last = np.quantile(times, share)
+                for part in parts:
+                    use[part.at] = part.t <= last
+        return use
+
+    def _minimize(self, use: Array | float = 1.0) -> None:
+        """Make the residuals least, each times `use`."""
         optimize = _scipy_optimize()
-        use = np.concatenate(
-            [part.t <= until * part.trial.data.t[-1] for part in self.parts]
-        ).astype(float)
         tolerance = self.runs.tolerance
-        step = forward_step(tolerance)
         # A value at its bound would hold the search there.
         inner = np.clip(self.x, self.low + _inset(self.low), self.high - _inset(self.high))
-        inside = np.where(self.low < self.high, inner, self.x)
+        start = np.where(self.low < self.high, inner, self.x)
+        # From 0, TRF's first step has the length of x_scale: half of the value.
         found = optimize.least_squares(
-            lambda x: use * self._residuals(x),
-            inside,
-            jac=lambda x: -self._weighted(self.runs.slopes(x, self.low, self.high, step), use),
-            bounds=(self.low, self.high),
+            lambda x: use * self._residuals(start + x),
+            np.zeros(len(start)),
+            jac=lambda x: -self._slopes(start + x, use),
+            bounds=(self.low - start, self.high - start),
             method="trf",
+            x_scale=_FIRST_STEP,
             # Differences smaller than the error of a run say nothing.
             ftol=max(1e-8, tolerance),
             xtol=max(1e-8, tolerance),
             gtol=1e-12,
             max_nfev=100,
         )
-        self.x = np.asarray(found.x)
+        inside = start + np.asarray(found.x)
         # TRF stays inside: it says which bounds it was driven to.
         mask = np.asarray(found.active_mask)
-        self.x = np.where(mask < 0, self.low, np.where(mask > 0, self.high, self.x))
+        self.x = np.where(mask < 0, self.low, np.where(mask > 0, self.high, inside))
         if mask.any() and self.runs.predict(self.x) is None:
-            self.x = np.asarray(found.x)
+            self.x = inside
         self.converged = bool(found.status > 0)
 
     def _residuals(self, x: Array) -> Array:
@@ -205,7 +233,9 @@ class Search:
         self._misfit = float(np.sqrt(np.mean(residuals**2)))
         return np.asarray(residuals)
 
-    def _weighted(self, slopes: Array, use: Array | float = 1.0) -> Array:
+    def _slopes(self, x: Array, use: Array | float = 1.0) -> Array:
+        """Return the derivatives (N, p) of the weighted predicted values, each times `use`."""
+        slopes = self.runs.slopes(x, self.low, self.high, forward_step(self.runs.tolerance))
         return np.asarray(slopes * (use / self.sigma)[:, None])
 
     def _final_slopes(self) -> tuple[Array, Array]:
@@ -213,9 +243,13 @@ class Search:
 
         The error is by how much differences over one step and over twice the step differ, and a
         column's step is halved as long as that makes it less. An error of truncation is a third of
-        it; one of rounding, of which neither difference knows the other's, is about that much.
+        it; one of rounding, of which neither difference knows the other's, is about that much. It
+        is no less than what the tolerance of a run does to a difference.
         """
         slopes, errors = [], []
+        values = self.runs.predict(self.x)
+        assert values is not None
+        rounding = self.runs.tolerance * np.abs(values) / self.sigma
         for k in range(len(self.x)):
             step = central_step(self.runs.tolerance)
             near = self._slope(k, step)
@@ -230,7 +264,7 @@ class Search:
                     break
                 near, error = nearer, less
             slopes.append(near)
-            errors.append(error)
+            errors.append(np.maximum(np.abs(error), rounding / step))
         return np.column_stack(slopes), np.column_stack(errors)
 
     def _slope(self, k: int, step: float) -> Array:
