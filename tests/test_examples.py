@@ -34,6 +34,7 @@ def test_every_example_is_tested():
         "02_own_loop",
         "03_parameter_study",
         "04_taxels_on_a_crease",
+        "06_fit_measured_rebounds",
     }
 
 
@@ -80,3 +81,14 @@ def test_taxels_on_a_crease(run):
     assert np.abs(names["felt"] - names["pressed"]).max() < 1e-12 * force
     assert np.abs(names["images"].outside).max() < 1e-12 * force
     assert len(names["two"]) > 10
+
+
+def test_a_fit_of_measured_rebounds(run):
+    files = ["alumina.urdf", "rebound.toml", "rebound.fitted.toml", "fit.png"]
+    found = run("06_fit_measured_rebounds", files)["found"]
+    friction, young = found.parameters
+    assert found.determined
+    # The coefficient that the authors found from the same impacts, the modulus of handbooks.
+    assert friction.low < 0.092 < friction.high
+    assert young.low < 70e9 < young.high
+    assert len(found.series) == 20

@@ -85,7 +85,7 @@ def _of_joints(built: Built) -> list[Quantity]:
         for kind, first, count in (("q", joint.idx_q, joint.nq), ("v", joint.idx_v, joint.nv)):
             for i in range(count):
                 label = f"{kind}.{name}.{i}" if count > 1 else f"{kind}.{name}"
-                unit = _unit(joint.shortname(), kind, i)
+                unit = unit_of(joint.shortname(), kind, i)
                 out.append(Quantity(label, unit, _at_rows(_state(kind, first + i))))
     return out
 
@@ -94,7 +94,7 @@ def _state(kind: str, column: int) -> Callable[[Result], Array]:
     return lambda result: np.asarray(getattr(result, kind)[:, column])
 
 
-def _unit(joint: str, kind: str, index: int) -> str:
+def unit_of(joint: str, kind: str, index: int) -> str:
     """Return the unit of one coordinate (or speed) of a joint; `joint` is Pinocchio's name."""
     plain = joint.removeprefix("JointModel")
     slides = plain.startswith("P") and not plain.startswith("Planar")  # PX, PrismaticUnaligned
