@@ -36,6 +36,7 @@ def test_every_example_is_tested():
         "03_parameter_study",
         "04_taxels_on_a_crease",
         "05_circle_with_5_newtons",
+        "06_fit_measured_rebounds",
     }
 
 
@@ -99,3 +100,14 @@ def test_a_circle_with_5_newtons(run):
     for q, center in zip(replays["adaptive"].q, names["centers"], strict=True):
         pin.framesForwardKinematics(model, data, q)
         assert np.linalg.norm(data.oMf[hand].translation - center) < 1e-3
+
+
+def test_a_fit_of_measured_rebounds(run):
+    files = ["alumina.urdf", "rebound.toml", "rebound.fitted.toml", "fit.png"]
+    found = run("06_fit_measured_rebounds", files)["found"]
+    friction, young = found.parameters
+    assert found.determined
+    # The coefficient that the authors found from the same impacts, the modulus of handbooks.
+    assert friction.low < 0.092 < friction.high
+    assert young.low < 70e9 < young.high
+    assert len(found.series) == 20
