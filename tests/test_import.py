@@ -28,6 +28,8 @@ HEAVY = (
     "tornado",
     "zmq",
     "OCP",
+    "crocoddyl",
+    "casadi",
     "mcap",
     "pyarrow",
 )
@@ -113,6 +115,7 @@ LAYERS = (
     ("shell",),
     ("contact",),
     ("dynamics",),
+    ("adapters",),
     ("patches",),
     ("sphshell_pin",),  # its public names are those of the folders above
     ("scenario",),
