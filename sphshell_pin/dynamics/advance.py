@@ -59,11 +59,13 @@ def start_run(
     sensors: SensorSet,
     record: Collection[str] = (),
     warn: bool = True,
+    prepare: Callable[[_core.Simulation], None] | None = None,
 ) -> _core.Simulation:
     """Check the arguments of Simulation.run and return the compiled run at its start.
 
-    With `warn`, a law that cannot stop its sphere causes a WeakLawWarning, and a controller whose
-    parameters are probably a mistake a SetupWarning.
+    `prepare` is called with it before its first row is recorded. With `warn`, a law that cannot
+    stop its sphere causes a WeakLawWarning, and a controller whose parameters are probably a
+    mistake a SetupWarning.
     """
     q, v = scene.check_state(q0, v0)
     duration = check_not_negative("duration", duration, "s")
@@ -79,6 +81,8 @@ def start_run(
     core = _core.Simulation(
         scene.model, pairs, joints, core_controller, q, v, settings, sensors.core
     )
+    if prepare is not None:
+        prepare(core)
     deep = core.deep_start()
     if deep is not None:
         raise deep_start(scene, *deep)

@@ -107,9 +107,8 @@ class Simulation:
             record=record,
             t0=t0,
             sensors=sensors,
+            prepare=None if asked is None else asked.begin,
         )
-        if asked:
-            asked.begin(core)
         ctrl_c = CtrlC()
 
         def glance() -> None:
