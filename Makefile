@@ -8,7 +8,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick lint format bench report robots hard-cases work-precision rollouts \
-  real-surfaces new-study fuzz kills sweep-survival sanitize wheel docs clean
+  real-surfaces new-study fuzz kills sweep-survival sampling-survival sanitize wheel docs clean
 
 help:
 	@sed -nE 's/^([a-z-]+):.* ## (.*)/make \1\t\2/p' Makefile | expand -t 22
@@ -103,6 +103,9 @@ kills: $(VENV)/.test ## kill runs at every system call and at random times, fill
 
 sweep-survival: $(VENV)/.test ## 500 runs five ways, workers killed and the sweep resumed: same bytes
 	$(BIN)/python -m tests.study.sweep_survival
+
+sampling-survival: $(VENV)/.test ## 4096 sampled runs, Ishigami's indices, killed and resumed: 10 minutes
+	$(BIN)/python -m tests.study.sampling_survival
 
 sanitize: $(VENV)/.test ## run tests with checks of memory, undefined behavior and data races
 	.ci/sanitize address

@@ -53,6 +53,9 @@ if TYPE_CHECKING:
     from sphshell_pin.patches import WearMap as WearMap
     from sphshell_pin.patches import wear_maps as wear_maps
     from sphshell_pin.shell import Shell as Shell
+    from sphshell_pin.study.fit import Experiment as Experiment
+    from sphshell_pin.study.fit import Fit as Fit
+    from sphshell_pin.study.fit import fit as fit
 
 __version__ = "0.1.0"
 
@@ -64,7 +67,9 @@ _HOME = {
     "ContactSet": "contact",
     "ContactSwitch": "dynamics",
     "CoulombFriction": "contact",
+    "Experiment": "study.fit",
     "Feature": "contact",
+    "Fit": "study.fit",
     "ForceTorqueSensor": "dynamics",
     "FoundationLaw": "contact",
     "GravityCompensation": "dynamics",
@@ -93,6 +98,7 @@ _HOME = {
     "TaxelImages": "patches",
     "WearMap": "patches",
     "contact_wrench": "contact",
+    "fit": "study.fit",
     "foundation_pressure": "contact",
     "wear_maps": "patches",
 }

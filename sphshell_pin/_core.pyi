@@ -398,3 +398,42 @@ def mend_components(nodes: int, pairs: _Ints) -> _Ints: ...
 def mend_nesting(
     vertices: _Doubles, triangles: _Ints, component: _Ints, queries: _Doubles, closed: _Bytes
 ) -> _Ints: ...
+def evaluate_into(
+    scene: Scene, q: _Doubles, v: _Doubles, tau: _Doubles, acceleration: _Doubles, forces: _Doubles
+) -> None: ...
+def differentiate_into(
+    scene: Scene,
+    q: _Doubles,
+    v: _Doubles,
+    tau: _Doubles,
+    by_state: _Doubles,
+    by_tau: _Doubles,
+    forces_by_state: _Doubles,
+) -> None: ...
+def step_into(
+    scene: Scene,
+    integrator: str,
+    dt: float,
+    q: _Doubles,
+    v: _Doubles,
+    tau: _Doubles,
+    next: _Doubles,
+    forces: _Doubles,
+) -> None: ...
+def differentiate_step_into(
+    scene: Scene,
+    integrator: str,
+    dt: float,
+    q: _Doubles,
+    v: _Doubles,
+    tau: _Doubles,
+    by_state: _Doubles,
+    by_tau: _Doubles,
+    forces_by_state: _Doubles,
+) -> None: ...
+
+class Frame:
+    def __init__(self, joint: int, placement: _Doubles, reference: _Doubles) -> None: ...
+
+def frame_into(scene: Scene, frame: Frame, q: _Doubles, residual: _Doubles) -> None: ...
+def differentiate_frame_into(scene: Scene, frame: Frame, q: _Doubles, by_q: _Doubles) -> None: ...

@@ -206,6 +206,16 @@ class ResultError(SphshellError, OSError):
         self.path = path
 
 
+class DataError(SphshellError, ValueError):
+    """Measured data that no run can be fitted to: `source`, and `line` (1-based) of a file."""
+
+    def __init__(self, source: str, reason: str, line: int | None = None) -> None:
+        """Say what is wrong with the data of `source`, and in which `line`."""
+        super().__init__(f"{source}{'' if line is None else f', line {line}'}: {reason}")
+        self.source = source
+        self.line = line
+
+
 class SimulationDiverged(SphshellError, ArithmeticError):
     """The state stopped being finite at time `t` [s]; `result` holds all until then."""
 

@@ -6,6 +6,7 @@ import runpy
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 pytestmark = pytest.mark.slow
@@ -34,6 +35,8 @@ def test_every_example_is_tested():
         "02_own_loop",
         "03_parameter_study",
         "04_taxels_on_a_crease",
+        "05_circle_with_5_newtons",
+        "06_fit_measured_rebounds",
     }
 
 
@@ -80,3 +83,31 @@ def test_taxels_on_a_crease(run):
     assert np.abs(names["felt"] - names["pressed"]).max() < 1e-12 * force
     assert np.abs(names["images"].outside).max() < 1e-12 * force
     assert len(names["two"]) > 10
+
+
+def test_a_circle_with_5_newtons(run):
+    pytest.importorskip("crocoddyl")
+    names = run("05_circle_with_5_newtons", ["circle.png"])
+    assert names["converged"]
+    planned, model = names["planned"][:, : names["model"].nq], names["model"]
+    replays = names["replays"]
+    # The optimizer's steps are those of the simulation.
+    np.testing.assert_allclose(replays["runge-kutta-4"].q, planned, rtol=0, atol=1e-11)
+    for kind, result in replays.items():
+        assert len(result.contacts.t) == len(result.t), kind
+        assert np.abs(names["forces"][kind] - 5.0).max() < 0.05, kind
+    data, hand = model.createData(), names["hand"]
+    for q, center in zip(replays["adaptive"].q, names["centers"], strict=True):
+        pin.framesForwardKinematics(model, data, q)
+        assert np.linalg.norm(data.oMf[hand].translation - center) < 1e-3
+
+
+def test_a_fit_of_measured_rebounds(run):
+    files = ["alumina.urdf", "rebound.toml", "rebound.fitted.toml", "fit.png"]
+    found = run("06_fit_measured_rebounds", files)["found"]
+    friction, young = found.parameters
+    assert found.determined
+    # The coefficient that the authors found from the same impacts, the modulus of handbooks.
+    assert friction.low < 0.092 < friction.high
+    assert young.low < 70e9 < young.high
+    assert len(found.series) == 20

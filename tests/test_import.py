@@ -24,9 +24,12 @@ HEAVY = (
     "typer",
     "rich",
     "pandas",
+    "scipy",
     "tornado",
     "zmq",
     "OCP",
+    "crocoddyl",
+    "casadi",
     "mcap",
     "pyarrow",
 )
@@ -112,6 +115,7 @@ LAYERS = (
     ("shell",),
     ("contact",),
     ("dynamics",),
+    ("adapters",),
     ("patches",),
     ("sphshell_pin",),  # its public names are those of the folders above
     ("scenario",),

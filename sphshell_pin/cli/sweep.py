@@ -41,15 +41,48 @@ def sweep(
     context: typer.Context,
     scenario: ScenarioArgument,
     vary: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(
             metavar="KEY=VALUES",
             help="What varies: lo:hi:n, lo:hi:log:n or a,b,c; several keys make a grid.",
         ),
-    ],
+    ] = None,
     together: Annotated[
         bool, typer.Option("--together", help="Take the values of all keys in step: no grid.")
     ] = False,
+    dist: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="'KEY=DISTRIBUTION'",
+            help="An uncertain input: normal(mean, deviation), uniform(low, high) or "
+            "lognormal(median, factor): 68 % from median / factor to median * factor.",
+        ),
+    ] = None,
+    sample: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND", help="Points: sobol (a Sobol sequence) or lhs (a Latin hypercube)."
+        ),
+    ] = None,
+    n: Annotated[
+        int | None, typer.Option("--n", help="Number of points; a power of 2 for sobol.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the points.")] = 0,
+    indices: Annotated[
+        bool,
+        typer.Option("--indices", help="Sobol indices: n (d + 2) runs for d uncertain inputs."),
+    ] = False,
+    tornado: Annotated[
+        bool,
+        typer.Option("--tornado", help="2 d + 1 runs more: each input alone at 5 and at 95 %."),
+    ] = False,
+    bands: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CURVE", help="Record a curve of each run; draw quantiles over time."),
+    ] = None,
+    band_steps: Annotated[
+        int | None, typer.Option(help="Equal steps of the curves; by default 200.")
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Table, .parquet or .h5; by default sweep.parquet in results/SCENARIO."),
@@ -84,6 +117,8 @@ def sweep(
 ) -> None:
     """Run a scenario with many values, over processes or a Dask cluster; write one table.
 
+    With --dist the values are drawn from distributions: quantiles, bands, tornado, Sobol indices.
+
     The same command resumes where an earlier one was stopped.
 
     Example: sphshell-pin sweep sphere_on_shell --vary contact.law.k=1e3:1e5:log:20
@@ -92,7 +127,21 @@ def sweep(
         from sphshell_pin.study.sweep import plan_sweep, run_plan
 
         changes = changes_of(set_, dt, duration)
-        plan = plan_sweep(scenario, vary, changes=changes, together=together, verdicts=verdicts)
+        plan = plan_sweep(
+            scenario,
+            vary,
+            changes=changes,
+            together=together,
+            verdicts=verdicts,
+            dist=dist,
+            sample=sample,
+            n=n,
+            seed=seed,
+            indices=indices,
+            tornado=tornado,
+            bands=bands or (),
+            band_steps=band_steps,
+        )
         figures = _drawn(plan, plot or [], wanted=pictures)
         file = out or Path("results") / str(plan.head["scenario"]) / "sweep.parquet"
         try:
@@ -109,8 +158,22 @@ def sweep(
         except KeyboardInterrupt as stop:
             again = shlex.join(["sphshell-pin", *sys.argv[1:]])
             raise KeyboardInterrupt(f"{stop}; to go on: {again}" if str(stop) else "") from None
-        files = [file, *_draw(report.table, figures, file, all_=bool(plot))]
-        _print_report(plan, report, files)
+        _print_head(plan, report)
+        if plan.design is None:
+            files = [file, *_draw(report.table, figures, file, all_=bool(plot))]
+            _print_ranges(plan, report)
+        else:
+            from sphshell_pin.cli.sampling import report_sample
+
+            files = [file, *([] if report.curves_out is None else [report.curves_out])]
+            files += report_sample(plan, report, figures, all_=bool(plot), pictures=pictures)
+        _print_failures(plan, report)
+        names = ", ".join(map(str, files))
+        terminal().print(
+            f"files: {names}; journal with wall times: {report.journal}",
+            markup=False,
+            highlight=False,
+        )
     if report.failed == len(plan.runs):
         raise typer.Exit(ERROR)
 
@@ -139,6 +202,10 @@ def _drawn(plan: Plan, plot: list[str], *, wanted: bool) -> list[str]:
     for name in plot:
         if name not in plan.figures:
             raise NameNotFound("figure", name, "a run of this scenario", plan.figures)
+    own = [name for name in plan.figures if name.startswith("figures.")]
+    own += [name for name in plan.figures if name.endswith(".peak_force")]
+    if plan.design is not None:
+        return plot or own
     if not wanted:
         return []
     from sphshell_pin.plot.sweep import drawable_keys
@@ -150,9 +217,7 @@ def _drawn(plan: Plan, plot: list[str], *, wanted: bool) -> list[str]:
             raise
         typer.echo(f"no picture: {fault}", err=True)
         return []
-    own = [name for name in plan.figures if name.startswith("figures.")]
-    peaks = [name for name in plan.figures if name.endswith(".peak_force")]
-    return plot or own + peaks
+    return plot or own
 
 
 def _draw(table: pd.DataFrame, figures: list[str], file: Path, *, all_: bool) -> list[Path]:
@@ -178,10 +243,9 @@ def _draw(table: pd.DataFrame, figures: list[str], file: Path, *, all_: bool) ->
     return paths
 
 
-def _print_report(plan: Plan, report: SweepReport, files: list[Path]) -> None:
-    console = terminal()
+def _print_head(plan: Plan, report: SweepReport) -> None:
     total = len(plan.runs)
-    console.print(
+    terminal().print(
         f"[bold]{plan.head['scenario']}[/bold]: {total} runs, {total - report.failed} done, "
         f"{report.failed} failed"
         + (f"; {report.resumed} were done before" if report.resumed else ""),
@@ -189,6 +253,9 @@ def _print_report(plan: Plan, report: SweepReport, files: list[Path]) -> None:
     )
     if report.deaths:
         typer.echo(f"{report.deaths} workers died; their runs were done again", err=True)
+
+
+def _print_ranges(plan: Plan, report: SweepReport) -> None:
     ranges = make_table("figure", "smallest", "in run", "largest", "in run")
     for name in plan.figures:
         column = report.table[name]
@@ -199,14 +266,13 @@ def _print_report(plan: Plan, report: SweepReport, files: list[Path]) -> None:
             plain(name), f"{column[low]:.6g}", f"{low}", f"{column[high]:.6g}", f"{high}"
         )
     if ranges.row_count:
-        console.print(ranges)
+        terminal().print(ranges)
+
+
+def _print_failures(plan: Plan, report: SweepReport) -> None:
     failed = report.table[report.table["status"] == "failed"]
     for _, row in failed.head(_MOST_FAILURES).iterrows():
         values = [f"{axis.key} = {row[axis.key]} {axis.unit}".rstrip() for axis in plan.axes]
         typer.echo(f"run {row['run']} failed ({', '.join(values)}): {row['error']}", err=True)
     if len(failed) > _MOST_FAILURES:
         typer.echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)
-    names = ", ".join(str(file) for file in files)
-    console.print(
-        f"files: {names}; journal with wall times: {report.journal}", markup=False, highlight=False
-    )

@@ -102,7 +102,7 @@ def _draw_curves(axis: Axes, groups: list[tuple[str, pd.DataFrame]], key: str, f
         ordered = rows.sort_values(key)
         axis.plot(ordered[key], ordered[figure], "o-", markersize=4, label=name or None)
     every = np.unique(np.concatenate([rows[key].to_numpy(float) for _, rows in groups]))
-    axis.set(xlabel=key, ylabel=_label(figure), title=figure)
+    axis.set(xlabel=key, ylabel=figure_label(figure), title=figure)
     if _grows_by_a_factor(every):
         axis.set_xscale("log")
     if not any(np.isfinite(rows[figure]).any() for _, rows in groups):
@@ -113,7 +113,7 @@ def _draw_curves(axis: Axes, groups: list[tuple[str, pd.DataFrame]], key: str, f
 def _draw_bars(axis: Axes, groups: list[tuple[str, pd.DataFrame]], figure: str) -> None:
     heights = [float(rows[figure].iloc[0]) for _, rows in groups]
     axis.bar([name or "run 0" for name, _ in groups], heights)
-    axis.set(ylabel=_label(figure), title=figure)
+    axis.set(ylabel=figure_label(figure), title=figure)
     axis.tick_params(axis="x", labelrotation=30 if len(groups) > 3 else 0)
 
 
@@ -147,7 +147,7 @@ def _draw_maps(
             axis.set_yscale("log")
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
-    canvas.colorbar(mesh, ax=list(axes), label=_label(figure))
+    canvas.colorbar(mesh, ax=list(axes), label=figure_label(figure))
     canvas.suptitle(figure, fontsize=12)
 
 
@@ -171,7 +171,8 @@ def _grows_by_a_factor(values: FloatArray) -> bool:
     return bool(np.ptp(factors) < _EVEN * factors.max())
 
 
-def _label(figure: str) -> str:
+def figure_label(figure: str) -> str:
+    """Return the last part of a figure's name, with its unit where that is known."""
     last = figure.rpartition(".")[2]
     unit = PAIR_UNITS.get(last, "") if figure.startswith("pairs.") else RUN_FIGURES.get(figure, "")
     return f"{last.replace('_', ' ')} [{unit}]" if unit else last.replace("_", " ")

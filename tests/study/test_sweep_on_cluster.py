@@ -46,6 +46,27 @@ def test_a_killed_worker_of_a_cluster_costs_nothing(tmp_path, request):
     assert table.read_bytes() == serial.read_bytes()
 
 
+def test_a_sample_is_the_same_on_a_cluster(tmp_path, request):
+    cluster = Cluster(tmp_path)
+    request.addfinalizer(cluster.close)
+    path = write(tmp_path / "scenario")
+    cluster.start_worker("--no-nanny")
+    sample = {
+        "dist": {"contact.law.stiffness": "lognormal(1e5,1.5)"},
+        "sample": "sobol",
+        "n": 4,
+        "indices": True,
+        "tornado": True,
+        "bands": ["pairs.ball-plate.depth"],
+    }
+    serial, table = tmp_path / "serial.parquet", tmp_path / "cluster.parquet"
+    sweep(path, **sample, workers=0, out=serial)
+    sweep(path, **sample, scheduler=cluster.address, out=table)
+    check_once(table, 15)
+    for end in (".parquet", ".curves.parquet"):
+        assert table.with_suffix(end).read_bytes() == serial.with_suffix(end).read_bytes()
+
+
 def test_a_run_that_kills_the_workers_of_a_cluster_is_given_up(tmp_path, request):
     # Runs that were with a dying worker are given up at once, and tried again alone.
     cluster = Cluster(tmp_path, allowed_failures=0)

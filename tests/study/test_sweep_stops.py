@@ -66,11 +66,16 @@ def reference(scenario):
 
 def stopped(scenario, out, workers, number):
     """Begin a sweep, send it the signal when 5 runs are done; return the ended process."""
-    command = [*ENTRY, "sweep", scenario, *VARY, "--workers", workers, "--out", out]
+    return stopped_at(5, scenario, VARY, out, workers, number)
+
+
+def stopped_at(runs, scenario, options, out, workers, number):
+    """Begin a sweep, send it the signal when so many runs are done; return the ended process."""
+    command = [*ENTRY, "sweep", scenario, *options, "--workers", workers, "--out", out]
     with subprocess.Popen(
         list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
-        wait_for(lambda: len(entries(out)) >= 5 or process.poll() is not None)
+        wait_for(lambda: len(entries(out)) >= runs or process.poll() is not None)
         process.send_signal(number)
         _, told = process.communicate(timeout=60)
     return process.returncode, told

@@ -48,6 +48,7 @@ class Evaluations {
     return work(state->scene(), Evaluate{*state, q, v});
   }
 
+  const pinocchio::Model& model() const { return first_.scene().body().model(); }
   int bristle_size() const { return first_.scene().bristle_size(); }
   // Unstretched.
   VectorX bristles(const SceneData& scene) const { return VectorX::Zero(scene.bristle_size()); }

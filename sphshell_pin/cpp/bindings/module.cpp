@@ -8,6 +8,7 @@ void bind_mending(nb::module_& m);
 void bind_shell(nb::module_& m);
 void bind_contact(nb::module_& m);
 void bind_dynamics(nb::module_& m);
+void bind_evaluator(nb::module_& m);
 void bind_foundation(nb::module_& m);
 void bind_rollout(nb::module_& m);
 void bind_sensors(nb::module_& m);
@@ -23,6 +24,7 @@ NB_MODULE(_core, m) {
   bind_contact(m);
   bind_sensors(m);
   bind_dynamics(m);
+  bind_evaluator(m);
   bind_foundation(m);
   bind_rollout(m);
 }

@@ -1,6 +1,8 @@
 // A number of a pair by which forces are differentiated.
 #pragma once
 
+#include <utility>
+
 #include "dynamics/pair.hpp"
 
 namespace sphshell {
@@ -18,6 +20,29 @@ struct Parameter {
   // law's own formulas is differenced, what follows through the motion of the contact is not.
   Pair less = {}, more = {};
   double step = 0;
+
+  // The pair changed by a step of this sign, and that step: `move` where the parameter moves
+  // something [m or rad].
+  std::pair<Pair, double> changed(const Pair& pair, double sign, double move) const {
+    if (kind != Kind::Offset && kind != Kind::Placement) return {sign > 0 ? more : less, step};
+    Pair out = pair;
+    if (kind == Kind::Offset) {
+      out.placement_i.translation() += sign * move * pair.placement_i.rotation().col(axis);
+    } else {
+      pinocchio::Motion twist = pinocchio::Motion::Zero();
+      twist.toVector()[axis] = sign * move;
+      out.placement_j = pair.placement_j * exp_of(twist);
+    }
+    return {out, move};
+  }
+
+ private:
+  // Of a twist along or about one axis.
+  static SE3 exp_of(const pinocchio::Motion& twist) {
+    const double angle = twist.angular().norm();
+    if (angle == 0) return SE3(Eigen::Matrix3d::Identity(), twist.linear());
+    return SE3(Eigen::AngleAxisd(angle, twist.angular() / angle).toRotationMatrix(), Vec3::Zero());
+  }
 };
 
 }  // namespace sphshell

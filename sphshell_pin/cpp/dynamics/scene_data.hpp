@@ -68,6 +68,8 @@ class SceneData {
   // The same pairs with other laws, friction of the same kind, radii and relaxation; the same stops
   // and dry friction of joints with other values.
   void change(std::vector<Pair> pairs, JointForces::Effects joints);
+  // Puts another in the place of pair k, with the same bodies; returns that.
+  Pair exchange(std::size_t k, const Pair& other) { return std::exchange(pairs_[k], other); }
   // Hands the pairs over; nothing can be evaluated any more.
   std::vector<Pair> give_back() { return std::move(pairs_); }
 

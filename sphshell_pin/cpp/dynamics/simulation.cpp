@@ -230,16 +230,19 @@ void Simulation::hold_torques() {
   if (time() + hair < next_control_) return;
   while (next_control_ <= time() + hair)
     next_control_ = settings_.start_time + double(++controls_) * settings_.control_dt;
+  // First at the state itself: a controller may begin there.
+  command(time(), q(), v());
   if (sensitivities_) {
     const KeptCuts kept(cut_);
+    const VectorX asked = tau_;
     sensitivities_->hold(
         [this](double t, const VectorX& q, const VectorX& v) -> const VectorX& {
           command(t, q, v);
           return tau_;
         },
         stepping_.state());
+    tau_ = asked;
   }
-  command(time(), q(), v());
   if (sensors_) sensors_->jump();
 }
 

@@ -2,7 +2,26 @@
 
 from __future__ import annotations
 
-from sphshell_pin.study.sweep.driver import Plan, SweepReport, plan_sweep, run_plan, sweep
+from sphshell_pin.study.sweep.distributions import Distribution, LogNormal, Normal, Uniform
+from sphshell_pin.study.sweep.driver import SweepReport, run_plan, sweep
 from sphshell_pin.study.sweep.grid import Axis, axes_of
+from sphshell_pin.study.sweep.indices import quantile_bands, quantiles, sobol_indices, tornado
+from sphshell_pin.study.sweep.plan import Plan, plan_sweep
 
-__all__ = ["Axis", "Plan", "SweepReport", "axes_of", "plan_sweep", "run_plan", "sweep"]
+__all__ = [
+    "Axis",
+    "Distribution",
+    "LogNormal",
+    "Normal",
+    "Plan",
+    "SweepReport",
+    "Uniform",
+    "axes_of",
+    "plan_sweep",
+    "quantile_bands",
+    "quantiles",
+    "run_plan",
+    "sobol_indices",
+    "sweep",
+    "tornado",
+]

@@ -6,83 +6,35 @@ import contextlib
 import multiprocessing
 import os
 import tempfile
-import warnings
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sphshell_pin.errors import (
-    InvalidParameter,
-    ResultError,
-    ScenarioError,
-    SphshellError,
-    SweepError,
-)
-from sphshell_pin.scenario import (
-    Built,
-    Scenario,
-    find_scenario,
-    read_scenario,
-    shipped_scenarios,
-)
-from sphshell_pin.scenario.build import build_scenario
-from sphshell_pin.scenario.figures import check_expectations
-from sphshell_pin.scenario.knobs import meaning
-from sphshell_pin.scenario.reading import look_up
+from sphshell_pin.errors import InvalidParameter, ResultError, SweepError
 from sphshell_pin.study.sweep.cluster import run_on_cluster
-from sphshell_pin.study.sweep.grid import Axis, Value, Vary, axes_of, points_of, text_of
-from sphshell_pin.study.sweep.job import (
-    FAILED,
-    Job,
-    Run,
-    digest,
-    digest_files,
-    digest_settings,
-    files_of,
-    need,
-    versions,
-)
+from sphshell_pin.study.sweep.curves import columns_of_curves
+from sphshell_pin.study.sweep.distributions import Dist
+from sphshell_pin.study.sweep.grid import Vary
+from sphshell_pin.study.sweep.job import FAILED, Outcome, need
 from sphshell_pin.study.sweep.journal import SUFFIX, Journal
 from sphshell_pin.study.sweep.local import run_locally
+from sphshell_pin.study.sweep.plan import Plan, plan_sweep
 from sphshell_pin.study.sweep.table import (
     check_place,
     check_suffix,
     columns_of,
     frame_of,
-    varied_columns,
     write_table,
 )
-from sphshell_pin.study.sweep.worker import changed, run_one, sweep_figures, verdict_names
+from sphshell_pin.study.sweep.worker import run_one
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Progress = Callable[[int, int, int], object]
 """Called with the numbers of runs done, failed among them, and in all."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A sweep whose keys and values were checked."""
-
-    axes: tuple[Axis, ...]
-    points: list[tuple[Value, ...]]
-    """The values of each run, in the order of `axes`."""
-    runs: list[Run]
-    digests: list[str]
-    """Of each run's settings."""
-    figures: tuple[str, ...]
-    """Columns that a finished run fills."""
-    job: Job
-    head: Mapping[str, object]
-    """What distinguishes this sweep from another."""
-
-    @property
-    def varied(self) -> pd.DataFrame:
-        """The columns of the varied keys, as a pandas.DataFrame."""
-        return frame_of(varied_columns(self.axes, self.points))
 
 
 @dataclass(frozen=True)
@@ -100,11 +52,14 @@ class SweepReport:
     failed: int
     notes: tuple[str, ...] = field(default=())
     """What happened on the way, one sentence each."""
+    curves: pd.DataFrame | None = None
+    """The curves of all runs of the sample that are done: `run`, `t` [s], a column for each."""
+    curves_out: Path | None = None
 
 
 def sweep(
     scenario: str | PathLike[str],
-    vary: Vary | Iterable[str],
+    vary: Vary | Iterable[str] | None = None,
     *,
     changes: Mapping[str, str] | None = None,
     together: bool = False,
@@ -114,6 +69,14 @@ def sweep(
     verdicts: bool = False,
     retry_failed: bool = False,
     progress: Progress | None = None,
+    dist: Dist | Iterable[str] | None = None,
+    sample: str | None = None,
+    n: int | None = None,
+    seed: int = 0,
+    indices: bool = False,
+    tornado: bool = False,
+    bands: Sequence[str] = (),
+    band_steps: int | None = None,
 ) -> pd.DataFrame:
     """Run a scenario many times with other values and return the table of its figures.
 
@@ -134,13 +97,27 @@ def sweep(
     verdicts : give each expectation of the scenario a column: 1 where met, 0 where missed.
     retry_failed : do again the runs that failed, as the journal says.
     progress : called with the numbers of runs done, failed among them, and in all.
+    dist : in place of `vary`, what is uncertain: a mapping from dotted keys of numbers to
+        distributions, `Normal`, `Uniform`, `LogNormal` or texts as "normal(1e5,1e4)"; or texts
+        "key=normal(1e5,1e4)". Inputs are independent of each other.
+    sample : "sobol" (points of a scrambled Sobol sequence) or "lhs" (a Latin hypercube).
+    n : number of points; a power of 2 for "sobol".
+    seed : of the points.
+    indices : make n (d + 2) runs for d uncertain inputs, from which `sobol_indices` follow.
+    tornado : add 2 d + 1 runs: all inputs at their medians, and each in turn at its quantiles of
+        5 and 95 %; see `sphshell_pin.study.sweep.tornado`. Alone, without a sample, too.
+    bands : curves to record of each run of the sample, as "pairs.NAME.normal_force"; they are
+        written beside the table, as `out` with ".curves" before its suffix; see `quantile_bands`.
+    band_steps : number of equal steps of these curves from 0 to run.duration; by default 200, or
+        fewer where the rows of a run are farther apart (run.record_dt).
 
     Returns
     -------
     pandas.DataFrame : row i is run i: `run`, the varied keys, `status` ("done", "failed"), `error`
-        (why it failed, in one sentence), the figures of a run's summary [SI units] (NaN where a
-        run has none), `settings`, the digest of its settings. Bit for bit the same however and
-        wherever the runs were made, on one kind of processor.
+        (why it failed, in one sentence), with `dist` also `design` (what the run is for: "sample";
+        "A", "B", "AB KEY" of Saltelli's design; "median", "5 % KEY", "95 % KEY"), the figures of a
+        run's summary [SI units] (NaN where a run has none), `settings`, the digest of its settings.
+        Bit for bit the same however and wherever the runs were made, on one kind of processor.
 
     Raises
     ------
@@ -155,7 +132,21 @@ def sweep(
     KeyboardInterrupt
         On Ctrl-C; its text says how many runs are done and kept.
     """
-    plan = plan_sweep(scenario, vary, changes=changes, together=together, verdicts=verdicts)
+    plan = plan_sweep(
+        scenario,
+        vary,
+        changes=changes,
+        together=together,
+        verdicts=verdicts,
+        dist=dist,
+        sample=sample,
+        n=n,
+        seed=seed,
+        indices=indices,
+        tornado=tornado,
+        bands=bands,
+        band_steps=band_steps,
+    )
     report = run_plan(
         plan,
         workers=workers,
@@ -165,66 +156,6 @@ def sweep(
         progress=progress,
     )
     return report.table
-
-
-def plan_sweep(
-    scenario: str | PathLike[str],
-    vary: Vary | Iterable[str],
-    *,
-    changes: Mapping[str, str] | None = None,
-    together: bool = False,
-    verdicts: bool = False,
-) -> Plan:
-    """Check all runs of a sweep, see `sweep`, and return what it will do."""
-    given = axes_of(vary)
-    path = find_scenario(scenario)
-    _check_keys(given, changes or {}, path)
-    points = points_of(given, together)
-    fixed = read_scenario(path, changes)
-    axes = tuple(replace(axis, unit=_unit(fixed, axis.key, path)) for axis in given)
-    runs = [
-        Run(i, {axis.key: text_of(value) for axis, value in zip(axes, point, strict=True)})
-        for i, point in enumerate(points)
-    ]
-    digests, names = [], set[str]()
-    for run in runs:
-        one = changed(fixed, run, path)
-        digests.append(digest_settings(one))
-        names |= files_of(one)
-    sample, built = _build_one(runs, fixed, path)
-    figures = sweep_figures(built)
-    if verdicts:
-        check_expectations(built)
-        figures += [f"met.{name}" for name in verdict_names(fixed)]
-    for axis in axes:
-        if axis.key in figures:
-            raise InvalidParameter(
-                "vary",
-                axis.key,
-                "is what a column of figures is called: give each routine a figure of its own",
-            )
-    shipped = path == shipped_scenarios().get(path.stem)
-    files, used = digest_files(path.parent, names), versions()
-    head = {
-        "scenario": path.stem,
-        "settings": digest_settings(fixed),
-        "vary": [[axis.key, list(axis.values)] for axis in axes],
-        "together": together,
-        "verdicts": verdicts,
-        "files": files,
-        "versions": used,
-    }
-    job = Job(
-        name=path.stem if shipped else str(path.absolute()),
-        shipped=shipped,
-        scenario=fixed,
-        sample=sample,
-        verdicts=verdicts,
-        files=files,
-        versions=used,
-        token=digest([str(path.absolute()), head]),
-    )
-    return Plan(axes, points, runs, digests, tuple(figures), job, head)
 
 
 def run_plan(
@@ -245,7 +176,8 @@ def run_plan(
     need("pandas")
     if out is not None:
         check_suffix(out)
-        check_place(out)
+        for path in (out, *([] if plan.job.curves is None else [_curves_file(out)])):
+            check_place(path)
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         # A worker that loads the script of its parent must not begin the sweep again.
         raise SweepError('a script must call sweep below if __name__ == "__main__":')
@@ -262,7 +194,7 @@ def run_plan(
         journal = Journal(out.with_name(out.name + SUFFIX), plan.head, len(plan.runs))
         for sentence in journal.notes:
             report_note(sentence)
-    outcomes = {} if journal is None else dict(journal.outcomes)
+    outcomes: dict[int, Outcome] = {} if journal is None else dict(journal.outcomes)
     if retry_failed:
         outcomes = {i: one for i, one in outcomes.items() if one.status != FAILED}
     resumed = len(outcomes)
@@ -291,18 +223,37 @@ def run_plan(
             kept = f"are done and kept in {journal.path}" if journal is not None else "were done"
             text = f"{len(outcomes)} of {len(plan.runs)} runs {kept}"
             raise KeyboardInterrupt(text) from None
-    columns = columns_of(plan.axes, plan.points, plan.digests, outcomes, plan.figures)
-    if out is not None:
-        write_table(out, columns, plan.head)
+    table, curves = _write(plan, outcomes, out)
     return SweepReport(
-        table=frame_of(columns),
+        table=table,
         out=out,
         journal=None if journal is None else journal.path,
         resumed=resumed,
         deaths=sum(deaths),
         failed=failed,
         notes=tuple(notes),
+        curves=curves,
+        curves_out=None if curves is None or out is None else _curves_file(out),
     )
+
+
+def _write(
+    plan: Plan, outcomes: Mapping[int, Outcome], out: Path | None
+) -> tuple[pd.DataFrame, pd.DataFrame | None]:
+    """Return the table of all runs and that of their curves, as written to `out`."""
+    wanted = plan.job.curves
+    curves = None if wanted is None else columns_of_curves(wanted, outcomes)
+    parts = () if plan.design is None else plan.design.parts
+    columns = columns_of(plan.axes, plan.points, plan.digests, outcomes, plan.figures, parts)
+    if out is not None:
+        if curves is not None:
+            write_table(_curves_file(out), curves, plan.head)
+        write_table(out, columns, plan.head)
+    return frame_of(columns), None if curves is None else frame_of(curves)
+
+
+def _curves_file(out: Path) -> Path:
+    return out.with_suffix(f".curves{out.suffix}")
 
 
 def _make_folder(folder: Path) -> None:
@@ -315,45 +266,6 @@ def _make_folder(folder: Path) -> None:
         raise ResultError(
             folder, f"the folder cannot be written: {fault.strerror}; give another with --out"
         ) from None
-
-
-def _check_keys(axes: Iterable[Axis], changes: Mapping[str, str], path: Path) -> None:
-    """Refuse two keys for one value: which of them holds would be a matter of order."""
-    scenario = read_scenario(path)
-
-    def full_name(key: str) -> str:
-        try:
-            return look_up(scenario, key, path)[1]
-        except ScenarioError:
-            return key  # not in the file; read_scenario raises if no file may have it
-
-    keys = [axis.key for axis in axes]
-    meant = [full_name(key) for key in keys]
-    for key, whole in zip(keys, meant, strict=True):
-        if meant.count(whole) > 1:
-            raise InvalidParameter("vary", key, "is given twice: put all its values together")
-        if whole in map(full_name, changes):
-            raise InvalidParameter("vary", key, "is set as well: leave one of the two out")
-
-
-def _unit(scenario: Scenario, key: str, path: Path) -> str:
-    try:
-        return meaning(scenario, look_up(scenario, key, path)).unit
-    except ScenarioError:
-        return ""  # not in the file; read_scenario raises if no file may have it
-
-
-def _build_one(runs: list[Run], scenario: Scenario, path: Path) -> tuple[Run, Built]:
-    """Build the first run, or else the last: where neither can be, no run can be built."""
-    faults: list[SphshellError] = []
-    for run in (runs[0], runs[-1]):
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                return run, build_scenario(changed(scenario, run, path), path)
-        except SphshellError as fault:
-            faults.append(fault)
-    raise faults[0]
 
 
 def _count_workers(workers: int | None, scheduler: str | None) -> int:

@@ -23,7 +23,7 @@ MOST_RUNS = 1_000_000
 # Steps between the ends are rounded: 0.3 rather than 0.30000000000000004, on every machine.
 _DIGITS = 12
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\s*", re.IGNORECASE)
-_HOW = "key=lo:hi:n, key=lo:hi:log:n or key=a,b,c"
+HOW = "key=lo:hi:n, key=lo:hi:log:n or key=a,b,c"
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def axes_of(vary: Vary | Iterable[str]) -> tuple[Axis, ...]:
             raise InvalidParameter("vary", key, "is given twice: put all its values together")
         axes.append(Axis(key, values))
     if not axes:
-        raise InvalidParameter("vary", {}, f"must say what varies: {_HOW}")
+        raise InvalidParameter("vary", {}, f"must say what varies: {HOW}")
     return tuple(axes)
 
 
@@ -110,7 +110,7 @@ def _as_number(value: Value) -> Value:
 def _split(text: str) -> tuple[str, str]:
     key, equals, values = text.partition("=")
     if not equals or not key.strip() or not values.strip():
-        raise InvalidParameter("--vary", text, f"must be {_HOW}")
+        raise InvalidParameter("--vary", text, f"must be {HOW}")
     return key.strip(), values.strip()
 
 

@@ -10,9 +10,13 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    from sphshell_pin.study.sweep.curves import Curves
 
 DONE, FAILED = "done", "failed"
 JsonObject = dict[str, object]
@@ -24,6 +28,8 @@ class Run:
 
     number: int
     changes: Mapping[str, str]
+    recorded: bool = False
+    """Whether it leaves the curves of the job."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +44,8 @@ class Outcome:
     figures: Mapping[str, float]
     wall_time: float = 0.0
     worker: str = ""
+    curves: bytes = b""
+    """As `Curves.of` returns them; empty where the run records none, or failed."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +66,8 @@ class Job:
     versions: Mapping[str, str]
     token: str
     """Identifies this job."""
+    curves: Curves | None = None
+    """What its recorded runs leave."""
 
 
 def need(module: str) -> ModuleType:

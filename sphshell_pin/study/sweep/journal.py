@@ -17,8 +17,8 @@ from sphshell_pin.atomic.lock import lock_file
 from sphshell_pin.errors import ResultError, SweepError
 from sphshell_pin.study.sweep.job import JsonObject, Outcome
 
-FORMAT = 3
-"""Formats 1 and 2 were lines of JSON; they cannot be read any more."""
+FORMAT = 4
+"""Format 3 had no curves, 1 and 2 were lines of JSON; they cannot be read any more."""
 SUFFIX = ".journal"
 
 # What two sweeps can differ in, and the words for it.
@@ -27,6 +27,7 @@ _DIFFERENCES = {
     "scenario": "another scenario",
     "settings": "other settings of the scenario",
     "vary": "other values",
+    "bands": "other curves (--bands)",
     "together": "values combined in another way",
     "verdicts": "other columns (--verdicts)",
     "files": "other contents of the files beside the scenario",
@@ -35,7 +36,7 @@ _DIFFERENCES = {
 _TABLES = """
 CREATE TABLE sweep (description TEXT NOT NULL);
 CREATE TABLE runs (run INTEGER, status TEXT, error TEXT, figures TEXT, wall_time REAL, worker TEXT,
-                   crc32 INTEGER);
+                   curves BLOB, crc32 INTEGER);
 """
 
 
@@ -94,10 +95,11 @@ class Journal:
             json.dumps(dict(outcome.figures)),  # writes floats so that they are read back exactly
             outcome.wall_time,
             outcome.worker,
+            outcome.curves,
         )
         try:
             with self._file:
-                self._file.execute("INSERT INTO runs VALUES (?,?,?,?,?,?,?)", (*row, _crc(row)))
+                self._file.execute("INSERT INTO runs VALUES (?,?,?,?,?,?,?,?)", (*row, _crc(row)))
         except sqlite3.Error as fault:
             raise self._broken(fault) from None
         self.outcomes[outcome.number] = outcome
@@ -136,9 +138,9 @@ class Journal:
                     "row is done again"
                 )
                 continue
-            number, status, error, figures, wall_time, worker = row
+            number, status, error, figures, wall_time, worker, curves = row
             self.outcomes[number] = Outcome(
-                number, status, error, json.loads(figures), wall_time, worker
+                number, status, error, json.loads(figures), wall_time, worker, curves
             )
 
     def _compare(self, found: JsonObject, wanted: JsonObject) -> None:

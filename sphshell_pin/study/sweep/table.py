@@ -27,6 +27,10 @@ DATASET = "sweep"
 """Name of the dataset in an HDF5 file, and of the description in either kind of file."""
 
 
+DESIGN = "design"
+"""The column that says what each run of a sampled sweep is for."""
+
+
 def check_suffix(path: Path) -> None:
     """Refuse a file whose kind is not known, and one that an optional package is missing for.
 
@@ -59,12 +63,13 @@ def columns_of(
     digests: Sequence[str],
     outcomes: Mapping[int, Outcome],
     figures: Sequence[str],
+    design: Sequence[str] = (),
 ) -> Columns:
     """Return the columns of the table by name, each (n,) for n runs.
 
-    They are `run`, the varied keys, `status`, `error`, the figures (float64; NaN where a run has
-    none), and `settings`, the digest of the run's settings. Columns of `figures` come first, then
-    those that only some runs have (where robots or contacts vary).
+    They are `run`, the varied keys, `status`, `error`, `design` if it is given, the figures
+    (float64; NaN where a run has none), and `settings`, the digest of the run's settings. Columns
+    of `figures` come first, then those that only some runs have (where robots or contacts vary).
     """
     rows = [outcomes[i] for i in range(len(points))]
     names = list(dict.fromkeys([*figures, *(name for row in rows for name in row.figures)]))
@@ -72,6 +77,8 @@ def columns_of(
     columns |= varied_columns(axes, points)
     columns["status"] = _texts([row.status for row in rows])
     columns["error"] = _texts([row.error for row in rows])
+    if design:
+        columns[DESIGN] = _texts(design)
     for name in names:
         columns[name] = np.array([row.figures.get(name, np.nan) for row in rows], dtype=np.float64)
     columns["settings"] = _texts(digests)
@@ -142,7 +149,7 @@ def _write_hdf5(file: IO[bytes], columns: Columns, description: str) -> None:
         else:
             encoded[name] = values
             fields.append((name, values.dtype))
-    records = np.zeros(len(columns["run"]), dtype=fields)
+    records = np.zeros(len(next(iter(columns.values()))), dtype=fields)
     for name, values in encoded.items():
         records[name] = values
     with h5py.File(file, "w") as table:

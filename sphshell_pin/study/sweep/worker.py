@@ -82,8 +82,8 @@ def run_one(job: Job, run: Run) -> Outcome:
         if job.token not in _built:
             _prepare(job)
         start = time.perf_counter()
-        status, error, figures = _try_run(job, run)
-        return Outcome(run.number, status, error, figures, time.perf_counter() - start, _here())
+        outcome = _try_run(job, run)
+        return replace(outcome, wall_time=time.perf_counter() - start, worker=_here())
 
 
 def _prepare(job: Job) -> None:
@@ -119,7 +119,7 @@ def _path(job: Job) -> Path:
     return find_scenario(job.name) if job.shipped else Path(job.name)
 
 
-def _try_run(job: Job, run: Run) -> tuple[str, str, dict[str, float]]:
+def _try_run(job: Job, run: Run) -> Outcome:
     path = _path(job)
     try:
         with warnings.catch_warnings():
@@ -130,12 +130,16 @@ def _try_run(job: Job, run: Run) -> tuple[str, str, dict[str, float]]:
             _built[job.token] = built
             result, stopped = simulate(built)
     except (Exception, SystemExit) as fault:  # a routine of the user's may call exit()
-        return FAILED, _sentence(fault, path), {}
+        return Outcome(run.number, FAILED, _sentence(fault, path), {})
     if isinstance(stopped, Interrupted):
         raise KeyboardInterrupt
     if stopped is not None:
-        return FAILED, _sentence(stopped, path), {}
-    return _measure(job, built, result)
+        return Outcome(run.number, FAILED, _sentence(stopped, path), {})
+    status, error, figures = _measure(job, built, result)
+    curves = b""
+    if job.curves is not None and run.recorded and status == DONE:
+        curves = job.curves.of(built, result)
+    return Outcome(run.number, status, error, figures, curves=curves)
 
 
 def _measure(job: Job, built: Built, result: Result) -> tuple[str, str, dict[str, float]]:

@@ -43,8 +43,8 @@ Sensitivities::Sensitivities(SceneData& scene, SensitivitySettings settings)
 }
 
 void Sensitivities::hold(const TorqueAt& torque, const State& state) {
-  const MatrixX& slopes = slopes_.torque_slopes(torque, state.t, state.q, state.v, state.z);
-  torque_ = applied(slopes, now_, 0);
+  slopes_.torque_slopes(torque, state.t, state.q, state.v, state.z);
+  torque_ = slopes_.held(now_);
 }
 
 void Sensitivities::step(Chart& chart, const Stepper& stepper, const State& from, const State& to) {

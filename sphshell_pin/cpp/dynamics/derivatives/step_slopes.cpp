@@ -11,7 +11,7 @@ namespace sphshell {
 namespace {
 
 // Of central differences of torques, relative to the larger of 1 and the number.
-constexpr double kTorqueDifference = 1e-6;
+constexpr double kTorqueDifference = 1e-7;
 // Changes over a step and over its halves agree to this share of the largest, or are taken as they
 // are after so many halvings.
 constexpr double kAgreed = 1e-6;
@@ -59,8 +59,8 @@ void StepSlopes::linearize(Chart& chart, double t) {
     jacobian_.topRows(tau_.size()).noalias() += linearization_.inverse_mass() * torque_slopes_;
 }
 
-const MatrixX& StepSlopes::torque_slopes(const TorqueAt& torque, double t, const VectorX& q,
-                                         const VectorX& v, const VectorX& z) {
+void StepSlopes::torque_slopes(const TorqueAt& torque, double t, const VectorX& q, const VectorX& v,
+                               const VectorX& z) {
   const Eigen::Index nv = v.size();
   torque_slopes_.setZero(nv, 2 * nv + z.size());
   const auto add = [&](Eigen::Index column, double share) {
@@ -94,14 +94,35 @@ const MatrixX& StepSlopes::torque_slopes(const TorqueAt& torque, double t, const
       z_[k] = z[k];
     }
   }
+  // What a controller makes of forces that the parameters change at a held state.
+  const std::vector<Parameter>& parameters = linearization_.parameters();
+  torque_by_parameters_.setZero(nv, static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t c = 0; c < parameters.size(); ++c)
+    for (const double sign : {1.0, -1.0}) {
+      const Parameter& one = parameters[c];
+      const auto [pair, step] = one.changed(scene_.pairs()[one.pair], sign, kTorqueDifference);
+      const Pair kept = scene_.exchange(one.pair, pair);
+      scene_.evaluate(q, v, z, true);
+      torque_by_parameters_.col(c) += sign / (2 * step) * torque(t, q, v);
+      scene_.exchange(one.pair, kept);
+    }
   scene_.evaluate(q, v, z, true);
-  return torque_slopes_;
 }
 
-void StepSlopes::add_parameters(MatrixX& acceleration, MatrixX& bristles) const {
-  const MatrixX& by = linearization_.by_parameters();
-  acceleration.leftCols(by.cols()) += by.topRows(acceleration.rows());
-  bristles.leftCols(by.cols()) += by.bottomRows(bristles.rows());
+MatrixX StepSlopes::held(const Tangent& at) const {
+  const Eigen::Index nv = at.q.rows();
+  MatrixX out = torque_slopes_.leftCols(nv) * at.q + torque_slopes_.middleCols(nv, nv) * at.v;
+  out.noalias() += torque_slopes_.rightCols(at.z.rows()) * at.z;
+  out.leftCols(torque_by_parameters_.cols()) += torque_by_parameters_;
+  return out;
+}
+
+// Of (v', z').
+MatrixX StepSlopes::by_parameters() const {
+  MatrixX out = linearization_.by_parameters();
+  if (follows_)
+    out.topRows(tau_.size()).noalias() += linearization_.inverse_mass() * torque_by_parameters_;
+  return out;
 }
 
 void StepSlopes::rates(Chart& chart, double t, const VectorX& y, const Coordinates& by,
@@ -119,7 +140,9 @@ void StepSlopes::rates(Chart& chart, double t, const VectorX& y, const Coordinat
   out.z.noalias() = jacobian_.bottomLeftCorner(nz, nv) * q_by_;
   out.z.noalias() += jacobian_.block(nv, nv, nz, nv) * v_by_;
   out.z.noalias() += jacobian_.bottomRightCorner(nz, nz) * by.z;
-  add_parameters(out.w, out.z);
+  const MatrixX own = by_parameters();
+  out.w.leftCols(own.cols()) += own.topRows(nv);
+  out.z.leftCols(own.cols()) += own.bottomRows(nz);
   scene_.evaluate(state_.q, state_.v, state_.z);
   y_ = scene_.acceleration(state_.q, state_.v, tau_);
   chart_slopes_.rates(y_, state_.v, by.u, by.w, v_by_, out.u, out.w);
@@ -216,8 +239,8 @@ bool StepSlopes::radau(const Path& path, double from, double to, MatrixX& change
     add_turning(scene_.body(), state_.v, slope[i]);
     force[i].setZero(n, m);
     force[i].middleRows(nv, nv).noalias() = linearization_.inverse_mass() * *torque_;
-    const MatrixX& by = linearization_.by_parameters();
-    force[i].bottomLeftCorner(nv + nz, by.cols()) += by;
+    const MatrixX own = by_parameters();
+    force[i].bottomLeftCorner(nv + nz, own.cols()) += own;
     for (Eigen::Index k = 2 * nv; k < n; ++k)
       if (!slope[i].row(k).isZero(0) || !slope[i].col(k).isZero(0)) lives[k] = 1;
   }

@@ -43,9 +43,12 @@ class StepSlopes {
   void along(Chart& chart, const Stepper& stepper, double h, double share, const MatrixX& torque,
              const Tangent& from, Tangent& out);
 
-  // Derivatives (nv, 2 nv + nz) of torques at a state by (u, v, z), by central differences.
-  const MatrixX& torque_slopes(const TorqueAt& torque, double t, const VectorX& q, const VectorX& v,
-                               const VectorX& z);
+  // Differences torques at a state by (u, v, z), (nv, 2 nv + nz), and by the parameters.
+  void torque_slopes(const TorqueAt& torque, double t, const VectorX& q, const VectorX& v,
+                     const VectorX& z);
+
+  // The changes of torques whose slopes were found last.
+  MatrixX held(const Tangent& at) const;
 
   Linearization& linearization() { return linearization_; }
 
@@ -60,7 +63,7 @@ class StepSlopes {
   bool radau(const Path& path, double from, double to, MatrixX& changes);
   // The rates at a state, and how the last ones answer.
   void linearize(Chart& chart, double t);
-  void add_parameters(MatrixX& acceleration, MatrixX& bristles) const;
+  MatrixX by_parameters() const;
 
   SceneData& scene_;
   Linearization linearization_;
@@ -69,7 +72,7 @@ class StepSlopes {
   const MatrixX* torque_ = nullptr;
   State state_;
   VectorX tau_, q_, v_, z_, u_, y_;
-  MatrixX jacobian_, torque_slopes_, q_by_, v_by_, rates_;
+  MatrixX jacobian_, torque_slopes_, torque_by_parameters_, q_by_, v_by_, rates_;
   bool follows_ = false;  // torques do, and torque_slopes_ says how
 };
 

@@ -1,0 +1,136 @@
+"""Fits to synthetic data with known parameters: errors, and how often the intervals hold them.
+
+python -m benchmarks.fitting [--sets 1000] [--first 0]
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.benchmarks.timing import machine
+from sphshell_pin.scenario import build
+from sphshell_pin.study.fit import fit
+from sphshell_pin.study.fit.quantities import quantities_of
+
+Array = NDArray[np.float64]
+
+NOISE, STEP = 0.02, 2e-4  # of the largest value of each column; between times [s]
+SCENARIO = """
+title = "A rubber ball, thrown at an angle, bounces on a plate"
+
+[robot]
+name = "ball"
+
+[robot.start]
+root_joint = [0.0, 0.0, 0.017, 0.0, 0.0, 0.0, 1.0]  # 5 mm above the plate
+
+[robot.speed]
+root_joint = [3.0, 0.0, -0.5, 0.0, 0.0, 0.0]  # it slides in all impacts
+
+[[shell]]
+name = "plate"
+primitive = { type = "half-space", extent = 2.0 }
+
+[[contact]]
+name = "tip"
+sphere = { frame = "ball", radius = 0.012 }
+shell = "plate"
+law = { type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }
+friction = { type = "coulomb", mu_static = 0.3, mu_dynamic = 0.2, v_static = 0.05, v_dynamic = 0.1 }
+
+[run]
+duration = 0.25
+rtol = 1e-7
+"""
+LAW = "contact.tip.law."
+TRUTH = {
+    f"{LAW}stiffness": 1e5,
+    f"{LAW}dissipation": 0.3,
+    "contact.tip.friction.mu_dynamic": 0.2,
+}
+COLUMNS = {"pairs.tip.normal_force": "N", "pairs.tip.force_x": "N"}
+
+
+def exact(path: Path) -> tuple[Array, dict[str, Array]]:
+    """Return the times (n,) and the columns (n,) of a run with the true values."""
+    built = build(path)
+    run = built.scenario.run
+    t = STEP * np.arange(1, round(run.duration / STEP) + 1)
+    result = built.simulation.run(built.q0, built.v0, run.duration, record_dt=STEP)
+    known = quantities_of(built)
+    return t, {name: known[name].at(result, t) for name in COLUMNS}
+
+
+def one_set(path: Path, number: int) -> tuple[Array, Array, Array, int]:
+    """Return values, ends of the intervals, and runs of the fit to one noisy set.
+
+    The noise and the start, up to 30 % from the truth, are those of the seed `number`.
+    """
+    rng = np.random.default_rng(number)
+    t, columns = exact(path)
+    data = {"t [s]": t}
+    for name, unit in COLUMNS.items():
+        noise = NOISE * np.abs(columns[name]).max() * rng.normal(size=len(t))
+        data[f"{name} [{unit}]"] = columns[name] + noise
+    start = {key: repr(value * rng.uniform(0.7, 1.3)) for key, value in TRUTH.items()}
+    found = fit(path, data, list(TRUTH), changes=start)
+    values, low, high = (
+        np.array([getattr(one, part) for one in found.parameters])
+        for part in ("value", "low", "high")
+    )
+    return values, low, high, found.runs
+
+
+def many_sets(
+    count: int, first: int = 0, workers: int = 2
+) -> Iterator[tuple[Array, Array, Array, int]]:
+    """Yield what one_set returns of sets `first` to `first` + `count`."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bounce.toml"
+        path.write_text(SCENARIO, encoding="utf-8")
+        numbers = range(first, first + count)
+        if workers < 2:
+            yield from map(partial(one_set, path), numbers)
+            return
+        with ProcessPoolExecutor(workers) as pool:
+            yield from pool.map(partial(one_set, path), numbers, chunksize=8)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.fitting", description=__doc__)
+    parser.add_argument("--sets", type=int, default=1000)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first set")
+    given = parser.parse_args()
+    print(machine())
+    begin = time.perf_counter()
+    values, low, high, runs = zip(*many_sets(given.sets, given.first), strict=True)
+    truth = np.array(list(TRUTH.values()))
+    off = np.array(values) / truth - 1.0
+    inside = (np.array(low) <= truth) & (truth <= np.array(high))
+    print(
+        f"{given.sets} sets in {time.perf_counter() - begin:.0f} s, "
+        f"{np.mean(runs):.0f} runs a fit on average, {max(runs)} at most\n"
+    )
+    print("| parameter | mean | mean error | mean of errors' sizes | largest | in its interval |")
+    print("|---|---|---|---|---|---|")
+    for k, key in enumerate(TRUTH):
+        column = off[:, k]
+        print(
+            f"| `{key}` | {np.mean(values, axis=0)[k]:.6g} | {column.mean():+.3%} | "
+            f"{np.abs(column).mean():.3%} | {np.abs(column).max():.2%} | "
+            f"{inside[:, k].mean():.1%} |"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,216 @@
+"""The command fit: parameters of a scenario from measured data."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import shlex
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sphshell_pin.cli.app import (
+    MISSED,
+    PackageDirOption,
+    ScenarioArgument,
+    SetOption,
+    app,
+    changes_of,
+    faults,
+    make_table,
+    plain,
+    progress_bar,
+    terminal,
+)
+
+if TYPE_CHECKING:
+    from sphshell_pin.study.fit import Experiment, Fit
+
+
+@app.command()
+def fit(
+    *,
+    context: typer.Context,
+    data: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[DATA.csv]...", help="Measured data: columns by name and unit."),
+    ] = None,
+    scenario: ScenarioArgument,
+    param: Annotated[
+        list[str],
+        typer.Option(
+            "--param",
+            metavar="KEY[=LO:HI]",
+            help="What is fitted, in this range if it is given; may be given several times. "
+            "KEY+KEY: one value for both.",
+        ),
+    ],
+    experiment: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="'DATA.csv KEY=VALUE...'",
+            help="Data of an experiment with other values than the scenario; may be given several "
+            "times.",
+        ),
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Use this column; by default all; several times."),
+    ] = None,
+    sigma: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Standard deviation of a column, in SI; by default from the residuals.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the files.", show_default="results/<scenario>")
+    ] = None,
+    picture: Annotated[
+        bool, typer.Option("--picture/--no-picture", help="Draw fit and residuals.")
+    ] = True,
+    set_: SetOption = None,
+    package_dir: PackageDirOption = None,
+) -> None:
+    """Fit values of a scenario to measured data, and write the scenario with the fitted values.
+
+    The scenario's values are where the search starts. Exit code 1 says that the data do not
+    determine a value.
+
+    Example: sphshell-pin fit drop.csv ball.toml --param contact.tip.law.stiffness
+    """
+    with faults(context):
+        from sphshell_pin.scenario.reading import find_scenario, read_scenario
+        from sphshell_pin.study.fit import Experiment
+        from sphshell_pin.study.fit import fit as fit_scenario
+        from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
+        from sphshell_pin.study.fit.writing import check_places
+
+        changes = changes_of(set_, None, None)
+        wanted = parse_wanted(param)
+        given = [Experiment(path) for path in data or []]
+        given += [_experiment(text) for text in experiment or []]
+        path = find_scenario(scenario)
+        # Where no value can be written, it is said before the runs.
+        free = free_parameters(wanted, read_scenario(path, changes), path)
+        check_places(path, [key for one in free for key in one.keys], changes)
+        with _bar() as progress:
+            found = fit_scenario(
+                scenario,
+                given,
+                wanted,
+                changes=changes,
+                columns=column,
+                sigma=_deviations(sigma),
+                progress=progress,
+            )
+        files = _write(found, path, out or Path("results") / path.stem, changes, picture=picture)
+        _print_report(found, files)
+    if not found.determined:
+        raise typer.Exit(MISSED)
+
+
+def _experiment(text: str) -> Experiment:
+    """Return the experiment that "DATA.csv KEY=VALUE ..." states."""
+    from sphshell_pin.errors import InvalidParameter
+    from sphshell_pin.study.fit import Experiment
+
+    try:
+        file, *changes = shlex.split(text)
+    except ValueError:
+        file, changes = "", []
+    if not file or not all("=" in one for one in changes):
+        raise InvalidParameter("--experiment", text, "must be 'DATA.csv KEY=VALUE ...'")
+    return Experiment(file, changes_of(changes, None, None), " ".join([Path(file).stem, *changes]))
+
+
+def _deviations(stated: list[str] | None) -> dict[str, float]:
+    from sphshell_pin.errors import InvalidParameter
+
+    found = {}
+    for one in stated or []:
+        name, _, value = one.partition("=")
+        try:
+            found[name.strip()] = float(value)
+        except ValueError:
+            raise InvalidParameter("--sigma", one, "must be NAME=VALUE, in SI units") from None
+    return found
+
+
+@contextlib.contextmanager
+def _bar() -> Iterator[Callable[[int, float], object]]:
+    """Show on a terminal how many runs were made, and how far they are from the data."""
+    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    told = TextColumn("{task.completed} runs, misfit {task.fields[misfit]}")
+    bar = progress_bar(SpinnerColumn(), told, TimeElapsedColumn())
+    with bar:
+        task = bar.add_task("fit", total=None, misfit="-")
+
+        def progress(runs: int, misfit: float) -> None:
+            shown = "-" if math.isnan(misfit) else f"{misfit:.4g} sigma"
+            bar.update(task, completed=runs, misfit=shown)
+
+        yield progress
+
+
+def _write(
+    found: Fit, path: Path, folder: Path, changes: dict[str, str], *, picture: bool
+) -> list[Path]:
+    from sphshell_pin.atomic import write_whole
+    from sphshell_pin.errors import MissingExtra
+
+    files = [
+        found.write_scenario(folder / f"{path.stem}.fitted.toml", changes),
+        write_whole(folder / "fit.json", found.to_json().encode()),
+    ]
+    if picture:
+        from sphshell_pin.plot.figure import write_figure
+
+        try:
+            files.append(write_figure(folder / "fit.png", found.plot()))
+        except MissingExtra as missing:
+            typer.echo(str(missing), err=True)
+    return files
+
+
+def _print_report(found: Fit, files: list[Path]) -> None:
+    from sphshell_pin.study.fit.report import interval_text
+
+    console = terminal()
+    count = sum(len(one.t) for one in found.series)
+    console.print(
+        f"[bold]{plain(found.scenario)}[/bold]: {count} values of "
+        f"{len({one.experiment for one in found.series})} experiments, {found.runs} runs",
+        highlight=False,
+    )
+    table = make_table("parameter", "start", "value", f"{found.level:.0%} interval", "unit")
+    for one in found.parameters:
+        table.add_row(
+            plain(one.key), f"{one.start:.6g}", f"{one.value:.6g}", interval_text(one), one.unit
+        )
+    console.print(table)
+    if len(found.parameters) > 1:
+        rows = make_table("correlation", *(str(k + 1) for k in range(len(found.parameters))))
+        for k, (one, row) in enumerate(zip(found.parameters, found.correlation, strict=True)):
+            cells = ["-" if math.isnan(r) else f"{r:+.3f}" for r in row[: k + 1].tolist()]
+            rows.add_row(f"{k + 1} {plain(one.key)}", *cells)
+        console.print(rows)
+    columns = make_table("data", "values", "rms residual", "sigma", "unit")
+    for series in found.series:
+        sigma = f"{math.sqrt(float((series.sigma**2).mean())):.4g}"
+        columns.add_row(
+            plain(f"{series.name} of {series.experiment}"),
+            f"{len(series.t)}",
+            f"{series.rms:.4g}",
+            f"{sigma} given" if series.given else sigma,
+            series.unit,
+        )
+    console.print(columns)
+    for remark in found.remarks:
+        typer.echo(f"note: {remark}", err=True)
+    names = ", ".join(str(file) for file in files)
+    console.print(f"files: {names}", markup=False, highlight=False)

@@ -1,0 +1,267 @@
+#include "bindings/interop.hpp"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <pinocchio/spatial.hpp>
+
+#include "bindings/evaluations.hpp"
+#include "dynamics/chain.hpp"
+#include "dynamics/contact_row.hpp"
+#include "dynamics/derivatives/step_slopes.hpp"
+#include "dynamics/integrators/table.hpp"
+#include "dynamics/linearization.hpp"
+
+#include <nanobind/eigen/dense.h>
+#include <nanobind/stl/string.h>
+
+// Names of its own, as files may be compiled together.
+namespace sphshell::evaluator {
+namespace {
+
+using Out = Eigen::Ref<VectorX>;
+using Columns = Eigen::Ref<MatrixX>;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Rows = Eigen::Ref<RowMajor>;
+
+constexpr int kForce = 4;  // numbers of a pair: normal force, force in the world
+
+void check_forces(const SceneData& scene, const Rows& forces, Eigen::Index columns) {
+  check_count("rows of forces", forces.rows(),
+              kForce * static_cast<Eigen::Index>(scene.pairs().size()));
+  check_count("columns of forces", forces.cols(), columns);
+}
+
+void check_slopes(const Columns& by_state, const Columns& by_tau, Eigen::Index rows,
+                  Eigen::Index nv) {
+  check_count("rows of by_state", by_state.rows(), rows);
+  check_count("columns of by_state", by_state.cols(), 2 * nv);
+  check_count("rows of by_tau", by_tau.rows(), rows);
+  check_count("columns of by_tau", by_tau.cols(), nv);
+}
+
+// Adds up the forces of each pair: 4 pairs rows, one column.
+void sum_forces(SceneData& scene, const VectorX& q, const VectorX& v, Rows forces) {
+  check_forces(scene, forces, 1);
+  forces.setZero();
+  if (!scene.touching()) return;
+  std::vector<ContactRow> rows;
+  scene.log(q, v, rows);
+  for (const ContactRow& row : rows) {
+    auto force = forces.col(0).segment<kForce>(kForce * row.pair);
+    force[0] += row.normal_force;
+    force.tail<3>() += row.normal_force * Eigen::Map<const Vec3>(row.normal) +
+                       Eigen::Map<const Vec3>(row.friction_force);
+  }
+}
+
+// The same of their derivatives by q and v: 2 nv columns.
+void sum_slopes(Linearization& linearization, SceneData& scene, const VectorX& q, const VectorX& v,
+                Rows slopes) {
+  check_forces(scene, slopes, 2 * v.size());
+  slopes.setZero();
+  if (!scene.touching()) return;
+  std::vector<ContactRow> rows;
+  scene.log(q, v, rows);
+  ContactForceSlopes found;
+  linearization.contact_forces(q, v, found);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    auto force = slopes.middleRows<kForce>(kForce * rows[k].pair);
+    force.row(0) += found.normal_force.row(k).head(2 * v.size());
+    force.bottomRows<3>() += found.force_world.middleRows<3>(3 * k).leftCols(2 * v.size());
+  }
+}
+
+// Fills acceleration (nv), and the forces.
+void evaluate_into(Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& tau,
+                   Out acceleration, Rows forces) {
+  self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
+    check_count("tau", tau.size(), v.size());
+    check_count("acceleration", acceleration.size(), v.size());
+    evaluate();
+    acceleration = scene.acceleration(q, v, tau);
+    sum_forces(scene, q, v, forces);
+  });
+}
+
+// Fills by_state (nv, 2 nv), by_tau (nv, nv), and those of the forces.
+void differentiate_into(Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& tau,
+                        Columns by_state, Columns by_tau, Rows forces_by_state) {
+  self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
+    const Eigen::Index nv = v.size();
+    check_count("tau", tau.size(), nv);
+    check_slopes(by_state, by_tau, nv, nv);
+    Linearization& linearization = evaluate.linearization();
+    evaluate();
+    MatrixX jacobian;
+    linearization.rates(q, v, self.bristles(scene), tau, jacobian);
+    by_state = jacobian.topLeftCorner(nv, 2 * nv);
+    by_tau = linearization.inverse_mass();
+    sum_slopes(linearization, scene, q, v, forces_by_state);
+  });
+}
+
+// A step from (q, v) under held torques, with bristles that begin unstretched.
+class Step {
+ public:
+  Step(SceneData& scene, const std::string& integrator, double dt, const VectorX& q,
+       const VectorX& v, const VectorX& tau)
+      : scene_(scene),
+        before_(scene.least_relaxation()),
+        torques_(tau),
+        stepper_(make_stepper(integrator, scene)),
+        chart_(scene, torques_),
+        start_{0, q, v, VectorX::Zero(scene.bristle_size()), {}} {
+    // Explicit steps of this length hold bristles back.
+    scene.relax_in(stepper_->is_implicit() ? 0 : dt);
+    scene.restart();
+    chart_.begin(start_);
+    scene.evaluate(q, v, start_.z, true);
+  }
+  ~Step() {
+    scene_.restart();
+    scene_.relax_in(before_);
+  }
+  void take(double dt) {
+    stepper_->begin(chart_);
+    stepper_->step(chart_, dt, end_);
+  }
+  Chart& chart() { return chart_; }
+  const Stepper& stepper() const { return *stepper_; }
+  const State& end() const { return end_; }
+
+ private:
+  class Held : public Torques {
+   public:
+    explicit Held(const VectorX& tau) : tau_(tau) {}
+    const VectorX& torque(double, const VectorX&, const VectorX&) override { return tau_; }
+    bool follow_state() const override { return false; }
+    bool follow_time() const override { return false; }
+
+   private:
+    const VectorX& tau_;
+  };
+
+  SceneData& scene_;
+  const double before_;
+  Held torques_;
+  std::unique_ptr<Stepper> stepper_;
+  Chart chart_;
+  const State start_;
+  State end_;
+};
+
+// Fills next (nq + nv), where a step leads, and the forces at its start.
+void step_into(Evaluations& self, const std::string& integrator, double dt, const VectorX& q,
+               const VectorX& v, const VectorX& tau, Out next, Rows forces) {
+  self.at(q, v, [&](SceneData& scene, auto&&) {
+    check_count("tau", tau.size(), v.size());
+    check_count("next", next.size(), q.size() + v.size());
+    Step step(scene, integrator, dt, q, v, tau);
+    sum_forces(scene, q, v, forces);
+    step.take(dt);
+    next << step.end().q, step.end().v;
+  });
+}
+
+// Fills by_state (2 nv, 2 nv), by_tau (2 nv, nv), and those of the forces at the start.
+void differentiate_step_into(Evaluations& self, const std::string& integrator, double dt,
+                             const VectorX& q, const VectorX& v, const VectorX& tau,
+                             Columns by_state, Columns by_tau, Rows forces_by_state) {
+  self.at(q, v, [&](SceneData& scene, auto&&) {
+    const Eigen::Index nv = v.size();
+    check_count("tau", tau.size(), nv);
+    check_slopes(by_state, by_tau, 2 * nv, nv);
+    StepSlopes slopes(scene, {});
+    Step step(scene, integrator, dt, q, v, tau);
+    sum_slopes(slopes.linearization(), scene, q, v, forces_by_state);
+    step.take(dt);
+    Tangent tangent{MatrixX::Zero(nv, 3 * nv), MatrixX::Zero(nv, 3 * nv),
+                    MatrixX::Zero(scene.bristle_size(), 3 * nv)};
+    MatrixX torque = MatrixX::Zero(nv, 3 * nv);
+    tangent.q.leftCols(nv).setIdentity();
+    tangent.v.middleCols(nv, nv).setIdentity();
+    torque.rightCols(nv).setIdentity();
+    slopes.carry(step.chart(), step.stepper(), dt, torque, tangent);
+    by_state << tangent.q.leftCols(2 * nv), tangent.v.leftCols(2 * nv);
+    by_tau << tangent.q.rightCols(nv), tangent.v.rightCols(nv);
+  });
+}
+
+// A frame of the model, at `placement` in a joint, against a reference in the world.
+struct Frame {
+  int joint;
+  pinocchio::SE3 placement, reference;
+
+  Frame(int joint, const Eigen::Matrix4d& placement, const Eigen::Matrix4d& reference)
+      : joint(joint), placement(placement), reference(reference) {}
+
+  pinocchio::SE3 place(const Multibody& body) const { return body.world_from(joint, placement); }
+};
+
+// Fills residual: (3), the place against that of the reference, or (6), log6 of the placement in
+// the reference.
+void frame_into(Evaluations& self, const Frame& frame, const VectorX& q, Out residual) {
+  self.at(q, VectorX::Zero(self.model().nv), [&](SceneData& scene, auto&&) {
+    scene.body().need(frame.joint);
+    scene.body().kinematics(q);
+    const pinocchio::SE3 world_from_frame = frame.place(scene.body());
+    if (residual.size() == 3)
+      residual = world_from_frame.translation() - frame.reference.translation();
+    else
+      residual = pinocchio::log6(frame.reference.actInv(world_from_frame)).toVector();
+  });
+}
+
+// Fills by_q (3 or 6, nv), in the tangent space of q.
+void differentiate_frame_into(Evaluations& self, const Frame& frame, const VectorX& q,
+                              Columns by_q) {
+  const VectorX v = VectorX::Zero(self.model().nv);
+  check_count("columns of by_q", by_q.cols(), v.size());
+  self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
+    Multibody& body = scene.body();
+    evaluate.linearization();  // prepares the axes
+    body.need(frame.joint);
+    body.place_axes(q);
+    const pinocchio::SE3 world_from_frame = frame.place(body);
+    Chain chain(body.model(), 0, frame.joint);
+    // Twists in the frame.
+    chain.place(body, world_from_frame, v);
+    Matrix6 slope = Matrix6::Identity();
+    if (by_q.rows() == 3)
+      slope.topLeftCorner<3, 3>() = world_from_frame.rotation();
+    else
+      pinocchio::Jlog6(frame.reference.actInv(world_from_frame), slope);
+    by_q.setZero();
+    for (int k = 0; k < chain.size(); ++k)
+      by_q.col(chain.velocity(k)) += slope.topRows(by_q.rows()) * chain.axes().col(k);
+  });
+}
+
+}  // namespace
+}  // namespace sphshell::evaluator
+
+void bind_evaluator(nanobind::module_& m) {
+  using namespace sphshell;
+  using namespace sphshell::evaluator;
+  m.def("evaluate_into", &evaluate_into, nb::arg("scene"), nb::arg("q"), nb::arg("v"),
+        nb::arg("tau"), nb::arg("acceleration").noconvert(), nb::arg("forces").noconvert());
+  m.def("differentiate_into", &differentiate_into, nb::arg("scene"), nb::arg("q"), nb::arg("v"),
+        nb::arg("tau"), nb::arg("by_state").noconvert(), nb::arg("by_tau").noconvert(),
+        nb::arg("forces_by_state").noconvert());
+  nb::class_<Frame>(m, "Frame")
+      .def(nb::init<int, const Eigen::Matrix4d&, const Eigen::Matrix4d&>(), nb::arg("joint"),
+           nb::arg("placement"), nb::arg("reference"));
+  m.def("frame_into", &frame_into, nb::arg("scene"), nb::arg("frame"), nb::arg("q"),
+        nb::arg("residual").noconvert());
+  m.def("differentiate_frame_into", &differentiate_frame_into, nb::arg("scene"), nb::arg("frame"),
+        nb::arg("q"), nb::arg("by_q").noconvert());
+  m.def("step_into", &step_into, nb::arg("scene"), nb::arg("integrator"), nb::arg("dt"),
+        nb::arg("q"), nb::arg("v"), nb::arg("tau"), nb::arg("next").noconvert(),
+        nb::arg("forces").noconvert());
+  m.def("differentiate_step_into", &differentiate_step_into, nb::arg("scene"),
+        nb::arg("integrator"), nb::arg("dt"), nb::arg("q"), nb::arg("v"), nb::arg("tau"),
+        nb::arg("by_state").noconvert(), nb::arg("by_tau").noconvert(),
+        nb::arg("forces_by_state").noconvert());
+}

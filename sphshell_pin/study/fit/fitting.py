@@ -1,0 +1,130 @@
+"""Fits parameters of a scenario to measured data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.scenario.build import Built, build_scenario
+from sphshell_pin.scenario.knobs import check_knobs
+from sphshell_pin.scenario.reading import change_scenario, find_scenario, read_scenario
+from sphshell_pin.scenario.schema import Scenario
+from sphshell_pin.study.fit.data import Experiment, Source, read_experiment
+from sphshell_pin.study.fit.parameters import Free, Wanted, free_parameters
+from sphshell_pin.study.fit.quantities import quantities_of
+from sphshell_pin.study.fit.report import Fit
+from sphshell_pin.study.fit.runs import Trial, ready
+from sphshell_pin.study.fit.search import Progress, Search
+
+Data = Source | Experiment | Sequence[Source | Experiment]
+
+
+def fit(
+    scenario: str | PathLike[str],
+    data: Data,
+    parameters: Wanted,
+    *,
+    changes: Mapping[str, object] | None = None,
+    columns: Collection[str] | None = None,
+    sigma: Mapping[str, float] | None = None,
+    level: float = 0.95,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit parameters of a scenario to measured data, by least squares over whole runs.
+
+    Parameters
+    ----------
+    scenario : name of a shipped scenario, or path of a file
+    data : a csv file, columns by their headers, an Experiment, or a sequence of these. A header is
+        a name with its unit: "t [s]", "pairs.PAIR.normal_force [N]", "q.JOINT [rad]"
+    parameters : keys such as "contact.tip.law.stiffness", or a mapping from keys to ranges
+        (low, high) that the values must stay in (None: the bounds of the key). The scenario's
+        values are where the search starts
+    changes : values by dotted key that differ from the file's in all experiments
+    columns : names of the columns to use; by default all
+    sigma : standard deviations by the name of a column, in its SI unit. Those of columns without,
+        and without a column "NAME.sigma" beside them, are estimated from the residuals
+    level : probability of the intervals
+    progress : called after each run with the number of runs and the misfit: the root of the mean
+        square of the weighted residuals
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    DataError
+        What is wrong with the data, and where.
+    ScenarioError, InvalidParameter, NameNotFound
+        A key, a value or a name that is wrong.
+    SphshellError
+        The run at the start values fails: why.
+    MissingExtra
+        scipy is not installed.
+    """
+    if not 0.0 < level < 1.0:
+        raise InvalidParameter("level", level, "must lie between 0 and 1")
+    for name, value in (sigma or {}).items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise InvalidParameter(f"sigma of '{name}'", value, "must be positive")
+    path = find_scenario(scenario)
+    texts = {key: str(value) for key, value in (changes or {}).items()}
+    base = read_scenario(path, texts)
+    free = free_parameters(parameters, base, path)
+    trials = _trials(base, path, free, data, columns, sigma)
+    search = Search(trials, free, progress)
+    search.run()
+    return search.report(str(scenario), level)
+
+
+def _trials(
+    base: Scenario,
+    path: Path,
+    free: Sequence[Free],
+    data: Data,
+    columns: Collection[str] | None,
+    sigma: Mapping[str, float] | None,
+) -> list[Trial]:
+    several = isinstance(data, Sequence) and not isinstance(data, str)
+    given: Sequence[Source | Experiment] = data if several else [data]  # type: ignore[list-item, assignment]
+    if not given:
+        raise InvalidParameter("data", [], "must be at least one csv file or experiment")
+    trials: list[Trial] = []
+    reuse: Built | None = None
+    used: set[str] = set()
+    for number, one in enumerate(given, 1):
+        experiment = one if isinstance(one, Experiment) else Experiment(one)
+        texts = {key: str(value) for key, value in experiment.changes.items()}
+        for key, text in texts.items():
+            if any(key in one.keys for one in free):
+                raise InvalidParameter(key, text, "is fitted, so no experiment can set it")
+        scenario = change_scenario(base, texts, path) if texts else base
+        check_knobs(scenario, path, ranges=False)
+        built = reuse = build_scenario(scenario, path, reuse)
+        read = read_experiment(
+            experiment,
+            number,
+            quantities_of(built),
+            scenario.run.duration,
+            only=columns,
+            sigma=sigma,
+        )
+        used |= {column.name for column in read.columns}
+        trials.append(ready(built, read))
+    for name in sigma or {}:
+        if name not in used:
+            must = f"names no column; there are: {', '.join(sorted(used))}"
+            raise InvalidParameter("sigma", name, must, given=f"of '{name}'")
+    size = sum(trial.size for trial in trials)
+    if size <= len(free):
+        raise InvalidParameter(
+            "data",
+            size,
+            f"must be more than parameters, of which there are {len(free)}",
+            given=f"with {size} value{'s' * (size != 1)}",
+        )
+    return trials

@@ -1,0 +1,194 @@
+"""What of a run can be measured: quantities by the names of the columns that exports have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.dynamics.models import find_frame
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.scenario.build import Built
+
+Array = NDArray[np.float64]
+
+# Times that differ by less than this part of the step between them are one.
+_SAME = 1e-6
+# Rows for each of the data's steps, where these do not lie on one grid.
+_FINER = 8
+# A grid of times may be so much finer than the steps between them.
+_FINEST = 16
+# So many rows for each time at most.
+_MOST_ROWS = 64
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of a run over time, in its SI `unit`; "" and "1" for a pure number."""
+
+    name: str
+    unit: str
+    at: Callable[[Result, Array], Array]
+    """Its values (n,) in a result at the times (n,) [s]; nan before the first one."""
+
+
+def quantities_of(built: Built) -> dict[str, Quantity]:
+    """Return what can be measured of the runs of a scenario, by name.
+
+    `q.JOINT`, `v.JOINT` (`q.JOINT.0`, ... where a joint has several), `pairs.PAIR.normal_force`,
+    `.force_x` and on, `.friction_force_x` and on, `.depth`, `SENSOR.COLUMN`; of each frame, along
+    the axes of the world, `frames.FRAME.x` (position), `.vx` (velocity), `.wx` (angular velocity).
+    """
+    return {
+        one.name: one
+        for one in (*_of_joints(built), *_of_pairs(built), *_of_sensors(built), *_of_frames(built))
+    }
+
+
+def row_step(t: Array) -> float:
+    """Return the time between rows [s] that a run needs for values at the times `t` (n,).
+
+    Where all of them are multiples of one step it is that step: the values are then those of rows.
+    """
+    steps = np.diff(t, prepend=0.0)
+    steps = steps[steps > 0.0]
+    if not len(steps):
+        return 0.0
+    least = float(t[-1]) / max(_MOST_ROWS * len(t), 1000)
+    for parts in range(1, _FINEST + 1):
+        step = float(steps.min()) / parts
+        if step < least:
+            break
+        # The last one defines the step more exactly than the shortest does.
+        step = float(t[-1]) / round(float(t[-1]) / step)
+        if np.abs(t / step - np.rint(t / step)).max() < _SAME * len(t):
+            return step
+    return max(float(np.median(steps)) / _FINER, least)
+
+
+def _at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:
+    """Interpolate between rows, linearly; at the time of a row it is that row's value."""
+
+    def at(result: Result, t: Array) -> Array:
+        return np.interp(t, result.t, of(result))
+
+    return at
+
+
+def _of_joints(built: Built) -> list[Quantity]:
+    model, out = built.scene.model, []
+    for k in range(1, model.njoints):
+        joint, name = model.joints[k], model.names[k]
+        for kind, first, count in (("q", joint.idx_q, joint.nq), ("v", joint.idx_v, joint.nv)):
+            for i in range(count):
+                label = f"{kind}.{name}.{i}" if count > 1 else f"{kind}.{name}"
+                unit = unit_of(joint.shortname(), kind, i)
+                out.append(Quantity(label, unit, _at_rows(_state(kind, first + i))))
+    return out
+
+
+def _state(kind: str, column: int) -> Callable[[Result], Array]:
+    return lambda result: np.asarray(getattr(result, kind)[:, column])
+
+
+def unit_of(joint: str, kind: str, index: int) -> str:
+    """Return the unit of one coordinate (or speed) of a joint; `joint` is Pinocchio's name."""
+    plain = joint.removeprefix("JointModel")
+    slides = plain.startswith("P") and not plain.startswith("Planar")  # PX, PrismaticUnaligned
+    slides = slides or plain == "Translation" or (plain == "FreeFlyer" and index < 3)
+    slides = slides or (plain == "Planar" and index < 2)
+    if slides:
+        return "m" if kind == "q" else "m/s"
+    if kind == "v":
+        return "rad/s"
+    # Quaternions, and cosine and sine of joints without ends.
+    pure = plain in ("FreeFlyer", "Spherical", "Planar")
+    pure = pure or plain.startswith(("RU", "RevoluteUnbounded"))
+    return "1" if pure else "rad"
+
+
+def _of_pairs(built: Built) -> list[Quantity]:
+    out = []
+    for k, pair in enumerate(built.scene.pairs):
+        names = {"normal_force": "N", "depth": "m"}
+        names |= {f"{part}_{a}": "N" for part in ("force", "friction_force") for a in "xyz"}
+        for name, unit in names.items():
+            out.append(Quantity(f"pairs.{pair.name}.{name}", unit, _at_rows(_of_pair(k, name))))
+    return out
+
+
+def _of_pair(pair: int, name: str) -> Callable[[Result], Array]:
+    """Return the sum over the contacts of a pair, or the largest depth; 0 without contact."""
+
+    def of(result: Result) -> Array:
+        contacts = result.contacts.of_pair(pair)
+        whole = np.zeros(len(result.t))
+        if name == "depth":
+            np.maximum.at(whole, contacts.row, contacts.depth)
+            return whole
+        if name == "normal_force":
+            values = contacts.normal_force
+        else:
+            part, axis = name[:-2], "xyz".index(name[-1])
+            forces = contacts.force_world if part == "force" else contacts.friction_force_world
+            values = forces[:, axis]
+        np.add.at(whole, contacts.row, values)
+        return whole
+
+    return of
+
+
+def _of_sensors(built: Built) -> list[Quantity]:
+    return [
+        Quantity(f"{sensor.name}.{label}", unit.rstrip("]"), _reading(sensor.name, i))
+        for sensor in built.simulation.sensors
+        for i, column in enumerate(sensor.columns(built.scene))
+        for label, _, unit in [column.partition(" [")]
+    ]
+
+
+def _reading(sensor: str, column: int) -> Callable[[Result, Array], Array]:
+    def at(result: Result, t: Array) -> Array:
+        # The last reading that had arrived, as a controller or a logger has it.
+        log = result.sensors[sensor]
+        if not len(log):
+            return np.full(len(t), np.nan)
+        # A time as a file has it may be rounded down.
+        late = t + _SAME * float(np.diff(log.t).min(initial=np.inf) if len(log) > 1 else 0.0)
+        row = np.searchsorted(log.t, late, side="right") - 1
+        return np.where(row >= 0, log.values[np.maximum(row, 0), column], np.nan)
+
+    return at
+
+
+def _of_frames(built: Built) -> list[Quantity]:
+    model, out = built.scene.model, []
+    for name in dict.fromkeys(frame.name for frame in model.frames[1:]):
+        frame = find_frame(model, name)
+        for part, unit in (("", "m"), ("v", "m/s"), ("w", "rad/s")):
+            for axis in range(3):
+                label = f"frames.{name}.{part}{'xyz'[axis]}"
+                out.append(Quantity(label, unit, _at_rows(_motion(model, frame, part, axis))))
+    return out
+
+
+def _motion(model: pin.Model, frame: int, part: str, axis: int) -> Callable[[Result], Array]:
+    """Return position ("") or velocity ("v", "w") of a frame, along an axis of the world."""
+
+    def of(result: Result) -> Array:
+        data, out = model.createData(), np.zeros(len(result.t))
+        aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        for row, (q, v) in enumerate(zip(result.q, result.v, strict=True)):
+            pin.forwardKinematics(model, data, q, v)
+            if part:
+                velocity = pin.getFrameVelocity(model, data, frame, aligned)
+                vector = velocity.linear if part == "v" else velocity.angular
+            else:
+                vector = pin.updateFramePlacement(model, data, frame).translation
+            out[row] = vector[axis]
+        return out
+
+    return of

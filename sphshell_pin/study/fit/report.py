@@ -1,0 +1,200 @@
+"""What a fit comes to: values, intervals, correlation, residuals, and remarks on them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.atomic import write_whole
+from sphshell_pin.scenario.reading import find_scenario
+from sphshell_pin.study.fit.parameters import TIE
+from sphshell_pin.study.fit.writing import scenario_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fitted parameter: `value`, and the interval from `low` to `high`, in its `unit`.
+
+    `key` of several keys with one value is "KEY+KEY". The interval is infinite for a parameter of
+    which the data say nothing, and nan for one that its bound holds off the data: `at_bound`.
+    """
+
+    key: str
+    unit: str
+    start: float
+    value: float
+    low: float
+    high: float
+    determined: bool
+    at_bound: bool = False
+
+
+@dataclass(frozen=True)
+class Series:
+    """One measured column of one experiment, and what the fitted scenario says: all (m,).
+
+    `sigma` are the standard deviations that weighted it; `given` whether the data came with them.
+    """
+
+    experiment: str
+    name: str
+    unit: str
+    t: Array
+    measured: Array
+    fitted: Array
+    sigma: Array
+    given: bool
+
+    @property
+    def residuals(self) -> Array:
+        """Measured less fitted values (m,), in `unit`."""
+        return self.measured - self.fitted
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the residuals, in `unit`."""
+        return float(np.sqrt(np.mean(self.residuals**2)))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Parameters of a scenario that were fitted to data.
+
+    Attributes
+    ----------
+    scenario : name or path of the scenario
+    parameters : the fitted ones, in the order they were asked for
+    correlation (p, p) : of the parameters on the scales they were fitted on; nan in the rows of
+        those that the data do not determine
+    series : each measured column of each experiment, with residuals
+    remarks : sentences on what the data do not determine, on what is strongly correlated, on values
+        at a bound, on residuals that are not noise
+    dof : measured values less parameters
+    level : probability of the intervals
+    runs : how many runs were made
+    converged : whether the search ended where no step makes the residuals smaller
+    """
+
+    scenario: str
+    parameters: tuple[Fitted, ...]
+    correlation: Array
+    series: tuple[Series, ...]
+    remarks: tuple[str, ...]
+    dof: int
+    level: float
+    runs: int
+    converged: bool
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The fitted values by key."""
+        return {one.key: one.value for one in self.parameters}
+
+    @property
+    def determined(self) -> bool:
+        """Whether the data determine all parameters."""
+        return all(one.determined for one in self.parameters)
+
+    def __getitem__(self, key: str) -> Fitted:
+        """Return the parameter with this key; a KeyError for another one."""
+        return {one.key: one for one in self.parameters}[key]
+
+    def plot(self) -> Figure:
+        """Return a figure of data, fitted curves and residuals; MissingExtra without matplotlib."""
+        from sphshell_pin.plot.fit import plot_fit
+
+        return plot_fit(self)
+
+    def write_scenario(
+        self, path: str | PathLike[str], changes: Mapping[str, str] | None = None
+    ) -> Path:
+        """Write the scenario's file with the fitted values, and `changes`, in place.
+
+        Comments stay; names of files beside the scenario are written relative to the new place.
+
+        Raises ScenarioError where a value has no place in the file, ResultError where it cannot be
+        written.
+        """
+        source = find_scenario(self.scenario)
+        texts = {
+            key: file_number(one.value) for one in self.parameters for key in one.key.split(TIE)
+        }
+        text = scenario_text(source, {**(changes or {}), **texts}, Path(path).parent)
+        return write_whole(path, text.encode())
+
+    def to_json(self) -> str:
+        """Return everything but the series, as JSON; null for what is infinite or nan."""
+        data = {
+            "scenario": self.scenario,
+            "level": self.level,
+            "degrees_of_freedom": self.dof,
+            "runs": self.runs,
+            "converged": self.converged,
+            "parameters": [
+                {
+                    "key": one.key,
+                    "unit": one.unit,
+                    "start": one.start,
+                    "value": one.value,
+                    "low": _finite(one.low),
+                    "high": _finite(one.high),
+                    "determined": one.determined,
+                    "at_bound": one.at_bound,
+                }
+                for one in self.parameters
+            ],
+            "correlation": [[_finite(value) for value in row] for row in self.correlation.tolist()],
+            "series": [
+                {
+                    "experiment": one.experiment,
+                    "column": one.name,
+                    "unit": one.unit,
+                    "values": len(one.t),
+                    "rms": one.rms,
+                    "sigma": float(np.sqrt(np.mean(one.sigma**2))),
+                    "sigma_given": one.given,
+                }
+                for one in self.series
+            ],
+            "remarks": list(self.remarks),
+        }
+        return json.dumps(data, indent=2, allow_nan=False) + "\n"
+
+    def __str__(self) -> str:
+        """Return a line for each parameter, then the remarks."""
+        lines = [
+            f"{one.key} = {one.value:.6g} {one.unit}".rstrip() + f"  {interval_text(one)}"
+            for one in self.parameters
+        ]
+        return "\n".join([*lines, *self.remarks])
+
+
+def interval_text(one: Fitted) -> str:
+    """Return the interval of a parameter as a table shows it."""
+    if one.at_bound:
+        return "at its bound"
+    if math.isinf(one.low) and math.isinf(one.high):
+        return "not determined"
+    return f"{one.low:.5g} to {one.high:.5g}"
+
+
+def file_number(value: float) -> str:
+    """Return a fitted value as a file states it, with nine digits."""
+    return repr(float(f"{value:.9g}"))
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,159 @@
+"""How an uncertain number is distributed, as texts such as "normal(1e5,1e4)" and as classes."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.study.sweep.job import need
+
+FloatArray = NDArray[np.float64]
+Dist = Mapping[str, "str | Distribution"]
+
+_CALL = re.compile(r"\s*(\w+)\s*\(([^()]*)\)\s*")
+
+
+@dataclass(frozen=True)
+class Distribution(Ingredient):
+    """A distribution of one number; its kinds are `Normal`, `Uniform` and `LogNormal`."""
+
+    def quantile(self, share: FloatArray) -> FloatArray:
+        """Return the values that `share` (n,) of the distribution lies below.
+
+        Raises MissingExtra without scipy.
+        """
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        return f"{self.kind}({','.join(f'{one:.12g}' for one in self.numbers())})"
+
+
+@dataclass(frozen=True)
+class Normal(Distribution, kind="normal"):
+    """The normal distribution; 68 % of the values lie within mean ± deviation."""
+
+    mean: float = parameter(help="mean")
+    deviation: float = parameter(above=0, help="standard deviation")
+
+    def quantile(self, share: FloatArray) -> FloatArray:
+        """Return the values that `share` (n,) of the distribution lies below."""
+        return np.asarray(need("scipy.stats").norm.ppf(share, self.mean, self.deviation))
+
+
+@dataclass(frozen=True)
+class Uniform(Distribution, kind="uniform"):
+    """Every value from low to high is as likely as any other."""
+
+    low: float = parameter(help="smallest value")
+    high: float = parameter(help="largest value")
+
+    def __post_init__(self) -> None:
+        """Check the values; InvalidParameter where they enclose nothing."""
+        super().__post_init__()
+        if not self.low < self.high:
+            raise InvalidParameter("high", self.high, f"must be more than low = {self.low:g}")
+
+    def quantile(self, share: FloatArray) -> FloatArray:
+        """Return the values that `share` (n,) of the distribution lies below."""
+        found = need("scipy.stats").uniform.ppf(share, self.low, self.high - self.low)
+        return np.asarray(found)
+
+
+@dataclass(frozen=True)
+class LogNormal(Distribution, kind="lognormal"):
+    """The logarithm is normal; 68 % of the values lie from median / factor to median * factor.
+
+    The logarithm has mean log(median) and standard deviation log(factor).
+    """
+
+    median: float = parameter(above=0, help="half of the values lie below it")
+    factor: float = parameter(
+        above=1, help="68 % of the values lie from median / factor to median * factor"
+    )
+
+    def __post_init__(self) -> None:
+        """Check the values; InvalidParameter where they look like those of the logarithm."""
+        if isinstance(self.factor, int | float) and 0 < self.factor <= 1:
+            raise InvalidParameter(
+                "factor",
+                self.factor,
+                "must be more than 1: 68 % of the values lie from median / factor to median * "
+                "factor; a mean m and a deviation s of the logarithm are written "
+                f"lognormal(exp(m),exp(s)), where exp({self.factor:g}) = "
+                f"{math.exp(self.factor):.6g}",
+            )
+        super().__post_init__()
+
+    def quantile(self, share: FloatArray) -> FloatArray:
+        """Return the values that `share` (n,) of the distribution lies below."""
+        ppf = need("scipy.stats").lognorm.ppf
+        return np.asarray(ppf(share, math.log(self.factor), scale=self.median))
+
+
+def forms() -> str:
+    """Return how the distributions are written, as a list."""
+    return ", ".join(
+        f"{kind}({','.join(one.name for one in fields(family))})"
+        for kind, family in Distribution.kinds.items()
+    )
+
+
+def distributions_of(dist: Dist | Iterable[str]) -> dict[str, Distribution]:
+    """Return the distributions by key, of a mapping or of texts "KEY=normal(1e5,1e4)".
+
+    Raises
+    ------
+    InvalidParameter
+        A text that is no distribution, values that it cannot have, or a key given twice.
+    """
+    if isinstance(dist, str):
+        dist = [dist]
+    if not isinstance(dist, Iterable):
+        raise InvalidParameter("dist", dist, "must map keys to distributions")
+    found: dict[str, Distribution] = {}
+    for key, given in dist.items() if isinstance(dist, Mapping) else map(_split, dist):
+        if key in found:
+            raise InvalidParameter("dist", key, "is given twice: leave one of the two out")
+        found[key] = given if isinstance(given, Distribution) else _parse(key, given)
+    return found
+
+
+def _split(text: str) -> tuple[str, str]:
+    key, equals, given = text.partition("=")
+    if not equals or not key.strip() or not given.strip():
+        raise InvalidParameter("dist", text, f"must be KEY=DISTRIBUTION, one of {forms()}")
+    return key.strip(), given.strip()
+
+
+def _parse(key: str, text: object) -> Distribution:
+    call = _CALL.fullmatch(text) if isinstance(text, str) else None
+    if call is None:
+        raise InvalidParameter(f"dist {key}", text, f"must be one of {forms()}")
+    name, given = call[1], [one.strip() for one in call[2].split(",")]
+    family = Distribution.kinds.get(name.lower())
+    if family is None:
+        raise InvalidParameter(
+            f"dist {key}", text, f"names no distribution that is known: {forms()}"
+        )
+    names = [one.name for one in fields(family)]
+    try:
+        values = [float(one) for one in given]
+    except ValueError:
+        values = []
+    if len(values) != len(names):
+        raise InvalidParameter(
+            f"dist {key}", text, f"must have {len(names)} numbers: {name}({','.join(names)})"
+        )
+    try:
+        made = family(*values)
+    except InvalidParameter as fault:
+        raise InvalidParameter(f"dist {key}", text, f"is no distribution: {fault}") from None
+    assert isinstance(made, Distribution)
+    return made

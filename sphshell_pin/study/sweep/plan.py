@@ -1,0 +1,282 @@
+"""What a sweep will do: its runs, checked before anything is computed."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sphshell_pin.errors import InvalidParameter, ScenarioError, SphshellError
+from sphshell_pin.scenario import (
+    Built,
+    Scenario,
+    find_scenario,
+    read_scenario,
+    shipped_scenarios,
+)
+from sphshell_pin.scenario.build import build_scenario
+from sphshell_pin.scenario.figures import check_expectations
+from sphshell_pin.scenario.knobs import meaning
+from sphshell_pin.scenario.reading import look_up
+from sphshell_pin.study.sweep.curves import curves_of
+from sphshell_pin.study.sweep.distributions import Dist
+from sphshell_pin.study.sweep.grid import HOW, Axis, Value, Vary, axes_of, points_of, text_of
+from sphshell_pin.study.sweep.job import (
+    Job,
+    Run,
+    digest,
+    digest_files,
+    digest_settings,
+    files_of,
+    versions,
+)
+from sphshell_pin.study.sweep.sampling import DRAWN, Design, design_of
+from sphshell_pin.study.sweep.table import frame_of, varied_columns
+from sphshell_pin.study.sweep.worker import changed, sweep_figures, verdict_names
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sweep whose keys and values were checked."""
+
+    axes: tuple[Axis, ...]
+    points: list[tuple[Value, ...]]
+    """The values of each run, in the order of `axes`."""
+    runs: list[Run]
+    digests: list[str]
+    """Of each run's settings."""
+    figures: tuple[str, ...]
+    """Columns that a finished run fills."""
+    job: Job
+    head: Mapping[str, object]
+    """What distinguishes this sweep from another."""
+    design: Design | None = None
+    """What the runs of a sample are for."""
+
+    @property
+    def varied(self) -> pd.DataFrame:
+        """The columns of the varied keys, as a pandas.DataFrame."""
+        return frame_of(varied_columns(self.axes, self.points))
+
+
+def plan_sweep(
+    scenario: str | PathLike[str],
+    vary: Vary | Iterable[str] | None = None,
+    *,
+    changes: Mapping[str, str] | None = None,
+    together: bool = False,
+    verdicts: bool = False,
+    dist: Dist | Iterable[str] | None = None,
+    sample: str | None = None,
+    n: int | None = None,
+    seed: int = 0,
+    indices: bool = False,
+    tornado: bool = False,
+    bands: Sequence[str] = (),
+    band_steps: int | None = None,
+) -> Plan:
+    """Check all runs of a sweep, see `sweep`, and return what it will do."""
+    design = None
+    if dist is None:
+        _refuse_without_dist(
+            sample=sample,
+            n=n,
+            seed=seed,
+            indices=indices,
+            tornado=tornado,
+            bands=bands,
+            band_steps=band_steps,
+        )
+        if vary is None:
+            raise InvalidParameter(
+                "vary",
+                None,
+                f"what varies, as {HOW}; or dist what is uncertain, as key=normal(mean,deviation)",
+                "must say",
+            )
+        given = axes_of(vary)
+    else:
+        _refuse_with_dist(vary=vary, together=together)
+        design = design_of(dist, sample, n, seed=seed, indices=indices, tornado=tornado)
+        given = design.axes
+        if band_steps is not None and not bands:
+            raise InvalidParameter("band_steps", band_steps, "is for bands: say which curves")
+        if bands and sample is None:
+            raise InvalidParameter(
+                "bands", bands, "need a sample: give sample, sobol or lhs, and n"
+            )
+    path = find_scenario(scenario)
+    word = "vary" if design is None else "dist"
+    _check_keys(given, changes or {}, path, word)
+    points = points_of(given, together) if design is None else design.points
+    fixed = read_scenario(path, changes)
+    axes = tuple(replace(axis, unit=_unit(fixed, axis.key, path)) for axis in given)
+    runs = [
+        Run(
+            number=i,
+            changes={axis.key: text_of(value) for axis, value in zip(axes, point, strict=True)},
+            recorded=design is not None and bool(bands) and design.parts[i] in DRAWN,
+        )
+        for i, point in enumerate(points)
+    ]
+    if design is not None:
+        _check_medians(design, fixed, path)
+    digests, names = _check_runs(runs, fixed, path, design)
+    probe, built = _build_one(runs, fixed, path)
+    figures = sweep_figures(built)
+    if verdicts:
+        check_expectations(built)
+        figures += [f"met.{name}" for name in verdict_names(fixed)]
+    for axis in axes:
+        if axis.key in figures:
+            raise InvalidParameter(
+                word,
+                axis.key,
+                "is what a column of figures is called: give each routine a figure of its own",
+            )
+    recorded = sum(run.recorded for run in runs)
+    curves = curves_of(built, bands, band_steps, recorded)
+    shipped = path == shipped_scenarios().get(path.stem)
+    files, used = digest_files(path.parent, names), versions()
+    head: dict[str, object] = {
+        "scenario": path.stem,
+        "settings": digest_settings(fixed),
+        "vary": [[axis.key, list(axis.values)] for axis in axes],
+        "together": together,
+        "verdicts": verdicts,
+        "files": files,
+        "versions": used,
+    }
+    if design is not None:
+        head["vary"] = dict(design.description)
+    if curves is not None:
+        head["bands"] = [list(curves.names), curves.steps]
+    job = Job(
+        name=path.stem if shipped else str(path.absolute()),
+        shipped=shipped,
+        scenario=fixed,
+        sample=probe,
+        verdicts=verdicts,
+        files=files,
+        versions=used,
+        token=digest([str(path.absolute()), head]),
+        curves=curves,
+    )
+    return Plan(axes, points, runs, digests, tuple(figures), job, head, design)
+
+
+def _refuse_without_dist(**given: object) -> None:
+    for name, value in given.items():
+        if value:
+            raise InvalidParameter(name, value, "is for uncertain inputs: say them with dist")
+
+
+def _refuse_with_dist(**given: object) -> None:
+    for name, value in given.items():
+        if value:
+            raise InvalidParameter(
+                name, value, "is for values in a grid, dist for a sample: leave one of the two out"
+            )
+
+
+def _check_medians(design: Design, scenario: Scenario, path: Path) -> None:
+    """Refuse a key that no scenario has, or that takes no number, by its own sentence."""
+    medians = {key: one.quantile(np.array([0.5]))[0] for key, one in design.dists.items()}
+    changed(scenario, Run(0, {key: repr(float(one)) for key, one in medians.items()}), path)
+
+
+def _check_runs(
+    runs: list[Run], scenario: Scenario, path: Path, design: Design | None
+) -> tuple[list[str], set[str]]:
+    """Return the digests of all runs' settings, and the files that they name.
+
+    Raises
+    ------
+    ScenarioError
+        A value that no run may have.
+    InvalidParameter
+        A distribution that reaches such values.
+    """
+    digests, names = [], set[str]()
+    faults: list[ScenarioError] = []
+    for run in runs:
+        try:
+            one = changed(scenario, run, path)
+        except ScenarioError as fault:
+            if design is None:
+                raise
+            faults.append(fault)
+        else:
+            digests.append(digest_settings(one))
+            names |= files_of(one)
+    if faults:
+        advice = (
+            "take a distribution that does not reach it: lognormal(median,factor) is positive, "
+            "uniform(low,high) has two ends"
+        )
+        if _is_whole(scenario, faults[0].key, path):
+            advice = "give whole numbers by vary, a distribution has others"
+        raise InvalidParameter(
+            "dist",
+            len(faults),
+            f"points of {len(runs)} have a value that is not allowed; the first: {faults[0]}; "
+            f"{advice}",
+            f"does not fit: {len(faults)}",
+        )
+    return digests, names
+
+
+def _check_keys(axes: Iterable[Axis], changes: Mapping[str, str], path: Path, word: str) -> None:
+    """Refuse two keys for one value: which of them holds would be a matter of order."""
+    scenario = read_scenario(path)
+
+    def full_name(key: str) -> str:
+        try:
+            return look_up(scenario, key, path)[1]
+        except ScenarioError:
+            return key  # not in the file; read_scenario raises if no file may have it
+
+    more = "put all its values together" if word == "vary" else "leave one of the two out"
+    keys = [axis.key for axis in axes]
+    meant = [full_name(key) for key in keys]
+    for key, whole in zip(keys, meant, strict=True):
+        if meant.count(whole) > 1:
+            raise InvalidParameter(word, key, f"is given twice: {more}")
+        if whole in map(full_name, changes):
+            raise InvalidParameter(word, key, "is set as well: leave one of the two out")
+
+
+def _is_whole(scenario: Scenario, key: str, path: Path) -> bool:
+    try:
+        value = look_up(scenario, key, path).value
+    except ScenarioError:
+        return False
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _unit(scenario: Scenario, key: str, path: Path) -> str:
+    try:
+        return meaning(scenario, look_up(scenario, key, path)).unit
+    except ScenarioError:
+        return ""  # not in the file; read_scenario raises if no file may have it
+
+
+def _build_one(runs: list[Run], scenario: Scenario, path: Path) -> tuple[Run, Built]:
+    """Build the first run, or else the last: where neither can be, no run can be built."""
+    faults: list[SphshellError] = []
+    for run in (runs[0], runs[-1]):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                return run, build_scenario(changed(scenario, run, path), path)
+        except SphshellError as fault:
+            faults.append(fault)
+    raise faults[0]

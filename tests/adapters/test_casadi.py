@@ -1,0 +1,178 @@
+"""Scenes in CasADi: values and Jacobians against the scene's own, and a program solved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter, NameNotFound
+from tests.adapters.test_crocoddyl import arm_on_moving_plate, free_ball
+
+casadi = pytest.importorskip("casadi")
+
+from sphshell_pin.adapters.casadi import ForwardDynamics, Step  # noqa: E402
+
+CASES = {"arm": arm_on_moving_plate, "ball": free_ball}
+PARAMETERS = ("touch.law.stiffness", "touch.sphere.radius")
+
+
+def flat(matrix) -> np.ndarray:
+    """Return CasADi's matrix as a vector."""
+    return np.array(matrix).ravel()
+
+
+def columns(f, inputs: list[np.ndarray], k: int, step: float) -> np.ndarray:
+    """Return central differences of order 4 of the outputs, one behind the other, by input k."""
+
+    def at(e):
+        moved = [one + e if i == k else one for i, one in enumerate(inputs)]
+        return np.concatenate([flat(out) for out in f.call(moved)])
+
+    out = [
+        (8 * (at(e) - at(-e)) - (at(2 * e) - at(-2 * e))) / (12 * step)
+        for e in step * np.eye(len(inputs[k]))
+    ]
+    return np.transpose(out)
+
+
+def jacobian(f, inputs: list[np.ndarray], k: int) -> np.ndarray:
+    """Return CasADi's Jacobian of all outputs by input k."""
+    symbols = [casadi.MX.sym(f.name_in(i), f.size1_in(i)) for i in range(f.n_in())]
+    outputs = casadi.vertcat(*f.call(symbols))
+    return np.array(casadi.Function("j", symbols, [casadi.jacobian(outputs, symbols[k])])(*inputs))
+
+
+@pytest.mark.parametrize("parameters", [(), PARAMETERS], ids=["state", "parameters"])
+@pytest.mark.parametrize("kind", ["dynamics", "euler", "runge-kutta"])
+@pytest.mark.parametrize("case", CASES)
+def test_jacobians_are_those_of_differences(case, kind, parameters):
+    scene, x = CASES[case]()
+    nq, nv = scene.model.nq, scene.model.nv
+    # A start apart from q, so that the chart of CasADi's q is seen.
+    q0 = pin.integrate(scene.model, x[:nq], np.linspace(-0.3, 0.4, nv))
+    q = pin.difference(scene.model, q0, x[:nq])
+    if kind == "dynamics":
+        f = ForwardDynamics(scene, q0, parameters=parameters)
+    else:
+        integrator = sp.SemiImplicitEuler(1e-4) if kind == "euler" else sp.RungeKutta4(1e-4)
+        f = Step(sp.Simulation(scene, integrator), q0, parameters=parameters)
+    inputs = [q, x[nq:], np.linspace(-1.0, 1.0, nv)]
+    if parameters:
+        inputs.append(np.array([2.1e6, 0.02001]))
+    for k, _ in enumerate(inputs):
+        step = (1e-6, 1e-6, 1e-2, 1e-6)[k]
+        expected = columns(f, inputs, k, step) if k != 3 else by_parameters(f, inputs)
+        got = jacobian(f, inputs, k)
+        largest = np.abs(expected).max(axis=0)
+        assert largest.any()
+        assert (
+            np.abs(got - expected).max(axis=0) <= 2e-6 * np.maximum(largest, 1e-6 * largest.max())
+        ).all(), (kind, k)
+
+
+def by_parameters(f, inputs: list[np.ndarray]) -> np.ndarray:
+    """Return differences by p, whose numbers are of several sizes."""
+    sizes = inputs[3].copy()
+
+    class Scaled:
+        def call(self, arguments):
+            return f.call([*arguments[:3], arguments[3] * sizes])
+
+    return columns(Scaled(), [*inputs[:3], np.ones(len(sizes))], 3, 1e-6) / sizes
+
+
+def test_values_are_those_of_the_scene():
+    scene, x = free_ball()
+    nq, nv = scene.model.nq, scene.model.nv
+    q, v, tau = x[:nq], x[nq:], np.linspace(-1.0, 1.0, nv)
+    got = flat(ForwardDynamics(scene, q)(np.zeros(nv), v, tau))
+    fext = scene.external_forces(q, v)
+    np.testing.assert_allclose(
+        got, pin.aba(scene.model, scene.model.createData(), q, v, tau, fext), rtol=1e-12
+    )
+    simulation = sp.Simulation(scene, sp.RungeKutta4(1e-4))
+    q_next, v_next = (flat(one) for one in Step(simulation, q)(np.zeros(nv), v, tau))
+    run = simulation.run(q, v, 1e-4, lambda t, q, v, contacts: tau)
+    np.testing.assert_allclose(pin.integrate(scene.model, q, q_next), run.q[-1], atol=1e-14)
+    np.testing.assert_allclose(v_next, run.v[-1], rtol=1e-12, atol=1e-14)
+
+
+def test_a_nonlinear_program_finds_the_torques_that_hold_a_press():
+    """Of all postures in which an arm presses with 3 N, the one with the least torques."""
+    model = pin.Model()
+    joint = 0
+    for k in range(2):
+        at = pin.SE3(np.eye(3), np.array([0.3 if k else 0.0, 0.0, 0.0]))
+        joint = model.addJoint(joint, pin.JointModelRY(), at, f"arm{k}")
+        half = pin.SE3(np.eye(3), np.array([0.15, 0.0, 0.0]))
+        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.5, 0.03), half)
+    tip = pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0]))
+    model.addFrame(pin.Frame("tip", joint, tip, pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    law = sp.ImpactLaw(2e5, 1.5)
+    table = sp.Shell([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
+    below = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.2]))
+    scene.add_contact(sp.Sphere(0.02, "tip"), table, placement=below, law=law, name="touch")
+    depth = law.depth_at(3.0)
+    f = ForwardDynamics(scene)
+    q, tau = casadi.MX.sym("q", 2), casadi.MX.sym("tau", 2)
+    height = -0.3 * casadi.sin(q[0]) - 0.3 * casadi.sin(q[0] + q[1])
+    problem = {
+        "x": casadi.vertcat(q, tau),
+        "f": casadi.sumsqr(tau),
+        "g": casadi.vertcat(f(q, np.zeros(2), tau), height),
+    }
+    quiet = {
+        "print_time": False,
+        "ipopt": {"print_level": 0, "hessian_approximation": "limited-memory", "tol": 1e-10},
+    }
+    solver = casadi.nlpsol("press", "ipopt", problem, quiet)
+    wanted = [0.0, 0.0, -0.2 + 0.02 - depth]
+    first = np.array([0.0, 0.6, -1.0, 0.0])
+    found = flat(solver(x0=first, lbg=wanted, ubg=wanted)["x"])
+    assert solver.stats()["success"]
+    contacts = scene.contacts(found[:2])
+    assert contacts.normal_force.sum() == pytest.approx(3.0, rel=1e-6)
+    # Held by gravity and the press alone, by Pinocchio.
+    data = model.createData()
+    weight = pin.computeGeneralizedGravity(model, data, found[:2])
+    jacobian = pin.computeFrameJacobian(
+        model, data, found[:2], model.getFrameId("tip"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    )
+    np.testing.assert_allclose(found[2:], weight - 3.0 * jacobian[2], atol=1e-5)
+    # No posture nearby that holds the same height takes less.
+    least = found[2:] @ found[2:]
+    along = np.array([-jacobian[2, 1], jacobian[2, 0]])
+    for e in (-1e-2, 1e-2):
+        other = found[:2] + e * along
+        for _ in range(20):  # back to the height
+            pin.framesForwardKinematics(model, data, other)
+            off = data.oMf[model.getFrameId("tip")].translation[2] - wanted[2]
+            slope = pin.computeFrameJacobian(
+                model, data, other, model.getFrameId("tip"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            )[2]
+            other = other - off * slope / (slope @ slope)
+        torque = pin.computeGeneralizedGravity(model, data, other) - 3.0 * slope
+        assert torque @ torque > least
+
+
+def test_wrong_arguments_get_a_sentence():
+    scene, _ = free_ball()
+    with pytest.raises(NameNotFound, match=r"touch\.law\.stiffness"):
+        ForwardDynamics(scene, parameters=["touch.law.stifness"])
+    with pytest.raises(NameNotFound, match="one number"):
+        ForwardDynamics(scene, parameters=["touch.sphere.offset"])
+    with pytest.raises(InvalidParameter, match="fixed step"):
+        Step(sp.Simulation(scene, sp.Adaptive()))
+    with pytest.raises(InvalidParameter, match=r"must be a sphshell_pin\.Simulation"):
+        Step(scene)
+    scene.replace_pair("touch", friction=sp.BristleFriction(0.4, 0.3, 0.01))
+    with pytest.raises(InvalidParameter, match="bristles in the friction of touch"):
+        ForwardDynamics(scene)
+    q0 = scene.neutral
+    q0[2] = 0.02 - 2e-4
+    loose = ForwardDynamics(scene, q0, without_history=True)
+    at_rest = flat(loose(np.zeros(6), np.zeros(6), np.zeros(6)))
+    assert at_rest[2] > 0.0

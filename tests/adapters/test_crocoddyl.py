@@ -1,0 +1,441 @@
+"""Scenes in Crocoddyl: derivatives against differences, steps against Simulation, refusals."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
+
+crocoddyl = pytest.importorskip("crocoddyl")
+
+from sphshell_pin.adapters.crocoddyl import (  # noqa: E402
+    ContactDynamics,
+    ContactForceResidual,
+    ContactStep,
+    FrameResidual,
+)
+
+LAW = sp.ImpactLaw(2e6, 1.5, damping=10.0, full_damping_depth=1e-4)
+SLIDING = sp.CoulombFriction(0.4, 0.3, 0.01, 0.1)
+
+
+def plate(bend: float = 0.0) -> sp.Shell:
+    """Return a plate of 0.4 m; `bend` lifts its corners."""
+    at = np.linspace(-0.2, 0.2, 5)
+    points = [[x, y, bend * (x * x + y * y)] for y in at for x in at]
+    quads = [
+        [5 * j + i, 5 * j + i + 1, 5 * j + i + 6, 5 * j + i + 5] for j in range(4) for i in range(4)
+    ]
+    return sp.Shell(points, quads)
+
+
+def arm_on_moving_plate() -> tuple[sp.Scene, np.ndarray]:
+    """Return an arm whose tip touches a plate that slides and turns, and a state."""
+    model = pin.Model()
+    parent = 0
+    for k, axis in enumerate((pin.JointModelRZ(), pin.JointModelRY(), pin.JointModelRY())):
+        at = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.3 if k else 0.4]))
+        parent = model.addJoint(parent, axis, at, f"arm{k}")
+        model.appendBodyToJoint(parent, pin.Inertia.FromCylinder(1.0, 0.03, 0.3), at)
+    tip = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.3]))
+    model.addFrame(pin.Frame("tip", parent, tip, pin.FrameType.OP_FRAME))
+    slide = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
+    turn = model.addJoint(slide, pin.JointModelRY(), pin.SE3.Identity(), "turn")
+    model.appendBodyToJoint(turn, pin.Inertia.FromBox(2.0, 0.4, 0.4, 0.02), pin.SE3.Identity())
+    model.addFrame(pin.Frame("plate", turn, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    q = np.array([0.2, 0.9, 1.2, 0.1, 0.05])
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    tip_in_plate = data.oMi[turn].actInv(data.oMf[model.getFrameId("tip")].translation)
+    tilt = pin.rpy.rpyToMatrix(0.1, -0.2, 0.3)
+    scene = sp.Scene(model)
+    scene.add_contact(
+        sp.Sphere(0.02, "tip"),
+        plate(0.5),
+        "plate",
+        pin.SE3(tilt, tip_in_plate - tilt @ [0.02, 0.01, 0.0213]),
+        law=LAW,
+        friction=SLIDING,
+        name="touch",
+    )
+    return pressed(scene, q, [0.1, -0.2, 0.15, 0.05, 0.1])
+
+
+def free_ball() -> tuple[sp.Scene, np.ndarray]:
+    """Return a ball that rolls and slides on a plate, and a state: a free-flyer."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root_joint")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.3, 0.02), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    scene.add_contact(sp.Sphere(0.02, "ball"), plate(), law=LAW, friction=SLIDING, name="touch")
+    quaternion = pin.Quaternion(pin.rpy.rpyToMatrix(0.3, -0.5, 0.9)).coeffs()
+    q = np.concatenate(([0.03, 0.04, 0.02 - 2e-4], quaternion))
+    return pressed(scene, q, [0.2, -0.1, 0.05, 1.0, -2.0, 0.5])
+
+
+def ball_in_a_corner(joints: sp.JointIngredients | None = None) -> tuple[sp.Scene, np.ndarray]:
+    """Return a ball on slides that presses into two walls, and a state."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "slides")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.3, 0.02), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model, joints=joints)
+    upright = pin.SE3(pin.rpy.rpyToMatrix(0.0, np.pi / 2, 0.0), np.zeros(3))
+    ball = sp.Sphere(0.02, "ball")
+    scene.add_contact(ball, plate(), placement=upright, law=LAW, friction=SLIDING, name="wall")
+    scene.add_contact(ball, plate(), law=LAW, friction=SLIDING, name="touch")
+    return scene, np.array([0.02 - 3e-4, 0.03, 0.02 - 2e-4, 0.05, 0.1, -0.05])
+
+
+def pressed(scene: sp.Scene, q: np.ndarray, v: list[float]) -> tuple[sp.Scene, np.ndarray]:
+    """Return the scene and the state, where there is a force and friction."""
+    contacts = scene.contacts(q, v)
+    assert contacts.normal_force.sum() > 1.0
+    assert np.linalg.norm(contacts.friction_force_world) > 0.3
+    return scene, np.concatenate((q, v))
+
+
+def dynamics(scene: sp.Scene, actuation: str = "Full", frame: str = "tip") -> ContactDynamics:
+    """Return a model with every residual of the adapter."""
+    return ContactDynamics(scene, *parts(scene, actuation, frame))
+
+
+def parts(scene: sp.Scene, actuation: str = "Full", frame: str = "tip"):
+    """Return state, actuation, and costs with every residual of the adapter."""
+    state = crocoddyl.StateMultibody(scene.model)
+    kind = getattr(crocoddyl, f"ActuationModel{actuation}")
+    actuated = kind(state)
+    nu = actuated.nu
+    costs = crocoddyl.CostModelSum(state, nu)
+    placement = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([0.1, 0.2, 0.1]))
+    residuals = {
+        "normal": ContactForceResidual(scene, state, "touch", 3.0, nu),
+        "world": ContactForceResidual(scene, state, "touch", [1.0, 0.5, 2.0], nu),
+        "place": FrameResidual(scene, state, frame, [0.3, 0.0, 0.1], nu),
+        "placement": FrameResidual(scene, state, frame, placement, nu),
+        "state": crocoddyl.ResidualModelState(state, nu),
+    }
+    if nu:
+        residuals["control"] = crocoddyl.ResidualModelControl(state, nu)
+    for name, residual in residuals.items():
+        costs.addCost(name, crocoddyl.CostModelResidual(state, residual), 1.0)
+    return state, actuated, costs
+
+
+CASES = {
+    "arm": (arm_on_moving_plate, "Full", "tip"),
+    "corner": (ball_in_a_corner, "Full", "ball"),
+    "ball": (free_ball, "Full", "ball"),
+    "ball-without-motors": (free_ball, "FloatingBase", "ball"),
+}
+
+
+def differences(f, state, x: np.ndarray, step: float = 1e-6) -> np.ndarray:
+    """Return central differences of order 4 of f(x), in the tangent space of x."""
+    columns = []
+    for e in step * np.eye(state.ndx):
+        near = (f(state.integrate(x, e)) - f(state.integrate(x, -e))) * 8
+        far = f(state.integrate(x, 2 * e)) - f(state.integrate(x, -2 * e))
+        columns.append((near - far) / (12 * step))
+    return np.transpose(columns)
+
+
+KINDS = {
+    "dynamics": None,
+    "euler": sp.SemiImplicitEuler(1e-4),
+    "runge-kutta": sp.RungeKutta4(1e-4),
+    "implicit": sp.LinearlyImplicitEuler(1e-3),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("case", CASES)
+def test_derivatives_are_those_of_differences(case, kind):
+    make, actuation, frame = CASES[case]
+    scene, x = make()
+    if KINDS[kind] is None:
+        model = dynamics(scene, actuation, frame)
+    else:
+        simulation = sp.Simulation(scene, KINDS[kind])
+        model = ContactStep(simulation, *parts(scene, actuation, frame))
+    u = np.linspace(-1.0, 2.0, model.nu)
+    data, other = model.createData(), model.createData()
+    model.calc(data, x, u)
+    model.calcDiff(data, x, u)
+
+    def at(what, x=x, u=u):
+        model.calc(other, x, u)
+        return np.array(what(other), dtype=float)
+
+    def out(data):
+        """Return the acceleration, or the displacement to the next state."""
+        return data.xout if KINDS[kind] is None else model.state.diff(x, data.xnext)
+
+    def close(got, expected):
+        np.testing.assert_allclose(got, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+    # The displacement is from x, the derivative in the tangent space at the end.
+    end = np.eye(len(data.Fx))
+    if KINDS[kind] is not None:
+        _, end = model.state.Jdiff(x, data.xnext)
+    close(end @ data.Fx, differences(lambda x: at(out, x), model.state, x))
+    if model.nu:
+        step = 1e-2
+        by_u = [(at(out, u=u + e) - at(out, u=u - e)) / (2 * step) for e in step * np.eye(model.nu)]
+        close(end @ data.Fu, np.transpose(by_u))
+    for name in ("normal", "world", "place", "placement"):
+        residual = data.costs.costs[name].residual
+        expected = differences(
+            lambda x, name=name: at(lambda d: d.costs.costs[name].residual.r, x), model.state, x
+        )
+        close(np.reshape(residual.Rx, expected.shape), expected)
+    close(data.Lx, differences(lambda x: at(lambda d: [d.cost], x), model.state, x)[0])
+
+
+def test_forces_are_those_of_the_scene():
+    scene, x = arm_on_moving_plate()
+    model = dynamics(scene)
+    data = model.createData()
+    model.calc(data, x, np.zeros(model.nu))
+    contacts = scene.contacts(x[: scene.model.nq], x[scene.model.nq :])
+    costs = data.costs.costs
+    np.testing.assert_allclose(costs["normal"].residual.r, contacts.normal_force.sum() - 3.0)
+    wanted = contacts.force_world.sum(axis=0) - [1.0, 0.5, 2.0]
+    np.testing.assert_allclose(costs["world"].residual.r, wanted)
+    # As of a last node.
+    last = model.createData()
+    model.calc(last, x)
+    model.calcDiff(last, x)
+    np.testing.assert_array_equal(last.costs.costs["world"].residual.r, wanted)
+
+
+@pytest.mark.parametrize("joints", [None, sp.JointIngredients(damping={"slides": 7.0})])
+def test_forces_of_several_pairs_and_of_joints(joints):
+    """Each pair has its own force; the acceleration is ABA's with the scene's forces."""
+    scene, x = ball_in_a_corner(joints)
+    q, v = x[:3], x[3:]
+    state, actuation, costs = parts(scene, "Full", "ball")
+    force = ContactForceResidual(scene, state, "wall", [0.0, 0.0, 0.0])
+    costs.addCost("wall", crocoddyl.CostModelResidual(state, force), 1.0)
+    model = ContactDynamics(scene, state, actuation, costs)
+    data = model.createData()
+    tau = np.array([1.0, 2.0, 3.0])
+    model.calc(data, x, tau)
+    contacts = scene.contacts(q, v)
+    assert sorted(contacts.pair) == [0, 1]
+    for name, pair in (("wall", 0), ("touch", 1)):
+        row = contacts.force_world[contacts.pair == pair][0]
+        residual = data.costs.costs["world" if name == "touch" else name].residual
+        reference = np.array([1.0, 0.5, 2.0]) if name == "touch" else np.zeros(3)
+        np.testing.assert_allclose(residual.r, row - reference, rtol=1e-14)
+    total = tau + scene.joint_forces(q, v)
+    fext = scene.external_forces(q, v)
+    expected = pin.aba(scene.model, scene.model.createData(), q, v, total, fext)
+    np.testing.assert_allclose(data.xout, expected, rtol=1e-12)
+
+
+def test_dry_friction_of_joints_is_refused_as_bristles_are():
+    dry = sp.JointIngredients(friction={"slides": sp.JointFriction(1.0)})
+    scene, _ = ball_in_a_corner(dry)
+    with pytest.raises(InvalidParameter, match="dry friction in its joints"):
+        dynamics(scene, "Full", "ball")
+
+
+def test_where_nothing_touches_forces_and_derivatives_are_zero():
+    scene, x = free_ball()
+    x[2] += 0.1
+    model = dynamics(scene, "Full", "ball")
+    data = model.createData()
+    model.calc(data, x, np.zeros(model.nu))
+    model.calcDiff(data, x, np.zeros(model.nu))
+    residual = data.costs.costs["normal"].residual
+    assert residual.r[0] == -3.0
+    assert not residual.Rx.any()
+
+
+def test_a_reference_can_be_changed():
+    scene, x = arm_on_moving_plate()
+    model = dynamics(scene)
+    data = model.createData()
+    residual = model.costs.costs["normal"].cost.residual
+    assert isinstance(residual, ContactForceResidual)
+    residual.reference = 1.0
+    model.calc(data, x, np.zeros(model.nu))
+    contacts = scene.contacts(x[: scene.model.nq], x[scene.model.nq :])
+    assert data.costs.costs["normal"].residual.r[0] == contacts.normal_force.sum() - 1.0
+    with pytest.raises(InvalidParameter, match="reference"):
+        residual.reference = [1.0, 2.0]
+
+
+def euler(scene, dt):
+    return crocoddyl.IntegratedActionModelEuler(dynamics(scene), dt)
+
+
+def runge_kutta(scene, dt):
+    return crocoddyl.IntegratedActionModelRK(dynamics(scene), crocoddyl.RKType.four, dt)
+
+
+def implicit(scene, dt):
+    return ContactStep(sp.Simulation(scene, sp.LinearlyImplicitEuler(dt)), *parts(scene))
+
+
+@pytest.mark.parametrize(
+    ("integrator", "wrap"),
+    [
+        (sp.SemiImplicitEuler, euler),
+        (sp.RungeKutta4, runge_kutta),
+        (sp.LinearlyImplicitEuler, implicit),
+    ],
+)
+def test_its_steps_are_those_of_a_simulation(integrator, wrap):
+    scene, x = arm_on_moving_plate()
+    dt, steps, nq = 1e-4, 50, scene.model.nq
+    model = wrap(scene, dt)
+    data = model.createData()
+    torque = np.array([0.1, -2.0, -1.0, 0.3, 0.2])
+    result = sp.Simulation(scene, integrator(dt)).run(
+        x[:nq], x[nq:], steps * dt, lambda t, q, v, contacts: torque, control_dt=dt
+    )
+    for _ in range(steps):
+        model.calc(data, x, torque)
+        x = data.xnext.copy()
+    assert len(result.contacts.t) > 10
+    np.testing.assert_allclose(x, [*result.q[-1], *result.v[-1]], rtol=0, atol=1e-12)
+
+
+def test_a_solver_presses_with_a_force_within_bounds_of_its_motor():
+    """SolverBoxFDDP brings a ball on a slide to 5 N; the law says at which depth."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "slide")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.5, 0.02), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", joint, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    law = sp.ImpactLaw(2e5, 1.5, damping=30.0, full_damping_depth=1e-4)
+    scene.add_contact(sp.Sphere(0.02, "ball"), plate(), law=law, name="touch")
+    state = crocoddyl.StateMultibody(scene.model)
+    actuation = crocoddyl.ActuationModelFull(state)
+    x0, dt, steps = np.array([0.02 + 1e-4, 0.0]), 1e-3, 60
+
+    def node(last):
+        costs = crocoddyl.CostModelSum(state)
+        force = ContactForceResidual(scene, state, "touch", 5.0)
+        costs.addCost("force", crocoddyl.CostModelResidual(state, force), 1e3 if last else 1e-2)
+        place = FrameResidual(scene, state, "ball", [0.0, 0.0, 0.02 - law.depth_at(5.0)])
+        costs.addCost("place", crocoddyl.CostModelResidual(state, place), 1e6 if last else 1e2)
+        rest = crocoddyl.ActivationModelWeightedQuad(np.array([0.0, 1e3 if last else 1e-2]))
+        still = crocoddyl.ResidualModelState(state)
+        costs.addCost("rest", crocoddyl.CostModelResidual(state, rest, still), 1.0)
+        if not last:
+            control = crocoddyl.ResidualModelControl(state)
+            costs.addCost("effort", crocoddyl.CostModelResidual(state, control), 1e-6)
+        made = crocoddyl.IntegratedActionModelEuler(
+            ContactDynamics(scene, state, actuation, costs), 0.0 if last else dt
+        )
+        made.u_lb, made.u_ub = np.array([-6.0]), np.array([6.0])
+        return made
+
+    problem = crocoddyl.ShootingProblem(x0, [node(False)] * steps, node(True))
+    solver = crocoddyl.SolverBoxFDDP(problem)
+    weight = np.array([9.81 * 0.5])
+    solver.solve([x0] * (steps + 1), [weight] * steps, 100)
+    us = np.array(solver.us)
+    assert np.abs(us).max() <= 6.0 + 1e-12
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(
+        x0[:1], x0[1:], steps * dt, lambda t, q, v, c: us[min(round(t / dt), steps - 1)]
+    )
+    contacts = scene.contacts(result.q[-1], result.v[-1])
+    assert contacts.normal_force.sum() == pytest.approx(5.0, rel=0.01)
+
+
+def test_a_step_has_the_costs_of_its_start():
+    """dt times them, and without controls them, as of a last node; it then stays."""
+    scene, x = arm_on_moving_plate()
+    dt = 1e-3
+    whole, step = dynamics(scene), implicit(scene, dt)
+    u = np.linspace(-1.0, 1.0, whole.nu)
+    expected, data = whole.createData(), step.createData()
+    for controls, weight in (((u,), dt), ((), 1.0)):
+        for model, memory in ((whole, expected), (step, data)):
+            model.calc(memory, x, *controls)
+            model.calcDiff(memory, x, *controls)
+        np.testing.assert_allclose(data.cost, weight * expected.cost, rtol=1e-14)
+        for name in ("Lx", "Lxx", "Lu", "Luu") if controls else ("Lx", "Lxx"):
+            got, wanted = getattr(data, name), getattr(expected, name)
+            np.testing.assert_allclose(got, weight * np.array(wanted), rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(data.xnext, x)
+
+
+def test_a_step_needs_a_fixed_length():
+    scene, _ = free_ball()
+    with pytest.raises(InvalidParameter, match=r"RungeKutta4\(dt\)"):
+        ContactStep(sp.Simulation(scene, sp.Adaptive()), *parts(scene, "Full", "ball"))
+    with pytest.raises(InvalidParameter, match=r"must be a sphshell_pin\.Simulation"):
+        ContactStep(scene, *parts(scene, "Full", "ball"))
+
+
+def test_bristles_are_refused_unless_told_otherwise():
+    scene, x = free_ball()
+    scene.replace_pair("touch", friction=sp.BristleFriction(0.4, 0.3, 0.01))
+    with pytest.raises(InvalidParameter, match=r"bristles in the friction of touch.*Coulomb"):
+        dynamics(scene, "Full", "ball")
+    state = crocoddyl.StateMultibody(scene.model)
+    actuation = crocoddyl.ActuationModelFull(state)
+    costs = crocoddyl.CostModelSum(state)
+    model = ContactDynamics(scene, state, actuation, costs, without_history=True)
+    data = model.createData()
+    u = np.zeros(model.nu)
+    model.calc(data, x, u)
+    q, v = x[: scene.model.nq], x[scene.model.nq :]
+    fext = scene.external_forces(q, v)
+    expected = pin.aba(scene.model, scene.model.createData(), q, v, u, fext)
+    np.testing.assert_allclose(data.xout, expected, rtol=1e-9)
+
+
+def test_wrong_arguments_get_a_sentence():
+    scene, _ = free_ball()
+    other, _ = arm_on_moving_plate()
+    state = crocoddyl.StateMultibody(scene.model)
+    actuation = crocoddyl.ActuationModelFull(state)
+    costs = crocoddyl.CostModelSum(state)
+    with pytest.raises(InvalidParameter, match=r"crocoddyl.StateMultibody\(scene.model\)"):
+        ContactDynamics(other, state, actuation, costs)
+    with pytest.raises(InvalidParameter, match=r"must be a sphshell_pin\.Scene"):
+        ContactDynamics(scene.model, state, actuation, costs)
+    with pytest.raises(NameNotFound, match="touch"):
+        ContactForceResidual(scene, state, "tuch", 1.0)
+    with pytest.raises(FrameNotFound, match="ball"):
+        FrameResidual(scene, state, "bal", [0.0, 0.0, 0.0])
+    residual = crocoddyl.ResidualModelFrameTranslation(state, 1, np.zeros(3))
+    costs.addCost("place", crocoddyl.CostModelResidual(state, residual), 1.0)
+    with pytest.raises(
+        InvalidParameter, match=r"place.*ResidualModelFrameTranslation.*FrameResidual"
+    ):
+        ContactDynamics(scene, state, actuation, costs)
+
+
+def test_a_force_of_another_scene_is_refused():
+    scene, _ = free_ball()
+    other, _ = free_ball()
+    state = crocoddyl.StateMultibody(scene.model)
+    costs = crocoddyl.CostModelSum(state)
+    force = ContactForceResidual(other, state, "touch", 1.0)
+    costs.addCost("force", crocoddyl.CostModelResidual(state, force), 1.0)
+    with pytest.raises(InvalidParameter, match=r"'force'.*same scene"):
+        ContactDynamics(scene, state, crocoddyl.ActuationModelFull(state), costs)
+
+
+@pytest.mark.parametrize("package", ["crocoddyl", "casadi"])
+def test_a_missing_package_names_its_extra(package):
+    program = f"import sys; sys.modules['{package}'] = None\nimport sphshell_pin.adapters.{package}"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert f"pip install 'sphshell-pin[{package}]'" in done.stderr.splitlines()[-1]

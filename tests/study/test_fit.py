@@ -1,0 +1,396 @@
+"""Fits: closed forms of values and intervals, coverage, and what the data do not determine."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+pytest.importorskip("scipy")
+pytest.importorskip("matplotlib")
+from scipy import stats
+
+import sphshell_pin as sp
+from sphshell_pin.benchmarks.fitting import SCENARIO, TRUTH, many_sets
+from sphshell_pin.cli import app
+from sphshell_pin.errors import DataError, InvalidParameter, ScenarioError
+from sphshell_pin.scenario import build, read_scenario
+from sphshell_pin.study.fit.parameters import parse_wanted
+from sphshell_pin.study.fit.quantities import quantities_of, row_step
+from sphshell_pin.study.fit.statistics import serial_of, spread_of
+
+STIFFNESS, DISSIPATION, FRICTION = TRUTH
+HEIGHT = "q.root_joint.2"
+FORCE = "pairs.tip.normal_force"
+
+
+@pytest.fixture
+def bounce(tmp_path):
+    path = tmp_path / "bounce.toml"
+    path.write_text(SCENARIO, encoding="utf-8")
+    return path
+
+
+def columns_of(path, t, names, changes=None):
+    """Run the scenario; return quantities at the times."""
+    built = build(path, changes)
+    result = built.simulation.run(
+        built.q0, built.v0, float(t[-1]), built.controller, record_dt=row_step(t)
+    )
+    known = quantities_of(built)
+    return {f"{name} [{known[name].unit}]": known[name].at(result, t) for name in names}
+
+
+def noisy(columns, share, seed=0):
+    rng = np.random.default_rng(seed)
+    return {
+        name: values + share * np.abs(values).max() * rng.normal(size=len(values))
+        for name, values in columns.items()
+    }
+
+
+def test_a_straight_line_has_its_closed_form(bounce):
+    """z = z0 + v0 t - g t^2 / 2 is linear in g: value and interval are those of regression."""
+    t = np.linspace(0.0, 0.005, 41)
+    z = 0.017 - 0.5 * t - 0.5 * 9.81 * t**2 + 1e-4 * np.random.default_rng(3).normal(size=41)
+    found = sp.fit(bounce, {"t [s]": t, f"{HEIGHT} [m]": z}, ["gravity.2"])
+    slope, y = 0.5 * t**2, z - 0.017 + 0.5 * t
+    value = slope @ y / (slope @ slope)
+    sigma = math.sqrt(np.sum((y - value * slope) ** 2) / 40)
+    half = stats.t.ppf(0.975, 40) * sigma / math.sqrt(slope @ slope)
+    one = found["gravity.2"]
+    assert found.dof == 40
+    assert one.value == pytest.approx(value, rel=1e-6)
+    assert (one.low, one.high) == pytest.approx((value - half, value + half), rel=1e-5)
+    assert found.series[0].rms == pytest.approx(sigma * math.sqrt(40 / 41), rel=1e-6)
+
+
+def test_given_deviations_weight_the_data(bounce):
+    """Half of the rows are ten times as exact; the closed form is that of weighted regression."""
+    t = np.linspace(0.0, 0.005, 41)
+    sigma = np.where(np.arange(41) % 2, 1e-5, 1e-4)
+    z = 0.017 - 0.5 * t - 0.5 * 9.81 * t**2 + sigma * np.random.default_rng(4).normal(size=41)
+    data = {"t [s]": t, f"{HEIGHT} [m]": z, f"{HEIGHT}.sigma [mm]": 1e3 * sigma}
+    one = sp.fit(bounce, data, ["gravity.2"])["gravity.2"]
+    slope, y = 0.5 * t**2, z - 0.017 + 0.5 * t
+    information = np.sum((slope / sigma) ** 2)
+    assert one.value == pytest.approx(np.sum(slope * y / sigma**2) / information, rel=1e-6)
+    half = stats.t.ppf(0.975, 40) / math.sqrt(information)
+    assert one.high - one.value == pytest.approx(half, rel=1e-4)
+
+
+def test_exact_data_give_back_the_values(bounce):
+    t = np.linspace(0.0, 0.12, 301)
+    data = {"t [s]": t, **columns_of(bounce, t, [FORCE, "pairs.tip.force_x"])}
+    start = {STIFFNESS: 7e4, DISSIPATION: 0.4, FRICTION: 0.15}
+    told = []
+    found = sp.fit(
+        bounce, data, list(TRUTH), changes=start, progress=lambda runs, misfit: told.append(runs)
+    )
+    assert found.converged
+    assert list(found.values.values()) == pytest.approx(list(TRUTH.values()), rel=1e-4)
+    assert told == list(range(1, found.runs + 1))
+    assert not found.remarks
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    """The study of docs/fitting.md with 40 sets: bounds of the binomial at 1 in 1000."""
+    values, low, high, _ = zip(*many_sets(40, first=5000), strict=True)
+    truth = np.array(list(TRUTH.values()))
+    assert np.abs(np.array(values) / truth - 1.0).mean(axis=0).max() < 0.01
+    inside = ((np.array(low) <= truth) & (truth <= np.array(high))).sum(axis=0)
+    least = stats.binom.ppf(0.001, 40, 0.95)
+    assert (inside >= least).all(), inside
+
+
+def test_touches_out_of_step_do_not_mislead(bounce):
+    """From far off, pulses of force do not overlap; the times are then fitted one after another."""
+    t = np.linspace(0.0, 0.24, 1201)
+    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
+    found = sp.fit(bounce, data, [STIFFNESS, DISSIPATION], changes={DISSIPATION: 0.8})
+    assert found[DISSIPATION].value == pytest.approx(0.3, rel=0.02)
+    assert found[STIFFNESS].value == pytest.approx(1e5, rel=0.02)
+
+
+REST = {
+    "robot.ball.speed.root_joint": "[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]",
+    # Where the weight presses it to.
+    "robot.ball.start.root_joint.2": repr(0.012 - (0.056458 * 9.81 / 1e5) ** (2 / 3)),
+}
+
+
+@pytest.mark.parametrize("name", [FORCE, "pairs.tip.depth"])
+def test_damping_cannot_be_seen_at_rest(bounce, name):
+    t = np.linspace(0.01, 0.2, 191)
+    data = {"t [s]": t, **noisy(columns_of(bounce, t, [name], REST), 0.02)}
+    found = sp.fit(bounce, data, [STIFFNESS, DISSIPATION], changes=REST)
+    assert not found[DISSIPATION].determined
+    assert any(
+        one.startswith(f"the data do not determine {DISSIPATION}: ") for one in found.remarks
+    )
+    assert found[STIFFNESS].determined
+
+
+def test_what_no_column_feels_is_told(bounce):
+    t = np.linspace(0.0, 0.2, 101)
+    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
+    found = sp.fit(bounce, data, [STIFFNESS, FRICTION])
+    assert found[STIFFNESS].determined
+    assert not found[FRICTION].determined
+    assert found.remarks == (
+        f"the data do not determine {FRICTION}: a change of it changes nothing that was measured",
+    )
+    assert found[FRICTION].value == found[FRICTION].start
+    assert np.isnan(found.correlation[0, 1])
+
+
+def test_two_that_act_as_one_are_told_together(bounce, tmp_path):
+    """Hertz's law has both moduli in 1/E* = (1 - nu^2) (1 / E1 + 1 / E2) alone."""
+    law = '{ type = "hertz", young_1 = 1e6, poisson_1 = 0.4, young_2 = 2e6, poisson_2 = 0.4 }'
+    path = tmp_path / "two.toml"
+    path.write_text(
+        SCENARIO.replace('{ type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }', law)
+    )
+    t = np.linspace(0.0, 0.1, 101)
+    data = {"t [s]": t, **noisy(columns_of(path, t, [FORCE]), 0.01)}
+    keys = ["contact.tip.law.young_1", "contact.tip.law.young_2"]
+    found = sp.fit(path, data, keys)
+    assert not found.determined
+    assert found.remarks[0].startswith(f"the data do not determine {keys[0]} and {keys[1]} sep")
+    one, two = found.values.values()
+    assert 1 / one + 1 / two == pytest.approx(1.5e-6, rel=0.02)
+    assert sp.fit(path, data, keys[:1]).determined
+
+
+def test_a_value_at_its_bound_is_told(bounce):
+    t = np.linspace(0.0, 0.2, 401)
+    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
+    found = sp.fit(
+        bounce,
+        data,
+        {STIFFNESS: None, DISSIPATION: (0.35, 0.6)},
+        changes={
+            DISSIPATION: 0.4,
+        },
+    )
+    assert found[DISSIPATION].at_bound
+    assert found[DISSIPATION].value == 0.35
+    assert any("stands at its bound, 0.35 s/m" in one for one in found.remarks)
+
+
+def test_residuals_that_are_not_noise_are_told(bounce):
+    t = np.linspace(0.0, 0.1, 401)
+    columns = columns_of(bounce, t, [FORCE])
+    (name, force), *_ = columns.items()
+    rng = np.random.default_rng(0)
+    hum = force.max() * (0.02 * rng.normal(size=401) + 0.05 * np.sin(300.0 * t))
+    found = sp.fit(bounce, {"t [s]": t, name: force + hum}, [STIFFNESS])
+    assert any("are not noise" in one for one in found.remarks)
+    found = sp.fit(bounce, {"t [s]": t, **noisy(columns, 0.02)}, [STIFFNESS])
+    assert not found.remarks
+
+
+def test_wrong_deviations_are_told(bounce):
+    t = np.linspace(0.0, 0.1, 201)
+    columns = noisy(columns_of(bounce, t, [FORCE]), 0.02)
+    largest = float(np.max(next(iter(columns.values()))))
+    data = {"t [s]": t, **columns}
+    assert not sp.fit(bounce, data, [STIFFNESS], sigma={FORCE: 0.02 * largest}).remarks
+    (told,) = sp.fit(bounce, data, [STIFFNESS], sigma={FORCE: 0.01 * largest}).remarks
+    assert "times the standard deviations that were given" in told
+
+
+def test_experiments_of_their_own_settings_are_fitted_together(bounce):
+    """A slow and a fast impact: together they tell the exponent from the stiffness."""
+    exponent, speed = "contact.tip.law.exponent", "robot.ball.speed.root_joint"
+    t = np.linspace(0.0, 0.05, 101)
+    experiments = []
+    for k, down in enumerate((0.4, 1.0)):
+        changes = {speed: f"[0.0, 0.0, {-down}, 0.0, 0.0, 0.0]"}
+        data = noisy(columns_of(bounce, t, [FORCE], changes), 0.01, k)
+        experiments.append(sp.Experiment({"t [s]": t, **data}, changes, f"{down} m/s"))
+    start = {exponent: 1.3, STIFFNESS: 5e4}
+    found = sp.fit(bounce, experiments, [STIFFNESS, exponent], changes=start)
+    assert found[exponent].value == pytest.approx(1.5, abs=0.02)
+    assert {one.experiment for one in found.series} == {"0.4 m/s", "1.0 m/s"}
+    assert any("are correlated" in one for one in found.remarks)
+
+
+def test_keys_with_one_value(bounce):
+    both = "contact.tip.friction.mu_static+contact.tip.friction.mu_dynamic"
+    t = np.linspace(0.0, 0.1, 201)
+    same = {"contact.tip.friction.mu_static": "0.2"}
+    data = {"t [s]": t, **noisy(columns_of(bounce, t, ["pairs.tip.force_x"], same), 0.02)}
+    changes = dict.fromkeys(both.split("+"), 0.1)
+    found = sp.fit(bounce, data, [both], changes=changes)
+    assert found[both].value == pytest.approx(0.2, rel=0.02)
+    path = found.write_scenario(bounce.with_name("fitted.toml"))
+    friction = read_scenario(path).contact[0].friction
+    assert friction.mu_static == friction.mu_dynamic == pytest.approx(found[both].value)
+
+
+def test_a_sensor_is_read_as_it_logs(bounce, tmp_path):
+    """Its readings are those of the file sensors.csv; its noise is that of the data alone."""
+    text = SCENARIO.replace(
+        "[run]",
+        '[[sensor]]\ntype = "force-torque"\nname = "wrist"\nframe = "ball"\nrate = 2000.0\n'
+        "delay = 0.001\nforce_noise = 0.3\n\n[run]",
+    )
+    path = tmp_path / "sensed.toml"
+    path.write_text(text)
+    built = build(path)
+    result = built.simulation.run(built.q0, built.v0, 0.1, record_dt=1e-3)
+    data = result.sensor_columns()
+    found = sp.fit(path, data, [STIFFNESS], columns=["wrist.force_z"], changes={STIFFNESS: 8e4})
+    assert found[STIFFNESS].low < 1e5 < found[STIFFNESS].high
+    assert found.series[0].rms == pytest.approx(0.3, rel=0.2)
+    late = {"t [s]": [0.0, 0.01, 0.02], "wrist.force_z [N]": [0.0, 0.0, 0.0]}
+    with pytest.raises(DataError, match=r"no reading of 'wrist\.force_z' has arrived at 0 s"):
+        sp.fit(path, late, [STIFFNESS])
+
+
+def test_the_run_at_the_start_must_succeed(bounce):
+    deep = {"robot.ball.start.root_joint.2": "0.001"}
+    data = {"t [s]": [0.0, 0.1], f"{HEIGHT} [m]": [0.0, 0.1]}
+    with pytest.raises(sp.SphshellError, match="starts at depth") as caught:
+        sp.fit(bounce, data, [STIFFNESS], changes=deep)
+    assert caught.value.__notes__ == ["this is the run at the start values"]
+
+
+def test_what_is_seen_is_told_from_the_error_of_slopes():
+    """Whatever the units; columns that are parallel but for less than the error are one."""
+    rng = np.random.default_rng(0)
+    jacobian = rng.normal(size=(50, 3)) * [1.0, 1e6, 1e-6]
+    error = 1e-4 * jacobian * rng.normal(size=(50, 3))
+    seen = spread_of(jacobian, error)
+    assert not len(seen.blind)
+    expected = np.linalg.inv(jacobian.T @ jacobian)
+    np.testing.assert_allclose(seen.covariance, expected, rtol=1e-6)
+    jacobian[:, 2] = 1e-9 * jacobian[:, 1] * (1 + 1e-6 * rng.normal(size=50))
+    lost = spread_of(jacobian, error)
+    assert np.isfinite(lost.deviations).tolist() == [True, False, False]
+    (direction,) = lost.blind
+    np.testing.assert_allclose(direction / direction[2], [0.0, -1e-9, 1.0], rtol=1e-3, atol=1e-9)
+    # The first is determined whatever the other two do.
+    others = jacobian[:, 1:2]
+    residual = jacobian[:, 0] - others @ np.linalg.lstsq(others, jacobian[:, 0], rcond=None)[0]
+    assert lost.deviations[0] == pytest.approx(1 / np.linalg.norm(residual), rel=1e-6)
+    # A column of nothing but error takes nothing from the others.
+    jacobian[:, 1:] = 1e-3 * rng.normal(size=(50, 2))
+    error[:, 1:] = 2e-3 * rng.normal(size=(50, 2))
+    assert np.isfinite(spread_of(jacobian, error).deviations).tolist() == [True, False, False]
+
+
+def test_false_alarms_of_the_test_for_noise_are_rare():
+    rng = np.random.default_rng(0)
+    alarms = sum(not serial_of(rng.normal(size=60)).independent for _ in range(2000))
+    assert stats.binom.ppf(0.001, 2000, 0.01) <= alarms <= stats.binom.ppf(0.999, 2000, 0.01)
+    chain = np.zeros(20000)
+    for k in range(1, len(chain)):
+        chain[k] = 0.5 * chain[k - 1] + rng.normal()
+    seen = serial_of(chain)
+    assert not seen.independent
+    assert seen.correlation == pytest.approx(0.5, abs=0.02)
+    assert seen.inflation == pytest.approx(math.sqrt(3.0), rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("t", "step"),
+    [
+        ([0.0, 0.1, 0.2], 0.1),
+        ([0.1, 0.3, 0.4], 0.1),
+        ([0.1, 0.25, 0.3], 0.05),
+        ([3e-5], 3e-5),
+        ([0.0], 0.0),
+        ([0.0, 0.1, 0.1 + 1e-9 * math.pi, 0.3], 0.1 / 8),
+    ],
+)
+def test_rows_lie_at_the_times_of_the_data(t, step):
+    assert row_step(np.array(t)) == pytest.approx(step, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "said"),
+    [
+        ([], "parameters"),
+        (["contact.tip.law.stifness"], "did you mean 'stiffness'"),
+        (["run.rtol"], "no property of what was measured"),
+        (["contact.tip.law.type"], "is not a number"),
+        (["robot.ball.start.root_joint.0"], "must not start at 0"),
+        ([STIFFNESS, "contact.law.stiffness"], "given twice"),
+        ({STIFFNESS: (1.0, 2.0)}, "must start within its range"),
+        ({STIFFNESS: (2.0, 1.0)}, "must be a range"),
+        ({STIFFNESS: (-1.0, 1e9)}, "must be positive"),
+        ([f"{STIFFNESS}+{DISSIPATION}"], "must have one unit"),
+    ],
+)
+def test_a_wrong_parameter_gets_a_sentence(bounce, wanted, said):
+    data = {"t [s]": [0.0, 0.1], f"{HEIGHT} [m]": [0.0, 0.1]}
+    with pytest.raises((ScenarioError, InvalidParameter), match=said):
+        sp.fit(bounce, data, wanted)
+
+
+def test_the_command_writes_values_in_place(bounce, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    t = np.linspace(0.0, 0.1, 201)
+    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
+    rows = [",".join(data), *(",".join(map(repr, row)) for row in zip(*data.values(), strict=True))]
+    Path("drop.csv").write_text("\n".join(rows).replace("np.float64(", "").replace(")", ""))
+    fast = "robot.ball.speed.root_joint=[0.0,0.0,-1.0,0.0,0.0,0.0]"
+    changes = dict([fast.split("=")])
+    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE], changes), 0.02)}
+    np.savetxt(
+        "fast.csv",
+        np.column_stack(list(data.values())),
+        header=",".join(data),
+        delimiter=",",
+        comments="",
+    )
+    command = [
+        "fit",
+        "drop.csv",
+        str(bounce),
+        "--param",
+        STIFFNESS,
+        "--param",
+        f"{DISSIPATION}=0:1",
+    ]
+    command += ["--experiment", f"fast.csv {fast}", "--set", f"{STIFFNESS}=8e4"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    assert "2 experiments" in done.output
+    out = Path("results/bounce")
+    assert sorted(path.name for path in out.iterdir()) == [
+        "bounce.fitted.toml",
+        "fit.json",
+        "fit.png",
+    ]
+    fit = json.loads((out / "fit.json").read_text())
+    text = (out / "bounce.fitted.toml").read_text()
+    changed = [
+        (old, new)
+        for old, new in zip(SCENARIO.split("\n"), text.split("\n"), strict=True)
+        if old != new
+    ]
+    assert len(changed) == 1
+    law = read_scenario(out / "bounce.fitted.toml").contact[0].law
+    values = {one["key"]: one["value"] for one in fit["parameters"]}
+    assert law.stiffness == pytest.approx(values[STIFFNESS], rel=1e-8)
+    assert law.stiffness == pytest.approx(1e5, rel=0.02)
+
+
+def test_the_command_ends_with_1_where_the_data_do_not_determine(bounce, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("fall.csv").write_text(f"t [ms],{HEIGHT} [mm]\n0,17\n1,16.5\n2,16.0\n5,14.4\n")
+    command = ["fit", "fall.csv", str(bounce), "--param", STIFFNESS, "--no-picture"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 1, done.output
+    assert f"the data do not determine {STIFFNESS}" in done.output
+    done = CliRunner().invoke(app, [*command, "--set", f"{STIFFNESS}=-1"])
+    assert done.exit_code == 2
+    assert parse_wanted(["a=1:2", "b"]) == {"a": (1.0, 2.0), "b": None}

@@ -1,0 +1,255 @@
+"""Measured data: what is wrong with them gets one sentence, and says where."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from typer.testing import CliRunner
+
+pytest.importorskip("scipy")
+
+import sphshell_pin as sp
+from sphshell_pin.benchmarks.fitting import SCENARIO
+from sphshell_pin.cli import app
+from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound, ScenarioError
+from sphshell_pin.scenario import build, read_scenario
+from sphshell_pin.study.fit.data import read_experiment
+from sphshell_pin.study.fit.quantities import quantities_of, unit_of
+from sphshell_pin.study.fit.units import factor_to_si
+from sphshell_pin.study.fit.writing import scenario_text
+
+HEIGHT = "q.root_joint.2"
+HEAD = f"t [s],{HEIGHT} [m]\n"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    path = tmp_path_factory.mktemp("data") / "bounce.toml"
+    path.write_text(SCENARIO, encoding="utf-8")
+    return build(path)
+
+
+@pytest.fixture
+def read(built, tmp_path):
+    """Reads a csv file with this text, or columns."""
+
+    def read_data(data, **options):
+        if isinstance(data, str | bytes):
+            path = tmp_path / "data.csv"
+            path.write_bytes(data if isinstance(data, bytes) else data.encode())
+            data = path
+        return read_experiment(
+            sp.Experiment(data), 1, quantities_of(built), built.scenario.run.duration, **options
+        )
+
+    return read_data
+
+
+def test_units_empty_cells_and_comments(read):
+    found = read(
+        "\ufeff# of Monday\n"
+        f" t [ms] ,{HEIGHT} [mm],pairs.tip.normal_force [kN],pairs.tip.normal_force.sigma [N]\n"
+        "\n0,17,,\n1,16.5,0.001,2\n# pause\n2,,0.002,3\n"
+    )
+    assert found.name == "data"
+    np.testing.assert_allclose(found.t, [0.0, 1e-3, 2e-3])
+    height, force = found.columns
+    assert (height.name, force.name) == (HEIGHT, "pairs.tip.normal_force")
+    np.testing.assert_allclose(height.values, [0.017, 0.0165])
+    assert height.rows.tolist() == [0, 1]
+    assert height.sigma is None
+    np.testing.assert_allclose(force.values, [1.0, 2.0])
+    np.testing.assert_allclose(force.sigma, [2.0, 3.0])
+
+
+def test_columns_may_be_chosen(read):
+    text = f"t [s],{HEIGHT} [m],remark [1]\n0,1,7\n"
+    (column,) = read(text, only=[HEIGHT], sigma={HEIGHT: 0.5}).columns
+    assert column.sigma.tolist() == [0.5]
+    with pytest.raises(NameNotFound, match="no column 'depth'"):
+        read(text, only=["depth"])
+
+
+WRONG = {
+    "empty": ("", "is empty"),
+    "comments alone": ("# a\n\n,,\n", "is empty"),
+    "a header alone": (HEAD, "has no rows of data"),
+    "no header": ("0,1\n1,2\n", "line 1: the first line must be a header"),
+    "no time": (f"{HEIGHT} [m]\n1\n", r"has no column 't \[s\]'; its columns are: q\.root_joint"),
+    "time alone": ("t [s]\n0\n0.1\n", "has no column of data"),
+    "no unit": (f"t [s],{HEIGHT}\n0,1\n", rf"needs its unit in the header: '{HEIGHT} \[m\]'"),
+    "no unit of time": (f"t,{HEIGHT} [m]\n0,1\n", r"'t' needs its unit .*'t \[s\]'"),
+    "unit of another kind": (f"t [s],{HEIGHT} [N]\n0,1\n", r"in \[N\] must be in one of: m, "),
+    "unknown unit of time": (f"t [h],{HEIGHT} [m]\n0,1\n", "must be in one of: s, ms, us"),
+    "unknown column": ("t [s],force [N]\n0,1\n", "no quantity 'force'; the nearest are pairs.tip"),
+    "two of one name": (f"t [s],{HEIGHT} [m],{HEIGHT} [m]\n0,1,1\n", "two columns are called"),
+    "the same in two units": (f"t [s],{HEIGHT} [m],{HEIGHT} [mm]\n0,1,1\n", "two columns are"),
+    "backwards": (HEAD + "0,1\n0.2,1\n\n0.1,1\n", "line 5: time 0.1 s is before that of the row"),
+    "twice": (HEAD + "0,1\n0.2,1\n0.2,1\n", "line 4: time 0.2 s is the same as that of the row"),
+    "time nan": (HEAD + "0,1\nnan,1\n", "line 3: 'nan' in column 't .s.' is not a finite number$"),
+    "time missing": (HEAD + "0,1\n,1\n", "line 3: the time is missing"),
+    "value nan": (HEAD + "0,1\n0.1,nan\n", "line 3: 'nan' .* leave the cell empty where"),
+    "a word": (HEAD + "0,1\n0.1,high\n", "line 3: 'high' in column .* is not a finite number"),
+    "semicolons": ("t [s];x [m]\n0;1,5\n", "line 1: columns must be separated by commas"),
+    "decimal commas": (HEAD + "0,06,1\n", "line 2: has 3 values, the header has 2 columns"),
+    "a short row": (HEAD + "0,1\n0.1\n", "line 3: has 1 values"),
+    "after the run": (HEAD + "0,1\n9,1\n", "line 3: time 9 s is after the end of the run, 0.25 s"),
+    "before the run": (HEAD + "-1,1\n0,1\n", "line 2: time -1 s is before the start"),
+    "no value": (HEAD + "0,\n0.1,\n", f"column '{HEIGHT}' has no value"),
+    "sigma 0": (f"t [s],{HEIGHT} [m],{HEIGHT}.sigma [m]\n0,1,0\n", "line 2: .* must be positive"),
+    "sigma missing": (f"t [s],{HEIGHT} [m],{HEIGHT}.sigma [m]\n0,1,\n", "must be positive"),
+    "sigma of nothing": (f"t [s],{HEIGHT} [m],v.a.sigma [m]\n0,1,1\n", "has no column 'v.a' to"),
+    "not UTF-8": (HEAD.encode() + b"0,\xff\n", "is not a text file in UTF-8"),
+    "an open quote": ('"t [s],x [m]\n0,1\n', "is not a csv file"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_data_get_a_sentence(read, case):
+    text, said = WRONG[case]
+    with pytest.raises(DataError, match=said) as caught:
+        read(text)
+    assert str(caught.value).count("\n") == 0
+    assert str(caught.value).startswith(caught.value.source)
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ({"t [s]": [0.0, 1.0], f"{HEIGHT} [m]": [0.0]}, "must be of one length"),
+        ({"t [s]": [0.0, 0.0], f"{HEIGHT} [m]": [0.0, 1.0]}, "row 1: time 0 s is the same"),
+        ({"t [s]": [0.0, math.nan], f"{HEIGHT} [m]": [0.0, 1.0]}, "row 1: the time is missing"),
+        ({"t [s]": ["a"], f"{HEIGHT} [m]": [0.0]}, "columns of numbers"),
+        (7, "must be a csv file, or a mapping"),
+    ],
+)
+def test_wrong_columns_get_a_sentence(read, columns, said):
+    with pytest.raises(DataError, match=said):
+        read(columns)
+
+
+def test_no_file_gets_a_sentence(built, tmp_path):
+    with pytest.raises(DataError, match=r"missing\.csv: cannot be read: No such file"):
+        sp.fit(built.path, tmp_path / "missing.csv", ["gravity.2"])
+
+
+def test_gaps_are_told(read):
+    t = np.delete(np.arange(30) * 1e-3, [7, 8, 20])
+    (note,) = read({"t [s]": t, f"{HEIGHT} [m]": t}).notes
+    assert "2 gaps, in which about 3 rows of 0.001 s are missing" in note
+    assert "the longest is from 0.006 s to 0.009 s" in note
+    uneven = np.cumsum(np.random.default_rng(0).exponential(1e-3, 30))
+    assert not read({"t [s]": uneven, f"{HEIGHT} [m]": uneven}).notes
+
+
+def test_too_few_values_get_a_sentence(built):
+    data = {"t [s]": [0.1], f"{HEIGHT} [m]": [0.01]}
+    with pytest.raises(InvalidParameter, match="data with 1 value must be more than parameters"):
+        sp.fit(built.path, data, ["gravity.2"])
+    with pytest.raises(InvalidParameter, match="at least one csv file"):
+        sp.fit(built.path, [], ["gravity.2"])
+
+
+def test_an_experiment_cannot_set_what_is_fitted(built):
+    data = sp.Experiment({"t [s]": [0.1], f"{HEIGHT} [m]": [0.01]}, {"gravity.2": -9.0})
+    with pytest.raises(InvalidParameter, match="is fitted, so no experiment can set it"):
+        sp.fit(built.path, data, ["gravity.2"])
+
+
+def test_the_command_ends_with_2(built, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "wrong.csv").write_text(HEAD + "0,1\n0,1\n")
+    command = ["fit", "wrong.csv", str(built.path), "--param", "gravity.2"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 2
+    assert done.output.startswith("error: wrong.csv, line 3: time 0 s is the same")
+    for option, value in {
+        "--experiment": "wrong.csv speed",
+        "--sigma": "height=high",
+        "--set": "no",
+    }.items():
+        done = CliRunner().invoke(app, [*command, option, value])
+        assert done.exit_code == 2
+        assert "must be " in done.output
+    assert not (tmp_path / "results").exists()
+
+
+AXIS = np.array([0.0, 0.6, 0.8])
+JOINTS = [
+    (pin.JointModelRY(), ["rad"], ["rad/s"]),
+    (pin.JointModelRevoluteUnaligned(AXIS), ["rad"], ["rad/s"]),
+    (pin.JointModelRUBZ(), ["1"] * 2, ["rad/s"]),
+    (pin.JointModelRevoluteUnboundedUnaligned(), ["1"] * 2, ["rad/s"]),
+    (pin.JointModelPX(), ["m"], ["m/s"]),
+    (pin.JointModelPrismaticUnaligned(AXIS), ["m"], ["m/s"]),
+    (pin.JointModelTranslation(), ["m"] * 3, ["m/s"] * 3),
+    (pin.JointModelSpherical(), ["1"] * 4, ["rad/s"] * 3),
+    (pin.JointModelSphericalZYX(), ["rad"] * 3, ["rad/s"] * 3),
+    (pin.JointModelPlanar(), ["m"] * 2 + ["1"] * 2, ["m/s"] * 2 + ["rad/s"]),
+    (pin.JointModelFreeFlyer(), ["m"] * 3 + ["1"] * 4, ["m/s"] * 3 + ["rad/s"] * 3),
+]
+
+
+@pytest.mark.parametrize(("joint", "q", "v"), JOINTS, ids=lambda one: str(one)[:20].strip())
+def test_coordinates_of_joints_have_units(joint, q, v):
+    assert (len(q), len(v)) == (joint.nq, joint.nv)
+    assert [unit_of(joint.shortname(), "q", i) for i in range(joint.nq)] == q
+    assert [unit_of(joint.shortname(), "v", i) for i in range(joint.nv)] == v
+
+
+@pytest.mark.parametrize(
+    ("given", "unit", "factor"),
+    [
+        ("mm", "m", 1e-3),
+        ("deg/s", "rad/s", math.pi / 180),
+        ("rpm", "rad/s", math.pi / 30),
+        ("N mm", "N m", 1e-3),
+        ("mm/s", "m/s", 1e-3),
+        (None, "", 1.0),
+        (None, "1", 1.0),
+        ("us", "s", 1e-6),
+    ],
+)
+def test_units(given, unit, factor):
+    assert factor_to_si("x", given, unit) == pytest.approx(factor)
+
+
+def test_values_are_written_in_place_whatever_the_form(tmp_path):
+    """Inline tables, tables, dotted keys, lists, keys that are not there, names of files."""
+    folder = tmp_path / "here"
+    (folder / "parts").mkdir(parents=True)
+    (folder / "parts" / "plate.stl").write_text("")
+    source = folder / "a.toml"
+    text = SCENARIO.replace(
+        'primitive = { type = "half-space", extent = 2.0 }',
+        'file = "parts/plate.stl"  # 0.3\nunit = "mm"',
+    )
+    assert text != SCENARIO
+    text = text.replace(
+        'law = { type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }',
+        'law.type = "hunt-crossley"\nlaw.stiffness = 1e5  # 1e5\nlaw.dissipation = 0.3',
+    )
+    source.write_text(text)
+    changes = {
+        "contact.tip.law.stiffness": "2e5",
+        "contact.tip.law.dissipation": "0.0",
+        "contact.tip.friction.mu_dynamic": "0.5",  # only after mu_static
+        "contact.tip.friction.mu_static": "0.6",
+        "robot.ball.start.root_joint.2": "0.02",
+        "gravity.2": "-1.62",
+        "contact.tip.sphere.offset": "[0.0, 0.0, 0.001]",
+        "run.integrator": "implicit",
+    }
+    target = tmp_path / "there" / "b.toml"
+    target.parent.mkdir()
+    target.write_text(scenario_text(source, changes, target.parent))
+    was, now = read_scenario(source, changes), read_scenario(target)
+    assert now.shell[0].file == "../here/parts/plate.stl"
+    assert was.model_copy(update={"shell": now.shell}) == now
+    for comment in ("# 0.3", "# 1e5", "# 5 mm above the plate"):
+        assert comment in target.read_text()
+    with pytest.raises(ScenarioError, match="state the key in it first"):
+        scenario_text(source, {"shell.plate.placement.xyz": "[0.0, 0.0, 1.0]"}, target.parent)
