@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.explain import explain_pairs, relaxation_time
 from sphshell_pin.dynamics.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.variations import Variations, numbers_of
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_PARTS = ("law", "friction", "sphere", "other_sphere", "placement")
 _AXES = ("x", "y", "z")
 _TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
 # Of Parameter in C++.
@@ -134,12 +136,7 @@ def _columns_of(scene: Scene) -> dict[str, tuple[str, ...]]:
 def _core_parameter(
     scene: Scene, column: str, start: tuple[Array, Array] | None
 ) -> _core.Parameter:
-    # Names of pairs may have dots.
-    pair = max(
-        (k for k, one in enumerate(scene.pairs) if column.startswith(f"{one.name}.")),
-        key=lambda k: len(scene.pairs[k].name),
-    )
-    what = column.removeprefix(f"{scene.pairs[pair].name}.").split(".")
+    pair, what = _place_of(scene, column)
     if what[0] == "placement":
         return _core.Parameter(pair, _PLACEMENT, _TWIST.index(what[1]))
     if what[1] == "offset":
@@ -147,7 +144,7 @@ def _core_parameter(
         # The ball's center is the origin of what stands for the shell's frame.
         return _core.Parameter(pair, _OFFSET if what[0] == "sphere" else _PLACEMENT, axis)
     kind = _FIELD
-    if what[1] == "radius":
+    if what[0] in ("sphere", "other_sphere"):
         kind = _RADIUS if what[0] == "sphere" else _BALL
     value = getattr(getattr(scene.pairs[pair], what[0]), what[1])
 
@@ -169,6 +166,16 @@ def _core_parameter(
         else:
             less, more = changed(value - 2 * step), here
     return _core.Parameter(pair, kind, 0, less, more, step)
+
+
+def _place_of(scene: Scene, column: str) -> tuple[int, list[str]]:
+    """Return the number of a column's pair, whose name may have dots, and the words behind it."""
+    found: dict[int, list[str]] = {}
+    for k, pair in enumerate(scene.pairs):
+        words = column.removeprefix(f"{pair.name}.").split(".")
+        if column.startswith(f"{pair.name}.") and words[0] in _PARTS:
+            found[k] = words
+    return min(found.items(), key=lambda one: len(one[1]))
 
 
 def _core_pair(
@@ -197,12 +204,16 @@ class Place:
 def dynamics_derivatives(at: Place) -> DynamicsDerivatives:
     """See Scene.dynamics_derivatives."""
     parts = at.core.dynamics_derivatives(at.q, at.v, at.tau, at.parameters)
+    for part in parts:
+        read_only(part)
     return DynamicsDerivatives(*parts, parameters=at.columns)
 
 
 def step_derivatives(integrator: str, dt: float, at: Place) -> StepDerivatives:
     """See Simulation.step_derivatives; `integrator` is its name."""
     parts = at.core.step_derivatives(integrator, dt, at.q, at.v, at.tau, at.parameters)
+    for part in parts:
+        read_only(part)
     return StepDerivatives(*parts, parameters=at.columns)
 
 
@@ -211,7 +222,8 @@ def contact_force_derivatives(at: Place) -> ContactForceDerivatives:
     rows, force, normal, depth = at.core.contact_force_derivatives(at.q, at.v, at.parameters)
     contacts = SceneContacts.from_rows(rows)
     nv, p = len(at.v), len(at.columns)
-    force = force.reshape(len(contacts.depth), 3, -1)
+    force = read_only(force.reshape(len(contacts.depth), 3, -1))
+    normal, depth = read_only(normal), read_only(depth)
     # What there is between v and the parameters are bristles.
     first = force.shape[-1] - p
     return ContactForceDerivatives(

@@ -134,7 +134,7 @@ class Asked:
             raise InvalidParameter(
                 "sensitivities", names, "must be names, as ('PAIR.law.stiffness', 'v0')"
             )
-        self._scene = scene
+        self._scene, self._names = scene, tuple(names)
         self.by_q0, self.by_v0 = (one in names for one in _START)
         for one in _START:
             if names.count(one) > 1:
@@ -153,9 +153,12 @@ class Asked:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of all columns."""
-        numbers = range(self._scene.model.nv)
-        starts = [f"{name}.{k}" for name in _START if getattr(self, f"by_{name}") for k in numbers]
-        return (*self._columns, *starts)
+        return tuple(column for name in self._names for column in self._columns_of(name))
+
+    def _columns_of(self, name: str) -> tuple[str, ...]:
+        if name in _START:
+            return tuple(f"{name}.{k}" for k in range(self._scene.model.nv))
+        return parameter_columns(self._scene, [name])
 
     def begin(self, core: _core.Simulation) -> None:
         """Let a compiled run, which has not begun, follow its derivatives."""
@@ -166,13 +169,17 @@ class Asked:
     def rows(self, core: _core.Simulation) -> Sensitivities:
         """Return what the run has recorded."""
         record = core.take_sensitivities()
-        nv, p = self._scene.model.nv, len(self.columns)
+        nv, columns = self._scene.model.nv, self.columns
+        # The core has the parameters first, then the start.
+        starts = [one for name in _START if name in self._names for one in self._columns_of(name)]
+        recorded = [*self._columns, *starts]
+        order = [recorded.index(column) for column in columns]
 
         def rows(name: str, *shape: int) -> Array:
-            return read_only(record[name].reshape(-1, *shape, p))
+            return read_only(record[name].reshape(-1, *shape, len(columns))[..., order])
 
         return Sensitivities(
-            self.columns,
+            columns,
             q=rows("q", nv),
             v=rows("v", nv),
             force_world=rows("force_world", 3),

@@ -11,11 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.testing.finding import Finding, Optional, worst
 from sphshell_pin.testing.forces import accelerations, joint_jacobian, joint_names
+from sphshell_pin.testing.numbers import changed, is_place, names_of, scale_of
 
 Array = NDArray[np.float64]
 
 # Central differences of order 4: places, in steps, and weights.
 _PLACES = ((-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0))
+
+# Of a number at its bound, from its one side.
+_AHEAD = ((0.0, -25.0 / 12.0), (1.0, 4.0), (2.0, -3.0), (3.0, 4.0 / 3.0), (4.0, -0.25))
 
 # What rounding leaves of a force or an acceleration, relative to the largest, and how much larger
 # than that, over the step, a derivative must be to be seen with 1e-7.
@@ -26,20 +30,18 @@ _STEPS, _AGREED = (1e-3, 1e-4, 1e-5), 1e-7
 
 _Function = Callable[[Array, Array], Array]
 _Pair = tuple[Array, Array]
-_Compared = tuple[str, _Function, _Pair]
 
 
 def derivatives(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = None) -> Finding:
-    """Compare the derivatives of contact forces and accelerations by q and by v to differences.
+    """Compare derivatives of contact forces and accelerations to differences.
 
-    `scene.contact_derivatives` and the Jacobian of the accelerations on which `Implicit` runs,
-    against central differences of order 4 of J^T f and of ABA with `scene.external_forces`. Steps
-    are 1e-3 of the least depth [m or rad] and of the largest joint speed; where that does not agree
-    1e-4 and 1e-5 too, and the best counts: a kink nearby or rounding spoils one of them, a wrong
-    derivative none. The error of a column is relative to the column's largest entry, or to a
-    hundredth of the matrix's; columns that rounding hides from differences count less.
-
-    Accelerations are left out where a contact has bristles, which the scene's state does not hold.
+    `scene.contact_derivatives` by q and v, and `scene.dynamics_derivatives` by q, v, tau and all
+    numbers of the contacts, against central differences of order 4 of J^T f and of ABA with
+    `scene.external_forces`. Steps are 1e-3 of the least depth [m or rad], of the largest joint
+    speed, of a number's value; where that does not agree 1e-4 and 1e-5 too, and the best counts: a
+    kink nearby or rounding spoils one of them, a wrong derivative none. The error of a column is
+    relative to the column's largest entry, or to a hundredth of the matrix's; columns that rounding
+    hides from differences count less.
     """
     q, v = scene.check_state(q, v)
     model, data = scene.model, scene.model.createData()
@@ -56,23 +58,86 @@ def derivatives(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = 
             total += jacobian.T @ forces[joint].vector
         return total
 
-    def acceleration(q: Array, v: Array) -> Array:
-        return accelerations(model, data, q, v, tau, scene.external_forces(q, v))
+    def acceleration(q: Array, v: Array, tau: Array = tau, scene: Scene = scene) -> Array:
+        torques = tau + scene.joint_forces(q, v)
+        return accelerations(model, data, q, v, torques, scene.external_forces(q, v))
 
-    compared: list[_Compared] = [("contact forces", force, scene.contact_derivatives(q, v))]
-    if not any(pair.friction and pair.friction.has_state for pair in scene.pairs):
-        whole = scene.core.rate_jacobian(q, v, np.zeros(0), tau)
-        both = whole[:, : model.nv], whole[:, model.nv : 2 * model.nv]
-        compared.append(("accelerations", acceleration, both))
-    return worst([_at_best(scene, q, v, *one) for one in compared], "nothing was compared")
+    numbers = names_of(scene)
+    got = scene.dynamics_derivatives(q, v, tau, parameters=numbers)
+    findings = [
+        _at_best(scene, q, v, "contact forces", force, scene.contact_derivatives(q, v)),
+        _at_best(scene, q, v, "accelerations", acceleration, (got.by_q, got.by_v)),
+    ]
+    # By torques they are linear: one step will do.
+    pushes = np.eye(model.nv)
+    by_tau = [acceleration(q, v, tau + 0.5 * e) - acceleration(q, v, tau - 0.5 * e) for e in pushes]
+    rounding = _ROUNDING * float(np.abs(got.acceleration).max(initial=0.0))
+    names = joint_names(model)
+    findings.append(
+        _compare("accelerations by tau", got.by_tau, np.transpose(by_tau), rounding, names)
+    )
+    deep = _depth(scene, q, v)
+    sizes = np.abs(got.by_parameters).max(axis=0, initial=0.0)
+    for column, one in zip(got.parameters, got.by_parameters.T, strict=True):
+        scale, ahead = scale_of(scene, column, deep)
+        # Along the surface a place may not matter, and rounding is that of the others.
+        alike = [is_place(name) for name in got.parameters] if is_place(column) else [False]
+        floor = 1e-2 * float(sizes[np.flatnonzero(alike)].max(initial=0.0))
+
+        def moved(x: float, column: str = column) -> Array:
+            return acceleration(q, v, scene=changed(scene, column, x))
+
+        findings.append(_number_at_best(column, one, moved, scale, rounding, floor, ahead=ahead))
+    return worst(findings, "nothing was compared")
+
+
+def differentiated(f: Callable[[float], Array], step: float, *, ahead: bool = False) -> Array:
+    """Return the derivative of f at 0 by differences, with `ahead` from values at and above 0."""
+    return np.asarray(sum(w * f(p * step) for p, w in (_AHEAD if ahead else _PLACES)) / step)
+
+
+def _depth(scene: Scene, q: Array, v: Array) -> float:
+    return float(scene.contacts(q, v).depth.min(initial=1e-2))
+
+
+def _number_at_best(
+    column: str,
+    got: Array,
+    f: Callable[[float], Array],
+    scale: float,
+    rounding: float,
+    floor: float,
+    *,
+    ahead: bool,
+) -> Finding:
+    """Compare the derivative `got` of `f` by one number with the step that agrees best.
+
+    What is smaller than `floor`, or than what differences can see, counts as that large.
+    """
+    best: Finding | None = None
+    for step in (share * scale for share in _STEPS):
+        expected = differentiated(f, step, ahead=ahead)
+        size = max(float(np.abs(expected).max(initial=0.0)), floor, _SEEN * rounding / step)
+        off = np.abs(got - expected)
+        k = int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
+        where = (
+            f"the accelerations by '{column}': entry {k} is {got[k]:.9g}, by differences "
+            f"{expected[k]:.9g}"
+        )
+        finding = Finding(float(off[k]) / size if size > 0.0 else float(off[k]), where)
+        if best is None or finding.error < best.error:
+            best = finding
+        if best.error <= _AGREED:
+            break
+    assert best is not None
+    return best
 
 
 def _at_best(scene: Scene, q: Array, v: Array, what: str, f: _Function, got: _Pair) -> Finding:
     """Compare derivatives `got` of `f` by q and v with the step that agrees best."""
     model = scene.model
     names = joint_names(model)
-    depths = scene.contacts(q, v).depth
-    deep = float(depths.min()) if len(depths) else 1e-2
+    deep = _depth(scene, q, v)
     fast = max(float(np.abs(v).max(initial=0.0)), 1e-2)
     rounding = _ROUNDING * float(np.abs(f(q, v)).max(initial=0.0))
     best: Finding | None = None

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.dynamics import Adaptive, Result, Scene, SemiImplicitEuler, Simulation
@@ -82,8 +83,10 @@ CHECKS: dict[str, Check] = {
     ),
     "derivatives": Check(
         "derivatives",
-        "analytic derivatives of contact forces and accelerations by q and v against central "
-        "differences on the tangent space; relative to the largest entry of the column",
+        "analytic derivatives of contact forces by q and v, and of accelerations by q, v, torques "
+        "and every number of law, friction, sphere and placement, against central differences on "
+        'the tangent space, methods "smooth" and "facets", touching and not; relative to the '
+        "largest entry of the column",
         1e-6,
     ),
     "contacts": Check(
@@ -136,7 +139,9 @@ def run_checks(
         "reaction": lambda: [reaction(t.scene, t.q, t.v) for t, _ in touches[1::2]],
         "momentum": lambda: runs(_momentum),
         "energy": lambda: runs(_energies),
-        "derivatives": lambda: [derivatives(t.scene, t.q, t.v, tau) for t, tau in touches],
+        "derivatives": lambda: [
+            derivatives(scene, t.q, t.v, tau) for t, tau in touches for scene in _variants(t.scene)
+        ],
         "contacts": lambda: _contacts(setting, rng, sizes.poses),
         "fast": lambda: runs(_fast),
     }
@@ -150,6 +155,16 @@ def run_checks(
                 raise
             found[key] = Finding(math.inf, str(error))
     return found
+
+
+def _variants(scene: Scene) -> list[Scene]:
+    """Return a scene that touches, the same with method "facets", and out of touch."""
+    (pair,) = scene.pairs
+    flat = replace(pair, method="facets")
+    # The patch goes behind itself.
+    away = pin.SE3(np.eye(3), np.array([0.0, 0.0, -10.0 * pair.least_radius]))
+    far = replace(pair, placement=pair.placement * away)
+    return [scene, scene.with_pairs((flat,)), scene.with_pairs((far,))]
 
 
 def _momentum(setting: Setting, rng: np.random.Generator) -> list[Finding]:

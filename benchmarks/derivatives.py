@@ -1,0 +1,100 @@
+"""The cost of derivatives of the dynamics against Pinocchio's: python -m benchmarks.derivatives.
+
+The Panda's fingertip touches 200 k triangles, with damping and friction. Both sides are times of
+compiled code: of Scene.dynamics_derivatives by repeating it inside the core, of
+pin.computeABADerivatives by taking the Python call off, which is timed with a model of one joint.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+import sphshell_pin as sp
+from sphshell_pin.benchmarks.step import panda, start_of, with_sheet
+from sphshell_pin.benchmarks.surfaces import wavy_sheet
+from sphshell_pin.benchmarks.timing import machine, median_us, one_core, ratio, take_turns
+from sphshell_pin.testing.numbers import names_of
+
+Array = NDArray[np.float64]
+CALLS, ROUNDS = 2000, 50
+
+
+def timed(call: Callable[[], object], calls: int = CALLS) -> Callable[[], float]:
+    """Return what measures the seconds of one call."""
+
+    def run() -> float:
+        begin = time.perf_counter()
+        for _ in range(calls):
+            call()
+        return (time.perf_counter() - begin) / calls
+
+    return run
+
+
+def pinocchios(model: pin.Model, q: Array, v: Array) -> Callable[[], float]:
+    """Seconds of pin.computeABADerivatives, Python's call included."""
+    data, tau = model.createData(), np.zeros(model.nv)
+    return timed(lambda: pin.computeABADerivatives(model, data, q, v, tau))
+
+
+def one_joint() -> pin.Model:
+    """Return the model whose derivatives cost little but the call."""
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "one")
+    return model
+
+
+def compiled(scene: sp.Scene, q: Array, v: Array, names: Sequence[str] = ()) -> Callable[[], float]:
+    """Seconds of Scene.dynamics_derivatives without its Python."""
+    at = scene.place(q, v, None, names, None)
+
+    def run() -> float:
+        begin = time.perf_counter()
+        at.core.dynamics_derivatives(at.q, at.v, at.tau, at.parameters, CALLS)
+        return (time.perf_counter() - begin) / CALLS
+
+    return run
+
+
+def main() -> None:
+    """Print the ratios."""
+    one_core()
+    print(machine())
+    free, touching = panda(), with_sheet(panda(), sp.Shell(*wavy_sheet(316, 1.0)), 5e-4)
+    model, q = free.model, start_of(free)
+    v = 0.1 * np.ones(model.nv)
+    if len(touching.contacts(q, v)) != 1:
+        raise SystemExit("the fingertip does not touch")
+    names = names_of(touching)
+    columns = len(touching.dynamics_derivatives(q, v, parameters=names).parameters)
+    call, whole = "a call", "computeABADerivatives with its call"
+    lone = one_joint()
+    own = {
+        "dynamics_derivatives, no contact": compiled(free, q, v),
+        "dynamics_derivatives, touching": compiled(touching, q, v),
+        f"the same by {columns} parameters": compiled(touching, q, v, names),
+        "touching, with Python": timed(lambda: touching.dynamics_derivatives(q, v)),
+        f"by {columns} parameters, with Python": timed(
+            lambda: touching.dynamics_derivatives(q, v, parameters=names), CALLS // 100
+        ),
+    }
+    contestants = {
+        call: pinocchios(lone, np.zeros(1), np.zeros(1)),
+        whole: pinocchios(model, q, v),
+        **own,
+    }
+    times = take_turns(contestants, ROUNDS)
+    aba = times[whole] - times[call]
+    print("Derivatives of the Panda's dynamics, fingertip on 199712 triangles, C++ unless said")
+    print(f"  {'pin.computeABADerivatives':40s} {median_us(aba)}")
+    for name in own:
+        print(f"  {name:40s} {median_us(times[name])}   {ratio(times[name], aba)} x")
+
+
+if __name__ == "__main__":
+    main()

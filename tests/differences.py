@@ -1,0 +1,92 @@
+"""Derivatives by their definition: differences of an own loop, written without the analytic ones.
+
+Central differences of order 4. A step h leaves the truncation h^4 f''''' / 30 and the rounding
+eps |f| / h; steps of 1e-3, 1e-4 and 1e-5 of the length or value on which a function changes are
+tried, and the best counts: a kink nearby or rounding spoils one of them, a wrong derivative none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+import sphshell_pin as sp
+from sphshell_pin.testing.differences import _AHEAD as AHEAD
+from sphshell_pin.testing.differences import _PLACES as PLACES
+from sphshell_pin.testing.differences import differentiated as derivative
+from sphshell_pin.testing.forces import accelerations
+from sphshell_pin.testing.numbers import changed, columns_of, is_place, names_of, scale_of
+
+__all__ = ["AHEAD", "PLACES", "changed", "columns_of", "is_place", "names_of", "scale_of"]
+
+Array = NDArray[np.float64]
+Function = Callable[[float], Array]
+
+SHARES = (1e-3, 1e-4, 1e-5)
+ROUNDING = 8.0 * float(np.finfo(float).eps)
+
+
+def off(
+    got: Array,
+    f: Function,
+    scale: float,
+    *,
+    floor: float = 0.0,
+    tolerance: float = 1e-6,
+    known: float | None = None,
+    shares: Sequence[float] = SHARES,
+    ahead: bool = False,
+) -> float:
+    """Return by how much `got` is not the derivative of f at 0, relative to its largest entry.
+
+    f changes on the length `scale`; what is smaller than `floor`, or than what differences resolve
+    with a tenth of `tolerance` where f is `known` to so much, counts as that large.
+    """
+    if known is None:
+        known = ROUNDING * float(np.abs(f(0.0)).max(initial=0.0))
+    best = np.inf
+    for share in shares:
+        step = share * scale
+        expected = derivative(f, step, ahead=ahead)
+        assert got.shape == expected.shape
+        size = max(np.abs(expected).max(), floor, 10.0 / tolerance * known / step)
+        error = np.abs(got - expected).max()
+        best = min(best, error / size if size > 0.0 else (0.0 if error == 0.0 else np.inf))
+        if best <= 0.1 * tolerance:
+            break
+    return best
+
+
+def by_number(
+    got: Array,
+    f: Callable[[sp.Scene], Array],
+    scene: sp.Scene,
+    column: str,
+    depth: float,
+    tolerance: float = 1e-6,
+    floor: float = 0.0,
+) -> float:
+    """Return by how much `got` is not the derivative of f(scene) by one of the scene's numbers."""
+    scale, ahead = scale_of(scene, column, depth)
+    return off(got, lambda x: f(changed(scene, column, x)), scale, ahead=ahead, tolerance=tolerance)
+
+
+def acceleration(
+    scene: sp.Scene,
+    q: Array,
+    v: Array,
+    tau: Array,
+    state: sp.SceneState | None = None,
+) -> Array:
+    """ABA with `Scene.external_forces`; of mimic joints, which ABA has not, M^-1 (tau - rnea)."""
+    model = scene.model
+    torques = tau + scene.joint_forces(q, v, state=state)
+    forces = scene.external_forces(q, v, state=state)
+    return accelerations(model, model.createData(), q, v, torques, forces)
+
+
+def depth_of(scene: sp.Scene, q: Array, v: Array) -> float:
+    """Return the least depth of all contacts, 1 cm where there is none [m]."""
+    return float(scene.contacts(q, v).depth.min(initial=1e-2))

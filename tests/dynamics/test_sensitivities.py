@@ -1,0 +1,318 @@
+"""Sensitivities of runs, through touches, against differences of whole runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+import sphshell_pin as sp
+from sphshell_pin.errors import InvalidParameter, NameNotFound
+from tests import differences, meshes, models
+from tests.dynamics.test_contact_derivatives import FRICTIONS
+from tests.sensitivities import (
+    BRISTLE,
+    COULOMB,
+    HUNT,
+    IMPACT,
+    INTEGRATORS,
+    PAIR,
+    Case,
+    R,
+    drop,
+    every_integrator,
+    thrown,
+)
+
+Array = NDArray[np.float64]
+
+NUMBERS = [f"{PAIR}.law.stiffness", f"{PAIR}.sphere.radius", f"{PAIR}.placement", "q0", "v0"]
+
+
+@every_integrator
+@pytest.mark.parametrize("law", [IMPACT, HUNT], ids=["impact", "hunt-crossley"])
+def test_a_bounce(law: sp.NormalLaw, integrator: str) -> None:
+    drop(law, INTEGRATORS[integrator], duration=0.05).check(NUMBERS, bounces=1)
+
+
+LAWS = {
+    "linear": sp.ImpactLaw(4e4, 1.0, 20.0, 1e-3),
+    "exponent 2.2": sp.ImpactLaw(1e8, 2.2, 50.0, 1e-3),
+    "hertz": sp.HertzLaw(2e7, 0.3, restitution=0.7, speed=0.5),
+    "hertz, loss tangent": sp.HertzLaw(2e7, 0.3, loss_tangent=0.2, frequency=50.0),
+    "foundation": sp.FoundationLaw(1e7, 0.05, 0.2),
+    "table": sp.TableLaw(
+        1e-2 * np.linspace(0, 1, 200) ** 2, 2e6 * (1e-2 * np.linspace(0, 1, 200) ** 2) ** 1.5
+    ),
+}
+
+
+# Where damping comes on the acceleration has a kink within a step.
+KINKED = ("linear", "exponent 2.2")
+# At the touch its damping grows as depth^(1/2), with no slope there.
+STEEP = pytest.param("hertz, loss tangent", marks=pytest.mark.xfail(reason="steps are too long"))
+
+
+@pytest.mark.parametrize("law", [STEEP if "tangent" in law else law for law in LAWS])
+def test_a_bounce_by_all_numbers_of_a_law(law: str) -> None:
+    case = drop(LAWS[law], duration=0.05)
+    names = [name for name in differences.names_of(case.scene) if ".law." in name]
+    tolerance = 5e-5 if law in KINKED else 1e-5
+    case.check([*names, f"{PAIR}.sphere.radius", "v0"], bounces=1, tolerance=tolerance)
+
+
+@every_integrator
+def test_an_oblique_bounce_with_coulomb_friction(integrator: str) -> None:
+    case = thrown(IMPACT, COULOMB, INTEGRATORS[integrator])
+    names = ["ball.law.stiffness", "ball.friction.mu_static", "ball.friction.v_static", "v0"]
+    case.check(names, bounces=1, tolerance=3e-5)
+
+
+@pytest.mark.slow
+@every_integrator
+def test_an_oblique_bounce_by_everything(integrator: str) -> None:
+    case = thrown(HUNT, COULOMB, INTEGRATORS[integrator])
+    case.check([*differences.names_of(case.scene), "q0", "v0"], bounces=1)
+
+
+# Of a stretch that begins at the touch.
+@every_integrator
+def test_an_oblique_bounce_with_bristles(integrator: str) -> None:
+    case = thrown(IMPACT, BRISTLE, INTEGRATORS[integrator])
+    names = ["ball.law.stiffness", "ball.friction.mu_static", "ball.friction.stiffness", "v0"]
+    # Explicit steps as long as the error allows are long for a spring that begins within one.
+    tolerance = 1e-3 if integrator == "adaptive" else 3e-5
+    case.check(names, bounces=1, tolerance=tolerance, error=100.0)
+
+
+@pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
+def test_an_oblique_bounce_with_other_bristles(friction: str) -> None:
+    law = sp.HertzLaw(2e7, 0.3, restitution=0.7, speed=0.5)
+    case = thrown(law, FRICTIONS[friction])
+    names = ["ball.law.young", "ball.friction.mu_static", "v0"]
+    # Of friction that only sticks the coefficient does not matter, and errors of runs are all.
+    case.check(names, bounces=1, tolerance=1e-3, error=100.0)
+
+
+# Slopes where the contact just begins.
+BEGINNING = pytest.param("smooth", marks=pytest.mark.xfail(reason="the slope at a touch is steep"))
+
+
+@pytest.mark.parametrize("method", [BEGINNING, "facets"])
+def test_a_bounce_off_a_curved_shell(method: str) -> None:
+    vertices, triangles = meshes.dome(8, 1.0)
+    below = np.array([0.0, 0.0, -2.0])
+    normals = (vertices - below) / np.linalg.norm(vertices - below, axis=1, keepdims=True)
+    shell = sp.Shell(vertices, triangles, normals=normals)
+    law = sp.HertzLaw(2e7, 0.3, restitution=0.7, speed=0.5)
+    # Adaptive's steps end where the fitted curvature is not smooth.
+    case = thrown(law, COULOMB, sp.Implicit(1e-8), shell=shell, method=method)
+    case.check(["ball.law.young", "ball.placement", "ball.sphere.offset", "v0"], bounces=1)
+
+
+@pytest.mark.parametrize("integrator", ["adaptive", "implicit", "runge-kutta"])
+def test_several_bounces(integrator: str) -> None:
+    """Each stretches what the one before has left: by v0 it grows."""
+    case = drop(HUNT, INTEGRATORS[integrator], duration=0.5, gap=0.005, speed=0.3)
+    result = case.check([f"{PAIR}.law.stiffness", f"{PAIR}.law.dissipation", "v0"])
+    assert len(result.events) >= 8
+
+
+@every_integrator
+def test_sliding(integrator: str) -> None:
+    """A block that is braked by friction, in touch throughout."""
+    model = models.empty()
+    models.add_body(model, "ball", pin.JointModelTranslation())
+    scene = models.on_plate(model, IMPACT, COULOMB)
+    depth = IMPACT.depth_at(9.81)
+    case = Case(scene, [0.0, 0.0, R - depth], [0.4, 0.1, 0.0], 0.04, INTEGRATORS[integrator])
+    case.check([f"{PAIR}.friction.mu_static", f"{PAIR}.friction.mu_dynamic", "v0"], depth=depth)
+
+
+def test_two_spheres_that_collide() -> None:
+    """And the sum of their momenta does not depend on the law."""
+    model = models.empty(0.0)
+    for name in ("one", "two"):
+        models.add_body(model, name, pin.JointModelFreeFlyer())
+    scene = sp.Scene(model)
+    scene.add_contact(
+        sp.Sphere(0.05, "one"), sp.Sphere(0.08, "two"), law=HUNT, friction=COULOMB, name="balls"
+    )
+    q0 = np.r_[models.free_q([0.0, 0.0, 0.14]), models.free_q([0.03, 0.0, 0.0])]
+    v0 = np.r_[0.1, 0.2, -0.6, 1, 2, 3.0, np.zeros(6)]
+    case = Case(scene, q0, v0, 0.04)
+    names = ["balls.law.stiffness", "balls.other_sphere.radius", "balls.friction.mu_dynamic"]
+    result = case.check(names, bounces=1)
+    got = result.sensitivities
+    assert got is not None
+    first, second = (pin.XYZQUATToSE3(result.q[-1, k : k + 7]).rotation for k in (0, 7))
+    assert np.abs(got.v[-1, :3]).max() > 1e-7
+    # In the world: turning the bodies changes what their own axes show.
+    turns = [np.cross(got.q[-1, 3:6, 0], result.v[-1, :3])]
+    turns.append(np.cross(got.q[-1, 9:12, 0], result.v[-1, 6:9]))
+    one = first @ (got.v[-1, :3, 0] + turns[0])
+    two = second @ (got.v[-1, 6:9, 0] + turns[1])
+    assert np.abs(one + two).max() <= 1e-6 * np.abs(one).max()
+
+
+def sampled(t: float, q: Array, v: Array, contacts: object) -> Array:
+    """A controller without a memory, whose torques follow the state."""
+    return -30.0 * (q - 0.06) - 2.0 * v + 10.0
+
+
+@every_integrator
+@pytest.mark.parametrize("control_dt", [None, 2e-3])
+def test_a_controller_of_the_package(control_dt: float | None, integrator: str) -> None:
+    scene = sp.Scene(models.arm())
+    plate = models.plate()
+    scene.add_contact(sp.Sphere(R, "ball"), plate, law=HUNT, friction=COULOMB, name="tip")
+    data = scene.model.createData()
+    q0 = models.ARM_Q.copy()
+    pin.framesForwardKinematics(scene.model, data, q0)
+    height = data.oMf[scene.model.getFrameId("ball")].translation[2]
+    place = replace(
+        scene.pairs[0], placement=pin.SE3(np.eye(3), np.array([0, 0, height - R - 1e-3]))
+    )
+    scene = scene.with_pairs((place,))
+    control = sp.JointPD(80.0, 4.0, q_ref=q0 + [0.0, 0.1, 0.05])
+    case = Case(
+        scene,
+        q0,
+        np.zeros(3),
+        0.06,
+        INTEGRATORS[integrator],
+        controller=control,
+        control_dt=control_dt,
+    )
+    names = ["tip.law.stiffness", "tip.friction.mu_static", "tip.placement", "q0"]
+    result = case.check(names, tolerance=3e-5)
+    assert len(result.contacts.t) >= 3
+
+
+@pytest.mark.parametrize("integrator", ["adaptive", "runge-kutta"])
+def test_a_controller_of_the_users_own(integrator: str) -> None:
+    case = drop(HUNT, INTEGRATORS[integrator], duration=0.05)
+    case.options |= {"controller": sampled, "control_dt": 1e-3}
+    case.check([f"{PAIR}.law.stiffness", "v0"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(1e-4), sp.Adaptive(1e-9)], ids=str)
+def test_the_panda_on_the_blade(integrator: object) -> None:
+    """The scenario's impedance controller, 50 ms from before the touch."""
+    pytest.importorskip("example_robot_data")
+    from sphshell_pin.scenario import build
+
+    built = build("fingertip_on_blade")
+    pair = built.scene.pairs[0].name
+    case = Case(
+        built.scene,
+        built.q0,
+        built.v0,
+        0.05,
+        integrator,
+        controller=built.controller,
+        control_dt=1e-3,
+        record_dt=0.01,
+    )
+    names = ["law.stiffness", "law.damping", "friction.mu_static", "sphere.radius", "placement"]
+    result = case.check([f"{pair}.{name}" for name in names] + ["v0"], depth=1e-4)
+    assert len(result.contacts.t)
+
+
+def test_a_joint_that_meets_its_stop() -> None:
+    model = models.empty(0.0)
+    models.add_body(model, "ball", pin.JointModelPZ())
+    stop = sp.JointLimits(-0.1, 0.1, sp.HuntCrossleyLaw(2e5, 1.5, 0.3))
+    scene = sp.Scene(model, joints=sp.JointIngredients(limits={"ball_joint": stop}))
+    case = Case(scene, [0.0], [2.0], 0.15)
+    result = case.check(["q0", "v0"])
+    assert "stop" in [event.kind for event in result.events]
+
+
+def impulse(result: sp.Result) -> float:
+    """Of the rows, at equal times: the force's integral over the row's spacing."""
+    return float(result.contacts.force_world[:, 2].sum())
+
+
+FIGURES: dict[str, Callable[[sp.Result], float]] = {
+    "height": lambda result: float(result.q[-1, 0]),
+    "speed": lambda result: float(result.v[-1, 0] ** 2),
+    "deepest": lambda result: float(result.contacts.depth.max()),
+    "impulse": impulse,
+    "mean force": lambda result: float(np.linalg.norm(result.contacts.force_world, axis=1).mean()),
+    "nothing": lambda result: 3.0,
+}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_of_a_figure(name: str) -> None:
+    figure = FIGURES[name]
+    case = drop(IMPACT, duration=0.05, record_dt=5e-4)
+    names = [f"{PAIR}.law.stiffness", f"{PAIR}.law.damping", "v0"]
+    result = case.run(names=names)
+    assert result.sensitivities is not None
+    got = result.sensitivities.of(figure)
+    assert got.shape == (3,)
+    start = figure(result)
+    for k, column in enumerate(case.columns(names)):
+        f = lambda x, c=column: np.array([figure(case.moved(c, x)) - start])  # noqa: E731
+        scale = case.scale(column, 1e-3)[0]
+        error = differences.off(
+            got[k : k + 1], f, scale, tolerance=1e-5, known=1e-12 * max(abs(start), 1e-3)
+        )
+        assert error <= 1e-5
+
+
+def test_without_asking_there_are_none() -> None:
+    case = drop(IMPACT, duration=0.03)
+    assert case.run().sensitivities is None
+
+
+def test_the_run_has_the_same_bits() -> None:
+    for integrator in INTEGRATORS.values():
+        case = drop(IMPACT, integrator, duration=0.03)
+        one, other = case.run(), case.run(names=["v0", f"{PAIR}.law.stiffness"])
+        for name in ("t", "q", "v"):
+            assert getattr(one, name).tobytes() == getattr(other, name).tobytes(), integrator
+        again = case.run(names=["v0", f"{PAIR}.law.stiffness"])
+        assert other.sensitivities is not None
+        assert again.sensitivities is not None
+        assert other.sensitivities.q.tobytes() == again.sensitivities.q.tobytes()
+
+
+def test_a_column_does_not_depend_on_the_others() -> None:
+    case = thrown(IMPACT, BRISTLE, duration=0.04)
+    alone = case.run(names=["ball.law.stiffness"]).sensitivities
+    among = case.run(names=["v0", "ball.law.stiffness", "ball.placement"]).sensitivities
+    assert alone is not None
+    assert among is not None
+    at = list(among.parameters).index("ball.law.stiffness")
+    for name in ("q", "v", "depth", "force_world"):
+        one, other = getattr(alone, name)[..., 0], getattr(among, name)[..., at]
+        np.testing.assert_allclose(other, one, rtol=0, atol=1e-5 * np.abs(one).max())
+
+
+@pytest.mark.parametrize(
+    "name", ["ball-plate.law.stifness", "ball.law.stiffness", "v", "t0", "q0.0"]
+)
+def test_an_unknown_name_lists_the_valid_ones(name: str) -> None:
+    with pytest.raises(NameNotFound, match=r"ball-plate\.law\.stiffness") as caught:
+        drop(IMPACT).run(names=[name])
+    assert name in str(caught.value)
+
+
+def test_bad_input() -> None:
+    case = drop(IMPACT)
+    with pytest.raises(InvalidParameter, match="v0"):
+        case.run(names=["v0", f"{PAIR}.law.stiffness", "v0"])
+    with pytest.raises(InvalidParameter, match="sensitivities"):
+        case.run(names=3)  # type: ignore[arg-type]
+    with pytest.raises(NameNotFound, match=r"friction\.mu_static"):
+        case.run(names=[f"{PAIR}.friction.mu_static"])
+    with pytest.raises(NameNotFound, match=r"law\.dissipation"):
+        case.run(names=[f"{PAIR}.law.dissipation"])

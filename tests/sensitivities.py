@@ -1,0 +1,217 @@
+"""Runs whose sensitivities are compared with differences of whole runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+import sphshell_pin as sp
+from tests import differences, models
+
+Array = NDArray[np.float64]
+
+R = 0.05
+ADAPTIVE, IMPLICIT = sp.Adaptive(1e-10), sp.Implicit(1e-9)
+INTEGRATORS = {
+    "adaptive": ADAPTIVE,
+    "implicit": IMPLICIT,
+    "runge-kutta": sp.RungeKutta4(2e-5),
+    "semi-implicit": sp.SemiImplicitEuler(2e-5),
+    "linearly implicit": sp.LinearlyImplicitEuler(2e-5),
+}
+every_integrator = pytest.mark.parametrize("integrator", INTEGRATORS)
+LINEAR = sp.ImpactLaw(4e4, 1.0)
+IMPACT = sp.ImpactLaw(2e6, 1.5, 50.0, 1e-3)
+HUNT = sp.HuntCrossleyLaw(2e6, 1.5, 0.3)
+COULOMB = sp.CoulombFriction(0.3, 0.2, 0.02, 0.2)
+BRISTLE = sp.BristleFriction(0.4, 0.3, 2e4, 20.0, 0.05)
+
+
+PAIR = "ball-plate"
+
+
+class Case:
+    """A scene, where it starts, and how it is run; its sensitivities and those by differences."""
+
+    def __init__(
+        self,
+        scene: sp.Scene,
+        q0: Sequence[float] | Array,
+        v0: Sequence[float] | Array,
+        duration: float,
+        integrator: object = ADAPTIVE,
+        *,
+        record_dt: float | None = None,
+        controller: object = None,
+        control_dt: float | None = None,
+    ) -> None:
+        self.scene, self.duration, self.integrator = scene, duration, integrator
+        self.q0, self.v0 = np.array(q0, dtype=float), np.array(v0, dtype=float)
+        self.options = {
+            "record_dt": duration / 8 if record_dt is None else record_dt,
+            "controller": controller,
+            "control_dt": control_dt,
+        }
+
+    def run(
+        self,
+        scene: sp.Scene | None = None,
+        q0: Array | None = None,
+        v0: Array | None = None,
+        names: Sequence[str] | None = None,
+    ) -> sp.Result:
+        asked = {} if names is None else {"sensitivities": names}
+        return sp.Simulation(scene or self.scene, self.integrator).run(  # type: ignore[arg-type]
+            self.q0 if q0 is None else q0,
+            self.v0 if v0 is None else v0,
+            self.duration,
+            **self.options,
+            **asked,  # type: ignore[arg-type]
+        )
+
+    def columns(self, names: Sequence[str]) -> list[str]:
+        """The names of the columns."""
+        nv, out = self.scene.model.nv, []
+        for name in names:
+            own = name in ("q0", "v0")
+            out += [f"{name}.{k}" for k in range(nv)] if own else differences.columns_of(name)
+        return out
+
+    def moved(self, column: str, x: float) -> sp.Result:
+        """The run with one number changed by x."""
+        part, _, k = column.partition(".")
+        if part == "q0":
+            step = x * np.eye(self.scene.model.nv)[int(k)]
+            return self.run(q0=pin.integrate(self.scene.model, self.q0, step))
+        if part == "v0":
+            return self.run(v0=self.v0 + x * np.eye(self.scene.model.nv)[int(k)])
+        return self.run(differences.changed(self.scene, column, x))
+
+    def scale(self, column: str, depth: float) -> tuple[float, bool]:
+        """What a number is changed by is a small part of this; and whether it is at its bound."""
+        part = column.partition(".")[0]
+        if part == "v0":
+            return max(float(np.abs(self.v0).max()), 0.1), False
+        return (depth, False) if part == "q0" else differences.scale_of(self.scene, column, depth)
+
+    def check(
+        self,
+        names: Sequence[str],
+        *,
+        tolerance: float = 1e-5,
+        depth: float = 1e-3,
+        error: float = 1.0,
+        bounces: int | None = None,
+    ) -> sp.Result:
+        """Compare motion, forces and depths of all rows, each relative to its largest entry.
+
+        Runs of an integrator that controls its error are known to `error` times its tolerance.
+        """
+        result, model = self.run(names=names), self.scene.model
+        plain, got = self.run(), result.sensitivities
+        assert plain.sensitivities is None
+        assert got is not None, "no sensitivities"
+        columns = self.columns(names)
+        count, rows, logged = len(columns), len(result.t), len(result.contacts.t)
+        assert list(got.parameters) == columns
+        assert got.q.shape == got.v.shape == (rows, model.nv, count)
+        assert got.force_world.shape == (logged, 3, count)
+        assert got.depth.shape == (logged, count)
+        # The run itself is the same.
+        np.testing.assert_array_equal(plain.t, result.t)
+        for one, other in ((plain.q, result.q), (plain.v, result.v)):
+            np.testing.assert_allclose(other, one, rtol=0, atol=1e-9 * np.abs(one).max())
+        if bounces is not None:
+            kinds = [event.kind for event in result.events]
+            assert kinds.count("lift_off") == bounces, kinds
+
+        def parts(column: str, x: float) -> list[Array] | None:
+            run = self.moved(column, x)
+            moves = [pin.difference(model, *two) for two in zip(plain.q, run.q, strict=True)]
+            log = run.contacts
+            if log.row.tolist() != plain.contacts.row.tolist():
+                return None  # Another row touches.
+            return [
+                np.array(moves),
+                run.v - plain.v,
+                log.force_world - plain.contacts.force_world,
+                log.depth - plain.contacts.depth,
+            ]
+
+        errors = {}
+        # What hardly matters is measured by what is alike: spins by velocities.
+        kinds = [name.rstrip("0123456789xyz") for name in columns]
+        sizes = [plain.q, plain.v, plain.contacts.force_world, plain.contacts.depth]
+        # How well a run is known: no difference of runs shows more.
+        known = max(1e-13, error * float(getattr(self.integrator, "rtol", 0.0)))
+        resolved = [known * max(float(np.abs(one).max(initial=0.0)), 1e-3) for one in sizes]
+        for k, column in enumerate(columns):
+            found = [got.q[..., k], got.v[..., k], got.force_world[..., k], got.depth[..., k]]
+            best = np.full(4, np.inf)
+            alike = [j for j, kind in enumerate(kinds) if kind == kinds[k]]
+            floors = [
+                1e-2 * float(np.abs(one[..., alike]).max(initial=0.0))
+                for one in (got.q, got.v, got.force_world, got.depth)
+            ]
+            # A touch within a step of fixed length leaves kinks, one a step.
+            fixed = hasattr(self.integrator, "dt")
+            shares = (1e-5, 1e-4, 1e-6) if fixed else (1e-3, 1e-2, 1e-4, 3e-5)
+            scale, ahead = self.scale(column, depth)
+            places = differences.AHEAD if ahead else differences.PLACES
+            for step in (share * scale for share in shares):
+                moved = [(weight, parts(column, place * step)) for place, weight in places]
+                for part in range(4):
+                    if any(one is None for _, one in moved):
+                        continue
+                    expected = sum(weight * one[part] for weight, one in moved if one) / step
+                    wrong = np.abs(found[part] - expected).max(initial=0.0)
+                    size = np.abs(expected).max(initial=0.0)
+                    unseen = resolved[part] / (tolerance * max(shares) * scale)
+                    size = max(size, floors[part], unseen)
+                    best[part] = min(best[part], wrong / size)
+                if best.max() <= 0.3 * tolerance:
+                    break
+            for part, least in zip(("q", "v", "force", "depth"), best, strict=True):
+                errors[f"{part} by {column}"] = float(least)
+        over = {name: f"{least:.1e}" for name, least in errors.items() if not least <= tolerance}
+        assert not over, over
+        return result
+
+
+def drop(
+    law: sp.NormalLaw,
+    integrator: object = ADAPTIVE,
+    *,
+    gap: float = 0.01,
+    speed: float = 0.5,
+    duration: float = 0.1,
+    gravity: float = 9.81,
+    **more: object,
+) -> Case:
+    """A mass that falls on a plate, `gap` below it."""
+    scene = models.on_plate(models.slider(gravity), law)
+    return Case(scene, [R + gap], [-speed], duration, integrator, **more)  # type: ignore[arg-type]
+
+
+def thrown(
+    law: sp.NormalLaw,
+    friction: sp.CoulombFriction | sp.BristleFriction | sp.MindlinFriction | None,
+    integrator: object = ADAPTIVE,
+    *,
+    shell: sp.Shell | None = None,
+    method: str = "smooth",
+    duration: float = 0.06,
+    gap: float = 0.01,
+) -> Case:
+    """A free, spinning ball that meets a plate at an angle."""
+    scene = sp.Scene(models.ball())
+    plate = models.plate(4.0) if shell is None else shell
+    scene.add_contact(
+        sp.Sphere(R, "ball"), plate, law=law, friction=friction, method=method, name="ball"
+    )
+    q0 = models.free_q([0.02, -0.03, R + gap])
+    return Case(scene, q0, [0.3, 0.15, -0.5, 2.0, -3.0, 1.0], duration, integrator)
