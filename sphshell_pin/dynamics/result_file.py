@@ -194,7 +194,7 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
     sensitivities = None
     if "sensitivities.q" in arrays:
         rows = {name.removeprefix("sensitivities."): arrays[name] for name in SENSITIVITY_ARRAYS}
-        sensitivities = Sensitivities(tuple(header.sensitivities), **rows)
+        sensitivities = Sensitivities(tuple(header.sensitivities), **rows, result=None)
     origin = None
     if header.origin is not None:
         origin = Origin(header.origin.found_from(Path(path).parent), header.origin.settings)
