@@ -222,7 +222,7 @@ class Result:
         return self.patch_rows
 
     def save(self, path: str | PathLike[str], *, home: str | PathLike[str] | None = None) -> Path:
-        """Write all but scene and sensitivities to a compressed .npz file, whole or not at all.
+        """Write everything but the scene to a compressed .npz file, whole or not at all.
 
         The path of a scenario is written relative to the folder `home`, where the results will stay
         (default: that of `path`).
