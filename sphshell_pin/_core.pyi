@@ -159,6 +159,7 @@ class Parameter:
         less: Pair | None = None,
         more: Pair | None = None,
         step: float = 0.0,
+        scale: float = 1.0,
     ) -> None: ...
 
 class _Evaluations:

@@ -165,7 +165,7 @@ def _core_parameter(
             less, more = here, changed(value + 2 * step)
         else:
             less, more = changed(value - 2 * step), here
-    return _core.Parameter(pair, kind, 0, less, more, step)
+    return _core.Parameter(pair, kind, 0, less, more, step, abs(value) or 1.0)
 
 
 def _place_of(scene: Scene, column: str) -> tuple[int, list[str]]:

@@ -97,9 +97,11 @@ def assert_derivatives(
 ) -> float:
     """Assert that the analytic derivatives of forces and accelerations are those of differences.
 
-    Central differences of order 4 on the tangent space of q (nq,), and by v (nv,), with steps of
-    1e-3 to 1e-5 of the least depth. The error of a column is relative to its largest entry, or to a
-    hundredth of the matrix's. Not where a contact just comes, goes or changes its feature, or its
+    `scene.contact_derivatives`, and `scene.dynamics_derivatives` by q, v, tau and every number of
+    the contacts' laws, friction, spheres and placements. Central differences of order 4 on the
+    tangent space of q (nq,), by v (nv,), tau (nv,) and the numbers, with steps of 1e-3 to 1e-5 of
+    the least depth. The error of a column is relative to its largest entry, or to a hundredth of
+    the matrix's. Not where a contact just comes, goes or changes its feature, or its
     law or friction the branch: there is a kink.
     """
     return derivatives(scene, q, v, tau).require("the derivatives are wrong", tolerance)

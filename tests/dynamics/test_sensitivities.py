@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from tests import differences, meshes, models
 from tests.dynamics.test_contact_derivatives import FRICTIONS
 from tests.sensitivities import (
@@ -316,3 +317,22 @@ def test_bad_input() -> None:
         case.run(names=[f"{PAIR}.friction.mu_static"])
     with pytest.raises(NameNotFound, match=r"law\.dissipation"):
         case.run(names=[f"{PAIR}.law.dissipation"])
+
+
+def test_a_controller_that_reads_sensors_is_refused() -> None:
+    case = drop(IMPACT, controller=lambda t, q, v, contacts, sensors: 0.0 * q, control_dt=1e-3)
+    with pytest.raises(InvalidParameter, match="controller"):
+        case.run(names=["v0"])
+
+
+def test_a_figure_of_what_has_no_derivative_is_refused() -> None:
+    got = drop(IMPACT, duration=0.03).run(names=["v0"]).sensitivities
+    assert got is not None
+    with pytest.raises(ResultError, match="energy"):
+        got.of(lambda result: float(result.energy.kinetic[-1]))
+
+
+def test_they_are_pickled() -> None:
+    result = drop(IMPACT, duration=0.03).run(names=["v0"])
+    again = pickle.loads(pickle.dumps(result))
+    assert again.sensitivities.q.tobytes() == result.sensitivities.q.tobytes()

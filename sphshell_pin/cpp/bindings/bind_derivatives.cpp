@@ -127,17 +127,18 @@ void bind_derivatives(nanobind::module_& m, nanobind::class_<sphshell::Evaluatio
       .def(
           "__init__",
           [](Parameter* self, int pair, int kind, int axis, const Pair* less, const Pair* more,
-             double step) {
+             double step, double scale) {
             new (self) Parameter{pair,
                                  static_cast<Parameter::Kind>(kind),
                                  axis,
                                  less ? *less : Pair(),
                                  more ? *more : Pair(),
-                                 step};
+                                 step,
+                                 scale};
           },
           nb::arg("pair"), nb::arg("kind"), nb::arg("axis") = 0,
           nb::arg("less").none() = nb::none(), nb::arg("more").none() = nb::none(),
-          nb::arg("step") = 0.0);
+          nb::arg("step") = 0.0, nb::arg("scale") = 1.0);
   bind(scene);
   bind(state);
 }

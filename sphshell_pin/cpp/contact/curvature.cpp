@@ -128,6 +128,7 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
         turn.dot(motion.normal.col(i));
   // The rise comes on with the depth, so that a touch begins where it is found.
   const double rise = local[6];
+  depth = std::max(depth, 0.0);  // where a difference reaches beyond it
   const double share = rise == 0 ? 0 : std::exp(-depth / std::abs(rise));
   out.depth = depth + rise * (1 - share);
   out.tilt =

@@ -20,6 +20,7 @@ struct Parameter {
   // law's own formulas is differenced, what follows through the motion of the contact is not.
   Pair less = {}, more = {};
   double step = 0;
+  double scale = 1;  // size of the number
 
   // The pair changed by a step of this sign, and that step: `move` where the parameter moves
   // something [m or rad].

@@ -16,6 +16,11 @@ constexpr double kTorqueDifference = 1e-7;
 // are after so many halvings.
 constexpr double kAgreed = 1e-6;
 constexpr int kMostHalvings = 16;
+// Smaller changes of positions [m or rad] and velocities, of stretches [m], count as these, where a
+// parameter changes by all of itself.
+constexpr double kLeast = 1e-6, kLeastStretch = 1e-9;
+// A step ends just behind its event, where the slopes may jump: those before it count.
+constexpr double kLastNode = 1 - 1e-5;
 
 }  // namespace
 
@@ -173,6 +178,9 @@ void StepSlopes::along(Chart& chart, const Stepper& stepper, double h, double sh
   const Eigen::Index nv = chart.nv(), nz = chart.nz();
   MatrixX changes(2 * nv + nz, origin_->q.cols());
   changes << origin_->q, origin_->v, origin_->z;
+  const std::vector<Parameter>& parameters = linearization_.parameters();
+  scales_.setOnes(changes.cols());
+  for (std::size_t c = 0; c < parameters.size(); ++c) scales_[c] = parameters[c].scale;
   follow(path, 0, share, 0, changes);
   out.q = changes.topRows(nv);
   out.v = changes.middleRows(nv, nv);
@@ -193,13 +201,14 @@ void StepSlopes::follow(const Path& path, double from, double to, int depth, Mat
   radau(path, from, middle, twice);
   radau(path, middle, to, twice);
   const Eigen::Index nv = path.chart.nv(), nz = path.chart.nz();
-  const auto off = [&](Eigen::Index first, Eigen::Index count) {
+  const MatrixX error = (once - twice) * scales_.asDiagonal(), all = twice * scales_.asDiagonal();
+  const auto off = [&](Eigen::Index first, Eigen::Index count, double least) {
     if (count == 0) return 0.0;
-    const double size = twice.middleRows(first, count).cwiseAbs().maxCoeff();
-    const double error = (once - twice).middleRows(first, count).cwiseAbs().maxCoeff();
-    return size > 0 ? error / size : 0.0;
+    const double size = all.middleRows(first, count).cwiseAbs().maxCoeff();
+    return error.middleRows(first, count).cwiseAbs().maxCoeff() / std::max(size, least);
   };
-  if (std::max({off(0, nv), off(nv, nv), off(2 * nv, nz)}) > kAgreed) {
+  if (std::max({off(0, nv, kLeast), off(nv, nv, kLeast), off(2 * nv, nz, kLeastStretch)}) >
+      kAgreed) {
     follow(path, from, middle, depth + 1, changes);
     follow(path, middle, to, depth + 1, changes);
   } else {
@@ -224,11 +233,9 @@ bool StepSlopes::radau(const Path& path, double from, double to, MatrixX& change
   std::fill_n(lives.begin(), 2 * nv, 1);
   bool touching = false;
   for (int i = 0; i < kStages; ++i) {
-    const double at = from + (to - from) * kNode[i], t = chart.origin().t + at * path.h;
-    if (at < 1)
-      path.stepper.interpolate(at, y_);
-    else
-      y_ = path.stepper.end();
+    const double at = std::min(from + (to - from) * kNode[i], kLastNode),
+                 t = chart.origin().t + at * path.h;
+    path.stepper.interpolate(at, y_);
     chart.finish(t, y_, state_);
     scene_.evaluate(state_.q, state_.v, state_.z);
     touching = touching || scene_.touching() || scene_.joints().act();

@@ -72,6 +72,7 @@ class StepSlopes {
   const MatrixX* torque_ = nullptr;
   State state_;
   VectorX tau_, q_, v_, z_, u_, y_;
+  VectorX scales_;  // of the columns
   MatrixX jacobian_, torque_slopes_, torque_by_parameters_, q_by_, v_by_, rates_;
   bool follows_ = false;  // torques do, and torque_slopes_ says how
 };

@@ -1,0 +1,164 @@
+"""Arguments and results of the derivatives of the dynamics."""
+
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from sphshell_pin.errors import InvalidParameter, NameNotFound
+from tests import differences
+from tests.dynamics.test_contact_derivatives import (
+    FRICTIONS,
+)
+from tests.dynamics.test_dynamics_derivatives import BRISTLE, COULOMB, LAWS, in_bowl
+from tests.dynamics.test_two_spheres import in_touch, two_spheres
+
+Array = NDArray[np.float64]
+
+
+def test_without_torques_they_are_zero() -> None:
+    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
+    one, other = scene.dynamics_derivatives(q, v), scene.dynamics_derivatives(q, v, np.zeros(3))
+    for name in ("acceleration", "by_q", "by_v", "by_tau", "by_parameters"):
+        assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
+
+
+def test_repeated_calls_give_the_same_bits_and_leave_the_scene_as_it_was() -> None:
+    scene, q, v = in_bowl(LAWS["hertz, two materials"], FRICTIONS["mindlin"])
+    names = differences.names_of(scene)
+    forces = np.array([f.vector for f in scene.external_forces(q, v)])
+    one = scene.dynamics_derivatives(q, v, parameters=names)
+    scene.dynamics_derivatives(q, -v, np.ones(3), parameters=names[::-1])
+    other = scene.dynamics_derivatives(q, v, parameters=names)
+    assert one.by_parameters.tobytes() == other.by_parameters.tobytes()
+    assert one.by_q.tobytes() == other.by_q.tobytes()
+    again = np.array([f.vector for f in scene.external_forces(q, v)])
+    assert again.tobytes() == forces.tobytes()
+    with pytest.raises(FrozenInstanceError):
+        one.by_q = one.by_v  # type: ignore[misc]
+    with pytest.raises(ValueError, match="read-only"):
+        one.by_q[0, 0] = 1.0
+
+
+def test_the_order_of_the_columns_is_that_of_the_names() -> None:
+    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
+    names = differences.names_of(scene)
+    one = scene.dynamics_derivatives(q, v, parameters=names)
+    other = scene.dynamics_derivatives(q, v, parameters=names[::-1])
+    columns = dict(zip(one.parameters, one.by_parameters.T, strict=True))
+    for name, column in zip(other.parameters, other.by_parameters.T, strict=True):
+        np.testing.assert_allclose(column, columns[name], rtol=1e-12)
+    assert set(other.parameters) == set(columns)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["tip.law.stifness"], "tip.law.stiffness"),
+        (["top.law.stiffness"], "tip.law.stiffness"),
+        (["tip.law"], "tip.law.stiffness"),
+        (["tip.friction"], "tip.friction.mu_static"),
+        (["tip.law.young"], "tip.law.stiffness"),
+        (["tip.other_sphere.radius"], "tip.sphere.radius"),
+        (["q0"], "tip.law.stiffness"),
+        (["tip.sphere.offset.w"], "tip.sphere.offset"),
+    ],
+)
+def test_an_unknown_name_lists_the_valid_ones(names: list[str], said: str) -> None:
+    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
+    with pytest.raises(NameNotFound, match=said) as caught:
+        scene.dynamics_derivatives(q, v, parameters=names)
+    assert names[0] in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("law", "friction", "name"),
+    [
+        ("table", "coulomb", "tip.law.stiffness"),
+        ("hertz", "coulomb", "tip.law.restitution"),
+        ("hertz", "none", "tip.friction.mu_static"),
+        ("hertz", "soft finger", "tip.friction.torsional"),
+        ("hertz", "rings", "tip.friction.rings"),
+    ],
+)
+def test_a_name_that_has_no_number_there(law: str, friction: str, name: str) -> None:
+    scene, q, v = in_bowl(LAWS[law], FRICTIONS[friction])
+    with pytest.raises(NameNotFound, match=name):
+        scene.dynamics_derivatives(q, v, parameters=[name])
+
+
+def test_placement_of_two_spheres_is_no_parameter() -> None:
+    scene = two_spheres(LAWS["impact"])
+    with pytest.raises(NameNotFound, match=r"balls\.placement"):
+        scene.dynamics_derivatives(*in_touch(3), parameters=["balls.placement"])
+
+
+@pytest.mark.parametrize(
+    ("names", "named"),
+    [
+        (["tip.law.stiffness", "tip.sphere.radius", "tip.law.stiffness"], "tip.law.stiffness"),
+        (["tip.placement", "tip.placement.vx"], "tip.placement.vx"),
+    ],
+)
+def test_a_name_given_twice_is_refused(names: list[str], named: str) -> None:
+    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
+    with pytest.raises(InvalidParameter, match="twice") as caught:
+        scene.dynamics_derivatives(q, v, parameters=names)
+    assert named in str(caught.value)
+
+
+def test_one_column_of_several() -> None:
+    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
+    whole = scene.dynamics_derivatives(q, v, parameters=["tip.placement", "tip.sphere.offset"])
+    some = ["tip.sphere.offset.z", "tip.placement.wy"]
+    got = scene.dynamics_derivatives(q, v, parameters=some)
+    assert list(got.parameters) == some
+    for name, column in zip(some, got.by_parameters.T, strict=True):
+        expected = whole.by_parameters[:, whole.parameters.index(name)]
+        np.testing.assert_allclose(column, expected, rtol=1e-12)
+
+
+def test_pairs_whose_names_begin_alike() -> None:
+    """Names of pairs may have dots."""
+    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
+    pair = scene.pairs[0]
+    names = ("tip", "tip.law")
+    twins = tuple(replace(pair, name=name) for name in names)
+    scene = scene.with_pairs(twins)
+    got = scene.dynamics_derivatives(q, v, parameters=[f"{one}.law.stiffness" for one in names])
+    assert got.by_parameters[:, 0].any()
+    np.testing.assert_allclose(got.by_parameters[:, 1], got.by_parameters[:, 0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("parameters", ["tip.law.stiffness", 3, None])
+def test_parameters_that_are_no_list_of_names(parameters: object) -> None:
+    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
+    with pytest.raises(InvalidParameter, match="parameters"):
+        scene.dynamics_derivatives(q, v, parameters=parameters)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("q", "v", "tau", "named"),
+    [
+        (np.zeros(4), np.zeros(3), None, "q"),
+        (np.zeros(3), np.zeros(2), None, "v"),
+        (np.zeros(3), np.zeros(3), np.zeros(4), "tau"),
+        (np.zeros(3), np.zeros(3), np.full(3, np.nan), "tau"),
+        (np.zeros(3), np.zeros(3), "heavy", "tau"),
+    ],
+)
+def test_wrong_shapes(q: Array, v: Array, tau: Array | None, named: str) -> None:
+    scene = in_bowl(LAWS["impact"], COULOMB)[0]
+    with pytest.raises(InvalidParameter) as caught:
+        scene.dynamics_derivatives(q, v, tau)
+    assert caught.value.name.split("[")[0] == named
+
+
+def test_a_state_of_another_scene_is_refused() -> None:
+    scene, q, v = in_bowl(LAWS["impact"], BRISTLE)
+    other, *_ = in_bowl(LAWS["impact"], BRISTLE)
+    with pytest.raises(InvalidParameter, match="state of this scene"):
+        scene.dynamics_derivatives(q, v, state=other.state(q, v))
