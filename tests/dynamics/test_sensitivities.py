@@ -52,25 +52,19 @@ LAWS = {
 }
 
 
-# Where damping comes on the acceleration has a kink within a step.
-KINKED = ("linear", "exponent 2.2")
-# At the touch its damping grows as depth^(1/2), with no slope there.
-STEEP = pytest.param("hertz, loss tangent", marks=pytest.mark.xfail(reason="steps are too long"))
-
-
-@pytest.mark.parametrize("law", [STEEP if "tangent" in law else law for law in LAWS])
+@pytest.mark.parametrize("law", LAWS)
 def test_a_bounce_by_all_numbers_of_a_law(law: str) -> None:
     case = drop(LAWS[law], duration=0.05)
     names = [name for name in differences.names_of(case.scene) if ".law." in name]
-    tolerance = 5e-5 if law in KINKED else 1e-5
-    case.check([*names, f"{PAIR}.sphere.radius", "v0"], bounces=1, tolerance=tolerance)
+    # Where damping comes on and ends runs are known less well: forces have kinks there.
+    case.check([*names, f"{PAIR}.sphere.radius", "v0"], bounces=1, error=100.0)
 
 
 @every_integrator
 def test_an_oblique_bounce_with_coulomb_friction(integrator: str) -> None:
     case = thrown(IMPACT, COULOMB, INTEGRATORS[integrator])
     names = ["ball.law.stiffness", "ball.friction.mu_static", "ball.friction.v_static", "v0"]
-    case.check(names, bounces=1, tolerance=3e-5)
+    case.check(names, bounces=1)
 
 
 @pytest.mark.slow
@@ -86,7 +80,7 @@ def test_an_oblique_bounce_with_bristles(integrator: str) -> None:
     case = thrown(IMPACT, BRISTLE, INTEGRATORS[integrator])
     names = ["ball.law.stiffness", "ball.friction.mu_static", "ball.friction.stiffness", "v0"]
     # Explicit steps as long as the error allows are long for a spring that begins within one.
-    tolerance = 1e-3 if integrator == "adaptive" else 3e-5
+    tolerance = 1e-3 if integrator == "adaptive" else 1e-5
     case.check(names, bounces=1, tolerance=tolerance, error=100.0)
 
 
@@ -99,11 +93,7 @@ def test_an_oblique_bounce_with_other_bristles(friction: str) -> None:
     case.check(names, bounces=1, tolerance=1e-3, error=100.0)
 
 
-# Slopes where the contact just begins.
-BEGINNING = pytest.param("smooth", marks=pytest.mark.xfail(reason="the slope at a touch is steep"))
-
-
-@pytest.mark.parametrize("method", [BEGINNING, "facets"])
+@pytest.mark.parametrize("method", ["smooth", "facets"])
 def test_a_bounce_off_a_curved_shell(method: str) -> None:
     vertices, triangles = meshes.dome(8, 1.0)
     below = np.array([0.0, 0.0, -2.0])
@@ -190,7 +180,7 @@ def test_a_controller_of_the_package(control_dt: float | None, integrator: str) 
         control_dt=control_dt,
     )
     names = ["tip.law.stiffness", "tip.friction.mu_static", "tip.placement", "q0"]
-    result = case.check(names, tolerance=3e-5)
+    result = case.check(names, error=100.0)
     assert len(result.contacts.t) >= 3
 
 
