@@ -132,6 +132,9 @@ def test_every_public_name_is_in_the_api(built, pages):
     for name in faults:
         if not name.startswith("_"):
             assert f"sphshell_pin.errors.{name}" in anchors, name
+    # What a class inherits from one that has no page.
+    for name in ("model", "add_contact", "replace_pair", "dynamics_derivatives"):
+        assert f"sphshell_pin.dynamics.Scene.{name}" in anchors, name
 
 
 def test_meanings_of_parameters_do_not_pass_for_types(built, pages):

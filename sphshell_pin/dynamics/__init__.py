@@ -2,19 +2,28 @@
 
 from sphshell_pin.dynamics import controllers, integrators, sensors
 from sphshell_pin.dynamics.controllers import *  # noqa: F403
+from sphshell_pin.dynamics.derivatives import (
+    ContactForceDerivatives,
+    DynamicsDerivatives,
+    StepDerivatives,
+)
 from sphshell_pin.dynamics.integrators import *  # noqa: F403
 from sphshell_pin.dynamics.joints import JointFriction, JointIngredients, JointLimits
-from sphshell_pin.dynamics.result import ContactLog, EnergyAudit, Event, Result
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.result_parts import ContactLog, EnergyAudit, Event
 from sphshell_pin.dynamics.rollout import Rollout
 from sphshell_pin.dynamics.run_stats import JointFigures, PairFigures, RunStats
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts, SceneState
+from sphshell_pin.dynamics.sensitivities import Sensitivities
 from sphshell_pin.dynamics.sensor_log import Readings, SensorLog
 from sphshell_pin.dynamics.sensors import *  # noqa: F403
 from sphshell_pin.dynamics.simulation import Simulation
 
 __all__ = [
+    "ContactForceDerivatives",
     "ContactLog",
     "ContactPair",
+    "DynamicsDerivatives",
     "EnergyAudit",
     "Event",
     "JointFigures",
@@ -29,8 +38,10 @@ __all__ = [
     "Scene",
     "SceneContacts",
     "SceneState",
+    "Sensitivities",
     "SensorLog",
     "Simulation",
+    "StepDerivatives",
 ]
 __all__ += controllers.__all__
 __all__ += integrators.__all__

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import read_only
-from sphshell_pin.dynamics.patches import PATCH, Patches, patches_of
+from sphshell_pin.dynamics.patches import Patches, patches_of
+from sphshell_pin.dynamics.result_parts import ContactLog, EnergyAudit, Event, Origin
 from sphshell_pin.dynamics.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene import Scene
-from sphshell_pin.dynamics.scene_contacts import Columns, SceneContacts, columns
-from sphshell_pin.dynamics.sensor_log import SensorLog, joined_logs, sensor_columns, split_logs
+from sphshell_pin.dynamics.scene_contacts import Columns, columns
+from sphshell_pin.dynamics.sensor_log import SensorLog, sensor_columns
 from sphshell_pin.errors import MissingExtra, ResultError
 
 if TYPE_CHECKING:
@@ -31,108 +32,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 EVENT_KINDS = get_args(EventKind)
-
-
-@dataclass(frozen=True)
-class ContactLog(SceneContacts):
-    """Every contact of every recorded row: the columns of SceneContacts, and when.
-
-    With m logged contacts: `t` (m,) [s], `row` (m,) index into the result's rows.
-    """
-
-    t: Array
-    row: NDArray[np.int64]
-
-    def of_pair(self, pair: int) -> ContactLog:
-        """Return the entries of one pair."""
-        keep = self.pair == pair
-        return ContactLog(**{f.name: getattr(self, f.name)[keep] for f in fields(self)})
-
-    def at_row(self, row: int) -> SceneContacts:
-        """Return the contacts of one of the result's rows."""
-        first, last = np.searchsorted(self.row, (row, row + 1))
-        return SceneContacts(
-            **{f.name: getattr(self, f.name)[first:last] for f in fields(SceneContacts)}
-        )
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happened at time `t` [s] to the pair, or the joint, called `pair`.
-
-    `kind` of a pair: "touch", "lift_off", "deep" (the depth passed half the sphere's radius),
-    "through" (the sphere's center was pushed through the shell; it is pushed back) or
-    "beyond_hertz" (HertzLaw's theory no longer holds: the ellipse of contact is more than half as
-    long as the sphere, or the shell is a socket of nearly its radius). Of a joint:
-    "stop" (it reached the end of its range), "effort_limit" (the controller's torque is cut),
-    "speed_limit" (it is too fast), and "stop_left", "effort_limit_left", "speed_limit_left".
-    """
-
-    t: float
-    pair: str
-    kind: str
-
-
-@dataclass(frozen=True)
-class EnergyAudit:
-    """Where the energy is and where it went, (n,) [J] at the result's rows.
-
-    `kinetic` and `potential` (gravity) of the model, `elastic` of the contacts and stops of joints,
-    stretched bristles included; since the start: `damping_loss` and `friction_loss` of the contacts
-    and joints, `control_work` of the controller.
-    """
-
-    kinetic: Array
-    potential: Array
-    elastic: Array
-    damping_loss: Array
-    friction_loss: Array
-    control_work: Array
-
-    @property
-    def total(self) -> Array:
-        """Energy stored and lost, less the controller's work (n,) [J]: it should not change."""
-        return (
-            self.kinetic
-            + self.potential
-            + self.elastic
-            + self.damping_loss
-            + self.friction_loss
-            - self.control_work
-        )
-
-    @property
-    def residual(self) -> Array:
-        """Energy that appeared from nowhere since the start (n,) [J]: the integration's error."""
-        return self.total - self.total[:1]
-
-    @property
-    def exchanged(self) -> float:
-        """Energy that changed form [J]: the scale on which to judge the residual.
-
-        Sum over kinetic, potential and elastic energy of what each moved up and down in total
-        between rows, halved, plus losses and the work of the controller.
-        """
-        until = self.exchanged_until
-        return float(until[-1]) if len(until) else 0.0
-
-    @property
-    def exchanged_until(self) -> Array:
-        """The same from the start until each row (n,) [J]."""
-        parts = np.array([getattr(self, f.name) for f in fields(self)])
-        steps = np.abs(np.diff(parts, axis=1, prepend=parts[:, :1])).sum(axis=0)
-        return np.asarray(0.5 * np.cumsum(steps))
-
-
-@dataclass(frozen=True)
-class Origin:
-    """The scenario that ran: `scenario`, a shipped name or a path, with all its `settings`.
-
-    The settings, as JSON knows them, are those of the run, changed ones included.
-    """
-
-    scenario: str
-    settings: dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -227,36 +126,9 @@ class Result:
         The path of a scenario is written relative to the folder `home`, where the results will stay
         (default: that of `path`).
         """
-        from sphshell_pin.dynamics.result_file import (
-            PATCH_ARRAYS,
-            SENSOR_ARRAYS,
-            origin_in_file,
-            write_result,
-        )
+        from sphshell_pin.dynamics.result_file import save_result
 
-        target = Path(path)
-        arrays: Columns = {"t": self.t, "q": self.q, "v": self.v}
-        for part in ("contacts", "energy"):
-            value = getattr(self, part)
-            arrays |= {f"{part}.{f.name}": getattr(value, f.name) for f in fields(value)}
-        origin = None
-        if self.origin is not None:
-            home = Path(target.parent if home is None else home)
-            origin = origin_in_file(self.origin.scenario, self.origin.settings, home)
-        header = {
-            "pairs": self.pairs,
-            "stats": asdict(self.stats),
-            "events": [[e.t, e.pair, e.kind] for e in self.events],
-            "origin": origin,
-        }
-        if self.sensors:
-            header["sensors"] = {name: log.columns for name, log in self.sensors.items()}
-            arrays |= dict(zip(SENSOR_ARRAYS, joined_logs(self.sensors), strict=True))
-        if self.patch_rows is not None:
-            for name in PATCH_ARRAYS:
-                arrays[name] = self.patch_rows[name.removeprefix("patches.")]
-        write_result(target, header, arrays)
-        return target
+        return save_result(self, Path(path), home)
 
     @classmethod
     def load(cls, path: str | PathLike[str], *, max_size: float = 2e9) -> Result:
@@ -269,38 +141,9 @@ class Result:
         ResultError
             The file cannot be read, or is not what save() writes: the text says which part of it.
         """
-        from sphshell_pin.dynamics.result_file import SENSOR_ARRAYS, read_result
+        from sphshell_pin.dynamics.result_file import load_result
 
-        header, arrays = read_result(path, max_size)
-        log = {f.name: arrays[f"contacts.{f.name}"] for f in fields(ContactLog)}
-        energy = {f.name: arrays[f"energy.{f.name}"] for f in fields(EnergyAudit)}
-        patches = None
-        if "patches.approach" in arrays:
-            patches = np.empty(len(log["row"]), PATCH)
-            for name in PATCH.names or ():
-                patches[name] = arrays[f"patches.{name}"]
-            read_only(patches)
-        origin = None
-        if header.origin is not None:
-            origin = Origin(header.origin.found_from(Path(path).parent), header.origin.settings)
-        return cls(
-            t=arrays["t"],
-            q=arrays["q"],
-            v=arrays["v"],
-            pairs=tuple(header.pairs),
-            contacts=ContactLog(**log),
-            events=tuple(Event(*e) for e in header.events),
-            energy=EnergyAudit(**energy),
-            stats=header.stats,
-            origin=origin,
-            sensors=split_logs(
-                {name: tuple(columns) for name, columns in header.sensors.items()},
-                *(arrays[name] for name in SENSOR_ARRAYS),
-            )
-            if header.sensors
-            else {},
-            patch_rows=patches,
-        )
+        return load_result(cls, path, max_size)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the contact log as a pandas DataFrame, one row a contact, units in the names.

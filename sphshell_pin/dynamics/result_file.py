@@ -13,18 +13,27 @@ import os
 import warnings
 import zipfile
 from collections.abc import Mapping
+from dataclasses import asdict, fields
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from sphshell_pin.atomic import atomic_file
+from sphshell_pin.checks import read_only
+from sphshell_pin.dynamics.patches import PATCH
+from sphshell_pin.dynamics.result_parts import ContactLog, EnergyAudit, Event, Origin
 from sphshell_pin.dynamics.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene_contacts import Columns
+from sphshell_pin.dynamics.sensitivities import Sensitivities
+from sphshell_pin.dynamics.sensor_log import joined_logs, split_logs
 from sphshell_pin.errors import ResultError
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.result import Result
 
 LARGEST_HEADER = 1 << 26  # characters; a million events need less
 
@@ -72,7 +81,16 @@ PATCH_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
 }
 """The same of a run that recorded patches."""
 
-_IN_FILE = {name: name for name in ARRAYS | SENSOR_ARRAYS | PATCH_ARRAYS}
+SENSITIVITY_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
+    "sensitivities.q": (FLOAT, ("n", "nv", "p")),
+    "sensitivities.v": (FLOAT, ("n", "nv", "p")),
+    "sensitivities.force_world": (FLOAT, ("m", 3, "p")),
+    "sensitivities.normal_force": (FLOAT, ("m", "p")),
+    "sensitivities.depth": (FLOAT, ("m", "p")),
+}
+"""The same of a run that recorded its derivatives; the header names their p columns."""
+
+_IN_FILE = {name: name for name in ARRAYS | SENSOR_ARRAYS | PATCH_ARRAYS | SENSITIVITY_ARRAYS}
 _IN_FILE["contacts.contact_id"] = "contacts.number"
 
 
@@ -104,10 +122,43 @@ class Header(_Part):
     events: list[tuple[float, str, EventKind]]
     origin: _Origin | None = None
     sensors: dict[str, list[str]] = {}
+    sensitivities: list[str] = []
 
 
-def origin_in_file(scenario: str, settings: dict[str, object], home: Path) -> dict[str, object]:
+def save_result(result: Result, path: Path, home: str | PathLike[str] | None) -> Path:
+    """See Result.save."""
+    arrays: Columns = {"t": result.t, "q": result.q, "v": result.v}
+    for part in ("contacts", "energy"):
+        value = getattr(result, part)
+        arrays |= {f"{part}.{f.name}": getattr(value, f.name) for f in fields(value)}
+    origin = None
+    if result.origin is not None:
+        home = Path(path.parent if home is None else home)
+        origin = _origin_in_file(result.origin, home)
+    header = {
+        "pairs": result.pairs,
+        "stats": asdict(result.stats),
+        "events": [[e.t, e.pair, e.kind] for e in result.events],
+        "origin": origin,
+    }
+    if result.sensors:
+        header["sensors"] = {name: log.columns for name, log in result.sensors.items()}
+        arrays |= dict(zip(SENSOR_ARRAYS, joined_logs(result.sensors), strict=True))
+    if result.patch_rows is not None:
+        for name in PATCH_ARRAYS:
+            arrays[name] = result.patch_rows[name.removeprefix("patches.")]
+    rows = result.sensitivity_rows
+    if rows is not None:
+        header["sensitivities"] = rows.parameters
+        for name in SENSITIVITY_ARRAYS:
+            arrays[name] = getattr(rows, name.removeprefix("sensitivities."))
+    _write(path, header, arrays)
+    return path
+
+
+def _origin_in_file(origin: Origin, home: Path) -> dict[str, object]:
     """Return what a file in the folder `home` holds of the scenario that ran."""
+    scenario, settings = origin.scenario, origin.settings
     if Path(scenario).suffix != ".toml":
         return {"scenario": scenario, "settings": settings}
     # Results and scenario may move together, or the results alone: both paths are written.
@@ -118,7 +169,7 @@ def origin_in_file(scenario: str, settings: dict[str, object], home: Path) -> di
     return {"scenario": scenario, "settings": settings, "path": path}
 
 
-def write_result(path: Path, header: Mapping[str, object], arrays: Columns) -> None:
+def _write(path: Path, header: Mapping[str, object], arrays: Columns) -> None:
     """Write a compressed .npz file, whole or not at all; ResultError where that fails."""
     named = {_IN_FILE[name]: array for name, array in arrays.items()}
     named["header"] = np.array(json.dumps({"format": 1, **header}))
@@ -129,7 +180,46 @@ def write_result(path: Path, header: Mapping[str, object], arrays: Columns) -> N
         raise ResultError(path, f"cannot write the results: {error.strerror}") from error
 
 
-def read_result(path: str | PathLike[str], max_size: float) -> tuple[Header, Columns]:
+def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) -> Result:
+    """See Result.load; `kind` is Result, of which this module knows nothing else."""
+    header, arrays = _read_file(path, max_size)
+    log = {f.name: arrays[f"contacts.{f.name}"] for f in fields(ContactLog)}
+    energy = {f.name: arrays[f"energy.{f.name}"] for f in fields(EnergyAudit)}
+    patches = None
+    if "patches.approach" in arrays:
+        patches = np.empty(len(log["row"]), PATCH)
+        for name in PATCH.names or ():
+            patches[name] = arrays[f"patches.{name}"]
+        read_only(patches)
+    sensitivities = None
+    if "sensitivities.q" in arrays:
+        rows = {name.removeprefix("sensitivities."): arrays[name] for name in SENSITIVITY_ARRAYS}
+        sensitivities = Sensitivities(tuple(header.sensitivities), **rows, result=None)
+    origin = None
+    if header.origin is not None:
+        origin = Origin(header.origin.found_from(Path(path).parent), header.origin.settings)
+    return kind(
+        t=arrays["t"],
+        q=arrays["q"],
+        v=arrays["v"],
+        pairs=tuple(header.pairs),
+        contacts=ContactLog(**log),
+        events=tuple(Event(*e) for e in header.events),
+        energy=EnergyAudit(**energy),
+        stats=header.stats,
+        origin=origin,
+        sensors=split_logs(
+            {name: tuple(columns) for name, columns in header.sensors.items()},
+            *(arrays[name] for name in SENSOR_ARRAYS),
+        )
+        if header.sensors
+        else {},
+        patch_rows=patches,
+        sensitivity_rows=sensitivities,
+    )
+
+
+def _read_file(path: str | PathLike[str], max_size: float) -> tuple[Header, Columns]:
     """Return the header and the ARRAYS of the results at `path`.
 
     Raises
@@ -157,6 +247,7 @@ def _read(
     shapes: dict[str, tuple[int, ...]] = {}
     arrays_in = ARRAYS | (SENSOR_ARRAYS if "sensors.t.npy" in files else {})
     arrays_in |= PATCH_ARRAYS if "patches.approach.npy" in files else {}
+    arrays_in |= SENSITIVITY_ARRAYS if "sensitivities.q.npy" in files else {}
     parts = {"header": "header.npy"} | {name: f"{_IN_FILE[name]}.npy" for name in arrays_in}
     for name, part in parts.items():
         if part not in files:
@@ -180,6 +271,7 @@ def _read(
     _check_values(path, arrays, len(header.pairs))
     if header.sensors:
         _check_sensors(path, arrays, header.sensors)
+    _check_sensitivities(path, arrays, header.sensitivities)
     return header, arrays
 
 
@@ -276,6 +368,16 @@ def _check_sensors(
     if wanted != arrays["sensors.values"].size:
         found = arrays["sensors.values"].size
         raise _refused(path, f"'sensors.values' has {found} values, its readings {wanted}")
+
+
+def _check_sensitivities(path: str | PathLike[str], arrays: Columns, names: list[str]) -> None:
+    rows = arrays.get("sensitivities.q")
+    columns = 0 if rows is None else rows.shape[-1]
+    if columns != len(names) or len(set(names)) < len(names):
+        raise _refused(
+            path,
+            f"header.sensitivities does not name each of {columns} columns once: {names}",
+        )
 
 
 def _refused(path: str | PathLike[str], why: str) -> ResultError:

@@ -12,7 +12,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.dynamics.patches import Patches
-from sphshell_pin.dynamics.result import Origin, Result
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.result_parts import Origin
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
 from sphshell_pin.scenario.build import Built, build_scenario

@@ -15,7 +15,8 @@ import numpy as np
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
 from sphshell_pin.dynamics.controllers import Controller
-from sphshell_pin.dynamics.result import Origin, Result
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.result_parts import Origin
 from sphshell_pin.errors import (
     Interrupted,
     MissingExtra,

@@ -10,7 +10,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result import ContactLog, Result
+    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.result_parts import ContactLog
     from sphshell_pin.dynamics.scene import ContactPair, Scene
 
 FloatArray = NDArray[np.float64]

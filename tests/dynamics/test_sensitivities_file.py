@@ -1,0 +1,115 @@
+"""Files of results keep the sensitivities of the rows, and damaged ones are refused."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import ResultError
+from tests.patches.scenes import LAW, RADIUS, plate, slider
+
+ASKED = ("tip.law.stiffness", "tip.sphere.offset", "v0")
+
+
+@pytest.fixture(scope="module")
+def bounced():
+    """A run with 7 columns and rows in and out of contact."""
+    scene = sp.Scene(slider())
+    friction = sp.CoulombFriction(0.3, 0.2, 0.01, 0.1)
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), plate(), law=LAW, friction=friction, name="tip")
+    return sp.Simulation(scene, sp.Adaptive()).run(
+        [0.0, 0.0, RADIUS + 1e-4], [0.1, 0.0, -0.2], 5e-3, record_dt=1e-4, sensitivities=ASKED
+    )
+
+
+@pytest.fixture
+def file(bounced, tmp_path):
+    return bounced.save(tmp_path / "run.npz")
+
+
+def test_files_keep_them_to_the_bit(bounced, file):
+    again, before = sp.Result.load(file).sensitivities, bounced.sensitivities
+    assert len(before.parameters) == 7
+    assert again.parameters == before.parameters
+    assert len(bounced.contacts) > 10
+    for one in ("q", "v", "force_world", "normal_force", "depth"):
+        kept, had = getattr(again, one), getattr(before, one)
+        assert kept.shape == had.shape
+        assert kept.tobytes() == np.ascontiguousarray(had).tobytes()
+        assert not kept.flags.writeable
+    assert np.abs(again.force_world).max() > 0
+    assert {f.name for f in fields(before)} == {
+        "parameters", "q", "v", "force_world", "normal_force", "depth", "result"
+    }  # fmt: skip
+
+
+def test_a_run_without_them_has_none_in_its_file(bounced, file, tmp_path):
+    alone = replace(bounced, sensitivity_rows=None).save(tmp_path / "alone.npz")
+    assert sp.Result.load(alone).sensitivities is None
+    with np.load(alone) as arrays, np.load(file) as more:
+        assert set(more) - set(arrays) == {
+            f"sensitivities.{one}" for one in ("q", "v", "force_world", "normal_force", "depth")
+        }
+
+
+def test_a_loaded_result_moves_its_rows_in_a_given_scene(bounced, file):
+    loaded = sp.Result.load(file)
+
+    def hardest(result):
+        return float(result.contacts.normal_force.max())
+
+    with pytest.raises(ResultError, match="has no scene"):
+        loaded.sensitivities.of(hardest)
+    again = replace(loaded, scene=bounced.scene).sensitivities.of(hardest)
+    assert (again == bounced.sensitivities.of(hardest)).all()
+
+
+def damaged(file, name, change):
+    with np.load(file) as whole:
+        arrays = dict(whole)
+    changed = change(arrays.pop(name))
+    if changed is not None:
+        arrays[name] = np.asarray(changed)
+    np.savez(file, **arrays)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("sensitivities.q", lambda a: a[:-1], r"'sensitivities\.q' has the shape \(50, 3, 7\)"),
+        ("sensitivities.v", lambda a: a[:, :2], r"'sensitivities\.v' has the shape \(51, 2, 7\)"),
+        ("sensitivities.depth", lambda a: a[:, :-1], r"'sensitivities\.depth' has the shape"),
+        ("sensitivities.force_world", lambda a: a[..., 0], "not \\(m, 3, p\\)"),
+        ("sensitivities.normal_force", lambda a: None, "no array 'sensitivities.normal_force'"),
+        ("sensitivities.q", lambda a: None, "does not name each of 0 columns once"),
+        ("sensitivities.q", lambda a: a.astype("f4"), r"'sensitivities\.q' holds float32"),
+        ("sensitivities.q", lambda a: a.astype(object), "Python objects"),
+        (
+            "header",
+            lambda a: str(a).replace("tip.law.stiffness", "v0.0"),
+            r"header\.sensitivities does not name each of 7 columns once",
+        ),
+        (
+            "header",
+            lambda a: str(a).replace('"tip.law.stiffness", ', ""),
+            r"header\.sensitivities does not name each of 7 columns once",
+        ),
+        (
+            "header",
+            lambda a: str(a).replace('"tip.law.stiffness"', "3"),
+            r"header\.sensitivities\.0: ",
+        ),
+    ],
+)
+def test_a_damaged_file_is_refused(file, name, change, said):
+    with pytest.raises(ResultError, match=said):
+        sp.Result.load(damaged(file, name, change))
+
+
+def test_they_count_as_memory(bounced, file):
+    rows = bounced.sensitivities
+    needed = sum(a.nbytes for a in (rows.q, rows.v, rows.force_world, rows.normal_force))
+    with pytest.raises(ResultError, match="max_size"):
+        sp.Result.load(file, max_size=needed)
