@@ -15,7 +15,7 @@ from tests import differences, models
 Array = NDArray[np.float64]
 
 R = 0.05
-ADAPTIVE, IMPLICIT = sp.Adaptive(1e-10), sp.Implicit(1e-9)
+ADAPTIVE, IMPLICIT = sp.Adaptive(1e-11), sp.Implicit(1e-9)
 INTEGRATORS = {
     "adaptive": ADAPTIVE,
     "implicit": IMPLICIT,
