@@ -79,9 +79,7 @@ def test_an_oblique_bounce_by_everything(integrator: str) -> None:
 def test_an_oblique_bounce_with_bristles(integrator: str) -> None:
     case = thrown(IMPACT, BRISTLE, INTEGRATORS[integrator])
     names = ["ball.law.stiffness", "ball.friction.mu_static", "ball.friction.stiffness", "v0"]
-    # Explicit steps as long as the error allows are long for a spring that begins within one.
-    tolerance = 1e-3 if integrator == "adaptive" else 1e-5
-    case.check(names, bounces=1, tolerance=tolerance, error=100.0)
+    case.check(names, bounces=1, error=100.0)
 
 
 @pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
@@ -90,7 +88,7 @@ def test_an_oblique_bounce_with_other_bristles(friction: str) -> None:
     case = thrown(law, FRICTIONS[friction])
     names = ["ball.law.young", "ball.friction.mu_static", "v0"]
     # Of friction that only sticks the coefficient does not matter, and errors of runs are all.
-    case.check(names, bounces=1, tolerance=1e-3, error=100.0)
+    case.check(names, bounces=1, error=300.0)
 
 
 @pytest.mark.parametrize("method", ["smooth", "facets"])
