@@ -134,7 +134,7 @@ class Asked:
             raise InvalidParameter(
                 "sensitivities", names, "must be names, as ('PAIR.law.stiffness', 'v0')"
             )
-        self._scene, self._names = scene, tuple(names)
+        self._scene, self._names, self._controller = scene, tuple(names), controller
         self.by_q0, self.by_v0 = (one in names for one in _START)
         for one in _START:
             if names.count(one) > 1:
@@ -168,8 +168,18 @@ class Asked:
         parameters = core_parameters(self._scene, self._columns, start)
         core.differentiate(parameters, self.by_q0, self.by_v0)
 
+    def check(self, core: _core.Simulation) -> None:
+        """Raise InvalidParameter if the controller was seen to have a memory."""
+        if core.controller_remembers:
+            must = (
+                "cannot be differentiated, as it gave two torques when it was asked twice at a "
+                "state: it must compute them from t, q, v and contacts alone"
+            )
+            raise InvalidParameter("controller", self._controller, must)
+
     def rows(self, core: _core.Simulation) -> Sensitivities:
         """Return what the run has recorded."""
+        self.check(core)
         record = core.take_sensitivities()
         nv, columns = self._scene.model.nv, self.columns
         # The core has the parameters first, then the start.

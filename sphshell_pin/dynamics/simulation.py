@@ -116,6 +116,8 @@ class Simulation:
         def glance() -> None:
             if progress is not None:
                 progress(core.progress)
+            if asked:
+                asked.check(core)
             if ctrl_c.pressed and core.progress < 1:
                 raise KeyboardInterrupt
 

@@ -396,6 +396,7 @@ void bind_dynamics(nanobind::module_& m) {
              const auto& model = self.simulation.model();
              return to_dict(self.simulation.snapshot(), model.nq, model.nv);
            })
+      .def_prop_ro("controller_remembers", &alone<&Simulation::controller_remembers>)
       .def_prop_ro("progress", &alone<&Simulation::progress>)
       .def_prop_ro("time", &alone<&Simulation::time>)
       .def_prop_ro("q", &alone<&Simulation::q>)

@@ -59,6 +59,9 @@ class Simulation : private Torques {
     return sensitivities_ ? sensitivities_->take() : SensitivityRecord();
   }
 
+  // Whether the controller, asked twice at a state, has given two answers.
+  bool controller_remembers() const { return sensitivities_ && sensitivities_->torques_remember(); }
+
   // The first pair whose sphere is deeper than half its radius (of two spheres, the smaller) at the
   // start, or inside a closed one-sided shell on the wrong side, however far.
   std::optional<DeepStart> deep_start();

@@ -32,7 +32,7 @@ class Sensitivities : public RowFollower {
 
   // Hands over what was recorded since the last call.
   SensitivityRecord take() { return std::exchange(record_, {}); }
-  Eigen::Index columns() const { return columns_; }
+  bool torques_remember() const { return slopes_.torques_remember(); }
 
  private:
   void begin_contacts(const State& to, double h);

@@ -74,6 +74,8 @@ void StepSlopes::torque_slopes(const TorqueAt& torque, double t, const VectorX& 
   };
   q_ = q, v_ = v, z_ = z;
   u_.setZero(nv);
+  scene_.evaluate(q, v, z, true);
+  const VectorX before = torque(t, q, v);
   for (const double sign : {1.0, -1.0}) {
     const double share = sign / (2 * kTorqueDifference);
     for (Eigen::Index k = 0; k < nv; ++k) {
@@ -112,6 +114,7 @@ void StepSlopes::torque_slopes(const TorqueAt& torque, double t, const VectorX& 
       scene_.exchange(one.pair, kept);
     }
   scene_.evaluate(q, v, z, true);
+  if (torque(t, q, v) != before) remembers_ = true;
 }
 
 MatrixX StepSlopes::held(const Tangent& at) const {

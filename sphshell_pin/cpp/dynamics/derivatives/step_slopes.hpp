@@ -50,6 +50,9 @@ class StepSlopes {
   // The changes of torques whose slopes were found last.
   MatrixX held(const Tangent& at) const;
 
+  // Whether torques asked for twice at a state were not the same: they cannot be differenced.
+  bool torques_remember() const { return remembers_; }
+
   Linearization& linearization() { return linearization_; }
 
  private:
@@ -75,6 +78,7 @@ class StepSlopes {
   VectorX scales_;  // of the columns
   MatrixX jacobian_, torque_slopes_, torque_by_parameters_, q_by_, v_by_, rates_;
   bool follows_ = false;  // torques do, and torque_slopes_ says how
+  bool remembers_ = false;
 };
 
 }  // namespace sphshell
