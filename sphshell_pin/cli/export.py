@@ -62,6 +62,10 @@ def export(
                 must += "; Rerun's viewer opens .mcap files"
             raise InvalidParameter("--to", to, must)
         begin = nanoseconds(start)
+        if begin and to != "mcap":
+            raise InvalidParameter(
+                "--start", start, "is for --to mcap: tables have the run's own t"
+            )
         words = ["export", str(run), "--to", to]
         words += [] if out is None else ["--out", str(out)]
         words += ["--start", start] if begin else []

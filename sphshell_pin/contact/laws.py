@@ -234,15 +234,18 @@ def dissipation_for(restitution: float, speed: float) -> float:
     """Return the dissipation b [s/m] of Hunt-Crossley that rebounds at restitution * `speed`.
 
     Energy of approach and of rebound are equal where the depth is largest, which gives
-    x - ln(1 + x) = -y - ln(1 - y) with x = b v, y = b v restitution; solved by bisection.
+    x - ln(1 + x) = -y - ln(1 - y) with x = b v, y = b v restitution; solved by bisection. Both
+    sides are nearly equal where x is small: there their series are subtracted, divided by x^2.
     """
 
     def excess(x: float) -> float:
+        if x < 0.1:
+            powers = ((restitution**n - (-1) ** n) / n * x ** (n - 2) for n in range(3, 20))
+            return (restitution - 1) * (restitution + 1) / 2 + sum(powers)
         y = restitution * x
         return (-y - math.log1p(-y)) - (x - math.log1p(x))
 
     if restitution == 1:
         return 0.0
-    # y < 1: the rebound never exceeds 1 / b. Below the root the series
-    # x^2 (restitution^2 - 1) / 2 makes the difference negative.
+    # y < 1: the rebound never exceeds 1 / b.
     return bisect(excess, 0.0, 1 / restitution) / speed

@@ -87,22 +87,23 @@ class ContactForceDerivatives:
     parameters: tuple[str, ...]
 
 
-def parameter_columns(scene: Scene, names: object) -> tuple[str, ...]:
+def parameter_columns(scene: Scene, names: object, others: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return the columns that the parameters called `names` have, in their order.
 
     Names are those of Simulation.rollout's `vary` for single numbers, and "PAIR.placement" (six
     columns). One column of several can be named, too: "PAIR.sphere.offset.z".
 
-    Raises InvalidParameter for what are no names and for one given twice, NameNotFound for another.
+    Raises InvalidParameter for what are no names and for one given twice, NameNotFound for another:
+    it lists `others`, which the caller knows, too.
     """
-    if isinstance(names, str) or not isinstance(names, Iterable):
+    if isinstance(names, str | bytes) or not isinstance(names, Iterable):
         raise InvalidParameter("parameters", names, "must be names, as ['PAIR.law.stiffness']")
     columns_of = _columns_of(scene)
     valid = set(columns_of) | {one for columns in columns_of.values() for one in columns}
     found: list[str] = []
     for name in names:
         if not isinstance(name, str) or name not in valid:
-            raise NameNotFound("parameter", str(name), "the scene", list(columns_of))
+            raise NameNotFound("parameter", str(name), "the scene", [*columns_of, *others])
         for column in columns_of.get(name, (name,)):
             if column in found:
                 raise InvalidParameter("parameters", column, "must not be named twice")
@@ -165,6 +166,9 @@ def _core_parameter(
             less, more = here, changed(value + 2 * step)
         else:
             less, more = changed(value - 2 * step), here
+    if less is None or more is None:
+        must = "cannot be differentiated: neither a larger nor a smaller value is allowed"
+        raise InvalidParameter(column, value, must)
     return _core.Parameter(pair, kind, 0, less, more, step, abs(value) or 1.0)
 
 

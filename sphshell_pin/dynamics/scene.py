@@ -163,7 +163,8 @@ class Scene(SceneParts):
         q, v = self.check_state(q, v)
         nv = self._model.nv
         torques = np.zeros(nv) if tau is None else check_vector("tau", tau, nv, " [N m or N]")
-        columns = () if parameters == () else parameter_columns(self, parameters)
+        some = not isinstance(parameters, tuple) or parameters
+        columns = parameter_columns(self, parameters) if some else ()
         start = None if state is None else state.start
         return Place(core, q, v, torques, columns, core_parameters(self, columns, start))
 

@@ -139,7 +139,9 @@ class Asked:
         for one in _START:
             if names.count(one) > 1:
                 raise InvalidParameter("sensitivities", one, "must not be named twice")
-        self._columns = parameter_columns(scene, [one for one in names if one not in _START])
+        self._columns = parameter_columns(
+            scene, [one for one in names if one not in _START], _START
+        )
         if callable(controller) and reads_sensors(controller):
             must = (
                 "cannot be differentiated, as it reads sensors, which have a memory: take one that "

@@ -94,7 +94,9 @@ class Simulation:
         deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.
         """
         sensors = SensorSet(self.sensors, self.scene)
-        asked = None if sensitivities == () else Asked(self.scene, sensitivities, controller)
+        asked = None
+        if not isinstance(sensitivities, tuple) or sensitivities:
+            asked = Asked(self.scene, sensitivities, controller)
         core = start_run(
             self.scene,
             self.integrator,

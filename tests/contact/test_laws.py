@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
@@ -112,6 +113,23 @@ def test_hertz_with_restitution(restitution: float, speed: float) -> None:
     assert law.exponent == 1.5
     got = oracle.hunt_crossley_restitution(speed, law.dissipation)
     assert got == pytest.approx(restitution, abs=1e-8)
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.9, 0.93, 0.99, 0.99999, 1 - 1e-7, 1 - 1e-14])
+def test_dissipation_is_exact_however_near_the_restitution_is_to_one(restitution: float) -> None:
+    with localcontext(prec=60):
+        e = Decimal(restitution)
+
+        def excess(x: Decimal) -> Decimal:
+            return -e * x - (1 - e * x).ln() - x + (1 + x).ln()
+
+        low, high = Decimal("1e-18"), (1 - Decimal("1e-30")) / e
+        for _ in range(120):
+            middle = (low + high) / 2
+            low, high = (middle, high) if excess(middle) < 0 else (low, middle)
+        exact = float(low)
+    law = HuntCrossleyLaw.with_restitution(1e5, 1.5, restitution, 1.0)
+    assert law.dissipation == pytest.approx(exact, rel=2e-14)
 
 
 def test_hertz_asks_for_both_restitution_and_speed() -> None:

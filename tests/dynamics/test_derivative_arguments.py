@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sphshell_pin import CoulombFriction, Simulation
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import differences
 from tests.dynamics.test_contact_derivatives import (
@@ -162,3 +163,25 @@ def test_a_state_of_another_scene_is_refused() -> None:
     other, *_ = in_bowl(LAWS["impact"], BRISTLE)
     with pytest.raises(InvalidParameter, match="state of this scene"):
         scene.dynamics_derivatives(q, v, state=other.state(q, v))
+
+
+def test_a_number_that_no_side_allows_has_no_derivative() -> None:
+    scene, q, v = in_bowl(LAWS["impact"], CoulombFriction(0.0, 0.0, 0.1, 1.0))
+    # More than mu_static and less than 0 are refused; mu_static may grow.
+    with pytest.raises(InvalidParameter, match=r"mu_dynamic = 0\.0 .*neither a larger nor"):
+        scene.dynamics_derivatives(q, v, parameters=["tip.friction.mu_dynamic"])
+    d = scene.dynamics_derivatives(q, v, parameters=["tip.friction.mu_static"])
+    assert np.isfinite(d.by_parameters).all()
+
+
+def test_names_may_be_an_array_and_bytes_are_none() -> None:
+    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
+    names = ["tip.law.stiffness", "tip.sphere.radius"]
+    d = scene.dynamics_derivatives(q, v, parameters=np.array(names))  # type: ignore[arg-type]
+    assert d.parameters == tuple(names)
+    with pytest.raises(InvalidParameter, match="must be names"):
+        scene.dynamics_derivatives(q, v, parameters=b"x")  # type: ignore[arg-type]
+    with pytest.raises(InvalidParameter, match="must be names"):
+        Simulation(scene).run(q, v, 0.1, sensitivities=np.array(names))  # type: ignore[arg-type]
+    with pytest.raises(NameNotFound, match=r"tip\.placement, q0, v0"):
+        Simulation(scene).run(q, v, 0.1, sensitivities=["v"])

@@ -74,6 +74,7 @@ def test_faults(folder, tmp_path, monkeypatch):
         (["drop", "--to", "bag"], "must be one of mcap, csv, parquet"),
         (["drop", "--to", "mcap", "--start", "soon"], "--start"),
         (["drop", "--to", "mcap", "--start", "-1"], "give another start"),
+        (["drop", "--to", "csv", "--start", "5"], "is for --to mcap"),
         (["none", "--to", "csv"], "none: cannot read the results"),
         ([damaged, "--to", "csv"], "damaged.npz: is not a file that Result.save wrote"),
         (["drop", "--to", "csv", "--scenario", "gear_contact"], "its model had nq = 7"),
