@@ -35,7 +35,7 @@ def plate(bend: float = 0.0) -> sp.Shell:
     return sp.Shell(points, quads)
 
 
-def arm_on_moving_plate() -> tuple[sp.Scene, np.ndarray]:
+def arm_on_moving_plate(joints: sp.JointIngredients | None = None) -> tuple[sp.Scene, np.ndarray]:
     """Return an arm whose tip touches a plate that slides and turns, and a state."""
     model = pin.Model()
     parent = 0
@@ -54,7 +54,7 @@ def arm_on_moving_plate() -> tuple[sp.Scene, np.ndarray]:
     pin.framesForwardKinematics(model, data, q)
     tip_in_plate = data.oMi[turn].actInv(data.oMf[model.getFrameId("tip")].translation)
     tilt = pin.rpy.rpyToMatrix(0.1, -0.2, 0.3)
-    scene = sp.Scene(model)
+    scene = sp.Scene(model, joints=joints)
     scene.add_contact(
         sp.Sphere(0.02, "tip"),
         plate(0.5),
@@ -242,10 +242,10 @@ def test_forces_of_several_pairs_and_of_joints(joints):
 
 
 def test_dry_friction_of_joints_is_refused_as_bristles_are():
-    dry = sp.JointIngredients(friction={"slides": sp.JointFriction(1.0)})
-    scene, _ = ball_in_a_corner(dry)
+    dry = sp.JointIngredients(friction={"slide": sp.JointFriction(1.0)})
+    scene, _ = arm_on_moving_plate(dry)
     with pytest.raises(InvalidParameter, match="dry friction in its joints"):
-        dynamics(scene, "Full", "ball")
+        dynamics(scene)
 
 
 def test_where_nothing_touches_forces_and_derivatives_are_zero():

@@ -12,9 +12,9 @@ namespace {
 
 // Of central differences of torques, relative to the larger of 1 and the number.
 constexpr double kTorqueDifference = 1e-7;
-// Changes over a step and over its halves agree to this share of the largest, or are taken as they
-// are after so many halvings.
-constexpr double kAgreed = 1e-6;
+// Changes over a step and over its halves agree to this share of the largest, in contact and out of
+// it, or are taken as they are after so many halvings.
+constexpr double kAgreed = 1e-6, kAgreedFree = 1e-9;
 constexpr int kMostHalvings = 16;
 // Smaller changes of positions [m or rad] and velocities, of stretches [m], count as these, where a
 // parameter changes by all of itself.
@@ -190,12 +190,12 @@ void StepSlopes::along(Chart& chart, const Stepper& stepper, double h, double sh
   out.z = changes.bottomRows(nz);
 }
 
-// Where friction begins to slip, or a law is clamped, the derivatives of the rates jump within a
-// step: halves are taken until they agree.
+// Halves are taken until they agree: in free flight a body may turn far in a step; where friction
+// begins to slip, or a law is clamped, the derivatives of the rates jump within one.
 void StepSlopes::follow(const Path& path, double from, double to, int depth, MatrixX& changes) {
   MatrixX once = changes;
   const bool touching = radau(path, from, to, once);
-  if (!touching || depth >= kMostHalvings) {
+  if (depth >= kMostHalvings) {
     changes = once;
     return;
   }
@@ -211,7 +211,7 @@ void StepSlopes::follow(const Path& path, double from, double to, int depth, Mat
     return error.middleRows(first, count).cwiseAbs().maxCoeff() / std::max(size, least);
   };
   if (std::max({off(0, nv, kLeast), off(nv, nv, kLeast), off(2 * nv, nz, kLeastStretch)}) >
-      kAgreed) {
+      (touching ? kAgreed : kAgreedFree)) {
     follow(path, from, middle, depth + 1, changes);
     follow(path, middle, to, depth + 1, changes);
   } else {
