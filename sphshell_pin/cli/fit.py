@@ -161,12 +161,16 @@ def _write(
     found: Fit, path: Path, folder: Path, changes: dict[str, str], *, picture: bool
 ) -> list[Path]:
     from sphshell_pin.atomic import write_whole
-    from sphshell_pin.errors import MissingExtra
+    from sphshell_pin.errors import MissingExtra, ScenarioError
+    from sphshell_pin.scenario.knobs import check_knobs
+    from sphshell_pin.scenario.reading import read_scenario
 
-    files = [
-        found.write_scenario(folder / f"{path.stem}.fitted.toml", changes),
-        write_whole(folder / "fit.json", found.to_json().encode()),
-    ]
+    fitted = found.write_scenario(folder / f"{path.stem}.fitted.toml", changes)
+    files = [fitted, write_whole(folder / "fit.json", found.to_json().encode())]
+    try:
+        check_knobs(read_scenario(fitted), fitted, ranges=True)
+    except ScenarioError as fault:
+        typer.echo(f"note: the fitted scenario needs a change before it runs: {fault}", err=True)
     if picture:
         from sphshell_pin.plot.figure import write_figure
 

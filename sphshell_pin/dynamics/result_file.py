@@ -372,6 +372,8 @@ def _check_sensors(
 
 def _check_sensitivities(path: str | PathLike[str], arrays: Columns, names: list[str]) -> None:
     rows = arrays.get("sensitivities.q")
+    if rows is None and names:
+        raise _refused(path, "it has no array 'sensitivities.q'")
     columns = 0 if rows is None else rows.shape[-1]
     if columns != len(names) or len(set(names)) < len(names):
         raise _refused(

@@ -52,25 +52,19 @@ LAWS = {
 }
 
 
-# Where damping comes on the acceleration has a kink within a step.
-KINKED = ("linear", "exponent 2.2")
-# At the touch its damping grows as depth^(1/2), with no slope there.
-STEEP = pytest.param("hertz, loss tangent", marks=pytest.mark.xfail(reason="steps are too long"))
-
-
-@pytest.mark.parametrize("law", [STEEP if "tangent" in law else law for law in LAWS])
+@pytest.mark.parametrize("law", LAWS)
 def test_a_bounce_by_all_numbers_of_a_law(law: str) -> None:
     case = drop(LAWS[law], duration=0.05)
     names = [name for name in differences.names_of(case.scene) if ".law." in name]
-    tolerance = 5e-5 if law in KINKED else 1e-5
-    case.check([*names, f"{PAIR}.sphere.radius", "v0"], bounces=1, tolerance=tolerance)
+    # Where damping comes on and ends runs are known less well: forces have kinks there.
+    case.check([*names, f"{PAIR}.sphere.radius", "v0"], bounces=1, error=100.0)
 
 
 @every_integrator
 def test_an_oblique_bounce_with_coulomb_friction(integrator: str) -> None:
     case = thrown(IMPACT, COULOMB, INTEGRATORS[integrator])
     names = ["ball.law.stiffness", "ball.friction.mu_static", "ball.friction.v_static", "v0"]
-    case.check(names, bounces=1, tolerance=3e-5)
+    case.check(names, bounces=1)
 
 
 @pytest.mark.slow
@@ -85,25 +79,25 @@ def test_an_oblique_bounce_by_everything(integrator: str) -> None:
 def test_an_oblique_bounce_with_bristles(integrator: str) -> None:
     case = thrown(IMPACT, BRISTLE, INTEGRATORS[integrator])
     names = ["ball.law.stiffness", "ball.friction.mu_static", "ball.friction.stiffness", "v0"]
-    # Explicit steps as long as the error allows are long for a spring that begins within one.
-    tolerance = 1e-3 if integrator == "adaptive" else 3e-5
+    case.check(names, bounces=1, error=100.0)
+
+
+@pytest.mark.parametrize(
+    ("integrator", "tolerance"), [(sp.Implicit(1e-10), 1e-5), (sp.Adaptive(1e-11), 1e-4)], ids=str
+)
+@pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
+def test_an_oblique_bounce_with_other_bristles(
+    friction: str, integrator: object, tolerance: float
+) -> None:
+    """Stiff springs: explicit steps know less of them."""
+    law = sp.HertzLaw(2e7, 0.3, restitution=0.7, speed=0.5)
+    case = thrown(law, FRICTIONS[friction], integrator)
+    names = ["ball.law.young", "ball.friction.mu_static", "v0"]
+    # Of friction that only sticks the coefficient does not matter, and errors of runs are all.
     case.check(names, bounces=1, tolerance=tolerance, error=100.0)
 
 
-@pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
-def test_an_oblique_bounce_with_other_bristles(friction: str) -> None:
-    law = sp.HertzLaw(2e7, 0.3, restitution=0.7, speed=0.5)
-    case = thrown(law, FRICTIONS[friction])
-    names = ["ball.law.young", "ball.friction.mu_static", "v0"]
-    # Of friction that only sticks the coefficient does not matter, and errors of runs are all.
-    case.check(names, bounces=1, tolerance=1e-3, error=100.0)
-
-
-# Slopes where the contact just begins.
-BEGINNING = pytest.param("smooth", marks=pytest.mark.xfail(reason="the slope at a touch is steep"))
-
-
-@pytest.mark.parametrize("method", [BEGINNING, "facets"])
+@pytest.mark.parametrize("method", ["smooth", "facets"])
 def test_a_bounce_off_a_curved_shell(method: str) -> None:
     vertices, triangles = meshes.dome(8, 1.0)
     below = np.array([0.0, 0.0, -2.0])
@@ -190,7 +184,7 @@ def test_a_controller_of_the_package(control_dt: float | None, integrator: str) 
         control_dt=control_dt,
     )
     names = ["tip.law.stiffness", "tip.friction.mu_static", "tip.placement", "q0"]
-    result = case.check(names, tolerance=3e-5)
+    result = case.check(names, error=100.0)
     assert len(result.contacts.t) >= 3
 
 
@@ -264,7 +258,7 @@ def test_of_a_figure(name: str) -> None:
         f = lambda x, c=column: np.array([figure(case.moved(c, x)) - start])  # noqa: E731
         scale = case.scale(column, 1e-3)[0]
         error = differences.off(
-            got[k : k + 1], f, scale, tolerance=1e-5, known=1e-12 * max(abs(start), 1e-3)
+            got[k : k + 1], f, scale, tolerance=1e-5, known=1e-10 * max(abs(start), 1e-3)
         )
         assert error <= 1e-5
 
@@ -317,6 +311,26 @@ def test_bad_input() -> None:
         case.run(names=[f"{PAIR}.friction.mu_static"])
     with pytest.raises(NameNotFound, match=r"law\.dissipation"):
         case.run(names=[f"{PAIR}.law.dissipation"])
+
+
+def test_a_controller_with_a_memory_is_refused() -> None:
+    asked = []
+
+    def counts(t: float, q: Array, v: Array, contacts: object) -> Array:
+        asked.append(t)
+        return 1e-3 * len(asked) + 0.0 * q
+
+    case = drop(IMPACT, duration=0.03, controller=counts, control_dt=1e-3)
+    with pytest.raises(InvalidParameter, match="controller"):
+        case.run(names=["v0"])
+    assert len(case.run().t) > 2
+
+
+def test_one_column_takes_no_longer_than_several() -> None:
+    """Of friction that sticks the coefficient hardly matters: that is no reason for short steps."""
+    case = thrown(IMPACT, BRISTLE, sp.Adaptive(1e-8))
+    plain = case.run().stats
+    assert case.run(names=["ball.friction.mu_static"]).stats.steps == plain.steps
 
 
 def test_a_controller_that_reads_sensors_is_refused() -> None:

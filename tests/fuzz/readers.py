@@ -44,6 +44,8 @@ def _read_mesh(path: Path) -> None:
 def _read_result(path: Path) -> None:
     result = sp.Result.load(path)
     result.contact_columns()
+    if (by := result.sensitivities) is not None:
+        assert by.q.shape == (*result.v.shape, len(by.parameters))
     assert result.energy.exchanged >= 0.0 or np.isnan(result.energy.exchanged)
     replay = Replay(result)
     replay.advance(1e-2)

@@ -12,12 +12,14 @@ import tempfile
 import tomllib
 import xml.etree.ElementTree as ET
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sphshell_pin import robots
+from sphshell_pin.dynamics import Sensitivities
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.run import simulate
 from sphshell_pin.study.sweep.job import Outcome
@@ -119,9 +121,15 @@ def prepare(folder: Path) -> None:
 
 @functools.cache
 def _run() -> dict[str, np.ndarray[Any, Any]]:
-    """Return the arrays of a short run's file."""
+    """Return the arrays of a short run's file, with derivatives of its rows."""
     with tempfile.TemporaryDirectory() as home:
         result, _ = simulate(build(write(Path(home)), {"run.record_dt": "5e-3"}))
+        nv, m = result.v.shape[1], len(result.contacts)
+        shapes = {"q": (len(result.t), nv), "v": (len(result.t), nv), "force_world": (m, 3)}
+        shapes |= {"normal_force": (m,), "depth": (m,)}
+        rows = {name: np.ones((*shape, 2)) for name, shape in shapes.items()}
+        by = Sensitivities(("v0.0", "v0.1"), **rows, result=None)
+        result = replace(result, sensitivity_rows=by)
         with np.load(result.save(Path(home, "run.npz")), allow_pickle=False) as file:
             arrays = dict(file)
     header = json.loads(str(arrays["header"]))

@@ -19,8 +19,11 @@ from sphshell_pin.benchmarks.fitting import SCENARIO, TRUTH, many_sets
 from sphshell_pin.cli import app
 from sphshell_pin.errors import DataError, InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
-from sphshell_pin.study.fit.parameters import parse_wanted
+from sphshell_pin.study.fit import runs
+from sphshell_pin.study.fit.data import read_experiment
+from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
 from sphshell_pin.study.fit.quantities import quantities_of, row_step
+from sphshell_pin.study.fit.runs import Runs, ready
 from sphshell_pin.study.fit.statistics import serial_of, spread_of
 
 STIFFNESS, DISSIPATION, FRICTION = TRUTH
@@ -297,6 +300,30 @@ def test_false_alarms_of_the_test_for_noise_are_rare():
     assert not seen.independent
     assert seen.correlation == pytest.approx(0.5, abs=0.02)
     assert seen.inflation == pytest.approx(math.sqrt(3.0), rel=0.03)
+
+
+def test_slopes_by_sensitivities_are_those_of_differences(bounce, monkeypatch):
+    """Of forces, friction, depth and a speed; with a fixed step both are exact."""
+    names = [FORCE, "pairs.tip.force_x", "pairs.tip.friction_force_x", "pairs.tip.depth"]
+    names += ["v.root_joint.2"]
+    t = np.linspace(0.0, 0.05, 101)
+    fixed = bounce.with_name("fixed.toml")
+    fixed.write_text(SCENARIO.replace("rtol = 1e-7", 'dt = 5e-5\nintegrator = "runge-kutta-4"'))
+    data = sp.Experiment({"t [s]": t, **columns_of(fixed, t, names)})
+    built = build(fixed)
+    trial = ready(built, read_experiment(data, 1, quantities_of(built), 0.25))
+    free = free_parameters(list(TRUTH), built.scenario, fixed)
+    x = np.array([one.to_x(one.start * 1.01) for one in free])
+    ends = np.full(3, np.inf)
+    monkeypatch.setattr(runs, "COST_OF_SENSITIVITIES", 0)
+    followed = Runs([trial], free)
+    found = followed.slopes(x, -ends, ends, 1e-4)
+    assert followed.count == 1
+    for k in range(3):
+        expected = followed.slope(x, k, -ends, ends, 1e-4, central=True)
+        for part in np.split(np.arange(len(expected)), len(names)):
+            error = np.linalg.norm(found[part, k] - expected[part])
+            assert error <= 2e-3 * np.linalg.norm(expected[part]) + 1e-7 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize(

@@ -185,6 +185,8 @@ Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3
     whole.dn_dc += c.dn_dc;
   }
   whole.normal.normalize();
+  // As one contact its weight is 1, wherever the sphere is.
+  whole.dn_dc -= (whole.normal * (whole.normal.transpose() * whole.dn_dc)).eval();
   whole.point = center - (radius - whole.depth) * whole.normal;
   return whole;
 }

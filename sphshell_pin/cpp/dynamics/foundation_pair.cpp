@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 
 #include "contact/dual.hpp"
 #include "dynamics/patch.hpp"
@@ -133,12 +134,14 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
     const double size = std::max(normal_force, 1e-300);
     double stiffness = -n.dot(slope * n);
     if (!(stiffness > 0)) stiffness = size / pair.radius;
-    spring.contact.depth = size / stiffness;
     // Along the shell its force changes by that of its length, too.
     spring.contact.dn_dc = (slope + stiffness * n * n.transpose()) / size;
-    NormalLaw linear;
-    linear.law = ImpactLaw({stiffness, 1, 0, 1});
-    contact_slopes(linear, pair.friction, relaxation, spring, out);
+    // A power of the depth with this force and this stiffness there.
+    const double depth = row.depth, exponent = stiffness * depth / size;
+    NormalLaw power;
+    power.law = ImpactLaw({size / std::pow(depth, exponent), exponent, 0, 1});
+    spring.disc_radius = 2 * pair.disc_radius();
+    contact_slopes(power, pair.friction, relaxation, spring, out);
     out.wrench.tail<3>() += (center_ - row.center).cross(force);
   } else {
     out.wrench << force, center_.cross(force);

@@ -33,6 +33,8 @@ class Quantity:
     unit: str
     at: Callable[[Result, Array], Array]
     """Its values (n,) in a result at the times (n,) [s]; nan before the first one."""
+    slopes: Callable[[Result, Array], Array] | None = None
+    """Its derivatives (n, p) by what the result has sensitivities of; None: by differences only."""
 
 
 def quantities_of(built: Built) -> dict[str, Quantity]:
@@ -78,6 +80,16 @@ def _at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:
     return at
 
 
+def _slopes_at_rows(of: Callable[[Result], Array]) -> Callable[[Result, Array], Array]:
+    """Interpolate rows (n, p) as `_at_rows` does."""
+
+    def at(result: Result, t: Array) -> Array:
+        rows = of(result)
+        return np.column_stack([np.interp(t, result.t, rows[:, k]) for k in range(rows.shape[1])])
+
+    return at
+
+
 def _of_joints(built: Built) -> list[Quantity]:
     model, out = built.scene.model, []
     for k in range(1, model.njoints):
@@ -86,12 +98,19 @@ def _of_joints(built: Built) -> list[Quantity]:
             for i in range(count):
                 label = f"{kind}.{name}.{i}" if count > 1 else f"{kind}.{name}"
                 unit = unit_of(joint.shortname(), kind, i)
-                out.append(Quantity(label, unit, _at_rows(_state(kind, first + i))))
+                # A coordinate whose rate is its speed has the derivatives of the tangent space.
+                plain = kind == "v" or joint.nq == joint.nv
+                moved = _slopes_at_rows(_state_slopes(kind, joint.idx_v + i)) if plain else None
+                out.append(Quantity(label, unit, _at_rows(_state(kind, first + i)), moved))
     return out
 
 
 def _state(kind: str, column: int) -> Callable[[Result], Array]:
     return lambda result: np.asarray(getattr(result, kind)[:, column])
+
+
+def _state_slopes(kind: str, column: int) -> Callable[[Result], Array]:
+    return lambda result: np.asarray(getattr(result.sensitivities, kind)[:, column])
 
 
 def unit_of(joint: str, kind: str, index: int) -> str:
@@ -116,7 +135,9 @@ def _of_pairs(built: Built) -> list[Quantity]:
         names = {"normal_force": "N", "depth": "m"}
         names |= {f"{part}_{a}": "N" for part in ("force", "friction_force") for a in "xyz"}
         for name, unit in names.items():
-            out.append(Quantity(f"pairs.{pair.name}.{name}", unit, _at_rows(_of_pair(k, name))))
+            moved = _slopes_at_rows(_pair_slopes(k, name))
+            label = f"pairs.{pair.name}.{name}"
+            out.append(Quantity(label, unit, _at_rows(_of_pair(k, name)), moved))
     return out
 
 
@@ -136,6 +157,34 @@ def _of_pair(pair: int, name: str) -> Callable[[Result], Array]:
             forces = contacts.force_world if part == "force" else contacts.friction_force_world
             values = forces[:, axis]
         np.add.at(whole, contacts.row, values)
+        return whole
+
+    return of
+
+
+def _pair_slopes(pair: int, name: str) -> Callable[[Result], Array]:
+    """Return the derivatives of `_of_pair`'s rows."""
+
+    def of(result: Result) -> Array:
+        seen, log = result.sensitivities, result.contacts
+        assert seen is not None
+        keep = np.flatnonzero(log.pair == pair)
+        rows = log.row[keep]
+        whole = np.zeros((len(result.t), len(seen.parameters)))
+        if name == "depth":
+            # The deepest contact of a row comes last.
+            order = np.lexsort((log.depth[keep], rows))
+            whole[rows[order]] = seen.depth[keep[order]]
+            return whole
+        normal = seen.normal_force[keep]
+        if name == "normal_force":
+            values = normal
+        else:
+            part, axis = name[:-2], "xyz".index(name[-1])
+            values = seen.force_world[keep, axis]
+            if part == "friction_force":
+                values = values - normal * log.normal_world[keep, axis, None]
+        np.add.at(whole, rows, values)
         return whole
 
     return of

@@ -74,10 +74,7 @@ void Linearization::add_differences(const Parameter& parameter, const ActiveCont
     const Pair& pair = sign > 0 ? parameter.more : parameter.less;
     const double share = sign / (2 * parameter.step), relaxation = scene_.relaxation(pair);
     ContactSite other = site;
-    if (active.row >= 0 && parameter.kind == Kind::Field) {
-      answer.wrench += share * foundation_wrench(scene_.foundation(active), pair, active.row, other,
-                                                 relaxation, other_slopes_);
-    } else if (active.row >= 0) {
+    if (active.row >= 0) {
       FoundationPair foundation;
       std::vector<Contact> contacts;
       foundation.find(pair, site.place, true, contacts);
