@@ -240,8 +240,8 @@ def dissipation_for(restitution: float, speed: float) -> float:
 
     def excess(x: float) -> float:
         if x < 0.1:
-            powers = ((restitution**n - (-1) ** n) / n * x ** (n - 2) for n in range(3, 20))
-            return (restitution - 1) * (restitution + 1) / 2 + sum(powers)
+            powers = ((restitution**n - (-1.0) ** n) / n * x ** (n - 2) for n in range(3, 20))
+            return math.fsum(((restitution - 1) * (restitution + 1) / 2, *powers))
         y = restitution * x
         return (-y - math.log1p(-y)) - (x - math.log1p(x))
 

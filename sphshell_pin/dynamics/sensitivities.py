@@ -58,8 +58,10 @@ class Sensitivities:
         `figure` gets results whose rows q, v and contacts are moved a little along each column; it
         is differenced between them. What is no row has no derivative here: `stats`, `events`,
         `energy`, `sensors` and `patches` raise ResultError. A result that was loaded has no scene,
-        and its q cannot be moved (ResultError).
+        and its q cannot be moved (ResultError). InvalidParameter for what returns no number.
         """
+        if not callable(figure):
+            raise InvalidParameter("figure", figure, "must be a function of a Result")
         return np.array([self._of(figure, k) for k in range(len(self.parameters))])
 
     def _of(self, figure: Callable[[Result], float], column: int) -> float:
@@ -75,8 +77,8 @@ class Sensitivities:
         if max(sizes) == 0:
             return 0.0
         step = _STEP / max(sizes)
-        more, less = (figure(self._moved(result, column, sign * step)) for sign in (1, -1))
-        return (float(more) - float(less)) / (2 * step)
+        more, less = (_number(figure(self._moved(result, column, sign * step))) for sign in (1, -1))
+        return (more - less) / (2 * step)
 
     def _moved(self, result: Result, column: int, step: float) -> Result:
         if result.scene is None:
@@ -119,6 +121,14 @@ class _NoRow:
         )
 
     __getattr__ = __getitem__ = __iter__ = __len__ = _refuse
+
+
+def _number(value: object) -> float:
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        given = f"returned {type(value).__name__},"
+        raise InvalidParameter("figure", value, "must return a number", given) from None
 
 
 def _largest(values: Array) -> float:

@@ -121,15 +121,16 @@ class Simulation:
             if ctrl_c.pressed and core.progress < 1:
                 raise KeyboardInterrupt
 
+        def so_far() -> Result:
+            result = result_of(self.scene, self.integrator, core, core.take(), sensors)
+            return replace(result, sensitivity_rows=asked.rows(core)) if asked else result
+
         try:
             with ctrl_c:
                 status = advance(core, glance=glance)
         except KeyboardInterrupt:
-            result = result_of(self.scene, self.integrator, core, core.take(), sensors)
-            raise Interrupted(core.time, result) from None
-        result = result_of(self.scene, self.integrator, core, core.take(), sensors)
-        if asked:
-            result = replace(result, sensitivity_rows=asked.rows(core))
+            raise Interrupted(core.time, so_far()) from None
+        result = so_far()
         reason = why_ended(status, core, self.scene)
         if reason is not None:
             raise SimulationDiverged(core.time, reason, result)

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
+from sphshell_pin.errors import Interrupted, InvalidParameter, NameNotFound, ResultError
 from tests import differences, meshes, models
 from tests.dynamics.test_contact_derivatives import FRICTIONS
 from tests.sensitivities import (
@@ -344,6 +344,29 @@ def test_a_figure_of_what_has_no_derivative_is_refused() -> None:
     assert got is not None
     with pytest.raises(ResultError, match="energy"):
         got.of(lambda result: float(result.energy.kinetic[-1]))
+
+
+def test_a_figure_that_is_no_number_is_refused() -> None:
+    got = drop(IMPACT, duration=0.03).run(names=["v0"]).sensitivities
+    assert got is not None
+    with pytest.raises(InvalidParameter, match="figure returned ndarray, must return a number"):
+        got.of(lambda result: result.q)  # type: ignore[arg-type, return-value]
+    with pytest.raises(InvalidParameter, match="must be a function"):
+        got.of(3.0)  # type: ignore[arg-type]
+
+
+def test_an_interrupted_run_has_those_of_its_rows() -> None:
+    case = drop(IMPACT, duration=0.03)
+    simulation = sp.Simulation(case.scene, sp.RungeKutta4(1e-4))
+
+    def stop(share: float) -> None:
+        if share > 0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted) as stopped:
+        simulation.run(case.q0, case.v0, 100.0, sensitivities=["v0"], progress=stop)
+    result = stopped.value.result
+    assert result.sensitivities.q.shape == (len(result.t), case.scene.model.nv, case.scene.model.nv)
 
 
 def test_they_are_pickled() -> None:
