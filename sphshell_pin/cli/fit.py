@@ -145,8 +145,8 @@ def _bar() -> Iterator[Callable[[int, float], object]]:
     """Show on a terminal how many runs were made, and how far they are from the data."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    told = TextColumn("{task.completed} runs, misfit {task.fields[misfit]}")
-    bar = progress_bar(SpinnerColumn(), told, TimeElapsedColumn())
+    status = TextColumn("{task.completed} runs, misfit {task.fields[misfit]}")
+    bar = progress_bar(SpinnerColumn(), status, TimeElapsedColumn())
     with bar:
         task = bar.add_task("fit", total=None, misfit="-")
 

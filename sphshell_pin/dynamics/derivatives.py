@@ -116,8 +116,8 @@ def core_parameters(
 ) -> list[_core.Parameter]:
     """Return what the compiled core needs to know of each column.
 
-    `start`: q (nq,), v (nv,) by which bristles are told how fast an impact is, as of the run or
-    state that is differentiated; None where they are not told.
+    `start`: q (nq,), v (nv,) of the run or state that is differentiated, from which bristles take
+    how fast an impact is; None where they do not.
     """
     return [_core_parameter(scene, column, start) for column in columns]
 

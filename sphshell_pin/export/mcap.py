@@ -101,8 +101,8 @@ def write_mcap(
                     if kind not in schemas:
                         text = schema_of(kind).encode()
                         schemas[kind] = writer.register_schema(full_name(kind), "ros2msg", text)
-                    told = {"offered_qos_profiles": _LATCHED} if latched else {}
-                    channels[topic] = writer.register_channel(topic, "cdr", schemas[kind], told)
+                    metadata = {"offered_qos_profiles": _LATCHED} if latched else {}
+                    channels[topic] = writer.register_channel(topic, "cdr", schemas[kind], metadata)
                 counts[topic] = counts.get(topic, -1) + 1
                 data = encode(kind, message)
                 writer.add_message(channels[topic], logged, data, published, counts[topic])

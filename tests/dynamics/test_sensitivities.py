@@ -195,6 +195,23 @@ def test_a_controller_of_the_users_own(integrator: str) -> None:
     case.check([f"{PAIR}.law.stiffness", "v0"])
 
 
+@pytest.mark.parametrize("integrator", ["adaptive", "implicit"])
+def test_torques_that_jump_at_the_touch(integrator: str) -> None:
+    """The acceleration jumps there; so do the derivatives of v."""
+    model = pin.Model()
+    slide = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "slide")
+    model.appendBodyToJoint(slide, pin.Inertia.FromSphere(0.3, R), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", slide, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    scene = sp.Scene(model)
+    scene.add_contact(sp.Sphere(R, "ball"), models.plate(1.0), law=HUNT, name="ball")
+
+    def tau(t: float, q: Array, v: Array, contacts: sp.dynamics.SceneContacts) -> Array:
+        return np.array([4.0 + 2.0 * v[0] if len(contacts.depth) else 0.5])
+
+    case = Case(scene, [R + 0.004], [-0.3], 0.06, INTEGRATORS[integrator], controller=tau)
+    case.check(["q0", "v0", "ball.law.stiffness", "ball.sphere.radius"], bounces=1)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(1e-4), sp.Adaptive(1e-9)], ids=str)
 def test_the_panda_on_the_blade(integrator: object) -> None:

@@ -23,15 +23,15 @@ def call(*arguments):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
-    told = call("run", write(folder), "--out", folder / "drop", "--no-recording")
-    assert told.exit_code == 0, told.output
+    printed = call("run", write(folder), "--out", folder / "drop", "--no-recording")
+    assert printed.exit_code == 0, printed.output
     return folder
 
 
 def test_files_are_written_beside_the_run(folder, monkeypatch):
     monkeypatch.chdir(folder)
-    told = call("export", "drop", "--to", "mcap", "--start", "2026-11-22T21:00:00.5Z")
-    assert (told.exit_code, told.stdout) == (0, "drop.mcap\n"), told.output
+    printed = call("export", "drop", "--to", "mcap", "--start", "2026-11-22T21:00:00.5Z")
+    assert (printed.exit_code, printed.stdout) == (0, "drop.mcap\n"), printed.output
     with open("drop.mcap", "rb") as stream:
         reader = make_reader(stream)
         assert reader.get_summary().statistics.message_start_time == 1795381200_500_000_000
@@ -40,9 +40,9 @@ def test_files_are_written_beside_the_run(folder, monkeypatch):
     assert about["command"] == command
     assert Path(about["scenario"]).name == "drop.toml"
     for format in ("csv", "parquet"):
-        told = call("export", "drop/run.npz", "--to", format)
-        assert told.exit_code == 0, told.output
-        assert told.stdout.split()[0] == f"drop_{format}/rows.{format}"
+        printed = call("export", "drop/run.npz", "--to", format)
+        assert printed.exit_code == 0, printed.output
+        assert printed.stdout.split()[0] == f"drop_{format}/rows.{format}"
     assert "q.root_joint.2 [m]" in Path("drop_csv/rows.csv").read_text().partition("\n")[0]
 
 
@@ -80,21 +80,21 @@ def test_faults(folder, tmp_path, monkeypatch):
         (["drop", "--to", "csv", "--scenario", "gear_contact"], "its model had nq = 7"),
         (["drop", "--to", "mcap", "--out", "drop.toml/x.mcap"], "cannot be written"),
     ):
-        told = call("export", *arguments)
-        assert (told.exit_code, told.stderr.count("\n")) == (2, 1), told.output
-        assert words in told.stderr
-        assert told.stdout == ""
+        printed = call("export", *arguments)
+        assert (printed.exit_code, printed.stderr.count("\n")) == (2, 1), printed.output
+        assert words in printed.stderr
+        assert printed.stdout == ""
 
 
 def test_without_a_scenario_a_run_has_numbered_joints(folder, tmp_path):
     run = tmp_path / "own.npz"
     replace(sp.Result.load(folder / "drop" / "run.npz"), origin=None).save(run)
-    told = call("export", run, "--to", "csv")
-    assert told.exit_code == 0
-    assert "warning: joints have numbers instead of names" in told.stderr
+    printed = call("export", run, "--to", "csv")
+    assert printed.exit_code == 0
+    assert "warning: joints have numbers instead of names" in printed.stderr
     assert (tmp_path / "own_csv" / "rows.csv").read_text().startswith("t [s],q.0,q.1")
-    told = call("export", run, "--to", "mcap")
-    assert told.exit_code == 2
-    assert "give its scenario with --scenario" in told.stderr
-    told = call("export", run, "--to", "mcap", "--scenario", folder / "drop.toml")
-    assert (told.exit_code, told.stdout.strip()) == (0, str(tmp_path / "own.mcap"))
+    printed = call("export", run, "--to", "mcap")
+    assert printed.exit_code == 2
+    assert "give its scenario with --scenario" in printed.stderr
+    printed = call("export", run, "--to", "mcap", "--scenario", folder / "drop.toml")
+    assert (printed.exit_code, printed.stdout.strip()) == (0, str(tmp_path / "own.mcap"))

@@ -47,10 +47,10 @@ def call(scenario: Path, out: Path, options: list[str], kill_at: int | None = No
             time.sleep(0.2)
         if kill_at is not None:
             process.kill()
-        told, _ = process.communicate()
+        printed, _ = process.communicate()
     if kill_at is None:
-        assert process.returncode == 0, told
-        print(told.splitlines()[0])
+        assert process.returncode == 0, printed
+        print(printed.splitlines()[0])
 
 
 def killed_and_resumed(scenario: Path, options: list[str], runs: int) -> bool:

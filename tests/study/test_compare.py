@@ -165,8 +165,8 @@ def call(*arguments):
 def drop(folder, name, **changes):
     out = folder / name
     set_ = [f"--set={key.replace('__', '.')}={value}" for key, value in changes.items()]
-    told = call("run", write(folder), "--out", out, "--no-recording", *set_)
-    assert told.exit_code == 0, told.output
+    printed = call("run", write(folder), "--out", out, "--no-recording", *set_)
+    assert printed.exit_code == 0, printed.output
     return out
 
 
@@ -174,10 +174,10 @@ def test_the_command_prints_differences_and_writes_them(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     soft = drop(tmp_path, "soft")
     stiff = drop(tmp_path, "stiff", run__dt="5e-5", run__duration="0.04")
-    told = call("compare", soft, stiff / "run.npz", "--out", tmp_path / "both")
-    assert told.exit_code == 0, told.output
+    printed = call("compare", soft, stiff / "run.npz", "--out", tmp_path / "both")
+    assert printed.exit_code == 0, printed.output
     for words in ("stiff beside soft", "run.duration", "pairs.ball-plate.peak_force [N]", " %"):
-        assert words in told.output
+        assert words in printed.output
     assert {one.name for one in (tmp_path / "both").iterdir()} == {
         "figures.csv",
         "curves.csv",
@@ -191,28 +191,28 @@ def test_the_command_prints_differences_and_writes_them(tmp_path, monkeypatch):
     ]
     (line,) = (one for one in lines if one.startswith("pairs.ball-plate.peak_force,"))
     assert [float(one) for one in line.split(",")[2:4]] == peaks
-    told = call("compare", soft, soft, "--out", tmp_path / "same", "--no-picture")
-    assert told.exit_code == 0
-    assert "equal to the last bit" in told.output
-    assert "figure" not in told.output.partition("equal to")[0]
+    printed = call("compare", soft, soft, "--out", tmp_path / "same", "--no-picture")
+    assert printed.exit_code == 0
+    assert "equal to the last bit" in printed.output
+    assert "figure" not in printed.output.partition("equal to")[0]
 
 
 def test_faults_of_compare(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     soft = drop(tmp_path, "soft")
-    told = call("compare", soft)
-    assert told.exit_code == 2
-    assert "two at least" in told.stderr
-    told = call("compare", soft, tmp_path / "none")
-    assert (told.exit_code, told.stderr.count("\n")) == (2, 1)
-    assert "none" in told.stderr
+    printed = call("compare", soft)
+    assert printed.exit_code == 2
+    assert "two at least" in printed.stderr
+    printed = call("compare", soft, tmp_path / "none")
+    assert (printed.exit_code, printed.stderr.count("\n")) == (2, 1)
+    assert "none" in printed.stderr
     (tmp_path / "bad.npz").write_bytes((soft / "run.npz").read_bytes()[:2000])
-    told = call("compare", soft, tmp_path / "bad.npz")
-    assert (told.exit_code, told.stderr.count("\n")) == (2, 1)
-    assert "bad.npz: is not a file that Result.save wrote" in told.stderr
+    printed = call("compare", soft, tmp_path / "bad.npz")
+    assert (printed.exit_code, printed.stderr.count("\n")) == (2, 1)
+    assert "bad.npz: is not a file that Result.save wrote" in printed.stderr
     other = DROP.replace("ball-plate", "elsewhere")
     assert call("run", write(tmp_path, other), "--out", "other", "--no-recording").exit_code == 0
-    told = call("compare", soft, "other", "--out", "x", "--no-picture")
-    assert told.exit_code == 0
-    assert "in soft alone: contact ball-plate" in told.output
-    assert "in other alone: contact elsewhere" in told.output
+    printed = call("compare", soft, "other", "--out", "x", "--no-picture")
+    assert printed.exit_code == 0
+    assert "in soft alone: contact ball-plate" in printed.output
+    assert "in other alone: contact elsewhere" in printed.output

@@ -90,13 +90,13 @@ def test_exact_data_give_back_the_values(bounce):
     t = np.linspace(0.0, 0.12, 301)
     data = {"t [s]": t, **columns_of(bounce, t, [FORCE, "pairs.tip.force_x"])}
     start = {STIFFNESS: 7e4, DISSIPATION: 0.4, FRICTION: 0.15}
-    told = []
+    counts = []
     found = sp.fit(
-        bounce, data, list(TRUTH), changes=start, progress=lambda runs, misfit: told.append(runs)
+        bounce, data, list(TRUTH), changes=start, progress=lambda runs, misfit: counts.append(runs)
     )
     assert found.converged
     assert list(found.values.values()) == pytest.approx(list(TRUTH.values()), rel=1e-4)
-    assert told == list(range(1, found.runs + 1))
+    assert counts == list(range(1, found.runs + 1))
     assert not found.remarks
 
 
@@ -139,7 +139,7 @@ def test_damping_cannot_be_seen_at_rest(bounce, name):
     assert found[STIFFNESS].determined
 
 
-def test_what_no_column_feels_is_told(bounce):
+def test_what_no_column_feels_is_said(bounce):
     t = np.linspace(0.0, 0.2, 101)
     data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
     found = sp.fit(bounce, data, [STIFFNESS, FRICTION])
@@ -152,7 +152,7 @@ def test_what_no_column_feels_is_told(bounce):
     assert np.isnan(found.correlation[0, 1])
 
 
-def test_two_that_act_as_one_are_told_together(bounce, tmp_path):
+def test_two_that_act_as_one_are_named_together(bounce, tmp_path):
     """Hertz's law has both moduli in 1/E* = (1 - nu^2) (1 / E1 + 1 / E2) alone."""
     law = '{ type = "hertz", young_1 = 1e6, poisson_1 = 0.4, young_2 = 2e6, poisson_2 = 0.4 }'
     path = tmp_path / "two.toml"
@@ -170,7 +170,7 @@ def test_two_that_act_as_one_are_told_together(bounce, tmp_path):
     assert sp.fit(path, data, keys[:1]).determined
 
 
-def test_a_value_at_its_bound_is_told(bounce):
+def test_a_value_at_its_bound_is_said(bounce):
     t = np.linspace(0.0, 0.2, 401)
     data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
     found = sp.fit(
@@ -186,7 +186,7 @@ def test_a_value_at_its_bound_is_told(bounce):
     assert any("stands at its bound, 0.35 s/m" in one for one in found.remarks)
 
 
-def test_residuals_that_are_not_noise_are_told(bounce):
+def test_residuals_that_are_not_noise_are_said(bounce):
     t = np.linspace(0.0, 0.1, 401)
     columns = columns_of(bounce, t, [FORCE])
     (name, force), *_ = columns.items()
@@ -198,14 +198,14 @@ def test_residuals_that_are_not_noise_are_told(bounce):
     assert not found.remarks
 
 
-def test_wrong_deviations_are_told(bounce):
+def test_wrong_deviations_are_said(bounce):
     t = np.linspace(0.0, 0.1, 201)
     columns = noisy(columns_of(bounce, t, [FORCE]), 0.02)
     largest = float(np.max(next(iter(columns.values()))))
     data = {"t [s]": t, **columns}
     assert not sp.fit(bounce, data, [STIFFNESS], sigma={FORCE: 0.02 * largest}).remarks
-    (told,) = sp.fit(bounce, data, [STIFFNESS], sigma={FORCE: 0.01 * largest}).remarks
-    assert "times the standard deviations that were given" in told
+    (remark,) = sp.fit(bounce, data, [STIFFNESS], sigma={FORCE: 0.01 * largest}).remarks
+    assert "times the standard deviations that were given" in remark
 
 
 def test_experiments_of_their_own_settings_are_fitted_together(bounce):
@@ -265,7 +265,7 @@ def test_the_run_at_the_start_must_succeed(bounce):
     assert caught.value.__notes__ == ["this is the run at the start values"]
 
 
-def test_what_is_seen_is_told_from_the_error_of_slopes():
+def test_what_is_seen_stands_out_from_the_error_of_slopes():
     """Whatever the units; columns that are parallel but for less than the error are one."""
     rng = np.random.default_rng(0)
     jacobian = rng.normal(size=(50, 3)) * [1.0, 1e6, 1e-6]

@@ -210,9 +210,11 @@ void Simulation::accept() {
     const KeptCuts kept(cut_);
     sensors_->add_fixed(scene_, *this, stepping_.state(), stepping_.next(), settings_.dt, push_);
   }
-  if (sensitivities_)
-    sensitivities_->accept(stepping_.state(), stepping_.next(),
-                           (settings_.dt == 0 || stepping_.fine()) && stepping_.at_event());
+  if (sensitivities_) {
+    const KeptCuts kept(cut_);
+    const bool controlled = settings_.dt == 0 || stepping_.fine();
+    sensitivities_->accept(stepping_.next(), controlled && stepping_.at_event());
+  }
   stepping_.accept();
   recorder_.add_step(scene_, time(), time() - before);
   recorder_.add_limits(scene_, v(), cut_, time(), time() - before);

@@ -52,20 +52,20 @@ class Trial:
 class Runs:
     """All experiments as one function of x: (N,) predicted values, experiment by experiment.
 
-    `count` is how many runs were made, `told` is called with it after each.
+    `count` is how many runs were made, `progress` is called with it after each.
     """
 
     def __init__(
         self,
         trials: Sequence[Trial],
         free: Sequence[Free],
-        told: Callable[[int], object] | None = None,
+        progress: Callable[[int], object] | None = None,
     ) -> None:
         self.trials = tuple(trials)
         self.free = tuple(free)
         self.count = 0
         self.failure: SphshellError | None = None
-        self._told = told
+        self._progress = progress
         self._known: dict[bytes, Array] = {}
         # Differences of a few parameters take fewer runs than sensitivities cost.
         enough = len(self.free) > COST_OF_SENSITIVITIES
@@ -106,7 +106,7 @@ class Runs:
         # The user's own functions are loaded anew: what they remember must not reach another run.
         before = replace(trial.built, functions={}) if trial.built.functions else trial.built
         with warnings.catch_warnings():
-            for kind in (WeakLawWarning, SetupWarning, UnitWarning):  # told of the fitted values
+            for kind in (WeakLawWarning, SetupWarning, UnitWarning):  # said of the fitted values
                 warnings.simplefilter("ignore", kind)
             scenario = change_scenario(trial.built.scenario, texts, trial.built.path)
             built = build_scenario(scenario, trial.built.path, before)
@@ -126,8 +126,8 @@ class Runs:
                 record_dt=trial.row_step or None,
                 sensitivities=tuple(sensitivities),
             )
-        if self._told is not None:
-            self._told(self.count)
+        if self._progress is not None:
+            self._progress(self.count)
         return result
 
     def _run(self, trial: Trial, x: Array) -> Array:

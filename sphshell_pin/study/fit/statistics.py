@@ -47,7 +47,7 @@ def spread_of(jacobian: Array, error: Array) -> Spread:
     A column that is not longer than twice its error says nothing of its parameter. The others are
     brought to one length, which leaves the condition about as good as any lengths can (van der
     Sluis, Numer. Math. 14 (1969) 14). By Weyl's theorem a singular value below the norm of the
-    error cannot be told from 0: the data say nothing along its vector. By Wedin's theorem such
+    error may be 0: the data say nothing along its vector. By Wedin's theorem such
     vectors are known to an angle of the error over the gap to the other singular values; a
     parameter that takes part in one by more than that is not determined.
 

@@ -6,8 +6,6 @@
 namespace sphshell {
 namespace {
 
-using pinocchio::Motion;
-
 // The motion that a twist gives to a place.
 Vec3 motion_of(const Vector6& twist, const Vec3& place) {
   return twist.head<3>() + twist.tail<3>().cross(place);
@@ -44,7 +42,7 @@ Linearization::Answer Linearization::answer_of(const Parameter& parameter,
     } else {
       out.moved[parameter.axis] = 1;
       moved = -motion_of(out.moved, site.place);
-      twist = -Motion(out.moved).cross(Motion(site.twist)).toVector();
+      twist = -pinocchio::Motion(out.moved).cross(pinocchio::Motion(site.twist)).toVector();
     }
     out.wrench = slopes_.by_place * moved + slopes_.by_twist * twist;
     out.depth = slopes_.depth_by_place * moved;
@@ -113,7 +111,8 @@ void Linearization::add_parameters(const ActiveContact& active, const ContactSit
     const Answer answer = answer_of(parameters_[c], active, site);
     for (int m = 0; m < chain.size(); ++m) {
       const auto axis = chain.axes().col(m);
-      const Vector6 axis_moved = -Motion(answer.moved).cross(Motion(axis)).toVector();
+      const Vector6 axis_moved =
+          -pinocchio::Motion(answer.moved).cross(pinocchio::Motion(axis)).toVector();
       by_parameters_(chain.velocity(m), c) +=
           axis.dot(answer.wrench) + axis_moved.dot(slopes_.wrench);
     }

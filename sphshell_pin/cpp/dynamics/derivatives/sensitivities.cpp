@@ -13,6 +13,9 @@ namespace {
 constexpr double kJustBegun = 1e-2;
 // Stretches are differenced by this share of their size.
 constexpr double kStretchDifference = 1e-4;
+// A state just before the event at the end of a step, as a share of it; what an acceleration
+// changes there at least, where it jumps, relative to its size and to the velocity over 1 s.
+constexpr double kBefore = 1 - 1e-5, kJump = 1e-3;
 
 // The change of what has `slopes` by (u, v, z, parameters).
 MatrixX applied(const MatrixX& slopes, const Tangent& by, Eigen::Index parameters) {
@@ -55,17 +58,70 @@ void Sensitivities::step(Chart& chart, const Stepper& stepper, const State& from
   scene_.evaluate(to.q, to.v, to.z);
 }
 
-void Sensitivities::accept(const State& from, const State& to, bool located) {
-  chart_ = nullptr;
+void Sensitivities::accept(const State& to, bool located) {
   std::swap(now_, next_);
+  if (located) jump(to);
+  chart_ = nullptr;
   if (now_.z.rows() == 0) return;
-  if (located) begin_contacts(to, to.t - from.t);
+  if (located) begin_contacts(to);
   reorder_bristles(to.z);
+}
+
+// Forces begin and end with no depth, and torques that do not know of them go on: then nothing
+// jumps. Where the acceleration does, as by a controller that counts contacts, v changes by its
+// jump times the time by which the event comes earlier (Hiskens and Pai, IEEE Trans. Circuits
+// Syst. I 47 (2000) 204).
+void Sensitivities::jump(const State& to) {
+  Torques& torques = chart_->torques();
+  const auto acceleration = [&](const State& at) -> VectorX {
+    scene_.evaluate(at.q, at.v, at.z, true);
+    return scene_.acceleration(at.q, at.v, torques.torque(at.t, at.q, at.v));
+  };
+  State before;
+  VectorX y;
+  stepper_->interpolate(kBefore, y);
+  chart_->finish(to.t - (1 - kBefore) * h_, y, before);
+  const VectorX first = acceleration(before);
+  const std::vector<char> touching = touching_pairs();
+  const Eigen::RowVectorXd end = time_of(before, touching, true);
+  scene_.restart();
+  const VectorX last = acceleration(to);
+  // A step ends a little behind its event, where forces have grown by next to nothing.
+  if ((last - first).norm() < kJump * (first.norm() + last.norm() + to.v.norm())) return;
+  const Eigen::RowVectorXd begin = time_of(to, touching, false), &time = begin.size() ? begin : end;
+  if (time.size() > 0) now_.v += (first - last) * time;
+}
+
+std::vector<char> Sensitivities::touching_pairs() const {
+  std::vector<char> out;
+  for (const PairState& state : scene_.states()) out.push_back(state.count > 0);
+  return out;
+}
+
+// How the time changes at which the shallowest contact begins, of the pairs that did not touch, or
+// ends, of those that did; the scene is evaluated at the state. Empty where there is none.
+Eigen::RowVectorXd Sensitivities::time_of(const State& at, const std::vector<char>& touched,
+                                          bool ends) {
+  const std::vector<ActiveContact>& active = scene_.active();
+  std::size_t found = active.size();
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    if (static_cast<bool>(touched[active[i].pair]) != ends) continue;
+    if (found == active.size() || active[i].contact.depth < active[found].contact.depth) found = i;
+  }
+  if (found == active.size()) return {};
+  slopes_.linearization().contact_forces(at.q, at.v, contacts_);
+  std::vector<int> row_of;
+  scene_.rows_of_contacts(row_of);
+  const auto parameters = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
+  const auto row = contacts_.depth.row(row_of[found]);
+  const double rate = row.head(at.v.size()).dot(at.v);
+  if (rate == 0) return {};
+  return applied(row, now_, parameters) / -rate;
 }
 
 // The time of a touch changes with the parameters. A stretch that begins there with a rate jumps
 // from no change to that rate times the time by which it begins earlier.
-void Sensitivities::begin_contacts(const State& to, double h) {
+void Sensitivities::begin_contacts(const State& to) {
   const std::vector<ActiveContact>& active = scene_.active();
   const auto is_new = [&](const ActiveContact& one) { return one.slot >= 0 && scene_.is_new(one); };
   if (std::none_of(active.begin(), active.end(), is_new)) return;
@@ -77,7 +133,7 @@ void Sensitivities::begin_contacts(const State& to, double h) {
   for (std::size_t i = 0; i < active.size(); ++i) {
     if (!is_new(active[i])) continue;
     const double rate = contacts_.depth.row(row_of[i]).head(to.v.size()).dot(to.v);
-    if (!(rate > 0) || active[i].contact.depth > kJustBegun * rate * h) continue;
+    if (!(rate > 0) || active[i].contact.depth > kJustBegun * rate * h_) continue;
     const int rings = scene_.pairs()[active[i].pair].friction.rings();
     const Eigen::Index at = 3 * active[i].slot, size = 3 * rings;
     now_.z.middleRows(at, size) =

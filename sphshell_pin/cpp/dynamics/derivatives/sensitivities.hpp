@@ -25,8 +25,8 @@ class Sensitivities : public RowFollower {
   void hold(const TorqueAt& torque, const State& state);
   // A step was made to `to`, where it leaves the scene evaluated.
   void step(Chart& chart, const Stepper& stepper, const State& from, const State& to);
-  // The step is accepted next; `located`: contacts that are new in it began at its end.
-  void accept(const State& from, const State& to, bool located);
+  // The step is accepted next; `located`: it ends at an event.
+  void accept(const State& to, bool located);
   // A row of what is recorded. Leaves the scene evaluated there.
   void add_row(const State& state, double share) override;
 
@@ -35,7 +35,10 @@ class Sensitivities : public RowFollower {
   bool torques_remember() const { return slopes_.torques_remember(); }
 
  private:
-  void begin_contacts(const State& to, double h);
+  void jump(const State& to);
+  std::vector<char> touching_pairs() const;
+  Eigen::RowVectorXd time_of(const State& at, const std::vector<char>& touched, bool ends);
+  void begin_contacts(const State& to);
   void reorder_bristles(const VectorX& z);
 
   SceneData& scene_;

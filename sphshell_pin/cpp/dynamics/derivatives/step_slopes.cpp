@@ -68,53 +68,60 @@ void StepSlopes::torque_slopes(const TorqueAt& torque, double t, const VectorX& 
                                const VectorX& z) {
   const Eigen::Index nv = v.size();
   torque_slopes_.setZero(nv, 2 * nv + z.size());
-  const auto add = [&](Eigen::Index column, double share) {
-    scene_.evaluate(q_, v_, z_, true);
-    torque_slopes_.col(column) += share * torque(t, q_, v_);
-  };
   q_ = q, v_ = v, z_ = z;
   u_.setZero(nv);
   scene_.evaluate(q, v, z, true);
-  const VectorX before = torque(t, q, v);
-  for (const double sign : {1.0, -1.0}) {
-    const double share = sign / (2 * kTorqueDifference);
-    for (Eigen::Index k = 0; k < nv; ++k) {
-      u_[k] = sign * kTorqueDifference;
+  const VectorX rates = scene_.bristle_rates(), here = torque(t, q, v);
+  const std::size_t contacts = scene_.active().size();
+  // Torques may jump where a contact begins or ends: they are differenced on this side of it.
+  const auto difference = [&](Eigen::Index column, double step, const auto& move) {
+    VectorX sum = VectorX::Zero(nv);
+    double span = 0;
+    for (const double sign : {1.0, -1.0}) {
+      move(sign * step);
+      scene_.evaluate(q_, v_, z_, true);
+      if (scene_.active().size() != contacts) continue;
+      sum += sign * (torque(t, q_, v_) - here);
+      span += step;
+    }
+    move(0);
+    if (span > 0) torque_slopes_.col(column) = sum / span;
+  };
+  for (Eigen::Index k = 0; k < nv; ++k) {
+    difference(k, kTorqueDifference, [&](double step) {
+      u_[k] = step;
       scene_.body().integrate(q, u_, q_);
-      add(k, share);
       u_[k] = 0;
-    }
+    });
     q_ = q;
-    for (Eigen::Index k = 0; k < nv; ++k) {
-      const double scale = std::max(1.0, std::abs(v[k]));
-      v_[k] = v[k] + sign * kTorqueDifference * scale;
-      add(nv + k, share / scale);
-      v_[k] = v[k];
-    }
-    scene_.evaluate(q, v, z);
-    for (Eigen::Index k = 0; k < z.size(); ++k) {
-      // Slots without a contact change nothing.
-      if (scene_.bristle_rates()[k] == 0) continue;
-      const double scale = 1e-3;  // stretches are short
-      z_[k] = z[k] + sign * kTorqueDifference * scale;
-      add(2 * nv + k, share / scale);
-      z_[k] = z[k];
-    }
+    difference(nv + k, kTorqueDifference * std::max(1.0, std::abs(v[k])),
+               [&](double step) { v_[k] = v[k] + step; });
   }
+  // Slots without a contact change nothing; stretches are short.
+  for (Eigen::Index k = 0; k < z.size(); ++k)
+    if (rates[k] != 0)
+      difference(2 * nv + k, 1e-3 * kTorqueDifference, [&](double step) { z_[k] = z[k] + step; });
   // What a controller makes of forces that the parameters change at a held state.
   const std::vector<Parameter>& parameters = linearization_.parameters();
   torque_by_parameters_.setZero(nv, static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t c = 0; c < parameters.size(); ++c)
+  for (std::size_t c = 0; c < parameters.size(); ++c) {
+    const Parameter& one = parameters[c];
+    VectorX sum = VectorX::Zero(nv);
+    double span = 0;
     for (const double sign : {1.0, -1.0}) {
-      const Parameter& one = parameters[c];
       const auto [pair, step] = one.changed(scene_.pairs()[one.pair], sign, kTorqueDifference);
       const Pair kept = scene_.exchange(one.pair, pair);
       scene_.evaluate(q, v, z, true);
-      torque_by_parameters_.col(c) += sign / (2 * step) * torque(t, q, v);
+      if (scene_.active().size() == contacts) {
+        sum += sign * (torque(t, q, v) - here);
+        span += step;
+      }
       scene_.exchange(one.pair, kept);
     }
+    if (span > 0) torque_by_parameters_.col(c) = sum / span;
+  }
   scene_.evaluate(q, v, z, true);
-  if (torque(t, q, v) != before) remembers_ = true;
+  if (torque(t, q, v) != here) remembers_ = true;
 }
 
 MatrixX StepSlopes::held(const Tangent& at) const {
