@@ -34,7 +34,7 @@ void append(std::vector<double>& to, const MatrixX& rows) {
 }  // namespace
 
 Sensitivities::Sensitivities(SceneData& scene, SensitivitySettings settings)
-    : scene_(scene), slopes_(scene, std::move(settings.parameters)), by_v0_(settings.by_v0) {
+    : scene_(scene), slopes_(scene, std::move(settings.parameters)) {
   const Eigen::Index nv = scene.body().model().nv, nz = scene.bristle_size();
   const auto first = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
   const Eigen::Index last = first + (settings.by_q0 ? nv : 0);

@@ -1,6 +1,7 @@
 // How the motion of a run changes with parameters and with its start.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "dynamics/derivatives/step_slopes.hpp"
@@ -44,9 +45,8 @@ class Sensitivities : public RowFollower {
   SceneData& scene_;
   StepSlopes slopes_;
   Eigen::Index columns_;
-  bool by_v0_;
   Tangent now_, next_, between_;  // at the state; at the end of the step that was made
-  MatrixX torque_, forces_;
+  MatrixX torque_;                // held
   ContactForceSlopes contacts_;
   Chart* chart_ = nullptr;  // of the step that was made, until it is accepted
   const Stepper* stepper_ = nullptr;

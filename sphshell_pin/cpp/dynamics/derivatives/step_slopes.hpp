@@ -32,8 +32,7 @@ class StepSlopes {
   void rates(Chart& chart, double t, const VectorX& y, const Coordinates& by, Coordinates& out);
   // As carry(), from the rates of bristles at the chart's origin with another velocity.
   const MatrixX& bristle_rates(Chart& chart, const VectorX& v, const MatrixX& v_by);
-  // The changes at the origin; those of y there; back from those of y at the end.
-  const Tangent& origin() const { return *origin_; }
+  // The changes of y at the origin, and those of a state from those of y there.
   Coordinates at_origin() const;
   void finish(Chart& chart, const VectorX& y, const Coordinates& by, Tangent& out);
   // Moves the changes at the origin to the share of the step's dense output, by the Radau method of
