@@ -243,6 +243,22 @@ class JointPd(Controller):
 class PythonController(Controller):
     def __init__(self, callable: Callable[..., Any]) -> None: ...
 
+class Path:
+    def __init__(
+        self,
+        *,
+        along: Sequence[float],
+        points: _Doubles,
+        tangents: _Doubles,
+        normals: _Doubles,
+        times: Sequence[float],
+        places: Sequence[float],
+        speeds: Sequence[float],
+        accelerations: Sequence[float],
+        jerks: Sequence[float],
+        kinks: Sequence[float],
+    ) -> None: ...
+
 class CartesianImpedance(Controller):
     def __init__(
         self,
@@ -251,9 +267,7 @@ class CartesianImpedance(Controller):
         frame: _Doubles,
         path_joint: int,
         path_placement: _Doubles,
-        times: Sequence[float],
-        points: _Doubles,
-        normals: _Doubles,
+        path: Path,
         stiffness: float,
         damping: float,
         normal_force: float,
@@ -263,6 +277,7 @@ class CartesianImpedance(Controller):
         joint_damping: _Doubles,
         q_ref: _Doubles,
         actuated: _Doubles,
+        decoupled: bool,
     ) -> None: ...
 
 class RunSettings:
