@@ -57,7 +57,7 @@ def _load() -> None:
             f"sphshell_pin is not built in {folder}: build it there with pip install -e ., or "
             "start Python in another folder if it is installed"
         )
-    from sphshell_pin._built_against import VERSIONS as built
+    built = import_module("sphshell_pin._built_against").VERSIONS
 
     try:
         for name, _ in _LIBRARIES:
