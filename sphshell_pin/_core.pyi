@@ -12,9 +12,6 @@ _Ints = NDArray[np.int32]
 _Bytes = NDArray[np.uint8]
 _Longs = NDArray[np.int64]
 
-pinocchio_version: str
-coal_version: str
-
 _Columns = tuple[_Doubles, _Doubles, _Doubles, _Ints, _Bytes, _Doubles, _Doubles]
 
 class Shell:
