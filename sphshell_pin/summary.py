@@ -90,7 +90,7 @@ class Summarized:
         """Return the same, and more, as a table; it takes its colors from the page around it."""
         from html import escape
 
-        side = "text-align: left; padding: 0.1em 1.2em 0.1em 0; border: 0"
+        side = "text-align: left; padding: 0.1em 0.7em; border: 0"
         lines = "".join(
             f'<tr style="background: none"><th style="{side}; font-weight: normal; opacity: 0.7">'
             f'{escape(fact.label)}</th><td style="{side}">{escape(fact.shown)}</td></tr>'
