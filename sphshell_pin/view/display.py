@@ -272,12 +272,14 @@ def choose_view(
     normals_world: FloatArray | None = None,
     visual_model: pin.GeometryModel | None = None,
     reach: float = REACH,
+    direction: FloatArray | None = None,
 ) -> View:
     """Choose a camera for the `configurations` (n, nq) and the contacts seen in them, world [m].
 
     Without contacts the spheres are where things happen; without spheres, the joints. What is
-    farther away than `reach` times the size of that need not be in the picture. Raises
-    InvalidParameter for a `visual_model` that does not hang on the scene's joints.
+    farther away than `reach` times the size of that need not be in the picture. `direction` (3,)
+    leads from the target to the eye; without it, it is chosen. Raises InvalidParameter for a
+    `visual_model` that does not hang on the scene's joints.
     """
     model, data = scene.model, scene.model.createData()
     boxes = [
@@ -311,7 +313,8 @@ def choose_view(
     if touched and normals_world is not None:
         mean = normals_world.mean(axis=0)
         normal = mean / max(float(np.linalg.norm(mean)), 1e-9)
-    return View.of(action, np.array(around).reshape(-1, 3), normal, min(radii, default=0.02), reach)
+    radius = min(radii, default=0.02)
+    return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach, direction)
 
 
 def _geometry_boxes(
