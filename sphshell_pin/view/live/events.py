@@ -13,6 +13,7 @@ from sphshell_pin.errors import SphshellError
 LARGEST_MESSAGE = 16_384  # bytes
 LONGEST_TEXT = 200
 LARGEST_NUMBER = 1e12
+MOST_CURVES = 64  # that one browser may ask for
 
 Event = dict[str, Any]
 
@@ -70,6 +71,12 @@ def _direction(value: object) -> list[float]:
     return [one / length for one in numbers]
 
 
+def _keys(value: object) -> list[str]:
+    if not isinstance(value, list) or len(value) > MOST_CURVES:
+        raise BadMessage(f"must be a list of at most {MOST_CURVES} texts")
+    return [_text(one) for one in value]
+
+
 _Fields = dict[str, Callable[[object], object]]
 FIELDS: dict[str, _Fields] = {
     "run": {"on": _switch},
@@ -88,6 +95,8 @@ FIELDS: dict[str, _Fields] = {
     "show": {"part": _text, "on": _switch},
     "arrows": {"value": _not_negative},
     "look": {},
+    "charts": {"keys": _keys},
+    "keep": {},
     "seek": {"t": _number},
     "seen": {"frame": _number},
 }

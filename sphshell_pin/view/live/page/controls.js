@@ -16,6 +16,11 @@ export function number(value, digits = 4) {
   return String(Number(value.toPrecision(digits)));
 }
 
+export function fill(select, options) {
+  select.textContent = "";
+  for (const [value, text] of options) select.append(new Option(text, value));
+}
+
 // "N/m^1.5" with its exponent raised.
 export function write_unit(node, unit) {
   node.textContent = "";
