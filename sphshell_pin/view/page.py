@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from meshcat import Visualizer
 
 PARTS = Path(__file__).with_name("recording_page")
-STYLES = ("style.css",)
+STYLES = ("../live/page/palette.css", "style.css")
 SCRIPTS = ("replay.js", "cameras.js", "chart.js", "panel.js")
 # A mesh file this long may well be used by several links: it is stored once.
 SHARED_TEXT = 20_000

@@ -78,7 +78,7 @@ class Chart {
     pen.clearRect(0, 0, width, height);
     pen.font = "11px system-ui, 'Segoe UI', 'DejaVu Sans', sans-serif";
     const style = getComputedStyle(document.documentElement);
-    const color = (name) => style.getPropertyValue(`--${name}`).trim();
+    const color = (name) => style.getPropertyValue(`--${{ depth: "curve-1" }[name] || name}`).trim();
     const span = this.end - this.start || 1;
     const x = (t) => LEFT + ((t - this.start) / span) * (width - LEFT - RIGHT);
     const room = height - TOP - BOTTOM - GAP;
@@ -109,7 +109,7 @@ class Chart {
     pen.lineWidth = 1;
     for (let k = Math.ceil(this.start / tick - 1e-9); k * tick <= this.end + 1e-9 * tick; k += 1) {
       const at = Math.round(x(k * tick)) + 0.5;
-      pen.strokeStyle = color("line");
+      pen.strokeStyle = color("grid");
       pen.beginPath(); pen.moveTo(at, TOP); pen.lineTo(at, height - BOTTOM); pen.stroke();
       if (at > width - 46) continue;
       pen.fillStyle = color("faint");
@@ -135,7 +135,7 @@ class Chart {
     pen.textBaseline = "middle";
     for (let k = Math.round(low / step); k * step <= high * (1 + 1e-9); k += 1) {
       const at = Math.round(y(k * step)) + 0.5;
-      pen.strokeStyle = color(k === 0 ? "axis" : "line");
+      pen.strokeStyle = color(k === 0 ? "axis" : "grid");
       pen.beginPath(); pen.moveTo(LEFT, at); pen.lineTo(width - RIGHT, at); pen.stroke();
       pen.fillStyle = color("faint");
       pen.fillText(digits(k * step * factor, 9), LEFT - 6, at);

@@ -1,7 +1,6 @@
 // The panel: time, speed, cameras, what is shown, keys.
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4]; // of the pace that the recording was made at
 const LEAP = 10; // frames, with the shift key
-const BACKGROUND = { light: [[1, 1, 1], [0.8, 0.84, 0.88]], dark: [[0.16, 0.18, 0.21], [0.07, 0.08, 0.1]] };
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 const small = matchMedia("(max-width: 900px), (max-height: 600px)");
@@ -172,9 +171,11 @@ class Panel {
 
   follow_surroundings() {
     const paint = () => {
-      const [top, bottom] = BACKGROUND[dark.matches ? "dark" : "light"];
-      this.viewer.set_property(["Background"], "top_color", top);
-      this.viewer.set_property(["Background"], "bottom_color", bottom);
+      const style = getComputedStyle(document.documentElement);
+      for (const [property, name] of [["top_color", "sky"], ["bottom_color", "earth"]]) {
+        const color = style.getPropertyValue(`--${name}`).trim().match(/[0-9a-f]{2}/gi);
+        this.viewer.set_property(["Background"], property, color.map((part) => parseInt(part, 16) / 255));
+      }
       this.viewer.set_dirty();
       this.chart.draw();
     };
