@@ -274,6 +274,7 @@ def choose_view(
     normals_world: FloatArray | None = None,
     visual_model: pin.GeometryModel | None = None,
     reach: float = REACH,
+    direction: FloatArray | None = None,
     *,
     whole: bool = False,
 ) -> View:
@@ -281,8 +282,9 @@ def choose_view(
 
     Without contacts the spheres are where things happen; without spheres, the joints. What is
     farther away than `reach` times the size of that need not be in the picture; with `whole` all of
-    the robot is, and of the shells what is not far from it. Raises
-    InvalidParameter for a `visual_model` that does not hang on the scene's joints.
+    the robot is, and of the shells what is not far from it. `direction` (3,) leads from the target
+    to the eye; without it, it is chosen. Raises InvalidParameter for a `visual_model` that does not
+    hang on the scene's joints.
     """
     model, data = scene.model, scene.model.createData()
     boxes = [
@@ -335,7 +337,7 @@ def choose_view(
     if touched and normals_world is not None:
         mean = normals_world.mean(axis=0)
         normal = mean / max(float(np.linalg.norm(mean)), 1e-9)
-    return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach)
+    return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach, direction)
 
 
 def _geometry_boxes(
