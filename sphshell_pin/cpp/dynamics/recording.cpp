@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
+
+#include "dynamics/patch.hpp"
 
 namespace sphshell {
 
@@ -16,6 +19,13 @@ Recorder::Recorder(const SceneData& scene, double start, double end, double reco
   if (joints) limits_.resize(std::max(joints->most_effort.size(), joints->speed.size()));
   limit_status_.resize(limits_.size());
   if (patches) record_.patches.emplace();
+}
+
+void Recorder::record_patches(bool on) {
+  if (on == record_.patches.has_value()) return;
+  record_.patches.reset();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  if (on) record_.patches.emplace(record_.contacts.size(), unknown_patch(nan));
 }
 
 Record Recorder::take() {
