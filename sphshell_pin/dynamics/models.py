@@ -176,6 +176,7 @@ def apparent_mass(model: pin.Model, q: Array, joint: int, point: Array) -> float
     mass = np.triu(mass) + np.triu(mass, 1).T
     pin.computeJointJacobians(model, data, q)
     jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)
+    jacobian = jacobian.reshape(6, model.nv)  # of one velocity it comes as a vector
     moved = jacobian[:3] - pin.skew(point) @ jacobian[3:]
     mobility = float(np.trace(moved @ np.linalg.solve(mass, moved.T)))
     total = float(pin.computeTotalMass(model))

@@ -48,7 +48,9 @@ def targets_of(controller: AnyController, model: pin.Model, start: Array) -> tup
     return tuple(
         _target(model, joint, posture)
         for joint in list(model.joints)[1:]
-        if joint.nv == 1 and joint.nq <= 2 and pulled[joint.idx_v] > 0
+        if joint.nv == 1
+        and joint.nq <= 2
+        and pulled[joint.idx_v] > 0
         # A mimic joint has the coordinate of another one.
         and model.names[joint.id] not in follows
     )

@@ -152,7 +152,9 @@ def test_a_pull_outlives_a_change_and_ends_with_a_push() -> None:
     run.pull("ball", np.zeros(3), [0.0, 0.0, 1.0], 1e3, 60.0)
     run.advance(2.0)
     hung = run.snapshot().q[0, 2]
-    softer = models.on_plate(models.ball(), models.linear_law(1e4, 1.0), models.FRICTION, shell=PLATE)
+    softer = models.on_plate(
+        models.ball(), models.linear_law(1e4, 1.0), models.FRICTION, shell=PLATE
+    )
     assert run.change(softer)
     run.advance(0.1)
     assert run.snapshot().q[0, 2] == pytest.approx(hung, abs=1e-9)

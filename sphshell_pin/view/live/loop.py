@@ -21,6 +21,7 @@ from sphshell_pin.view.live.greeting import (
     check_speed,
     greeting,
 )
+from sphshell_pin.view.live.hands import Hands
 from sphshell_pin.view.live.panel import Panel, Strip, StripRow, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown, frame_point
 from sphshell_pin.view.live.server import Server
@@ -96,7 +97,9 @@ class Live:
         try:
             canvas = new_visualizer(self._foreign or self._window)
             self.picture = Picture(player, canvas)
-            self._panel.greet(greeting(player, framed))
+            own = self._window if self._foreign is None else None
+            self._hands = Hands(player, self.picture, own)
+            self._panel.greet(greeting(player, framed, self._hands.offer()))
             self.draw()
         except BaseException:
             self.server.stop()
@@ -206,7 +209,7 @@ class Live:
             try:
                 # A diverging run is reported in the panel, not on the terminal.
                 with np.errstate(all="ignore"):
-                    self.picture.update(self.player, self._push_shown())
+                    self.picture.update(self.player, self._push_shown(), self._hands.drag)
             except Exception as fault:
                 # A picture that fails is reported in the panel, which goes on.
                 self.fault = fault
@@ -239,7 +242,7 @@ class Live:
 
     def _advance(self, duration: float, wall: float) -> None:
         player = self.player
-        for event in self._holds.values():
+        for event in () if self._hands.dragging else self._holds.values():
             self._push(event, 1.5 * duration)
         before = player.time
         try:
@@ -297,11 +300,18 @@ class Live:
             case "hold":
                 self._check_body(event["body"])
                 self._holds[client] = event
+            case "drag":
+                self._hands.pull(client, event)
             case "release":
                 self._holds.pop(client, None)
+                self._hands.release(client)
+            case "target":
+                self._hands.aim(event)
             case "show":
                 if event["part"] not in LIVE_PARTS:
                     raise NameNotFound("part", event["part"], "the picture", LIVE_PARTS)
+                if event["part"] == "pressure":
+                    self._hands.record_patches(event["on"])
                 self.picture.show(event["part"], event["on"])
             case "arrows":
                 self.picture.magnify_arrows(min(max(event["value"], 1e-2), 1e2))
@@ -335,6 +345,7 @@ class Live:
     def _start_anew(self) -> None:
         self.fault = None
         self._pushed = None
+        self._hands.forget()
         self._ahead = 0.0
         self._start_strip()
         self.picture.clear()
@@ -400,10 +411,11 @@ class Live:
             "exchanged": exchanged,
             "ended": self._why_ended(),
             "parameters": self._parameter_values,
-            "show": self.picture.shown,
+            "show": self.picture.switches(player, self._hands.can_record_patches),
             "arrows": self.picture.magnification,
             "scale": str(self.picture.arrow_scale),
             "cut": self.picture.cut,
             "coloring": self.picture.display.coloring,
             "pressure": self.picture.pressure,
+            **self._hands.state(),
         }
