@@ -122,6 +122,14 @@ class OpenRun:
         return rows
 
     @one_at_a_time
+    def record_torques(self) -> None:
+        """Record the controller's torques from now on, as `record=["torque"]` does from the start.
+
+        Rows that were recorded before have nan.
+        """
+        self._core.record_torques()
+
+    @one_at_a_time
     def snapshot(self) -> Result:
         """Return the state where the run stands, as a result of one row."""
         return self._result(self._core.snapshot())

@@ -43,7 +43,8 @@ class Result:
     its cost, and figures of each pair over all steps; `scene` that ran
     (None after load); `origin` the scenario it came from (None without one); `sensors` the readings
     of each sensor by its name; `patch_rows` the patches of the contacts, None where they were not
-    recorded (see `patches`).
+    recorded (see `patches`); `torque` (n, nv) the controller's torques, cut to their limits [N m or
+    N], None unless the run recorded them: nan where a torque that is held was not known yet.
     """
 
     t: Array
@@ -59,6 +60,7 @@ class Result:
     sensors: Mapping[str, SensorLog] = field(default_factory=dict)
     patch_rows: Patches | None = None
     sensitivity_rows: Sensitivities | None = None
+    torque: Array | None = None
 
     @property
     def sensitivities(self) -> Sensitivities | None:
@@ -101,6 +103,7 @@ class Result:
             scene=scene,
             sensors=sensors.logs(whole),
             patch_rows=patches_of(whole["patches"]) if "patches" in whole else None,
+            torque=read_only(whole["torques"]) if "torques" in whole else None,
         )
 
     @property

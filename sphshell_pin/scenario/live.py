@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,14 @@ from sphshell_pin.scenario.drag import Drag, Dragged
 from sphshell_pin.scenario.knobs import Knob, knobs_of
 from sphshell_pin.scenario.player import Rows
 from sphshell_pin.scenario.reading import look_up
+from sphshell_pin.scenario.series import (
+    RESIDUAL,
+    Series,
+    force_series,
+    held,
+    motion_series,
+    sensor_series,
+)
 from sphshell_pin.scenario.targets import Target, aimed, check_aim, targets_of
 
 Array = npt.NDArray[np.float64]
@@ -55,6 +64,7 @@ class LiveRun:
         self._aims: dict[str, float] = {}
         self._targets: tuple[Target, ...] | None = None
         self._patches = "patch" in built.scenario.run.record
+        self._torques = False
         self._begin(self._open(built))
 
     def _begin(self, run: OpenRun) -> None:
@@ -63,6 +73,9 @@ class LiveRun:
         self._fault: str | None = None
         self._push: tuple[str, Array, float] | None = None
         self._drag: Drag | None = None
+        self._readings: dict[str, Array] = {}
+        if self._torques:
+            run.record_torques()
         self._row = run.snapshot()
         self._total = float(self._row.energy.total[0])
         self._exchanged = 0.0
@@ -156,6 +169,44 @@ class LiveRun:
         """Whether the patches of contacts can be switched on."""
         return True
 
+    @property
+    def series(self) -> tuple[Series, ...]:
+        """What charts can show of the run."""
+        sensors = {one.name: one.columns(self.scene) for one in self.built.simulation.sensors}
+        return (
+            *force_series([pair.name for pair in self.scene.pairs]),
+            *motion_series(self.scene.model, torque=self.built.controller is not None),
+            *sensor_series(sensors),
+            RESIDUAL,
+        )
+
+    @property
+    def now(self) -> Rows:
+        """The state of now as one row."""
+        return self._rows(self._row)
+
+    @one_at_a_time
+    def ask(self, sources: Collection[str]) -> None:
+        """Record these blocks of Rows from now on: "torque" is recorded only where it is asked for.
+
+        A controller whose torques are not held is asked for them at each row.
+        """
+        if "torque" in sources and not self._torques:
+            self._torques = True
+            self._run.record_torques()
+            self._row = self._run.snapshot()
+
+    def _rows(self, rows: Result) -> Rows:
+        more = {"q": rows.q, "v": rows.v, "residual": (rows.energy.total - self._total)[:, None]}
+        if rows.torque is not None:
+            more["torque"] = rows.torque
+        for name, log in rows.sensors.items():
+            more[f"sensor.{name}"] = held(log, rows.t, self._readings.get(name))
+            if len(log):
+                self._readings[name] = log.values[-1]
+        pairs = len(self.scene.pairs)
+        return Rows.of(rows.t, pairs, rows.contacts, rows.contacts.row, more)
+
     @one_at_a_time
     def advance(self, duration: float, wall: float = math.inf) -> Rows:
         """Go on for `duration` [s], or until `wall` [s] of computing are over; return the rows.
@@ -171,7 +222,7 @@ class LiveRun:
                 self._end_push()
         if self.time < until:
             pieces.append(self._advance(until - self.time, wall))
-        return _joined(pieces, len(self.scene.pairs))
+        return Rows.joined(pieces) if pieces else Rows.empty(len(self.scene.pairs))
 
     def _advance(self, duration: float, wall: float) -> Rows:
         pairs = len(self.scene.pairs)
@@ -186,7 +237,7 @@ class LiveRun:
             return Rows.empty(pairs)
         self._exchanged += _exchanged(self._row, rows, now)
         self._row = now
-        return Rows.of(rows.t, pairs, rows.contacts, rows.contacts.row)
+        return self._rows(rows)
 
     @one_at_a_time
     def reset(self) -> None:
@@ -194,8 +245,8 @@ class LiveRun:
         self._begin(self._open(self.built))
 
     @one_at_a_time
-    def change(self, key: str, value: float) -> None:
-        """Set the number at the dotted `key` of the scenario.
+    def change(self, key: str, value: float | str) -> None:
+        """Set the number, or a word of a knob with choices, at the dotted `key` of the scenario.
 
         Raises
         ------
@@ -210,9 +261,14 @@ class LiveRun:
             why = "is too large or too small to compute with"
             raise InvalidParameter(key, value, why) from None
 
-    def _change(self, key: str, value: float) -> None:
+    def _change(self, key: str, value: float | str) -> None:
         before = self.built
-        after = rebuild(before, {key: repr(float(value))})
+        if isinstance(value, str):
+            words = next((knob.choices for knob in self._knobs if knob.key == key), ())
+            if value not in words:
+                valid = f"one of {', '.join(words)}" if words else "a number"
+                raise InvalidParameter(key, value, f"must be {valid}")
+        after = rebuild(before, {key: value if isinstance(value, str) else repr(float(value))})
         same = {
             name: getattr(before.scenario, name) == getattr(after.scenario, name)
             for name in ("robot", "shell", "sensor", "controller", "run")
@@ -230,8 +286,9 @@ class LiveRun:
         self._targets = None
         # Their ranges stay those of the start: they do not wander with the values.
         self._knobs = tuple(
-            replace(knob, value=float(look_up(after.scenario, knob.key, after.path)[0]))
+            replace(knob, value=str(now) if knob.choices else float(now))
             for knob in self._knobs
+            for now in [look_up(after.scenario, knob.key, after.path).value]
         )
 
     def _go_on(self, run: OpenRun) -> None:
@@ -393,12 +450,3 @@ def _exchanged(before: Result, rows: Result, now: Result) -> float:
     ]
     with np.errstate(all="ignore"):  # of a run that diverges
         return 0.5 * float(np.abs(np.diff(columns, axis=1)).sum())
-
-
-def _joined(pieces: list[Rows], pairs: int) -> Rows:
-    if len(pieces) == 1:
-        return pieces[0]
-    if not pieces:
-        return Rows.empty(pairs)
-    names = ("t", "normal_force", "friction_force", "depth")
-    return Rows(*(np.concatenate([getattr(one, name) for one in pieces]) for name in names))

@@ -250,7 +250,7 @@ class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integ
     integrator: Annotated[str, AfterValidator(_check_integrator)] = ""
     control_dt: Annotated[Positive | None, Parameter("s", "control period")] = None
     record_dt: Annotated[Positive | None, Parameter("s", "time between rows")] = None
-    record: list[Literal["patch"]] = Field(default_factory=list)
+    record: list[Literal["patch", "torque"]] = Field(default_factory=list)
     wear: Annotated[Positive | None, Parameter("1/Pa", "Preston coefficient")] = None
     recording_speed: Annotated[Positive, Parameter(label="speed of the recording")] = 1.0
 

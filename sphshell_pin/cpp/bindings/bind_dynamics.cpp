@@ -308,17 +308,18 @@ void bind_dynamics(nanobind::module_& m) {
           "__init__",
           [](RunSettings* self, std::string integrator, double dt, double rtol, double atol,
              double duration, double start_time, double control_dt, double record_dt,
-             bool patches) {
+             bool patches, bool torques) {
             new (self) RunSettings{{std::move(integrator), dt, rtol, atol},
                                    duration,
                                    start_time,
                                    control_dt,
                                    record_dt,
-                                   patches};
+                                   patches,
+                                   torques};
           },
           nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"), nb::arg("atol"),
           nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"),
-          nb::arg("patches"));
+          nb::arg("patches"), nb::arg("torques"));
 
   nb::class_<OneUser>(m, "OneUser").def(nb::init<std::string>(), nb::arg("what"));
   // Entered and left in one instruction of Python each, so that Ctrl-C cannot come between.
@@ -398,6 +399,11 @@ void bind_dynamics(nanobind::module_& m) {
              const Use use(self.user, "take");
              const auto& model = self.simulation.model();
              return to_dict(self.simulation.take(), model.nq, model.nv);
+           })
+      .def("record_torques",
+           [](Run& self) {
+             const Use use(self.user, "record_torques");
+             self.simulation.record_torques();
            })
       .def("snapshot",
            [](Run& self) {

@@ -1,6 +1,7 @@
 // What a run keeps: rows of the motion, events, and figures of each pair.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -56,6 +57,7 @@ struct Record {
   std::vector<double> t, q, v, energy;
   std::vector<ContactRow> contacts;
   std::optional<std::vector<PatchRow>> patches;  // of the contacts, where they are asked for
+  std::optional<std::vector<double>> torques;    // of the controller (nv), where asked for; or nan
   std::vector<double> contact_row;               // the recorded row of each contact
   std::vector<Event> events;
   SensorRows sensors;
@@ -84,6 +86,10 @@ class Recorder {
   // already are unknown.
   void record_patches(bool on);
   void set_follower(RowFollower* follower) { follower_ = follower; }
+
+  // From now on rows have the torques (nv) that `torques` gives where the scene was evaluated.
+  using TorquesAt = std::function<const VectorX&(const State&)>;
+  void record_torques(TorquesAt torques, Eigen::Index nv);
 
   // The scene's last evaluate() was at the state; `share`: see RowFollower.
   void add_row(SceneData& scene, const State& state, double share = 1);
@@ -134,6 +140,7 @@ class Recorder {
   State between_;
   VectorX y_;
   RowFollower* follower_ = nullptr;
+  TorquesAt torques_;  // empty unless asked for
 };
 
 }  // namespace sphshell

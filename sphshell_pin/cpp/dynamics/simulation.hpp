@@ -21,6 +21,7 @@ struct RunSettings : StepSettings {
   double control_dt = 0;  // hold the torques this long [s]; 0: evaluate at every stage
   double record_dt = 0;   // between recorded rows [s]; 0: every step
   bool patches = false;   // record those of contacts
+  bool torques = false;   // record those of the controller
 };
 
 // A sphere that starts too deep in a shell for its contacts to be trusted.
@@ -74,6 +75,10 @@ class Simulation : private Torques {
   // The current state as the only row of a record; what was recorded stays.
   Record snapshot();
 
+  // From now on rows have the controller's torques, cut to their limits. A controller whose torques
+  // are not held is asked for them at each row.
+  void record_torques();
+
   // From now on the same pairs have other laws, friction (of the same kind) and radii, stops and
   // dry friction of joints have other values, and the controller is another, unless null. The
   // energy this brings counts as the controller's work.
@@ -121,6 +126,7 @@ class Simulation : private Torques {
   void differentiate_step();
   void accept();
   void hold_torques();
+  const VectorX& recorded_torques(const State& state);
   void command(double t, const VectorX& q, const VectorX& v);
   double end_of_step() const;
   bool is_finite() const;

@@ -13,6 +13,7 @@ from sphshell_pin.errors import SphshellError
 LARGEST_MESSAGE = 16_384  # bytes
 LONGEST_TEXT = 200
 LARGEST_NUMBER = 1e12
+MOST_CURVES = 64  # that one browser may ask for
 
 Event = dict[str, Any]
 
@@ -60,6 +61,10 @@ def _switch(value: object) -> bool:
     return value
 
 
+def _number_or_word(value: object) -> float | str:
+    return _text(value) if isinstance(value, str) else _number(value)
+
+
 def _positive(value: object) -> float:
     number = _number(value)
     if not number > 0.0:
@@ -81,13 +86,19 @@ def _direction(value: object) -> list[float]:
     return [one / length for one in numbers]
 
 
+def _keys(value: object) -> list[str]:
+    if not isinstance(value, list) or len(value) > MOST_CURVES:
+        raise BadMessage(f"must be a list of at most {MOST_CURVES} texts")
+    return [_text(one) for one in value]
+
+
 _Fields = dict[str, Callable[[object], object]]
 FIELDS: dict[str, _Fields] = {
     "run": {"on": _switch},
     "step": {"seconds": _not_negative},
     "reset": {},
     "speed": {"value": _not_negative},
-    "parameter": {"key": _text, "value": _number},
+    "parameter": {"key": _text, "value": _number_or_word},
     "push": {
         "body": _text,
         "direction": _direction,
@@ -101,6 +112,8 @@ FIELDS: dict[str, _Fields] = {
     "show": {"part": _text, "on": _switch},
     "arrows": {"value": _not_negative},
     "look": {},
+    "charts": {"keys": _keys},
+    "keep": {},
     "seek": {"t": _number},
     "seen": {"frame": _number},
 }

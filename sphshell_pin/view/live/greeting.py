@@ -45,6 +45,7 @@ def greeting(player: Player, picture: str | None, offer: Json) -> Json:
         "parameters": [
             {name: getattr(knob, name) for name in _PARAMETER}
             | {"restart": bool(getattr(knob, "restart", False))}
+            | {"choices": list(getattr(knob, "choices", ()))}
             for knob in player.knobs
         ],
         "start": player.start,

@@ -78,9 +78,18 @@ class Hands:
             },
         }
 
-    def pull(self, client: Client, event: Event) -> None:
+    def do(self, client: Client, event: Event) -> None:
+        """Drag a body, or move the target of a joint."""
+        if self._player is None:
+            raise BadMessage(NOT_HERE)
+        if event["type"] == "target":
+            self._player.aim(event["joint"], event["value"])
+        else:
+            self._pull(self._player, client, event)
+
+    def _pull(self, player: Interactive, client: Client, event: Event) -> None:
         """Drag the body of a node by a point of the node towards a target."""
-        player, window = self._able(), self._window
+        window = self._window
         grips = self._picture.display.grips()
         frame = grips.get(event["node"])
         matrix = None if window is None else window.matrix(event["node"])
@@ -104,16 +113,7 @@ class Hands:
         """Drop the drag, as the run has started anew."""
         self._dragger = None
 
-    def aim(self, event: Event) -> None:
-        """Move the target of a joint."""
-        self._able().aim(event["joint"], event["value"])
-
     def record_patches(self, on: bool) -> None:
         """Compute patches from now on, or no longer; where they were recorded, nothing is done."""
         if self._player is not None and self._player.can_record_patches:
             self._player.record_patches(on)
-
-    def _able(self) -> Interactive:
-        if self._player is None:
-            raise BadMessage(NOT_HERE)
-        return self._player

@@ -85,7 +85,7 @@ class Player(Protocol):
     def reset(self) -> None:
         """Go back to the start."""
 
-    def change(self, key: str, value: float) -> None:
+    def change(self, key: str, value: float | str) -> None:
         """Set a parameter; raise SphshellError, and go on unchanged, where it cannot be."""
 
     def push(self, body: str, force_world: FloatArray, seconds: float) -> None:
