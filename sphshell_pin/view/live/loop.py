@@ -360,7 +360,8 @@ class Live:
         self._ahead = 0.0
         if self.player.duration is None:
             self._charts.start_anew()
-            self._post_earlier("last")
+            if "last" in self._charts.earlier:
+                self._post_earlier("last")
         self._clear_charts()
         self.picture.clear()
 

@@ -111,6 +111,8 @@ function switch_mode() {
   point_out();
 }
 
+add_key({ keys: ["d"], says: "drag bodies without Ctrl, on or off", act: switch_mode });
+
 function show({ drag, running }) {
   label.hidden = !drag;
   if (!drag) return;
@@ -129,7 +131,6 @@ on("hello", ({ drag }) => {
   button.setAttribute("aria-pressed", "false");
   button.onclick = switch_mode;
   element("stage").append(button, label);
-  add_key({ keys: ["d"], says: "drag bodies with the mouse, on or off", act: switch_mode });
   const { row } = make_parameter({
     key: "drag-stiffness", label: "Stiffness", unit: "N/m per kg", value: stiffness,
     low: stiffness / 100, high: stiffness * 100, log: true,
