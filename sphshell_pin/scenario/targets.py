@@ -66,7 +66,7 @@ def aimed(
     for joint, value in aims.items():
         set_joint(model, posture, joint, value)
     changes: dict[str, Any] = {"q_ref": posture}
-    return replace(controller, **changes)  # type: ignore[type-var]
+    return replace(controller, **changes)
 
 
 def check_aim(targets: tuple[Target, ...], joint: str, value: float) -> None:

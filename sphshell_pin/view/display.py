@@ -233,7 +233,8 @@ class Display:
 
     def grips(self) -> dict[str, str]:
         """Return the nodes that show moving bodies: their paths, each with a frame of its body."""
-        held = [(one.node, one.joint) for one in (*self._shells.values(), *self._spheres.values())]
+        held = [(one.node, one.joint) for one in self._shells.values()]
+        held += [(one.node, one.joint) for one in self._spheres.values()]
         found = {}
         for node, joint in held:
             frame = frame_on_joint(self._model, joint)

@@ -72,7 +72,7 @@ def test_several_contacts_are_told_apart():
     [
         (knob("contact.ball-plate.law.stifness"), r"no 'stifness'.*did you mean 'stiffness'"),
         (knob("contact.tip.law.stiffness"), r"there are: ball-plate"),
-        (knob("shell.plate.side"), r"shell\.plate\.side: is not a number"),
+        (knob("shell.plate.name"), r"shell\.plate\.name: is not a number"),
         (knob("run.rtol"), r"run\.rtol: is not a number"),
         (knob("contact.ball-plate.law"), r"is not a number"),
         (knob(STIFFNESS) + knob(STIFFNESS), r"knob\[1\]\.key: is a knob already"),

@@ -9,6 +9,13 @@ const MANY = 8; // more are folded away at first
 const DEGREE = Math.PI / 180;
 const sliders = new Map();
 
+// What is shown is rounded: a value just beyond an end means that end.
+function at_limit(value, low, high) {
+  const hair = 1e-3 * (high - low);
+  if (value > high && value < high + hair) return high;
+  return value < low && value > low - hair ? low : value;
+}
+
 on("hello", ({ targets }) => {
   if (!targets?.length) return;
   const body = add_section("targets-section", "Joint targets");
@@ -19,7 +26,7 @@ on("hello", ({ targets }) => {
     const { row, slider } = make_parameter({
       key: `target-${joint}`, label: joint, unit: rotates ? "\u00b0" : "m", log: false,
       low: low / unit, high: high / unit, value: value / unit,
-    }, (shown) => aim(joint, shown * unit));
+    }, (shown) => aim(joint, at_limit(shown * unit, low, high)));
     const text = row.querySelector("label");
     text.title = limited ? `${joint}: the slider ends at its limits` : `${joint}: has no limits`;
     body.append(row);
