@@ -24,18 +24,9 @@ BLOCK = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end measured -->)", re
 # What the README shows, by key of the finding, in its order.
 SUMMARY = (
     "force_error",
-    "flat_error",
     "query_coal",
-    "query_libigl",
-    "query_fcpw",
-    "query_growth",
-    "query_smooth",
     "step_touching",
-    "step_control",
     "swing_period",
-    "stiff_cost",
-    "import",
-    "hard_cases",
     "peers_press",
     "peers_swing",
 )
