@@ -29,6 +29,7 @@ from sphshell_pin.view.nodes import FloatArray, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 from sphshell_pin.view.patches import PatchScale
+from sphshell_pin.view.robot import has_links
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -38,6 +39,10 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result import Result
     from sphshell_pin.dynamics.scene import Scene
 
+BARE = (
+    "The robot is drawn by its joints, as the scene's model has no geometry: "
+    "view(visual_model=...) takes a pinocchio.GeometryModel of the same joints."
+)
 MOST_ARROWS = 24
 MOST_PIECES = 80  # of a trail
 
@@ -83,6 +88,7 @@ def render_recording(
     title: str = "A finished run",
     arrows: ArrowKind = "components",
     color: Coloring = "surface",
+    whole: bool = False,
 ) -> str:
     """Return `result` as one self-contained HTML page.
 
@@ -92,7 +98,8 @@ def render_recording(
     it. Each frame shows the recorded row nearest in time, or, where a touch begins and ends between
     two frames, that touch at its peak. `arrows` is "components" (normal and friction) or "total".
     `color` is what the colors of the shells show: nothing ("surface"), the patches ("patches"),
-    or how far curved elements are from the flat ones ("distance").
+    or how far curved elements are from the flat ones ("distance"). With `whole` the camera takes in
+    all of the robot, else the surroundings of the contacts.
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
     positive, another `color`, or a geometry model that does not fit.
@@ -116,6 +123,7 @@ def render_recording(
         contacts.point_world,
         contacts.normal_world,
         visual_model,
+        whole=whole,
     )
     radii = [one.radius for pair in scene.pairs for one in pair.spheres]
     length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
@@ -153,24 +161,29 @@ def render_recording(
 
 @dataclass(frozen=True)
 class RecordingView:
-    """A recording: `page`, a whole HTML page, to be shown `height` [pixels] high."""
+    """A recording: `page`, a whole HTML page, to be shown `height` [pixels] high.
+
+    `hint` says in a sentence what could be better, "" if nothing.
+    """
 
     page: str
     height: int = 480
+    hint: str = ""
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the page at `path` and return it; ResultError if it cannot be written."""
         return write_whole(path, self.page.encode())
 
     def __repr__(self) -> str:
-        return f"RecordingView({len(self.page) / 1e6:.1f} MB; .save(path) writes the page)"
+        hint = f"; {self.hint}" if self.hint else ""
+        return f"<RecordingView: {len(self.page) / 1e6:.1f} MB, .save(path) writes the page{hint}>"
 
     def _repr_html_(self) -> str:
         """Return a frame with the page inside, which needs no server and no network."""
         return (
             f'<iframe srcdoc="{html.escape(self.page)}" width="100%" height="{self.height}" '
             'style="border: 1px solid #c8d0d8; border-radius: 4px" allowfullscreen></iframe>'
-        )
+        ) + (f'<div style="opacity: 0.7">{html.escape(self.hint)}</div>' if self.hint else "")
 
 
 def view_result(
@@ -196,9 +209,16 @@ def view_result(
     if scene is None:
         raise ResultError("the result", "has no scene to be drawn in: give view(scene=...)")
     page = render_recording(
-        result, scene, visual_model, speed=speed or 1.0, title=title or "A finished run"
+        result,
+        scene,
+        visual_model,
+        speed=speed or 1.0,
+        title=title or "A finished run",
+        whole=True,
     )
-    return RecordingView(page, height)
+    return RecordingView(
+        page, height, BARE if visual_model is None and has_links(scene.model) else ""
+    )
 
 
 def choose_rows(
