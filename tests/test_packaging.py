@@ -215,7 +215,7 @@ GOOD = {
             "sphshell_pin/_built_against.py",
             "sphshell_pin/_core.pyi",
             "sphshell_pin/py.typed",
-            "sphshell_pin/view/recording.html",
+            "sphshell_pin/view/recording_page/page.html",
             "sphshell_pin/view/live/page/page.js",
             "sphshell_pin/robots/urdf/ball.urdf",
             "sphshell_pin/robots/meshes/gear_20.stl",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -63,6 +63,8 @@ class Controller(Ingredient):
     """
 
     joints: Iterable[str] | None
+    posture_gain: ClassVar[str | None] = None
+    """The gain that pulls the joints to `q_ref`, of a controller that has both."""
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter unless `joints` is None or a list of names."""
@@ -171,6 +173,7 @@ class JointPD(Controller, kind="joint-pd"):
     leaves a joint out; the difference is pinocchio.difference's.
     """
 
+    posture_gain: ClassVar[str | None] = "kp"
     kp: Gain = parameter(unit="N m/rad", label="joint stiffness", help="stiffness of the joints")
     kd: Gain = parameter(unit="N m s/rad", label="joint damping", help="damping of the joints")
     q_ref: Posture | None = parameter(None, help="posture; by default that of the start")
@@ -219,6 +222,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     InvalidParameter asks for `shell_frame`.
     """
 
+    posture_gain: ClassVar[str | None] = "posture_stiffness"
     frame: str = parameter(help="the frame that is moved")
     path: Sequence[tuple[float, float, float]] | Array = parameter(
         unit="m", help="points of the path (k, 3)", min_length=1

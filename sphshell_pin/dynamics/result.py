@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from sphshell_pin.dynamics.sensitivities import Sensitivities
     from sphshell_pin.dynamics.sensors import SensorSet
+    from sphshell_pin.view.film import FilmOptions
     from sphshell_pin.view.recording import RecordingView
 
 Array = NDArray[np.float64]
@@ -281,6 +282,26 @@ class Result(Summarized):
         from sphshell_pin.view.recording import view_result
 
         return view_result(self, scene, visual_model, speed=speed, height=height, title=title)
+
+    def render(
+        self,
+        path: str | PathLike[str],
+        scene: Scene | None = None,
+        visual_model: pin.GeometryModel | None = None,
+        **options: Unpack[FilmOptions],
+    ) -> Path:
+        """Draw this result as a picture (.png), a film (.gif, .mp4) or a folder of pictures.
+
+        `scene` and `visual_model` are as in `view`; the options are those of
+        `sphshell_pin.view.film.render_film`, among them `time` of a picture and `span` of a film
+        [s], `size` [pixels] and `camera`. Returns the path.
+
+        Raises what `render_film` does: MissingExtra without playwright, ResultError without
+        Chromium.
+        """
+        from sphshell_pin.view.film import render_film
+
+        return render_film(path, self, scene, visual_model, **options)
 
 
 def _owners(pairs: tuple[str, ...], scene: Scene) -> dict[str, tuple[str, ...]]:

@@ -392,11 +392,20 @@ void bind_dynamics(nanobind::module_& m) {
           nb::arg("pairs"), nb::arg("joints").none(), nb::arg("controller").none())
       .def(
           "push",
-          [](Run& self, int joint, const Vec3& point, const Vec3& force_world, int frame) {
+          [](Run& self, int joint, const Vec3& point, const Vec3& force, const Vec3& anchor,
+             double stiffness, double damping, int frame) {
             const Use use(self.user, "push");
-            self.simulation.push(joint, point, force_world, frame);
+            self.simulation.push(joint, point, {force, anchor, stiffness, damping}, frame);
           },
-          nb::arg("joint"), nb::arg("point"), nb::arg("force_world"), nb::arg("frame"))
+          nb::arg("joint"), nb::arg("point"), nb::arg("force_world"), nb::arg("anchor_world"),
+          nb::arg("stiffness"), nb::arg("damping"), nb::arg("frame"))
+      .def(
+          "record_patches",
+          [](Run& self, bool on) {
+            const Use use(self.user, "record");
+            self.simulation.record_patches(on);
+          },
+          nb::arg("on"))
       .def("take",
            [](Run& self) {
              const Use use(self.user, "take");
