@@ -54,7 +54,7 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as folder:
                 run_scenario(given.scenario, Path(folder) / "out")
                 url = (Path(folder) / "out" / "recording.html").as_uri()
-                shoot(chromium, given.folder, "recording", url, "window.recording_ready")
+                shoot(chromium, given.folder, "recording", url, "window.recording")
         for name in {"report", "docs"}.intersection(wanted):
             page = (given.report if name == "report" else given.site).resolve()
             if page.is_file():
