@@ -195,7 +195,7 @@ class Replay:
         self._given = 0
         self._go_to(self.start)
 
-    def change(self, key: str, value: float) -> None:
+    def change(self, key: str, value: float | str) -> None:
         """Refuse: a finished run has nothing to change."""
         raise InvalidParameter(key, value, "cannot be changed: this is a finished run")
 

@@ -183,7 +183,9 @@ class ContactSection(Section):
     spheres: Literal["collision"] | Spheres | None = None
     shell: str | None = None
     other_sphere: SphereSection | None = None
-    method: Literal["facets", "smooth", "elements"] | None = None
+    method: Annotated[Literal["facets", "smooth", "elements"] | None, Parameter(label="method")] = (
+        None
+    )
     law: Law
     friction: Friction = NoFriction()
 

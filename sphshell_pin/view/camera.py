@@ -53,9 +53,7 @@ class View:
         from the target to the eye is given. `radius` [m] is the smallest sphere's. All in the
         world [m].
         """
-        low, high = action.min(axis=0), action.max(axis=0)
-        middle = 0.5 * (low + high)
-        half = max(0.5 * float(np.linalg.norm(high - low)), 4.0 * radius)
+        middle, half = ball_around(action, 4.0 * radius)
         kept = around[np.linalg.norm(around - middle, axis=1) <= reach * half]
         subject = np.vstack((kept, middle + half * _CORNERS / np.sqrt(3.0)))
         if direction is None:
@@ -71,6 +69,12 @@ class View:
         distance = MARGIN * max(height / slope, width / (ASPECT * slope))
         target = middle + 0.5 * (low + high) @ axes
         return cls(target + (distance + 0.3 * (high[2] - low[2])) * direction, target)
+
+
+def ball_around(points: FloatArray, least: float = 0.0) -> tuple[FloatArray, float]:
+    """Return center (3,) and radius, `least` or more, of the ball around the box of points [m]."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), least)
 
 
 def _direction(target: FloatArray, subject: FloatArray, normal: FloatArray) -> FloatArray:

@@ -29,6 +29,7 @@ from sphshell_pin.view.nodes import FloatArray, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 from sphshell_pin.view.patches import PatchScale
+from sphshell_pin.view.robot import has_links
 from sphshell_pin.view.run_panel import run_panel
 
 if TYPE_CHECKING:
@@ -39,6 +40,10 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result import Result
     from sphshell_pin.dynamics.scene import Scene
 
+BARE = (
+    "The robot is drawn by its joints, as the scene's model has no geometry: "
+    "view(visual_model=...) takes a pinocchio.GeometryModel of the same joints."
+)
 MOST_ARROWS = 24
 MOST_PIECES = 80  # of a trail
 
@@ -85,6 +90,7 @@ def render_recording(
     arrows: ArrowKind = "components",
     color: Coloring = "surface",
     span: tuple[float, float] | None = None,
+    whole: bool = False,
 ) -> str:
     """Return `result` as one self-contained HTML page.
 
@@ -95,7 +101,8 @@ def render_recording(
     two frames, that touch at its peak. `arrows` is "components" (normal and friction) or "total".
     `color` is what the colors of the shells show: nothing ("surface"), the patches ("patches"),
     or how far curved elements are from the flat ones ("distance"). Of a `span` from and to a time
-    of the run [s] the scene has that part alone, in one frame where both are the same.
+    of the run [s] the scene has that part alone, in one frame where both are the same. With `whole`
+    the camera takes in all of the robot, else the surroundings of the contacts.
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
     positive, another `color`, or a geometry model that does not fit.
@@ -118,6 +125,7 @@ def render_recording(
         contacts.point_world,
         contacts.normal_world,
         visual_model,
+        whole=whole,
     )
     radii = [one.radius for pair in scene.pairs for one in pair.spheres]
     length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
@@ -182,24 +190,29 @@ def sound_rows(result: Result) -> int:
 
 @dataclass(frozen=True)
 class RecordingView:
-    """A recording: `page`, a whole HTML page, to be shown `height` [pixels] high."""
+    """A recording: `page`, a whole HTML page, to be shown `height` [pixels] high.
+
+    `hint` says in a sentence what could be better, "" if nothing.
+    """
 
     page: str
     height: int = 480
+    hint: str = ""
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the page at `path` and return it; ResultError if it cannot be written."""
         return write_whole(path, self.page.encode())
 
     def __repr__(self) -> str:
-        return f"RecordingView({len(self.page) / 1e6:.1f} MB; .save(path) writes the page)"
+        hint = f"; {self.hint}" if self.hint else ""
+        return f"<RecordingView: {len(self.page) / 1e6:.1f} MB, .save(path) writes the page{hint}>"
 
     def _repr_html_(self) -> str:
         """Return a frame with the page inside, which needs no server and no network."""
         return (
             f'<iframe srcdoc="{html.escape(self.page)}" width="100%" height="{self.height}" '
             'style="border: 1px solid #c8d0d8; border-radius: 4px" allowfullscreen></iframe>'
-        )
+        ) + (f'<div style="opacity: 0.7">{html.escape(self.hint)}</div>' if self.hint else "")
 
 
 @dataclass(frozen=True)
@@ -250,9 +263,15 @@ def view_result(
         raise InvalidParameter("height", height, "must be a positive number of pixels")
     shown = Shown.of(result, scene, visual_model, title, speed)
     page = render_recording(
-        result, shown.scene, shown.visual_model, speed=shown.speed, title=shown.title
+        result,
+        shown.scene,
+        shown.visual_model,
+        speed=shown.speed,
+        title=shown.title,
+        whole=True,
     )
-    return RecordingView(page, height)
+    bare = shown.visual_model is None and has_links(shown.scene.model)
+    return RecordingView(page, height, BARE if bare else "")
 
 
 def choose_rows(

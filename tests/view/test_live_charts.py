@@ -122,6 +122,8 @@ def test_the_run_before_and_a_kept_one_are_there_to_compare_with():
     charts.start_anew()
     assert charts.points("last", 0.1) == [[0.0, 9.0]]
     assert len(charts.points("kept", 0.1)) == 3
+    charts.start_anew()  # twice: the run between them had no time
+    assert charts.points("last", 0.1) == [[0.0, 9.0]]
     # A curve that is chosen later is there, too; a run of many rows stays small.
     charts.ask("tab", ["depth.tip"])
     assert charts.points("last", 0.1)[0] == pytest.approx([0.0, 0.9])

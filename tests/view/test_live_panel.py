@@ -47,7 +47,7 @@ def test_json_has_no_nan_and_no_infinity():
     }
 
 
-def test_contacts_are_listed_in_millimetres_and_stick_or_slip():
+def test_contacts_are_listed_in_millimetres_and_stick_creep_or_slip():
     laws = [
         None,
         CoulombFriction(0.3, 0.2, v_static=0.01, v_dynamic=0.1),
@@ -61,7 +61,7 @@ def test_contacts_are_listed_in_millimetres_and_stick_or_slip():
     slip = rows["slip_velocity_world"][:, 0]
     slip[:] = [1.0, 0.009, 0.011, 0.0009, 0.0011]
     listed = list_contacts(SceneContacts.from_rows(rows.tobytes()), pairs)
-    assert [one["sticks"] for one in listed] == [None, True, False, True, False]
+    assert [one["motion"] for one in listed] == [None, "creep", "slip", "stick", "slip"]
     np.testing.assert_allclose([one["depth"] for one in listed], 0.2)
     np.testing.assert_allclose([one["friction"] for one in listed], 0.5)
     np.testing.assert_allclose([one["slip"] for one in listed], 1e3 * slip)

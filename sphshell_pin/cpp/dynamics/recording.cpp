@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "dynamics/patch.hpp"
+
 namespace sphshell {
 
 Recorder::Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches)
@@ -17,6 +19,13 @@ Recorder::Recorder(const SceneData& scene, double start, double end, double reco
   if (joints) limits_.resize(std::max(joints->most_effort.size(), joints->speed.size()));
   limit_status_.resize(limits_.size());
   if (patches) record_.patches.emplace();
+}
+
+void Recorder::record_patches(bool on) {
+  if (on == record_.patches.has_value()) return;
+  record_.patches.reset();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  if (on) record_.patches.emplace(record_.contacts.size(), unknown_patch(nan));
 }
 
 void Recorder::record_torques(TorquesAt torques, Eigen::Index nv) {

@@ -298,9 +298,11 @@ Record Simulation::snapshot() {
   return recorder_.snapshot(scene_, stepping_.state());
 }
 
-void Simulation::push(int joint, const Vec3& point, const Vec3& force_world, int frame) {
+void Simulation::push(int joint, const Vec3& point, const PointForce& force, int frame) {
   scene_.need_velocity_of(joint);
-  push_.set(joint, point, force_world, frame);
+  // The next step begins with what was evaluated here, maybe without this joint.
+  scene_.body().kinematics(q(), v());
+  push_.set(joint, point, force, frame);
   if (sensors_) sensors_->jump();
 }
 

@@ -84,9 +84,11 @@ class Simulation : private Torques {
   // energy this brings counts as the controller's work.
   void change(std::vector<Pair> pairs, JointForces::Effects joints,
               std::shared_ptr<Controller> controller);
-  // From now on a force [N] in the world acts at a point of the joint's frame; zero ends it. Its
-  // work counts as the controller's. `frame`: the number of the one whose origin that is.
-  void push(int joint, const Vec3& point, const Vec3& force_world, int frame);
+  // From now on a force acts at a point of the joint's frame; zero ends it. Its work counts as the
+  // controller's. `frame`: the number of the one to whose body the point belongs.
+  void push(int joint, const Vec3& point, const PointForce& force, int frame);
+  // Whether the rows from now on have the patches of their contacts.
+  void record_patches(bool on) { recorder_.record_patches(on); }
 
   // Hands over what a caller may share; the run is at its end.
   Lent give_back() { return {scene_.give_back(), std::move(controller_)}; }

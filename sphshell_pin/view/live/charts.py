@@ -181,8 +181,9 @@ class Charts:
         self._history, _ = History(), self._thinner.clear()
 
     def start_anew(self) -> None:
-        """Begin another run, and keep the one so far as the last one."""
-        self.earlier["last"] = self._history
+        """Begin another run, and keep the one so far as the last one, if it went on at all."""
+        if self._history.since(-math.inf) is not None:
+            self.earlier["last"] = self._history
         self.clear()
 
     def keep(self) -> None:

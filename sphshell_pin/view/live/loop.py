@@ -22,6 +22,7 @@ from sphshell_pin.view.live.greeting import (
     check_speed,
     greeting,
 )
+from sphshell_pin.view.live.hands import Hands
 from sphshell_pin.view.live.panel import Panel, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown, frame_point
 from sphshell_pin.view.live.server import Server
@@ -97,7 +98,9 @@ class Live:
         try:
             canvas = new_visualizer(self._foreign or self._window)
             self.picture = Picture(player, canvas)
-            hello = {"type": "hello", **greeting(player, framed)}
+            own = self._window if self._foreign is None else None
+            self._hands = Hands(player, self.picture, own)
+            hello = {"type": "hello", **greeting(player, framed, self._hands.offer())}
             self._panel.post("hello", hello | {"series": self._charts.descriptions()})
             self.draw()
         except BaseException:
@@ -208,7 +211,7 @@ class Live:
             try:
                 # A diverging run is reported in the panel, not on the terminal.
                 with np.errstate(all="ignore"):
-                    self.picture.update(self.player, self._push_shown())
+                    self.picture.update(self.player, self._push_shown(), self._hands.drag)
             except Exception as fault:
                 # A picture that fails is reported in the panel, which goes on.
                 self.fault = fault
@@ -243,7 +246,7 @@ class Live:
 
     def _advance(self, duration: float, wall: float) -> None:
         player = self.player
-        for event in self._holds.values():
+        for event in () if self._hands.dragging else self._holds.values():
             self._push(event, 1.5 * duration)
         before = player.time
         try:
@@ -273,7 +276,6 @@ class Live:
     # Events
 
     def _handle(self, client: Client, event: Event) -> None:
-        player = self.player
         match event["type"]:
             case "run":
                 self._run(event["on"])
@@ -288,26 +290,24 @@ class Live:
                 self.speed = min(max(event["value"], SLOWEST), FASTEST)
                 self._pace.clear()
             case "parameter":
-                if event["key"] not in {knob.key for knob in player.knobs}:
-                    raise NameNotFound(
-                        "parameter", event["key"], "this run", [knob.key for knob in player.knobs]
-                    )
-                before = player.time
-                player.change(event["key"], event["value"])
-                if player.time < before:  # it started again
-                    self._start_anew()
+                self._change(event["key"], event["value"])
             case "push":
                 self._push(event, event["seconds"])
             case "hold":
                 self._check_body(event["body"])
                 self._holds[client] = event
+            case "drag" | "target":
+                self._hands.do(client, event)
             case "release":
                 self._holds.pop(client, None)
+                self._hands.release(client)
                 if client not in self.server.clients and self._charts.forget(client):
                     self._send_curves()
             case "show":
                 if event["part"] not in LIVE_PARTS:
                     raise NameNotFound("part", event["part"], "the picture", LIVE_PARTS)
+                if event["part"] == "pressure":
+                    self._hands.record_patches(event["on"])
                 self.picture.show(event["part"], event["on"])
             case "arrows":
                 self.picture.magnify_arrows(min(max(event["value"], 1e-2), 1e2))
@@ -321,6 +321,15 @@ class Live:
                 self._post_earlier("kept")
             case "seek":
                 self._seek(event["t"])
+
+    def _change(self, key: str, value: float | str) -> None:
+        keys = [knob.key for knob in self.player.knobs]
+        if key not in keys:
+            raise NameNotFound("parameter", key, "this run", keys)
+        before = self.player.time
+        self.player.change(key, value)
+        if self.player.time < before:  # it started again
+            self._start_anew()
 
     def _run(self, on: bool) -> None:
         self._waiting = False
@@ -347,10 +356,12 @@ class Live:
     def _start_anew(self) -> None:
         self.fault = None
         self._pushed = None
+        self._hands.forget()
         self._ahead = 0.0
         if self.player.duration is None:
             self._charts.start_anew()
-            self._post_earlier("last")
+            if "last" in self._charts.earlier:
+                self._post_earlier("last")
         self._clear_charts()
         self.picture.clear()
 
@@ -411,7 +422,7 @@ class Live:
 
     # The panel
 
-    def _read_parameters(self) -> dict[str, float]:
+    def _read_parameters(self) -> dict[str, float | str]:
         return {knob.key: knob.value for knob in self.player.knobs}
 
     def _state(self) -> Json:
@@ -431,10 +442,11 @@ class Live:
             "exchanged": exchanged,
             "ended": self._why_ended(),
             "parameters": self._parameter_values,
-            "show": self.picture.shown,
+            "show": self.picture.switches(player, self._hands.can_record_patches),
             "arrows": self.picture.magnification,
             "scale": str(self.picture.arrow_scale),
             "cut": self.picture.cut,
             "coloring": self.picture.display.coloring,
             "pressure": self.picture.pressure,
+            **self._hands.state(),
         }

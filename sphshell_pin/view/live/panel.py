@@ -92,7 +92,7 @@ def list_contacts(contacts: SceneContacts, pairs: tuple[ContactPair, ...]) -> tu
             "normal": contacts.normal_force[k],
             "friction": friction[k],
             "slip": 1e3 * slip[k],
-            "sticks": sticks(pairs[int(contacts.pair[k])], float(slip[k])),
+            "motion": motion(pairs[int(contacts.pair[k])], float(slip[k])),
         }
         for k in range(min(len(contacts), MOST_LISTED))
     )
@@ -108,13 +108,19 @@ def rows_now(player: Player) -> Rows:
     return Rows.of(np.array([player.time]), len(player.scene.pairs), player.contacts, 0)
 
 
-def sticks(pair: ContactPair, slip: float) -> bool | None:
-    """Tell whether a contact that slips at `slip` [m/s] is held; None without friction.
+def motion(pair: ContactPair, slip: float) -> str | None:
+    """Return the word for a contact that slips at `slip` [m/s]; None without friction.
 
-    Two-velocity friction holds below v_static, where it creeps; a bristle where almost nothing
-    moves.
+    "slip" from the friction's `sticking_speed` on. Below it "stick" where the friction has a state:
+    a stretch then holds the contact in place. Else "creep": the force follows from the slip speed,
+    so that a contact under load goes on moving.
     """
-    return None if pair.friction is None else slip < pair.friction.sticking_speed
+    friction = pair.friction
+    if friction is None:
+        return None
+    if slip >= friction.sticking_speed:
+        return "slip"
+    return "stick" if friction.has_state else "creep"
 
 
 def dump(value: object) -> str:

@@ -11,6 +11,7 @@ import { color } from "./theme.js";
 const MOST_ROWS = 4000;
 const MOST_CURVES = 8; // as many colors as palette.css has
 const AT_FIRST = 8;
+const IN_THE_HEADER = 3; // names of more curves stand below it
 
 const chart = new Chart(element("chart"));
 const quantities = new Map(); // "Force [N]": { name, unit, series, chosen: keys }
@@ -49,7 +50,7 @@ function choose(name) {
     box.value = one.key;
     box.checked = shown.chosen.includes(one.key);
     box.onchange = () => tick(box);
-    label.append(box, one.name);
+    label.append(box, document.createElement("u"), one.name);
     element("curve-list").append(label);
   }
   element("curves").hidden = shown.series.length < 2;
@@ -80,9 +81,14 @@ function update() {
   legend();
   chart.draw();
   ask();
+  element("plot").classList.toggle("many", chart.curves.length > IN_THE_HEADER);
 }
 
 function legend() {
+  for (const box of element("curve-list").querySelectorAll("input")) {
+    const curve = chart.curves.find((one) => one.key === box.value);
+    box.nextSibling.style.color = curve ? color(curve.color) : "transparent";
+  }
   const node = element("curve-legend");
   node.textContent = "";
   const entries = chart.curves.map((one) => [one.name, color(one.color), ""]);

@@ -13,7 +13,7 @@ on("state", ({ contacts, more }) => {
   const body = element("contacts");
   const rows = contacts.map((one) => [
     pairs[one.pair], fixed(one.depth, 4), fixed(one.normal, 3), fixed(one.friction, 3),
-    fixed(one.slip, 2), one.sticks,
+    fixed(one.slip, 2), one.motion,
   ]);
   if (!count) rows.push(["nothing touches"]);
   if (more) rows.push([`and ${more} more`]);
@@ -35,8 +35,8 @@ on("state", ({ contacts, more }) => {
 const fixed = (value, digits) => (value === null ? "-" : Math.abs(value) >= 1e5
   ? number(value, 3) : value.toFixed(Math.max(0, digits - (Math.abs(value) >= 1000 ? 2 : 0))));
 
-function mark(cell, sticks) {
-  const word = sticks === null ? "" : sticks ? "stick" : "slip";
+function mark(cell, motion) {
+  const word = motion ?? "";
   if (cell.textContent === word) return;
   cell.textContent = "";
   if (!word) return;

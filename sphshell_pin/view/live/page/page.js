@@ -10,6 +10,8 @@ import "./transport.js";
 import "./parameters.js";
 import "./push.js";
 import "./view_section.js";
+import "./drag.js";
+import "./targets.js";
 import "./charts.js";
 import "./contacts.js";
 import { add_help_key } from "./keys.js";

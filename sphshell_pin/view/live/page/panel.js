@@ -48,6 +48,13 @@ on("state", (data) => {
   }
 });
 
-const fold = (name) => () => document.body.classList.toggle(name);
-element("fold").onclick = element("unfold").onclick = fold("folded");
-element("fold-dock").onclick = fold("low");
+function fold(name, buttons, what) {
+  const folded = document.body.classList.toggle(name);
+  for (const button of buttons.map(element)) {
+    button.title = `${folded ? "Show" : "Hide"} ${what}`;
+    button.setAttribute("aria-label", button.title);
+  }
+}
+element("fold").onclick = element("unfold").onclick =
+  () => fold("folded", ["fold", "unfold"], "the panel");
+element("fold-dock").onclick = () => fold("low", ["fold-dock"], "the chart and the list");

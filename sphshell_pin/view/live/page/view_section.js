@@ -7,7 +7,7 @@ import { element, number, Slider } from "./controls.js";
 const PARTS = {
   robot: "Robot", spheres: "Spheres", arrows: "Force arrows", points: "Contact points",
   trails: "Trails", cones: "Friction cones", wireframe: "Wireframe", patches: "Patch colors",
-  distance: "Curved-flat distance",
+  distance: "Curved-flat distance", pressure: "Pressure patches",
 };
 const boxes = new Map();
 let arrows = null, picture = null, framed = false;
@@ -33,9 +33,9 @@ on("hello", (data) => {
 });
 on("state", (data) => {
   arrows.follow(data.arrows);
-  for (const [part, on_] of Object.entries(data.show)) {
-    const box = boxes.get(part);
-    if (box) box.checked = on_;
+  for (const [part, box] of boxes) {
+    box.parentElement.hidden = !(part in data.show); // nothing to show
+    box.checked = data.show[part] ?? false;
   }
 });
 element("look").onclick = () => (framed ? send({ type: "look" }) : picture?.look());
