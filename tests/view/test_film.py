@@ -45,7 +45,7 @@ def test_a_picture_has_its_time_and_size(rendered, tmp_path):
     assert start.shape == touching.shape == (177, 301, 3)
     # A red arrow is there, on a plate that is green.
     red = [
-        np.count_nonzero(one[..., 0] > one[..., 1:].max(axis=2) + 60) for one in (start, touching)
+        np.count_nonzero(one[..., 0] > one[..., 1:].max(axis=2) + 100) for one in (start, touching)
     ]
     assert red[0] == 0
     assert red[1] > 10
