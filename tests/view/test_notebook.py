@@ -86,3 +86,10 @@ def test_the_frame_plays_in_a_page(result, tmp_path, browser):
     frame.wait_for_function("viewer.animator.time > 0.1", timeout=20_000)
     tab.close()
     assert complaints == []
+
+
+def test_a_result_is_drawn_with_the_options_of_films(result, tmp_path):
+    with pytest.raises(InvalidParameter, match=r"time = 99 must be in the run"):
+        result.render(tmp_path / "late.png", time=99)
+    with pytest.raises(InvalidParameter, match=r"must end in \.png"):
+        result.render(tmp_path / "film.avi")
