@@ -26,9 +26,10 @@ from sphshell_pin.dynamics.scene_state import SceneState
 from sphshell_pin.dynamics.sensitivities import Asked
 from sphshell_pin.dynamics.sensors import Sensor, SensorSet, check_sensors
 from sphshell_pin.errors import Interrupted, InvalidParameter, SimulationDiverged
+from sphshell_pin.summary import Fact, Summarized
 
 
-class Simulation:
+class Simulation(Summarized):
     """Moves `scene` in time with `integrator`, Adaptive() unless given.
 
     `sensors` are read on the way: for the results, and for controller callables.
@@ -53,6 +54,13 @@ class Simulation:
         self.scene = scene
         self.integrator = integrator
         self.sensors = check_sensors(sensors)
+
+    def _facts(self) -> list[Fact]:
+        return [
+            Fact("integrator", repr(self.integrator)),
+            *self.scene._facts(),
+            Fact("sensors", len(self.sensors), brief=bool(self.sensors)),
+        ]
 
     def run(
         self,

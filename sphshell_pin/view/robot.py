@@ -54,6 +54,14 @@ def check_geometry_model(model: pin.Model, geometry_model: pin.GeometryModel) ->
             )
 
 
+def has_links(model: pin.Model) -> bool:
+    """Whether the skeleton of `model` has rods between joints: it is more than bodies that fly."""
+    return any(
+        model.parents[joint] != 0 or model.joints[joint].nv == 1
+        for joint in range(1, model.njoints)
+    )
+
+
 class GeometryRobot:
     """The geometry objects of a visual or collision model, drawn by Pinocchio's own loader."""
 

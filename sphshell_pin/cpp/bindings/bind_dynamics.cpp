@@ -269,22 +269,34 @@ void bind_dynamics(nanobind::module_& m) {
   nb::class_<PythonController, Controller>(
       m, "PythonController", nb::type_slots(slots<PythonController, visit_controller>()))
       .def(nb::init<nb::object>(), nb::arg("callable"));
+  nb::class_<PathSettings>(m, "Path").def(
+      "__init__",
+      [](PathSettings* self, std::vector<double> along, const RowPoints& points,
+         const RowPoints& tangents, const RowPoints& normals, std::vector<double> times,
+         std::vector<double> places, std::vector<double> speeds, std::vector<double> accelerations,
+         std::vector<double> jerks, std::vector<double> kinks) {
+        new (self) PathSettings{std::move(along),   to_points(points),        to_points(tangents),
+                                to_points(normals), std::move(times),         std::move(places),
+                                std::move(speeds),  std::move(accelerations), std::move(jerks),
+                                std::move(kinks)};
+      },
+      nb::kw_only(), nb::arg("along"), nb::arg("points"), nb::arg("tangents"), nb::arg("normals"),
+      nb::arg("times"), nb::arg("places"), nb::arg("speeds"), nb::arg("accelerations"),
+      nb::arg("jerks"), nb::arg("kinks"));
   nb::class_<CartesianImpedance, Controller>(m, "CartesianImpedance")
       .def(
           "__init__",
           [](CartesianImpedance* self, int num_joints, int joint, const Eigen::Matrix4d& frame,
-             int path_joint, const Eigen::Matrix4d& path_placement, std::vector<double> times,
-             const RowPoints& points, const RowPoints& normals, double stiffness, double damping,
-             double normal_force, double rotational_stiffness, double rotational_damping,
-             VectorX posture_stiffness, VectorX joint_damping, VectorX q_ref, VectorX actuated) {
+             int path_joint, const Eigen::Matrix4d& path_placement, const PathSettings& path,
+             double stiffness, double damping, double normal_force, double rotational_stiffness,
+             double rotational_damping, VectorX posture_stiffness, VectorX joint_damping,
+             VectorX q_ref, VectorX actuated, bool decoupled) {
             ImpedanceSettings s;
             s.joint = joint;
             s.frame = to_se3(frame);
             s.path_joint = path_joint;
             s.path_placement = to_se3(path_placement);
-            s.times = std::move(times);
-            s.points = to_points(points);
-            s.normals = to_points(normals);
+            s.path = path;
             s.stiffness = stiffness;
             s.damping = damping;
             s.normal_force = normal_force;
@@ -294,14 +306,14 @@ void bind_dynamics(nanobind::module_& m) {
             s.joint_damping = std::move(joint_damping);
             s.q_ref = std::move(q_ref);
             s.actuated = std::move(actuated);
+            s.decoupled = decoupled;
             new (self) CartesianImpedance(std::move(s), num_joints);
           },
           nb::arg("num_joints"), nb::arg("joint"), nb::arg("frame"), nb::arg("path_joint"),
-          nb::arg("path_placement"), nb::arg("times"), nb::arg("points"), nb::arg("normals"),
-          nb::arg("stiffness"), nb::arg("damping"), nb::arg("normal_force"),
-          nb::arg("rotational_stiffness"), nb::arg("rotational_damping"),
+          nb::arg("path_placement"), nb::arg("path"), nb::arg("stiffness"), nb::arg("damping"),
+          nb::arg("normal_force"), nb::arg("rotational_stiffness"), nb::arg("rotational_damping"),
           nb::arg("posture_stiffness"), nb::arg("joint_damping"), nb::arg("q_ref"),
-          nb::arg("actuated"));
+          nb::arg("actuated"), nb::arg("decoupled"));
 
   nb::class_<RunSettings>(m, "RunSettings")
       .def(
