@@ -63,7 +63,9 @@ def test_the_whole_robot_is_in_the_picture_of_a_short_run():
     joints = np.array([data.oMi[k].translation for k in range(1, scene.model.njoints)])
     whole = choose_view(*seen, whole=True)
     assert np.abs(in_picture(whole, joints)).max() < 1.0
-    assert np.abs(in_picture(whole, contacts.point_world)).max() < 1.0
+    (tip,) = scene.pairs[0].spheres
+    center = data.oMi[tip.joint].act(tip.placement.translation)
+    assert np.abs(in_picture(whole, center[None, :])).max() < 1.0
     near = choose_view(*seen)
     assert near.distance < 0.8 * whole.distance
     # A floor that reaches far beyond the robot does not make it small.
