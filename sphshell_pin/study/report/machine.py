@@ -66,9 +66,8 @@ def caution_of(cores: float | None) -> str:
         return ""
     return (
         f"The machine was busy: other processes used {cores:.2f} cores on average during the "
-        f"measurements (an idle machine: at most {BUSY:g}). Times are too long, ratios of times "
-        "less so: an aim of time that is missed may be met on an idle machine. Errors do not "
-        "depend on it."
+        f"measurements (an idle machine: at most {BUSY:g}). Times are too long, and ratios of "
+        "times uncertain, whether their aims are met here or missed. Errors do not depend on it."
     )
 
 
