@@ -1,7 +1,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-CPP := $(shell find sphshell_pin/cpp -name '*.[ch]pp')
+# What the Python module is made of; the C++ library and its consumers have more.
+CPP := $(shell find sphshell_pin/cpp/[!il]* -name '*.[ch]pp')
+ALL_CPP := $(shell find sphshell_pin/cpp tests/cpp docs/examples -name '*.[ch]pp')
 OUT ?= results
 # Modules are compiled once, and not in every process of the tests.
 unexport PYTHONDONTWRITEBYTECODE
@@ -63,12 +65,12 @@ lint: $(VENV)/.test ## check style and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/clang-format --dry-run --Werror $(CPP)
+	$(BIN)/clang-format --dry-run --Werror $(ALL_CPP)
 
 format: $(VENV)/.test ## correct the style
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i $(CPP)
+	$(BIN)/clang-format -i $(ALL_CPP)
 
 bench: $(VENV)/.bench ## print what contact costs, as ratios
 	$(BIN)/python -m benchmarks

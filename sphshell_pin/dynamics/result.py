@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from sphshell_pin.dynamics.sensitivities import Sensitivities
     from sphshell_pin.dynamics.sensors import SensorSet
+    from sphshell_pin.view.film import FilmOptions
     from sphshell_pin.view.recording import RecordingView
 
 Array = NDArray[np.float64]
@@ -44,7 +45,8 @@ class Result(Summarized):
     its cost, and figures of each pair over all steps; `scene` that ran
     (None after load); `origin` the scenario it came from (None without one); `sensors` the readings
     of each sensor by its name; `patch_rows` the patches of the contacts, None where they were not
-    recorded (see `patches`).
+    recorded (see `patches`); `torque` (n, nv) the controller's torques, cut to their limits [N m or
+    N], None unless the run recorded them: nan where a torque that is held was not known yet.
     """
 
     t: Array
@@ -60,6 +62,7 @@ class Result(Summarized):
     sensors: Mapping[str, SensorLog] = field(default_factory=dict)
     patch_rows: Patches | None = None
     sensitivity_rows: Sensitivities | None = None
+    torque: Array | None = None
 
     def _facts(self) -> list[Fact]:
         pairs = self.stats.pairs.values()
@@ -127,6 +130,7 @@ class Result(Summarized):
             scene=scene,
             sensors=sensors.logs(whole),
             patch_rows=patches_of(whole["patches"]) if "patches" in whole else None,
+            torque=read_only(whole["torques"]) if "torques" in whole else None,
         )
 
     @property
@@ -278,6 +282,26 @@ class Result(Summarized):
         from sphshell_pin.view.recording import view_result
 
         return view_result(self, scene, visual_model, speed=speed, height=height, title=title)
+
+    def render(
+        self,
+        path: str | PathLike[str],
+        scene: Scene | None = None,
+        visual_model: pin.GeometryModel | None = None,
+        **options: Unpack[FilmOptions],
+    ) -> Path:
+        """Draw this result as a picture (.png), a film (.gif, .mp4) or a folder of pictures.
+
+        `scene` and `visual_model` are as in `view`; the options are those of
+        `sphshell_pin.view.film.render_film`, among them `time` of a picture and `span` of a film
+        [s], `size` [pixels] and `camera`. Returns the path.
+
+        Raises what `render_film` does: MissingExtra without playwright, ResultError without
+        Chromium.
+        """
+        from sphshell_pin.view.film import render_film
+
+        return render_film(path, self, scene, visual_model, **options)
 
 
 def _owners(pairs: tuple[str, ...], scene: Scene) -> dict[str, tuple[str, ...]]:

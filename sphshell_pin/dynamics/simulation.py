@@ -86,7 +86,8 @@ class Simulation(Summarized):
         `sensors`: it gets the latest reading of each sensor by name. Rows are recorded every
         `record_dt` [s] (default: every step); `progress` is called a few times a second with the
         share done. The same input gives the same bits. With `record=("patch",)` the patch of each
-        recorded contact is kept, too: `Result.patches`.
+        recorded contact is kept, too: `Result.patches`; with "torque" the controller's torques, cut
+        to their limits: `Result.torque`. A controller that is not held is asked at each row then.
 
         `sensitivities` names what the rows are differentiated by: parameters as in
         `Scene.dynamics_derivatives`, "q0" and "v0" (nv columns each); `Result.sensitivities` then

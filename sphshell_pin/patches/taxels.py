@@ -56,9 +56,9 @@ class TaxelImages(Summarized):
 
     def save_film(self, path: str | PathLike[str], *, fps: float = 30, speed: float = 1.0) -> Path:
         """Write a film of the images of a grid, .gif or .mp4: see `sphshell_pin.plot.taxels`."""
-        from sphshell_pin.plot.taxels import write_film
+        from sphshell_pin.plot.taxels import save_film
 
-        return write_film(Path(path), self, fps=fps, speed=speed)
+        return save_film(Path(path), self, fps=fps, speed=speed)
 
 
 @dataclass(frozen=True)

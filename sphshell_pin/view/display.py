@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.dynamics.models import frame_on_joint
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, ContactColumns
 from sphshell_pin.view.bodies import (
@@ -94,6 +95,7 @@ class Display:
         self.patch_scale = PatchScale(1.0)
         self._pool = pool
         self._patches: PatchPool | None = None  # until there are some
+        self._patches_on = True
         self._arrows = ArrowPool(
             self.visualizer["contacts"], pool, 0.0026 * self.view.distance, arrows
         )
@@ -127,7 +129,7 @@ class Display:
             return
         if self._patches is None:
             self._patches = PatchPool(self.visualizer["pressure"], self._pool)
-            self.show("points", "points" not in self._hidden)
+            self._show_points()
         self._patches.update(contacts, patches, self.patch_scale)
 
     @property
@@ -212,14 +214,35 @@ class Display:
         if part == "arrows":
             self._arrows.show_arrows(on)
         elif part == "points":
-            self._arrows.show_points(on and self._patches is None)
-            if self._patches is not None:
-                show(self.visualizer["pressure"], on)
+            self._show_points()
         elif part in ("robot", "spheres"):
             show(self.visualizer[part], on)
         else:
             for shell in self._shells.values():
                 self._show_of_shell(shell, part, on)
+
+    def show_patches(self, on: bool) -> None:
+        """Draw the patches that `update` is given, or the contact points in their place."""
+        self._patches_on = on
+        self._show_points()
+
+    def _show_points(self) -> None:
+        on = "points" not in self._hidden
+        in_place = self._patches is not None and self._patches_on
+        self._arrows.show_points(on and not in_place)
+        if self._patches is not None:
+            show(self.visualizer["pressure"], on and in_place)
+
+    def grips(self) -> dict[str, str]:
+        """Return the nodes that show moving bodies: their paths, each with a frame of its body."""
+        held = [(one.node, one.joint) for one in self._shells.values()]
+        held += [(one.node, one.joint) for one in self._spheres.values()]
+        found = {}
+        for node, joint in held:
+            frame = frame_on_joint(self._model, joint)
+            if joint and frame is not None:
+                found[node.path.lower()] = frame
+        return found | self._robot.grips()
 
     def _show_of_shell(self, shell: DrawnShell, part: Part, on: bool) -> None:
         if part in COLORINGS:
@@ -274,6 +297,7 @@ def choose_view(
     normals_world: FloatArray | None = None,
     visual_model: pin.GeometryModel | None = None,
     reach: float = REACH,
+    direction: FloatArray | None = None,
     *,
     whole: bool = False,
 ) -> View:
@@ -281,8 +305,9 @@ def choose_view(
 
     Without contacts the spheres are where things happen; without spheres, the joints. What is
     farther away than `reach` times the size of that need not be in the picture; with `whole` all of
-    the robot is, and of the shells what is not far from it. Raises
-    InvalidParameter for a `visual_model` that does not hang on the scene's joints.
+    the robot is, and of the shells what is not far from it. `direction` (3,) leads from the target
+    to the eye; without it, it is chosen. Raises InvalidParameter for a `visual_model` that does not
+    hang on the scene's joints.
     """
     model, data = scene.model, scene.model.createData()
     boxes = [
@@ -335,7 +360,7 @@ def choose_view(
     if touched and normals_world is not None:
         mean = normals_world.mean(axis=0)
         normal = mean / max(float(np.linalg.norm(mean)), 1e-9)
-    return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach)
+    return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach, direction)
 
 
 def _geometry_boxes(

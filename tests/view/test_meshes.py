@@ -26,7 +26,12 @@ from sphshell_pin.view.meshes import (
 )
 from sphshell_pin.view.robot import GeometryRobot
 
-PAGE = Path(page_module.__file__).with_name("recording.html").read_text(encoding="utf-8")
+PAGE = (
+    Path(page_module.__file__)
+    .with_name("recording_page")
+    .joinpath("replay.js")
+    .read_text(encoding="utf-8")
+)
 
 
 def restored(packed):

@@ -109,21 +109,6 @@ auto contacts_batch(const Shell& shell, const Points& centers, const Doubles& ra
   return nb::make_tuple(to_array(std::move(depth)), to_array(std::move(count)));
 }
 
-// The place of the curved surface beside that of the flat one: the deepest contact of a sphere that
-// reaches it.
-SurfacePoint on_curved(const Shell& shell, const Vec3& point, SurfacePoint at, Query& query) {
-  const double reach = std::abs(at.distance) + 1.01 * shell.curved()->bulge();
-  const auto& found = query.find(shell, point, reach + 1e-9 * shell.size(), Method::Smooth);
-  if (found.empty()) return at;
-  const Vec3 from = point - found.front().point;
-  const bool behind = found.front().normal.dot(at.normal) < 0;
-  at.normal = behind ? Vec3(-found.front().normal) : found.front().normal;
-  at.point = found.front().point;
-  at.distance = from.dot(at.normal) < 0 ? -from.norm() : from.norm();
-  at.element = found.front().element;
-  return at;
-}
-
 auto closest_points(const Shell& shell, const Points& points, bool smooth, int threads) {
   const std::size_t n = points.shape(0);
   if (smooth) checked_method(shell, static_cast<int>(Method::Smooth));

@@ -198,4 +198,17 @@ void merge_groups(const std::vector<Contact>& contacts, const Vec3& center, doub
     if (leads(contacts, i)) shown.push_back(whole_of(contacts, i, center, radius));
 }
 
+SurfacePoint on_curved(const Shell& shell, const Vec3& point, SurfacePoint at, Query& query) {
+  const double reach = std::abs(at.distance) + 1.01 * shell.curved()->bulge();
+  const auto& found = query.find(shell, point, reach + 1e-9 * shell.size(), Method::Smooth);
+  if (found.empty()) return at;
+  const Vec3 from = point - found.front().point;
+  const bool behind = found.front().normal.dot(at.normal) < 0;
+  at.normal = behind ? Vec3(-found.front().normal) : found.front().normal;
+  at.point = found.front().point;
+  at.distance = from.dot(at.normal) < 0 ? -from.norm() : from.norm();
+  at.element = found.front().element;
+  return at;
+}
+
 }  // namespace sphshell

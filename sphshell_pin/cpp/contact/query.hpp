@@ -45,4 +45,8 @@ Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3
 void merge_groups(const std::vector<Contact>& contacts, const Vec3& center, double radius,
                   std::vector<Contact>& shown);
 
+// The place of the curved surface beside that of the flat one, `at`: the deepest contact of a
+// sphere that reaches it.
+SurfacePoint on_curved(const Shell& shell, const Vec3& point, SurfacePoint at, Query& query);
+
 }  // namespace sphshell

@@ -186,6 +186,7 @@ void Shell::curve(std::vector<Vec3> normals, bool exact,
                   const std::vector<std::uint8_t>& straight) {
   if (curved_) return;
   curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals), exact, straight);
+  ready_.store(curved_.get(), std::memory_order_release);
   give_back_freed_memory(triangles_.size());
 }
 

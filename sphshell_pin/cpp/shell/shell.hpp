@@ -1,6 +1,7 @@
 // A clean surface, ready for queries: geometry in the order of its tree.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -92,7 +93,8 @@ class Shell {
   // Curved elements, made at first use: unit normals per triangle corner, or none; exact:
   // they are the surface's own; `straight` as of CurvedShell.
   void curve(std::vector<Vec3> normals, bool exact, const std::vector<std::uint8_t>& straight = {});
-  const CurvedShell* curved() const { return curved_.get(); }
+  // Null before that; threads may ask while one makes them.
+  const CurvedShell* curved() const { return ready_.load(std::memory_order_acquire); }
 
   // Its sheets, found at first use.
   const Sheets& sheets() const;
@@ -124,6 +126,7 @@ class Shell {
   LargeArray<NormalCone> cones_;
   double size_;
   std::shared_ptr<const CurvedShell> curved_;
+  std::atomic<const CurvedShell*> ready_{nullptr};
   mutable std::once_flag sheets_found_;
   mutable std::shared_ptr<const Sheets> sheets_;
 };

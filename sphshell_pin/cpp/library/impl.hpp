@@ -1,0 +1,44 @@
+// What the public classes hold.
+#pragma once
+
+#include <memory>
+#include <mutex>
+
+#include "contact/friction.hpp"
+#include "contact/query.hpp"
+#include "sphshell_pin/laws.hpp"
+#include "sphshell_pin/query.hpp"
+#include "sphshell_pin/shell.hpp"
+
+namespace sphshell_pin {
+
+namespace core = ::sphshell;
+
+struct Shell::Impl {
+  std::shared_ptr<core::Shell> shell;
+  std::vector<Eigen::Vector3d> normals;  // per triangle corner, or empty
+  mutable std::once_flag curved;
+
+  // The surface, with curved elements where the method needs them.
+  const std::shared_ptr<core::Shell>& with(Method method) const {
+    if (method == Method::Smooth)
+      std::call_once(curved, [&] {
+        // With no smooth edges every element is flat, whatever normals came with it.
+        const bool smooth = shell->crease_angle() > 0;
+        shell->curve(smooth ? normals : std::vector<Eigen::Vector3d>(), false);
+      });
+    return shell;
+  }
+};
+
+struct NormalLaw::Impl {
+  core::NormalLaw law;
+};
+
+struct FrictionLaw::Impl {
+  core::FrictionLaw law;
+};
+
+core::Method checked(Method method);
+
+}  // namespace sphshell_pin

@@ -1,0 +1,65 @@
+#include "sphshell_pin/query.hpp"
+
+#include "library/checks.hpp"
+#include "library/impl.hpp"
+
+namespace sphshell_pin {
+namespace {
+
+void convert(const std::vector<core::Contact>& from, std::vector<Contact>& to) {
+  to.clear();
+  for (const core::Contact& c : from)
+    to.push_back(
+        {c.point, c.normal, c.depth, c.element, static_cast<Feature>(c.feature), c.weight});
+}
+
+}  // namespace
+
+core::Method checked(Method method) {
+  const int number = static_cast<int>(method);
+  if (number < 0 || number > 2)
+    throw InvalidParameter("method", std::to_string(number),
+                           "must be Method::Facets, Elements or Smooth");
+  return static_cast<core::Method>(number);
+}
+
+struct Query::Impl {
+  core::Query query;
+  std::vector<core::Contact> merged;
+  std::vector<Contact> shown, terms;
+};
+
+Query::Query() : impl_(std::make_unique<Impl>()) {}
+Query::Query(const Query& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
+Query& Query::operator=(const Query& other) {
+  *impl_ = *other.impl_;
+  return *this;
+}
+Query::Query(Query&&) noexcept = default;
+Query& Query::operator=(Query&&) noexcept = default;
+Query::~Query() = default;
+
+const std::vector<Contact>& Query::contacts(const Shell& shell, const Eigen::Vector3d& center,
+                                            double radius, Method method) {
+  check_point("center", center);
+  check_positive("radius", radius, " [m]");
+  const core::Method how = checked(method);
+  const auto& found = impl_->query.find(*shell.impl().with(method), center, radius, how);
+  core::merge_groups(found, center, radius, impl_->merged);
+  convert(found, impl_->terms);
+  convert(impl_->merged, impl_->shown);
+  return impl_->shown;
+}
+
+const std::vector<Contact>& Query::terms() const { return impl_->terms; }
+
+ClosestPoint Query::closest_point(const Shell& shell, const Eigen::Vector3d& point, Method method) {
+  check_point("point", point);
+  checked(method);
+  const core::Shell& surface = *shell.impl().with(method);
+  core::SurfacePoint at = surface.closest_point(point);
+  if (method == Method::Smooth) at = core::on_curved(surface, point, at, impl_->query);
+  return {at.point, at.normal, at.distance, at.element};
+}
+
+}  // namespace sphshell_pin

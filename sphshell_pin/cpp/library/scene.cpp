@@ -1,0 +1,234 @@
+#include "sphshell_pin/scene.hpp"
+
+#include <algorithm>
+#include <pinocchio/algorithm/joint-configuration.hpp>
+
+#include "dynamics/scene_state.hpp"
+#include "library/checks.hpp"
+#include "library/impl.hpp"
+
+namespace sphshell_pin {
+namespace {
+
+using pinocchio::Model;
+using pinocchio::SE3;
+
+constexpr std::size_t kMostNames = 20;  // in a message
+
+std::string in_quotes(const std::string& name) { return "'" + name + "'"; }
+
+// As check_model of sphshell_pin/dynamics/models.py.
+void check_model(const Model& model) {
+  const auto count = static_cast<std::size_t>(model.njoints);
+  const auto check_length = [&](const char* name, std::size_t found) {
+    if (found != count)
+      throw InvalidParameter(std::string("model.") + name, std::to_string(found),
+                             "must have " + std::to_string(count) + " entries");
+  };
+  check_length("names", model.names.size());
+  check_length("joints", model.joints.size());
+  check_length("parents", model.parents.size());
+  check_length("inertias", model.inertias.size());
+  check_length("jointPlacements", model.jointPlacements.size());
+  check_length("nqs", model.nqs.size());
+  check_length("nvs", model.nvs.size());
+  for (std::size_t j = 0; j < count; ++j) {
+    const std::string at = "[" + std::to_string(j) + "]", joint = in_quotes(model.names[j]);
+    if (model.parents[j] >= std::max<std::size_t>(j, 1))
+      throw InvalidParameter("model.parents" + at, std::to_string(model.parents[j]),
+                             "must come before joint " + joint);
+    const auto& inertia = model.inertias[j];
+    if (!std::isfinite(inertia.mass()) || !inertia.lever().allFinite() ||
+        !inertia.inertia().matrix().allFinite())
+      throw InvalidParameter("model.inertias" + at, shown(inertia.mass()) + ", ...",
+                             "must be finite: joint " + joint);
+    const SE3& placement = model.jointPlacements[j];
+    if (!placement.rotation().allFinite() || !placement.translation().allFinite())
+      throw InvalidParameter("model.jointPlacements" + at, shown_all(placement.translation()),
+                             "must be finite: joint " + joint);
+    check_not_negative("the mass of joint " + joint, inertia.mass(), " [kg]");
+  }
+  const Eigen::VectorXd gravity = model.gravity.toVector();
+  if (!gravity.allFinite())
+    throw InvalidParameter("model.gravity", shown_all(gravity), "must be finite");
+  for (const pinocchio::Frame& frame : model.frames)
+    if (frame.parentJoint >= count || !frame.placement.rotation().allFinite() ||
+        !frame.placement.translation().allFinite())
+      throw InvalidParameter("model's frame " + in_quotes(frame.name),
+                             std::to_string(frame.parentJoint), "must be on a joint of it");
+}
+
+// Names may repeat (a link called as its joint): a body's frame comes first, then an operational
+// frame, then any other.
+const pinocchio::Frame& find_frame(const Model& model, const std::string& name) {
+  const pinocchio::Frame* found = nullptr;
+  const auto rank = [](const pinocchio::Frame& frame) {
+    return frame.type == pinocchio::BODY ? 0 : frame.type == pinocchio::OP_FRAME ? 1 : 2;
+  };
+  for (const pinocchio::Frame& frame : model.frames)
+    if (frame.name == name && (!found || rank(frame) < rank(*found))) found = &frame;
+  if (found) return *found;
+  std::string text = "no frame " + in_quotes(name) + "; the model has: ";
+  for (std::size_t k = 0; k < std::min(kMostNames, model.frames.size()); ++k)
+    text += (k ? ", " : "") + model.frames[k].name;
+  if (model.frames.size() > kMostNames)
+    text += " and " + std::to_string(model.frames.size() - kMostNames) + " more";
+  throw FrameNotFound(text);
+}
+
+void check_placement(const SE3& placement) {
+  const Eigen::Matrix3d r = placement.rotation();
+  if (!r.allFinite() || !placement.translation().allFinite())
+    throw InvalidParameter("placement", shown_all(placement.translation()), "must be finite");
+  if ((r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-6 ||
+      r.determinant() < 0)
+    throw InvalidParameter("placement.rotation",
+                           "a matrix of determinant " + shown(r.determinant()),
+                           "must be a rotation: orthonormal, determinant +1");
+}
+
+void check_size(const char* name, const Eigen::VectorXd& x, Eigen::Index size, const Model& model) {
+  if (x.size() != size)
+    throw InvalidParameter(name, "a vector of size " + std::to_string(x.size()),
+                           "must have size " + std::to_string(size) + ": this model has nq = " +
+                               std::to_string(model.nq) + ", nv = " + std::to_string(model.nv));
+  for (Eigen::Index i = 0; i < size; ++i)
+    if (!std::isfinite(x[i]))
+      throw InvalidParameter(name + ("[" + std::to_string(i) + "]"), shown(x[i]), "must be finite");
+}
+
+void check_state(const Model& model, const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
+  check_size("q", q, model.nq, model);
+  check_size("v", v, model.nv, model);
+  if (!pinocchio::isNormalized(model, q, 1e-3))
+    throw InvalidParameter("q", shown_all(q),
+                           "must have quaternions (x, y, z, w) and pairs (cos, sin) of unit "
+                           "length: take pinocchio::normalize");
+}
+
+}  // namespace
+
+struct Scene::Impl {
+  Model model;
+  std::vector<core::Pair> pairs;
+
+  // A sphere as a frame at its center, in its joint.
+  SE3 center_of(const Sphere& sphere, int& joint) const {
+    check_positive("radius", sphere.radius, " [m]");
+    check_point("offset", sphere.offset);
+    const pinocchio::Frame& frame = find_frame(model, sphere.frame);
+    joint = static_cast<int>(frame.parentJoint);
+    return frame.placement * SE3(Eigen::Matrix3d::Identity(), sphere.offset);
+  }
+
+  int add(core::Pair pair) {
+    pairs.push_back(std::move(pair));
+    return static_cast<int>(pairs.size()) - 1;
+  }
+};
+
+Scene::Scene(const Model& model) {
+  check_model(model);
+  impl_.reset(new Impl{model, {}});
+}
+Scene::Scene(const Scene& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
+Scene& Scene::operator=(const Scene& other) { return *this = Scene(other); }
+Scene::Scene(Scene&&) noexcept = default;
+Scene& Scene::operator=(Scene&&) noexcept = default;
+Scene::~Scene() = default;
+
+int Scene::add_contact(const Sphere& sphere, const Shell& shell, const NormalLaw& law,
+                       const FrictionLaw& friction, const Mount& mount) {
+  core::Pair pair;
+  pair.method = checked(mount.method);
+  check_placement(mount.placement);
+  pair.placement_i = impl_->center_of(sphere, pair.joint_i);
+  const pinocchio::Frame& frame = find_frame(impl_->model, mount.frame);
+  pair.joint_j = static_cast<int>(frame.parentJoint);
+  pair.placement_j = frame.placement * mount.placement;
+  pair.radius = sphere.radius;
+  pair.shell = shell.impl().with(mount.method);
+  pair.law = law.impl().law;
+  pair.friction = friction.impl().law;
+  pair.name = sphere.frame + "-" + mount.frame;
+  return impl_->add(std::move(pair));
+}
+
+int Scene::add_contact(const Sphere& sphere, const Sphere& other, const NormalLaw& law,
+                       const FrictionLaw& friction) {
+  core::Pair pair;
+  pair.placement_i = impl_->center_of(sphere, pair.joint_i);
+  pair.placement_j = impl_->center_of(other, pair.joint_j);
+  pair.radius = sphere.radius;
+  pair.ball = other.radius;
+  pair.law = law.impl().law;
+  pair.friction = friction.impl().law;
+  pair.name = sphere.frame + "-" + other.frame;
+  return impl_->add(std::move(pair));
+}
+
+void Scene::set_relaxation(int pair, double time) {
+  if (pair < 0 || pair >= num_pairs())
+    throw InvalidParameter("pair", std::to_string(pair),
+                           "must be one of the " + std::to_string(num_pairs()) + " of the scene");
+  impl_->pairs[pair].relaxation = check_positive("time", time, " [s]");
+}
+
+const Model& Scene::model() const { return impl_->model; }
+int Scene::num_pairs() const { return static_cast<int>(impl_->pairs.size()); }
+
+struct SceneState::Impl {
+  core::SceneState state;
+  core::Forces none;  // where nothing touches
+
+  explicit Impl(const Scene::Impl& scene)
+      : state(scene.model, scene.pairs, nullptr),
+        none(static_cast<std::size_t>(scene.model.njoints), pinocchio::Force::Zero()) {}
+
+  void evaluate(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
+    check_state(state.scene().body().model(), q, v);
+    state.evaluate(q, v);
+  }
+};
+
+SceneState::SceneState(const Scene& scene) : impl_(std::make_unique<Impl>(scene.impl())) {}
+SceneState::SceneState(const SceneState& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
+SceneState& SceneState::operator=(const SceneState& other) { return *this = SceneState(other); }
+SceneState::SceneState(SceneState&&) noexcept = default;
+SceneState& SceneState::operator=(SceneState&&) noexcept = default;
+SceneState::~SceneState() = default;
+
+const std::vector<pinocchio::Force>& SceneState::external_forces(const Eigen::VectorXd& q,
+                                                                 const Eigen::VectorXd& v) {
+  impl_->evaluate(q, v);
+  const core::SceneData& scene = impl_->state.scene();
+  return scene.touching() ? scene.external() : impl_->none;
+}
+
+std::vector<SceneContact> SceneState::contacts(const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
+  using Vec3 = Eigen::Vector3d;
+  impl_->evaluate(q, v);
+  std::vector<core::ContactRow> rows;
+  impl_->state.scene().log(q, v, rows);
+  std::vector<SceneContact> out;
+  for (const core::ContactRow& row : rows)
+    out.push_back({row.pair, Vec3(row.point), Vec3(row.normal), row.depth, row.normal_force,
+                   Vec3(row.friction_force), Vec3(row.slip_velocity), row.element,
+                   static_cast<Feature>(row.feature), row.contact_id});
+  return out;
+}
+
+void SceneState::contact_derivatives(const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                     Eigen::MatrixXd& by_q, Eigen::MatrixXd& by_v) {
+  // Before evaluate(): it makes the contacts carry what it needs.
+  core::Linearization& linearization = impl_->state.linearization();
+  impl_->evaluate(q, v);
+  linearization.forces(q, v, by_q, by_v);
+}
+
+void SceneState::advance(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double dt) {
+  check_state(impl_->state.scene().body().model(), q, v);
+  impl_->state.advance(q, v, check_not_negative("dt", dt, " [s]"));
+}
+
+}  // namespace sphshell_pin

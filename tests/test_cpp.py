@@ -1,0 +1,182 @@
+"""The C++ library: built and installed without Python, used from the installed package.
+
+What these tests build is left in build/cpp, so that the next run compiles what has changed.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parent.parent
+EXAMPLE = ROOT / "docs" / "examples" / "cpp"
+PAGE = ROOT / "docs" / "cpp.md"
+CACHE = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def call(*command: object, cwd: Path = ROOT) -> str:
+    """Return what the command prints; fail with all of it if it fails."""
+    # The programs that pip has installed come first: cmake, ninja.
+    path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+    done = subprocess.run(
+        [shutil.which(str(command[0]), path=path) or str(command[0]), *map(str, command[1:])],
+        cwd=cwd,
+        env={**os.environ, "PATH": path},
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        check=False,
+    )
+    assert done.returncode == 0, f"{command}\n{done.stdout}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory) -> str:
+    """The CMAKE_PREFIX_PATH of a consumer: the installed library, moved, and Pinocchio's."""
+    pinocchio = Path(pin.__file__).parents[4]  # the wheel's own prefix: lib/pythonX.Y/site-packages
+    build, first = ROOT / "build" / "cpp", tmp_path_factory.mktemp("installed") / "first"
+    call(
+        *("cmake", "-G", "Ninja", "-S", ROOT, "-B", build, *CACHE),
+        *(f"-DCMAKE_PREFIX_PATH={pinocchio}", "-DCMAKE_BUILD_TYPE=Release"),
+        *("-DSPHSHELL_PIN_PYTHON=OFF", "-DCMAKE_DISABLE_FIND_PACKAGE_Python=ON"),
+    )
+    call("cmake", "--build", build)
+    call("cmake", "--install", build, "--prefix", first)
+    # It may be moved.
+    home = first.rename(first.with_name("moved"))
+    return f"{home};{pinocchio}"
+
+
+def build_with(prefix: str, source: Path, folder: Path, *options: str) -> None:
+    # Neither optimized nor for a debugger: they are compiled in the shortest time.
+    ready = [f"-DCMAKE_PREFIX_PATH={prefix}", "-DCMAKE_BUILD_TYPE=", *CACHE, *options]
+    call("cmake", "-G", "Ninja", "-S", source, "-B", folder, *ready)
+    call("cmake", "--build", folder)
+
+
+@pytest.fixture(scope="module")
+def consumers(prefix, tmp_path_factory) -> Path:
+    """The folder of the programs of tests/cpp and of the blocks of docs/cpp.md."""
+    folder = tmp_path_factory.mktemp("consumers")
+    page = folder / "page.cpp"
+    page.write_text(program_of_page(), encoding="utf-8")
+    build_with(prefix, ROOT / "tests" / "cpp", folder / "build", f"-DPAGE={page}")
+    return folder / "build"
+
+
+def program_of_page() -> str:
+    """Return the blocks of docs/cpp.md but for the whole program, each in a function of its own."""
+    found = [text for kind, text in FENCE.findall(PAGE.read_text()) if kind == "cpp"]
+    bodies = [text for text in found if "int main" not in text]
+    assert bodies
+    includes = re.compile(r"^#include .*\n", re.MULTILINE)
+    lines = {line for text in found for line in includes.findall(text)}
+    out = "".join(sorted(lines)) + "#undef NDEBUG\n#include <cassert>\n"
+    out += "namespace pin = pinocchio;\nnamespace sp = sphshell_pin;\n"
+    for k, text in enumerate(bodies):
+        out += f"void block_{k}() {{\n{includes.sub('', text)}}}\n"
+    calls = "".join(f"  block_{k}();\n" for k in range(len(bodies)))
+    return f"{out}int main() {{\n{calls}}}\n"
+
+
+def test_the_example_comes_to_the_numbers_of_python(prefix, tmp_path):
+    build_with(prefix, EXAMPLE, tmp_path)
+    urdf = ROOT / "robots" / "urdf" / "three_link_finger.urdf"
+    lines = call(tmp_path / "finger_on_wall", urdf).splitlines()
+    printed = np.array(lines[0].split()[1:], float)
+    found = re.match(r"force (\S+) N, depth (\S+) m, element 0", lines[1])
+    assert found
+    force, depth = map(float, found.groups())
+
+    model = pin.buildModelFromUrdf(str(urdf))
+    corners = [[0.07, -0.1, 0.0], [0.07, 0.1, 0.0], [0.07, 0.1, 0.2], [0.07, -0.1, 0.2]]
+    scene = sp.Scene(model)
+    scene.add_contact(
+        sp.Sphere(0.010, "tip"),
+        sp.Shell(corners, [[0, 1, 2, 3]]),
+        law=sp.ImpactLaw(1e6, 1.5, 20.0, 1e-4),
+        friction=sp.CoulombFriction(0.5, 0.4, 0.005, 0.05),
+    )
+    data, dt = model.createData(), 2e-5
+    q, v = np.array([0.2, 0.6, 0.4]), np.zeros(3)
+    wanted = q + 0.2
+    for _ in range(15_000):
+        tau = 0.5 * (wanted - q) - 0.01 * v
+        v = v + dt * pin.aba(model, data, q, v, tau, scene.external_forces(q, v))
+        q = pin.integrate(model, q, dt * v)
+    contacts = scene.contacts(q, v)
+    np.testing.assert_allclose(printed, q, rtol=1e-10)
+    np.testing.assert_allclose([force, depth], [*contacts.normal_force, *contacts.depth], rtol=1e-8)
+    # One without its argument says how it is called.
+    alone = [tmp_path / "finger_on_wall"]
+    usage = subprocess.run(alone, capture_output=True, text=True, check=False)
+    assert usage.returncode == 2
+    assert "usage: finger_on_wall URDF" in usage.stderr
+
+
+@pytest.mark.parametrize("name", ["laws", "surfaces", "scenes", "page"])
+def test_in_cpp(consumers, name):
+    call("ctest", "--output-on-failure", "-R", f"^{name}$", "--no-tests=error", cwd=consumers)
+
+
+def test_contacts_are_those_of_python_to_the_bit(consumers):
+    rng = np.random.default_rng(3)
+    side = 9
+    x, y = np.meshgrid(np.arange(side), np.arange(side), indexing="ij")
+    height = 0.5 * np.sin(x) * np.cos(0.7 * y) + 0.2 * rng.standard_normal(x.shape)
+    vertices = np.stack([x, y, height], axis=-1).reshape(-1, 3)
+    corner = (x * side + y)[:-1, :-1].ravel()
+    quads = np.stack([corner, corner + side, corner + side + 1, corner + 1], axis=1)
+    quads[::3, 3] = -1  # triangles, and holes beside them
+    radius = rng.uniform(0.2, 2, 300)
+    center = rng.uniform([0, 0, -1], [side, side, 2], (300, 3))
+    method = rng.integers(0, 3, 300)
+
+    text = [f"{len(vertices)} {len(quads)} {len(center)}"]
+    text += [" ".join(map(repr, row)) for row in vertices.tolist()]
+    text += [" ".join(map(str, row)) for row in quads.tolist()]
+    for place, size, how in zip(center.tolist(), radius.tolist(), method, strict=True):
+        text.append(" ".join(map(repr, [*place, size])) + f" {how}")
+    program, given = [consumers / "contacts_of"], "\n".join(text)
+    done = subprocess.run(program, input=given, capture_output=True, text=True, check=True)
+
+    shell = sp.Shell(vertices, quads, clean=False)
+    rows = []
+    for k in range(len(center)):
+        found = shell.contacts(center[k], radius[k], ("facets", "elements", "smooth")[method[k]])
+        columns = found.point, found.normal, found.depth, found.element, found.feature, found.weight
+        rows.append(np.column_stack([np.full(len(found.depth), k), *columns]))
+    wanted = np.concatenate(rows)
+    assert len(wanted) > 1000
+    np.testing.assert_array_equal(np.loadtxt(done.stdout.splitlines()), wanted)
+
+
+def test_only_the_public_names_are_exported(prefix):
+    (library,) = {path.resolve() for path in Path(prefix.split(";")[0]).rglob("libsphshell_pin.*")}
+    if sys.platform != "linux":
+        pytest.skip("nm lists the names of an ELF library")
+    names = call("nm", "-D", "--defined-only", library)
+    assert "_ZN12sphshell_pin5Scene" in names
+    assert "_ZN8sphshell" not in names
+
+
+def test_the_page_has_the_example():
+    found = dict(reversed([(kind, text) for kind, text in FENCE.findall(PAGE.read_text())]))
+    assert found["cmake"] == (EXAMPLE / "CMakeLists.txt").read_text()
+    programs = [text for kind, text in FENCE.findall(PAGE.read_text()) if "int main" in text]
+    assert programs == [(EXAMPLE / "main.cpp").read_text()]
