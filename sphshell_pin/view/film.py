@@ -143,6 +143,7 @@ def render_film(
         speed=shown.speed,
         title=shown.title,
         span=times,
+        whole=True,
     )
     stage = _Stage(page, size, camera, chart, dark, told)
 
