@@ -82,7 +82,7 @@ def test_the_frame_plays_in_a_page(result, tmp_path, browser):
     tab.on("pageerror", lambda fault: complaints.append(str(fault)))
     tab.goto(page.as_uri())
     frame = tab.frames[1]
-    frame.wait_for_function("window.recording_ready", timeout=60_000)
-    frame.wait_for_function("viewer.animator.time > 0.1", timeout=20_000)
+    frame.wait_for_function("window.recording", timeout=60_000)
+    frame.wait_for_function("recording.time > 0.01", timeout=20_000)
     tab.close()
     assert complaints == []
