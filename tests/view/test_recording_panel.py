@@ -230,6 +230,20 @@ def test_text_of_a_run_is_no_code(page, ball):
 
 
 @pytest.mark.browser
+def test_the_browser_itself_keeps_the_page_from_other_hosts(browser, ball):
+    page = browser.new_page()
+    page.goto(ball[1].resolve().as_uri())
+    refused = page.evaluate(
+        """() => new Promise((done) => {
+            document.addEventListener("securitypolicyviolation", (one) => done(one.blockedURI));
+            new Image().src = "http://texture.example/steel.png";
+        })"""
+    )
+    assert refused == "http://texture.example/steel.png"
+    page.close()
+
+
+@pytest.mark.browser
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_nothing_is_cut_off_or_overlaps(opened, size, scheme):
