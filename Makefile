@@ -10,7 +10,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick lint format bench report robots hard-cases work-precision rollouts \
-  real-surfaces new-study fuzz kills sweep-survival sampling-survival sanitize wheel docs clean
+  real-surfaces new-study fuzz kills sweep-survival sampling-survival sanitize wheel notebooks docs docs-serve clean
 
 help:
 	@sed -nE 's/^([a-z-]+):.* ## (.*)/make \1\t\2/p' Makefile | expand -t 22
@@ -118,9 +118,20 @@ wheel: $(BIN)/python ## build a wheel into dist/ and run it in an environment wi
 	$(BIN)/python -m pip wheel -q . --no-deps -w dist
 	$(BIN)/python .ci/check_wheel.py dist/*.whl
 
-docs: $(VENV)/.test ## build the documentation site into build/site
+# An example is executed again when it has changed; `make clean` when the package has.
+NOTEBOOKS := $(patsubst docs/examples/%.py,build/notebooks/%.ipynb,$(wildcard docs/examples/*.py))
+
+build/notebooks/%.ipynb: docs/examples/%.py docs/site/notebooks.py $(VENV)/.test
+	$(BIN)/python docs/site/notebooks.py build/notebooks $*
+
+notebooks: $(NOTEBOOKS) ## execute the examples as notebooks, in build/notebooks: a minute
+
+docs: $(VENV)/.test $(NOTEBOOKS) ## build the documentation site into build/site
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
-	@echo "See it: $(BIN)/python -m http.server -d build/site --bind 127.0.0.1"
+	@echo "See it: build/site/index.html, or make docs-serve"
+
+docs-serve: docs ## serve the documentation site at http://127.0.0.1:8000
+	$(BIN)/python -m http.server 8000 -d build/site --bind 127.0.0.1
 
 clean: ## remove everything that was built
 	rm -rf $(VENV) build dist $(OUT)

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from sphshell_pin.study.fit import Fit as Fit
     from sphshell_pin.study.fit import fit as fit
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOME = {
     "Adaptive": "dynamics",

@@ -12,9 +12,6 @@ _Ints = NDArray[np.int32]
 _Bytes = NDArray[np.uint8]
 _Longs = NDArray[np.int64]
 
-pinocchio_version: str
-coal_version: str
-
 _Columns = tuple[_Doubles, _Doubles, _Doubles, _Ints, _Bytes, _Doubles, _Doubles]
 
 class Shell:
@@ -243,6 +240,22 @@ class JointPd(Controller):
 class PythonController(Controller):
     def __init__(self, callable: Callable[..., Any]) -> None: ...
 
+class Path:
+    def __init__(
+        self,
+        *,
+        along: Sequence[float],
+        points: _Doubles,
+        tangents: _Doubles,
+        normals: _Doubles,
+        times: Sequence[float],
+        places: Sequence[float],
+        speeds: Sequence[float],
+        accelerations: Sequence[float],
+        jerks: Sequence[float],
+        kinks: Sequence[float],
+    ) -> None: ...
+
 class CartesianImpedance(Controller):
     def __init__(
         self,
@@ -251,9 +264,7 @@ class CartesianImpedance(Controller):
         frame: _Doubles,
         path_joint: int,
         path_placement: _Doubles,
-        times: Sequence[float],
-        points: _Doubles,
-        normals: _Doubles,
+        path: Path,
         stiffness: float,
         damping: float,
         normal_force: float,
@@ -263,6 +274,7 @@ class CartesianImpedance(Controller):
         joint_damping: _Doubles,
         q_ref: _Doubles,
         actuated: _Doubles,
+        decoupled: bool,
     ) -> None: ...
 
 class RunSettings:
@@ -278,6 +290,7 @@ class RunSettings:
         control_dt: float,
         record_dt: float,
         patches: bool,
+        torques: bool,
     ) -> None: ...
 
 class OneUser:
@@ -309,8 +322,19 @@ class Simulation:
     def change(
         self, pairs: list[Pair], joints: JointEffects | None, controller: Controller | None
     ) -> None: ...
-    def push(self, joint: int, point: _Doubles, force_world: _Doubles, frame: int) -> None: ...
+    def push(
+        self,
+        joint: int,
+        point: _Doubles,
+        force_world: _Doubles,
+        anchor_world: _Doubles,
+        stiffness: float,
+        damping: float,
+        frame: int,
+    ) -> None: ...
+    def record_patches(self, on: bool) -> None: ...
     def take(self) -> dict[str, NDArray[Any]]: ...
+    def record_torques(self) -> None: ...
     def snapshot(self) -> dict[str, NDArray[Any]]: ...
     @property
     def progress(self) -> float: ...

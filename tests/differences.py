@@ -70,7 +70,14 @@ def by_number(
 ) -> float:
     """Return by how much `got` is not the derivative of f(scene) by one of the scene's numbers."""
     scale, ahead = scale_of(scene, column, depth)
-    return off(got, lambda x: f(changed(scene, column, x)), scale, ahead=ahead, tolerance=tolerance)
+    return off(
+        got,
+        lambda x: f(changed(scene, column, x)),
+        scale,
+        floor=floor,
+        tolerance=tolerance,
+        ahead=ahead,
+    )
 
 
 def acceleration(

@@ -25,6 +25,7 @@ PAGES = [
     ROOT / "README.md",
     ROOT / "CHANGELOG.md",
     ROOT / "CONTRIBUTING.md",
+    ROOT / "SECURITY.md",
     ROOT / "scenarios" / "README.md",
     *sorted((ROOT / "docs").rglob("*.md")),
 ]

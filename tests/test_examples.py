@@ -1,47 +1,103 @@
-"""The example scripts run as they stand, and come to what the books say."""
+"""The examples run as notebooks, and come to what the books say.
+
+Each is made a notebook and executed; what it comes to is checked in its own kernel, by the function
+`check_NAME` of this module.
+"""
 
 from __future__ import annotations
 
-import runpy
+import importlib.util
+import re
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-pytestmark = pytest.mark.slow
+ROOT = Path(__file__).parent.parent
+EXAMPLES = ROOT / "docs" / "examples"
+NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
+FILES = {
+    "01_ball_on_a_surface": ["overview.png", "contact_map.png", "ball.html"],
+    "02_own_loop": ["own_loop.png"],
+    "03_parameter_study": ["friction.png", "stiffness.png"],
+    "04_taxels_on_a_crease": ["taxels.npz", "taxels.png"],
+    "05_circle_with_5_newtons": ["circle.png"],
+    "06_fit_measured_rebounds": [
+        "alumina.urdf", "rebound.toml", "rebound.fitted.toml", "fit.png",
+    ],
+}  # fmt: skip
+# Objects that the last line of a cell shows as a table.
+TABLES = {
+    "01_ball_on_a_surface": ["Scene", "Result"],
+    "02_own_loop": ["Result"],
+    "04_taxels_on_a_crease": ["Result"],
+    "06_fit_measured_rebounds": ["Fit of "],
+}
+NEEDS = {"05_circle_with_5_newtons": "crocoddyl"}
 
-EXAMPLES = Path(__file__).parent.parent / "docs" / "examples"
+
+@pytest.fixture(scope="module")
+def notebooks():
+    """docs/site/notebooks.py, which is no part of a package."""
+    for package in ("nbclient", "ipykernel"):
+        pytest.importorskip(package)
+    spec = importlib.util.spec_from_file_location("notebooks", ROOT / "docs/site/notebooks.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
-@pytest.fixture
-def run(tmp_path, monkeypatch):
-    """Runs an example in an empty folder; returns its names, and checks the files it leaves."""
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_notebook_has_the_cells_of_its_script(notebooks, name):
+    script = EXAMPLES / f"{name}.py"
+    cells = notebooks.notebook_of(script).cells
+    code = "".join(cell.source for cell in cells if cell.cell_type == "code")
+    words = "".join(cell.source for cell in cells if cell.cell_type == "markdown")
+    assert cells[0].source.startswith("# ")
+    assert '"""' not in words
+    # No line is lost: those of the script are those of the cells.
+    lines = [line for line in script.read_text().splitlines() if not line.startswith("# %%")]
+    for line in lines:
+        bare = line.strip().strip('"').removeprefix("# ").strip()
+        assert bare in code or bare in words, line
 
-    def run_example(name, files):
-        names = runpy.run_path(str(EXAMPLES / f"{name}.py"))
-        assert {path.name for path in tmp_path.iterdir()} == set(files)
-        for path in tmp_path.glob("*.png"):
-            assert path.read_bytes().startswith(b"\x89PNG")
-        return names
 
-    return run_example
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_an_example_comes_to_what_it_should(notebooks, name, tmp_path):
+    pytest.importorskip(NEEDS.get(name, "numpy"))
+    notebook = notebooks.notebook_of(EXAMPLES / f"{name}.py")
+    check = f"check_{name[3:]}"
+    cell = (
+        f"import sys\nsys.path.insert(0, {str(ROOT)!r})\n"
+        f"from tests.test_examples import {check}\n{check}(globals())"
+    )
+    notebook.cells.append(type(notebook.cells[-1])(notebook.cells[-1], source=cell, id="check"))
+    done = notebooks.execute(notebook, tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == set(FILES[name])
+    for path in tmp_path.glob("*.png"):
+        assert path.read_bytes().startswith(b"\x89PNG")
+    outputs = [output for one in done.cells for output in one.get("outputs", [])]
+    for output in outputs:
+        assert output.get("name") != "stderr", output.get("text")
+        assert " at 0x" not in output.get("data", {}).get("text/plain", "")
+    assert any("image/png" in output.get("data", {}) for output in outputs)
+    tables = " ".join(output.get("data", {}).get("text/html", "") for output in outputs)
+    for title in TABLES.get(name, []):
+        assert re.search(rf"<b>{title}.*</b>.*<table", tables), title
+    done.cells.pop()
+    text, files = notebooks.page_of(done, name)
+    assert text.startswith("# ")
+    assert all(stem in text for stem in files)
+    assert "srcdoc" not in text  # a recording is a file of its own
 
 
 def test_every_example_is_tested():
-    assert {path.stem for path in EXAMPLES.glob("*.py")} == {
-        "01_ball_on_a_surface",
-        "02_own_loop",
-        "03_parameter_study",
-        "04_taxels_on_a_crease",
-        "05_circle_with_5_newtons",
-        "06_fit_measured_rebounds",
-    }
+    assert set(FILES) == set(NAMES)
 
 
-def test_a_ball_on_a_surface(run):
-    names = run("01_ball_on_a_surface", ["overview.png", "contact_map.png", "ball.html"])
+def check_ball_on_a_surface(names):
     result = names["result"]
     # The first flight ends where free fall says.
     assert result.contacts.t[0] == pytest.approx(
@@ -60,14 +116,12 @@ def _height(names):
     return float(gaps[np.argmax(depth > 0.0)])
 
 
-def test_a_loop_of_ones_own(run):
-    names = run("02_own_loop", ["own_loop.png"])
+def check_own_loop(names):
     assert names["difference"] < 1e-12
     assert names["force"][-1] > 1.0
 
 
-def test_a_parameter_study(run):
-    names = run("03_parameter_study", ["friction.png", "stiffness.png"])
+def check_parameter_study(names):
     mu, mass, k = names["coefficients"], names["mass"], names["stiffnesses"]
     np.testing.assert_allclose(names["times"], 2.0 / (7.0 * mu * 9.81), rtol=0.01)
     np.testing.assert_allclose(names["speeds"], 5.0 / 7.0, rtol=1e-3)
@@ -77,17 +131,14 @@ def test_a_parameter_study(run):
     np.testing.assert_allclose(durations, np.pi * np.sqrt(mass / k), rtol=0.03)
 
 
-def test_taxels_on_a_crease(run):
-    names = run("04_taxels_on_a_crease", ["taxels.npz", "taxels.png"])
+def check_taxels_on_a_crease(names):
     force = names["pressed"].max()
     assert np.abs(names["felt"] - names["pressed"]).max() < 1e-12 * force
     assert np.abs(names["images"].outside).max() < 1e-12 * force
     assert len(names["two"]) > 10
 
 
-def test_a_circle_with_5_newtons(run):
-    pytest.importorskip("crocoddyl")
-    names = run("05_circle_with_5_newtons", ["circle.png"])
+def check_circle_with_5_newtons(names):
     assert names["converged"]
     planned, model = names["planned"][:, : names["model"].nq], names["model"]
     replays = names["replays"]
@@ -102,9 +153,8 @@ def test_a_circle_with_5_newtons(run):
         assert np.linalg.norm(data.oMf[hand].translation - center) < 1e-3
 
 
-def test_a_fit_of_measured_rebounds(run):
-    files = ["alumina.urdf", "rebound.toml", "rebound.fitted.toml", "fit.png"]
-    found = run("06_fit_measured_rebounds", files)["found"]
+def check_fit_measured_rebounds(names):
+    found = names["found"]
     friction, young = found.parameters
     assert found.determined
     # The coefficient that the authors found from the same impacts, the modulus of handbooks.

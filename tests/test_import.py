@@ -65,14 +65,22 @@ def test_public_names_exist() -> None:
 NO_REDIRECT = "import sys; sys.meta_path = [f for f in sys.meta_path if isinstance(f, type)]; "
 
 
-def failing_import(folder: Path, core: str | None) -> str:
-    """Import a copy of the package in `folder` whose core is the module `core`: the last line."""
+OTHER = {"pinocchio": "3.9.1", "coal": "3.0.0"}
+
+
+def failing_import(folder: Path, core: str | None, built: dict[str, str] | None = None) -> str:
+    """Import a copy of the package in `folder`, with the module `core` as its core: the last line.
+
+    `built` are the versions that it was compiled against; those of this environment by default.
+    """
     package = folder / "sphshell_pin"
     package.mkdir()
     for name in ("__init__", "_interrupts", "_versions", "errors"):
         shutil.copy(PACKAGE / f"{name}.py", package)
     if core is not None:
         (package / "_core.py").write_text(core, encoding="utf-8")
+        built = built or {"pinocchio": version("pin"), "coal": version("coal")}
+        (package / "_built_against.py").write_text(f"VERSIONS = {built}", encoding="utf-8")
     program = NO_REDIRECT + "import sphshell_pin"  # without the finder of an editable install
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
@@ -88,17 +96,54 @@ def test_a_core_that_cannot_be_loaded_names_what_it_was_built_for(tmp_path: Path
     assert said.startswith(
         f"ImportError: the compiled core of sphshell_pin does not load: {linker}"
     )
-    assert "built for coal==" in said
     installed = {name: version(name) for name in ("pin", "coal", "cmeel-boost")}
+    assert f"compiled against pinocchio {installed['pin']} and coal {installed['coal']}" in said
     for name, number in installed.items():
         assert f"{name} {number}" in said
-    assert "reinstall sphshell-pin" in said
+    assert re.search(r"python -m pip install 'pin==\d+\.\d+\.\*' 'coal==\d+\.\d+\.\*'$", said)
 
 
-def test_a_core_of_other_versions_says_which(tmp_path: Path) -> None:
-    said = failing_import(tmp_path, "pinocchio_version, coal_version = '3.9.1', '3.0.0'")
-    assert "pinocchio 3.9.1" in said
-    assert "reinstall sphshell-pin" in said
+@pytest.mark.parametrize("wrong", OTHER)
+def test_a_core_of_other_versions_is_not_loaded(tmp_path: Path, wrong: str) -> None:
+    installed = {"pinocchio": version("pin"), "coal": version("coal")}
+    built = {**installed, wrong: "2.6.1"}
+    said = failing_import(tmp_path, "raise SystemError('the core was loaded')", built)
+    assert said.startswith(
+        f"ImportError: sphshell_pin was compiled against {wrong} 2.6.1, but {wrong} "
+        f"{installed[wrong]} is installed: python -m pip install 'pin=="
+    )
+    assert f"'{'pin' if wrong == 'pinocchio' else 'coal'}==2.6.*'" in said
+
+
+def test_without_the_wheels_the_libraries_are_not_those_of_pip(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Conda's and ROS's packages have no metadata, or other ones."""
+    hide = tmp_path / "hide"
+    hide.mkdir()
+    (hide / "sitecustomize.py").write_text(
+        """
+import importlib.metadata as metadata
+
+def version(name):
+    raise metadata.PackageNotFoundError(name)
+
+metadata.version = version
+""",
+        encoding="utf-8",
+    )
+    monkeypatch.setenv("PYTHONPATH", str(hide))
+    said = failing_import(tmp_path, "", OTHER)
+    assert said == (
+        f"ImportError: sphshell_pin was compiled against pinocchio 3.9.1, but pinocchio "
+        f"{version('pin')} is installed: install pinocchio 3.9 and coal 3.0, or compile "
+        "sphshell_pin again (docs/install.md)"
+    )
+
+
+def test_versions_are_compared_without_reading_metadata(loaded: set[str]) -> None:
+    """The module that reads it is slow to import, and only an error has to name distributions."""
+    assert "importlib.metadata" not in loaded
 
 
 def test_a_checkout_that_is_not_built_says_so(tmp_path: Path) -> None:

@@ -52,10 +52,10 @@ def test_versions_and_entry_points_agree():
             assert importlib.util.find_spec(module.partition(":")[0]) is not None, module
 
 
-def test_every_extra_is_in_the_table_of_the_readme_and_in_all():
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    table = dict(re.findall(r"^\| `(\w+)` \| (.+?) \|", readme, re.MULTILINE))
-    assert set(EXTRAS) <= set(table), "README's table of extras lacks some"
+def test_every_extra_is_in_the_table_and_in_all():
+    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    table = dict(re.findall(r"^\| `(\w+)` \| (.+?) \|", page, re.MULTILINE))
+    assert set(EXTRAS) <= set(table), "the table of extras in docs/install.md lacks some"
     assert set(table) & {"all"}
     (everything,) = EXTRAS["all"]
     inside = set(everything.partition("[")[2].rstrip("]").split(","))
@@ -160,6 +160,22 @@ def test_only_a_tag_publishes_and_only_what_was_checked(workflow):
     assert runners == {"ubuntu-24.04", "ubuntu-24.04-arm", "macos-15"}
 
 
+def test_every_job_ends_and_writes_only_where_it_must(workflow):
+    writes = {}
+    for file in WORKFLOWS.glob("*.yml"):
+        content = workflow(file.stem)
+        assert content["permissions"] == {"contents": "read"}
+        for name, job in content["jobs"].items():
+            if "uses" not in job and name != "publish":
+                assert 5 <= job["timeout-minutes"] <= 120, (file.name, name)
+            writes |= {(file.stem, name): set(job["permissions"])} if "permissions" in job else {}
+    assert writes == {
+        ("docs", "deploy"): {"pages", "id-token"},
+        ("pinocchio", "say"): {"issues"},
+        ("release", "publish"): {"id-token"},
+    }
+
+
 def test_ci_runs_the_projects_own_entry(workflow):
     steps = workflow("ci")["jobs"]["test"]["steps"]
     assert ".ci/run" in [step.get("run") for step in steps]
@@ -167,8 +183,8 @@ def test_ci_runs_the_projects_own_entry(workflow):
 
 
 def test_actions_are_pinned(workflow):
-    for name in ("ci", "release"):
-        text = (WORKFLOWS / f"{name}.yml").read_text(encoding="utf-8")
+    for file in WORKFLOWS.glob("*.yml"):
+        text = file.read_text(encoding="utf-8")
         uses = re.findall(r"uses: (\S+)", text)
         assert uses
         assert all(re.search(r"@(v\d+|release/v\d+)$", one) for one in uses), uses
@@ -176,23 +192,30 @@ def test_actions_are_pinned(workflow):
             assert re.fullmatch(r"cibuildwheel==\d+\.\d+\.\d+", line)
 
 
-@pytest.fixture
-def check_contents():
-    if not CHECK.is_file():
-        pytest.skip("the check of wheels is part of the checkout")
-    spec = importlib.util.spec_from_file_location("check_wheel", CHECK)
+def script(name):
+    """Import a script of .ci/."""
+    file = ROOT / ".ci" / f"{name}.py"
+    if not file.is_file():
+        pytest.skip("the scripts of .ci are part of the checkout")
+    spec = importlib.util.spec_from_file_location(name, file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.check_contents
+    return module
+
+
+@pytest.fixture
+def check_contents():
+    return script("check_wheel").check_contents
 
 
 GOOD = {
     "sphshell_pin/_core.cpython-311-x86_64-linux-gnu.so": b"\0$ORIGIN/../cmeel.prefix/lib\0",
     **dict.fromkeys(
         (
+            "sphshell_pin/_built_against.py",
             "sphshell_pin/_core.pyi",
             "sphshell_pin/py.typed",
-            "sphshell_pin/view/recording.html",
+            "sphshell_pin/view/recording_page/page.html",
             "sphshell_pin/view/live/page/page.js",
             "sphshell_pin/robots/urdf/ball.urdf",
             "sphshell_pin/robots/meshes/gear_20.stl",
@@ -200,7 +223,7 @@ GOOD = {
             "sphshell_pin/scenarios/surfaces/bladex_upper.LICENSE.txt",
             "sphshell_pin/benchmarks/__init__.py",
             "pytest_sphshell_pin/__init__.py",
-            "sphshell_pin-0.1.0.dist-info/METADATA",
+            "sphshell_pin-1.0.dist-info/METADATA",
         ),
         b"",
     ),
@@ -215,6 +238,10 @@ BAD = {
     ),
     "no scenarios": ({"sphshell_pin/scenarios/sphere_on_shell.toml": None}, "no sphshell_pin/scen"),
     "no plugin": ({"pytest_sphshell_pin/__init__.py": None}, "no pytest_sphshell_pin"),
+    "no versions that it was compiled against": (
+        {"sphshell_pin/_built_against.py": None},
+        "no sphshell_pin/_built_against.py",
+    ),
     "no types": ({"sphshell_pin/py.typed": None}, "no sphshell_pin/py.typed"),
 }
 
@@ -236,3 +263,24 @@ def test_a_wheel_is_refused_with(what, tmp_path, check_contents):
     change, said = BAD[what]
     faults = check_contents(pack(tmp_path / "bad.whl", {**GOOD, **change}))
     assert any(said in fault for fault in faults), faults
+
+
+@pytest.mark.parametrize(
+    ("tag", "newer"),
+    [("manylinux_2_28_x86_64", "GLIBCXX_3.4.30, GLIBC_2.35"), ("linux_x86_64", None)],
+)
+def test_symbols_must_be_those_of_the_tag(tag, newer, tmp_path, check_contents):
+    (core,) = (name for name in GOOD if name.endswith(".so"))
+    symbols = (
+        b"\0GLIBC_2.2.5\0GLIBC_2.28\0GLIBC_2.35\0GLIBCXX_3.4.24\0GLIBCXX_3.4.30\0CXXABI_1.3.9\0"
+    )
+    wheel = tmp_path / f"sphshell_pin-1.0-cp311-cp311-{tag}.whl"
+    faults = check_contents(pack(wheel, {**GOOD, core: GOOD[core] + symbols}))
+    assert faults == ([f"{core} needs {newer}, which {tag[:14]} does not have"] if newer else [])
+
+
+def test_the_tests_of_a_wheel_exist():
+    check = script("check_wheel")
+    assert all((ROOT / file).is_file() for file in check.TESTS)
+    assert list(check.TEST_NEEDS) == WHEELS["test-requires"]
+    assert ".ci/check_wheel.py --installed" in WHEELS["test-command"]

@@ -60,7 +60,8 @@ def built(tmp_path_factory):
     done = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(site)],
         cwd=ROOT,
-        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        # Examples without outputs, whatever notebooks there are.
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1", "NOTEBOOKS": str(site / "none")},
         capture_output=True,
         text=True,
         check=False,
@@ -83,6 +84,7 @@ def test_it_builds_without_a_warning(built):
 def test_every_page_is_there_and_in_the_menu(built, pages):
     site, _ = built
     written = {page.relative_to(ROOT / "docs") for page in (ROOT / "docs").rglob("*.md")}
+    written |= {Path("examples", f"{one.stem}.md") for one in (ROOT / "docs/examples").glob("*.py")}
     shown = {file.relative_to(site).with_suffix(".md") for file in pages} - {Path("404.md")}
     assert shown == written
     start = pages[site / "index.html"]
@@ -203,3 +205,22 @@ def test_it_fits_a_telephone_and_its_search_finds(browser, address, pages):
     page.locator(".md-search-result__item a").first.wait_for()
     assert not complaints
     context.close()
+
+
+@pytest.mark.browser
+def test_its_search_finds_in_a_page_that_is_opened_as_a_file(built, browser):
+    site, _ = built
+    page = browser.new_page()
+    complaints: list[str] = []
+    page.on("pageerror", lambda fault: complaints.append(str(fault)))
+    page.goto((site / "index.html").as_uri())
+    page.locator("input[name=query]").click()
+    page.keyboard.type("Mindlin")
+    found = page.locator(".md-search-result__meta")
+    page.wait_for_function(
+        "document.querySelector('.md-search-result__meta').textContent.includes('matching')"
+    )
+    assert "0 matching" not in found.text_content()
+    assert page.locator(".md-search-result__link").first.get_attribute("href").startswith("file:")
+    page.close()
+    assert complaints == []

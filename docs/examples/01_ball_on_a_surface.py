@@ -19,14 +19,16 @@ friction = sp.CoulombFriction(mu_static=0.2, mu_dynamic=0.15, v_static=1e-3, v_d
 scene.add_contact(sp.Sphere(0.012, "ball"), bowl, law=law, friction=friction, name="ball-bowl")
 q0 = np.array([0.06, 0.02, 0.10, 0, 0, 0, 1])  # position [m], then the quaternion x y z w
 result = sp.Simulation(scene, sp.Adaptive()).run(q0, duration=1.5, record_dt=2e-4)
+scene
 
 # %% [markdown]
-# What happened, in numbers.
+# What happened, in numbers. A notebook shows the last value of a cell as a table.
 
 # %%
 figures = result.stats.pairs["ball-bowl"]
 print(f"{figures.touches} touches, hardest {figures.peak_force:.0f} N")
 print(f"energy residual {np.abs(result.energy.residual).max():.1e} J")
+result
 
 # %% [markdown]
 # Forces, depth and energy over time; then where on the bowl it bounced and rolled: each element is
@@ -36,10 +38,12 @@ print(f"energy residual {np.abs(result.energy.residual).max():.1e} J")
 # %%
 overview = result.plot()
 overview.savefig("overview.png")
+overview
 
 # %%
 contact_map = result.plot("map")
 contact_map.savefig("contact_map.png")
+contact_map
 
 # %% [markdown]
 # The recording plays in the notebook, and as a page of its own in any browser.
@@ -47,3 +51,4 @@ contact_map.savefig("contact_map.png")
 # %%
 recording = result.view(visual_model=ball.visual_model, speed=0.5)
 recording.save("ball.html")
+recording

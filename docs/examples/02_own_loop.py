@@ -59,6 +59,7 @@ result = sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(
 )
 difference = np.abs(result.q[-1] - q).max()
 print(f"the two differ by {difference:.1e} rad")
+result
 
 # %%
 forces = result.plot("force")
@@ -66,3 +67,4 @@ axis = forces.axes[0]
 axis.plot(time[::5], force[::5], "k.", markersize=3, label="own loop")
 axis.legend()
 forces.savefig("own_loop.png")
+forces

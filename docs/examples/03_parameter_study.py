@@ -6,8 +6,8 @@ takes depends on friction alone, and the speed at which it ends does not: 5/7 of
 """
 
 # %%
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import sphshell_pin as sp
 from sphshell_pin import robots
@@ -52,8 +52,7 @@ for mu in coefficients:
     print(f"mu = {mu:4.2f}: rolls after {times[-1]:.3f} s with {speeds[-1]:.4f} m/s")
 
 # %%
-figure = Figure(figsize=(9, 4), layout="constrained")
-slides, rolls = figure.subplots(1, 2)
+figure, (slides, rolls) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 line = np.linspace(coefficients[0], coefficients[-1], 200)
 slides.plot(line, 2 * SPEED / (7 * line * GRAVITY), color="0.6", label="2 v / (7 mu g)")
 slides.plot(coefficients, times, "o", label="simulated")
@@ -90,8 +89,7 @@ for stiffness, one in zip(stiffnesses, study, strict=True):
     print(f"k = {stiffness:8.2e} N/m: {one.peak_force:6.1f} N, {one.contact_time * 1e3:.3f} ms")
 
 # %%
-figure = Figure(figsize=(9, 4), layout="constrained")
-pushes, lasts = figure.subplots(1, 2)
+figure, (pushes, lasts) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 pushes.loglog(stiffnesses, SPEED * np.sqrt(stiffnesses * mass), color="0.6", label="v sqrt(k m)")
 pushes.loglog(stiffnesses, [one.peak_force for one in study], "o", label="simulated")
 pushes.set(xlabel="stiffness [N/m]", ylabel="peak force [N]")

@@ -50,10 +50,13 @@ felt = images.forces.sum(axis=(1, 2)) + images.outside
 pressed = np.bincount(result.contacts.row, result.contacts.normal_force, len(result.t))
 print(f"forces on taxels and on the tip differ by {np.abs(felt - pressed).max():.0e} N at most")
 print(f"beside the grid: {np.abs(images.outside).max():.0e} N")
+result
 
 # %%
 images.save("taxels.npz")
 two = np.flatnonzero(np.bincount(result.contacts.row, minlength=len(result.t)) == 2)
 middle = two[len(two) // 2]
 rows = [middle - 40, two[0] - 1, two[0] + 1, middle, two[-1] - 1, two[-1] + 1, middle + 40]
-plot_taxels(images, rows).savefig("taxels.png", dpi=110)
+figure = plot_taxels(images, rows)
+figure.savefig("taxels.png", dpi=110)
+figure

@@ -106,5 +106,10 @@ found = sp.fit(
 )
 print(found)
 print(found.correlation)
-found.plot().savefig("fit.png", dpi=110)
+found
+
+# %%
+figure = found.plot()
+figure.savefig("fit.png", dpi=110)
 found.write_scenario("rebound.fitted.toml")
+figure

@@ -140,11 +140,12 @@ def _add_picture(
     assert report.out is not None
     rows = report.table[report.table["design"].isin(DRAWN)]
     values = rows[figure].to_numpy(float) if len(rows) else None
+    units = report.table.attrs.get("units")
     if values is None and tornado is None and indices is None:
         return
     path = report.out.with_name(f"{report.out.stem}.{figure.replace('/', '_')}.png")
     try:
-        paths.append(write_figure(path, plot_uncertainty(figure, values, tornado, indices)))
+        paths.append(write_figure(path, plot_uncertainty(figure, values, tornado, indices, units)))
     except MissingExtra as missing:
         typer.echo(str(missing), err=True)
 

@@ -109,6 +109,7 @@ def run_settings(
             f"must be small enough to count steps of {dt or 1e-6!r} s",
         )
     check_moved_mass(scene.model)
+    recorded = check_record(record)
     every = 0.0
     if record_dt is not None:
         every = min(check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
@@ -121,7 +122,8 @@ def run_settings(
         start_time=t0,
         control_dt=hold,
         record_dt=every,
-        patches=check_record(record),
+        patches="patch" in recorded,
+        torques="torque" in recorded,
     )
 
 

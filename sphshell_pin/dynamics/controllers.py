@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -26,6 +25,7 @@ from sphshell_pin.checks import (
 )
 from sphshell_pin.dynamics.callables import check_callable
 from sphshell_pin.dynamics.models import find_frame, find_joint, model_reach, set_joint
+from sphshell_pin.dynamics.path import Curve, Timing, core_path
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
 from sphshell_pin.dynamics.sensor_log import Readings
 from sphshell_pin.errors import InvalidParameter, SphshellError, add_origin
@@ -63,6 +63,8 @@ class Controller(Ingredient):
     """
 
     joints: Iterable[str] | None
+    posture_gain: ClassVar[str | None] = None
+    """The gain that pulls the joints to `q_ref`, of a controller that has both."""
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter unless `joints` is None or a list of names."""
@@ -171,6 +173,7 @@ class JointPD(Controller, kind="joint-pd"):
     leaves a joint out; the difference is pinocchio.difference's.
     """
 
+    posture_gain: ClassVar[str | None] = "kp"
     kp: Gain = parameter(unit="N m/rad", label="joint stiffness", help="stiffness of the joints")
     kd: Gain = parameter(unit="N m s/rad", label="joint damping", help="damping of the joints")
     q_ref: Posture | None = parameter(None, help="posture; by default that of the start")
@@ -195,22 +198,34 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
 
     F = stiffness (x_d - x) + damping (x_d' - x') [N/m], [N s/m] (Hogan 1985), at the point x with
     the coordinates `offset` (3,) [m] in the frame: its origin by default. `path` (k, 3) [m] are
-    its corners: with `shell` in the shell's frame and projected on it, else in the world. With
-    `normal_force` [N] (needs a shell) the spring acts in the tangent plane only, and the point is
-    pushed against the shell's normal, on the side where it is at the start. The target waits
-    `lead_in` [s] at the first point, then moves at `speed` [m/s], then waits at the last.
+    its points: with `shell` in the shell's frame and projected on it, else in the world. Straight
+    pieces join them, or with `spline` one smooth curve. With `normal_force` [N] (needs a shell) the
+    spring acts in the tangent plane only, and the point is pushed against the shell's normal, on
+    the side where it is at the start.
+
+    The target waits `lead_in` [s] at the first point, moves at `speed` [m/s], and waits at the
+    last. With `acceleration` [m/s2], `jerk` [m/s3] or both it sets out and stops softly, a spline
+    as a whole and straight pieces each; over a spline the speed is reduced to one at which the
+    curvature takes no more than `acceleration`. Without them its speed jumps, and a force with it.
+
     `rotational_stiffness` [N m/rad] and `rotational_damping` [N m s/rad] hold the orientation of
     the start. `posture_stiffness` [N m/rad] pulls the joints to `q_ref` (default: the start) and
     `joint_damping` [N m s/rad] damps the motion of the joints; gains and `q_ref` as in JointPD.
+
+    Without `decoupled` the robot's inertia acts on the surface as it follows the path. With it
+    the wrench that the target's acceleration a_d takes is added, Lambda (a_d - J' v) with Lambda =
+    (J M^-1 J^T)^-1, and posture and joint damping act where they do not accelerate the frame
+    (Khatib, IEEE Journal of Robotics and Automation 3, 1987).
 
     The shell is at `placement` in `shell_frame`; if neither is given, where the contacts of the
     scene have it, and if none has it, in the universe. If they have it in several places,
     InvalidParameter asks for `shell_frame`.
     """
 
+    posture_gain: ClassVar[str | None] = "posture_stiffness"
     frame: str = parameter(help="the frame that is moved")
     path: Sequence[tuple[float, float, float]] | Array = parameter(
-        unit="m", help="corners of the path (k, 3)", min_length=1
+        unit="m", help="points of the path (k, 3)", min_length=1
     )
     stiffness: float = parameter(
         at_least=0, unit="N/m", label="tip stiffness", help="pull towards the target"
@@ -247,6 +262,16 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         min_length=3,
         max_length=3,
     )
+    spline: bool = parameter(False, help="a smooth curve through the points of the path")
+    acceleration: float | None = parameter(
+        None, above=0, unit="m/s2", label="path acceleration", help="limit of the target's"
+    )
+    jerk: float | None = parameter(
+        None, above=0, unit="m/s3", label="path jerk", help="limit of the target's along the path"
+    )
+    decoupled: bool = parameter(
+        False, help="the robot's inertia, posture and joint damping do not act on the frame"
+    )
 
     def __post_init__(self) -> None:
         """Raise InvalidParameter for wrong types, and for a shell's place without a shell."""
@@ -281,23 +306,21 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         carrier_name, placement = self._shell_place(scene)
         carrier_index = find_frame(model, carrier_name, "shell_frame")
         carrier = model.frames[carrier_index]
-        points, normals = self._projected_path()
+        curve, timing = self._motion()
         if self.shell is not None:
             data = model.createData()
             pin.framesForwardKinematics(model, data, q0)
             shell_pose = data.oMf[carrier_index] * placement
             at = shell_pose.actInv(data.oMf[frame_index].act(np.asarray(self.offset)))
-            above = float((at - points[0]) @ normals[0])
-            normals = normals if above >= 0 else -normals
+            if float((at - curve.points[0]) @ curve.normals[0]) < 0:
+                curve = replace(curve, normals=-curve.normals)
         return _core.CartesianImpedance(
             num_joints=model.njoints,
             joint=int(frame.parentJoint),
             frame=(frame.placement * self._moved_point()).homogeneous,
             path_joint=int(carrier.parentJoint),
             path_placement=(carrier.placement * placement).homogeneous,
-            times=self._times(points).tolist(),
-            points=points,
-            normals=normals,
+            path=core_path(curve, timing),
             stiffness=self.stiffness,
             damping=self.damping,
             normal_force=self.normal_force,
@@ -307,6 +330,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
             joint_damping=self.gain("joint_damping", model),
             q_ref=self.posture(model, q0),
             actuated=self.actuated(model),
+            decoupled=self.decoupled,
         )
 
     def _moved_point(self) -> pin.SE3:
@@ -331,22 +355,14 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
             )
         return places[0] if places else ("universe", placement)
 
-    def _projected_path(self) -> tuple[Array, Array]:
-        """Return points (n, 3) and normals (n, 3) (zero without a shell) along the path."""
-        corners = check_points("path", self.path)
-        if len(corners) == 0:
+    def _motion(self) -> tuple[Curve, Timing]:
+        """Return the target's curve, in the path's own frame, and its motion along it."""
+        points = check_points("path", self.path)
+        if len(points) == 0:
             raise InvalidParameter("path", [], "must have at least one point")
-        shell = self.shell
-        if not isinstance(shell, Shell):
-            return corners, np.zeros_like(corners)
-        # Straight pieces between corners leave a curved surface: project a fine division of them.
-        spacing = shell.size / 500
-        pieces = [corners[:1]]
-        for a, b in itertools.pairwise(corners):
-            n = max(1, int(np.ceil(np.linalg.norm(b - a) / spacing)))
-            pieces.append(a + (b - a) * (np.arange(1, n + 1) / n)[:, None])
-        at = shell.closest_points(np.concatenate(pieces))
-        return at.points, at.normals
+        shell = self.shell if isinstance(self.shell, Shell) else None
+        curve = Curve.through(points, shell, spline=self.spline)
+        return curve, Timing.along(curve, self.lead_in, self.speed, self.acceleration, self.jerk)
 
     def doubts(self, scene: Scene, q0: Array) -> list[str]:
         """Say where the path is off the shell, or out of the robot's reach."""
@@ -387,29 +403,26 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         model, data = scene.model, scene.model.createData()
         name, placement = self._shell_place(scene)
         carrier, frame = find_frame(model, name), find_frame(model, self.frame)
-        points, normals = self._projected_path()
-        times, nearest = self._times(points), np.inf
+        (curve, timing), nearest = self._motion(), np.inf
         some = slice(None, None, -(-len(result.t) // _MOST_ROWS))
-        for t, q in zip(result.t[some], result.q[some], strict=True):
+        places = timing.at(result.t[some])
+        targets = zip(places, curve.at(places), strict=True)
+        for (place, target), q in zip(targets, result.q[some], strict=True):
             pin.framesForwardKinematics(model, data, q)
-            at = [np.interp(t, times, column) for column in points.T]
-            place = (data.oMf[carrier] * placement).actInv(
+            at = (data.oMf[carrier] * placement).actInv(
                 data.oMf[frame].act(np.array(self.offset, dtype=float))
             )
-            away = place - np.array(at)
+            away = at - target
             if self.normal_force:
-                normal = normals[min(int(np.searchsorted(times, t)), len(normals) - 1)]
+                k = min(int(np.searchsorted(curve.along, place)), len(curve.normals) - 1)
+                normal = curve.normals[k]
                 away = away - normal * (normal @ away)
             nearest = min(nearest, float(np.linalg.norm(away)))
         return nearest
 
-    def _times(self, points: Array) -> Array:
-        lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        return self.lead_in + np.concatenate([[0.0], np.cumsum(lengths)]) / self.speed
-
     def duration(self) -> float:
         """Return the time [s] at which the target reaches the last point."""
-        return float(self._times(self._projected_path()[0])[-1])
+        return float(self._motion()[1].times[-1])
 
 
 def wrap_callable(

@@ -15,6 +15,7 @@ from sphshell_pin.dynamics.explain import explain_pairs, relaxation_time
 from sphshell_pin.dynamics.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.variations import Variations, numbers_of
 from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.summary import Summarized
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.pairs import ContactPair
@@ -32,8 +33,8 @@ _FIELD, _RADIUS, _BALL, _OFFSET, _PLACEMENT = range(5)
 _STEP, _STEP_AT_BOUND = 1e-5, 1e-7
 
 
-@dataclass(frozen=True)
-class DynamicsDerivatives:
+@dataclass(frozen=True, repr=False)
+class DynamicsDerivatives(Summarized):
     """The acceleration (nv,) at a state, and its derivatives.
 
     `by_q` (nv, nv) is taken in the tangent space of q, along which pinocchio.integrate moves;
@@ -48,8 +49,8 @@ class DynamicsDerivatives:
     parameters: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class StepDerivatives:
+@dataclass(frozen=True, repr=False)
+class StepDerivatives(Summarized):
     """Where one fixed step leads, q (nq,) and v (nv,), and its derivatives.
 
     Changes of a state are those of q in its tangent space and of v, one behind the other: those at
@@ -65,8 +66,8 @@ class StepDerivatives:
     parameters: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class ContactForceDerivatives:
+@dataclass(frozen=True, repr=False)
+class ContactForceDerivatives(Summarized):
     """The m contacts at a state, and the derivatives of their forces and depths.
 
     `by_q`, `by_v` (m, 3, nv) of the force on the sphere in the world [N], `normal_by_q`,

@@ -60,7 +60,7 @@ class PairExplanation:
     group: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Explanation:
     """The answer of Scene.explain; str() gives it as text."""
 
@@ -69,6 +69,9 @@ class Explanation:
     pairs: tuple[PairExplanation, ...]
     recommended_dt: float
     warnings: tuple[str, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        return str(self)
 
     def __str__(self) -> str:
         """Return the explanation as text."""

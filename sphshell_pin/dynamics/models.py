@@ -164,6 +164,25 @@ def model_reach(model: pin.Model) -> float:
     return float(reach.max())
 
 
+def apparent_mass(model: pin.Model, q: Array, joint: int, point: Array) -> float:
+    """Return the mass [kg] that a force at a `point` (3,) [m] of a joint's frame has to move.
+
+    It is the harmonic mean over the directions of space, 3 / trace(J M^-1 J^T) with the Jacobian J
+    of the point and the mass matrix M at q (nq,) (Khatib 1987): of a free ball at its center the
+    ball's mass. It is at most the mass of all bodies, which a point that cannot move gets.
+    """
+    data = model.createData()
+    mass = pin.crba(model, data, q)
+    mass = np.triu(mass) + np.triu(mass, 1).T
+    pin.computeJointJacobians(model, data, q)
+    jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)
+    jacobian = jacobian.reshape(6, model.nv)  # of one velocity it comes as a vector
+    moved = jacobian[:3] - pin.skew(point) @ jacobian[3:]
+    mobility = float(np.trace(moved @ np.linalg.solve(mass, moved.T)))
+    total = float(pin.computeTotalMass(model))
+    return 3.0 / mobility if mobility * total > 3.0 else total
+
+
 def find_joint(model: pin.Model, name: str) -> pin.JointModel:
     """Return the joint called `name`; NameNotFound lists the joints."""
     names = list(model.names)[1:]

@@ -21,12 +21,13 @@ from sphshell_pin.dynamics.advance import (
     why_ended,
 )
 from sphshell_pin.dynamics.busy import one_at_a_time
+from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.run_stats import RunStats
 from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
 from sphshell_pin.dynamics.sensors import SensorSet
 from sphshell_pin.dynamics.simulation import Simulation
-from sphshell_pin.errors import FrameNotFound, InvalidParameter, NotPicklable
+from sphshell_pin.errors import InvalidParameter, NotPicklable
 
 Array = NDArray[np.float64]
 
@@ -121,6 +122,14 @@ class OpenRun:
         return rows
 
     @one_at_a_time
+    def record_torques(self) -> None:
+        """Record the controller's torques from now on, as `record=["torque"]` does from the start.
+
+        Rows that were recorded before have nan.
+        """
+        self._core.record_torques()
+
+    @one_at_a_time
     def snapshot(self) -> Result:
         """Return the state where the run stands, as a result of one row."""
         return self._result(self._core.snapshot())
@@ -145,8 +154,10 @@ class OpenRun:
         q, v = np.array(self._core.q), np.array(self._core.v)
         core_controller = None
         if controller is not None and controller is not self._controller:
+            # What it leaves to the start of the run, such as its posture, is as at the start.
+            start = self._start.q[0]
             core_controller, _ = bind_controller(
-                scene, simulation.integrator, controller, self._control_dt, q, self._sensors
+                scene, simulation.integrator, controller, self._control_dt, start, self._sensors
             )
         pairs = core_pairs(scene, q, v, warn=False)
         self._core.change(pairs, scene.joints.to_core(scene.model), core_controller)
@@ -168,15 +179,60 @@ class OpenRun:
         InvalidParameter
             The frame is fixed to the world, or the force is no three numbers.
         """
+        force = check_vector("force_world", force_world, 3, " [N]")
+        self._act(frame, np.zeros(3), force, np.zeros(3), 0.0, 0.0)
+
+    @one_at_a_time
+    def pull(
+        self,
+        frame: str,
+        point: ArrayLike,
+        anchor_world: ArrayLike,
+        stiffness: float,
+        damping: float = 0.0,
+    ) -> None:
+        """Pull a point of a body to an anchor with a spring and a damper, from now on.
+
+        The force on the point x, which has the coordinates `point` (3,) [m] in `frame`, is
+        stiffness (anchor - x) - damping x' [N/m], [N s/m], with `anchor_world` (3,) [m]. It is
+        evaluated at each stage of a step. It takes the place of a push; another push or pull, such
+        as a push of zero force, ends it. Its work counts as the controller's.
+
+        Raises
+        ------
+        FrameNotFound
+            The model has no such frame.
+        InvalidParameter
+            The frame is fixed to the world, point or anchor are no three numbers, or stiffness or
+            damping is negative.
+        """
+        at = check_vector("point", point, 3, " [m]")
+        anchor = check_vector("anchor_world", anchor_world, 3, " [m]")
+        stiffness = check_not_negative("stiffness", stiffness, "N/m")
+        damping = check_not_negative("damping", damping, "N s/m")
+        self._act(frame, at, np.zeros(3), anchor, stiffness, damping)
+
+    def _act(
+        self,
+        frame: str,
+        point: Array,
+        force: Array,
+        anchor: Array,
+        stiffness: float,
+        damping: float,
+    ) -> None:
         model = self.scene.model
-        if not model.existFrame(frame):
-            raise FrameNotFound(frame, [one.name for one in model.frames])
-        where = model.frames[model.getFrameId(frame)]
-        number = model.getFrameId(frame)
+        number = find_frame(model, frame)
+        where = model.frames[number]
         if where.parentJoint == 0:
             raise InvalidParameter("frame", frame, "is fixed to the world: nothing would move")
-        force = check_vector("force_world", force_world, 3, " [N]")
-        self._core.push(where.parentJoint, where.placement.translation, force, number)
+        at = where.placement.act(point)
+        self._core.push(where.parentJoint, at, force, anchor, stiffness, damping, number)
+
+    @one_at_a_time
+    def record_patches(self, on: bool) -> None:
+        """Record the patches of the contacts from now on, or no longer; see `Simulation.run`."""
+        self._core.record_patches(on)
 
     def _result(self, record: dict[str, NDArray[np.generic]], first: int = 0) -> Result:
         # The core counts rows from the start of the run, a result from its own first one.

@@ -17,6 +17,7 @@ from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.sources import Find, checked_source
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
+from sphshell_pin.summary import Fact, Summarized
 
 
 class PlacedSphere(NamedTuple):
@@ -27,8 +28,8 @@ class PlacedSphere(NamedTuple):
     radius: float
 
 
-@dataclass(frozen=True)
-class ContactPair:
+@dataclass(frozen=True, repr=False)
+class ContactPair(Summarized):
     """One pair of bodies that may touch; body i carries the sphere, body j the shell.
 
     `frame_i`, `frame_j` name their frames, `joint_i`, `joint_j` the joints, `pose_i`, `pose_j` the
@@ -66,6 +67,17 @@ class ContactPair:
         if isinstance(self.friction, MindlinFriction):
             must = "needs a sphere, and a contact source has none: take a BristleFriction"
             raise InvalidParameter("friction", self.friction.kind, must)
+
+    @property
+    def _title(self) -> str:
+        return f"ContactPair '{self.name}'"
+
+    def _facts(self) -> list[Fact]:
+        labels = ("sphere", "with", "normal law", "friction")
+        return [
+            Fact(label, text, brief=label in labels[:2])
+            for label, text in zip(labels, self.shown[1:], strict=True)
+        ]
 
     @property
     def plane_law(self) -> NormalLaw:
@@ -107,6 +119,27 @@ class ContactPair:
         if self.other_sphere is not None:
             return _center(self.pose_j, self.other_sphere)
         return self.pose_j * self.placement
+
+    @property
+    def shown(self) -> tuple[str, str, str, str, str]:
+        """Name, sphere, what it touches, law and friction, each in a few words."""
+        spheres = [
+            f"radius {one.radius * 1e3:g} mm at '{one.frame}'"
+            for one in (self.sphere, self.other_sphere)
+            if one is not None
+        ]
+        first = spheres[0] if self.sphere is not None else f"contact source at '{self.frame_i}'"
+        if self.shell is not None:
+            other = f"'{self.shell.name}' at '{self.frame_j}', {self.method}"
+        else:
+            other = spheres[1] if len(spheres) > 1 else f"'{self.frame_j}'"
+        return (
+            self.name,
+            first,
+            other,
+            self.law.text,
+            ("none" if self.friction is None else self.friction.text),
+        )
 
     def to_core(self) -> _core.Pair:
         """Build the C++ binding of this pair."""

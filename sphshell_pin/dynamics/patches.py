@@ -12,7 +12,7 @@ from sphshell_pin import _core
 from sphshell_pin.checks import read_only
 from sphshell_pin.errors import InvalidParameter
 
-RECORDED = ("patch",)
+RECORDED = ("patch", "torque")
 """What a run records only where it is asked to."""
 
 PATCH = np.dtype(_core.patch_row_type())
@@ -22,15 +22,15 @@ PATCH = np.dtype(_core.patch_row_type())
 Patches = NDArray[Any]  # (m,) of PATCH
 
 
-def check_record(record: Collection[str]) -> bool:
-    """Return whether `record` asks for patches; InvalidParameter if it asks for something else."""
+def check_record(record: Collection[str]) -> frozenset[str]:
+    """Return the names of RECORDED in `record`; InvalidParameter if it has others."""
     if isinstance(record, str) or not isinstance(record, Collection):
         raise InvalidParameter("record", record, "must be a list of names, such as ['patch']")
     for name in record:
         if name not in RECORDED:
             valid = " or ".join(f"'{one}'" for one in RECORDED)
             raise InvalidParameter("record", name, f"must be {valid}")
-    return "patch" in record
+    return frozenset(record)
 
 
 def patches_of(rows: NDArray[np.uint8]) -> Patches:

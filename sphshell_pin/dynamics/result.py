@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from sphshell_pin.dynamics.scene import Scene
 from sphshell_pin.dynamics.scene_contacts import Columns, columns
 from sphshell_pin.dynamics.sensor_log import SensorLog, sensor_columns
 from sphshell_pin.errors import MissingExtra, ResultError
+from sphshell_pin.summary import Detail, Fact, Summarized
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     from sphshell_pin.dynamics.sensitivities import Sensitivities
     from sphshell_pin.dynamics.sensors import SensorSet
+    from sphshell_pin.view.film import FilmOptions
     from sphshell_pin.view.recording import RecordingView
 
 Array = NDArray[np.float64]
@@ -34,8 +36,8 @@ Array = NDArray[np.float64]
 EVENT_KINDS = get_args(EventKind)
 
 
-@dataclass(frozen=True)
-class Result:
+@dataclass(frozen=True, repr=False)
+class Result(Summarized):
     """A finished run.
 
     `t` (n,) [s], `q` (n, nq), `v` (n, nv) at the recorded rows; `pairs` the names of the contact
@@ -43,7 +45,8 @@ class Result:
     its cost, and figures of each pair over all steps; `scene` that ran
     (None after load); `origin` the scenario it came from (None without one); `sensors` the readings
     of each sensor by its name; `patch_rows` the patches of the contacts, None where they were not
-    recorded (see `patches`).
+    recorded (see `patches`); `torque` (n, nv) the controller's torques, cut to their limits [N m or
+    N], None unless the run recorded them: nan where a torque that is held was not known yet.
     """
 
     t: Array
@@ -59,6 +62,32 @@ class Result:
     sensors: Mapping[str, SensorLog] = field(default_factory=dict)
     patch_rows: Patches | None = None
     sensitivity_rows: Sensitivities | None = None
+    torque: Array | None = None
+
+    def _facts(self) -> list[Fact]:
+        pairs = self.stats.pairs.values()
+        facts = [
+            Fact("simulated", self.stats.duration, "s"),
+            Fact("rows", len(self.t)),
+            Fact("contact pairs", len(self.pairs)),
+            Fact("touches", sum(one.touches for one in pairs), one="touch"),
+            Fact("peak force", max((one.peak_force for one in pairs), default=0.0), "N"),
+            Fact("energy residual", float(self.energy.residual[-1]) if len(self.t) else 0.0, "J"),
+            Fact("energy exchanged", self.energy.exchanged, "J", brief=False),
+            Fact("logged contacts", len(self.contacts), brief=False),
+            Fact("events", len(self.events), brief=False),
+            Fact("integrator", self.stats.integrator, brief=False),
+            Fact("steps", self.stats.steps, brief=False),
+            Fact("wall time", self.stats.wall_time, "s", brief=False),
+        ]
+        if self.sensors:
+            facts.append(Fact("sensors", ", ".join(self.sensors), brief=False))
+        if self.origin is not None:
+            facts.append(Fact("scenario", self.origin.scenario, brief=False))
+        return facts
+
+    def _rows(self) -> Detail | None:
+        return self.stats._rows() if len(self.pairs) else None
 
     @property
     def sensitivities(self) -> Sensitivities | None:
@@ -101,6 +130,7 @@ class Result:
             scene=scene,
             sensors=sensors.logs(whole),
             patch_rows=patches_of(whole["patches"]) if "patches" in whole else None,
+            torque=read_only(whole["torques"]) if "torques" in whole else None,
         )
 
     @property
@@ -252,6 +282,26 @@ class Result:
         from sphshell_pin.view.recording import view_result
 
         return view_result(self, scene, visual_model, speed=speed, height=height, title=title)
+
+    def render(
+        self,
+        path: str | PathLike[str],
+        scene: Scene | None = None,
+        visual_model: pin.GeometryModel | None = None,
+        **options: Unpack[FilmOptions],
+    ) -> Path:
+        """Draw this result as a picture (.png), a film (.gif, .mp4) or a folder of pictures.
+
+        `scene` and `visual_model` are as in `view`; the options are those of
+        `sphshell_pin.view.film.render_film`, among them `time` of a picture and `span` of a film
+        [s], `size` [pixels] and `camera`. Returns the path.
+
+        Raises what `render_film` does: MissingExtra without playwright, ResultError without
+        Chromium.
+        """
+        from sphshell_pin.view.film import render_film
+
+        return render_film(path, self, scene, visual_model, **options)
 
 
 def _owners(pairs: tuple[str, ...], scene: Scene) -> dict[str, tuple[str, ...]]:

@@ -90,7 +90,13 @@ SENSITIVITY_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]
 }
 """The same of a run that recorded its derivatives; the header names their p columns."""
 
-_IN_FILE = {name: name for name in ARRAYS | SENSOR_ARRAYS | PATCH_ARRAYS | SENSITIVITY_ARRAYS}
+TORQUE_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
+    "torque": (FLOAT, ("n", "nv")),
+}
+"""The same of a run that recorded the controller's torques."""
+
+_OPTIONAL = SENSOR_ARRAYS | PATCH_ARRAYS | SENSITIVITY_ARRAYS | TORQUE_ARRAYS
+_IN_FILE = {name: name for name in ARRAYS | _OPTIONAL}
 _IN_FILE["contacts.contact_id"] = "contacts.number"
 
 
@@ -147,6 +153,8 @@ def save_result(result: Result, path: Path, home: str | PathLike[str] | None) ->
     if result.patch_rows is not None:
         for name in PATCH_ARRAYS:
             arrays[name] = result.patch_rows[name.removeprefix("patches.")]
+    if result.torque is not None:
+        arrays["torque"] = result.torque
     rows = result.sensitivity_rows
     if rows is not None:
         header["sensitivities"] = rows.parameters
@@ -216,6 +224,7 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
         else {},
         patch_rows=patches,
         sensitivity_rows=sensitivities,
+        torque=arrays.get("torque"),
     )
 
 
@@ -247,6 +256,7 @@ def _read(
     shapes: dict[str, tuple[int, ...]] = {}
     arrays_in = ARRAYS | (SENSOR_ARRAYS if "sensors.t.npy" in files else {})
     arrays_in |= PATCH_ARRAYS if "patches.approach.npy" in files else {}
+    arrays_in |= TORQUE_ARRAYS if "torque.npy" in files else {}
     arrays_in |= SENSITIVITY_ARRAYS if "sensitivities.q.npy" in files else {}
     parts = {"header": "header.npy"} | {name: f"{_IN_FILE[name]}.npy" for name in arrays_in}
     for name, part in parts.items():

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.scene_contacts import SceneContacts
+from sphshell_pin.summary import Fact, Summarized
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ContactLog(SceneContacts):
     """Every contact of every recorded row: the columns of SceneContacts, and when.
 
@@ -21,6 +22,13 @@ class ContactLog(SceneContacts):
 
     t: Array
     row: NDArray[np.int64]
+
+    def _facts(self) -> list[Fact]:
+        rows = len(np.unique(self.row))
+        return [*super()._facts(), Fact("recorded rows with contact", rows, brief=False)]
+
+    def _rows(self) -> None:
+        return None  # its entries are those of many moments
 
     def of_pair(self, pair: int) -> ContactLog:
         """Return the entries of one pair."""
@@ -52,8 +60,8 @@ class Event:
     kind: str
 
 
-@dataclass(frozen=True)
-class EnergyAudit:
+@dataclass(frozen=True, repr=False)
+class EnergyAudit(Summarized):
     """Where the energy is and where it went, (n,) [J] at the result's rows.
 
     `kinetic` and `potential` (gravity) of the model, `elastic` of the contacts and stops of joints,
@@ -67,6 +75,18 @@ class EnergyAudit:
     damping_loss: Array
     friction_loss: Array
     control_work: Array
+
+    def _facts(self) -> list[Fact]:
+        parts = [
+            Fact(f"{f.name.replace('_', ' ')} at the end", _last(getattr(self, f.name)), "J", False)
+            for f in fields(self)
+        ]
+        return [
+            Fact("rows", len(self.kinetic)),
+            Fact("exchanged", self.exchanged, "J"),
+            Fact("residual at the end", _last(self.residual), "J"),
+            *parts,
+        ]
 
     @property
     def total(self) -> Array:
@@ -112,3 +132,7 @@ class Origin:
 
     scenario: str
     settings: dict[str, object]
+
+
+def _last(values: Array) -> float:
+    return float(values[-1]) if len(values) else np.nan

@@ -30,6 +30,7 @@ from sphshell_pin.errors import (
     SphshellError,
     WeakLawWarning,
 )
+from sphshell_pin.summary import Detail, Fact, Summarized, names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,7 +53,7 @@ class Plan:
     t0: float
 
 
-class Rollout(Sequence[Result]):
+class Rollout(Summarized, Sequence[Result]):
     """Runs that Simulation.rollout made: n of them, in the order of their starts.
 
     [i] gives the Result of run i, with the rows that were recorded, and a slice a list of them; a
@@ -149,6 +150,26 @@ class Rollout(Sequence[Result]):
         if number is None:
             raise self._plan.failures[run].with_traceback(None)
         return self._result(run, self._core.outcome(number))
+
+    def _facts(self) -> list[Fact]:
+        ended = float(self.t.max()) if len(self) else math.nan
+        return [
+            Fact("runs", len(self)),
+            Fact("failed", len(self.failures)),
+            Fact("until", ended, "s"),
+            Fact("varied", names(self.varied)),
+            Fact("steps", int(self.steps.sum()), brief=False),
+            Fact("threads", self.threads, brief=False),
+            Fact("wall time", self.wall_time, "s", brief=False),
+        ]
+
+    def _rows(self) -> Detail | None:
+        rows: list[tuple[object, ...]] = []
+        for name, values in self.figures.items():
+            known = values[np.isfinite(values)]
+            if len(known):
+                rows.append((name, known.min(), float(np.median(known)), known.max()))
+        return Detail(("figure [SI units]", "least", "median", "largest"), rows, len(rows))
 
     def __iter__(self) -> Iterator[Result]:
         """Go through the results of all runs."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
 from sphshell_pin.deprecation import FormerDict
+from sphshell_pin.summary import Detail, Fact, Summarized
 
 # Kinds of events in the order of the compiled core; from "stop" on, of joints.
 EventKind = Literal[
@@ -105,8 +106,8 @@ def _earlier(known: float | None, new: float) -> float | None:
     return new if known is None else min(known, new)
 
 
-@dataclass(frozen=True)
-class RunStats(FormerDict):
+@dataclass(frozen=True, repr=False)
+class RunStats(FormerDict, Summarized):
     """Cost and figures of a run; zeros for the rows of a run that goes on.
 
     `steps` accepted, `rejected` for their error or a sphere's motion, `event_steps` made to end at
@@ -131,3 +132,31 @@ class RunStats(FormerDict):
     integrator: str = ""
     pairs: dict[str, PairFigures] = field(default_factory=dict)
     joints: dict[str, JointFigures] = field(default_factory=dict)
+
+    def _facts(self) -> list[Fact]:
+        return [
+            Fact("simulated", self.duration, "s"),
+            Fact("steps", self.steps),
+            Fact("wall time", self.wall_time, "s"),
+            Fact("integrator", self.integrator, brief=False),
+            Fact("step", self.dt, "s", brief=False),
+            Fact("rejected steps", self.rejected, brief=False),
+        ]
+
+    def _rows(self) -> Detail:
+        headings = (
+            "pair",
+            "peak force [N]",
+            "mean force [N]",
+            "impulse [N s]",
+            "largest depth [m]",
+            "duration [s]",
+            "touches",
+        )
+        listed = sorted(self.pairs.items(), key=lambda item: -item[1].peak_force)
+        rows = [
+            (name, one.peak_force, one.mean_force, one.impulse, one.max_depth)
+            + (one.contact_time, one.touches)
+            for name, one in listed
+        ]
+        return Detail(headings, rows, len(rows))

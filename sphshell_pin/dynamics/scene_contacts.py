@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sphshell_pin import _core
 from sphshell_pin.checks import read_only
 from sphshell_pin.deprecation import renamed
+from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized
 
 Array = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]  # of numbers of several kinds
@@ -20,8 +21,8 @@ ROW = np.dtype(_core.contact_row_type())
 """The structured type of the core's rows: its fields are those of SceneContacts."""
 
 
-@dataclass(frozen=True)
-class SceneContacts:
+@dataclass(frozen=True, repr=False)
+class SceneContacts(Summarized):
     """Contacts of a scene at one state, as columns; vectors and points in the world.
 
     With k contacts: `pair` (k,) index into scene.pairs; `point_world`, `normal_world` (k, 3) from
@@ -51,6 +52,32 @@ class SceneContacts:
     def __len__(self) -> int:
         """Return the number of contacts."""
         return len(self.depth)
+
+    def _facts(self) -> list[Fact]:
+        facts = [Fact("contacts", len(self))]
+        if not len(self):
+            return facts
+        slip = np.linalg.norm(self.slip_velocity_world, axis=1)
+        return [
+            *facts,
+            Fact("largest normal force", float(self.normal_force.max()), "N"),
+            Fact("largest depth", float(self.depth.max()), "m"),
+            Fact("fastest slip", float(slip.max()), "m/s", brief=False),
+        ]
+
+    def _rows(self) -> Detail | None:
+        headings = ("pair", "normal force [N]", "friction force [N]", "depth [m]", "point [m]")
+        rows = [
+            (
+                self.pair[k],
+                self.normal_force[k],
+                float(np.linalg.norm(self.friction_force_world[k])),
+                self.depth[k],
+                self.point_world[k],
+            )
+            for k in range(min(len(self), MOST_ROWS))
+        ]
+        return Detail(headings, rows, len(self))
 
     @property
     def force_world(self) -> Array:

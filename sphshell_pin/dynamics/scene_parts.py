@@ -33,6 +33,7 @@ from sphshell_pin.dynamics.sources import Find
 from sphshell_pin.dynamics.spheres import Parts, default_group, named, parts_of, warn_of_size
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.shell import Shell
+from sphshell_pin.summary import Detail, Fact, Summarized, names
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ class _Settings(TypedDict, total=False):
     method: str
 
 
-class SceneParts:
+class SceneParts(Summarized):
     """What a Scene is made of."""
 
     def __init__(
@@ -76,6 +77,22 @@ class SceneParts:
         self._shown: pin.Model | None = None
         self._pairs: tuple[ContactPair, ...] = ()
         self._core: _core.Scene | None = None
+
+    def _facts(self) -> list[Fact]:
+        model = self._model
+        pairs = [pair.name for pair in self._pairs]
+        return [
+            Fact("model", model.name or "without a name"),
+            Fact("joints", model.njoints - 1),
+            Fact("degrees of freedom", model.nv, one="degree of freedom"),
+            Fact("contact pairs", len(pairs), brief=False),
+            Fact("contact", names(pairs)),
+        ]
+
+    def _rows(self) -> Detail:
+        headings = ("contact", "sphere", "with", "normal law", "friction")
+        rows = [pair.shown for pair in self._pairs]
+        return Detail(headings, rows, len(rows))
 
     def __getstate__(self) -> dict[str, object]:
         """Everything but the C++ binding, which is made again: what pickle and copy take."""

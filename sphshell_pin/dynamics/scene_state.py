@@ -10,12 +10,13 @@ from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative
 from sphshell_pin.dynamics.explain import explain_pairs, relaxation_time
 from sphshell_pin.errors import InvalidParameter, NotPicklable
+from sphshell_pin.summary import Fact, Summarized
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene import Scene
 
 
-class SceneState:
+class SceneState(Summarized):
     """The memory of a scene in your own loop, as `pinocchio.Data` is that of a model.
 
     It holds the contacts with their ids, on which side of its shell each sphere is, and the
@@ -50,6 +51,9 @@ class SceneState:
         self._core = _core.SceneState(scene.model, cores, scene.joints.to_core(scene.model))
         if q is not None:
             self._core.advance(*self.start, 0.0)
+
+    def _facts(self) -> list[Fact]:
+        return [Fact("contact pairs", len(self._pairs))]
 
     def advance(self, q: ArrayLike, v: ArrayLike, dt: float) -> None:
         """Move on to q (nq,), v (nv,), the end of an accepted step of `dt` >= 0 [s].

@@ -14,6 +14,7 @@ from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.callables import reads_sensors
 from sphshell_pin.dynamics.derivatives import core_parameters, parameter_columns
 from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.summary import Fact, Summarized, names
 
 if TYPE_CHECKING:
     from sphshell_pin import _core
@@ -27,8 +28,8 @@ _START = ("q0", "v0")
 _STEP = 1e-6
 
 
-@dataclass(frozen=True)
-class Sensitivities:
+@dataclass(frozen=True, repr=False)
+class Sensitivities(Summarized):
     """Derivatives of a result's rows, a column for each of `parameters` (p of them).
 
     Of the n rows `q` (n, nv, p) in the tangent space of q, and `v` (n, nv, p); of the m entries of
@@ -44,6 +45,13 @@ class Sensitivities:
     normal_force: Array
     depth: Array
     result: Result | None = None
+
+    def _facts(self) -> list[Fact]:
+        return [
+            Fact("by", names(self.parameters)),
+            Fact("rows", len(self.q)),
+            Fact("contacts", len(self.depth)),
+        ]
 
     def column(self, name: str) -> int:
         """Return the number of a column; InvalidParameter lists them."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.checks import read_only
 from sphshell_pin.errors import MissingExtra, NameNotFound
+from sphshell_pin.summary import Fact, Summarized
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,8 +27,8 @@ class Readings(dict[str, Array | float | bool]):
         raise NameNotFound("sensor", name, "the simulation", list(self))
 
 
-@dataclass(frozen=True)
-class SensorLog:
+@dataclass(frozen=True, repr=False)
+class SensorLog(Summarized):
     """The readings of one sensor in a run, m of them.
 
     `t` (m,) when each arrived, `sampled` (m,) when it was taken [s]; `values` (m, k); `columns`
@@ -47,6 +48,14 @@ class SensorLog:
     def __len__(self) -> int:
         """Return the number of readings."""
         return len(self.t)
+
+    def _facts(self) -> list[Fact]:
+        last = zip(self.columns, self.values[-1], strict=True) if len(self) else ()
+        return [
+            Fact("readings", len(self)),
+            Fact("of", ", ".join(self.columns)),
+            *(Fact(f"last {name}", float(value), brief=False) for name, value in last),
+        ]
 
     def at(self, t: float) -> Array:
         """Return the last reading (k,) that had arrived at time `t` [s]; nan before the first."""

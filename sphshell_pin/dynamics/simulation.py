@@ -26,9 +26,10 @@ from sphshell_pin.dynamics.scene_state import SceneState
 from sphshell_pin.dynamics.sensitivities import Asked
 from sphshell_pin.dynamics.sensors import Sensor, SensorSet, check_sensors
 from sphshell_pin.errors import Interrupted, InvalidParameter, SimulationDiverged
+from sphshell_pin.summary import Fact, Summarized
 
 
-class Simulation:
+class Simulation(Summarized):
     """Moves `scene` in time with `integrator`, Adaptive() unless given.
 
     `sensors` are read on the way: for the results, and for controller callables.
@@ -54,6 +55,13 @@ class Simulation:
         self.integrator = integrator
         self.sensors = check_sensors(sensors)
 
+    def _facts(self) -> list[Fact]:
+        return [
+            Fact("integrator", repr(self.integrator)),
+            *self.scene._facts(),
+            Fact("sensors", len(self.sensors), brief=bool(self.sensors)),
+        ]
+
     def run(
         self,
         q0: ArrayLike,
@@ -78,7 +86,8 @@ class Simulation:
         `sensors`: it gets the latest reading of each sensor by name. Rows are recorded every
         `record_dt` [s] (default: every step); `progress` is called a few times a second with the
         share done. The same input gives the same bits. With `record=("patch",)` the patch of each
-        recorded contact is kept, too: `Result.patches`.
+        recorded contact is kept, too: `Result.patches`; with "torque" the controller's torques, cut
+        to their limits: `Result.torque`. A controller that is not held is asked at each row then.
 
         `sensitivities` names what the rows are differentiated by: parameters as in
         `Scene.dynamics_derivatives`, "q0" and "v0" (nv columns each); `Result.sensitivities` then

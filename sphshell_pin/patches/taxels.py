@@ -17,6 +17,7 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from sphshell_pin.patches.ellipse import load_in_polygons
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
 from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, scene_of
+from sphshell_pin.summary import Summarized
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.pairs import ContactPair
@@ -31,8 +32,8 @@ _PER_TAXEL = 8  # pieces of an overlap along the side of a taxel
 _FACING = 0.5  # cosine between a contact's normal and that of an element that shares its load
 
 
-@dataclass(frozen=True)
-class TaxelImages:
+@dataclass(frozen=True, repr=False)
+class TaxelImages(Summarized):
     """Normal forces that taxels felt over time.
 
     Attributes
@@ -55,9 +56,9 @@ class TaxelImages:
 
     def save_film(self, path: str | PathLike[str], *, fps: float = 30, speed: float = 1.0) -> Path:
         """Write a film of the images of a grid, .gif or .mp4: see `sphshell_pin.plot.taxels`."""
-        from sphshell_pin.plot.taxels import write_film
+        from sphshell_pin.plot.taxels import save_film
 
-        return write_film(Path(path), self, fps=fps, speed=speed)
+        return save_film(Path(path), self, fps=fps, speed=speed)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from sphshell_pin.patches.foundation import Overlap, overlap_of
 from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on, scene_of
 from sphshell_pin.patches.sampling import Grid, Samples, divide
 from sphshell_pin.patches.taxels import same_shell
+from sphshell_pin.summary import Fact, Summarized
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,8 +35,8 @@ _PER_HALF_AXIS = 5.0
 _FACING, _FAR = 0.3, 1.0
 
 
-@dataclass(frozen=True)
-class WearMap:
+@dataclass(frozen=True, repr=False)
+class WearMap(Summarized):
     """What was removed from one shell, on small pieces of it where contacts passed.
 
     Attributes
@@ -58,6 +59,16 @@ class WearMap:
     depth: Array
     resolution: float
     unresolved: float
+
+    def _facts(self) -> list[Fact]:
+        return [
+            Fact("shell", self.shell.name),
+            Fact("pieces", len(self.depth)),
+            Fact("removed volume", self.volume, "m^3"),
+            Fact("largest depth", float(self.depth.max(initial=0.0)), "m"),
+            Fact("longest side of a piece", self.resolution, "m", brief=False),
+            Fact("share between the pieces' centers", self.unresolved, brief=False),
+        ]
 
     @property
     def volume(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.plot.figure import finish_axis, new_figure, say
 from sphshell_pin.scenario.figures import PAIR_UNITS, RUN_FIGURES
+from sphshell_pin.tables import column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,7 +104,9 @@ def _draw_curves(axis: Axes, groups: list[tuple[str, pd.DataFrame]], key: str, f
         ordered = rows.sort_values(key)
         axis.plot(ordered[key], ordered[figure], "o-", markersize=4, label=name or None)
     every = np.unique(np.concatenate([rows[key].to_numpy(float) for _, rows in groups]))
-    axis.set(xlabel=key, ylabel=figure_label(figure), title=figure)
+    units = units_of(groups[0][1])
+    axis.set(xlabel=column(key, units.get(key, "")))
+    axis.set(ylabel=figure_label(figure, units), title=figure)
     if _grows_by_a_factor(every):
         axis.set_xscale("log")
     if not any(np.isfinite(rows[figure]).any() for _, rows in groups):
@@ -113,19 +117,24 @@ def _draw_curves(axis: Axes, groups: list[tuple[str, pd.DataFrame]], key: str, f
 def _draw_bars(axis: Axes, groups: list[tuple[str, pd.DataFrame]], figure: str) -> None:
     heights = [float(rows[figure].iloc[0]) for _, rows in groups]
     axis.bar([name or "run 0" for name, _ in groups], heights)
-    axis.set(ylabel=figure_label(figure), title=figure)
+    axis.set(ylabel=figure_label(figure, units_of(groups[0][1])), title=figure)
     axis.tick_params(axis="x", labelrotation=30 if len(groups) > 3 else 0)
 
 
 def _draw_maps(
     canvas: Figure, groups: list[tuple[str, pd.DataFrame]], keys: list[str], figure: str
 ) -> None:
-    columns = min(len(groups), 3)
-    rows = -(-len(groups) // columns)
+    across = min(len(groups), 3)
+    rows = -(-len(groups) // across)
     if len(groups) > 1:
-        canvas.set_size_inches(2.0 + 4.5 * columns, 1.0 + 4.0 * rows)
-    axes = canvas.subplots(rows, columns, squeeze=False).reshape(-1)
+        canvas.set_size_inches(2.0 + 4.5 * across, 1.0 + 4.0 * rows)
+    axes = canvas.subplots(rows, across, squeeze=False).reshape(-1)
     y_key, x_key = keys
+    units = units_of(groups[0][1])
+
+    def label(key: str) -> str:
+        return column(key, units.get(key, ""))
+
     drawn = np.concatenate([part[figure].to_numpy(float) for _, part in groups])
     finite = drawn[np.isfinite(drawn)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
@@ -140,14 +149,14 @@ def _draw_maps(
             vmax=high,
         )
         axis.set_facecolor("0.8")
-        axis.set(xlabel=x_key, ylabel=y_key, title=name)
+        axis.set(xlabel=label(x_key), ylabel=label(y_key), title=name)
         if _grows_by_a_factor(x):
             axis.set_xscale("log")
         if _grows_by_a_factor(y):
             axis.set_yscale("log")
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
-    canvas.colorbar(mesh, ax=list(axes), label=figure_label(figure))
+    canvas.colorbar(mesh, ax=list(axes), label=figure_label(figure, units))
     canvas.suptitle(figure, fontsize=12)
 
 
@@ -171,8 +180,18 @@ def _grows_by_a_factor(values: FloatArray) -> bool:
     return bool(np.ptp(factors) < _EVEN * factors.max())
 
 
-def figure_label(figure: str) -> str:
+def units_of(table: pd.DataFrame) -> Mapping[str, str]:
+    """Return the units of the table's columns, as a sweep leaves them in its attrs."""
+    units = table.attrs.get("units", {})
+    return units if isinstance(units, dict) else {}
+
+
+def figure_label(figure: str, units: Mapping[str, str] | None = None) -> str:
     """Return the last part of a figure's name, with its unit where that is known."""
     last = figure.rpartition(".")[2]
-    unit = PAIR_UNITS.get(last, "") if figure.startswith("pairs.") else RUN_FIGURES.get(figure, "")
-    return f"{last.replace('_', ' ')} [{unit}]" if unit else last.replace("_", " ")
+    if last.isdecimal():  # one of several numbers of a joint
+        last = figure
+    known = PAIR_UNITS.get(last, "") if figure.startswith("pairs.") else RUN_FIGURES.get(figure, "")
+    return column(
+        last if last == figure else last.replace("_", " "), (units or {}).get(figure, known)
+    )

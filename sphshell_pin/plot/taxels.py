@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.atomic import atomic_path, write_whole
-from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
+from sphshell_pin.errors import InvalidParameter, MissingExtra
+from sphshell_pin.films import check_film, write_film
 from sphshell_pin.plot.figure import new_figure, reading_unit
 
 if TYPE_CHECKING:
@@ -20,8 +19,8 @@ if TYPE_CHECKING:
     from sphshell_pin.patches.taxels import TaxelImages
 
 COLORS = "inferno"
-SUFFIXES = (".gif", ".mp4")
 LARGE = 320  # pixels of a film's longer side, at least
+SAMPLES = 32  # frames that the colors of a .gif are chosen from
 
 
 def plot_taxels(images: TaxelImages, rows: Sequence[int]) -> Figure:
@@ -48,24 +47,21 @@ def plot_taxels(images: TaxelImages, rows: Sequence[int]) -> Figure:
     return figure
 
 
-def write_film(path: Path, images: TaxelImages, *, fps: float, speed: float) -> Path:
-    """Write a film of a grid's images at `path`: .gif, or .mp4 where the program ffmpeg is there.
+def save_film(path: Path, images: TaxelImages, *, fps: float, speed: float) -> Path:
+    """Write a film of a grid's images at `path`, .gif or .mp4.
 
     `fps` frames a second, of which each shows `speed` / `fps` seconds of simulated time.
 
     Raises InvalidParameter unless the images are those of a grid, for another suffix, and for an
-    `fps` or `speed` that is not positive; MissingExtra without
-    matplotlib, ResultError without ffmpeg.
+    `fps` or `speed` that is not positive; MissingExtra without matplotlib, or for a .mp4 without
+    imageio-ffmpeg.
     """
-    if path.suffix not in SUFFIXES:
-        raise InvalidParameter("path", str(path), f"must end in {' or '.join(SUFFIXES)}")
     for name, value in (("fps", fps), ("speed", speed)):
         if not (np.isfinite(value) and value > 0.0):
             raise InvalidParameter(name, value, "must be positive")
+    check_film(path, (LARGE, LARGE), fps)
     frames = _frames(images, fps, speed)
-    if path.suffix == ".gif":
-        return _write_gif(path, frames, fps)
-    return _write_mp4(path, frames, fps)
+    return write_film(path, frames, fps, list(frames[:: max(1, len(frames) // SAMPLES)]))
 
 
 def _grid(images: TaxelImages) -> NDArray[np.float64]:
@@ -93,41 +89,3 @@ def _frames(images: TaxelImages, fps: float, speed: float) -> NDArray[np.uint8]:
     # Films of odd sizes are refused by some players.
     times = 2 * (-(-LARGE // max(forces.shape[1:])) // 2 + 1)
     return np.asarray(colors.repeat(times, axis=1).repeat(times, axis=2))
-
-
-def _write_gif(path: Path, frames: NDArray[np.uint8], fps: float) -> Path:
-    try:
-        from PIL import Image
-    except ImportError as missing:
-        raise MissingExtra("pillow", "view", "a film of taxels as .gif") from missing
-    pictures = [Image.fromarray(frame) for frame in frames]
-    stream = io.BytesIO()
-    pictures[0].save(
-        stream,
-        format="gif",
-        save_all=True,
-        append_images=pictures[1:],
-        duration=max(20, round(1000.0 / fps)),
-        loop=0,
-    )
-    return write_whole(path, stream.getvalue())
-
-
-def _write_mp4(path: Path, frames: NDArray[np.uint8], fps: float) -> Path:
-    from matplotlib.animation import FFMpegWriter
-
-    if not FFMpegWriter.isAvailable():
-        raise ResultError(
-            path, "a film as .mp4 needs the program ffmpeg, which is not there: write a .gif"
-        )
-    from matplotlib.figure import Figure
-
-    height, width = frames.shape[1:3]
-    figure = Figure(figsize=(width / 100, height / 100), dpi=100)
-    image = figure.figimage(frames[0], origin="upper")
-    writer = FFMpegWriter(fps=fps)  # type: ignore[arg-type]  # as ffmpeg has it
-    with atomic_path(path, ".mp4") as aside, writer.saving(figure, str(aside), dpi=100):
-        for frame in frames:
-            image.set_data(frame)
-            writer.grab_frame()
-    return path

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.plot.figure import count, finish_axis, label_axis, new_figure, say
-from sphshell_pin.plot.sweep import figure_label
+from sphshell_pin.plot.sweep import figure_label, units_of
+from sphshell_pin.tables import column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,6 +32,7 @@ def plot_uncertainty(
     values: FloatArray | None = None,
     tornado: pd.DataFrame | None = None,
     indices: pd.DataFrame | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> Figure:
     """Return a matplotlib Figure of how uncertain a figure of a run is, and why.
 
@@ -40,6 +43,8 @@ def plot_uncertainty(
     tornado : the figure with each input at its quantiles; see
         `sphshell_pin.study.sweep.tornado`.
     indices : as `sphshell_pin.study.sweep.sobol_indices` returns them.
+    units : by name, of the figure and the inputs: attrs["units"] of the sweep's table; by default
+        those that `tornado` has kept.
 
     Of more than 20 inputs those with the largest change or total index are drawn.
 
@@ -52,11 +57,13 @@ def plot_uncertainty(
     inputs = max((len(one) for one in (tornado, indices) if one is not None), default=0)
     height = max(4.2, 1.6 + 0.42 * min(inputs, _MOST_INPUTS))
     canvas = new_figure(max(7.0, 5.4 * sum(parts)), height)
+    if units is None:
+        units = {} if tornado is None else units_of(tornado)
     axes = iter(canvas.subplots(1, max(sum(parts), 1), squeeze=False)[0])
     if values is not None:
-        _draw_histogram(next(axes), np.asarray(values, dtype=float), figure)
+        _draw_histogram(next(axes), np.asarray(values, dtype=float), figure, units)
     if tornado is not None:
-        _draw_tornado(next(axes), tornado, figure)
+        _draw_tornado(next(axes), tornado, figure, units)
     if indices is not None:
         _draw_indices(next(axes), indices)
     canvas.suptitle(figure, fontsize=12)
@@ -102,9 +109,9 @@ def plot_bands(bands: pd.DataFrame, curve: str) -> Figure:
     return canvas
 
 
-def _draw_histogram(axis: Axes, values: FloatArray, figure: str) -> None:
+def _draw_histogram(axis: Axes, values: FloatArray, figure: str, units: Mapping[str, str]) -> None:
     known = values[np.isfinite(values)]
-    axis.set(xlabel=figure_label(figure), ylabel="runs")
+    axis.set(xlabel=figure_label(figure, units), ylabel="runs")
     gaps = len(values) - len(known)
     title = count(len(known), "run", "runs")
     axis.set_title(f"{title} ({gaps} without this figure left out)" if gaps else title, fontsize=10)
@@ -128,7 +135,7 @@ def _bins(values: FloatArray) -> list[float] | int:
     return edges if len(edges) <= _MOST_BINS + 1 else _MOST_BINS
 
 
-def _draw_tornado(axis: Axes, tornado: pd.DataFrame, figure: str) -> None:
+def _draw_tornado(axis: Axes, tornado: pd.DataFrame, figure: str, units: Mapping[str, str]) -> None:
     shown = tornado.iloc[:_MOST_INPUTS]
     median = float(shown["median"].iloc[0])
     places = np.arange(len(shown))[::-1]
@@ -159,9 +166,11 @@ def _draw_tornado(axis: Axes, tornado: pd.DataFrame, figure: str) -> None:
                 fontsize=7,
             )
     axis.axvline(median, color="#444444", linewidth=1.0)
-    axis.set_yticks(places, [str(key) for key in shown.index], fontsize=8)
+    axis.set_yticks(
+        places, [column(str(key), units.get(key, "")) for key in shown.index], fontsize=8
+    )
     axis.margins(x=0.15)
-    axis.set_xlabel(figure_label(figure))
+    axis.set_xlabel(figure_label(figure, units))
     axis.set_title(f"one input at a time, others at their medians{_of(tornado)}", fontsize=10)
     _legend_below(axis)
 

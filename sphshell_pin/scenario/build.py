@@ -47,14 +47,15 @@ from sphshell_pin.scenario.reading import (
     read_scenario,
 )
 from sphshell_pin.scenario.spheres import spheres_of, to_sphere
+from sphshell_pin.summary import Fact, Summarized
 
 Array = npt.NDArray[np.float64]
 # A user's own; what it takes depends on where the scenario names it.
 Function = Callable[..., Any]
 
 
-@dataclass(frozen=True)
-class Built:
+@dataclass(frozen=True, repr=False)
+class Built(Summarized):
     """A scenario ready to run."""
 
     name: str
@@ -75,6 +76,18 @@ class Built:
     """The user's own functions by "file.py:function", loaded once."""
     figures: Mapping[str, Callable[[sp.Result, sp.Scene], float]]
     """The scenario's own figures: functions of (result, scene)."""
+
+    @property
+    def _title(self) -> str:
+        return f"Built '{self.name}'"
+
+    def _facts(self) -> list[Fact]:
+        return [
+            Fact("title", self.scenario.title),
+            Fact("duration", self.scenario.run.duration, "s"),
+            Fact("file", self.path, brief=False),
+            *(fact for fact in self.simulation._facts() if fact.label != "title"),
+        ]
 
 
 def build(

@@ -8,10 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.dynamics.joints import joint_slides
 from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.result_columns import coordinates
 from sphshell_pin.errors import ScenarioError, add_origin
 from sphshell_pin.scenario.bodies import joint_spans
 from sphshell_pin.scenario.build import Built
+from sphshell_pin.tables import quantity_of
 
 PAIR_FIGURES = {
     "contact_time": "s",
@@ -32,6 +35,8 @@ JOINT_FIGURES = {
     "cut_time": "s",
     "peak_speed": "rad/s",
 }
+_SLIDING = {"N m s": "N s", "N m": "N", "rad": "m", "rad/s": "m/s"}
+"""Units of a joint that slides, by those of one that turns."""
 SENSOR_FIGURES = ("min", "max", "mean", "last")
 """Of each value of a sensor's readings, in the unit of its column."""
 RUN_FIGURES = {
@@ -75,6 +80,27 @@ def figure_names(built: Built) -> list[str]:
             name = f"final.{kind}.{joint}"
             names += [f"{name}.{i}" for i in range(count)] if count > 1 else [name] * count
     return names
+
+
+def figure_units(built: Built) -> dict[str, str]:
+    """Return the units of the figures that are known to have one, by their names."""
+    model = built.scene.model
+    units = dict(RUN_FIGURES)
+    for pair in built.scene.pairs:
+        units |= {f"pairs.{pair.name}.{one}": unit for one, unit in PAIR_UNITS.items()}
+    for name in list(model.names)[1:]:
+        slides = joint_slides(model.joints[model.getJointId(name)])
+        units |= {
+            f"joints.{name}.{one}": _SLIDING.get(unit, unit) if slides else unit
+            for one, unit in JOINT_FIGURES.items()
+        }
+    for sensor in built.simulation.sensors:
+        for title in sensor.columns(built.scene):
+            name = f"sensors.{sensor.name}.{_label(title)}"
+            units |= {f"{name}.{one}": quantity_of(title)[1] for one in SENSOR_FIGURES}
+    for titles in coordinates(model):
+        units |= {f"final.{name}": unit for name, unit in map(quantity_of, titles)}
+    return {name: unit for name, unit in units.items() if unit not in ("", "1")}
 
 
 def check_expectations(built: Built) -> None:

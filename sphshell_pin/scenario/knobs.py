@@ -1,11 +1,11 @@
-"""Knobs: the numbers of a scenario that one turns while looking at it."""
+"""Knobs: what of a scenario is turned while it is looked at: numbers, and words of a choice."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 
@@ -26,7 +26,7 @@ _FROM_THE_START = ("robot", "shell", "run")
 
 @dataclass(frozen=True)
 class Knob:
-    """A number of a scenario with the range to turn it in."""
+    """A number of a scenario with the range to turn it in, or a word with its choices."""
 
     key: str
     """Dotted key, as --set takes it."""
@@ -37,9 +37,11 @@ class Knob:
     high: float
     log: bool
     """Whether equal turns multiply (else they add)."""
-    value: float
+    value: float | str
     restart: bool
     """Whether a new value holds only from the next start: start states, placements, times."""
+    choices: tuple[str, ...] = ()
+    """The words that the value may be; none where it is a number."""
 
 
 def knobs_of(built: Built) -> tuple[Knob, ...]:
@@ -62,11 +64,14 @@ def check_knobs(scenario: Scenario, path: Path, *, ranges: bool) -> None:
     seen: set[str] = set()
     for i, section in enumerate(scenario.knob):
         where = f"knob[{i}]"
-        found = _found(section, scenario, path)
-        value, key = float(found.value), found.key
-        if key in seen:
+        found = look_up(scenario, section.key, path)
+        if found.key in seen:
             raise ScenarioError(path, f"{where}.key", "is a knob already", section.key)
-        seen.add(key)
+        seen.add(found.key)
+        if _choices(scenario, found):
+            _check_choice(section, found, path, where)
+            continue
+        value = float(_found(section, scenario, path).value)
         low, high, log = _range(section, value, meaning(scenario, found))
         if low is None or high is None:
             if not ranges:
@@ -110,7 +115,35 @@ def _range(
     return low, high, log
 
 
+def _choices(scenario: Scenario, found: Found) -> tuple[str, ...]:
+    """Return the words that the value at a key may be, where its table lists them; else none."""
+    owner: object = scenario
+    for part in found.parts[:-1]:
+        owner = _child(owner, part)
+    info = type(owner).model_fields.get(found.parts[-1]) if isinstance(owner, BaseModel) else None
+    if info is None:
+        return ()
+    parts = (info.annotation, *get_args(info.annotation))
+    words = [word for part in parts if get_origin(part) is Literal for word in get_args(part)]
+    return tuple(word for word in words if isinstance(word, str))
+
+
+def _check_choice(section: KnobSection, found: Found, path: Path, where: str) -> None:
+    if found.value is None:
+        raise ScenarioError(path, section.key, "is not set: give it a value to make it a knob")
+    for name in ("min", "max", "log", "unit"):
+        if getattr(section, name) is not None:
+            given = getattr(section, name)
+            raise ScenarioError(path, f"{where}.{name}", "is for numbers, not for words", given)
+
+
 def _knob(section: KnobSection, scenario: Scenario, path: Path) -> Knob:
+    at = look_up(scenario, section.key, path)
+    choices = _choices(scenario, at)
+    if choices:
+        label = meaning(scenario, at).label if section.label is None else section.label
+        restart = at.parts[0] in _FROM_THE_START
+        return Knob(section.key, label, "", 0.0, 0.0, False, str(at.value), restart, choices)
     found = _found(section, scenario, path)
     value, about = float(found.value), meaning(scenario, found)
     low, high, log = _range(section, value, about)

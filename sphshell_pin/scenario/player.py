@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+FORCES = ("normal_force", "friction_force", "depth")
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -20,13 +23,15 @@ class Rows:
 
     `t` (n,) [s]; of each pair the sum of the `normal_force` and the size of the summed
     `friction_force` [N], and the largest `depth` [m], each (n, pairs) and zero where nothing
-    touches.
+    touches. `more` has further blocks (n, k) by name, where a player has them: "q", "v", "torque",
+    "residual" [J], "sensor.NAME", in SI units.
     """
 
     t: Array
     normal_force: Array
     friction_force: Array
     depth: Array
+    more: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -45,6 +50,7 @@ class Rows:
         pairs: int,
         contacts: SceneContacts,
         row: NDArray[np.int64] | int,
+        more: Mapping[str, Array] | None = None,
     ) -> Rows:
         """Sum `contacts` into rows at the instants `t` (n,) [s]; contact k belongs to `row[k]`."""
         shape = (len(t), pairs)
@@ -53,7 +59,13 @@ class Rows:
         np.add.at(normal, place, contacts.normal_force)
         np.add.at(friction, place, contacts.friction_force_world)
         np.maximum.at(deepest, place, contacts.depth)
-        return cls(np.asarray(t, dtype=float), normal, np.linalg.norm(friction, axis=2), deepest)
+        size = np.linalg.norm(friction, axis=2)
+        return cls(np.asarray(t, dtype=float), normal, size, deepest, more or {})
+
+    def block(self, name: str) -> Array | None:
+        """Return one of FORCES, or one of `more`; None where it was not recorded."""
+        found: Array | None = getattr(self, name) if name in FORCES else self.more.get(name)
+        return found
 
     def select(self, chosen: slice) -> Rows:
         """Return the rows that `chosen` picks."""
@@ -62,4 +74,20 @@ class Rows:
             self.normal_force[chosen],
             self.friction_force[chosen],
             self.depth[chosen],
+            {name: block[chosen] for name, block in self.more.items()},
         )
+
+    @classmethod
+    def joined(cls, pieces: Sequence[Rows]) -> Rows:
+        """Join pieces, at least one, that follow each other; what one of them lacks is nan."""
+        if len(pieces) == 1:
+            return pieces[0]
+        widths = {name: one.shape[1] for rows in pieces for name, one in rows.more.items()}
+        more = {
+            name: np.concatenate(
+                [rows.more.get(name, np.full((len(rows), width), np.nan)) for rows in pieces]
+            )
+            for name, width in widths.items()
+        }
+        forces = (np.concatenate([getattr(one, name) for one in pieces]) for name in ("t", *FORCES))
+        return cls(*forces, more)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -22,6 +23,14 @@ from sphshell_pin.scenario.knobs import Knob
 from sphshell_pin.scenario.player import Rows
 from sphshell_pin.scenario.reading import find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.schema import Scenario
+from sphshell_pin.scenario.series import (
+    RESIDUAL,
+    Series,
+    force_series,
+    held,
+    motion_series,
+    sensor_series,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -132,6 +141,23 @@ class Replay:
         return self.result.patch_rows[first:last]
 
     @property
+    def series(self) -> tuple[Series, ...]:
+        """What charts can show of the run: torques where it recorded them."""
+        sensors = {name: log.columns for name, log in self.result.sensors.items()}
+        return (
+            *force_series(self.result.pairs),
+            *motion_series(self.scene.model, torque=self.result.torque is not None),
+            *sensor_series(sensors),
+            RESIDUAL,
+        )
+
+    @property
+    def now(self) -> Rows:
+        """The row that is shown, at `time`."""
+        shown = self._rows.select(slice(self._row, self._row + 1))
+        return replace(shown, t=np.array([self._time]))
+
+    @property
     def residual(self) -> float:
         """Change of the total energy since the start [J]: the integration's error."""
         return float(self._residual[self._row])
@@ -169,7 +195,7 @@ class Replay:
         self._given = 0
         self._go_to(self.start)
 
-    def change(self, key: str, value: float) -> None:
+    def change(self, key: str, value: float | str) -> None:
         """Refuse: a finished run has nothing to change."""
         raise InvalidParameter(key, value, "cannot be changed: this is a finished run")
 
@@ -184,7 +210,13 @@ class Replay:
 
     def _all_rows(self) -> Rows:
         log = self.result.contacts
-        rows = Rows.of(self.result.t, len(self.result.pairs), log, log.row)
+        result = self.result
+        more = {"q": result.q, "v": result.v, "residual": result.energy.residual[:, None]}
+        if result.torque is not None:
+            more["torque"] = result.torque
+        for name, readings in result.sensors.items():
+            more[f"sensor.{name}"] = held(readings, result.t, None)
+        rows = Rows.of(result.t, len(result.pairs), log, log.row, more)
         return rows.select(slice(0, self._count))
 
     def _build(self, scenario: str | PathLike[str] | None, *, trust_code: bool) -> Built | None:

@@ -183,7 +183,9 @@ class ContactSection(Section):
     spheres: Literal["collision"] | Spheres | None = None
     shell: str | None = None
     other_sphere: SphereSection | None = None
-    method: Literal["facets", "smooth", "elements"] | None = None
+    method: Annotated[Literal["facets", "smooth", "elements"] | None, Parameter(label="method")] = (
+        None
+    )
     law: Law
     friction: Friction = NoFriction()
 
@@ -250,7 +252,7 @@ class RunSection(_Stepping):  # type: ignore[misc]  # of the keys that the integ
     integrator: Annotated[str, AfterValidator(_check_integrator)] = ""
     control_dt: Annotated[Positive | None, Parameter("s", "control period")] = None
     record_dt: Annotated[Positive | None, Parameter("s", "time between rows")] = None
-    record: list[Literal["patch"]] = Field(default_factory=list)
+    record: list[Literal["patch", "torque"]] = Field(default_factory=list)
     wear: Annotated[Positive | None, Parameter("1/Pa", "Preston coefficient")] = None
     recording_speed: Annotated[Positive, Parameter(label="speed of the recording")] = 1.0
 

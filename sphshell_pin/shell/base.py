@@ -15,11 +15,12 @@ from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.options import SIDES, check_size
 from sphshell_pin.shell.raw import Bytes, Floats, Ints, Mask
+from sphshell_pin.summary import Summarized
 
 Scalar = TypeVar("Scalar", np.float64, np.int32, np.bool_)
 
 
-class ShellBase:
+class ShellBase(Summarized):
     """A cleaned surface and the compiled one that queries run on; `Shell` has the attributes."""
 
     name: str

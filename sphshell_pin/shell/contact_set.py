@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized
 
 Array = NDArray[np.float64]
 
@@ -51,8 +52,8 @@ class ElasticLaw(Protocol):
         """Energy [J] at a depth [m]."""
 
 
-@dataclass(frozen=True)
-class ContactSet:
+@dataclass(frozen=True, repr=False)
+class ContactSet(Summarized):
     """Contacts, deepest first, in the shell's frame.
 
     With k contacts: `point` (k, 3) on the shell [m]; `normal` (k, 3) unit, from the shell to the
@@ -85,6 +86,42 @@ class ContactSet:
     def __len__(self) -> int:
         """Return the number of contacts."""
         return len(self.depth)
+
+    def _facts(self) -> list[Fact]:
+        facts = [Fact("contacts", len(self))]
+        if len(self):
+            found = [Feature(int(one)).name.lower() for one in np.unique(self.feature)]
+            facts += [
+                Fact("largest depth", float(self.depth.max()), "m"),
+                Fact("on", ", ".join(found), brief=len(found) == 1),
+            ]
+        saddles = int(np.count_nonzero(self.weight < 0))
+        return (
+            [
+                *facts,
+                Fact(
+                    "saddles at which contacts merge", saddles, one="saddle at which contacts merge"
+                ),
+            ]
+            if saddles
+            else facts
+        )
+
+    def _rows(self) -> Detail:
+        headings = ("depth [m]", "point [m]", "normal", "feature", "element", "weight")
+        shown = range(min(len(self), MOST_ROWS))
+        rows = [
+            (
+                self.depth[k],
+                self.point[k],
+                self.normal[k],
+                Feature(int(self.feature[k])).name.lower(),
+                self.element[k],
+                self.weight[k],
+            )
+            for k in shown
+        ]
+        return Detail(headings, rows, len(self))
 
     def force(self, law: ElasticLaw) -> Array:
         """Return the elastic force (3,) on the sphere [N], in the shell's frame: no damping."""

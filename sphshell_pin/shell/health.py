@@ -175,7 +175,7 @@ class CurvatureReport:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ShellHealth:
     """Findings about a surface: counts, worst values, and sentences about both.
 
@@ -309,6 +309,9 @@ class ShellHealth:
     def triangles_alone(self) -> int:
         """Elements with three corners."""
         return self.elements - self.quads
+
+    def __repr__(self) -> str:
+        return str(self)
 
     def __str__(self) -> str:
         """Lay the findings out as a table."""

@@ -19,10 +19,11 @@ from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.contact_set import ContactSet, Method
 from sphshell_pin.shell.options import thread_count
 from sphshell_pin.shell.raw import Bytes, Floats, Ints
+from sphshell_pin.summary import Summarized
 
 
-@dataclass(frozen=True)
-class ClosestPoints:
+@dataclass(frozen=True, repr=False)
+class ClosestPoints(Summarized):
     """Where the surface is nearest to each of n points, in the shell's frame.
 
     Attributes

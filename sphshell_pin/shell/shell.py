@@ -15,6 +15,7 @@ from sphshell_pin.checks import check_flag, check_positive, check_type
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.options import CREASE_ANGLE, check_options
 from sphshell_pin.shell.queries import Queries
+from sphshell_pin.summary import Fact
 
 # Readers, writers, cleaning and tessellation load with the first shell that needs them: importing
 # the package should cost little more than importing Pinocchio.
@@ -257,10 +258,18 @@ class Shell(Queries):
         """True if every component is closed."""
         return self.health.is_closed
 
-    def __repr__(self) -> str:
-        """Name, elements, size and state in one line."""
-        state = "closed" if self.is_closed else "open"
-        return (
-            f"<Shell '{self.name}': {len(self.elements)} elements, {len(self.vertices)} vertices, "
-            f"{state}, size {self.size:.4g} m, side {self.side}>"
-        )
+    @property
+    def _title(self) -> str:
+        return f"Shell '{self.name}'"
+
+    def _facts(self) -> list[Fact]:
+        return [
+            Fact("elements", len(self.elements)),
+            Fact("vertices", len(self.vertices)),
+            Fact("surface", "closed" if self.is_closed else "open"),
+            Fact("size", float(self.size), "m"),
+            Fact("side", self.side),
+            Fact("smooth patches", self.num_patches, brief=False),
+            Fact("file", self.source or "none", brief=False),
+            Fact("to look at", "; ".join(self.health.problems) or "nothing", brief=False),
+        ]

@@ -93,7 +93,7 @@ class DrawnSphere:
 
     def __init__(self, visualizer: Visualizer, name: str, drawn: PlacedSphere, index: int) -> None:
         self.joint, self._offset, radius = drawn
-        node = visualizer[f"{index}_{node_name(name)}"]
+        node = self.node = visualizer[f"{index}_{node_name(name)}"]
         set_object(
             node["ball"],
             sphere(radius, 48),

@@ -17,6 +17,9 @@ ASPECT = 1.2  # of the part of the window that legend and controls leave free
 REACH = 8.0  # in sizes of the action: what is farther away need not be in the picture
 MARGIN = 1.12  # joints are points, links have some width
 
+# From the target to the eye. From straight above there is no upright: y points up in the picture.
+DIRECTIONS = {"front": (1.0, 0.0, 0.0), "side": (0.0, -1.0, 0.0), "top": (0.0, -1e-3, 1.0)}
+
 _CORNERS = np.array(np.meshgrid(*3 * [(-1.0, 1.0)])).reshape(3, -1).T
 
 
@@ -40,20 +43,21 @@ class View:
         normal: FloatArray,
         radius: float,
         reach: float = REACH,
+        direction: FloatArray | None = None,
     ) -> View:
         """Choose a view of the points `action` (k, 3) where the contact happens.
 
         `around` (m, 3) are points of robot and shell worth having in the picture; those farther
         away than `reach` times the size of the action are let go. `normal` (3,) is the mean contact
-        normal (zero if there is none): the eye stands on its side. `radius` [m] is the smallest
-        sphere's. All in the world [m].
+        normal (zero if there is none): the eye stands on its side, unless a unit `direction` (3,)
+        from the target to the eye is given. `radius` [m] is the smallest sphere's. All in the
+        world [m].
         """
-        low, high = action.min(axis=0), action.max(axis=0)
-        middle = 0.5 * (low + high)
-        half = max(0.5 * float(np.linalg.norm(high - low)), 4.0 * radius)
+        middle, half = ball_around(action, 4.0 * radius)
         kept = around[np.linalg.norm(around - middle, axis=1) <= reach * half]
         subject = np.vstack((kept, middle + half * _CORNERS / np.sqrt(3.0)))
-        direction = _direction(middle, subject, normal)
+        if direction is None:
+            direction = _direction(middle, subject, normal)
         # Fit the subject into the picture, upright, as seen along this direction.
         right = np.cross(np.array([0.0, 0.0, 1.0]), direction)
         right /= np.linalg.norm(right)
@@ -65,6 +69,12 @@ class View:
         distance = MARGIN * max(height / slope, width / (ASPECT * slope))
         target = middle + 0.5 * (low + high) @ axes
         return cls(target + (distance + 0.3 * (high[2] - low[2])) * direction, target)
+
+
+def ball_around(points: FloatArray, least: float = 0.0) -> tuple[FloatArray, float]:
+    """Return center (3,) and radius, `least` or more, of the ball around the box of points [m]."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), least)
 
 
 def _direction(target: FloatArray, subject: FloatArray, normal: FloatArray) -> FloatArray:

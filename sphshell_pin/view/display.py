@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.dynamics.models import frame_on_joint
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, ContactColumns
 from sphshell_pin.view.bodies import (
@@ -18,7 +19,7 @@ from sphshell_pin.view.bodies import (
     shell_key,
     sphere_key,
 )
-from sphshell_pin.view.camera import REACH, View, look, set_surroundings
+from sphshell_pin.view.camera import REACH, View, ball_around, look, set_surroundings
 from sphshell_pin.view.distance import range_text
 from sphshell_pin.view.nodes import (
     FloatArray,
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.scene import Scene
 
 TRAIL_COLOR = 0x8E1B8E
+_WIDTH = 0.05  # of links, in sizes of the robot
+_FAR = 2.0  # in sizes of the robot: corners of shells that are farther away may leave the picture
 
 
 Part = Literal["robot", "spheres", "arrows", "points", "wireframe", "patches", "distance", "trails"]
@@ -92,6 +95,7 @@ class Display:
         self.patch_scale = PatchScale(1.0)
         self._pool = pool
         self._patches: PatchPool | None = None  # until there are some
+        self._patches_on = True
         self._arrows = ArrowPool(
             self.visualizer["contacts"], pool, 0.0026 * self.view.distance, arrows
         )
@@ -125,7 +129,7 @@ class Display:
             return
         if self._patches is None:
             self._patches = PatchPool(self.visualizer["pressure"], self._pool)
-            self.show("points", "points" not in self._hidden)
+            self._show_points()
         self._patches.update(contacts, patches, self.patch_scale)
 
     @property
@@ -210,14 +214,35 @@ class Display:
         if part == "arrows":
             self._arrows.show_arrows(on)
         elif part == "points":
-            self._arrows.show_points(on and self._patches is None)
-            if self._patches is not None:
-                show(self.visualizer["pressure"], on)
+            self._show_points()
         elif part in ("robot", "spheres"):
             show(self.visualizer[part], on)
         else:
             for shell in self._shells.values():
                 self._show_of_shell(shell, part, on)
+
+    def show_patches(self, on: bool) -> None:
+        """Draw the patches that `update` is given, or the contact points in their place."""
+        self._patches_on = on
+        self._show_points()
+
+    def _show_points(self) -> None:
+        on = "points" not in self._hidden
+        in_place = self._patches is not None and self._patches_on
+        self._arrows.show_points(on and not in_place)
+        if self._patches is not None:
+            show(self.visualizer["pressure"], on and in_place)
+
+    def grips(self) -> dict[str, str]:
+        """Return the nodes that show moving bodies: their paths, each with a frame of its body."""
+        held = [(one.node, one.joint) for one in self._shells.values()]
+        held += [(one.node, one.joint) for one in self._spheres.values()]
+        found = {}
+        for node, joint in held:
+            frame = frame_on_joint(self._model, joint)
+            if joint and frame is not None:
+                found[node.path.lower()] = frame
+        return found | self._robot.grips()
 
     def _show_of_shell(self, shell: DrawnShell, part: Part, on: bool) -> None:
         if part in COLORINGS:
@@ -272,12 +297,17 @@ def choose_view(
     normals_world: FloatArray | None = None,
     visual_model: pin.GeometryModel | None = None,
     reach: float = REACH,
+    direction: FloatArray | None = None,
+    *,
+    whole: bool = False,
 ) -> View:
     """Choose a camera for the `configurations` (n, nq) and the contacts seen in them, world [m].
 
     Without contacts the spheres are where things happen; without spheres, the joints. What is
-    farther away than `reach` times the size of that need not be in the picture. Raises
-    InvalidParameter for a `visual_model` that does not hang on the scene's joints.
+    farther away than `reach` times the size of that need not be in the picture; with `whole` all of
+    the robot is, and of the shells what is not far from it. `direction` (3,) leads from the target
+    to the eye; without it, it is chosen. Raises InvalidParameter for a `visual_model` that does not
+    hang on the scene's joints.
     """
     model, data = scene.model, scene.model.createData()
     boxes = [
@@ -285,12 +315,14 @@ def choose_view(
         for pair in scene.pairs
         if pair.shell is not None
     ]
+    shells = len(boxes)
     if visual_model is not None:
         check_geometry_model(model, visual_model)
         boxes += _geometry_boxes(visual_model)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     centers: list[FloatArray] = []
     around: list[FloatArray] = []
+    on_shells: list[FloatArray] = []
     radii = [one.radius for pair in scene.pairs for one in pair.spheres]
     for row in np.unique(np.linspace(0, len(configurations) - 1, 60).astype(int)):
         pin.forwardKinematics(model, data, configurations[row])
@@ -300,18 +332,35 @@ def choose_view(
             for one in pair.spheres:
                 centers.append(data.oMi[one.joint].act(one.placement.translation))
         if row == 0:
-            for joint, placement, low, high in boxes:
+            for k, (joint, placement, low, high) in enumerate(boxes):
                 where = data.oMi[joint] * placement
-                around.extend(where.act(low + corner * (high - low)) for corner in corners)
+                (on_shells if k < shells else around).extend(
+                    where.act(low + corner * (high - low)) for corner in corners
+                )
     touched = points_world is not None and len(points_world)
     action = np.array(centers) if centers else np.array(around or [np.zeros(3)])
     if touched and points_world is not None:
         action = points_world if not centers else np.vstack((action, points_world))
+    radius = min(radii, default=0.02)
+    if whole and around:
+        robot = np.array(around + centers)
+        (middle, size), (center, half) = ball_around(robot), ball_around(action, 4.0 * radius)
+        # Joints are points, links have some width.
+        links = robot[:, None] + _WIDTH * size * np.vstack((np.eye(3), -np.eye(3)))
+        around += list(links.reshape(-1, 3))
+        on_shells = [
+            corner
+            for corner in on_shells
+            if np.linalg.norm(corner - middle) <= _FAR * size
+            or np.linalg.norm(corner - center) <= reach * half
+        ]
+        reach = np.inf
+    around += on_shells
     normal = np.zeros(3)
     if touched and normals_world is not None:
         mean = normals_world.mean(axis=0)
         normal = mean / max(float(np.linalg.norm(mean)), 1e-9)
-    return View.of(action, np.array(around).reshape(-1, 3), normal, min(radii, default=0.02), reach)
+    return View.of(action, np.array(around).reshape(-1, 3), normal, radius, reach, direction)
 
 
 def _geometry_boxes(

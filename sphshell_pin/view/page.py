@@ -6,7 +6,6 @@ import base64
 import gzip
 import hashlib
 import html
-import json
 import struct
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +26,9 @@ from sphshell_pin.view.nodes import (
 if TYPE_CHECKING:
     from meshcat import Visualizer
 
+PARTS = Path(__file__).with_name("recording_page")
+STYLES = ("../live/page/palette.css", "style.css")
+SCRIPTS = ("replay.js", "cameras.js", "chart.js", "panel.js")
 # A mesh file this long may well be used by several links: it is stored once.
 SHARED_TEXT = 20_000
 
@@ -176,13 +178,10 @@ def _pose_tracks(times: FloatArray, matrices: FloatArray) -> list[Json]:
     return tracks
 
 
-def render_page(
-    commands: list[Json], title: str, legend: list[tuple[str, str]], clock: Json
-) -> str:
+def render_page(commands: list[Json], title: str, legend: list[tuple[str, str]]) -> str:
     """Return the HTML of a page that replays `commands`.
 
-    `legend` holds (color, sentence) pairs; `clock` has "start" and "speed" of the simulated time
-    [s] and [s/s].
+    `legend` holds (color, sentence) pairs.
     """
     import umsgpack
 
@@ -198,13 +197,18 @@ def render_page(
     parts = {
         "title": html.escape(title),
         "legend": rows,
-        "clock": json.dumps(clock),
+        "style": _joined(STYLES),
+        "script": _joined(SCRIPTS),
         "viewer": _compressed(viewer_script().read_bytes()),
         "scene": _compressed(bytes(packed)),
     }
-    page = Path(__file__).with_name("recording.html").read_text(encoding="utf-8")
+    page = (PARTS / "page.html").read_text(encoding="utf-8")
     pieces = page.split("@@")
     return "".join(parts[piece] if index % 2 else piece for index, piece in enumerate(pieces))
+
+
+def _joined(names: tuple[str, ...]) -> str:
+    return "".join((PARTS / name).read_text(encoding="utf-8") for name in names)
 
 
 def _compressed(data: bytes) -> str:

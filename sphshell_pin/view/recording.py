@@ -29,6 +29,8 @@ from sphshell_pin.view.nodes import FloatArray, new_visualizer
 from sphshell_pin.view.page import FilmWindow, render_page
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 from sphshell_pin.view.patches import PatchScale
+from sphshell_pin.view.robot import has_links
+from sphshell_pin.view.run_panel import run_panel
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -38,6 +40,10 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics.result import Result
     from sphshell_pin.dynamics.scene import Scene
 
+BARE = (
+    "The robot is drawn by its joints, as the scene's model has no geometry: "
+    "view(visual_model=...) takes a pinocchio.GeometryModel of the same joints."
+)
 MOST_ARROWS = 24
 MOST_PIECES = 80  # of a trail
 
@@ -83,6 +89,8 @@ def render_recording(
     title: str = "A finished run",
     arrows: ArrowKind = "components",
     color: Coloring = "surface",
+    span: tuple[float, float] | None = None,
+    whole: bool = False,
 ) -> str:
     """Return `result` as one self-contained HTML page.
 
@@ -92,30 +100,32 @@ def render_recording(
     it. Each frame shows the recorded row nearest in time, or, where a touch begins and ends between
     two frames, that touch at its peak. `arrows` is "components" (normal and friction) or "total".
     `color` is what the colors of the shells show: nothing ("surface"), the patches ("patches"),
-    or how far curved elements are from the flat ones ("distance").
+    or how far curved elements are from the flat ones ("distance"). Of a `span` from and to a time
+    of the run [s] the scene has that part alone, in one frame where both are the same. With `whole`
+    the camera takes in all of the robot, else the surroundings of the contacts.
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
     positive, another `color`, or a geometry model that does not fit.
     """
     check_coloring(color)
-    for name, value in (("fps", fps), ("speed", speed)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise InvalidParameter(name, value, "must be positive")
-    # A run that diverged is shown up to where its numbers end.
-    sound = np.all(np.abs(np.asarray(result.q)) < LARGEST, axis=1)
-    count = len(sound) if sound.all() else int(np.argmin(sound))
-    if not count:
-        raise InvalidParameter("result", "0 rows", "must hold at least one row of finite q")
+    check_pace(fps, speed)
+    count = sound_rows(result)
     contacts = ContactRows.of(result.contacts, result.patch_rows)
     contacts = contacts.select(contacts.row < count)
-    rows, times = choose_rows(np.asarray(result.t)[:count], contacts, fps, speed)
-    shown = contacts.select(np.isin(contacts.row, rows))
+    t = np.asarray(result.t)[:count]
+    start, end = (float(t[0]), float(t[-1])) if span is None else span
+    rows, times = choose_rows(t, contacts, fps, speed, span)
+    # Of a part of a run, too: pictures of it have the same cameras and the same arrows.
+    whole = rows if span is None else choose_rows(t, contacts, fps, speed)[0]
+    shown = contacts.select(np.isin(contacts.row, whole))
+    q = np.asarray(result.q, dtype=float)
     view = choose_view(
         scene,
-        np.asarray(result.q)[rows],
+        q[whole],
         contacts.point_world,
         contacts.normal_world,
         visual_model,
+        whole=whole,
     )
     radii = [one.radius for pair in scene.pairs for one in pair.spheres]
     length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
@@ -139,38 +149,104 @@ def render_recording(
     for frame, row in enumerate(rows):
         window.frame = frame
         now = contacts.at(int(row))
-        display.update(result.q[row], now, now.patches)
+        display.update(q[row], now, now.patches)
     window.frame = None
-    trailed = _draw_trails(display, window, result, speed)
+    trailed = _draw_trails(display, window, result, start, speed)
 
+    panel = run_panel(result, scene, visual_model, contacts, count, q[whole], q[rows], view)
+    clock = {
+        "start": start,
+        "end": end,
+        "duration": float(t[-1] - t[0]),  # of the whole run
+        "speed": float(speed),
+        "frames": len(times),
+        "digits": _digits(speed, fps),
+    }
     return render_page(
-        window.commands(times),
+        [*window.commands(times), {**panel, "clock": clock}],
         title,
         _legend(scene, scale, arrows, shown, trailed) + _color_keys(display, shown),
-        {"start": float(result.t[0]), "speed": float(speed), "digits": _digits(speed, fps)},
     )
+
+
+def check_pace(fps: float, speed: float) -> None:
+    """Raise InvalidParameter for a pace that is not positive."""
+    for name, value in (("fps", fps), ("speed", speed)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise InvalidParameter(name, value, "must be positive")
+
+
+def sound_rows(result: Result) -> int:
+    """Return how many rows there are up to where the numbers of a run that diverged end.
+
+    Raises InvalidParameter if there is none.
+    """
+    sound = np.all(np.abs(np.asarray(result.q)) < LARGEST, axis=1)
+    count = len(sound) if sound.all() else int(np.argmin(sound))
+    if not count:
+        raise InvalidParameter("result", "0 rows", "must hold at least one row of finite q")
+    return count
 
 
 @dataclass(frozen=True)
 class RecordingView:
-    """A recording: `page`, a whole HTML page, to be shown `height` [pixels] high."""
+    """A recording: `page`, a whole HTML page, to be shown `height` [pixels] high.
+
+    `hint` says in a sentence what could be better, "" if nothing.
+    """
 
     page: str
     height: int = 480
+    hint: str = ""
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the page at `path` and return it; ResultError if it cannot be written."""
         return write_whole(path, self.page.encode())
 
     def __repr__(self) -> str:
-        return f"RecordingView({len(self.page) / 1e6:.1f} MB; .save(path) writes the page)"
+        hint = f"; {self.hint}" if self.hint else ""
+        return f"<RecordingView: {len(self.page) / 1e6:.1f} MB, .save(path) writes the page{hint}>"
 
     def _repr_html_(self) -> str:
         """Return a frame with the page inside, which needs no server and no network."""
         return (
             f'<iframe srcdoc="{html.escape(self.page)}" width="100%" height="{self.height}" '
             'style="border: 1px solid #c8d0d8; border-radius: 4px" allowfullscreen></iframe>'
-        )
+        ) + (f'<div style="opacity: 0.7">{html.escape(self.hint)}</div>' if self.hint else "")
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a recording of `result` is drawn with: see `Result.view`."""
+
+    result: Result
+    scene: Scene
+    visual_model: pin.GeometryModel | None
+    title: str
+    speed: float
+
+    @classmethod
+    def of(
+        cls,
+        result: Result,
+        scene: Scene | None,
+        visual_model: pin.GeometryModel | None,
+        title: str | None,
+        speed: float | None,
+    ) -> Shown:
+        """Take from the scenario of `result` what is None."""
+        if scene is None and result.origin is not None:
+            from sphshell_pin.scenario.replay import Replay
+
+            replay = Replay(result)
+            scene, title = replay.scene, title or replay.title
+            visual_model = replay.visual_model if visual_model is None else visual_model
+            speed = replay.speed if speed is None else speed
+        scene = result.scene if scene is None else scene
+        if scene is None:
+            raise ResultError("the result", "has no scene to be drawn in: give view(scene=...)")
+        speed = 1.0 if speed is None else speed
+        return cls(result, scene, visual_model, title or "A finished run", speed)
 
 
 def view_result(
@@ -185,44 +261,53 @@ def view_result(
     """Return the recording of `result`: see `Result.view`."""
     if isinstance(height, bool) or not isinstance(height, int) or height <= 0:
         raise InvalidParameter("height", height, "must be a positive number of pixels")
-    if scene is None and result.origin is not None:
-        from sphshell_pin.scenario.replay import Replay
-
-        replay = Replay(result)
-        scene, title = replay.scene, title or replay.title
-        visual_model = replay.visual_model if visual_model is None else visual_model
-        speed = replay.speed if speed is None else speed
-    scene = result.scene if scene is None else scene
-    if scene is None:
-        raise ResultError("the result", "has no scene to be drawn in: give view(scene=...)")
+    shown = Shown.of(result, scene, visual_model, title, speed)
     page = render_recording(
-        result, scene, visual_model, speed=speed or 1.0, title=title or "A finished run"
+        result,
+        shown.scene,
+        shown.visual_model,
+        speed=shown.speed,
+        title=shown.title,
+        whole=True,
     )
-    return RecordingView(page, height)
+    bare = shown.visual_model is None and has_links(shown.scene.model)
+    return RecordingView(page, height, BARE if bare else "")
 
 
 def choose_rows(
-    t: FloatArray, contacts: ContactRows, fps: float, speed: float
+    t: FloatArray,
+    contacts: ContactRows,
+    fps: float,
+    speed: float,
+    span: tuple[float, float] | None = None,
 ) -> tuple[NDArray[np.int64], FloatArray]:
-    """Return the recorded row of each frame (f,) and its time in the page (f,) [s]."""
-    duration = float(t[-1] - t[0]) / speed
-    count = max(2, round(duration * fps) + 1)
+    """Return the recorded row of each frame (f,) and its time in the page (f,) [s].
+
+    The frames are those of the run from and to the times `span` [s], one where both are the same;
+    by default of all of it, two at least.
+    """
+    start, end = (t[0], t[-1]) if span is None else span
+    duration = float(end - start) / speed
+    count = round(duration * fps) + 1
+    if span is None or duration > 0.0:
+        count = max(2, count)
     times = np.linspace(0.0, duration, count)
-    wanted = t[0] + speed * times
+    wanted = start + speed * times
     after = np.clip(np.searchsorted(t, wanted), 1, max(1, len(t) - 1))
     before = after - 1
     after = np.minimum(after, len(t) - 1)
     rows = np.where(wanted - t[before] <= t[after] - wanted, before, after).astype(np.int64)
-    if not len(contacts.row):
+    if not len(contacts.row) or count == 1:
         return rows, times
     force = np.zeros(len(t))
     np.maximum.at(force, contacts.row, largest_force(contacts))
     # A touch shorter than a frame would otherwise be lost between two frames.
     middles = np.searchsorted(t, 0.5 * (wanted[1:] + wanted[:-1]))
-    starts, ends = np.append(0, middles), np.append(middles, len(t))
-    for frame, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        if end > start and force[rows[frame]] == 0.0:
-            peak = start + int(np.argmax(force[start:end]))
+    first, last = np.searchsorted(t, start), np.searchsorted(t, end, side="right")
+    starts, ends = np.append(first, middles), np.append(middles, last)
+    for frame, (low, high) in enumerate(zip(starts, ends, strict=True)):
+        if high > low and force[rows[frame]] == 0.0:
+            peak = low + int(np.argmax(force[low:high]))
             if force[peak] > 0.0:
                 rows[frame] = peak
     return rows, times
@@ -236,8 +321,13 @@ def _forces(contacts: ContactRows, arrows: ArrowKind) -> FloatArray:
     return contacts.normal_force
 
 
-def _draw_trails(display: Display, window: FilmWindow, result: Result, speed: float) -> bool:
-    """Draw each pair's contact path on its shell, in pieces that appear as the run gets there."""
+def _draw_trails(
+    display: Display, window: FilmWindow, result: Result, start: float, speed: float
+) -> bool:
+    """Draw each pair's contact path on its shell, in pieces that appear as the run gets there.
+
+    At the time `start` of the run [s] the page begins.
+    """
     drawn = False
     for path in contact_paths(result, display.scene):
         if not path.on_shell:
@@ -253,8 +343,9 @@ def _draw_trails(display: Display, window: FilmWindow, result: Result, speed: fl
                 name = f"{path.pair}_{piece[0]}"
                 node = display.draw_trail(name, path.points[piece], path.pair)
                 if node is not None:
-                    seen = float(result.t[path.row[piece[-1]]] - result.t[0]) / speed
-                    window.switch(node, np.array([0.0, max(seen, 1e-3)]), [False, True])
+                    seen = float(result.t[path.row[piece[-1]]] - start) / speed
+                    if seen >= 0.0:  # else it is there from the beginning
+                        window.switch(node, np.array([0.0, max(seen, 1e-3)]), [False, True])
                     drawn = True
     return drawn
 

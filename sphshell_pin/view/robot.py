@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin._interrupts import interrupts_delayed
+from sphshell_pin.dynamics.models import find_frame, frame_on_joint
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
@@ -53,6 +54,14 @@ def check_geometry_model(model: pin.Model, geometry_model: pin.GeometryModel) ->
             )
 
 
+def has_links(model: pin.Model) -> bool:
+    """Whether the skeleton of `model` has rods between joints: it is more than bodies that fly."""
+    return any(
+        model.parents[joint] != 0 or model.joints[joint].nv == 1
+        for joint in range(1, model.njoints)
+    )
+
+
 class GeometryRobot:
     """The geometry objects of a visual or collision model, drawn by Pinocchio's own loader."""
 
@@ -71,16 +80,39 @@ class GeometryRobot:
         self._geometry = geometry_model
         self._placed = geometry_model.createData()
         self._parts: list[tuple[Move, pin.SE3, FloatArray]] = []
+        self._paths: list[str] = []
         for index, body in enumerate(geometry_model.geometryObjects):
             node = visualizer[viewer.getViewerNodeName(body, pin.GeometryType.VISUAL)]
             # A reference: it follows the update of all placements.
             self._parts.append((mover(node), self._placed.oMg[index], _in_body(body)))
+            self._paths.append(node.path.lower())
+
+    def grips(self) -> dict[str, str]:
+        """Return the nodes that show moving bodies: their paths, each with a frame of its body."""
+        found: dict[str, str] = {}
+        for path, body in zip(self._paths, self._geometry.geometryObjects, strict=True):
+            frame = _frame_of(self._model, body)
+            if frame is not None:
+                found[path] = frame
+        return found
 
     def update(self, data: pin.Data) -> None:
         """Place all geometry where forward kinematics left the joints in `data`."""
         pin.updateGeometryPlacements(self._model, data, self._geometry, self._placed)
         for move, where, in_body in self._parts:
             move(where.homogeneous @ in_body)
+
+
+def _frame_of(model: pin.Model, body: pin.GeometryObject) -> str | None:
+    """Return a frame of the body that a geometry object shows; None if it cannot move."""
+    joint, number = body.parentJoint, body.parentFrame
+    if joint == 0:
+        return None
+    if number < model.nframes and model.frames[number].parentJoint == joint:
+        name = str(model.frames[number].name)
+        if find_frame(model, name) == number:
+            return name
+    return frame_on_joint(model, joint)
 
 
 def _in_body(body: pin.GeometryObject) -> FloatArray:
@@ -108,6 +140,8 @@ class SkeletonRobot:
         tips: list[tuple[int, FloatArray]],
         drawn: set[int],
     ) -> None:
+        self._model = model
+        self._held: list[tuple[str, int]] = []
         self._width = 0.012 * size
         self._links: list[tuple[Move, int, int, FloatArray]] = []
         self._axes: list[tuple[Move, int]] = []
@@ -126,6 +160,7 @@ class SkeletonRobot:
             node = root["links"][node_name(name)]
             set_object(node, rod(1.0, 1.0), material("MeshPhong", LINK_COLOR))
             self._links.append((mover(node), start, end, offset))
+            self._held.append((node.path.lower(), start))
         for joint in range(1, model.njoints):
             if joint in drawn or model.inertias[joint].mass == 0.0:
                 continue
@@ -141,6 +176,12 @@ class SkeletonRobot:
                 shape = np.array([self._width, length, self._width])
                 arm.set_transform(pose(rotation_to(direction), 0.5 * length * direction, shape))
             self._axes.append((mover(node), joint))
+            self._held.append((node.path.lower(), joint))
+
+    def grips(self) -> dict[str, str]:
+        """Return the nodes that show moving bodies: their paths, each with a frame of its body."""
+        found = ((path, frame_on_joint(self._model, joint)) for path, joint in self._held if joint)
+        return {path: frame for path, frame in found if frame is not None}
 
     def update(self, data: pin.Data) -> None:
         """Place rods and axes where forward kinematics left the joints in `data`."""

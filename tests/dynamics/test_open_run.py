@@ -21,6 +21,9 @@ PLATE = models.plate()
 BRISTLES = sp.BristleFriction(0.6, 0.5, 1e5, 100.0)
 
 
+FIXED_FIRST_ORDER = (sp.SemiImplicitEuler, sp.LinearlyImplicitEuler)
+
+
 def sliding_ball(friction=models.FRICTION) -> sp.Scene:
     return models.on_plate(models.ball(), models.LAW, friction)
 
@@ -86,6 +89,81 @@ def test_a_push_off_the_centre_turns_an_arm(integrator) -> None:
     run.advance(0.01)
     # The force keeps its direction in the world: cos(angle) is 1 to 1e-7 here.
     assert run.snapshot().v[0, 0] == pytest.approx(0.4 / 0.2 * run.time, rel=1e-6)
+
+
+@every
+def test_a_damped_pull_follows_its_closed_form(integrator) -> None:
+    """x'' + 2 w x' + w^2 x = 0 from rest at x = s: s (1 + w t) exp(-w t), a free ball's center."""
+    mass, rate, stretch = 2.0, 12.0, np.array([0.3, -0.1, 0.2])
+    scene = sp.Scene(models.ball(mass=mass, gravity=0.0))
+    anchor = np.array([0.1, 0.2, 1.0])
+    run = opened(scene, integrator, models.free_q(anchor + stretch), None)
+    run.pull("ball", np.zeros(3), anchor, mass * rate**2, 2.0 * mass * rate)
+    run.advance(0.15)
+    row, t = run.snapshot(), run.time
+    decay = np.exp(-rate * t)
+    tolerance = 1e-3 if isinstance(integrator, FIXED_FIRST_ORDER) else 1e-6
+    np.testing.assert_allclose(
+        row.q[0, :3], anchor + stretch * (1.0 + rate * t) * decay, rtol=tolerance
+    )
+    np.testing.assert_allclose(row.v[0, :3], -stretch * rate**2 * t * decay, rtol=tolerance)
+    # Its work is the kinetic energy that it gave; most of what the spring had is in the damper.
+    spring = 0.5 * mass * rate**2 * stretch @ stretch
+    kinetic = row.energy.kinetic[0]
+    assert row.energy.control_work[0] == pytest.approx(kinetic, abs=tolerance * spring)
+    assert abs(run.residual) < tolerance * spring
+
+
+@every
+def test_a_pull_that_has_come_to_rest_carries_the_weight(integrator) -> None:
+    mass, stiffness = 0.5, 40.0
+    run = opened(sp.Scene(models.ball(mass=mass)), integrator, models.free_q([0, 0, 1.0]), None)
+    # Off the center: the ball then hangs below the point that is held.
+    held = np.array([0.0, 0.0, 0.03])
+    run.pull("ball", held, [0.0, 0.0, 1.2], stiffness, 2.0 * np.sqrt(mass * stiffness))
+    run.advance(4.0)
+    row = run.snapshot()
+    stretch = 1.2 - row.q[0, 2] - held[2]
+    assert stiffness * stretch == pytest.approx(mass * G, rel=1e-6)
+    np.testing.assert_allclose(row.v[0], 0.0, atol=1e-6)
+    exchanged = mass * G * abs(row.q[0, 2] - 1.0)
+    assert abs(run.residual) < (1e-3 if isinstance(integrator, FIXED_FIRST_ORDER) else 1e-6) * (
+        exchanged
+    )
+
+
+@every
+def test_a_pull_takes_hold_where_a_body_is_that_nothing_touches(integrator) -> None:
+    """A hinge turned by 90 degrees: the first step, too, has to know where its tip is."""
+    model = models.empty(gravity=0.0)
+    inertia = models.pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.1, 0.2]))
+    models.add_body(model, "arm", models.pin.JointModelRZ(), inertia=inertia)
+    run = OpenRun(sp.Simulation(sp.Scene(model), integrator), [0.5 * np.pi], record_dt=1e-3)
+    # The point is at y = 0.4; the spring pulls along -x.
+    run.pull("arm", [0.4, 0.0, 0.0], [-0.5, 0.4, 0.0], 10.0)
+    run.advance(1e-3)
+    torque = 0.4 * 0.5 * 10.0
+    assert run.snapshot().v[0, 0] == pytest.approx(torque / 0.2 * run.time, rel=1e-3)
+
+
+def test_a_pull_outlives_a_change_and_ends_with_a_push() -> None:
+    scene = models.on_plate(models.ball(), models.LAW, models.FRICTION, shell=PLATE)
+    run = opened(scene, sp.Adaptive(1e-9), models.free_q([0.0, 0.0, 1.0]), None)
+    run.pull("ball", np.zeros(3), [0.0, 0.0, 1.0], 1e3, 60.0)
+    run.advance(2.0)
+    hung = run.snapshot().q[0, 2]
+    softer = models.on_plate(
+        models.ball(), models.linear_law(1e4, 1.0), models.FRICTION, shell=PLATE
+    )
+    assert run.change(softer)
+    run.advance(0.1)
+    assert run.snapshot().q[0, 2] == pytest.approx(hung, abs=1e-9)
+    assert abs(run.residual) < 1e-6
+    run.push("ball", np.zeros(3))
+    dropped = run.time
+    run.advance(0.1)
+    fallen = 0.5 * G * (run.time - dropped) ** 2
+    assert hung - run.snapshot().q[0, 2] == pytest.approx(fallen, rel=1e-6)
 
 
 @every
@@ -164,6 +242,33 @@ def test_a_push_that_cannot_be(frame: str, force: list[float], fault: type, says
     run = opened(sliding_ball(), FIXED[0], models.free_q([0.0, 0.0, R]), None)
     with pytest.raises(fault, match=says):
         run.push(frame, force)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        (("ball", [0, 0], [0, 0, 0], 1.0), "point"),
+        (("ball", [0, 0, 0], [0, 0, np.inf], 1.0), "anchor_world"),
+        (("ball", [0, 0, 0], [0, 0, 0], -1.0), "stiffness"),
+        (("ball", [0, 0, 0], [0, 0, 0], 1.0, np.nan), "damping"),
+        (("universe", [0, 0, 0], [0, 0, 0], 1.0), "fixed to the world"),
+    ],
+)
+def test_a_pull_that_cannot_be(given: tuple, says: str) -> None:
+    run = opened(sliding_ball(), FIXED[0], models.free_q([0.0, 0.0, R]), None)
+    with pytest.raises(InvalidParameter, match=says):
+        run.pull(*given)
+
+
+def test_patches_can_be_switched_on_and_off_on_the_way() -> None:
+    run = opened(sliding_ball(), FIXED[0], models.free_q([0, 0, R]), None)
+    assert run.advance(0.01).patch_rows is None
+    run.record_patches(True)
+    rows = run.advance(0.01)
+    assert len(rows.patch_rows) == len(rows.contacts.depth) > 0
+    np.testing.assert_allclose(rows.patch_rows["approach"], rows.contacts.depth)
+    run.record_patches(False)
+    assert run.advance(0.01).patch_rows is None
 
 
 def test_a_fixed_step_of_many_fine_ones_can_be_left_half_way() -> None:

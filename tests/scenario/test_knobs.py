@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sphshell_pin.errors import ScenarioError
+from sphshell_pin.errors import InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, knobs_of, rebuild, shipped_scenarios
 from sphshell_pin.scenario.live import LiveRun
 from tests.scenario.files import DROP, write
@@ -72,7 +72,7 @@ def test_several_contacts_are_told_apart():
     [
         (knob("contact.ball-plate.law.stifness"), r"no 'stifness'.*did you mean 'stiffness'"),
         (knob("contact.tip.law.stiffness"), r"there are: ball-plate"),
-        (knob("shell.plate.side"), r"shell\.plate\.side: is not a number"),
+        (knob("shell.plate.name"), r"shell\.plate\.name: is not a number"),
         (knob("run.rtol"), r"run\.rtol: is not a number"),
         (knob("contact.ball-plate.law"), r"is not a number"),
         (knob(STIFFNESS) + knob(STIFFNESS), r"knob\[1\]\.key: is a knob already"),
@@ -207,3 +207,47 @@ def test_labels_units_and_limits_are_those_of_the_description(tmp_path):
         path = write(tmp_path, DROP.replace(law, text) + knob(f"contact.ball-plate.law.{key}"))
         (found,) = knobs_of(build(path))
         assert (found.label, found.unit, found.high) == (label, unit, high)
+
+
+METHOD = "contact.ball-plate.method"
+WITH_METHOD = DROP.replace('shell = "plate"\n', 'shell = "plate"\nmethod = "smooth"\n')
+
+
+def test_a_word_of_a_choice_may_be_a_knob(tmp_path):
+    (found,) = knobs_of(build(write(tmp_path, WITH_METHOD + knob(METHOD))))
+    assert (found.value, found.choices) == ("smooth", ("facets", "smooth", "elements"))
+    assert (found.label, found.unit, found.restart) == ("method", "", False)
+
+
+@pytest.mark.parametrize(
+    ("text", "more", "says"),
+    [
+        (DROP, "", "is not set"),
+        (WITH_METHOD, "min = 1", "is for numbers"),
+        (WITH_METHOD, 'unit = "m"', "is for numbers"),
+    ],
+)
+def test_a_word_that_cannot_be_a_knob(text, more, says, tmp_path):
+    with pytest.raises(ScenarioError, match=says):
+        build(write(tmp_path, text + knob(METHOD, more)))
+
+
+def test_a_word_acts_on_the_run_under_way(tmp_path):
+    live = LiveRun(build(write(tmp_path, WITH_METHOD + knob(METHOD) + knob(STIFFNESS))))
+    live.advance(0.02)
+    time, q = live.time, live.q.copy()
+    live.change(METHOD, "facets")
+    assert live.scene.pairs[0].method == "facets"
+    assert [one.value for one in live.knobs] == ["facets", 1e6]
+    assert live.time == time
+    np.testing.assert_array_equal(live.q, q)
+    for key, word, says in (
+        (METHOD, "curved", "must be one of facets, smooth, elements"),
+        (STIFFNESS, "stiff", "must be a number"),
+        ("gravity.2", "down", "must be a number"),
+    ):
+        with pytest.raises(InvalidParameter, match=says):
+            live.change(key, word)
+    with pytest.raises(ScenarioError):
+        live.change(METHOD, 1.0)
+    assert live.scene.pairs[0].method == "facets"

@@ -54,7 +54,7 @@ def test_attributes(shell):
     assert (shell.name, shell.side, shell.unit, shell.source) == ("crate", "outside", None, None)
     assert shell.crease_angle == pytest.approx(np.deg2rad(30.0))
     assert repr(shell) == (
-        "<Shell 'crate': 6 elements, 8 vertices, closed, size 1.732 m, side outside>"
+        "<Shell 'crate': 6 elements, 8 vertices, surface closed, size 1.732 m, side outside>"
     )
 
 

@@ -16,6 +16,7 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError, SweepError
+from sphshell_pin.plot.sweep import plot_sweep
 from sphshell_pin.study.sweep import axes_of, plan_sweep, sweep
 from sphshell_pin.study.sweep.driver import run_plan
 from sphshell_pin.study.sweep.journal import Journal
@@ -112,6 +113,28 @@ def test_a_failed_run_is_a_row_that_says_why(folder):
     assert "starts at depth" in table["error"][1]
     assert str(folder) not in table["error"][1]
     assert table["figures.depth"].isna().tolist() == [False, True, False]
+
+
+def test_units_stay_with_the_table(folder, tmp_path):
+    stiffness, exponent = "contact.law.stiffness", "contact.law.exponent"
+    changes = {"run.duration": "0.1"}
+    plan = plan_sweep(folder / "resting.toml", {stiffness: [1e4, 2e4]}, changes=changes)
+    report = run_plan(plan, workers=0, out=tmp_path / "units.parquet")
+    units = report.table.attrs["units"]
+    assert units[stiffness] == "N/m^1.5"
+    assert units["pairs.ball-plate.max_depth"] == "m"
+    assert units["final.v.root_joint.5"] == "rad/s"
+    assert set(units) < set(report.table.columns)
+    assert pd.read_parquet(report.out).attrs["units"] == units
+    (axis,) = plot_sweep(report.table, "final.q.root_joint.2").axes
+    assert axis.get_xlabel() == f"{stiffness} [N/m^1.5]"
+    assert axis.get_ylabel() == "final.q.root_joint.2 [m]"
+    assert "2 runs, 0 failed, varied 'contact.law.stiffness [N/m^1.5]'" in repr(report)
+    assert "pairs.ball-plate.peak_force [N]" in report._repr_html_()
+    # Where the exponent varies, too, the unit of the stiffness does.
+    both = {stiffness: [1e4], exponent: [1.5, 2.0]}
+    varied = plan_sweep(folder / "resting.toml", both, changes=changes)
+    assert stiffness not in varied.units
 
 
 def test_a_figure_that_breaks_leaves_the_others(tmp_path):

@@ -1,8 +1,12 @@
 import meshcat
 import numpy as np
+import pinocchio as pin
 import pytest
 
+import sphshell_pin as sp
+from sphshell_pin.scenario import build
 from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View, set_surroundings
+from sphshell_pin.view.display import choose_view
 from sphshell_pin.view.page import FilmWindow
 
 
@@ -47,6 +51,25 @@ def test_things_far_away_do_not_shrink_the_contact():
     near = View.of(np.zeros((1, 3)), np.zeros((0, 3)), np.zeros(3), 0.01)
     far = View.of(np.zeros((1, 3)), np.array([[50.0, 0, 0]]), np.zeros(3), 0.01)
     assert far.distance == pytest.approx(near.distance)
+
+
+def test_the_whole_robot_is_in_the_picture_of_a_short_run():
+    scene = build("fingertip_on_blade").scene
+    q = build("fingertip_on_blade").q0
+    contacts = scene.contacts(q)
+    seen = (scene, q[None, :], contacts.point_world, contacts.normal_world)
+    data = scene.model.createData()
+    pin.forwardKinematics(scene.model, data, q)
+    joints = np.array([data.oMi[k].translation for k in range(1, scene.model.njoints)])
+    whole = choose_view(*seen, whole=True)
+    assert np.abs(in_picture(whole, joints)).max() < 1.0
+    assert np.abs(in_picture(whole, contacts.point_world)).max() < 1.0
+    near = choose_view(*seen)
+    assert near.distance < 0.8 * whole.distance
+    # A floor that reaches far beyond the robot does not make it small.
+    floor = sp.Shell([[-5, -5, -1], [5, -5, -1], [5, 5, -1], [-5, 5, -1]], [[0, 1, 2, 3]])
+    scene.add_contact(sp.Sphere(0.02, "panda_link0"), floor, law=sp.ImpactLaw(1e5, 1.5, 0, 1e-4))
+    assert choose_view(*seen, whole=True).distance < 1.5 * whole.distance
 
 
 def test_nothing_of_the_page_itself_cuts_through_the_scene():

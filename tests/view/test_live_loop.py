@@ -192,13 +192,14 @@ def test_a_run_that_fails_stops_says_why_and_can_start_again(make):
 
 def test_a_finished_run_scrubs_and_starts_again_at_its_end(make):
     live = make(FilmPlayer())
+    say(live, "charts", keys=["normal"])
     say(live, "seek", t=1.5)
     live.frame(0.0)
     assert live.player.time == 1.5
-    # The strip shows what led there: 5 N all the way.
-    assert live._strip_rows[0][0] < 0.02
-    assert 1.48 < live._strip_rows[-1][0] <= 1.5
-    assert {row[1][0] for row in live._strip_rows} == {5.0}
+    # The chart shows what led there: 5 N all the way.
+    assert live._points[0][0] < 0.02
+    assert 1.48 < live._points[-1][0] <= 1.5
+    assert {value for _, value in live._points} == {5.0}
     frames(live, 60)
     assert live.player.time == 2.0
     assert not live.running
@@ -259,13 +260,14 @@ def test_a_script_may_end_without_stopping_it():
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_in_slow_motion_the_strip_has_a_point_a_frame(make):
+def test_in_slow_motion_the_chart_has_a_point_a_frame(make):
     live = make(speed=0.01)
+    say(live, "charts", keys=["normal"])
     advance = live.player.advance
     live.player.advance = lambda *given: advance(*given).select(slice(0, 0))
     frames(live, 30)
-    assert len(live._strip_rows) >= 28
-    assert live._strip_rows[0][1][0] == pytest.approx(5e3 * 1e-3, rel=0.05)
+    assert len(live._points) >= 28
+    assert live._points[0][1] == pytest.approx(5e3 * 1e-3, rel=0.05)
 
 
 def test_a_state_that_is_no_number_is_not_drawn(make):

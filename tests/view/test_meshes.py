@@ -14,7 +14,12 @@ import umsgpack
 import sphshell_pin.view.page as page_module
 from sphshell_pin.view.meshes import LEVELS, MARK, pack_facets, pack_numbers, take_out_numbers
 
-PAGE = Path(page_module.__file__).with_name("recording.html").read_text(encoding="utf-8")
+PAGE = (
+    Path(page_module.__file__)
+    .with_name("recording_page")
+    .joinpath("replay.js")
+    .read_text(encoding="utf-8")
+)
 
 
 def restored(packed):

@@ -122,12 +122,12 @@ def test_a_page_needs_nothing_from_anywhere_and_escapes_what_it_is_told():
     meshcat.Visualizer(window=window)["node"].set_property("visible", True)
     commands = window.commands(np.zeros(1))
     title = 'A <b>bold</b> & "quoted" title @@scene@@ </script>'
-    page = render_page(commands, title, [("#ff0000", "5 < 6")], {"start": 0, "speed": 1})
+    page = render_page(commands, title, [("#ff0000", "5 < 6")])
     assert unpacked(page) == commands
     assert "A &lt;b&gt;bold&lt;/b&gt; &amp;" in page
     assert "5 &lt; 6" in page
     assert "<b>" not in page.split("<script>", maxsplit=1)[0]
     assert not re.search(r"<(script|link|img|iframe)[^>]*\b(src|href)=", page)
     # The same scene gives the same page, byte by byte.
-    again = render_page(commands, title, [("#ff0000", "5 < 6")], {"start": 0, "speed": 1})
+    again = render_page(commands, title, [("#ff0000", "5 < 6")])
     assert page == again

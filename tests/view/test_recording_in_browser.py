@@ -34,7 +34,7 @@ def opened(browser):
 
     def open_file(path):
         page.goto(path.resolve().as_uri())
-        page.wait_for_function("window.recording_ready", timeout=60_000)
+        page.wait_for_function("window.recording", timeout=60_000)
         return page
 
     yield open_file
@@ -44,14 +44,7 @@ def opened(browser):
 
 def at_time(page, time):
     """Pause, scrub to `time` [s] and return the picture (h, w, 3)."""
-    page.evaluate(
-        """time => {
-            viewer.animator.pause();
-            viewer.animator.time_scrubber.setValue(time);
-            viewer.render();
-        }""",
-        time,
-    )
+    page.evaluate("time => { recording.film('fit', false); recording.draw(time); }", time)
     return picture(page)
 
 
@@ -59,7 +52,7 @@ def picture(page):
     from PIL import Image
 
     # The captions may lie over what is looked for.
-    page.add_style_tag(content="#caption, .dg.main { visibility: hidden !important; }")
+    page.add_style_tag(content="#head, #key, #views { visibility: hidden !important; }")
     image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
     return np.asarray(image).astype(int)
 
@@ -96,15 +89,15 @@ def test_the_ball_its_shell_and_its_arrow_are_seen(ball_page, opened):
 
 def test_it_plays_pauses_and_starts_again(ball_page, opened):
     page = opened(ball_page)
-    page.wait_for_function("viewer.animator.time > 0.2", timeout=20_000)
-    page.get_by_text("pause", exact=True).click()
-    stopped = page.evaluate("viewer.animator.time")
-    page.wait_for_timeout(400)
-    assert page.evaluate("viewer.animator.time") == stopped
+    page.wait_for_function("recording.time > 0.2", timeout=20_000)
+    page.get_by_role("button", name="Pause").click()
+    stopped = page.evaluate("recording.time")
+    page.wait_for_timeout(300)
+    assert page.evaluate("recording.time") == stopped
     shown = page.locator("#clock").inner_text()
-    assert float(shown.split()[2]) == pytest.approx(stopped, abs=0.006)
-    page.get_by_text("play", exact=True).click()
-    page.wait_for_function(f"viewer.animator.time > {stopped} + 0.2", timeout=20_000)
+    assert float(shown.split()[0]) == pytest.approx(stopped, abs=0.006)
+    page.get_by_role("button", name="Play", exact=True).click()
+    page.wait_for_function(f"recording.time > {stopped} + 0.2", timeout=20_000)
 
 
 def test_the_trail_grows_with_time(ball_page, opened):
@@ -150,7 +143,7 @@ def test_patches_have_the_colors_of_their_pressure(tmp_path, opened):
     brightest = int(RAMP[-1].removeprefix("#"), 16)
     assert count(at_time(page, touching), brightest, 60) > 20
     assert count(at_time(page, 0.0), brightest, 60) == 0
-    assert "pressure of patches: 0 to 2 MPa" in page.locator("#caption").text_content()
+    assert "pressure of patches: 0 to 2 MPa" in page.locator("#legend").text_content()
 
 
 def test_a_damaged_page_says_so(ball_page, tmp_path, browser):

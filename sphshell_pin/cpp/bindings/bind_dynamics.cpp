@@ -269,22 +269,34 @@ void bind_dynamics(nanobind::module_& m) {
   nb::class_<PythonController, Controller>(
       m, "PythonController", nb::type_slots(slots<PythonController, visit_controller>()))
       .def(nb::init<nb::object>(), nb::arg("callable"));
+  nb::class_<PathSettings>(m, "Path").def(
+      "__init__",
+      [](PathSettings* self, std::vector<double> along, const RowPoints& points,
+         const RowPoints& tangents, const RowPoints& normals, std::vector<double> times,
+         std::vector<double> places, std::vector<double> speeds, std::vector<double> accelerations,
+         std::vector<double> jerks, std::vector<double> kinks) {
+        new (self) PathSettings{std::move(along),   to_points(points),        to_points(tangents),
+                                to_points(normals), std::move(times),         std::move(places),
+                                std::move(speeds),  std::move(accelerations), std::move(jerks),
+                                std::move(kinks)};
+      },
+      nb::kw_only(), nb::arg("along"), nb::arg("points"), nb::arg("tangents"), nb::arg("normals"),
+      nb::arg("times"), nb::arg("places"), nb::arg("speeds"), nb::arg("accelerations"),
+      nb::arg("jerks"), nb::arg("kinks"));
   nb::class_<CartesianImpedance, Controller>(m, "CartesianImpedance")
       .def(
           "__init__",
           [](CartesianImpedance* self, int num_joints, int joint, const Eigen::Matrix4d& frame,
-             int path_joint, const Eigen::Matrix4d& path_placement, std::vector<double> times,
-             const RowPoints& points, const RowPoints& normals, double stiffness, double damping,
-             double normal_force, double rotational_stiffness, double rotational_damping,
-             VectorX posture_stiffness, VectorX joint_damping, VectorX q_ref, VectorX actuated) {
+             int path_joint, const Eigen::Matrix4d& path_placement, const PathSettings& path,
+             double stiffness, double damping, double normal_force, double rotational_stiffness,
+             double rotational_damping, VectorX posture_stiffness, VectorX joint_damping,
+             VectorX q_ref, VectorX actuated, bool decoupled) {
             ImpedanceSettings s;
             s.joint = joint;
             s.frame = to_se3(frame);
             s.path_joint = path_joint;
             s.path_placement = to_se3(path_placement);
-            s.times = std::move(times);
-            s.points = to_points(points);
-            s.normals = to_points(normals);
+            s.path = path;
             s.stiffness = stiffness;
             s.damping = damping;
             s.normal_force = normal_force;
@@ -294,31 +306,32 @@ void bind_dynamics(nanobind::module_& m) {
             s.joint_damping = std::move(joint_damping);
             s.q_ref = std::move(q_ref);
             s.actuated = std::move(actuated);
+            s.decoupled = decoupled;
             new (self) CartesianImpedance(std::move(s), num_joints);
           },
           nb::arg("num_joints"), nb::arg("joint"), nb::arg("frame"), nb::arg("path_joint"),
-          nb::arg("path_placement"), nb::arg("times"), nb::arg("points"), nb::arg("normals"),
-          nb::arg("stiffness"), nb::arg("damping"), nb::arg("normal_force"),
-          nb::arg("rotational_stiffness"), nb::arg("rotational_damping"),
+          nb::arg("path_placement"), nb::arg("path"), nb::arg("stiffness"), nb::arg("damping"),
+          nb::arg("normal_force"), nb::arg("rotational_stiffness"), nb::arg("rotational_damping"),
           nb::arg("posture_stiffness"), nb::arg("joint_damping"), nb::arg("q_ref"),
-          nb::arg("actuated"));
+          nb::arg("actuated"), nb::arg("decoupled"));
 
   nb::class_<RunSettings>(m, "RunSettings")
       .def(
           "__init__",
           [](RunSettings* self, std::string integrator, double dt, double rtol, double atol,
              double duration, double start_time, double control_dt, double record_dt,
-             bool patches) {
+             bool patches, bool torques) {
             new (self) RunSettings{{std::move(integrator), dt, rtol, atol},
                                    duration,
                                    start_time,
                                    control_dt,
                                    record_dt,
-                                   patches};
+                                   patches,
+                                   torques};
           },
           nb::kw_only(), nb::arg("integrator"), nb::arg("dt"), nb::arg("rtol"), nb::arg("atol"),
           nb::arg("duration"), nb::arg("start_time"), nb::arg("control_dt"), nb::arg("record_dt"),
-          nb::arg("patches"));
+          nb::arg("patches"), nb::arg("torques"));
 
   nb::class_<OneUser>(m, "OneUser").def(nb::init<std::string>(), nb::arg("what"));
   // Entered and left in one instruction of Python each, so that Ctrl-C cannot come between.
@@ -379,16 +392,30 @@ void bind_dynamics(nanobind::module_& m) {
           nb::arg("pairs"), nb::arg("joints").none(), nb::arg("controller").none())
       .def(
           "push",
-          [](Run& self, int joint, const Vec3& point, const Vec3& force_world, int frame) {
+          [](Run& self, int joint, const Vec3& point, const Vec3& force, const Vec3& anchor,
+             double stiffness, double damping, int frame) {
             const Use use(self.user, "push");
-            self.simulation.push(joint, point, force_world, frame);
+            self.simulation.push(joint, point, {force, anchor, stiffness, damping}, frame);
           },
-          nb::arg("joint"), nb::arg("point"), nb::arg("force_world"), nb::arg("frame"))
+          nb::arg("joint"), nb::arg("point"), nb::arg("force_world"), nb::arg("anchor_world"),
+          nb::arg("stiffness"), nb::arg("damping"), nb::arg("frame"))
+      .def(
+          "record_patches",
+          [](Run& self, bool on) {
+            const Use use(self.user, "record");
+            self.simulation.record_patches(on);
+          },
+          nb::arg("on"))
       .def("take",
            [](Run& self) {
              const Use use(self.user, "take");
              const auto& model = self.simulation.model();
              return to_dict(self.simulation.take(), model.nq, model.nv);
+           })
+      .def("record_torques",
+           [](Run& self) {
+             const Use use(self.user, "record_torques");
+             self.simulation.record_torques();
            })
       .def("snapshot",
            [](Run& self) {

@@ -1,6 +1,4 @@
-#include <coal/config.hh>
 #include <nanobind/nanobind.h>
-#include <pinocchio/config.hpp>
 
 namespace nb = nanobind;
 
@@ -17,8 +15,6 @@ NB_MODULE(_core, m) {
   // Interpreters that end with objects alive are no leak of ours.
   nb::set_leak_warnings(false);
   m.doc() = "C++ core of sphshell_pin; its Python face checks and converts, this trusts and runs.";
-  m.attr("pinocchio_version") = PINOCCHIO_VERSION;
-  m.attr("coal_version") = COAL_VERSION;
   bind_mending(m);
   bind_shell(m);
   bind_contact(m);

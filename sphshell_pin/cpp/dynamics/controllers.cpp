@@ -1,10 +1,15 @@
 #include "dynamics/controllers.hpp"
 
-#include <algorithm>
+#include <Eigen/Eigenvalues>
 #include <pinocchio/spatial.hpp>
 #include <utility>
 
 namespace sphshell {
+namespace {
+
+constexpr double kMobility = 1e-9;  // of the largest: directions in which a frame cannot move
+
+}  // namespace
 
 GravityCompensation::GravityCompensation(VectorX actuated) : actuated_(std::move(actuated)) {}
 
@@ -30,13 +35,13 @@ void JointPd::torque(SceneData& scene, double, const VectorX& q, const VectorX& 
 
 CartesianImpedance::CartesianImpedance(ImpedanceSettings settings, int num_joints)
     : s_(std::move(settings)),
+      path_(std::move(s_.path)),
       opposed_(static_cast<std::size_t>(num_joints), pinocchio::Force::Zero()),
       error_(VectorX::Zero(s_.actuated.size())) {}
 
 void CartesianImpedance::prepare(SceneData& scene) {
   scene.need_velocity_of(s_.joint);
   scene.need_velocity_of(s_.path_joint);
-  segment_ = 0;
   started_ = false;
 }
 
@@ -49,30 +54,13 @@ void CartesianImpedance::torque(SceneData& scene, double t, const VectorX& q, co
   const Vec3 velocity = pose.rotation() * twist.linear(), spin = pose.rotation() * twist.angular();
   if (!started_) hold_ = pose.rotation(), started_ = true;
 
-  // The target moves along straight pieces of the path; time may also step back (inner stages).
-  const std::vector<double>& times = s_.times;
-  t -= late_;
-  while (segment_ + 2 < times.size() && t >= times[segment_ + 1]) ++segment_;
-  while (segment_ > 0 && t < times[segment_]) --segment_;
-  const std::size_t i = segment_, j = std::min(i + 1, times.size() - 1);
-  const double span = times[j] - times[i];
-  const double u = span > 0 ? std::clamp((t - times[i]) / span, 0.0, 1.0) : 0.0;
-  const bool moving = span > 0 && t >= times[i] && t < times[j];
-  Vec3 target = s_.points[i] + u * (s_.points[j] - s_.points[i]);
-  Vec3 target_velocity = Vec3::Zero();
-  if (moving) target_velocity = (s_.points[j] - s_.points[i]) / span;
-  Vec3 normal = s_.normals[i] + u * (s_.normals[j] - s_.normals[i]);
+  const TargetPath::Target on_path = path_.at(t - late_);
   SE3 path = s_.path_placement;
   if (s_.path_joint != 0) path = body.world_from_joint(s_.path_joint) * s_.path_placement;
-  target = path.act(target);
-  target_velocity = path.rotation() * target_velocity;
-  normal = path.rotation() * normal;
-  if (s_.path_joint != 0) {
-    const SE3& carrier = body.world_from_joint(s_.path_joint);
-    const pinocchio::Motion& w = body.velocity(s_.path_joint);
-    target_velocity +=
-        carrier.rotation() * (w.linear() + w.angular().cross(carrier.actInv(target)));
-  }
+  const Vec3 target = path.act(on_path.point);
+  Vec3 target_velocity = path.rotation() * on_path.velocity;
+  Vec3 normal = path.rotation() * on_path.normal;
+  if (s_.path_joint != 0) target_velocity += body.velocity_at(s_.path_joint, target);
 
   Vec3 offset = target - pose.translation();
   if (s_.normal_force != 0) {
@@ -86,41 +74,78 @@ void CartesianImpedance::torque(SceneData& scene, double t, const VectorX& q, co
     moment += s_.rotational_stiffness *
               pinocchio::log3(Eigen::Matrix3d(hold_ * pose.rotation().transpose()));
 
+  aside_.setZero(v.size());
+  if (s_.posture_stiffness.size() > 0) {
+    body.difference(q, s_.q_ref, error_);
+    aside_ = s_.posture_stiffness.cwiseProduct(error_);
+  }
+  if (s_.joint_damping.size() > 0) aside_ -= s_.joint_damping.cwiseProduct(v);
+  if (s_.decoupled) {
+    const pinocchio::Force more = wrench_of_motion(body, q, v, on_path, path);
+    force += pose.rotation() * more.linear();
+    moment += pose.rotation() * more.angular();
+  }
+
   // One recursion gives the bias torques and J^T F: inverse dynamics at rest against -F.
   pinocchio::Force& opposed = opposed_[s_.joint];
   const Vec3 local = joint.rotation().transpose() * force;
   opposed.linear() = -local;
   opposed.angular() =
       -(joint.rotation().transpose() * moment) - s_.frame.translation().cross(local);
-  tau = body.bias(q, v, opposed_);
-  if (s_.posture_stiffness.size() > 0) {
-    body.difference(q, s_.q_ref, error_);
-    tau += s_.posture_stiffness.cwiseProduct(error_);
-  }
-  if (s_.joint_damping.size() > 0) tau -= s_.joint_damping.cwiseProduct(v);
-  tau.array() *= s_.actuated.array();
+  tau = (body.bias(q, v, opposed_) + aside_).cwiseProduct(s_.actuated);
 }
 
-double CartesianImpedance::next_kink(double t) const {
-  const auto next = std::upper_bound(s_.times.begin(), s_.times.end(), t - late_);
-  return next == s_.times.end() ? std::numeric_limits<double>::infinity() : *next + late_;
+// In the frame: Lambda (a_d - Jdot v - J M^-1 tau), with tau what acts aside of F. Of a carrier
+// that moves, a_d has what its velocity determines. Where the frame has no mobility, as in a
+// singular posture, there is no wrench.
+pinocchio::Force CartesianImpedance::wrench_of_motion(Multibody& body, const VectorX& q,
+                                                      const VectorX& v,
+                                                      const TargetPath::Target& target,
+                                                      const SE3& path) {
+  pinocchio::Force& opposed = opposed_[s_.joint];
+  opposed.setZero();
+  body.bias(q, v, opposed_);
+  Vec3 wanted = path.rotation() * target.acceleration;
+  if (s_.path_joint != 0) {
+    const SE3& carrier = body.world_from_joint(s_.path_joint);
+    const pinocchio::Motion &w = body.velocity(s_.path_joint), drift = body.drift(s_.path_joint);
+    const Vec3 r = carrier.actInv(path.act(target.point));
+    const Vec3 along = s_.path_placement.rotation() * target.velocity;
+    wanted +=
+        carrier.rotation() * (drift.linear() + drift.angular().cross(r) +
+                              w.angular().cross(w.linear() + w.angular().cross(r) + 2 * along));
+  }
+  const pinocchio::Motion twist = s_.frame.actInv(body.velocity(s_.joint));
+  const pinocchio::Motion drift = s_.frame.actInv(body.drift(s_.joint));
+  const SE3 pose = body.world_from_joint(s_.joint) * s_.frame;
+  body.task(q, s_.joint, s_.frame, jacobian_, mobility_);
+  Eigen::Matrix<double, 6, 1> error;
+  error << pose.rotation().transpose() * wanted - drift.linear() -
+               twist.angular().cross(twist.linear()),
+      -drift.angular();
+  error -= mobility_.transpose() * aside_;
+  // Without a hold of the orientation that is left to the spring of the posture.
+  const int rows = s_.rotational_stiffness != 0 || s_.rotational_damping != 0 ? 6 : 3;
+  const MatrixX mobility = (jacobian_ * mobility_).topLeftCorner(rows, rows);
+  const Eigen::SelfAdjointEigenSolver<MatrixX> by_axis(mobility);
+  const double least = kMobility * by_axis.eigenvalues()[rows - 1];
+  Eigen::Matrix<double, 6, 1> wrench = Eigen::Matrix<double, 6, 1>::Zero();
+  for (int k = 0; k < rows; ++k) {
+    const auto axis = by_axis.eigenvectors().col(k);
+    if (by_axis.eigenvalues()[k] > least)
+      wrench.head(rows) += axis * (axis.dot(error.head(rows)) / by_axis.eigenvalues()[k]);
+  }
+  return pinocchio::Force(wrench);
 }
 
 // The orientation held stays, and the target stays where it is on the path.
 void CartesianImpedance::take_over(const Controller& before, double t) {
   const auto* other = dynamic_cast<const CartesianImpedance*>(&before);
-  if (!other || other->s_.times.size() != s_.times.size()) return;
+  if (!other || !path_.same_curve(other->path_)) return;
   hold_ = other->hold_;
   started_ = other->started_;
-  if (s_.times.size() < 2) return;
-  const std::vector<double>&now = s_.times, &then = other->s_.times;
-  const double at = std::clamp(t - other->late_, then.front(), then.back());
-  const auto next = std::upper_bound(then.begin() + 1, then.end() - 1, at);
-  const std::size_t j = std::min<std::size_t>(next - then.begin(), now.size() - 1);
-  const std::size_t i = j > 0 ? j - 1 : 0;
-  const double span = then[j] - then[i];
-  const double u = span > 0 ? (at - then[i]) / span : 0;
-  late_ = t - (now[i] + u * (now[j] - now[i]));
+  const double place = other->path_.place_at(t - other->late_);
+  late_ = place > 0 ? t - path_.time_of(place) : other->late_;
 }
 
 }  // namespace sphshell

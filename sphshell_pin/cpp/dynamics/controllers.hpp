@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dynamics/scene_data.hpp"
+#include "dynamics/target_path.hpp"
 
 namespace sphshell {
 
@@ -55,17 +56,19 @@ struct ImpedanceSettings {
   SE3 frame = SE3::Identity();  // in that joint
   int path_joint = 0;           // that carries the path
   SE3 path_placement = SE3::Identity();
-  std::vector<double> times;          // [s], increasing
-  std::vector<Vec3> points, normals;  // in the path's frame; normals zero where there is no surface
-  double stiffness = 0, damping = 0;  // [N/m], [N s/m]
-  double normal_force = 0;            // pressed against the normal [N]
+  PathSettings path;                                        // in the path's frame
+  double stiffness = 0, damping = 0;                        // [N/m], [N s/m]
+  double normal_force = 0;                                  // pressed against the normal [N]
   double rotational_stiffness = 0, rotational_damping = 0;  // [N m], [N m s]
   VectorX posture_stiffness, joint_damping, q_ref, actuated;
+  bool decoupled = false;  // the inertia of the robot does not disturb the frame
 };
 
 // Cartesian impedance (Hogan 1985): J^T F plus the bias torques, with
 // F = K (x_d - x) + D (xdot_d - xdot); with a normal force, the spring acts in the tangent plane of
-// the path's normal only and the frame is pressed against that normal.
+// the path's normal only and the frame is pressed against that normal. Decoupled, the wrench that
+// the target's acceleration takes is added, Lambda (a_d - Jdot v) with Lambda = (J M^-1 J^T)^-1,
+// and posture and joint damping act where they do not accelerate the frame (Khatib 1987).
 class CartesianImpedance : public Controller {
  public:
   explicit CartesianImpedance(ImpedanceSettings settings, int num_joints);
@@ -73,17 +76,22 @@ class CartesianImpedance : public Controller {
   void torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
               VectorX& tau) override;
   void take_over(const Controller& before, double t) override;
-  bool follows_time() const override { return s_.times.size() > 1; }
-  double next_kink(double t) const override;
+  bool follows_time() const override { return path_.moves(); }
+  double next_kink(double t) const override { return path_.next_kink(t - late_) + late_; }
 
  private:
   ImpedanceSettings s_;
-  std::size_t segment_ = 0;
+  TargetPath path_;
   double late_ = 0;  // the path is followed so much later than its times say [s]
   bool started_ = false;
   Eigen::Matrix3d hold_;  // orientation at the start
   Forces opposed_;
-  VectorX error_;
+  VectorX error_, aside_;  // joint torques besides those of F
+  Matrix6X jacobian_;
+  MatrixX mobility_;
+
+  pinocchio::Force wrench_of_motion(Multibody& body, const VectorX& q, const VectorX& v,
+                                    const TargetPath::Target& target, const SE3& path);
 };
 
 }  // namespace sphshell

@@ -173,6 +173,23 @@ const VectorX& Multibody::bias(const VectorX& q, const VectorX& v, const Forces&
   return pinocchio::rnea(model_, data_, q, v, zero_, external);
 }
 
+pinocchio::Motion Multibody::drift(int joint) const {
+  if (joint == 0) return pinocchio::Motion::Zero();
+  return data_.a_gf[joint] + data_.oMi[joint].actInv(model_.gravity);
+}
+
+void Multibody::task(const VectorX& q, int joint, const pinocchio::SE3& frame, Matrix6X& jacobian,
+                     MatrixX& mobility) {
+  using pinocchio::Convention;
+  pinocchio::crba(model_, data_, q, mimics_ ? Convention::WORLD : Convention::LOCAL);
+  mass_.compute(data_.M);
+  jacobian.setZero(6, model_.nv);
+  pinocchio::computeJointJacobian(model_, data_, q, joint, jacobian);
+  jacobian = frame.toActionMatrixInverse() * jacobian;
+  mobility = jacobian.transpose();
+  mass_.solveInPlace(mobility);
+}
+
 void Multibody::transmit(const VectorX& q, const VectorX& v, const VectorX& acceleration,
                          const Forces& external) {
   pinocchio::rnea(model_, data_, q, v, acceleration, external);

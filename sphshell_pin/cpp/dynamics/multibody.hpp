@@ -56,6 +56,12 @@ class Multibody {
   const VectorX& gravity(const VectorX& q);
   // Torque that holds the bias forces and opposes `external`: rnea(q, v, 0, external).
   const VectorX& bias(const VectorX& q, const VectorX& v, const Forces& external);
+  // After bias(): the acceleration of the joint's body that velocities alone determine, in the
+  // joint's frame (spatial: its linear part is not that of a point).
+  pinocchio::Motion drift(int joint) const;
+  // Jacobian (6, nv) of a frame of `joint`, in that frame, and M^-1 of its transpose (nv, 6).
+  void task(const VectorX& q, int joint, const pinocchio::SE3& frame, Matrix6X& jacobian,
+            MatrixX& mobility);
   // Inverse dynamics, and what it leaves, all in the joints' frames.
   void transmit(const VectorX& q, const VectorX& v, const VectorX& acceleration,
                 const Forces& external);

@@ -2,17 +2,22 @@
 
 namespace sphshell {
 
-void Push::set(int joint, const Eigen::Vector3d& point, const Eigen::Vector3d& force_world,
-               int frame) {
+void Push::set(int joint, const Eigen::Vector3d& point, const PointForce& force, int frame) {
   if (!opposed_.empty()) opposed_[joint_].setZero();
   joint_ = joint;
   frame_ = frame;
   point_ = point;
-  force_world_ = force_world;
+  force_ = force;
 }
 
 pinocchio::Force Push::on_joint(const Multibody& body) const {
-  const Eigen::Vector3d force = body.world_from_joint(joint_).rotation().transpose() * force_world_;
+  const pinocchio::SE3& pose = body.world_from_joint(joint_);
+  Eigen::Vector3d world = force_.force;
+  if (force_.stiffness != 0 || force_.damping != 0) {
+    const Eigen::Vector3d x = pose.act(point_);
+    world += force_.stiffness * (force_.anchor - x) - force_.damping * body.velocity_at(joint_, x);
+  }
+  const Eigen::Vector3d force = pose.rotation().transpose() * world;
   return {force, point_.cross(force)};
 }
 

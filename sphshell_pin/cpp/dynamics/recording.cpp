@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
+
+#include "dynamics/patch.hpp"
 
 namespace sphshell {
 
@@ -18,9 +21,24 @@ Recorder::Recorder(const SceneData& scene, double start, double end, double reco
   if (patches) record_.patches.emplace();
 }
 
+void Recorder::record_patches(bool on) {
+  if (on == record_.patches.has_value()) return;
+  record_.patches.reset();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  if (on) record_.patches.emplace(record_.contacts.size(), unknown_patch(nan));
+}
+
+void Recorder::record_torques(TorquesAt torques, Eigen::Index nv) {
+  torques_ = std::move(torques);
+  if (!record_.torques)  // rows that are there already have none
+    record_.torques.emplace(record_.t.size() * static_cast<std::size_t>(nv),
+                            std::numeric_limits<double>::quiet_NaN());
+}
+
 Record Recorder::take() {
   Record next;
   if (record_.patches) next.patches.emplace();
+  if (record_.torques) next.torques.emplace();
   return std::exchange(record_, std::move(next));
 }
 
@@ -71,6 +89,10 @@ void Recorder::add_row(SceneData& scene, const State& state, double share) {
   for (double e : {kinetic, potential, powers.elastic + powers.bristles, ledger.damping,
                    ledger.friction - powers.bristles, ledger.control})
     record_.energy.push_back(e);
+  if (record_.torques) {
+    const VectorX& torques = torques_(state);
+    record_.torques->insert(record_.torques->end(), torques.begin(), torques.end());
+  }
   if (follower_) follower_->add_row(state, share);
   ++rows_;
 }

@@ -1,6 +1,7 @@
 // What a run keeps: rows of the motion, events, and figures of each pair.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -56,6 +57,7 @@ struct Record {
   std::vector<double> t, q, v, energy;
   std::vector<ContactRow> contacts;
   std::optional<std::vector<PatchRow>> patches;  // of the contacts, where they are asked for
+  std::optional<std::vector<double>> torques;    // of the controller (nv), where asked for; or nan
   std::vector<double> contact_row;               // the recorded row of each contact
   std::vector<Event> events;
   SensorRows sensors;
@@ -80,7 +82,14 @@ class Recorder {
   // Rows every `record_dt` from `start` to `end` [s], and at `end`; 0: at the end of every step.
   Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches);
 
+  // Whether the rows from now on have the patches of their contacts; those of rows that are recorded
+  // already are unknown.
+  void record_patches(bool on);
   void set_follower(RowFollower* follower) { follower_ = follower; }
+
+  // From now on rows have the torques (nv) that `torques` gives where the scene was evaluated.
+  using TorquesAt = std::function<const VectorX&(const State&)>;
+  void record_torques(TorquesAt torques, Eigen::Index nv);
 
   // The scene's last evaluate() was at the state; `share`: see RowFollower.
   void add_row(SceneData& scene, const State& state, double share = 1);
@@ -131,6 +140,7 @@ class Recorder {
   State between_;
   VectorX y_;
   RowFollower* follower_ = nullptr;
+  TorquesAt torques_;  // empty unless asked for
 };
 
 }  // namespace sphshell

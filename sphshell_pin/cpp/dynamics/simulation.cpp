@@ -54,6 +54,7 @@ Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
       next_control_(settings_.start_time) {
   if (!sensors.empty())
     sensors_ = std::make_unique<Sensors>(std::move(sensors), model, settings_.start_time);
+  if (settings_.torques) record_torques();
   if (controller_) controller_->prepare(scene_);
   if (controller_ && sensors_) controller_->read(sensors_->readings());
   if (settings_.dt > 0) {
@@ -248,6 +249,23 @@ void Simulation::hold_torques() {
   if (sensors_) sensors_->jump();
 }
 
+void Simulation::record_torques() {
+  recorder_.record_torques([this](const State& at) -> const VectorX& { return recorded_torques(at); },
+                           tau_.size());
+}
+
+// The first row stands before the first torque that is held.
+const VectorX& Simulation::recorded_torques(const State& state) {
+  const bool held = settings_.control_dt > 0;
+  if (controller_ && !held) {
+    const KeptCuts kept(cut_);
+    command(std::min(state.t, std::nextafter(kink_, -kInfinity)), state.q, state.v);
+  } else if (controller_ && controls_ == 0) {
+    tau_.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return tau_;
+}
+
 // What the controller asks for, cut to what the motors give.
 void Simulation::command(double t, const VectorX& q, const VectorX& v) {
   controller_->torque(scene_, t, q, v, tau_);
@@ -280,9 +298,11 @@ Record Simulation::snapshot() {
   return recorder_.snapshot(scene_, stepping_.state());
 }
 
-void Simulation::push(int joint, const Vec3& point, const Vec3& force_world, int frame) {
+void Simulation::push(int joint, const Vec3& point, const PointForce& force, int frame) {
   scene_.need_velocity_of(joint);
-  push_.set(joint, point, force_world, frame);
+  // The next step begins with what was evaluated here, maybe without this joint.
+  scene_.body().kinematics(q(), v());
+  push_.set(joint, point, force, frame);
   if (sensors_) sensors_->jump();
 }
 

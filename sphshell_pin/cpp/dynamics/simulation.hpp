@@ -21,6 +21,7 @@ struct RunSettings : StepSettings {
   double control_dt = 0;  // hold the torques this long [s]; 0: evaluate at every stage
   double record_dt = 0;   // between recorded rows [s]; 0: every step
   bool patches = false;   // record those of contacts
+  bool torques = false;   // record those of the controller
 };
 
 // A sphere that starts too deep in a shell for its contacts to be trusted.
@@ -74,14 +75,20 @@ class Simulation : private Torques {
   // The current state as the only row of a record; what was recorded stays.
   Record snapshot();
 
+  // From now on rows have the controller's torques, cut to their limits. A controller whose torques
+  // are not held is asked for them at each row.
+  void record_torques();
+
   // From now on the same pairs have other laws, friction (of the same kind) and radii, stops and
   // dry friction of joints have other values, and the controller is another, unless null. The
   // energy this brings counts as the controller's work.
   void change(std::vector<Pair> pairs, JointForces::Effects joints,
               std::shared_ptr<Controller> controller);
-  // From now on a force [N] in the world acts at a point of the joint's frame; zero ends it. Its
-  // work counts as the controller's. `frame`: the number of the one whose origin that is.
-  void push(int joint, const Vec3& point, const Vec3& force_world, int frame);
+  // From now on a force acts at a point of the joint's frame; zero ends it. Its work counts as the
+  // controller's. `frame`: the number of the one to whose body the point belongs.
+  void push(int joint, const Vec3& point, const PointForce& force, int frame);
+  // Whether the rows from now on have the patches of their contacts.
+  void record_patches(bool on) { recorder_.record_patches(on); }
 
   // Hands over what a caller may share; the run is at its end.
   Lent give_back() { return {scene_.give_back(), std::move(controller_)}; }
@@ -119,6 +126,7 @@ class Simulation : private Torques {
   void differentiate_step();
   void accept();
   void hold_torques();
+  const VectorX& recorded_torques(const State& state);
   void command(double t, const VectorX& q, const VectorX& v);
   double end_of_step() const;
   bool is_finite() const;

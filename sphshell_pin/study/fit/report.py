@@ -17,6 +17,7 @@ from sphshell_pin.atomic import write_whole
 from sphshell_pin.scenario.reading import find_scenario
 from sphshell_pin.study.fit.parameters import TIE
 from sphshell_pin.study.fit.writing import scenario_text
+from sphshell_pin.summary import Detail, Fact, Summarized
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,8 +43,8 @@ class Fitted:
     at_bound: bool = False
 
 
-@dataclass(frozen=True)
-class Series:
+@dataclass(frozen=True, repr=False)
+class Series(Summarized):
     """One measured column of one experiment, and what the fitted scenario says: all (m,).
 
     `sigma` are the standard deviations that weighted it; `given` whether the data came with them.
@@ -58,6 +59,14 @@ class Series:
     sigma: Array
     given: bool
 
+    def _facts(self) -> list[Fact]:
+        return [
+            Fact("experiment", self.experiment),
+            Fact("column", self.name),
+            Fact("values", len(self.t)),
+            Fact("residuals, root of the mean square", self.rms, self.unit),
+        ]
+
     @property
     def residuals(self) -> Array:
         """Measured less fitted values (m,), in `unit`."""
@@ -69,8 +78,8 @@ class Series:
         return float(np.sqrt(np.mean(self.residuals**2)))
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, repr=False)
+class Fit(Summarized):
     """Parameters of a scenario that were fitted to data.
 
     Attributes
@@ -97,6 +106,25 @@ class Fit:
     level: float
     runs: int
     converged: bool
+
+    @property
+    def _title(self) -> str:
+        return f"Fit of '{self.scenario}'"
+
+    def _facts(self) -> list[Fact]:
+        return [
+            *(Fact(one.key, one.value, one.unit) for one in self.parameters),
+            Fact("search", "converged" if self.converged else "stopped before it converged"),
+            Fact("determined", self.determined),
+            Fact("runs", self.runs, brief=False),
+            Fact("degrees of freedom", self.dof, brief=False),
+            *(Fact("note", remark, brief=False) for remark in self.remarks),
+        ]
+
+    def _rows(self) -> Detail:
+        rows = [(one.key, interval_text(one), one.unit, one.start) for one in self.parameters]
+        headings = ("parameter", f"interval of {100 * self.level:g} %", "unit", "start")
+        return Detail(headings, rows, len(rows))
 
     @property
     def values(self) -> dict[str, float]:

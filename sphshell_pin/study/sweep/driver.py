@@ -26,19 +26,24 @@ from sphshell_pin.study.sweep.table import (
     check_suffix,
     columns_of,
     frame_of,
+    varied_keys,
     write_table,
 )
 from sphshell_pin.study.sweep.worker import run_one
+from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized, names
+from sphshell_pin.tables import column
 
 if TYPE_CHECKING:
     import pandas as pd
 
+MOST_FIGURES = 3
+"""Figures of each run that a notebook shows."""
 Progress = Callable[[int, int, int], object]
 """Called with the numbers of runs done, failed among them, and in all."""
 
 
-@dataclass(frozen=True)
-class SweepReport:
+@dataclass(frozen=True, repr=False)
+class SweepReport(Summarized):
     """What a sweep left behind."""
 
     table: pd.DataFrame
@@ -55,6 +60,31 @@ class SweepReport:
     curves: pd.DataFrame | None = None
     """The curves of all runs of the sample that are done: `run`, `t` [s], a column for each."""
     curves_out: Path | None = None
+
+    @property
+    def _title(self) -> str:
+        return "Sweep"
+
+    def _facts(self) -> list[Fact]:
+        units = self.table.attrs.get("units", {})
+        facts = [
+            Fact("runs", len(self.table)),
+            Fact("failed", self.failed),
+            Fact(
+                "varied", names(column(key, units.get(key, "")) for key in varied_keys(self.table))
+            ),
+            Fact("table", self.out or "not written"),
+            Fact("done before", self.resumed, brief=False),
+        ]
+        return [*facts, *(Fact("note", sentence, brief=False) for sentence in self.notes)]
+
+    def _rows(self) -> Detail:
+        units = self.table.attrs.get("units", {})
+        own = [name for name in self.table if name.startswith("figures.")]
+        own += [name for name in self.table if name.endswith(".peak_force")]
+        shown = ["run", *varied_keys(self.table), "status", *own[:MOST_FIGURES]]
+        rows = self.table[shown].head(MOST_ROWS).to_numpy(dtype=object).tolist()
+        return Detail([column(name, units.get(name, "")) for name in shown], rows, len(self.table))
 
 
 def sweep(
@@ -118,6 +148,9 @@ def sweep(
         "A", "B", "AB KEY" of Saltelli's design; "median", "5 % KEY", "95 % KEY"), the figures of a
         run's summary [SI units] (NaN where a run has none), `settings`, the digest of its settings.
         Bit for bit the same however and wherever the runs were made, on one kind of processor.
+
+    The units of columns, by their names, are attrs["units"] of the table: those of keys as the
+    file states their values, those of figures in SI.
 
     Raises
     ------
@@ -248,8 +281,8 @@ def _write(
     if out is not None:
         if curves is not None:
             write_table(_curves_file(out), curves, plan.head)
-        write_table(out, columns, plan.head)
-    return frame_of(columns), None if curves is None else frame_of(curves)
+        write_table(out, columns, plan.head, plan.units)
+    return frame_of(columns, plan.units), None if curves is None else frame_of(curves)
 
 
 def _curves_file(out: Path) -> Path:

@@ -204,6 +204,7 @@ def tornado(table: pd.DataFrame, figure: str) -> pd.DataFrame:
         index=keys,
         columns=["low_value", "high_value", "low", "median", "high"],
     )
+    found.attrs = dict(table.attrs)
     ends = found[["low", "median", "high"]]
     change = ends.max(axis=1) - ends.min(axis=1)
     return found.loc[change.sort_values(ascending=False, kind="stable").index]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +20,7 @@ from sphshell_pin.scenario import (
     shipped_scenarios,
 )
 from sphshell_pin.scenario.build import build_scenario
-from sphshell_pin.scenario.figures import check_expectations
+from sphshell_pin.scenario.figures import check_expectations, figure_units
 from sphshell_pin.scenario.knobs import meaning
 from sphshell_pin.scenario.reading import look_up
 from sphshell_pin.study.sweep.curves import curves_of
@@ -60,6 +60,8 @@ class Plan:
     """What distinguishes this sweep from another."""
     design: Design | None = None
     """What the runs of a sample are for."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Of keys and figures, those that are known."""
 
     @property
     def varied(self) -> pd.DataFrame:
@@ -170,7 +172,8 @@ def plan_sweep(
         token=digest([str(path.absolute()), head]),
         curves=curves,
     )
-    return Plan(axes, points, runs, digests, tuple(figures), job, head, design)
+    units = figure_units(built) | _units_of_all(axes, runs, fixed, path)
+    return Plan(axes, points, runs, digests, tuple(figures), job, head, design, units)
 
 
 def _refuse_without_dist(**given: object) -> None:
@@ -267,6 +270,18 @@ def _unit(scenario: Scenario, key: str, path: Path) -> str:
         return meaning(scenario, look_up(scenario, key, path)).unit
     except ScenarioError:
         return ""  # not in the file; read_scenario raises if no file may have it
+
+
+def _units_of_all(
+    axes: tuple[Axis, ...], runs: list[Run], scenario: Scenario, path: Path
+) -> dict[str, str]:
+    """Return the units of the axes, but of those that follow another key that varies."""
+    ends = [changed(scenario, run, path) for run in (runs[0], runs[-1])]
+    return {
+        axis.key: axis.unit
+        for axis in axes
+        if axis.unit and {_unit(one, axis.key, path) for one in ends} == {axis.unit}
+    }
 
 
 def _build_one(runs: list[Run], scenario: Scenario, path: Path) -> tuple[Run, Built]:

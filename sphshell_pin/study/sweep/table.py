@@ -27,6 +27,8 @@ DATASET = "sweep"
 """Name of the dataset in an HDF5 file, and of the description in either kind of file."""
 
 
+_ATTRS = "PANDAS_ATTRS"  # where pandas looks for them
+
 DESIGN = "design"
 """The column that says what each run of a sampled sweep is for."""
 
@@ -90,13 +92,29 @@ def varied_columns(axes: Sequence[Axis], points: Sequence[tuple[Value, ...]]) ->
     return {axis.key: _varied([point[i] for point in points]) for i, axis in enumerate(axes)}
 
 
-def frame_of(columns: Columns) -> pd.DataFrame:
-    """Return the table as a pandas.DataFrame."""
-    return need("pandas").DataFrame(columns)
+def varied_keys(table: pd.DataFrame) -> list[str]:
+    """Return the names of the columns that were varied."""
+    names = [str(name) for name in table.columns]
+    return names[1 : names.index("status")]
 
 
-def write_table(path: Path, columns: Columns, description: Mapping[str, object]) -> None:
+def frame_of(columns: Columns, units: Mapping[str, str] | None = None) -> pd.DataFrame:
+    """Return the table as a pandas.DataFrame; the `units` of columns are its attrs["units"]."""
+    frame: pd.DataFrame = need("pandas").DataFrame(columns)
+    if units:
+        frame.attrs["units"] = {name: unit for name, unit in units.items() if name in columns}
+    return frame
+
+
+def write_table(
+    path: Path,
+    columns: Columns,
+    description: Mapping[str, object],
+    units: Mapping[str, str] | None = None,
+) -> None:
     """Write the table to `path`, Parquet or HDF5 by its suffix, in place of an earlier one.
+
+    pandas reads the `units` of a Parquet file as attrs["units"].
 
     The same columns and description give the same bytes.
 
@@ -107,9 +125,10 @@ def write_table(path: Path, columns: Columns, description: Mapping[str, object])
     """
     write = _write_parquet if path.suffix.lower() in PARQUET else _write_hdf5
     text = json.dumps(description, sort_keys=True)
+    known = {name: unit for name, unit in sorted((units or {}).items()) if name in columns}
     try:
         with atomic_file(path) as file:
-            write(file, columns, text)
+            write(file, columns, text, known)
     except OSError as fault:
         raise ResultError(path, f"cannot be written: {fault.strerror or fault}") from None
 
@@ -125,17 +144,22 @@ def _is_table(path: Path) -> bool:
         return False
 
 
-def _write_parquet(file: IO[bytes], columns: Columns, description: str) -> None:
+def _write_parquet(
+    file: IO[bytes], columns: Columns, description: str, units: Mapping[str, str]
+) -> None:
     arrow, parquet = need("pyarrow"), need("pyarrow.parquet")
     arrays = {
         name: arrow.array(values.tolist(), arrow.string()) if _is_text(values) else values
         for name, values in columns.items()
     }
-    table = arrow.table(arrays).replace_schema_metadata({DATASET: description})
+    metadata = {DATASET: description} | ({_ATTRS: json.dumps({"units": units})} if units else {})
+    table = arrow.table(arrays).replace_schema_metadata(metadata)
     parquet.write_table(table, file, compression="zstd")
 
 
-def _write_hdf5(file: IO[bytes], columns: Columns, description: str) -> None:
+def _write_hdf5(
+    file: IO[bytes], columns: Columns, description: str, units: Mapping[str, str]
+) -> None:
     h5py = need("h5py")
     # One array of records: a column's name may hold the slash that would make it a folder.
     fields: list[tuple[str, np.dtype[np.generic]]] = []
@@ -155,6 +179,8 @@ def _write_hdf5(file: IO[bytes], columns: Columns, description: str) -> None:
     with h5py.File(file, "w") as table:
         dataset = table.create_dataset(DATASET, data=records, track_times=False)
         dataset.attrs["description"] = description
+        if units:
+            dataset.attrs["units"] = json.dumps(units)
 
 
 def _varied(values: Sequence[Value]) -> NDArray[np.generic]:

@@ -13,6 +13,7 @@ from sphshell_pin.errors import SphshellError
 LARGEST_MESSAGE = 16_384  # bytes
 LONGEST_TEXT = 200
 LARGEST_NUMBER = 1e12
+MOST_CURVES = 64  # that one browser may ask for
 
 Event = dict[str, Any]
 
@@ -60,14 +61,35 @@ def _switch(value: object) -> bool:
     return value
 
 
-def _direction(value: object) -> list[float]:
+def _number_or_word(value: object) -> float | str:
+    return _text(value) if isinstance(value, str) else _number(value)
+
+
+def _positive(value: object) -> float:
+    number = _number(value)
+    if not number > 0.0:
+        raise BadMessage("must be positive")
+    return number
+
+
+def _point(value: object) -> list[float]:
     if not isinstance(value, list) or len(value) != 3:
         raise BadMessage("must be a list of three numbers")
-    numbers = [_number(one) for one in value]
+    return [_number(one) for one in value]
+
+
+def _direction(value: object) -> list[float]:
+    numbers = _point(value)
     length = math.hypot(*numbers)
     if not length > 1e-9:
         raise BadMessage("must have a length")
     return [one / length for one in numbers]
+
+
+def _keys(value: object) -> list[str]:
+    if not isinstance(value, list) or len(value) > MOST_CURVES:
+        raise BadMessage(f"must be a list of at most {MOST_CURVES} texts")
+    return [_text(one) for one in value]
 
 
 _Fields = dict[str, Callable[[object], object]]
@@ -76,7 +98,7 @@ FIELDS: dict[str, _Fields] = {
     "step": {"seconds": _not_negative},
     "reset": {},
     "speed": {"value": _not_negative},
-    "parameter": {"key": _text, "value": _number},
+    "parameter": {"key": _text, "value": _number_or_word},
     "push": {
         "body": _text,
         "direction": _direction,
@@ -84,10 +106,14 @@ FIELDS: dict[str, _Fields] = {
         "seconds": _not_negative,
     },
     "hold": {"body": _text, "direction": _direction, "newtons": _number},
+    "drag": {"node": _text, "point": _point, "target": _point, "stiffness": _positive},
     "release": {},
+    "target": {"joint": _text, "value": _number},
     "show": {"part": _text, "on": _switch},
     "arrows": {"value": _not_negative},
     "look": {},
+    "charts": {"keys": _keys},
+    "keep": {},
     "seek": {"t": _number},
     "seen": {"frame": _number},
 }
@@ -132,8 +158,8 @@ def newest(events: list[tuple[Client, Event]]) -> list[tuple[Client, Event]]:
     kept: list[tuple[Client, Event]] = []
     seen: set[tuple[object, ...]] = set()
     for client, event in reversed(events):
-        if event["type"] in ("parameter", "speed", "arrows", "seek"):
-            key = (event["type"], event.get("key"))
+        if event["type"] in ("parameter", "speed", "arrows", "seek", "target", "drag"):
+            key = (event["type"], event.get("key", event.get("joint")))
             if key in seen:
                 continue
             seen.add(key)

@@ -31,10 +31,11 @@ def check_speed(speed: float) -> float:
     return value
 
 
-def greeting(player: Player, picture: str | None) -> Json:
+def greeting(player: Player, picture: str | None, offer: Json) -> Json:
     """Return what does not change while `player` runs; `picture` is the page of the scene, if any.
 
-    Its "session" differs from one run to the next on the same port.
+    `offer` is what there is to do with the mouse. The "session" differs from one run to the next on
+    the same port.
     """
     return {
         "session": secrets.token_hex(8),
@@ -44,6 +45,7 @@ def greeting(player: Player, picture: str | None) -> Json:
         "parameters": [
             {name: getattr(knob, name) for name in _PARAMETER}
             | {"restart": bool(getattr(knob, "restart", False))}
+            | {"choices": list(getattr(knob, "choices", ()))}
             for knob in player.knobs
         ],
         "start": player.start,
@@ -54,4 +56,5 @@ def greeting(player: Player, picture: str | None) -> Json:
         "ramp": list(RAMP),
         "pressure_ramp": list(PRESSURE_RAMP),
         "colors": {name: f"#{color:06x}" for name, color in _COLORS.items()},
+        **offer,
     }

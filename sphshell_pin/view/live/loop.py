@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sphshell_pin.errors import NameNotFound, SphshellError
+from sphshell_pin.view.live.charts import Charts, Point
 from sphshell_pin.view.live.events import BadMessage, Client, Event, newest
 from sphshell_pin.view.live.foreign import ForeignWindow, window_of
 from sphshell_pin.view.live.greeting import (
@@ -21,7 +22,8 @@ from sphshell_pin.view.live.greeting import (
     check_speed,
     greeting,
 )
-from sphshell_pin.view.live.panel import Panel, Strip, StripRow, list_contacts, rows_now
+from sphshell_pin.view.live.hands import Hands
+from sphshell_pin.view.live.panel import Panel, list_contacts, rows_now
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown, frame_point
 from sphshell_pin.view.live.server import Server
 from sphshell_pin.view.live.window import LiveWindow
@@ -75,9 +77,9 @@ class Live:
         if visualizer is not None:
             self._foreign = ForeignWindow(window_of(visualizer))
         self._panel = Panel()
-        self._strip = Strip()
-        self._strip_rows: list[StripRow] = []
-        self._clear_strip = True
+        self._charts = Charts(player)
+        self._points: list[Point] = []
+        self._clear_points = True
         self._factor = 1.0
         self._pace: deque[tuple[float, float]] = deque()
         self._holds: dict[Client, Event] = {}
@@ -96,7 +98,10 @@ class Live:
         try:
             canvas = new_visualizer(self._foreign or self._window)
             self.picture = Picture(player, canvas)
-            self._panel.greet(greeting(player, framed))
+            own = self._window if self._foreign is None else None
+            self._hands = Hands(player, self.picture, own)
+            hello = {"type": "hello", **greeting(player, framed, self._hands.offer())}
+            self._panel.post("hello", hello | {"series": self._charts.descriptions()})
             self.draw()
         except BaseException:
             self.server.stop()
@@ -206,7 +211,7 @@ class Live:
             try:
                 # A diverging run is reported in the panel, not on the terminal.
                 with np.errstate(all="ignore"):
-                    self.picture.update(self.player, self._push_shown())
+                    self.picture.update(self.player, self._push_shown(), self._hands.drag)
             except Exception as fault:
                 # A picture that fails is reported in the panel, which goes on.
                 self.fault = fault
@@ -214,8 +219,10 @@ class Live:
             self._window.commit()
         if now >= self._next_panel:
             self._next_panel = now + PANEL_PERIOD
-            self._panel.publish(self._state(), self._strip_rows, clear=self._clear_strip)
-            self._strip_rows, self._clear_strip = [], False
+            self._panel.publish(
+                self._state(), self._points, self._charts.keys, clear=self._clear_points
+            )
+            self._points, self._clear_points = [], False
         self.server.wake()
 
     def scene_news(self, since: int) -> tuple[int, bytes | None]:
@@ -239,7 +246,7 @@ class Live:
 
     def _advance(self, duration: float, wall: float) -> None:
         player = self.player
-        for event in self._holds.values():
+        for event in () if self._hands.dragging else self._holds.values():
             self._push(event, 1.5 * duration)
         before = player.time
         try:
@@ -253,8 +260,8 @@ class Live:
         if not len(rows.t) and player.time > before:
             # In slow motion a frame is shorter than the time between two recorded rows.
             rows = rows_now(player)
-        self._strip_rows += self._strip.add(rows, self._spacing)
-        self._strip_rows = self._strip_rows[-2 * STRIP_POINTS :]
+        self._points += self._charts.add(rows, self._spacing)
+        self._points = self._points[-2 * STRIP_POINTS :]
         self._simulated += player.time - before
         self._keep_pace()
         if player.ended is not None:
@@ -269,7 +276,6 @@ class Live:
     # Events
 
     def _handle(self, client: Client, event: Event) -> None:
-        player = self.player
         match event["type"]:
             case "run":
                 self._run(event["on"])
@@ -284,31 +290,46 @@ class Live:
                 self.speed = min(max(event["value"], SLOWEST), FASTEST)
                 self._pace.clear()
             case "parameter":
-                if event["key"] not in {knob.key for knob in player.knobs}:
-                    raise NameNotFound(
-                        "parameter", event["key"], "this run", [knob.key for knob in player.knobs]
-                    )
-                before = player.time
-                player.change(event["key"], event["value"])
-                if player.time < before:  # it started again
-                    self._start_anew()
+                self._change(event["key"], event["value"])
             case "push":
                 self._push(event, event["seconds"])
             case "hold":
                 self._check_body(event["body"])
                 self._holds[client] = event
+            case "drag" | "target":
+                self._hands.do(client, event)
             case "release":
                 self._holds.pop(client, None)
+                self._hands.release(client)
+                if client not in self.server.clients and self._charts.forget(client):
+                    self._send_curves()
             case "show":
                 if event["part"] not in LIVE_PARTS:
                     raise NameNotFound("part", event["part"], "the picture", LIVE_PARTS)
+                if event["part"] == "pressure":
+                    self._hands.record_patches(event["on"])
                 self.picture.show(event["part"], event["on"])
             case "arrows":
                 self.picture.magnify_arrows(min(max(event["value"], 1e-2), 1e2))
             case "look":
                 self.picture.look()
+            case "charts":
+                if self._charts.ask(client, event["keys"]):
+                    self._send_curves()
+            case "keep":
+                self._charts.keep()
+                self._post_earlier("kept")
             case "seek":
                 self._seek(event["t"])
+
+    def _change(self, key: str, value: float | str) -> None:
+        keys = [knob.key for knob in self.player.knobs]
+        if key not in keys:
+            raise NameNotFound("parameter", key, "this run", keys)
+        before = self.player.time
+        self.player.change(key, value)
+        if self.player.time < before:  # it started again
+            self._start_anew()
 
     def _run(self, on: bool) -> None:
         self._waiting = False
@@ -335,28 +356,49 @@ class Live:
     def _start_anew(self) -> None:
         self.fault = None
         self._pushed = None
+        self._hands.forget()
         self._ahead = 0.0
-        self._start_strip()
+        if self.player.duration is None:
+            self._charts.start_anew()
+            if "last" in self._charts.earlier:
+                self._post_earlier("last")
+        self._clear_charts()
         self.picture.clear()
 
     def _seek(self, t: float) -> None:
         if self.player.duration is None:
             raise BadMessage("only a finished run has a time to go to")
         back = t < self.player.time
-        self._start_strip()
-        # Up to there from a little earlier, for the strip: nothing is computed again.
+        self._clear_charts()
+        # Up to there from a little earlier, for the charts: nothing is computed again.
         span = STRIP_SECONDS * self.speed
         self.player.seek(t - span)
         rows = self.player.advance(max(0.0, t - self.player.time), BUDGET)
-        self._strip_rows = self._strip.add(rows, self._spacing)
+        self._points = self._charts.add(rows, self._spacing)
         self.player.seek(t)
         if back:
             self.picture.clear()
 
-    def _start_strip(self) -> None:
-        self._strip.clear()
-        self._strip_rows, self._clear_strip = [], True
+    def _clear_charts(self) -> None:
+        self._charts.clear()
+        self._points, self._clear_points = [], True
         self._pace.clear()
+
+    def _send_curves(self) -> None:
+        """Send the curves that are shown now, from the rows that are there."""
+        ask = getattr(self.player, "ask", None)
+        if ask is not None:
+            ask(self._charts.sources)
+        since = self.player.time - STRIP_SECONDS * self.speed
+        self._points, self._clear_points = self._charts.again(since, self._spacing), True
+        for name in self._charts.earlier:
+            self._post_earlier(name)
+
+    def _post_earlier(self, name: str) -> None:
+        points = self._charts.points(name, self._spacing)
+        self._panel.post(
+            name, {"type": "earlier", "name": name, "keys": self._charts.keys, "rows": points}
+        )
 
     def _check_body(self, body: str) -> None:
         if body not in self.player.bodies:
@@ -380,7 +422,7 @@ class Live:
 
     # The panel
 
-    def _read_parameters(self) -> dict[str, float]:
+    def _read_parameters(self) -> dict[str, float | str]:
         return {knob.key: knob.value for knob in self.player.knobs}
 
     def _state(self) -> Json:
@@ -400,10 +442,11 @@ class Live:
             "exchanged": exchanged,
             "ended": self._why_ended(),
             "parameters": self._parameter_values,
-            "show": self.picture.shown,
+            "show": self.picture.switches(player, self._hands.can_record_patches),
             "arrows": self.picture.magnification,
             "scale": str(self.picture.arrow_scale),
             "cut": self.picture.cut,
             "coloring": self.picture.display.coloring,
             "pressure": self.picture.pressure,
+            **self._hands.state(),
         }

@@ -18,11 +18,13 @@ from sphshell_pin.view.nodes import (
     Move,
     material,
     mover,
+    on_top,
     pose,
     rod,
     rotation_to,
     set_object,
     show,
+    sphere,
 )
 from sphshell_pin.view.patches import PatchRows, PatchScale
 
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from meshcat import Visualizer
 
     from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
+    from sphshell_pin.scenario.drag import Dragged
     from sphshell_pin.view.live.player import Player
 
 POOL = 16
@@ -41,7 +44,8 @@ FRAMES_TO_SCALE = 45
 # A trail is drawn in pieces of so many points; the oldest piece makes room for the newest.
 POINTS_OF_PIECE, PIECES = 48, 60
 
-LIVE_PARTS: tuple[str, ...] = (*get_args(Part), "cones")
+LIVE_PARTS: tuple[str, ...] = (*get_args(Part), "cones", "pressure")
+DRAG_COLOR = 0x0B7A3B
 SHOWN_AT_FIRST = frozenset({"robot", "spheres", "arrows", "points", "wireframe", "trails"})
 
 
@@ -60,13 +64,16 @@ class Picture:
         self.display = Display(scene, player.visual_model, visualizer, view=view, pool=_pool(scene))
         self.view: View = view
         self.shown = {part: part in SHOWN_AT_FIRST for part in LIVE_PARTS}
+        self.shown["pressure"] = player.patches is not None
         self._pairs = scene.pairs
+        self._empty = _empty_parts(scene)
         self._scale = _Scale(scene, view)
         self._cones = ConePool(visualizer["cones"], _pool(scene))
         show(visualizer["cones"], False)
         self._trails = _Trails(self.display)
         width = 0.0026 * view.distance
         self._push = ArrowPool(visualizer["push"], 1, width, "total")
+        self._drag: DragLine | None = None  # until something is dragged
         self.cut = False
         """Whether a force is larger than its arrow: no arrow is longer than the longest."""
 
@@ -78,13 +85,25 @@ class Picture:
     @property
     def pressure(self) -> str | None:
         """What the colors and sizes of patches mean; None without any in the picture."""
-        shown = self.shown["points"] and self.display.draws_patches
+        on = self.shown["points"] and self.shown["pressure"]
+        shown = on and self.display.draws_patches
         return str(self.display.patch_scale) if shown else None
 
-    def update(self, player: Player, push: PushShown | None) -> None:
-        """Show the state of `player`, and a `push` on a body."""
+    def switches(self, player: Player, with_patches: bool) -> dict[str, bool]:
+        """Return of the parts that have something to show whether they are shown.
+
+        `with_patches` tells whether the patches of contacts can be computed.
+        """
+        empty = self._empty
+        if not with_patches and player.patches is None:
+            empty = empty | {"pressure"}
+        return {part: on for part, on in self.shown.items() if part not in empty}
+
+    def update(self, player: Player, push: PushShown | None, drag: Dragged | None = None) -> None:
+        """Show the state of `player`, a `push` on a body, and a `drag`."""
         if player.scene.pairs is not self._pairs:
             self._pairs = player.scene.pairs
+            self._empty = _empty_parts(player.scene)
             self.display.replace_scene(player.scene, player.visual_model)
             self._trails.clear()
         if not np.isfinite(player.q).all():
@@ -92,14 +111,19 @@ class Picture:
         contacts = player.contacts
         scale = self._scale.update(contacts)
         self.display.arrow_scale = scale
-        if player.patches is not None:
-            self.display.patch_scale = self._scale.of_patches(player.patches)
-        self.display.update(player.q, contacts, player.patches)
+        patches = player.patches if self.shown["pressure"] else None
+        if patches is not None:
+            self.display.patch_scale = self._scale.of_patches(patches)
+        self.display.update(player.q, contacts, patches)
         if self.shown["cones"]:
             self._cones.update(contacts, self._pairs, scale)
         if self.shown["trails"]:
             self._trails.add(contacts)
         self._push.update(push, scale)
+        if drag is not None and self._drag is None:
+            self._drag = DragLine(self.display.visualizer["drag"], self.view.distance)
+        if self._drag is not None:
+            self._drag.update(drag)
         self.cut = scale.cuts(contacts.normal_force) or (
             push is not None and scale.cuts(push.normal_force)
         )
@@ -109,6 +133,8 @@ class Picture:
         self.shown[part] = on
         if part == "cones":
             show(self.display.visualizer["cones"], on)
+        elif part == "pressure":
+            self.display.show_patches(on)
         else:
             self.display.show(part, on)  # type: ignore[arg-type]
 
@@ -151,6 +177,33 @@ class PushShown:
         size = float(np.linalg.norm(force_world))
         direction = (force_world / size)[None]
         return cls(point_world[None], direction, np.array([size]), np.zeros((1, 3)))
+
+
+class DragLine:
+    """The spring of a drag below `visualizer`: from a point of the body to the cursor."""
+
+    def __init__(self, visualizer: Visualizer, size: float) -> None:
+        self._width = 0.0018 * size
+        look = on_top(DRAG_COLOR)
+        set_object(visualizer["line"], rod(1.0, 1.0), look, order=11)
+        self._line = mover(visualizer["line"])
+        self._ends: list[Move] = []
+        for name, radius in (("held", 2.6), ("cursor", 1.6)):
+            set_object(visualizer[name], sphere(radius * self._width, 16), look, order=11)
+            self._ends.append(mover(visualizer[name]))
+
+    def update(self, drag: Dragged | None) -> None:
+        """Show `drag`, or nothing."""
+        points = (np.zeros(3),) * 2 if drag is None else (drag.point_world, drag.target_world)
+        span = points[1] - points[0]
+        length = float(np.linalg.norm(span))
+        for move, point in zip(self._ends, points, strict=True):
+            move(pose(np.eye(3), point, HIDDEN_SCALE if drag is None else 1.0))
+        if length <= self._width:
+            self._line(pose(np.eye(3), points[0], HIDDEN_SCALE))
+            return
+        shape = np.array([self._width, length, self._width])
+        self._line(pose(rotation_to(span), points[0] + 0.5 * span, shape))
 
 
 class ConePool:
@@ -291,6 +344,17 @@ class _Trails:
             self._draw(index)
         if len(self._points.pop(index)) > 1:
             self._piece[index] = self._piece.get(index, 0) + 1
+
+
+def _empty_parts(scene: Scene) -> frozenset[str]:
+    """Return the parts that show nothing of `scene`."""
+    shells = [(pair.shell, pair.method) for pair in scene.pairs if pair.shell is not None]
+    has = {
+        "patches": any(np.ptp(shell.element_patch) for shell, _ in shells),
+        "distance": any(method == "smooth" for _, method in shells),
+        "pressure": bool(scene.pairs),
+    }
+    return frozenset(part for part, some in has.items() if not some)
 
 
 def _pool(scene: Scene) -> int:

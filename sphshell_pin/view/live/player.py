@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from sphshell_pin.view.nodes import FloatArray
 
@@ -10,8 +10,10 @@ if TYPE_CHECKING:
     import pinocchio as pin
 
     from sphshell_pin.dynamics.scene import Scene, SceneContacts
+    from sphshell_pin.scenario.drag import Dragged
     from sphshell_pin.scenario.knobs import Knob
     from sphshell_pin.scenario.player import Rows
+    from sphshell_pin.scenario.targets import Target
     from sphshell_pin.view.patches import PatchRows
 
 
@@ -83,7 +85,7 @@ class Player(Protocol):
     def reset(self) -> None:
         """Go back to the start."""
 
-    def change(self, key: str, value: float) -> None:
+    def change(self, key: str, value: float | str) -> None:
         """Set a parameter; raise SphshellError, and go on unchanged, where it cannot be."""
 
     def push(self, body: str, force_world: FloatArray, seconds: float) -> None:
@@ -91,3 +93,37 @@ class Player(Protocol):
 
     def seek(self, t: float) -> None:
         """Go to time `t` [s] of a replay."""
+
+
+@runtime_checkable
+class Interactive(Player, Protocol):
+    """A player whose bodies can be dragged and whose joints have targets, while it goes on."""
+
+    @property
+    def targets(self) -> tuple[Target, ...]:
+        """The joints that the controller pulls to a posture, with their present targets."""
+
+    @property
+    def drag(self) -> Dragged | None:
+        """What pulls at a body now; None if nothing does."""
+
+    @property
+    def can_record_patches(self) -> bool:
+        """Whether `record_patches` has an effect."""
+
+    def aim(self, joint: str, value: float) -> None:
+        """Move a target [rad or m]; raise SphshellError, and go on unchanged, where it cannot."""
+
+    def pull(
+        self, frame: str, point: FloatArray, target_world: FloatArray, stiffness: float
+    ) -> None:
+        """Pull a point (3,) [m] of a frame to a target, until `release` or another pull or push.
+
+        `stiffness` [N/m] is that for each kg which has to be moved.
+        """
+
+    def release(self) -> None:
+        """End a pull."""
+
+    def record_patches(self, on: bool) -> None:
+        """Compute `patches` from now on, or no longer."""

@@ -67,6 +67,11 @@ class LiveWindow:
 
         return move
 
+    def matrix(self, path: str) -> FloatArray | None:
+        """Return where the node at `path` was last placed (4, 4); None if it was not."""
+        row = self._row_of.get(path)
+        return None if row is None else self._drawn[row].reshape(4, 4).T.astype(float)
+
     def commit(self) -> int:
         """Close the frame, and return its number."""
         with self._lock:

@@ -1,10 +1,12 @@
-// A strip chart on a canvas: normal and friction force over the last seconds.
+// Curves over time on a canvas.
 "use strict";
 
 import { number } from "./controls.js";
+import { color } from "./theme.js";
 
-const MOST = 1600;
-const LEFT = 46, RIGHT = 14, TOP = 8, BOTTOM = 24;
+const LEFT = 52, RIGHT = 14, TOP = 8, BOTTOM = 24;
+const DASHES = [6, 4];
+const GHOST = 0.55; // opacity of the curves of an earlier run
 
 export function nice(value) {
   const power = 10 ** Math.floor(Math.log10(value));
@@ -12,38 +14,39 @@ export function nice(value) {
   return (lead <= 1 ? 1 : lead <= 2 ? 2 : lead <= 5 ? 5 : 10) * power;
 }
 
+// The first index of rows whose time is not before t.
+export function first_at(rows, t) {
+  let low = 0, high = rows.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (rows[middle][0] < t) low = middle + 1; else high = middle;
+  }
+  return low;
+}
+
+// The column of a curve in rows [t, value, value, ...]; -1 where it is not among them.
+const column_of = (keys, key) => keys.indexOf(key) + 1 || -1;
+
 export class Chart {
-  constructor(canvas, colors) {
+  constructor(canvas) {
     this.canvas = canvas;
-    this.colors = colors;
-    this.rows = [];
-    this.pair = null; // the sum of all
-    this.span = 6;
+    this.curves = []; // { key, name, color: variable of palette.css }
+    this.run = { keys: [], rows: [] };
+    this.ghost = null; // an earlier run, like this one
+    this.unit = "";
+    this.from_zero = false;
+    this.begin = 0; // [s]
+    this.span = 6; // [s]
     this.now = 0;
-    this.top = 0;
+    this.forget_scale();
     this.mouse = null;
-    canvas.addEventListener("pointermove", (event) => { this.mouse = event.offsetX; this.draw(); });
+    for (const kind of ["pointermove", "pointerdown"])
+      canvas.addEventListener(kind, (event) => { this.mouse = event.offsetX; this.draw(); });
     canvas.addEventListener("pointerleave", () => { this.mouse = null; this.draw(); });
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
-  add(rows, clear) {
-    if (clear) { this.rows = []; this.top = 0; }
-    for (const row of rows) {
-      // A run that started anew has an earlier time: what was later is gone.
-      while (this.rows.length && this.rows.at(-1)[0] >= row[0]) this.rows.pop();
-      this.rows.push(row);
-    }
-    if (this.rows.length > MOST) this.rows.splice(0, this.rows.length - MOST);
-  }
-
-  value(row, column) {
-    const values = row[column];
-    if (this.pair !== null) return values[this.pair];
-    let sum = 0;
-    for (const value of values) { if (value === null) return null; sum += value; }
-    return sum;
-  }
+  forget_scale() { this.low = this.high = null; }
 
   draw() {
     const { canvas } = this;
@@ -58,97 +61,138 @@ export class Chart {
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
     pen.font = "11px system-ui, 'Segoe UI', 'DejaVu Sans', sans-serif";
-    const end = Math.max(this.now, this.rows.length ? this.rows.at(-1)[0] : 0);
-    const start = end - this.span;
-    const seen = this.rows.filter((row) => row[0] >= start - 0.02 * this.span && row[0] <= end);
-    let most = 0, least = 0;
-    for (const row of seen) {
-      for (const column of [1, 2]) {
-        const value = this.value(row, column);
-        if (value !== null) { most = Math.max(most, value); least = Math.min(least, value); }
-      }
-    }
-    // The scale grows at once and shrinks late, so that it does not flicker.
-    const wanted = most > 0 ? nice(1.08 * most) : 1;
-    if (wanted > this.top || wanted < 0.45 * this.top || !this.top) this.top = wanted;
-    const low = least < -1e-9 * this.top ? -nice(-1.05 * least) : 0;
+    // At first the window stands still, then it follows.
+    const start = Math.max(this.begin, this.now - this.span), end = start + this.span;
+    const lines = this.lines(start, end);
+    this.scale(lines);
     const x = (t) => LEFT + ((t - start) / this.span) * (width - LEFT - RIGHT);
-    const y = (f) => TOP + ((this.top - f) / (this.top - low)) * (height - TOP - BOTTOM);
-    this.axes(pen, { start, end, low, x, y, width, height });
+    const y = (value) => TOP + ((this.high - value) / (this.high - this.low)) * (height - TOP - BOTTOM);
+    const frame = { start, end, x, y, width, height };
+    this.axes(pen, frame);
     pen.save();
     pen.beginPath();
     pen.rect(LEFT, 0, width - LEFT - RIGHT, height - BOTTOM + 1);
     pen.clip();
-    this.line(pen, seen, 2, this.colors.friction, x, y);
-    this.line(pen, seen, 1, this.colors.normal, x, y);
+    for (const line of lines.toReversed()) this.line(pen, line, x, y);
     pen.restore();
-    if (this.mouse !== null && seen.length) this.readout(pen, { seen, start, x, y, width, height });
+    if (this.mouse !== null) this.readout(pen, lines, frame);
   }
 
-  axes(pen, { start, end, low, x, y, width, height }) {
-    const range = this.top - low;
-    const step = nice(range / 4.5);
+  // What is seen: of each curve that of this run, then that of the earlier one.
+  lines(start, end) {
+    const lines = [];
+    for (const [run, ghost] of [[this.run, false], [this.ghost, true]]) {
+      if (!run) continue;
+      const first = Math.max(0, first_at(run.rows, start) - 1);
+      const rows = run.rows.slice(first, first_at(run.rows, end) + 1);
+      for (const curve of this.curves) {
+        const column = column_of(run.keys, curve.key);
+        if (column > 0 && rows.length) lines.push({ curve, column, rows, ghost });
+      }
+    }
+    return lines;
+  }
+
+  scale(lines) {
+    let least = this.from_zero ? 0 : Infinity, most = this.from_zero ? 0 : -Infinity;
+    for (const { rows, column } of lines) {
+      for (const row of rows) {
+        const value = row[column];
+        if (value !== null) { least = Math.min(least, value); most = Math.max(most, value); }
+      }
+    }
+    if (!(most >= least)) { least = 0; most = 0; }
+    // What does not change is no noise to be magnified.
+    const range = Math.max(most - least, 1e-6 * Math.max(Math.abs(most), Math.abs(least)), 1e-12);
+    const step = most === least ? nice(Math.abs(most) || 1) : nice(range / 4.5);
+    const low = this.from_zero && least >= -1e-9 * range ? 0 : step * Math.floor(least / step - 0.1);
+    const high = step * Math.ceil(most / step + (most > 0 || !this.from_zero ? 0.2 : 1));
+    // The scale grows at once and shrinks late, so that it does not flicker.
+    const fits = this.low !== null && least >= this.low && most <= this.high;
+    if (!fits || high - low < 0.5 * (this.high - this.low)) { this.low = low; this.high = high; }
+  }
+
+  axes(pen, { start, end, x, y, width, height }) {
+    const step = nice((this.high - this.low) / 4.5);
     pen.lineWidth = 1;
     pen.textAlign = "right";
     pen.textBaseline = "middle";
-    for (let k = Math.ceil(low / step - 1e-9); k * step <= this.top * (1 + 1e-9); k += 1) {
+    for (let k = Math.ceil(this.low / step - 1e-9); k * step <= this.high + 1e-9 * step; k += 1) {
       const at = Math.round(y(k * step)) + 0.5;
-      pen.strokeStyle = k === 0 ? "#b8c2cb" : "#e9edf1";
+      pen.strokeStyle = color(k === 0 ? "--axis" : "--grid");
       pen.beginPath(); pen.moveTo(LEFT, at); pen.lineTo(width - RIGHT, at); pen.stroke();
-      pen.fillStyle = "#67737f";
-      pen.fillText(number(k * step, 6), LEFT - 7, at);
+      pen.fillStyle = color("--faint");
+      pen.fillText(number(Number((k * step).toPrecision(9)), 6), LEFT - 7, at);
     }
-    const tick = nice(this.span / 7);
+    const tick = nice(this.span / Math.max(2, Math.min(7, width / 90)));
     pen.textBaseline = "top";
     pen.textAlign = "center";
     for (let k = Math.ceil(start / tick - 1e-9); k * tick <= end + 1e-9 * tick; k += 1) {
       const at = Math.round(x(k * tick)) + 0.5;
-      if (k < 0 || at > width - 44) continue;
-      pen.strokeStyle = "#e9edf1";
+      pen.strokeStyle = color("--grid");
       pen.beginPath(); pen.moveTo(at, TOP); pen.lineTo(at, height - BOTTOM); pen.stroke();
-      pen.fillText(String(Number((k * tick).toPrecision(9))), at, height - BOTTOM + 6);
+      if (at < width - 56) {
+        pen.fillText(String(Number((k * tick).toPrecision(9))), at, height - BOTTOM + 6);
+      }
     }
     pen.textAlign = "right";
     pen.fillText("t [s]", width - RIGHT, height - BOTTOM + 6);
   }
 
-  line(pen, rows, column, color, x, y) {
-    pen.strokeStyle = color;
+  line(pen, { curve, column, rows, ghost }, x, y) {
+    pen.strokeStyle = color(curve.color);
+    pen.globalAlpha = ghost ? GHOST : 1;
+    pen.setLineDash(ghost ? DASHES : []);
     pen.lineWidth = 1.6;
     pen.lineJoin = "round";
     pen.beginPath();
     let down = false;
     for (const row of rows) {
-      const value = this.value(row, column);
+      const value = row[column];
       if (value === null) { down = false; continue; }
       if (down) pen.lineTo(x(row[0]), y(value)); else pen.moveTo(x(row[0]), y(value));
       down = true;
     }
     pen.stroke();
+    pen.globalAlpha = 1;
+    pen.setLineDash([]);
   }
 
-  readout(pen, { seen, start, x, y, width, height }) {
+  // The values at the mouse: of each curve the point that is nearest in time.
+  readout(pen, lines, { start, x, y, width, height }) {
     const t = start + ((this.mouse - LEFT) / (width - LEFT - RIGHT)) * this.span;
-    const row = seen.reduce((best, one) => (Math.abs(one[0] - t) < Math.abs(best[0] - t) ? one : best));
-    const at = Math.round(x(row[0])) + 0.5;
-    pen.strokeStyle = "#9aa6b1";
+    const found = [];
+    for (const line of lines) {
+      const k = first_at(line.rows, t);
+      const near = [line.rows[k - 1], line.rows[k]].filter(Boolean)
+        .reduce((a, b) => (Math.abs(a[0] - t) <= Math.abs(b[0] - t) ? a : b));
+      if (near[line.column] !== null) found.push({ ...line, t: near[0], value: near[line.column] });
+    }
+    if (!found.length) return;
+    const at = Math.round(x(found[0].t)) + 0.5;
+    pen.strokeStyle = color("--axis");
     pen.beginPath(); pen.moveTo(at, TOP); pen.lineTo(at, height - BOTTOM); pen.stroke();
-    const tell = (value) => (value === null ? "-" : `${Number(value.toPrecision(4))} N`);
-    const texts = [`${row[0].toFixed(4)} s`, tell(this.value(row, 1)), tell(this.value(row, 2))];
+    const most = Math.max(2, Math.floor((height - BOTTOM - TOP - 22) / 15));
+    const texts = [`${found[0].t.toFixed(4)} s`];
+    for (const { curve, value, ghost } of found.slice(0, most)) {
+      texts.push(`${Number(value.toPrecision(4))} ${this.unit}  ${curve.name}${ghost ? ", earlier" : ""}`);
+    }
+    if (found.length > most) texts.push(`and ${found.length - most} more`);
     const wide = 12 + Math.max(...texts.map((text) => pen.measureText(text).width));
-    const left = at + wide + 8 > width ? at - wide - 6 : at + 6;
-    pen.fillStyle = "rgba(255, 255, 255, 0.92)";
-    pen.fillRect(left, TOP, wide, 50);
+    const left = at + wide + 8 > width ? Math.max(0, at - wide - 6) : at + 6;
+    pen.fillStyle = color("--overlay");
+    pen.fillRect(left, TOP, wide, 8 + 15 * texts.length);
     pen.textAlign = "left";
+    pen.textBaseline = "top";
     texts.forEach((text, k) => {
-      pen.fillStyle = ["#1c2630", this.colors.normal, this.colors.friction][k];
+      const line = found[k - 1];
+      pen.fillStyle = color(line && k <= most ? line.curve.color : "--ink");
       pen.fillText(text, left + 6, TOP + 4 + 15 * k);
     });
-    for (const [column, color] of [[1, this.colors.normal], [2, this.colors.friction]]) {
-      const value = this.value(row, column);
-      if (value === null) continue;
-      pen.fillStyle = color;
-      pen.beginPath(); pen.arc(at, y(value), 3, 0, 7); pen.fill();
+    this.read = texts;
+    for (const { curve, value, t: own } of found) {
+      pen.fillStyle = color(curve.color);
+      pen.beginPath(); pen.arc(x(own), y(value), 3, 0, 7); pen.fill();
     }
   }
 }

@@ -16,6 +16,11 @@ export function number(value, digits = 4) {
   return String(Number(value.toPrecision(digits)));
 }
 
+export function fill(select, options) {
+  select.textContent = "";
+  for (const [value, text] of options) select.append(new Option(text, value));
+}
+
 // "N/m^1.5" with its exponent raised.
 export function write_unit(node, unit) {
   node.textContent = "";
@@ -86,7 +91,20 @@ export class Slider {
   }
 }
 
-// One parameter: label, number with unit, slider.
+// One of several words: label, menu; `slider` only follows.
+function make_choice(row, label, { key, choices, value }, changed) {
+  const menu = document.createElement("select");
+  menu.id = `parameter-${key}`;
+  menu.dataset.parameter = key;
+  label.htmlFor = menu.id;
+  fill(menu, choices.map((word) => [word, word]));
+  menu.value = value;
+  menu.onchange = () => changed(menu.value);
+  row.append(label, menu);
+  return { row, slider: { follow: (word) => { menu.value = word; } } };
+}
+
+// One parameter: label, number with unit, slider; or a word of its choices.
 export function make_parameter(parameter, changed) {
   const row = document.createElement("div");
   row.className = "row";
@@ -100,6 +118,7 @@ export function make_parameter(parameter, changed) {
     mark.title = "A new value holds in a run that starts anew";
     label.append(mark);
   }
+  if (parameter.choices?.length) return make_choice(row, label, parameter, changed);
   const entry = document.createElement("span");
   entry.className = "entry";
   const field = document.createElement("input");

@@ -1,7 +1,13 @@
 // The picture: meshcat's viewer, fed with lists of its own commands.
 "use strict";
 
+import { emit, on } from "./connection.js";
+import { element } from "./controls.js";
+import { notice } from "./notices.js";
+import { parts } from "./theme.js";
+
 const { Viewer, THREE } = globalThis.MeshCat;
+const ASPECT = 1.2; // as camera.py has it
 
 export class Picture {
   constructor(pane) {
@@ -13,7 +19,9 @@ export class Picture {
     // The viewer takes the whole window for its own.
     const resize = viewer.set_3d_pane_size.bind(viewer);
     viewer.set_3d_pane_size = () => {
-      if (pane.clientWidth && pane.clientHeight) resize(pane.clientWidth, pane.clientHeight);
+      if (!pane.clientWidth || !pane.clientHeight) return;
+      this.fit();
+      resize(pane.clientWidth, pane.clientHeight);
     };
     new ResizeObserver(() => viewer.set_3d_pane_size()).observe(pane);
     this.eye = null;
@@ -21,6 +29,16 @@ export class Picture {
     this.settled = false; // the camera belongs to the user once it has been placed
     this.take = viewer.handle_command.bind(viewer);
     viewer.handle_command = (command) => this.handle(command);
+    this.paint();
+    on("theme", () => this.paint());
+  }
+
+  // The background has the colors of the page.
+  paint() {
+    for (const [property, name] of [["top_color", "--sky"], ["bottom_color", "--earth"]]) {
+      this.take({ type: "set_property", path: "/Background", property, value: parts(name) });
+    }
+    this.viewer.set_dirty();
   }
 
   draw(buffer) {
@@ -39,9 +57,17 @@ export class Picture {
     } else if (command.path && command.path.startsWith("/Cameras")) {
       if (command.property === "position") this.eye = command.value;
       if (!this.settled) this.take(command);
-    } else {
+      this.fit();
+    } else if (command.path !== "/Background") {
       this.take(command);
     }
+  }
+
+  // The view was chosen for a pane of that shape: a narrower one shows as much of its width.
+  fit() {
+    const { camera } = this.viewer;
+    camera.zoom = Math.min(1, this.pane.clientWidth / this.pane.clientHeight / ASPECT);
+    camera.updateProjectionMatrix();
   }
 
   move({ paths, matrices }) {
@@ -56,7 +82,7 @@ export class Picture {
   look() {
     if (!this.eye || !this.target) return;
     this.viewer.camera.position.fromArray(this.eye);
-    this.viewer.camera.zoom = 1;
+    this.fit();
     this.viewer.controls.target.fromArray(this.target);
     this.viewer.controls.update();
     this.viewer.set_dirty();
@@ -72,3 +98,22 @@ export class Picture {
     return [sign * axis.x, -sign * axis.z, sign * axis.y];
   }
 }
+
+let picture = null;
+on("frame", (buffer) => picture?.draw(buffer));
+on("hello", (data) => {
+  if (data.picture) {
+    const frame = document.createElement("iframe");
+    frame.src = data.picture;
+    frame.title = "meshcat";
+    element("scene").append(frame);
+    return;
+  }
+  try {
+    picture = new Picture(element("scene"));
+  } catch {
+    notice("This browser cannot draw the scene: it has no WebGL. All else works.", "blind");
+    return;
+  }
+  emit("picture", picture);
+});

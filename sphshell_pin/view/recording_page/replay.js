@@ -1,37 +1,7 @@
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>@@title@@</title>
-<style>
-  html, body { margin: 0; height: 100%; background: #e6ebf0; }
-  #meshcat-pane { width: 100vw; height: 100vh; overflow: hidden; }
-  #caption {
-    position: absolute; left: 14px; bottom: 14px; max-width: min(44ch, 45vw); padding: 9px 13px;
-    font: 13px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1c2630;
-    background: rgba(255, 255, 255, 0.82); border-radius: 6px; pointer-events: none;
-  }
-  #caption h1 { margin: 0 0 2px; font-size: 15px; font-weight: 600; }
-  #clock { font-variant-numeric: tabular-nums; }
-  #fault { color: #a01010; font-weight: 600; }
-  .swatch { display: inline-block; width: 12px; height: 12px; margin-right: 7px;
-    border-radius: 3px; vertical-align: -1px; }
-</style>
-</head>
-<body>
-<div id="meshcat-pane"></div>
-<div id="caption">
-  <h1>@@title@@</h1>
-  <div id="clock">loading ...</div>
-  @@legend@@
-  <div id="fault"></div>
-</div>
-<script type="text/plain" id="viewer">@@viewer@@</script>
-<script type="text/plain" id="scene">@@scene@@</script>
-<script>
+// What the page holds: meshcat's viewer, and the commands that draw the scene.
 "use strict";
-const clock = @@clock@@;
+
+const element = (id) => document.getElementById(id);
 
 async function unpack(name) {
   if (!("DecompressionStream" in window)) {
@@ -47,7 +17,15 @@ async function start_viewer() {
   const script = document.createElement("script");
   script.textContent = await (await unpack("viewer")).text();
   document.head.append(script);
-  return new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+  const pane = element("pane");
+  const viewer = new MeshCat.Viewer(pane);
+  viewer.gui.domElement.style.display = "none";
+  // The viewer takes the whole window for its own.
+  const resize = viewer.set_3d_pane_size.bind(viewer);
+  viewer.set_3d_pane_size = () => {
+    if (pane.clientWidth && pane.clientHeight) resize(pane.clientWidth, pane.clientHeight);
+  };
+  return viewer;
 }
 
 // A list of numbers of a mesh (meshes.py says how it is packed).
@@ -106,12 +84,16 @@ function resolve(value) {
   return value;
 }
 
+// Draw the scene; return what the page knows of the run besides.
 function replay(viewer, buffer) {
+  let panel = null;
   const take = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
     if (command.type === "text") {
       texts[command.name] = command.facets
         ? restore_facets(command.facets) : restore(command.text, command.numbers);
+    } else if (command.type === "panel") {
+      panel = command;
     } else if (command.type === "set_target") {
       viewer.controls.target.fromArray(command.value);
     } else {
@@ -124,35 +106,5 @@ function replay(viewer, buffer) {
     viewer.handle_command_bytearray(new Uint8Array(buffer.slice(at + 4, at + 4 + length)));
     at += 4 + length;
   }
+  return panel;
 }
-
-function show_time(viewer) {
-  const t = clock.start + clock.speed * viewer.animator.time;
-  const pace = clock.speed === 1 ? "" : `  (${clock.speed} x real time)`;
-  document.getElementById("clock").textContent = `t = ${t.toFixed(clock.digits)} s${pace}`;
-  requestAnimationFrame(() => show_time(viewer));
-}
-
-(async () => {
-  try {
-    const viewer = await start_viewer();
-    window.viewer = viewer;
-    replay(viewer, await (await unpack("scene")).arrayBuffer());
-    viewer.set_3d_pane_size();
-    viewer.gui.open();
-    viewer.gui.__folders["Scene"].close();
-    viewer.render();
-    show_time(viewer);
-    // Loading may have taken seconds: start only now that the first frame is on the screen.
-    requestAnimationFrame(() => {
-      if (viewer.animator.actions.length) viewer.animator.play();
-      window.recording_ready = true;
-    });
-  } catch (fault) {
-    document.getElementById("fault").textContent = `This recording cannot be shown: ${fault.message}`;
-    throw fault;
-  }
-})();
-</script>
-</body>
-</html>

@@ -1,0 +1,51 @@
+// A curve, and how a target moves along it.
+#pragma once
+
+#include <vector>
+
+#include "shell/triangle.hpp"
+
+namespace sphshell {
+
+struct PathSettings {
+  std::vector<double> along;          // arc length at the points, increasing from 0 [m]
+  std::vector<Vec3> points;           // [m]
+  std::vector<Vec3> tangents;         // d point / d arc length; none: straight pieces
+  std::vector<Vec3> normals;          // of a surface, else zero
+  std::vector<double> times;          // at which a phase of constant jerk begins [s]
+  std::vector<double> places;         // arc length there [m]
+  std::vector<double> speeds;         // [m/s]
+  std::vector<double> accelerations;  // [m/s2]
+  std::vector<double> jerks;          // [m/s3]
+  std::vector<double> kinks;          // times at which the velocity bends or jumps [s]
+};
+
+// Cubic Hermite pieces through the points, or straight ones; a phase lasts until the next begins,
+// the first from ever, the last for ever. With one point, or one phase, the target stands still.
+class TargetPath {
+ public:
+  struct Target {
+    Vec3 point, velocity, acceleration, normal;
+  };
+
+  explicit TargetPath(PathSettings settings) : s_(std::move(settings)) {}
+
+  Target at(double t);
+  bool moves() const { return s_.times.size() > 1; }
+  bool same_curve(const TargetPath& other) const { return s_.along == other.s_.along; }
+  double next_kink(double t) const;
+  // The arc length at time t, and the first time at which it is `place`.
+  double place_at(double t) const;
+  double time_of(double place) const;
+
+ private:
+  struct Place {
+    double place, speed, acceleration;
+  };
+  Place in_phase(std::size_t phase, double t) const;
+
+  PathSettings s_;
+  std::size_t phase_ = 0, piece_ = 0;
+};
+
+}  // namespace sphshell

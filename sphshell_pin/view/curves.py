@@ -1,0 +1,115 @@
+"""The curves and figures of a run that a recording shows under its scene."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.dynamics.pair_series import PairSeries
+from sphshell_pin.view.contact_path import LARGEST
+from sphshell_pin.view.meshes import pack_numbers
+from sphshell_pin.view.nodes import FloatArray, Json
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.result import Result
+
+MOST_PAIRS = 8
+BINS = 300  # of time: of each the extremes are kept
+ALL = "all pairs, summed"
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Forces [N] and depth [m] of one pair, or of all, at times `t` (k,) [s]; and its figures.
+
+    `contact_time` [s], `mean` and `peak` of the normal force [N], and the largest `depth` are
+    those over all steps where the run has them, else those of the recorded rows.
+    """
+
+    name: str
+    t: FloatArray
+    normal: FloatArray
+    friction: FloatArray
+    depth: FloatArray
+    figures: dict[str, float]
+
+    def packed(self) -> Json:
+        """Describe it for the page; `unfold` of its script reads the numbers."""
+        columns = {
+            name: pack_numbers(getattr(self, name), exact=False)
+            for name in ("t", "normal", "friction", "depth")
+        }
+        return {"name": self.name, "figures": self.figures, **columns}
+
+
+def run_curves(result: Result, count: int) -> list[Curves]:
+    """Return the curves of the first `count` rows: of all pairs that touched, and of their sum.
+
+    Of more than MOST_PAIRS pairs those with the largest forces are there; the sum is that of all.
+    """
+    touched = np.unique(np.asarray(result.contacts.pair, dtype=np.int64))
+    with np.errstate(invalid="ignore"):  # of a run that diverged
+        pairs = [PairSeries.of(result, int(pair)) for pair in touched]
+    t = np.asarray(result.t, dtype=float)[:count]
+    curves = []
+    if len(pairs) != 1:
+        zero = np.zeros(len(result.t))
+        whole = PairSeries(
+            ALL,
+            sum((one.normal for one in pairs), zero),
+            sum((one.friction for one in pairs), zero),
+            np.max([zero, *(one.depth for one in pairs)], axis=0),
+            zero,
+            zero,
+        )
+        curves.append(_curves(whole, t, {}))
+    for one in sorted(pairs, key=lambda pair: -pair.peak)[:MOST_PAIRS]:
+        stats = result.stats.pairs.get(one.name)
+        known = {} if stats is None else asdict(stats)
+        names = {"mean_force": "mean", "peak_force": "peak", "max_depth": "depth"}
+        figures = {names.get(key, key): float(value) for key, value in known.items()}
+        curves.append(_curves(one, t, figures))
+    return curves
+
+
+def _curves(series: PairSeries, t: FloatArray, known: dict[str, float]) -> Curves:
+    columns = [t, *(one[: len(t)] for one in (series.normal, series.friction, series.depth))]
+    # The last row of a run that diverged may hold forces that no chart can show.
+    sound = (np.abs(np.stack(columns)) < LARGEST).all(axis=0)
+    t, normal, friction, depth = (column[sound] for column in columns)
+    rows = _extremes(len(t), normal, friction, depth)
+    figures = _figures(t, normal, depth) | {
+        key: known[key] for key in ("contact_time", "mean", "peak", "depth") if key in known
+    }
+    return Curves(series.name, t[rows], normal[rows], friction[rows], depth[rows], figures)
+
+
+def _figures(t: FloatArray, normal: FloatArray, depth: FloatArray) -> dict[str, float]:
+    """Return the figures of rows, by the trapezoidal rule."""
+    steps = np.diff(t)
+    touch = (depth > 0.0) | (normal > 0.0)
+    touching = float(steps @ (0.5 * (touch[1:].astype(float) + touch[:-1])))
+    impulse = float(steps @ (0.5 * (normal[1:] + normal[:-1])))
+    return {
+        "contact_time": touching,
+        "mean": impulse / touching if touching else 0.0,
+        "peak": float(normal.max(initial=0.0)),
+        "depth": float(depth.max(initial=0.0)),
+    }
+
+
+def _extremes(count: int, *columns: FloatArray) -> NDArray[np.int64]:
+    """Return the rows of the extremes of each column within BINS equal parts of `count` rows."""
+    if count <= 4 * BINS:
+        return np.arange(count, dtype=np.int64)
+    edges = np.linspace(0, count, BINS + 1).astype(int)
+    kept = {0, count - 1}
+    for start, end in itertools.pairwise(edges.tolist()):
+        for column in columns:
+            kept.add(start + int(np.argmax(column[start:end])))
+        kept.add(start + int(np.argmin(columns[0][start:end])))
+    return np.array(sorted(kept), dtype=np.int64)

@@ -1,0 +1,323 @@
+"""A finished run as a picture, a film, or a folder of pictures, drawn by a headless browser.
+
+The browser shows the page of `render_recording` and is told the time of each picture: what it
+draws does not depend on how fast it draws.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypedDict, TypeVar, get_args
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.atomic import AtomicFolder, FolderInUse, write_whole
+from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
+from sphshell_pin.films import Pixels, check_film, write_film
+from sphshell_pin.view.recording import Shown, check_pace, render_recording, sound_rows
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page, Playwright
+
+    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.scene import Scene
+
+Drawn = TypeVar("Drawn")
+Camera = Literal["fit", "front", "side", "top", "follow", "contact"]
+CAMERAS: tuple[Camera, ...] = get_args(Camera)
+PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# Drawn by the processor: the same picture on every machine, with or without a graphics card.
+FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
+LAID_OUT = 1280 * 720  # pixels of the area for which text has its usual size
+LEAST_SIZE, MOST_SIZE = 64, 7680  # pixels
+SAMPLES = 6  # pictures that the colors of a .gif are chosen from
+PATIENCE = 120_000.0  # [ms] until the page is loaded
+FRAME = "frame_{:04d}.png"
+
+
+class FilmOptions(TypedDict, total=False):
+    """The options of `render_film`."""
+
+    time: float | None
+    span: tuple[float | None, float | None]
+    size: tuple[int, int]
+    fps: float | None
+    speed: float | None
+    camera: Camera
+    chart: bool
+    dark: bool
+    title: str | None
+    told: Callable[[int, int], object]
+
+
+def render_film(
+    path: str | PathLike[str],
+    result: Result,
+    scene: Scene | None = None,
+    visual_model: pin.GeometryModel | None = None,
+    *,
+    time: float | None = None,
+    span: tuple[float | None, float | None] = (None, None),
+    size: tuple[int, int] = (1280, 720),
+    fps: float | None = None,
+    speed: float | None = None,
+    camera: Camera = "fit",
+    chart: bool = True,
+    dark: bool = False,
+    title: str | None = None,
+    told: Callable[[int, int], object] = lambda done, all_: None,
+) -> Path:
+    """Draw `result` at `path`, and return the path.
+
+    Parameters
+    ----------
+    path
+        A .png is one picture, a .gif or .mp4 a film, a path without suffix a folder of pictures
+        `frame_0001.png` and so on. It is written whole or not at all.
+    scene, visual_model, title
+        As in `Result.view`.
+    time
+        Of a picture, the time of the run [s]; by default its end.
+    span
+        Of a film or folder, the times of the run from and to which it shows it [s]; None is its
+        beginning or end.
+    size
+        Width and height [pixels].
+    fps
+        Pictures per second; by default 30, of a .gif 20.
+    speed
+        Simulated seconds per second; by default as the scenario has it, or 1.
+    camera
+        From where: one of CAMERAS.
+    chart
+        Whether the chart of forces and depth is under the scene.
+    dark
+        Whether the background is dark.
+    told
+        Called with the number of pictures that are drawn, and of all.
+
+    Raises
+    ------
+    InvalidParameter
+        A value is none of these, or a time is not in the run.
+    MissingExtra
+        A package of the extra `video` or `view` is not installed.
+    ResultError
+        There is no scene or no Chromium, or the file cannot be written.
+    """
+    path = Path(path)
+    still, film = path.suffix.lower() == ".png", path.suffix.lower() in (".gif", ".mp4")
+    if path.suffix and not (still or film):
+        must = "must end in .png, .gif or .mp4, or have no suffix (a folder of pictures)"
+        raise InvalidParameter("path", str(path), must)
+    if camera not in CAMERAS:
+        raise InvalidParameter("camera", camera, f"must be one of {', '.join(CAMERAS)}")
+    for name, value in (("fps", fps), ("speed", speed), ("span", span)):
+        if still and value not in (None, (None, None)):
+            raise InvalidParameter(name, value, "is for a film or a folder of pictures, not a .png")
+    if not still and time is not None:
+        raise InvalidParameter("time", time, "is for a .png: a film has a span")
+    if not all(LEAST_SIZE <= pixels <= MOST_SIZE for pixels in size):
+        must = f"must be between {LEAST_SIZE} and {MOST_SIZE} pixels"
+        raise InvalidParameter("size", f"{size[0]}x{size[1]}", must)
+    fps = fps or (20.0 if path.suffix.lower() == ".gif" else 30.0)
+    shown = Shown.of(result, scene, visual_model, title, speed)
+    check_pace(fps, shown.speed)
+    if film:
+        check_film(path, size, fps)
+    times = _times(result, (time, time) if still else span, still=still)
+    page = render_recording(
+        result,
+        shown.scene,
+        shown.visual_model,
+        fps=fps,
+        speed=shown.speed,
+        title=shown.title,
+        span=times,
+    )
+    stage = _Stage(page, size, camera, chart, dark, told)
+
+    def draw() -> None:
+        with stage.opened(path):
+            if still:
+                write_whole(path, stage.picture(0))
+            elif film:
+                count = stage.count
+                wanted = SAMPLES if path.suffix.lower() == ".gif" else 1
+                chosen = sorted({round(k) for k in np.linspace(0, count - 1, wanted)})
+                samples = [stage.pixels(k) for k in chosen]
+                write_film(path, stage.all(stage.pixels), fps, samples)
+            else:
+                _write_folder(path, stage)
+
+    _interruptibly(draw, stage.stop)
+    return path
+
+
+def _times(
+    result: Result, span: tuple[float | None, float | None], *, still: bool
+) -> tuple[float, float]:
+    t = np.asarray(result.t)[: sound_rows(result)]
+    first, last = float(t[0]), float(t[-1])
+    for value in span:
+        if value is not None and not first <= value <= last:
+            name = "time" if still else "span"
+            raise InvalidParameter(name, value, f"must be in the run: {first:g} to {last:g} s")
+    start, end = span
+    if still:
+        return (last if end is None else end,) * 2
+    start, end = first if start is None else start, last if end is None else end
+    if not start < end:
+        raise InvalidParameter("span", f"{start:g} to {end:g} s", "must end after it begins")
+    return start, end
+
+
+class _Stopped(Exception):
+    """Ctrl-C was pressed in the main thread."""
+
+
+def _interruptibly(draw: Callable[[], None], stop: Callable[[], None]) -> None:
+    """Call `draw` in a thread of its own; `stop` it on Ctrl-C.
+
+    Playwright can neither be interrupted within a call nor be used where an event loop runs, as in
+    a notebook.
+    """
+    with ThreadPoolExecutor(1) as pool:
+        drawn = pool.submit(draw)
+        try:
+            drawn.result()
+        except KeyboardInterrupt:
+            stop()
+            raise
+
+
+class _Stage:
+    """A browser that shows the `page` of a recording, and draws its pictures by their number."""
+
+    def __init__(
+        self,
+        page: str,
+        size: tuple[int, int],
+        camera: Camera,
+        chart: bool,
+        dark: bool,
+        told: Callable[[int, int], object],
+    ) -> None:
+        self._html = page
+        self._size, self._camera, self._chart, self._dark = size, camera, chart, dark
+        self._told = told
+        self._stopped = threading.Event()
+        self._page: Page
+        self.stop = self._stopped.set
+        self.count = 0
+
+    @contextmanager
+    def opened(self, path: Path) -> Iterator[None]:
+        """Open the browser for the block; errors name the `path` that is to be written."""
+        try:
+            from playwright.sync_api import Error, sync_playwright
+        except ImportError as missing:
+            raise MissingExtra("playwright", "video", "a picture or film of a run") from missing
+        # Text has the same size relative to the picture in every size of it.
+        scale = max(0.5, float(np.sqrt(self._size[0] * self._size[1] / LAID_OUT)))
+        width, height = (max(1, round(pixels / scale)) for pixels in self._size)
+        try:
+            with sync_playwright() as driver:
+                browser = _launch(driver, path)
+                context = browser.new_context(
+                    viewport={"width": width, "height": height},
+                    device_scale_factor=scale,
+                    color_scheme="dark" if self._dark else "light",
+                    reduced_motion="reduce",
+                    offline=True,
+                )
+                self._page = context.new_page()
+                self._page.set_default_timeout(PATIENCE)
+                self._page.set_content(self._html)
+                self._page.wait_for_function(
+                    "window.recording || document.getElementById('fault').textContent"
+                )
+                fault = self._page.locator("#fault").text_content()
+                if fault:
+                    raise ResultError(path, f"cannot be drawn: {fault}")
+                self._page.evaluate(
+                    "([camera, chart]) => recording.film(camera, chart)",
+                    [self._camera, self._chart],
+                )
+                self.count = int(self._page.evaluate("recording.clock.frames"))
+                yield
+                browser.close()
+        except Error as fault:
+            raise ResultError(path, f"cannot be drawn: {fault.message.splitlines()[0]}") from fault
+
+    def picture(self, number: int) -> bytes:
+        """Draw the picture with this `number`, and return it as a .png file."""
+        from PIL import Image
+
+        if self._stopped.is_set():
+            raise _Stopped
+        self._page.evaluate("k => recording.draw_frame(k)", number)
+        drawn = self._page.screenshot()
+        with Image.open(io.BytesIO(drawn)) as image:
+            if image.size == self._size:
+                return drawn
+            # Whole pixels of the page are not always whole pixels of the picture.
+            stream = io.BytesIO()
+            image.resize(self._size, Image.Resampling.LANCZOS).save(stream, "png")
+            return stream.getvalue()
+
+    def pixels(self, number: int) -> Pixels:
+        """Draw the picture with this `number`; return its colors (height, width, 3)."""
+        from PIL import Image
+
+        with Image.open(io.BytesIO(self.picture(number))) as image:
+            return np.asarray(image.convert("RGB"))
+
+    def all(self, draw: Callable[[int], Drawn]) -> Iterator[Drawn]:
+        """Draw one picture after the other."""
+        for number in range(self.count):
+            yield draw(number)
+            self._told(number + 1, self.count)
+
+
+def _launch(driver: Playwright, path: Path) -> Browser:
+    """Start the Chromium of this machine, or the one that playwright has installed."""
+    from playwright.sync_api import Error
+
+    program = next(filter(None, map(shutil.which, PROGRAMS)), None)
+    # Within its own sandbox Chromium does not start for root, as in a container.
+    flags = [*FLAGS, *(["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else [])]
+    try:
+        return driver.chromium.launch(executable_path=program, args=flags, handle_sigint=False)
+    except Error as fault:
+        if program is None:
+            raise ResultError(
+                path,
+                "needs Chromium to be drawn, and there is none: playwright install chromium "
+                "installs one",
+            ) from fault
+        raise
+
+
+def _write_folder(path: Path, stage: _Stage) -> None:
+    """Replace the pictures of the folder at `path` by those of this run; other files stay."""
+    try:
+        with AtomicFolder(path, last=FRAME.format(1)) as folder:
+            desk = folder.desk()
+            for number, picture in enumerate(stage.all(stage.picture), start=1):
+                (desk / FRAME.format(number)).write_bytes(picture)
+            old = [one.name for one in path.glob("frame_*.png")]
+            folder.replace(desk, old)
+    except FolderInUse as busy:
+        raise ResultError(path, f"{busy}: wait until it ends") from None
+    except OSError as fault:
+        raise ResultError(path, f"cannot be written: {fault.strerror}") from fault

@@ -1,0 +1,47 @@
+// Run, step, reset, speed, and the time of a finished run.
+"use strict";
+
+import { on, send } from "./connection.js";
+import { element, number, Slider } from "./controls.js";
+import { add_key } from "./keys.js";
+
+let running = null, scrubbed = -Infinity, speed = null;
+
+const toggle = () => running !== null && send({ type: "run", on: !running });
+const step = () => send({ type: "step", seconds: Number(element("step-size").value) });
+const reset = () => send({ type: "reset" });
+
+element("run").onclick = toggle;
+element("step").onclick = step;
+element("reset").onclick = reset;
+element("notice").querySelector("button").onclick = reset;
+add_key({ keys: [" "], says: "run or pause", act: toggle });
+add_key({ keys: ["s", "ArrowRight"], says: "one step", act: step, repeats: true });
+add_key({ keys: ["r"], says: "reset: back to the start", act: reset });
+
+on("hello", (data) => {
+  speed = new Slider(element("speed"), {
+    low: data.speeds[0], high: data.speeds[1], log: true, value: 1, output: element("speed-value"),
+    tell: (value) => `${number(value, 3)} \u00d7`,
+  }, (value) => send({ type: "speed", value: Math.abs(value - 1) < 0.03 ? 1 : value }));
+  if (data.duration === null) return;
+  element("scrub").hidden = false;
+  const scrubber = element("scrubber");
+  scrubber.addEventListener("input", () => {
+    scrubbed = performance.now();
+    send({ type: "seek", t: data.start + (data.duration * scrubber.value) / 10000 });
+  });
+  on("state", ({ t }) => {
+    const share = data.duration > 0 ? (t - data.start) / data.duration : 0;
+    if (performance.now() - scrubbed > 400) scrubber.value = Math.round(10000 * share);
+    element("scrub-value").textContent =
+      `${(t - data.start).toFixed(3)} / ${data.duration.toFixed(3)} s`;
+  });
+});
+
+on("state", (data) => {
+  running = data.running;
+  element("run").classList.toggle("running", running);
+  element("run-word").textContent = running ? "Pause" : "Run";
+  speed.follow(data.speed);
+});

@@ -1,0 +1,171 @@
+"""A target on a path: limits of its motion, curves through points, and arms that follow exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import sphshell_pin as sp
+from sphshell_pin.dynamics.path import Curve, Timing
+from sphshell_pin.errors import InvalidParameter
+from tests import meshes, models
+
+POINTS = np.array([[0.3, 0.0, 0.3], [0.3, 0.06, 0.33], [0.28, 0.1, 0.3], [0.3, 0.12, 0.26]])
+numbers = st.floats(0.01, 10.0)
+
+
+def straight(length: float) -> Curve:
+    points = np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]])
+    return Curve.through(points, None, spline=False)
+
+
+@settings(max_examples=60, deadline=None)
+@given(numbers, numbers, st.none() | numbers, st.none() | numbers)
+def test_limits_hold_and_the_end_is_reached_at_rest(length, speed, acceleration, jerk) -> None:
+    timing = Timing.along(straight(length), 0.7, speed, acceleration, jerk)
+    assert timing.places[-1] == pytest.approx(length, rel=1e-12)
+    assert (timing.at(np.array([0.0, 0.7])) == 0.0).all()
+    span = np.diff(timing.times)
+    assert (span > 0).all()
+    v, a, j = timing.speeds[:-1], timing.accelerations[:-1], timing.jerks[:-1]
+    after = v + span * (a + span * j / 2)
+    assert max(v.max(), after.max()) <= speed * (1 + 1e-9)
+    # Each phase begins where the one before ends: the place always, the speed with a limit of the
+    # acceleration or jerk, the acceleration with one of the jerk.
+    place = timing.places[:-1] + span * (v + span * (a / 2 + span * j / 6))
+    np.testing.assert_allclose(place, timing.places[1:], rtol=1e-9, atol=1e-9 * length)
+    if acceleration is not None or jerk is not None:
+        np.testing.assert_allclose(after, [*v[1:], 0.0], atol=1e-8 * speed)
+        assert v[0] == 0.0
+    if acceleration is not None:
+        assert np.abs([a, a + j * span]).max() <= acceleration * (1 + 1e-9)
+    if jerk is not None:
+        assert np.abs(j).max() <= jerk
+        np.testing.assert_allclose((a + j * span)[:-1], a[1:], atol=1e-8 * np.abs(a + 1e-30).max())
+
+
+def test_times_of_textbook() -> None:
+    """Length over speed, plus a ramp: v / a, and with a limit of the jerk a / j more."""
+    for limits, more in (((None, None), 0.0), ((2.0, None), 0.25), ((2.0, 8.0), 0.25 + 0.25)):
+        timing = Timing.along(straight(3.0), 0.0, 0.5, *limits)
+        assert timing.times[-1] == pytest.approx(6.0 + more, rel=1e-12)
+    # Too short for the speed: two ramps of sqrt(length / a).
+    assert Timing.along(straight(0.02), 0.0, 0.5, 2.0, None).times[-1] == pytest.approx(0.2)
+    # Too short for the acceleration: four jerks of cbrt(length / (2 j)).
+    short = Timing.along(straight(2e-3), 0.0, 0.5, 2.0, 1.0)
+    assert short.times[-1] == pytest.approx(0.4)
+
+
+def test_straight_pieces_stop_at_corners_and_a_spline_does_not() -> None:
+    for spline in (False, True):
+        curve = Curve.through(POINTS, None, spline=spline)
+        timing = Timing.along(curve, 0.0, 0.05, 0.5, 5.0)
+        at = timing.reaching(curve.corners)
+        near = np.array([np.diff(timing.at(np.array([t - 1e-6, t + 1e-6])))[0] for t in at[1:-1]])
+        speeds = near / 2e-6
+        assert (speeds > 0.04).all() if spline else (speeds < 1e-4).all()
+        np.testing.assert_allclose(curve.at(curve.corners), POINTS, atol=1e-12)
+
+
+def test_a_spline_through_a_circle_is_one() -> None:
+    angles = np.linspace(0, 1.5 * np.pi, 40)
+    points = 0.2 * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    curve = Curve.through(points, None, spline=True)
+    inner = np.linspace(0.1, 0.9, 50) * curve.length
+    assert np.linalg.norm(curve.at(inner), axis=1) == pytest.approx(0.2, abs=1e-5)
+    assert curve.length == pytest.approx(0.3 * np.pi, rel=1e-4)
+    # The centripetal acceleration is v^2 / r; where the natural spline ends it bends more.
+    timing = Timing.along(curve, 0.0, 10.0, 0.5, None)
+    assert 0.85 * np.sqrt(0.5 * 0.2) < timing.speeds.max() < np.sqrt(0.5 * 0.2)
+
+
+def test_a_curve_on_a_shell_stays_on_it() -> None:
+    shell = sp.Shell(*meshes.icosphere(3, 0.4))
+    ends = np.array([[0.4, 0.0, 0.0], [0.3, 0.2, 0.2], [0.0, 0.4, 0.0], [-0.2, 0.3, 0.1]])
+    curve = Curve.through(ends, shell, spline=True)
+    assert np.abs(shell.closest_points(curve.points).distances).max() < 1e-12
+    toward = curve.points / np.linalg.norm(curve.points, axis=1)[:, None]
+    assert np.einsum("ij,ij->i", curve.normals, toward).min() > 0.999
+    assert np.einsum("ij,ij->i", curve.normals, curve.tangents) == pytest.approx(0.0, abs=0.02)
+
+
+def follow(scene: sp.Scene, frame: str, q, v, **more):
+    """Return the rows' times and the frame's places in the world."""
+    controller = sp.CartesianImpedance(
+        frame, stiffness=50.0, damping=5.0, speed=0.2, spline=True, decoupled=True, **more
+    )
+    rows = sp.Simulation(scene, sp.Adaptive(1e-9)).run(q, v, 1.5, controller, record_dt=0.01)
+    data = scene.model.createData()
+    places = []
+    for row in rows.q:
+        pin.framesForwardKinematics(scene.model, data, row)
+        places.append(data.oMf[scene.model.getFrameId(frame)].translation.copy())
+    curve, timing = controller._motion()
+    return rows, np.array(places), curve.at(timing.at(rows.t))
+
+
+@pytest.mark.parametrize("rotational", [0.0, 3.0])
+def test_a_decoupled_arm_follows_exactly(rotational: float) -> None:
+    """From rest on the path, in spite of weak springs, posture and joint damping."""
+    # A hold of the orientation takes three joints more.
+    if rotational:
+        model = pin.buildSampleModelManipulator()
+        q = np.array([0.3, 0.8, -0.9, 0.6, 0.4, 0.2])
+    else:
+        model, q = models.arm(), models.ARM_Q
+    scene, data = sp.Scene(model), model.createData()
+    frame = model.frames[model.nframes - 1].name
+    pin.framesForwardKinematics(model, data, q)
+    start = data.oMf[model.getFrameId(frame)].translation
+    way = start + 0.5 * (POINTS - POINTS[0])
+    more = {"path": way, "acceleration": 0.5, "jerk": 5.0, "lead_in": 0.1}
+    more |= {"rotational_stiffness": rotational, "rotational_damping": 0.1 * rotational}
+    more |= {"posture_stiffness": 0.3, "joint_damping": 0.1}
+    rows, places, targets = follow(scene, frame, q, None, **more)
+    assert np.linalg.norm(places[-1] - places[0]) > 0.05
+    # The targets are chords of the knots.
+    np.testing.assert_allclose(places, targets, atol=2e-6)
+    coupled = sp.CartesianImpedance(frame, way, 50.0, 5.0, speed=0.2, spline=True)
+    far = sp.Simulation(scene, sp.Adaptive(1e-9)).run(q, None, 1.5, coupled, record_dt=0.01)
+    assert np.abs(far.q - rows.q).max() > 1e-3
+
+
+def test_a_path_on_a_turning_carrier_is_followed_exactly() -> None:
+    """Coriolis and centrifugal parts of the target's acceleration: a disc that turns freely."""
+    model = pin.Model()
+    model.gravity.linear[:] = 0.0
+    inertia = pin.Inertia(0.7, np.zeros(3), np.diag([0.01, 0.01, 0.02]))
+    disc = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "disc")
+    model.appendBodyToJoint(disc, inertia, pin.SE3.Identity())
+    model.addFrame(pin.Frame("disc", disc, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    cart = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "cart")
+    model.appendBodyToJoint(cart, inertia, pin.SE3.Identity())
+    model.addFrame(pin.Frame("tip", cart, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    shell = models.plate()
+    rate, begin = 2.0, np.array([0.1, 0.05, 0.0])
+    path = [begin, [0.15, 0.1, 0.0], [0.05, 0.15, 0.0]]
+    q = np.concatenate([[0.0], begin])
+    v = np.concatenate([[rate], np.cross([0.0, 0.0, rate], begin)])
+    more = {"path": path, "shell": shell, "shell_frame": "disc", "joints": ["cart"]}
+    more |= {"acceleration": 0.5, "jerk": 5.0}
+    rows, places, targets = follow(sp.Scene(model), "tip", q, v, **more)
+    assert rows.q[-1, 0] == pytest.approx(1.5 * rate)
+    turned = [
+        pin.utils.rotate("z", angle) @ one for angle, one in zip(rows.q[:, 0], targets, strict=True)
+    ]
+    np.testing.assert_allclose(places, turned, atol=2e-6)
+
+
+def test_a_path_of_one_point_and_wrong_limits() -> None:
+    for spline in (False, True):
+        curve = Curve.through(POINTS[:1], None, spline=spline)
+        timing = Timing.along(curve, 0.3, 0.1, 1.0, None)
+        assert (len(timing.times), curve.length) == (1, 0.0)
+    twice = Curve.through(POINTS[[0, 0, 1, 1]], None, spline=True)
+    assert twice.length == pytest.approx(np.linalg.norm(POINTS[1] - POINTS[0]))
+    for wrong in ({"acceleration": 0.0}, {"jerk": -1.0}, {"speed": 0.0}):
+        with pytest.raises(InvalidParameter, match=next(iter(wrong))):
+            sp.CartesianImpedance("tip", POINTS, 1.0, 1.0, **wrong)

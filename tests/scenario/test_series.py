@@ -1,0 +1,116 @@
+"""Curves for charts: values and units of what a live run and a finished one record."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin.dynamics.result import Result
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.replay import Replay
+from sphshell_pin.scenario.run import run_built
+from sphshell_pin.scenario.series import held, motion_series
+from tests.scenario.files import FINGER, write
+
+
+@pytest.fixture
+def built(tmp_path):
+    return build(write(tmp_path, FINGER))
+
+
+def test_a_live_run_offers_its_joints_torques_sensors_and_energy(built) -> None:
+    live = LiveRun(built)
+    units = {(one.quantity, one.unit) for one in live.series}
+    assert units == {
+        ("Force", "N"),
+        ("Depth", "mm"),
+        ("Joint position", "deg"),
+        ("Joint velocity", "deg/s"),
+        ("Controller torque", "N m"),
+        ("Sensor wrist", "N"),
+        ("Sensor wrist", "N m"),
+        ("Energy residual", "J"),
+    }
+    keys = [one.key for one in live.series]
+    assert len(set(keys)) == len(keys)
+    rows = live.advance(0.05)
+    values = {one.key: one.values(rows) for one in live.series}
+    assert values["q.knuckle"][-1] == pytest.approx(np.rad2deg(live.q[0]))
+    assert values["v.knuckle"][-1] == pytest.approx(np.rad2deg(live.v[0]))
+    assert values["residual"][-1] == live.residual
+    assert np.isfinite(values["torque.knuckle"]).all()  # as the file records them
+    now = {one.key: one.values(live.now) for one in live.series}
+    assert now["q.knuckle"] == values["q.knuckle"][-1]
+
+
+def test_torques_are_recorded_once_they_are_asked_for(tmp_path) -> None:
+    live = LiveRun(build(write(tmp_path, FINGER.replace('record = ["torque"]', ""))))
+    torque = next(one for one in live.series if one.key == "torque.knuckle")
+    assert np.isnan(torque.values(live.advance(0.02))).all()
+    live.ask({"q"})
+    assert np.isnan(torque.values(live.advance(0.02))).all()
+    live.ask({"torque", "q"})
+    rows = live.advance(0.02)
+    model = live.scene.model
+    weight = pin.computeGeneralizedGravity(model, model.createData(), live.q)[0]
+    expected = 0.05 * (0.6 - live.q[0]) - 0.004 * live.v[0] + weight
+    assert torque.values(rows)[-1] == pytest.approx(expected, rel=1e-9)
+    assert torque.values(live.now)[0] == pytest.approx(expected, rel=1e-9)
+    live.reset()  # and in the next run
+    assert np.isfinite(torque.values(live.advance(0.02))[1:]).all()
+
+
+def test_a_sensor_shows_the_last_reading_that_had_arrived(built) -> None:
+    live, whole = (
+        LiveRun(built),
+        built.simulation.run(built.q0, built.v0, 0.1, built.controller, record_dt=5e-3),
+    )
+    log = whole.sensors["wrist"]
+    curve = next(one for one in live.series if one.key == "sensor.wrist.force_x")
+    pieces = [live.advance(duration) for duration in (0.007, 0.0004, 0.03, 0.0626)]
+    t = np.concatenate([rows.t for rows in pieces])
+    values = np.concatenate([curve.values(rows) for rows in pieces])
+    np.testing.assert_array_equal(values, [log.at(one)[0] for one in t])
+    assert np.isnan(values[0])
+    assert len(np.unique(values[1:])) > 10
+    np.testing.assert_array_equal(held(log, t, None)[:, 0], values)
+
+
+def test_a_finished_run_offers_what_it_recorded(built, tmp_path) -> None:
+    run_built(built, tmp_path / "out")
+    result = Result.load(tmp_path / "out" / "run.npz")
+    replay = Replay(result)
+    curves = {one.key: one for one in replay.series}
+    rows = replay.advance(1.0)
+    np.testing.assert_array_equal(curves["torque.knuckle"].values(rows), result.torque[:, 0])
+    np.testing.assert_array_equal(curves["q.knuckle"].values(rows), np.rad2deg(result.q[:, 0]))
+    np.testing.assert_array_equal(curves["residual"].values(rows), result.energy.residual)
+    log = result.sensors["wrist"]
+    np.testing.assert_array_equal(
+        curves["sensor.wrist.force_z"].values(rows), [log.at(t)[2] for t in result.t]
+    )
+    replay.seek(0.0525)
+    assert replay.now.t == [0.0525]
+    assert curves["q.knuckle"].values(replay.now) == np.rad2deg(replay.q[0])
+
+
+def test_a_joint_that_turns_without_end_has_an_angle() -> None:
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "wheel")
+    model.addJoint(1, pin.JointModelPZ(), pin.SE3.Identity(), "slide")
+    model.addJoint(2, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "free")
+    curves = {one.key: one for one in motion_series(model, torque=True)}
+    q = pin.neutral(model)
+    q[:3] = np.cos(2.5), np.sin(2.5), 0.25
+    assert curves["q.wheel"].of(q[None]) == pytest.approx(np.rad2deg(2.5))
+    assert curves["q.slide"].of(q[None]) == 250.0
+    shown = {key: one.unit for key, one in curves.items()}
+    assert shown["q.wheel"] == "deg"
+    assert shown["q.slide"] == shown["q.free.0"] == "mm"
+    assert shown["q.free.6"] == ""
+    assert shown["v.free.5"] == "deg/s"
+    assert shown["torque.slide"] == "N"
+    assert shown["torque.wheel"] == shown["torque.free.5"] == "N m"
+    assert len([key for key in curves if key.startswith("q.")]) == 9

@@ -1,0 +1,153 @@
+"""What states a version, a dependency or a title more than once states the same."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tomllib
+from datetime import date
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+import sphshell_pin
+from tests.test_packaging import NAME, script
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+RECIPE = ROOT / "packaging" / "conda" / "recipe.yaml"
+# What a package on PyPI is called on conda-forge, where that differs.
+CONDA = {"pin": "pinocchio", "meshcat": "meshcat-python", "matplotlib": "matplotlib-base"}
+FORMS = ROOT / ".github" / "ISSUE_TEMPLATE"
+
+
+def load(file):
+    yaml = pytest.importorskip("yaml", reason="needs PyYAML, which comes with the extra docs")
+    if not file.is_file():
+        pytest.skip(f"{file.name} is part of the checkout")
+    return yaml.safe_load(file.read_text(encoding="utf-8"))
+
+
+def changes():
+    """Return the date of each released version of the changelog, the latest first."""
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    return dict(re.findall(r"^## \[([0-9.]+)\] - (\d{4}-\d\d-\d\d)$", text, re.MULTILINE))
+
+
+def test_one_version_is_stated_everywhere():
+    version = PROJECT["version"]
+    assert sphshell_pin.__version__ == version
+    assert next(iter(changes())) == version
+    assert ElementTree.parse(ROOT / "package.xml").findtext("version") == version
+    assert load(ROOT / "CITATION.cff")["version"] == version
+    assert load(RECIPE)["context"]["version"] == version
+
+
+def test_the_changelog_has_its_form():
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    heads = re.findall(r"^## (.*)$", text, re.MULTILINE)
+    assert heads[0] == "[Unreleased]"
+    assert len(heads) == 1 + len(changes()), heads
+    assert list(changes().values()) == sorted(changes().values(), reverse=True)
+    kinds = set(re.findall(r"^### (.*)$", text, re.MULTILINE))
+    assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+
+
+def test_the_citation_is_of_this_release():
+    citation = load(ROOT / "CITATION.cff")
+    assert {"cff-version", "message", "title", "authors", "license"} <= set(citation)
+    assert citation["date-released"] == date.fromisoformat(changes()[PROJECT["version"]])
+    assert citation["license"] == PROJECT["license"]
+    assert [one["name"] for one in citation["authors"]] == [a["name"] for a in PROJECT["authors"]]
+    assert citation["title"].startswith("sphshell_pin")
+
+
+def wanted(requirements):
+    """Return {name on conda-forge: bound} of requirements as pip writes them."""
+    found = {}
+    for one in requirements:
+        name = NAME.match(one)[0]
+        found[CONDA.get(name, name)] = one[len(name) :].removeprefix("==")
+    return found
+
+
+def test_the_recipe_wants_what_pip_wants():
+    recipe = load(RECIPE)
+    context = recipe["context"]
+    (package,) = (one for one in recipe["outputs"] if one["package"]["name"] == PROJECT["name"])
+    needs = package["requirements"]
+
+    def bounds(lines):
+        words = [
+            re.sub(r"\$\{\{ (\w+) \}\}", lambda m: context[m[1]], one).split() for one in lines
+        ]
+        return {word[0]: " ".join(word[1:]) for word in words}
+
+    run = bounds(needs["run"])
+    assert run.pop("python") == ""
+    assert run == wanted(PROJECT["dependencies"])
+    assert bounds(needs["run_constraints"]) == wanted(PROJECT["optional-dependencies"]["view"])
+    host = bounds(one for one in needs["host"] if isinstance(one, str))
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["build-system"]
+    compiled = wanted(one.replace("[build]", "") for one in build["requires"])
+    assert compiled.items() <= host.items()
+    (command,) = package["build"]["python"]["entry_points"]
+    assert command == f"sphshell-pin = {PROJECT['scripts']['sphshell-pin']}"
+    assert (
+        f'match(python, "{PROJECT["requires-python"].replace(">=", "<")}")'
+        in (package["build"]["skip"])
+    )
+
+
+def test_pixi_wants_what_pip_wants():
+    file = ROOT / "pixi.toml"
+    if not file.is_file():
+        pytest.skip("pixi.toml is part of the checkout")
+    has = tomllib.loads(file.read_text(encoding="utf-8"))["dependencies"]
+    extras = PROJECT["optional-dependencies"]
+    needed = wanted([*PROJECT["dependencies"], *extras["view"], *extras["tables"]])
+    assert needed.items() <= has.items()
+    assert has["python"] == PROJECT["requires-python"]
+
+
+def test_newer_versions_of_pinocchio_reach_every_file(tmp_path, monkeypatch):
+    newest = script("newest_pinocchio")
+    for name in newest.PLACES:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    monkeypatch.setattr(newest, "ROOT", tmp_path)
+    newest.write({"pin": "7.5", "coal": "8.6"})
+    assert (newest.stated("pin"), newest.stated("coal")) == ("7.5", "8.6")
+    moved = tomllib.loads((tmp_path / "pyproject.toml").read_text(encoding="utf-8"))
+    assert {"pin[build]==7.5.*", "coal==8.6.*"} <= set(moved["build-system"]["requires"])
+    assert {"pin==7.5.*", "coal==8.6.*"} <= set(moved["project"]["dependencies"])
+    pixi = tomllib.loads((tmp_path / "pixi.toml").read_text(encoding="utf-8"))["dependencies"]
+    assert (pixi["pinocchio"], pixi["coal"]) == ("7.5.*", "8.6.*")
+    context = load(tmp_path / "packaging" / "conda" / "recipe.yaml")["context"]
+    assert (context["pinocchio"], context["coal"]) == ("7.5", "8.6")
+
+
+def test_the_ros_package_is_a_plain_cmake_project():
+    package = ElementTree.parse(ROOT / "package.xml").getroot()
+    assert package.findtext("export/build_type") == "cmake"
+    assert package.findtext("license") == PROJECT["license"]
+    assert {"pinocchio", "coal"} <= {one.text for one in package.findall("depend")}
+
+
+@pytest.mark.parametrize("name", ["bug", "feature"])
+def test_an_issue_form_asks(name):
+    form = load(FORMS / f"{name}.yml")
+    assert {"name", "description", "body"} <= set(form)
+    ids = [one["id"] for one in form["body"]]
+    assert len(set(ids)) == len(ids)
+    assert any(one.get("validations", {}).get("required") for one in form["body"])
+    assert all(one["attributes"]["label"] for one in form["body"])
+
+
+def test_the_command_of_the_bug_form_works(capsys):
+    form = load(FORMS / "bug.yml")
+    (versions,) = (one for one in form["body"] if one["id"] == "versions")
+    (program,) = re.findall(r'python -c "(.*)"', versions["attributes"]["description"])
+    exec(compile(program, "bug.yml", "exec"), {})
+    assert f"('sphshell_pin', '{PROJECT['version']}')" in capsys.readouterr().out

@@ -1,0 +1,179 @@
+"""What an object shows of itself: a line or two of text, a small table in a notebook."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.study.fit.report import Fitted
+from sphshell_pin.summary import MOST_ROWS, Detail, Fact, Summarized, names, show_value
+from tests.models import ball
+
+RADIUS = 0.01
+
+
+@pytest.fixture(scope="module")
+def shown() -> dict[str, object]:
+    """One of each of the objects that a session leaves in a notebook's cell."""
+    sheet = sp.Shell(
+        [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]], name="<b>sheet</b>"
+    )
+    scene = sp.Scene(ball())
+    frame = scene.model.frames[scene.model.nframes - 1].name
+    law = sp.ImpactLaw(1e5, 1.5, 10.0, 1e-4)
+    pair = scene.add_contact(sp.Sphere(RADIUS, frame), sheet, law=law, name="ball-sheet")
+    simulation = sp.Simulation(scene, sp.RungeKutta4(1e-4))
+    start = pin.neutral(scene.model)
+    start[2] = RADIUS + 1e-4
+    result = simulation.run(
+        start, duration=0.02, record_dt=1e-3, sensitivities=["ball-sheet.law.stiffness"]
+    )
+    rollout = simulation.rollout([start] * 3, None, 0.01)
+    state = scene.state(start)
+    low = start.copy()
+    low[2] = RADIUS - 1e-4
+    fit = sp.Fit(
+        scenario="drop.toml",
+        parameters=(Fitted("contact.0.law.k", "N/m", 1.0, 2.0, 1.5, 2.5, True),),
+        correlation=np.eye(1),
+        series=(),
+        remarks=("a < b",),
+        dof=3,
+        level=0.95,
+        runs=7,
+        converged=True,
+    )
+    return {
+        "scene": scene,
+        "pair": pair,
+        "shell": sheet,
+        "health": sheet.health,
+        "contacts": sheet.contacts([0, 0, RADIUS - 1e-4], RADIUS),
+        "closest": sheet.closest_points(np.zeros((5, 3))),
+        "scene_contacts": scene.contacts(low),
+        "explanation": scene.explain(low),
+        "simulation": simulation,
+        "state": state,
+        "result": result,
+        "log": result.contacts,
+        "energy": result.energy,
+        "stats": result.stats,
+        "sensitivities": result.sensitivities,
+        "rollout": rollout,
+        "dynamics": scene.dynamics_derivatives(low),
+        "step": simulation.step_derivatives(low),
+        "forces": scene.contact_force_derivatives(low),
+        "fit": fit,
+    }
+
+
+TEXTS = ("health", "explanation")  # whole texts, as print shows them
+
+
+class Cells(HTMLParser):
+    """The texts of a table's cells, and the tags that are open at the end."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.texts: list[str] = []
+        self.open: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+def test_no_object_is_shown_by_its_address_or_its_arrays(shown):
+    for name, one in shown.items():
+        text = repr(one)
+        assert " at 0x" not in text, name
+        assert "array(" not in text, name
+        assert len(text.splitlines()) <= (60 if name in TEXTS else 3), name
+        assert max(map(len, text.splitlines())) <= (200 if name in TEXTS else 88), name
+
+
+def test_tables_are_whole_and_take_the_colors_of_the_page(shown):
+    for name, one in shown.items():
+        if name in TEXTS:
+            continue
+        html = one._repr_html_()
+        cells = Cells(html)
+        assert cells.open == [], name
+        assert "<b>sheet" not in html, name  # what a user called something is escaped
+        assert not re.search(r"(?<!border-)color: (?!inherit)", html), name
+        assert not re.search("<(style|script)", html), name
+
+
+def test_figures_are_those_of_the_object_with_units(shown):
+    result = shown["result"]
+    peak = result.stats.pairs["ball-sheet"].peak_force
+    assert peak > 0
+    assert f"peak force {peak:.4g} N" in repr(result)
+    assert f"{len(result.t)} rows" in repr(result)
+    cells = Cells(result._repr_html_()).texts
+    assert cells[cells.index("peak force") + 1] == f"{peak:.4g} N"
+    assert "largest depth [m]" in cells
+    assert f"{result.stats.pairs['ball-sheet'].max_depth:.4g}" in cells
+    assert repr(shown["contacts"]) == "<ContactSet: 1 contact, largest depth 0.0001 m, on face>"
+    assert "contact.0.law.k 2 N/m" in repr(shown["fit"])
+    assert "a < b" in Cells(shown["fit"]._repr_html_()).texts
+    assert "<b>sheet</b>" in repr(shown["shell"])
+    rollout = Cells(shown["rollout"]._repr_html_()).texts
+    assert "ball-sheet.peak_force" in rollout
+
+
+def test_empty_objects_show_themselves():
+    sheet = sp.Shell([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    none = sheet.contacts([0, 0, 5.0], 0.1)
+    assert repr(none) == "<ContactSet: 0 contacts>"
+    assert "<ContactSet>" not in none._repr_html_()
+    assert "contact none" in repr(sp.Scene(ball()))
+
+
+class Many(Summarized):
+    def _facts(self):
+        return [Fact("length", 0.5, "m"), Fact("rows", 30), Fact("hidden", 1, brief=False)]
+
+    def _rows(self):
+        return Detail(("i",), [(i,) for i in range(30)], 30)
+
+
+def test_long_tables_are_cut_and_say_so():
+    assert repr(Many()) == "<Many: length 0.5 m, 30 rows>"
+    texts = Cells(Many()._repr_html_()).texts
+    assert "hidden" in texts
+    assert f"and {30 - MOST_ROWS} more" in texts
+    assert str(MOST_ROWS - 1) in texts
+    assert str(MOST_ROWS + 1) not in texts
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1.23456, "1.235"),
+        (float("nan"), "none"),
+        (True, "yes"),
+        (np.zeros((3, 4, 5)), "3 x 4 x 5"),
+        (np.array([1.0, 2.5]), "(1, 2.5)"),
+        (np.array(2.0), "2"),
+        ((), "none"),
+        (("a", "b"), "'a', 'b'"),
+    ],
+)
+def test_values(value, text):
+    assert show_value(value) == text
+
+
+def test_many_names_are_counted():
+    assert names("abcdef") == "'a', 'b', 'c', 'd', ... (6)"

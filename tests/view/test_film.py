@@ -1,0 +1,143 @@
+"""Pictures and films of a run, drawn by a headless browser."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.view import film
+from sphshell_pin.view.film import render_film
+from tests.view.stand_ins import ball_on_plate
+
+Image = pytest.importorskip("PIL.Image")
+SIZE = (160, 120)
+
+
+@pytest.fixture(scope="module")
+def run():
+    return ball_on_plate()  # 3 s
+
+
+@pytest.fixture
+def rendered(request, run, tmp_path):
+    """Draws the run into a file of the name."""
+    request.getfixturevalue("browser")  # or the test is skipped
+    scene, result = run
+
+    def render(name, **options):
+        return render_film(tmp_path / name, result, scene, **{"size": SIZE, **options})
+
+    return render
+
+
+def pixels(file):
+    with Image.open(file) as image:
+        return np.asarray(image.convert("RGB")).astype(int)
+
+
+@pytest.mark.browser
+def test_a_picture_has_its_time_and_size(rendered, tmp_path):
+    start = pixels(rendered("new/start.png", time=0.0, size=(301, 177)))
+    touching = pixels(rendered("touching.png", time=1.5, size=(301, 177)))
+    assert start.shape == touching.shape == (177, 301, 3)
+    # An arrow is there, nearly pure red, besides the red of legend and chart.
+    red = [
+        np.count_nonzero((one[..., 0] > 180) & (one[..., 1:] < 80).all(axis=2))
+        for one in (start, touching)
+    ]
+    assert red[1] > red[0] + 10
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["new", "touching.png"]
+    dark = pixels(rendered("dark.png", dark=True, chart=False, camera="contact"))
+    assert dark.mean() < 110 < touching.mean()
+
+
+@pytest.mark.browser
+def test_a_gif_lasts_as_long_as_the_run_takes(rendered):
+    told = []
+    file = rendered("run.gif", fps=4, speed=1.5, told=lambda *numbers: told.append(numbers))
+    with Image.open(file) as opened:
+        assert opened.n_frames == 9
+        assert opened.size == SIZE
+        durations = []
+        for k in range(opened.n_frames):
+            opened.seek(k)
+            durations.append(opened.info["duration"])
+    assert sum(durations) == 9 * 250
+    assert told == [(k, 9) for k in range(1, 10)]
+
+
+@pytest.mark.browser
+def test_a_film_shows_the_pictures_in_their_order(rendered):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    file = rendered("run.mp4", fps=2, span=(0.5, 2.5), chart=False)
+    frames = ffmpeg.read_frames(str(file))
+    about = next(frames)
+    assert about["codec"] == "h264"
+    assert about["pix_fmt"].startswith("yuv420p")
+    assert about["size"] == SIZE
+    assert about["fps"] == 2
+    drawn = [np.frombuffer(one, np.uint8).reshape(120, 160, 3).astype(int) for one in frames]
+    assert len(drawn) == 5
+    folder = rendered("frames", fps=2, span=(0.5, 2.5), chart=False)
+    names = sorted(one.name for one in folder.iterdir())
+    assert names == [f"frame_{k:04d}.png" for k in range(1, 6)]
+    pictures = [pixels(folder / name) for name in names]
+    for k, one in enumerate(drawn):
+        off = [np.abs(one - picture).mean() for picture in pictures]
+        assert np.argmin(off) == k
+        assert off[k] < 4.0
+    # A shorter run of pictures replaces the longer one, and nothing else; they are the same.
+    (folder / "notes.txt").write_text("mine")
+    rendered("frames", fps=2, span=(0.5, 1.5), chart=False)
+    assert sorted(one.name for one in folder.iterdir()) == [*names[:3], "notes.txt"]
+    np.testing.assert_array_equal(pixels(folder / names[1]), pictures[1])
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize(
+    "name",
+    ["run.mp4", *(pytest.param(one, marks=pytest.mark.slow) for one in ("run.gif", "frames"))],
+)
+def test_ctrl_c_leaves_nothing(rendered, tmp_path, name):
+    def press(done, _):
+        if done == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        rendered(name, fps=10, told=press)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "told"),
+    [
+        ("run.avi", {}, r"run\.avi' must end in \.png, \.gif or \.mp4"),
+        ("run.png", {"time": 3.5}, "time = 3.5 must be in the run: 0 to 3 s"),
+        ("run.gif", {"span": (-1.0, None)}, "span = -1.0 must be in the run"),
+        ("run.gif", {"span": (2.0, 1.0)}, "span = '2 to 1 s' must end after it begins"),
+        ("run.gif", {"time": 1.0}, "time = 1.0 is for a .png"),
+        ("run.png", {"fps": 5.0}, "fps = 5.0 is for a film"),
+        ("run.gif", {"fps": 60.0}, "fps = 60.0 must be at most 50"),
+        ("run.mp4", {"fps": -1.0}, "fps = -1.0 must be positive"),
+        ("run.mp4", {"size": (161, 120)}, "size = '161x120' must be even"),
+        ("run.png", {"size": (10, 120)}, "size = '10x120' must be between 64 and 7680"),
+        ("run.png", {"camera": "behind"}, "camera = 'behind' must be one of fit, front"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_before_anything_starts(run, tmp_path, name, options, told):
+    scene, result = run
+    with pytest.raises(InvalidParameter, match=told):
+        render_film(tmp_path / name, result, scene, **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_chromium_one_sentence_says_how_to_get_it(run, tmp_path, monkeypatch):
+    pytest.importorskip("playwright")
+    scene, result = run
+    monkeypatch.setattr(film, "PROGRAMS", ())
+    monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path / "none"))
+    with pytest.raises(ResultError, match="playwright install chromium"):
+        render_film(tmp_path / "run.png", result, scene)
+    assert list(tmp_path.iterdir()) == []

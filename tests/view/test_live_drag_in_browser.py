@@ -1,0 +1,191 @@
+"""The mouse on the live page, in a real browser: bodies are dragged, targets and views switched."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.live import LiveRun
+from tests.scenario.arms import write_arm
+from tests.scenario.files import DROP, write
+from tests.view.live_player import FilmPlayer
+from tests.view.test_live_in_browser import opened  # noqa: F401  (a fixture)
+
+pytestmark = pytest.mark.browser
+
+ON_SCREEN = """([x, y, z]) => {
+    const at = new MeshCat.THREE.Vector3(x, z, -y);
+    viewer.camera.updateMatrixWorld();
+    at.project(viewer.camera);
+    const box = document.querySelector("#scene").getBoundingClientRect();
+    return [box.left + 0.5 * (1 + at.x) * box.width, box.top + 0.5 * (1 - at.y) * box.height];
+}"""
+EYE = "viewer.camera.position.toArray()"
+IN_LOWER = np.array([0.0, 0.0, 0.2])  # a point of the arm's second link
+
+
+@pytest.fixture
+def arm(opened, tmp_path):  # noqa: F811
+    return opened(LiveRun(build(write_arm(tmp_path))))
+
+
+def point_of(live):
+    """Return where IN_LOWER is [m]."""
+    model, data = live.player.scene.model, live.player.scene.model.createData()
+    pin.framesForwardKinematics(model, data, live.player.q)
+    return data.oMf[model.getFrameId("lower")].act(IN_LOWER)
+
+
+def rightwards(tab):
+    """Return the direction in the world that is rightwards on the screen."""
+    return np.array(
+        tab.page.evaluate("""async () => {
+        const scene = await import("./scene.js");
+        return scene.Picture.prototype.direction.call({viewer}, "right");
+    }""")
+    )
+
+
+def drag_right(tab, start, steps=8):
+    tab.page.mouse.move(*start)
+    tab.page.mouse.down()
+    for step in range(1, steps + 1):
+        tab.page.mouse.move(start[0] + 12 * step, start[1])
+
+
+def wait_until_still(live, tab):
+    tab.wait("state.t > 0.05")
+    deadline = live.player.time + 30.0
+    while np.abs(live.player.v).max() > 1e-4 and live.player.time < deadline:
+        tab.page.wait_for_timeout(50)
+
+
+def test_a_link_is_dragged_with_the_mouse_and_comes_back(arm):
+    live, tab = arm
+    wait_until_still(live, tab)
+    rest, before, right = live.player.q.copy(), point_of(live), rightwards(tab)
+    start, eye = tab.page.evaluate(ON_SCREEN, before.tolist()), tab.page.evaluate(EYE)
+    tab.page.keyboard.down("Control")
+    drag_right(tab, start)
+    tab.wait("state.drag && state.drag.newtons > 1")
+    wait_until_still(live, tab)
+    moved = point_of(live) - before
+    assert moved @ right > 0.01
+    assert live.player.drag.force_world @ right > 0.0
+    assert tab.state("drag.body") == "lower"
+    shown = tab.page.locator("#drag-label").inner_text()
+    assert shown.endswith(" N")
+    # It is the force at rest: the label and the state are of the same instant or the next one.
+    assert float(shown.split()[0]) == pytest.approx(tab.state("drag.newtons"), rel=0.05)
+    assert tab.page.evaluate(EYE) == pytest.approx(eye)  # the camera has stayed
+    tab.page.mouse.up()
+    tab.page.keyboard.up("Control")
+    tab.wait("!state.drag && document.querySelector('#drag-label').hidden")
+    tab.page.wait_for_timeout(300)
+    wait_until_still(live, tab)
+    np.testing.assert_allclose(live.player.q, rest, atol=1e-3)
+
+
+def test_without_key_and_button_the_mouse_moves_the_camera(arm):
+    live, tab = arm
+    wait_until_still(live, tab)
+    start, eye = tab.page.evaluate(ON_SCREEN, point_of(live).tolist()), tab.page.evaluate(EYE)
+    drag_right(tab, start)
+    tab.page.mouse.up()
+    tab.page.wait_for_timeout(200)
+    assert tab.page.evaluate(EYE) != pytest.approx(eye, rel=1e-3)
+    assert live.player.drag is None
+    # With the button, bodies are taken hold of; beside them the camera still moves.
+    tab.page.keyboard.press("d")
+    assert tab.page.locator("#drag-mode").get_attribute("aria-pressed") == "true"
+    start = tab.page.evaluate(ON_SCREEN, point_of(live).tolist())
+    eye = tab.page.evaluate(EYE)
+    drag_right(tab, start)
+    tab.wait("state.drag")
+    tab.page.mouse.up()
+    tab.wait("!state.drag")
+    assert tab.page.evaluate(EYE) == pytest.approx(eye)
+    box = tab.page.locator("#scene").bounding_box()
+    drag_right(tab, (box["x"] + 30, box["y"] + 0.6 * box["height"]))
+    tab.page.mouse.up()
+    tab.page.wait_for_timeout(200)
+    assert tab.page.evaluate(EYE) != pytest.approx(eye, rel=1e-3)
+    assert live.player.drag is None
+
+
+def test_a_finger_drags_where_the_button_is_on(arm):
+    live, tab = arm
+    wait_until_still(live, tab)
+    tab.click("#drag-mode")
+    x, y = tab.page.evaluate(ON_SCREEN, point_of(live).tolist())
+    finger = tab.page.context.new_cdp_session(tab.page)
+
+    def touch(kind, *points):
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(points)})
+
+    touch("touchStart", {"x": x, "y": y})
+    for step in range(1, 6):
+        touch("touchMove", {"x": x + 15 * step, "y": y})
+    tab.wait("state.drag && state.drag.newtons > 1")
+    touch("touchEnd")
+    tab.wait("!state.drag")
+
+
+def test_a_drag_ends_when_the_tab_is_closed(arm):
+    live, tab = arm
+    wait_until_still(live, tab)
+    tab.page.keyboard.down("Control")
+    drag_right(tab, tab.page.evaluate(ON_SCREEN, point_of(live).tolist()))
+    tab.wait("state.drag")
+    tab.page.close()
+    for _ in range(200):
+        if live.player.drag is None:
+            break
+        live.server.arrived.wait(0.05)
+    assert live.player.drag is None
+
+
+def test_sliders_move_the_targets_of_the_joints_in_degrees(arm):
+    live, tab = arm
+    tab.slide('[data-parameter="target-elbow"]', 0.0)
+    tab.wait("state.targets.elbow === -2")
+    field = tab.page.locator("#targets-section input[type=text]").first
+    field.fill("30")
+    field.press("Enter")
+    tab.wait("Math.abs(state.targets.shoulder - Math.PI / 6) < 1e-6")
+    wait_until_still(live, tab)
+    np.testing.assert_allclose(live.player.q, [np.pi / 6, -2.0], atol=2e-3)
+    field.fill("300")
+    field.press("Enter")
+    tab.wait("document.getElementById('toasts').innerText.includes('limits of the joint')")
+    tab.page.wait_for_function(
+        "document.querySelector('#targets-section input[type=text]').value === '30'"
+    )
+    tab.click("#targets-section button")
+    tab.wait("state.targets.elbow === 0.5 && state.targets.shoulder === 0.4")
+
+
+def test_a_word_is_a_menu_and_views_have_switches(opened, tmp_path):  # noqa: F811
+    text = DROP.replace('shell = "plate"\n', 'shell = "plate"\nmethod = "smooth"\n')
+    text += '\n[[knob]]\nkey = "contact.ball-plate.method"\n'
+    live, tab = opened(LiveRun(build(write(tmp_path, text))))
+    tab.wait("state.contacts.length")
+    visible = '[data-part="distance"]'
+    assert tab.page.locator(visible).is_visible()
+    tab.click('[data-part="distance"]')
+    tab.wait("!document.getElementById('coloring').hidden")
+    tab.click('[data-part="pressure"]')
+    tab.wait("document.getElementById('pressure').innerText.includes('MPa')")
+    tab.page.select_option("#parameters select", "facets")
+    tab.wait("state.parameters['contact.ball-plate.method'] === 'facets'")
+    tab.wait("!('distance' in state.show)")
+    assert not tab.page.locator(visible).is_visible()
+    assert live.player.scene.pairs[0].method == "facets"
+
+
+def test_a_finished_run_has_neither_drags_nor_targets(opened):  # noqa: F811
+    _, tab = opened(FilmPlayer(), running=False)
+    for selector in ("#drag-mode", "#drag-section", "#targets-section", '[data-part="pressure"]'):
+        assert not tab.page.locator(selector).is_visible()
+    tab.page.keyboard.press("d")  # not a key of this page: no fault
+    tab.wait("state.t === 0")

@@ -1,0 +1,239 @@
+"""Drags, targets and switches as messages of a browser: what they do, and what they are refused."""
+
+import asyncio
+import json
+
+import meshcat
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.view.live import Live
+from tests.scenario.arms import write_arm
+from tests.scenario.files import write
+from tests.view.live_player import BallPlayer, FilmPlayer
+from tests.view.test_live_loop import OTHER_TAB, TAB, ForeignWindow, Told, frames, say
+
+
+class Watcher:
+    """Stands in for a browser that looks on."""
+
+    wake = asyncio.Event()
+
+    def send(self, data):
+        pass
+
+
+NODE = "/meshcat/robot/visuals/lower_0"
+
+
+@pytest.fixture
+def make():
+    made = []
+
+    def make_live(player, **options):
+        live = Live(player, **options)
+        live.told = live.server.report = Told()
+        live.server.clients.add(Watcher())
+        made.append(live)
+        return live
+
+    yield make_live
+    for live in made:
+        live.server.clients.clear()
+        live.stop()
+
+
+@pytest.fixture
+def arm(make, tmp_path):
+    return make(LiveRun(build(write_arm(tmp_path))))
+
+
+@pytest.fixture
+def ball(make, tmp_path):
+    return make(LiveRun(build(write(tmp_path))))
+
+
+def drag(live, target, client=TAB, **fields):
+    given = {"node": NODE, "point": [0.0, 0.0, 0.1], "stiffness": 100.0, "target": target}
+    say(live, "drag", client, **given | fields)
+
+
+def hello(live):
+    return json.loads(live._panel.news(0)[1][0])
+
+
+def drawn(live):
+    """Return the placements (4, 4) of the nodes of a drag; None before the first one."""
+    return [live._window.matrix(f"/meshcat/drag/{name}") for name in ("held", "cursor", "line")]
+
+
+def test_the_page_is_told_what_can_be_taken_hold_of(arm):
+    offered = hello(arm)
+    # The base has no joint.
+    assert offered["drag"]["nodes"][NODE] == "lower"
+    assert set(offered["drag"]["nodes"].values()) == {"upper", "lower"}
+    assert offered["drag"]["stiffness"] > 0.0
+    elbow = offered["targets"][1]
+    assert elbow == {
+        "joint": "elbow",
+        "rotates": True,
+        "low": -2.0,
+        "high": 1.5,
+        "limited": True,
+        "value": 0.5,
+    }
+
+
+def test_a_drag_pulls_the_point_of_the_node_that_was_hit(arm):
+    frames(arm, 5)
+    live, model = arm.player, arm.player.scene.model
+    drag(arm, [1.0, 0.0, 0.5])
+    frames(arm, 1, wall=0.0)
+    assert arm.told == []
+    # The box of the link is drawn around its middle, 0.15 m from the joint.
+    shown, data = live.drag, model.createData()
+    pin.framesForwardKinematics(model, data, live.q)
+    expected = data.oMf[model.getFrameId("lower")].act(np.array([0.0, 0.0, 0.25]))
+    np.testing.assert_allclose(shown.point_world, expected, atol=1e-6)
+    held, cursor, line = drawn(arm)
+    np.testing.assert_allclose(held[:3, 3], shown.point_world, atol=1e-6)
+    np.testing.assert_allclose(cursor[:3, 3], [1.0, 0.0, 0.5], atol=1e-6)
+    span = shown.target_world - shown.point_world
+    np.testing.assert_allclose(line[:3, 1], span, atol=1e-6)  # a rod along y, one unit long
+    before = shown.point_world
+    frames(arm, 30)
+    assert (live.drag.point_world - before) @ span > 0.01
+    state = arm._state()
+    assert state["drag"]["body"] == "lower"
+    assert state["drag"]["newtons"] == pytest.approx(np.linalg.norm(live.drag.force_world))
+
+
+def test_it_comes_back_when_it_is_released_or_the_browser_leaves(arm):
+    rest = arm.player.q.copy()
+    for end in (lambda: say(arm, "release"), lambda: arm.server.leave(TAB)):
+        drag(arm, [1.0, 0.0, 0.5])
+        frames(arm, 60)
+        assert np.linalg.norm(arm.player.q - rest) > 0.02
+        end()
+        frames(arm, 1)
+        assert arm.player.drag is None
+        assert arm._state()["drag"] is None
+        assert drawn(arm)[0][0, 0] < 1e-5  # hidden
+        frames(arm, 180)
+        np.testing.assert_allclose(arm.player.q, rest, atol=1e-4)
+
+
+def test_the_last_browser_drags_and_only_it_releases(arm):
+    drag(arm, [1.0, 0.0, 0.5])
+    frames(arm, 2)
+    drag(arm, [-1.0, 0.0, 0.5], OTHER_TAB)
+    frames(arm, 2)
+    say(arm, "release")
+    frames(arm, 2)
+    np.testing.assert_array_equal(arm.player.drag.target_world, [-1.0, 0.0, 0.5])
+    say(arm, "release", OTHER_TAB)
+    frames(arm, 2)
+    assert arm.player.drag is None
+
+
+def test_a_drag_goes_on_after_a_reset_where_the_browser_repeats_it(arm):
+    drag(arm, [1.0, 0.0, 0.5])
+    frames(arm, 10)
+    say(arm, "reset")
+    frames(arm, 1)
+    assert arm._state()["drag"] is None
+    drag(arm, [1.0, 0.0, 0.5])
+    frames(arm, 1)
+    assert arm.player.drag is not None
+
+
+def test_while_it_drags_no_button_pushes(ball):
+    say(ball, "hold", OTHER_TAB, body="ball", direction=[1.0, 0.0, 0.0], newtons=1.0)
+    node = "/meshcat/spheres/0_ball-plate"
+    drag(ball, [0.0, 0.0, 0.1], node=node, point=[0.0, 0.0, 0.0])
+    frames(ball, 10)
+    assert ball.player.drag is not None
+    say(ball, "release")
+    frames(ball, 10)
+    assert ball.player.v[0] > 0.0
+
+
+def test_messages_that_cannot_be_are_one_sentence_and_the_run_goes_on(arm):
+    drag(arm, [1.0, 0.0, 0.5], node="/meshcat/robot/visuals/base_0")
+    drag(arm, [1.0, 0.0, 0.5], node="nothing")
+    say(arm, "target", joint="wrist", value=0.1)
+    say(arm, "target", joint="elbow", value=9.0)
+    frames(arm, 1)
+    frames(arm, 5)
+    texts = [text for _, text in arm.told]
+    # Of messages of a kind the last one counts.
+    assert len(texts) == 3
+    assert "no body to drag 'nothing'" in texts[0]
+    assert NODE in texts[0]
+    assert "shoulder, elbow" in texts[1]
+    assert "limits of the joint" in texts[2]
+    assert not any("\n" in text for text in texts)
+    assert arm.player.time > 0.05
+
+
+def test_a_slider_moves_a_target(arm):
+    for value in np.linspace(0.5, -1.0, 50):
+        say(arm, "target", joint="elbow", value=value)
+        say(arm, "target", joint="shoulder", value=0.1)
+    frames(arm, 1)
+    assert arm._state()["targets"] == {"shoulder": 0.1, "elbow": -1.0}
+    frames(arm, 240)
+    np.testing.assert_allclose(arm.player.q, [0.1, -1.0], atol=1e-3)
+
+
+def test_patches_are_computed_when_they_are_switched_on(ball):
+    frames(ball, 60)
+    assert ball._state()["show"]["pressure"] is False
+    assert ball.player.patches is None
+    say(ball, "show", part="pressure", on=True)
+    frames(ball, 2)
+    assert len(ball.player.patches) == 1
+    assert "MPa" in ball._state()["pressure"]
+    say(ball, "show", part="pressure", on=False)
+    frames(ball, 2)
+    assert ball.player.patches is None
+    assert ball._state()["pressure"] is None
+
+
+def test_parts_without_anything_to_show_have_no_switch(ball, make):
+    # A box has patches, one a side; its elements are flat.
+    assert {"patches", "pressure", "robot"} < set(ball._state()["show"])
+    plain = make(BallPlayer())._state()["show"]
+    assert not {"patches", "pressure", "distance"} & set(plain)
+
+
+def test_a_finished_run_and_other_players_offer_neither_drags_nor_targets(make):
+    for player in (FilmPlayer(), BallPlayer()):
+        live = make(player)
+        assert hello(live)["drag"] is None
+        assert hello(live)["targets"] == []
+        drag(live, [1.0, 0.0, 0.5])
+        say(live, "target", joint="elbow", value=0.1)
+        say(live, "show", part="pressure", on=True)
+        frames(live, 1)
+        assert [text for _, text in live.told] == [
+            "this run cannot be dragged or aimed: it is a finished one, or its player cannot"
+        ] * 2
+
+
+def test_a_picture_in_somebody_elses_window_offers_no_drag(make, tmp_path):
+    player = LiveRun(build(write_arm(tmp_path)))
+    live = make(player, visualizer=meshcat.Visualizer(window=ForeignWindow()))
+    assert hello(live)["drag"] is None
+    assert len(hello(live)["targets"]) == 2
+    drag(live, [1.0, 0.0, 0.5])
+    frames(live, 1)
+    assert len(live.told) == 1
+
+
+def test_without_a_drag_nothing_of_it_is_drawn(arm):
+    frames(arm, 10)
+    assert drawn(arm) == [None, None, None]

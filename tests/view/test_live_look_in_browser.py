@@ -1,0 +1,304 @@
+"""How the live page looks and reads: sizes, light and dark, contrast, targets, names, keys."""
+
+import itertools
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sphshell_pin.contact import CoulombFriction
+from sphshell_pin.view.live import Live
+from tests.view.live_player import BallPlayer
+
+pytestmark = pytest.mark.browser
+
+DOCS = Path(__file__).parents[2] / "docs" / "view.md"
+LONG = 60_000  # [ms] on machines that draw without a graphics card
+NARROW = [(390, 844), (844, 390), (768, 1024), (320, 568)]
+WIDE = [(1440, 900), (1280, 720), (900, 500)]
+FRICTION = CoulombFriction(0.3, 0.2, v_static=0.01, v_dynamic=0.1)
+
+# Everything that one can press or drag, and is seen, with its box in the page.
+TARGETS = """() => [...document.querySelectorAll(
+    "button, select, input:not([type=checkbox]), summary, label:has(input[type=checkbox])")]
+  .filter((one) => one.checkVisibility({visibilityProperty: true}) && !one.closest("dialog"))
+  .map((one) => {
+    const box = one.getBoundingClientRect();
+    return {name: one.id || one.textContent.trim(), left: box.left, right: box.right,
+            top: box.top + scrollY, bottom: box.bottom + scrollY,
+            floats: one.closest("#stage") !== null,
+            cut: one.scrollWidth > one.clientWidth + 1 && one.tagName === "BUTTON"};
+  })"""
+
+# Of each piece of text that is seen: its color, and the colors behind it from the nearest on.
+TEXTS = """() => {
+  const found = [];
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walk.nextNode()) {
+    const text = walk.currentNode.textContent.trim(), one = walk.currentNode.parentElement;
+    if (!text || !one.checkVisibility({visibilityProperty: true})) continue;
+    if (one.closest("script, style, option, select, :disabled")) continue;
+    const behind = [];
+    for (let node = one; node; node = node.parentElement)
+      behind.push(getComputedStyle(node).backgroundColor);
+    found.push([text, getComputedStyle(one).color, behind]);
+  }
+  for (const one of document.querySelectorAll("select, input[type=text]")) {
+    if (!one.checkVisibility() || one.disabled) continue;
+    const behind = [];
+    for (let node = one; node; node = node.parentElement)
+      behind.push(getComputedStyle(node).backgroundColor);
+    found.push([one.id || one.type, getComputedStyle(one).color, behind]);
+  }
+  return found;
+}"""
+
+VARIABLES = """(names) => {
+  const style = getComputedStyle(document.documentElement);
+  return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(name).trim()]));
+}"""
+
+
+class Look:
+    """One page for all tests of this file; `show` makes it as if newly opened."""
+
+    def __init__(self, browser):
+        self.live = Live(BallPlayer(friction=FRICTION), running=False).start()
+        self.context = browser.new_context(viewport={"width": 1440, "height": 900})
+        self.page = self.context.new_page()
+        self.complaints = []
+        self.page.on("pageerror", lambda fault: self.complaints.append(str(fault)))
+        self.page.goto(self.live.url)
+        self.wait("globalThis.state && document.body.classList.contains('ready')")
+        self.page.evaluate("document.getElementById('step-size').value = '0.1'")
+        self.click("#step")
+        self.wait("state.contacts.length === 1")
+
+    def wait(self, expression):
+        self.page.wait_for_function(expression, timeout=LONG, polling=50)
+
+    def click(self, selector):
+        self.page.evaluate("selector => document.querySelector(selector).click()", selector)
+
+    def show(self, size=(1440, 900), scheme="light"):
+        self.page.set_viewport_size({"width": size[0], "height": size[1]})
+        self.page.emulate_media(color_scheme=scheme)
+        self.page.evaluate("scrollTo(0, 0)")
+        self.wait(f"innerWidth === {size[0]} && chart.canvas.clientWidth > 0")
+
+
+@pytest.fixture(scope="module")
+def opened(browser):
+    look = Look(browser)
+    yield look
+    look.context.close()
+    look.live.stop()
+    assert look.complaints == []
+
+
+@pytest.fixture
+def look(opened):
+    opened.show()
+    return opened
+
+
+@pytest.mark.parametrize("size", NARROW + WIDE)
+def test_nothing_is_cut_off_and_no_control_lies_over_another(look, size):
+    look.show(size)
+    assert look.page.evaluate("document.documentElement.scrollWidth") == size[0]
+    targets = look.page.evaluate(TARGETS)
+    if size in WIDE:  # the panel scrolls by itself there
+        assert look.page.evaluate("document.documentElement.scrollHeight") == size[1]
+        targets = [one for one in targets if one["bottom"] <= size[1]]
+    assert len(targets) > 10
+    for one in targets:
+        assert one["left"] >= -0.5, one
+        assert one["right"] <= size[0] + 0.5, one
+        assert not one["cut"], one
+    fixed = [one for one in targets if not one["floats"]]
+    for a, b in itertools.combinations(fixed, 2):
+        apart_x = min(a["right"], b["right"]) - max(a["left"], b["left"]) <= 0.5
+        apart_y = min(a["bottom"], b["bottom"]) - max(a["top"], b["top"]) <= 0.5
+        assert apart_x or apart_y, (a, b)
+
+
+@pytest.mark.parametrize("size", NARROW)
+def test_a_finger_meets_every_control_of_a_narrow_page(look, size):
+    look.show(size)
+    for one in look.page.evaluate(TARGETS):
+        assert one["bottom"] - one["top"] >= 40, one
+        assert one["right"] - one["left"] >= 40, one
+
+
+def test_on_a_phone_the_scene_stays_while_the_sheet_scrolls(look):
+    look.show((390, 844))
+    look.page.evaluate("scrollTo(0, 1200)")
+    look.wait("scrollY > 1000")
+    boxes = {
+        name: look.page.locator(name).bounding_box()
+        for name in ("#stage", "#transport", "#view-section")
+    }
+    assert boxes["#stage"]["y"] == 0
+    assert 0.4 * 844 < boxes["#stage"]["height"] < 0.5 * 844
+    assert boxes["#transport"]["y"] == pytest.approx(boxes["#stage"]["height"], abs=1)
+    assert 0 < boxes["#view-section"]["y"] < 844
+    look.click("#unfold")  # the scene alone
+    look.wait("document.querySelector('#stage').clientHeight > 780")
+    assert look.page.locator("#transport").bounding_box()["y"] + 58 <= 845
+    look.click("#unfold")
+    look.show((844, 390))
+    stage = look.page.locator("#stage").bounding_box()
+    run = look.page.locator("#run").bounding_box()
+    assert (stage["x"], stage["height"]) == (0, 390)
+    assert run["x"] >= stage["width"]
+    assert run["y"] < 40
+
+
+def luminance(color):
+    """Relative luminance, WCAG 2.2."""
+    linear = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
+    return linear @ [0.2126, 0.7152, 0.0722]
+
+
+def contrast(a, b):
+    light, dark = sorted((luminance(a), luminance(b)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def rgba(text):
+    if text.startswith("#"):
+        return np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)]), 1.0
+    numbers = [float(one) for one in re.findall(r"[\d.]+", text)]
+    return np.array(numbers[:3]) / 255, numbers[3] if len(numbers) > 3 else 1.0
+
+
+def paint(colors, below):
+    """Return what is seen of `colors`, the uppermost first, over `below`."""
+    seen = below
+    for color, alpha in map(rgba, reversed(colors)):
+        seen = alpha * color + (1 - alpha) * seen
+    return seen
+
+
+def test_the_measure_of_contrast_is_that_of_the_standard():
+    white, black, grey = np.ones(3), np.zeros(3), np.full(3, 0x77 / 255)
+    assert contrast(white, black) == pytest.approx(21)
+    assert contrast(grey, white) == pytest.approx(4.48, abs=0.01)  # #777, the known near miss
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_all_text_has_contrast(look, scheme, size):
+    look.show(size, scheme)
+    look.page.evaluate("document.getElementById('curves').open = true")
+    look.click("#help-button")
+    texts = look.page.evaluate(TEXTS)
+    look.click("#help-close")
+    look.page.evaluate("document.getElementById('curves').open = false")
+    assert len(texts) > 60
+    sky = look.page.evaluate(VARIABLES, ["--sky", "--earth"])
+    for text, color, behind in texts:
+        for below in sky.values():  # the scene lies below what is not opaque
+            ground = paint(behind, rgba(below)[0])
+            assert contrast(paint([color], ground), ground) >= 4.5, (text, color, behind)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_curves_and_labels_of_charts_have_contrast(look, scheme):
+    look.show(scheme=scheme)
+    curves = ["--normal", "--friction", *(f"--curve-{k}" for k in range(1, 9))]
+    found = look.page.evaluate(VARIABLES, ["--panel", "--faint", "--ink", *curves])
+    panel = rgba(found["--panel"])[0]
+    for name in ("--faint", "--ink", *curves):  # the values at the mouse have the curves' colors
+        assert contrast(rgba(found[name])[0], panel) >= 4.5, name
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_scene_and_the_chart_follow_the_preference(look, scheme):
+    import io
+
+    from PIL import Image
+
+    look.show(scheme=scheme)
+    look.page.wait_for_timeout(300)
+    shot = look.page.locator("#stage").screenshot(timeout=LONG)
+    picture = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(float) / 255
+    # Left and right of what stands in the middle there is nothing but the background.
+    edges = luminance(picture[150:-50, [5, -5]])
+    assert (edges > 0.6).all() if scheme == "light" else (edges < 0.1).all()
+    assert look.page.evaluate("getComputedStyle(document.body).colorScheme") == "light dark"
+    assert (
+        look.page.evaluate("import('./theme.js').then((it) => it.color('--normal'))")
+        == ({"light": "#c81e3c", "dark": "#ff6b81"}[scheme])
+    )
+
+
+def test_every_control_has_a_name_and_messages_are_announced(look):
+    nameless = look.page.evaluate("""() => [...document.querySelectorAll(
+        "button, input, select, summary, canvas, iframe, dialog")].filter((one) => {
+            if (one.closest("#scene, .dg")) return false;  // meshcat's own controls are hidden
+            const named = one.getAttribute("aria-label") || one.textContent.trim() ||
+                (one.labels && one.labels[0]?.textContent.trim()) ||
+                document.getElementById(one.getAttribute("aria-labelledby"))?.textContent;
+            return !named;
+        }).map((one) => one.outerHTML)""")
+    assert nameless == []
+    # A select is named by its label, not by its options.
+    unlabelled = look.page.evaluate("""() => [...document.querySelectorAll("select, input")]
+        .filter((one) => !one.closest("#scene, .dg"))
+        .filter((one) => !one.labels?.length && !one.getAttribute("aria-label"))
+        .map((one) => one.outerHTML)""")
+    assert unlabelled == []
+    live = look.page.evaluate("""() => ["notice", "toasts"].map((name) => {
+        const one = document.getElementById(name);
+        return one.getAttribute("aria-live") || one.getAttribute("role");
+    })""")
+    assert live == ["status", "polite"]
+
+
+def test_focus_is_seen_and_a_focused_button_takes_its_keys(look):
+    look.page.locator("#title").click()
+    look.page.keyboard.press("Tab")
+    look.page.keyboard.press("Tab")
+    look.page.keyboard.press("Tab")
+    focused = look.page.evaluate("""() => {
+        const style = getComputedStyle(document.activeElement);
+        return [document.activeElement.id, style.outlineStyle, parseFloat(style.outlineWidth)];
+    }""")
+    assert focused[0] == "run"
+    assert focused[1] == "solid"
+    assert focused[2] >= 2
+    look.page.keyboard.press("Tab")  # Step
+    before = look.page.evaluate("state.t")
+    look.page.keyboard.press(" ")
+    look.wait(f"state.t > {before}")
+    assert not look.page.evaluate("state.running")
+    assert look.page.evaluate("document.activeElement.id") == "step"
+    # After a click of the mouse the space bar is the page's again.
+    look.page.locator("#step").click()
+    look.page.keyboard.press(" ")
+    look.wait("state.running")
+    look.page.keyboard.press(" ")
+    look.wait("!state.running")
+
+
+def test_the_overlay_lists_the_keys_that_the_documentation_has(look):
+    look.page.keyboard.press("?")
+    look.wait("document.getElementById('help').open")
+    assert look.page.get_by_role("dialog", name="Keys").is_visible()
+    rows = look.page.evaluate(
+        """[...document.getElementById("keys").rows]
+        .map((row) => [...row.cells].map((one) => one.innerText))"""
+    )
+    # Keys do nothing below the overlay.
+    t = look.page.evaluate("state.t")
+    look.page.keyboard.press("s")
+    look.page.wait_for_timeout(150)
+    assert look.page.evaluate("state.t") == t
+    look.page.keyboard.press("Escape")
+    look.wait("!document.getElementById('help').open")
+    section = DOCS.read_text("utf-8").partition("\n## Keys\n")[2].partition("\n## ")[0]
+    table = re.findall(r"^\| (`.+) \| (.+) \|$", section, re.M)
+    assert [[keys.replace("`", ""), says] for keys, says in table] == rows
+    assert len(rows) >= 7

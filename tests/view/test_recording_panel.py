@@ -1,0 +1,286 @@
+"""The panel of a recording in a real browser: time, chart, cameras, keys, narrow and dark."""
+
+import numpy as np
+import pytest
+
+from sphshell_pin.view import write_recording
+from sphshell_pin.view.curves import BINS, run_curves
+from tests.view.stand_ins import a_result, ball_configuration, ball_on_plate
+
+SIZES = {"wide": (1100, 640), "narrow": (390, 844)}
+STEP = 1.0 / 30.0
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory):
+    """The result of a ball on a plate, and the file of its recording."""
+    scene, result = ball_on_plate()
+    result.pairs = ["ball </script><script>window.hacked = 1</script>"]
+    title = "</script><script>window.hacked = 1</script>"
+    file = tmp_path_factory.mktemp("page") / "ball.html"
+    return result, write_recording(file, result, scene, title=title)
+
+
+@pytest.fixture(scope="module")
+def opened(browser, ball):
+    """Opens the recording in a window; complaints and requests of it end the tests."""
+    complaints = []
+    contexts = {}
+
+    def page_of(size="wide", scheme="light", motion="reduce"):
+        key = size, scheme, motion
+        if key not in contexts:
+            width, height = SIZES[size]
+            context = browser.new_context(
+                viewport={"width": width, "height": height},
+                color_scheme=scheme,
+                reduced_motion=motion,
+                offline=True,
+            )
+            page = contexts[key] = context.new_page()
+            page.on("pageerror", lambda fault: complaints.append(str(fault)))
+            page.on(
+                "request",
+                lambda one: (
+                    one.url.startswith(("file:", "data:", "blob:")) or complaints.append(one.url)
+                ),
+            )
+            page.goto(ball[1].resolve().as_uri())
+            page.wait_for_function("window.recording", timeout=60_000)
+        return contexts[key]
+
+    yield page_of
+    for page in contexts.values():
+        page.context.close()
+    assert complaints == []
+
+
+@pytest.fixture
+def page(opened):
+    page = opened()
+    page.evaluate("recording.pause(); recording.seek(0); recording.cameras.look('fit')")
+    return page
+
+
+def ball_place(page):
+    """Where the scene has the ball [m]."""
+    return np.array(
+        page.evaluate(
+            "viewer.scene_tree.find(['meshcat', 'spheres', '0_ball']).object.position.toArray()"
+        )
+    )
+
+
+def time_of(page):
+    return page.evaluate("recording.time")
+
+
+def check_agreement(page, result):
+    """Compare scene, clock, scrub bar, and the readings of the chart, with the result."""
+    t = time_of(page)
+    expected = [np.interp(t, result.t, result.q[:, k]) for k in range(3)]
+    # Keys of the page's frames, between which it interpolates a motion with kinks.
+    np.testing.assert_allclose(ball_place(page), expected, atol=0.01)
+    assert float(page.locator("#clock").inner_text().split()[0]) == pytest.approx(t, abs=0.0051)
+    assert float(page.locator("#scrub").input_value()) == pytest.approx(t, abs=1e-6)
+    row = int(np.argmin(np.abs(result.t - t)))
+    force = result.contacts.normal_force[result.contacts.row == row].sum()
+    reading = page.locator("#normal").inner_text()
+    assert float(reading.split()[0]) == pytest.approx(force, abs=1e-3)
+
+
+@pytest.mark.browser
+def test_without_motion_where_none_is_wanted(opened):
+    assert opened().evaluate("!recording.playing && recording.time === 0")
+    assert opened(motion="no-preference").evaluate("recording.playing || recording.time > 0")
+
+
+@pytest.mark.browser
+def test_chart_scrub_bar_and_scene_show_the_same_time(page, ball):
+    result, _ = ball
+    check_agreement(page, result)
+    box = page.locator("#chart").bounding_box()
+    left, right = page.evaluate("[LEFT, RIGHT]")
+    for share in (0.4, 0.62):
+        at = box["x"] + left + share * (box["width"] - left - right)
+        page.mouse.click(at, box["y"] + 30)
+        assert time_of(page) == pytest.approx(share * result.t[-1], abs=0.01)
+        check_agreement(page, result)
+        ink = page.evaluate(
+            """share => {
+                const canvas = element("chart"), pen = canvas.getContext("2d");
+                const at = Math.round(LEFT + share * (canvas.clientWidth - LEFT - RIGHT));
+                const gap = TOP + FORCE_SHARE * (canvas.clientHeight - TOP - BOTTOM - GAP) + GAP / 2;
+                return [...pen.getImageData(at - 2, Math.round(gap), 5, 1).data];
+            }""",
+            share,
+        )
+        darkest = np.reshape(ink, (5, 4))[:, :3].sum(axis=1).min()
+        assert darkest < 3 * 70  # the line of the cursor
+    page.locator("#scrub").fill("1.25")
+    assert time_of(page) == 1.25
+    check_agreement(page, result)
+    # A drag takes the cursor along.
+    page.mouse.move(box["x"] + 200, box["y"] + 40)
+    page.mouse.down()
+    page.mouse.move(box["x"] + left + 0.25 * (box["width"] - left - right), box["y"] + 40)
+    page.mouse.up()
+    assert time_of(page) == pytest.approx(0.25 * result.t[-1], abs=0.01)
+
+
+@pytest.mark.browser
+def test_keys(page, ball):
+    end = float(ball[0].t[-1])
+    page.keyboard.press("End")
+    assert time_of(page) == end
+    page.keyboard.press("ArrowLeft")
+    assert time_of(page) == pytest.approx(end - STEP)
+    page.keyboard.press("Shift+ArrowLeft")
+    assert time_of(page) == pytest.approx(end - 11 * STEP)
+    page.keyboard.press("ArrowRight")
+    assert time_of(page) == pytest.approx(end - 10 * STEP)
+    page.keyboard.press("Home")
+    assert time_of(page) == 0.0
+    page.keyboard.press("Space")
+    assert page.evaluate("recording.playing")
+    page.wait_for_function("recording.time > 0")
+    page.keyboard.press("Space")
+    assert not page.evaluate("recording.playing")
+    page.keyboard.press("ArrowDown")
+    assert page.evaluate("recording.rate") == 0.5
+    page.keyboard.press("ArrowUp")
+    assert page.evaluate("recording.rate") == 1.0
+    page.keyboard.press("4")
+    assert page.evaluate("recording.cameras.name") == "top"
+    page.keyboard.press("c")
+    assert not page.locator("#chart").is_visible()
+    page.keyboard.press("c")
+    assert page.locator("#chart").is_visible()
+    page.keyboard.press("?")
+    assert page.locator("#help").is_visible()
+    page.keyboard.press("Escape")
+    assert not page.locator("#help").is_visible()
+
+
+@pytest.mark.browser
+def test_it_stops_at_the_end_or_begins_again(page, ball):
+    end = float(ball[0].t[-1])
+    page.locator("#speed").select_option("4")
+    page.evaluate("end => { recording.seek(end - 0.1); recording.play(); }", end)
+    page.wait_for_function("!recording.playing")
+    assert time_of(page) == end
+    page.locator("#loop").click()
+    page.evaluate("end => { recording.seek(end - 0.1); recording.play(); }", end)
+    page.wait_for_function("recording.playing && recording.time < 1.5")
+    page.locator("#loop").click()
+    page.locator("#speed").select_option("1")
+
+
+@pytest.mark.browser
+def test_cameras(page):
+    eyes = {}
+    for name in page.evaluate("recording.cameras.names"):
+        page.locator(f"#views [data-view={name}]").click()
+        eyes[name] = np.array(page.evaluate("viewer.camera.position.toArray()"))
+        target = np.array(page.evaluate("viewer.controls.target.toArray()"))
+        toward = (eyes[name] - target) / np.linalg.norm(eyes[name] - target)
+        # The page's camera has y up: front is +x, side -y, top +z of the world.
+        axis = {"front": [1, 0, 0], "side": [0, 0, 1], "top": [0, 1, 0]}.get(name)
+        assert axis is None or toward @ axis > 0.999
+    assert list(eyes) == ["fit", "front", "side", "top", "follow", "contact"]
+    # The camera goes with the ball, of which the scene has y up too.
+    offsets = []
+    for time in (0.0, 2.0):
+        page.evaluate("time => recording.draw(time)", time)
+        eye = np.array(page.evaluate("viewer.camera.position.toArray()"))
+        x, y, z = ball_place(page)
+        offsets.append(eye - [x, z, -y])
+    np.testing.assert_allclose(offsets[0], offsets[1], atol=2e-3)
+    assert np.linalg.norm(offsets[0]) < np.linalg.norm(eyes["fit"]) * 0.9
+    page.mouse.move(500, 250)
+    page.mouse.down()
+    page.mouse.move(560, 250, steps=3)
+    page.mouse.up()
+    assert page.evaluate("recording.cameras.name") is None
+
+
+@pytest.mark.browser
+def test_switches_hide_what_they_name(page):
+    labels = page.locator("#parts label").all_inner_texts()
+    assert " ".join(labels).split() == "Robot Spheres Arrows Points Path Wireframe".split()
+    visible = "viewer.scene_tree.find(['meshcat', 'spheres']).object.visible"
+    box = page.locator("#parts label", has_text="Spheres").locator("input")
+    box.uncheck()
+    assert page.evaluate(visible) is False
+    box.check()
+    assert page.evaluate(visible) is True
+
+
+@pytest.mark.browser
+def test_text_of_a_run_is_no_code(page, ball):
+    assert page.evaluate("window.hacked") is None
+    assert page.locator("h1").inner_text() == "</script><script>window.hacked = 1</script>"
+    assert page.evaluate("recording.chart.curve.name") == ball[0].pairs[0]
+    assert not page.evaluate("viewer.gui.domElement.checkVisibility()")
+    figures = page.locator("#figures").inner_text()
+    peak = ball[0].contacts.normal_force.max()
+    assert f"{peak:.3g} N" in figures
+    assert "3 s" in figures
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_is_cut_off_or_overlaps(opened, size, scheme):
+    page = opened(size, scheme)
+    width, height = SIZES[size]
+    parts = page.evaluate(
+        """() => [...document.querySelectorAll("h1, button, select, #scrub, #clock, .reading, summary")]
+            .filter((one) => one.checkVisibility() && one.getClientRects().length)
+            .map((one) => { const r = one.getBoundingClientRect();
+                return [one.id || one.textContent, r.left, r.top, r.right, r.bottom]; })"""
+    )
+    assert len(parts) > 15
+    for name, left, top, right, bottom in parts:
+        assert 0 <= left < right <= width, name
+        assert 0 <= top < bottom <= height, name
+    for k, (name, left, top, right, bottom) in enumerate(parts):
+        for other, left_, top_, right_, bottom_ in parts[:k]:
+            apart = right <= left_ or right_ <= left or bottom <= top_ or bottom_ <= top
+            assert apart, (name, other)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    backgrounds = page.evaluate(
+        """() => [getComputedStyle(element("dock")).backgroundColor.match(/\\d+/g).map(Number),
+            viewer.scene_tree.find(["Background"]).object.top_color]"""
+    )
+    for color in backgrounds:
+        assert (np.mean(color) < 80) == (scheme == "dark")
+
+
+def test_curves_keep_every_peak_of_a_long_run():
+    t = np.linspace(0.0, 5.0, 50_001)
+    q = np.tile(ball_configuration([0, 0, 0.05]), (len(t), 1))
+    rows = [{"row": row, "normal_force": 1.0, "depth": 1e-5} for row in range(0, len(t), 7)]
+    rows += [{"row": 12_345, "normal_force": 50.0, "depth": 3e-4}]
+    result = a_result(t, q, rows, ("tip",))
+    (curve,) = run_curves(result, len(t))
+    assert len(curve.t) <= 4 * BINS + 2
+    assert curve.normal.max() == curve.figures["peak"] == 50.0
+    assert curve.t[np.argmax(curve.normal)] == t[12_345]
+    assert curve.normal.min() == 0.0
+
+
+def test_curves_of_several_pairs_begin_with_their_sum():
+    t = np.array([0.0, 1.0, 2.0])
+    q = np.tile(ball_configuration([0, 0, 0.05]), (3, 1))
+    rows = [
+        {"row": 1, "pair": 0, "normal_force": 1.0, "friction_force_world": [3.0, 4.0, 0.0]},
+        {"row": 1, "pair": 2, "normal_force": 2.0},
+    ]
+    curves = run_curves(a_result(t, q, rows, ("a", "b", "c")), 3)
+    assert [one.name for one in curves] == ["all pairs, summed", "c", "a"]
+    assert curves[0].normal.tolist() == [0.0, 3.0, 0.0]
+    assert curves[0].friction.tolist() == [0.0, 5.0, 0.0]
+    # The trapezoids of a touch at one row of three.
+    assert curves[0].figures["contact_time"] == 1.0
+    assert curves[0].figures["mean"] == 3.0
