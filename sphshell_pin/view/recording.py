@@ -116,12 +116,12 @@ def render_recording(
     start, end = (float(t[0]), float(t[-1])) if span is None else span
     rows, times = choose_rows(t, contacts, fps, speed, span)
     # Of a part of a run, too: pictures of it have the same cameras and the same arrows.
-    whole = rows if span is None else choose_rows(t, contacts, fps, speed)[0]
-    shown = contacts.select(np.isin(contacts.row, whole))
+    all_rows = rows if span is None else choose_rows(t, contacts, fps, speed)[0]
+    shown = contacts.select(np.isin(contacts.row, all_rows))
     q = np.asarray(result.q, dtype=float)
     view = choose_view(
         scene,
-        q[whole],
+        q[all_rows],
         contacts.point_world,
         contacts.normal_world,
         visual_model,
@@ -153,7 +153,7 @@ def render_recording(
     window.frame = None
     trailed = _draw_trails(display, window, result, start, speed)
 
-    panel = run_panel(result, scene, visual_model, contacts, count, q[whole], q[rows], view)
+    panel = run_panel(result, scene, visual_model, contacts, count, q[all_rows], q[rows], view)
     clock = {
         "start": start,
         "end": end,
