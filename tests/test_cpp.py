@@ -1,10 +1,11 @@
 """The C++ library: built and installed without Python, used from the installed package.
 
-What these tests build is left in build/cpp, so that the next run compiles what has changed.
+What these tests build is left in build/cpp and beside it: the next run compiles what has changed.
 """
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import shutil
@@ -24,6 +25,9 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "docs" / "examples" / "cpp"
 PAGE = ROOT / "docs" / "cpp.md"
+BUILD = ROOT / "build"
+PINOCCHIO = Path(pin.__file__).parents[4]  # the wheels' prefix, of which this is lib/python/...
+WITHOUT_PYTHON = "-DSPHSHELL_PIN_PYTHON=OFF", "-DCMAKE_DISABLE_FIND_PACKAGE_Python=ON"
 CACHE = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -46,37 +50,27 @@ def call(*command: object, cwd: Path = ROOT) -> str:
 
 
 @pytest.fixture(scope="module")
-def prefix(tmp_path_factory) -> str:
-    """The CMAKE_PREFIX_PATH of a consumer: the installed library, moved, and Pinocchio's."""
-    pinocchio = Path(pin.__file__).parents[4]  # the wheel's own prefix: lib/pythonX.Y/site-packages
-    build, first = ROOT / "build" / "cpp", tmp_path_factory.mktemp("installed") / "first"
-    call(
-        *("cmake", "-G", "Ninja", "-S", ROOT, "-B", build, *CACHE),
-        *(f"-DCMAKE_PREFIX_PATH={pinocchio}", "-DCMAKE_BUILD_TYPE=Release"),
-        *("-DSPHSHELL_PIN_PYTHON=OFF", "-DCMAKE_DISABLE_FIND_PACKAGE_Python=ON"),
-    )
-    call("cmake", "--build", build)
-    call("cmake", "--install", build, "--prefix", first)
-    # It may be moved.
-    home = first.rename(first.with_name("moved"))
-    return f"{home};{pinocchio}"
+def built() -> Path:
+    """The folder of the library, cpp and cpp-installed, and its users, cpp-finger and cpp-tests."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with (BUILD / "cpp.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # one process of the tests builds, the others wait
+        build("cpp", ROOT, PINOCCHIO, *WITHOUT_PYTHON, kind="Release")
+        call("cmake", "--install", BUILD / "cpp", "--prefix", BUILD / "cpp-installed")
+        both = f"{BUILD / 'cpp-installed'};{PINOCCHIO}"
+        build("cpp-finger", EXAMPLE, both)
+        page = BUILD / "cpp-page.cpp"
+        if not page.exists() or page.read_text() != program_of_page():
+            page.write_text(program_of_page())
+        build("cpp-tests", ROOT / "tests" / "cpp", both, f"-DPAGE={page}")
+    return BUILD
 
 
-def build_with(prefix: str, source: Path, folder: Path, *options: str) -> None:
-    # Neither optimized nor for a debugger: they are compiled in the shortest time.
-    ready = [f"-DCMAKE_PREFIX_PATH={prefix}", "-DCMAKE_BUILD_TYPE=", *CACHE, *options]
-    call("cmake", "-G", "Ninja", "-S", source, "-B", folder, *ready)
-    call("cmake", "--build", folder)
-
-
-@pytest.fixture(scope="module")
-def consumers(prefix, tmp_path_factory) -> Path:
-    """The folder of the programs of tests/cpp and of the blocks of docs/cpp.md."""
-    folder = tmp_path_factory.mktemp("consumers")
-    page = folder / "page.cpp"
-    page.write_text(program_of_page(), encoding="utf-8")
-    build_with(prefix, ROOT / "tests" / "cpp", folder / "build", f"-DPAGE={page}")
-    return folder / "build"
+def build(name: str, source: Path, prefix: object, *options: str, kind: str = "") -> None:
+    # Consumers are neither optimized nor for a debugger: so they are compiled fastest.
+    ready = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_BUILD_TYPE={kind}", *CACHE, *options]
+    call("cmake", "-G", "Ninja", "-S", source, "-B", BUILD / name, *ready)
+    call("cmake", "--build", BUILD / name)
 
 
 def program_of_page() -> str:
@@ -85,7 +79,7 @@ def program_of_page() -> str:
     bodies = [text for text in found if "int main" not in text]
     assert bodies
     includes = re.compile(r"^#include .*\n", re.MULTILINE)
-    lines = {line for text in found for line in includes.findall(text)}
+    lines = {line for text in bodies for line in includes.findall(text)}
     out = "".join(sorted(lines)) + "#undef NDEBUG\n#include <cassert>\n"
     out += "namespace pin = pinocchio;\nnamespace sp = sphshell_pin;\n"
     for k, text in enumerate(bodies):
@@ -94,10 +88,9 @@ def program_of_page() -> str:
     return f"{out}int main() {{\n{calls}}}\n"
 
 
-def test_the_example_comes_to_the_numbers_of_python(prefix, tmp_path):
-    build_with(prefix, EXAMPLE, tmp_path)
+def test_the_example_comes_to_the_numbers_of_python(built):
     urdf = ROOT / "robots" / "urdf" / "three_link_finger.urdf"
-    lines = call(tmp_path / "finger_on_wall", urdf).splitlines()
+    lines = call(built / "cpp-finger" / "finger_on_wall", urdf).splitlines()
     printed = np.array(lines[0].split()[1:], float)
     found = re.match(r"force (\S+) N, depth (\S+) m, element 0", lines[1])
     assert found
@@ -123,18 +116,19 @@ def test_the_example_comes_to_the_numbers_of_python(prefix, tmp_path):
     np.testing.assert_allclose(printed, q, rtol=1e-10)
     np.testing.assert_allclose([force, depth], [*contacts.normal_force, *contacts.depth], rtol=1e-8)
     # One without its argument says how it is called.
-    alone = [tmp_path / "finger_on_wall"]
+    alone = [built / "cpp-finger" / "finger_on_wall"]
     usage = subprocess.run(alone, capture_output=True, text=True, check=False)
     assert usage.returncode == 2
     assert "usage: finger_on_wall URDF" in usage.stderr
 
 
 @pytest.mark.parametrize("name", ["laws", "surfaces", "scenes", "page"])
-def test_in_cpp(consumers, name):
-    call("ctest", "--output-on-failure", "-R", f"^{name}$", "--no-tests=error", cwd=consumers)
+def test_in_cpp(built, name):
+    tests = built / "cpp-tests"
+    call("ctest", "--output-on-failure", "-R", f"^{name}$", "--no-tests=error", cwd=tests)
 
 
-def test_contacts_are_those_of_python_to_the_bit(consumers):
+def test_contacts_are_those_of_python_to_the_bit(built):
     rng = np.random.default_rng(3)
     side = 9
     x, y = np.meshgrid(np.arange(side), np.arange(side), indexing="ij")
@@ -152,7 +146,7 @@ def test_contacts_are_those_of_python_to_the_bit(consumers):
     text += [" ".join(map(str, row)) for row in quads.tolist()]
     for place, size, how in zip(center.tolist(), radius.tolist(), method, strict=True):
         text.append(" ".join(map(repr, [*place, size])) + f" {how}")
-    program, given = [consumers / "contacts_of"], "\n".join(text)
+    program, given = [built / "cpp-tests" / "contacts_of"], "\n".join(text)
     done = subprocess.run(program, input=given, capture_output=True, text=True, check=True)
 
     shell = sp.Shell(vertices, quads, clean=False)
@@ -166,13 +160,19 @@ def test_contacts_are_those_of_python_to_the_bit(consumers):
     np.testing.assert_array_equal(np.loadtxt(done.stdout.splitlines()), wanted)
 
 
-def test_only_the_public_names_are_exported(prefix):
-    (library,) = {path.resolve() for path in Path(prefix.split(";")[0]).rglob("libsphshell_pin.*")}
-    if sys.platform != "linux":
-        pytest.skip("nm lists the names of an ELF library")
-    names = call("nm", "-D", "--defined-only", library)
+@pytest.mark.skipif(sys.platform != "linux", reason="nm lists the names of an ELF library")
+def test_only_the_public_names_are_exported(built):
+    names = call(
+        "nm", "-D", "--defined-only", built / "cpp-installed" / "lib" / "libsphshell_pin.so"
+    )
     assert "_ZN12sphshell_pin5Scene" in names
     assert "_ZN8sphshell" not in names
+
+
+def test_the_package_may_be_moved(built):
+    files = list((built / "cpp-installed" / "lib" / "cmake").rglob("*.cmake"))
+    assert len(files) == 4
+    assert not [file for file in files if str(ROOT) in file.read_text()]
 
 
 def test_the_page_has_the_example():

@@ -74,7 +74,7 @@ void bad_numbers_are_refused() {
   CHECK_THROWS(E, "stiffness = 0 must be positive [N/m]", FrictionLaw(BristleFriction{1, 1, 0}));
   MindlinFriction rings{1, 1, {1e9, 0.3}};
   rings.rings = 9;
-  CHECK_THROWS(E, "rings = 9 must be a whole number in [1, 8]", FrictionLaw(rings));
+  CHECK_THROWS(E, "rings = 9 must be a whole number in [1, 8]", FrictionLaw{rings});
   CHECK_THROWS(E, "slip_speed = -1 must not be negative", FrictionLaw().coefficient(-1));
 }
 

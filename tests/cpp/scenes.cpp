@@ -11,6 +11,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 using pinocchio::SE3;
+using Vector = Eigen::Ref<const VectorXd>;  // for which Pinocchio has aba() compiled
 
 namespace {
 
@@ -25,6 +26,7 @@ pinocchio::Model balls(int count) {
     const std::string name = "ball " + std::to_string(k);
     const auto joint = model.addJoint(0, Joint(), SE3::Identity(), name);
     model.appendBodyToJoint(joint, pinocchio::Inertia::FromSphere(kMass, kRadius));
+    model.addJointFrame(joint);
     model.addBodyFrame(name, joint);
   }
   return model;
@@ -105,7 +107,7 @@ void derivatives_are_those_of_the_forces() {
   for (int k = 0; k < 6; ++k) {
     const VectorXd step = h * VectorXd::Unit(6, k);
     const VectorXd up = force(pinocchio::integrate(scene.model(), q, step), v);
-    const VectorXd down = force(pinocchio::integrate(scene.model(), q, -step), v);
+    const VectorXd down = force(pinocchio::integrate(scene.model(), q, VectorXd(-step)), v);
     CHECK(((up - down) / (2 * h) - by_q.col(k)).norm() < 1e-5 * by_q.norm());
     const VectorXd slope = (force(q, v + step) - force(q, v - step)) / (2 * h);
     CHECK((slope - by_v.col(k)).norm() < 1e-5 * by_v.norm());
@@ -126,8 +128,8 @@ double creep(const FrictionLaw& friction, bool advance) {
   state.advance(q, v, 0);
   for (int step = 0; step < 10000; ++step) {
     const auto& forces = state.external_forces(q, v);
-    v += dt * pinocchio::aba(model, data, q, v, none, forces);
-    q = pinocchio::integrate(model, q, dt * v);
+    v += dt * pinocchio::aba(model, data, Vector(q), Vector(v), Vector(none), forces);
+    q = pinocchio::integrate(model, q, VectorXd(dt * v));
     if (advance) state.advance(q, v, dt);
   }
   CHECK(state.contacts(q, v).at(0).contact_id == 0);

@@ -8,6 +8,7 @@
 
 namespace pin = pinocchio;
 namespace sp = sphshell_pin;
+using Vector = Eigen::Ref<const Eigen::VectorXd>;  // for which Pinocchio has aba() compiled
 
 int main(int argc, char** argv) try {
   if (argc != 2) throw std::invalid_argument("usage: finger_on_wall URDF");
@@ -29,8 +30,8 @@ int main(int argc, char** argv) try {
   for (int step = 0; step < 15000; ++step) {
     const Eigen::VectorXd tau = kp * (q_wanted - q) - kd * v;
     const auto& forces = state.external_forces(q, v);
-    v += dt * pin::aba(model, data, q, v, tau, forces);
-    q = pin::integrate(model, q, dt * v);
+    v += dt * pin::aba(model, data, Vector(q), Vector(v), Vector(tau), forces);
+    q = pin::integrate(model, q, Eigen::VectorXd(dt * v));
     state.advance(q, v, dt);
   }
 

@@ -18,6 +18,9 @@ inline std::string shown(double x) {
     std::snprintf(text, sizeof text, "%.*g", digits, x);
     if (std::strtod(text, nullptr) == x) break;
   }
+  // A whole number without its exponent.
+  if (std::abs(x) >= 1 && std::abs(x) < 1e15 && std::string(text).find('e') != std::string::npos)
+    std::snprintf(text, sizeof text, "%.0f", x);
   return text;
 }
 
