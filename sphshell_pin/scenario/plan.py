@@ -286,7 +286,8 @@ def _press_plan(
     if len(path) < 2:
         reason = "it has no room" if stance.inertia else "its joints cannot keep it from rolling"
         why.append(f"the tip presses in one place and does not slide: {reason}")
-    duration = math.ceil(10 * (LEAD_IN + length / rate + 2 * RAMP + 0.5)) / 10
+    ramps = 2 * RAMP if len(path) > 1 else 0.0
+    duration = math.ceil(10 * (LEAD_IN + length / rate + ramps + 0.5)) / 10
     return Plan((tip,), contact, control, duration, gap, placement, None, tuple(why))
 
 
