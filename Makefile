@@ -36,13 +36,13 @@ $(VENV)/.build: $(BIN)/python pyproject.toml
 comma := ,
 define install # EXTRAS
 	$(FETCH) -r pyproject.toml $(addprefix --extra ,$(1))
-	@echo "Building sphshell_pin into $(VENV): about 80 seconds"
+	@echo "Building sphshell_pin into $(VENV): about two minutes"
 	$(PIP) --no-build-isolation -e '.[$(subst $() ,$(comma),$(1))]'
 	@touch $@ $(VENV)/.demo
 endef
 
 $(VENV)/.demo: $(VENV)/.build CMakeLists.txt $(CPP)
-	$(call install,view robots)
+	$(call install,view robots cad)
 
 $(VENV)/.test: $(VENV)/.build CMakeLists.txt $(CPP)
 	$(call install,test)

@@ -47,6 +47,7 @@ RPATHS = (b"$ORIGIN/../cmeel.prefix/lib", b"@loader_path/../cmeel.prefix/lib")
 NEWEST = {"manylinux_2_28": {"GLIBC": (2, 28), "GLIBCXX": (3, 4, 24), "CXXABI": (1, 3, 11)}}
 COMPILERS = ("cc", "c++", "gcc", "g++", "clang", "cmake", "ninja", "make")
 JOB = "fingertip_on_blade"
+EXTRAS = "view,robots,cad"  # of the job
 FILES = ("run.npz", "contacts.csv", "summary.json", "recording.html", "force_and_depth.png")
 # Of the checkout beside this file, run against what is installed: shells, contacts, motion. They
 # need TEST_NEEDS and no extra.
@@ -155,7 +156,7 @@ def check_run(wheel: Path, folder: Path) -> list[str]:
     ).stdout.strip()
     cached = ["--cache-dir", cache] if cache else []
     install = ["-m", "pip", "install", "--quiet", *cached, "--only-binary", ":all:"]
-    for what in ([str(wheel)], [f"{wheel}[view,robots]", *TEST_NEEDS]):
+    for what in ([str(wheel)], [f"{wheel}[{EXTRAS}]", *TEST_NEEDS]):
         if call(*install, *what) or call("-c", f"import {PACKAGE}"):
             return [f"it cannot be installed and imported: {', '.join(what)}"]
     return ["it does not work: see above"] if call(__file__, "--installed") else []

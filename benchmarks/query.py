@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 RADIUS, DEPTH = 0.010, 0.0005
 
 
-def query_contestant(shell: Shell, centers: Array, method: str = "facets") -> Callable[[], float]:
+def query_contestant(shell: Shell, centers: Array, method: str = "smooth") -> Callable[[], float]:
     radii = np.full(len(centers), RADIUS)
 
     def run() -> float:
@@ -100,21 +100,22 @@ def fcpw_contestant(
     return run
 
 
-THIS, COAL = "this", "coal::collide, all contacts"
+THIS, FACETS, COAL = "this", "this, method facets", "coal::collide, all contacts"
 LIBIGL, FCPW = "libigl AABB, closest point", "fcpw, closest point, single precision"
 
 
 def measure_peers(rounds: int, progress: Progress = silent) -> dict[str, Array]:
     """Return times [s] of a query on 200 k triangles at cold, random positions, by name.
 
-    A sphere that touches, all its contacts; libigl and fcpw, where installed, look for the closest
-    point alone.
+    A sphere that touches, all its contacts by the default method and by "facets"; libigl and fcpw,
+    where installed, look for the closest point alone.
     """
     vertices, triangles = wavy_sheet(316, 1.0)
     shell = Shell(vertices, triangles)
     centers = touching_centers(20_000, 1.0, RADIUS, DEPTH)
     contestants = {
         THIS: query_contestant(shell, centers),
+        FACETS: query_contestant(shell, centers, "facets"),
         COAL: coal_contestant(vertices, triangles, centers[:2000]),
     }
     peers = {

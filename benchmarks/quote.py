@@ -17,25 +17,16 @@ from pathlib import Path
 from sphshell_pin.atomic import atomic_file
 
 ROOT = Path(__file__).parent.parent
-PAGES = ("README.md", "docs/speed.md")
+PAGES = ("README.md", "docs/speed.md", "docs/why_not.md")
 DATA = "docs/measured/report.json"
 BLOCK = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end measured -->)", re.DOTALL)
 
 # What the README shows, by key of the finding, in its order.
 SUMMARY = (
     "force_error",
-    "flat_error",
     "query_coal",
-    "query_libigl",
-    "query_fcpw",
-    "query_growth",
-    "query_smooth",
     "step_touching",
-    "step_control",
     "swing_period",
-    "stiff_cost",
-    "import",
-    "hard_cases",
     "peers_press",
     "peers_swing",
 )
@@ -55,6 +46,8 @@ def blocks_of(data: dict) -> dict[str, str]:
         for key in keys
         if machine.get(key)
     ]
+    if "peers_ratios" in tables:
+        tables["peers"] = peers(tables["peers_ratios"])
     return tables | {
         "findings": findings(list(found.values())),
         "summary": head + findings([found[key] for key in SUMMARY if key in found]),
@@ -68,6 +61,17 @@ def findings(rows: list[list[str]]) -> str:
     for what, figure, quartiles, aim, verdict in rows:
         missed = " (missed)" if verdict == "missed" else ""
         lines.append([what.replace("|", "\\|"), figure, quartiles, aim + missed])
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def peers(ratios: str) -> str:
+    """Return the ratios of "peers_ratios" alone: a row for each scene, a column for each peer."""
+    rows = [line.strip("| ").split(" | ")[:3] for line in ratios.splitlines()[2:]]
+    names = list(dict.fromkeys(peer for _, peer, _ in rows))
+    cells = {(scene, peer): ratio for scene, peer, ratio in rows}
+    lines = [["scene", *names], ["---"] * (len(names) + 1)]
+    for scene in dict.fromkeys(scene for scene, _, _ in rows):
+        lines.append([scene, *(cells.get((scene, name), "") for name in names)])
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 

@@ -32,6 +32,8 @@ HEAVY = (
     "casadi",
     "mcap",
     "pyarrow",
+    "playwright",
+    "imageio_ffmpeg",
 )
 
 

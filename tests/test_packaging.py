@@ -283,4 +283,5 @@ def test_the_tests_of_a_wheel_exist():
     check = script("check_wheel")
     assert all((ROOT / file).is_file() for file in check.TESTS)
     assert list(check.TEST_NEEDS) == WHEELS["test-requires"]
+    assert check.EXTRAS.split(",") == WHEELS["test-extras"]
     assert ".ci/check_wheel.py --installed" in WHEELS["test-command"]

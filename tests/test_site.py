@@ -220,7 +220,7 @@ def test_its_search_finds_in_a_page_that_is_opened_as_a_file(built, browser):
     page.wait_for_function(
         "document.querySelector('.md-search-result__meta').textContent.includes('matching')"
     )
-    assert "0 matching" not in found.text_content()
+    assert int(found.text_content().split()[0]) > 0
     assert page.locator(".md-search-result__link").first.get_attribute("href").startswith("file:")
     page.close()
     assert complaints == []

@@ -192,7 +192,13 @@ def make_table(*columns: str) -> Table:
 
     table = Table(box=box.SIMPLE_HEAD)
     for i, column in enumerate(columns):
-        table.add_column(column, overflow="fold", justify="left" if i == 0 else "right")
+        # In a narrow terminal, lines are broken between words, those of the first column first.
+        table.add_column(
+            column,
+            overflow="fold",
+            justify="left" if i == 0 else "right",
+            min_width=max(map(len, column.split()), default=0),
+        )
     return table
 
 

@@ -73,8 +73,13 @@ def _print(made: Report) -> None:
     for section in made.sections:
         for finding in section.findings:
             word = {True: "[green]met[/green]", False: "[red]missed[/red]", None: ""}[finding.met]
+            word = "[red]not measured[/red]" if finding.unmeasured else word
             texts = (finding.what, finding.text, finding.spread_text, finding.aim_text)
             table.add_row(*(plain(text) for text in texts), word)
     terminal().print(table)
+    for line in [line for section in made.sections for line in section.unmeasured]:
+        typer.echo(f"not measured: {line}", err=True)
+    if made.caution:
+        typer.echo(f"caution: {made.caution}", err=True)
     for section in made.failed:
         typer.echo(f"not measured: {section.title}: {section.error}", err=True)

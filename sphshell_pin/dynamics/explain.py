@@ -75,8 +75,8 @@ class Explanation:
 
     def __str__(self) -> str:
         """Return the explanation as text."""
-        lines = ["Modelled:", *(f"  {line}" for line in self.modelled)]
-        lines += ["Not modelled:", *(f"  {line}" for line in self.not_modelled)]
+        lines = ["Modeled:", *(f"  {line}" for line in self.modelled)]
+        lines += ["Not modeled:", *(f"  {line}" for line in self.not_modelled)]
         for pair, others in _shown(self.pairs):
             alike = f", the nearest of {others + 1} of '{pair.group}'" if others else ""
             lines += [f"Contact '{pair.name}'{alike}:", *(f"  {line}" for line in pair.modelled)]

@@ -224,7 +224,7 @@ def _peak(
 
 def _without_repetitions(points: Array) -> Array:
     moved = np.linalg.norm(np.diff(points, axis=0), axis=1) > 0
-    return points[np.concatenate([[True], moved])]
+    return np.asarray(points[np.concatenate([[True], moved])])
 
 
 def _lengths(points: Array) -> Array:

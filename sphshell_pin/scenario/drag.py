@@ -14,8 +14,22 @@ from sphshell_pin.errors import InvalidParameter
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.open_run import OpenRun
+    from sphshell_pin.dynamics.scene import Scene
 
 Array = npt.NDArray[np.float64]
+
+
+def movable_bodies(scene: Scene) -> tuple[str, ...]:
+    """Return a frame of each moving body; those with a sphere first."""
+    model = scene.model
+    names = {pair.joint_i: pair.frame_i for pair in scene.pairs if pair.joint_i}
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY and frame.parentJoint:
+            names.setdefault(frame.parentJoint, frame.name)
+    for joint in range(1, model.njoints):
+        if model.existFrame(model.names[joint]):
+            names.setdefault(joint, model.names[joint])
+    return tuple(names.values())
 
 
 @dataclass(frozen=True)

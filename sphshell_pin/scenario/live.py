@@ -20,7 +20,7 @@ from sphshell_pin.dynamics.result import Result
 from sphshell_pin.dynamics.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.scenario.build import Built, rebuild
-from sphshell_pin.scenario.drag import Drag, Dragged
+from sphshell_pin.scenario.drag import Drag, Dragged, movable_bodies
 from sphshell_pin.scenario.knobs import Knob, knobs_of
 from sphshell_pin.scenario.player import Rows
 from sphshell_pin.scenario.reading import look_up
@@ -140,16 +140,7 @@ class LiveRun:
     @property
     def bodies(self) -> tuple[str, ...]:
         """Frames that can be pushed, one of each moving body; those with a sphere first."""
-        model = self.scene.model
-        spheres = {pair.joint_i: pair.frame_i for pair in self.scene.pairs if pair.joint_i}
-        names = dict(spheres)
-        for frame in model.frames:
-            if frame.type == pin.FrameType.BODY and frame.parentJoint:
-                names.setdefault(frame.parentJoint, frame.name)
-        for joint in range(1, model.njoints):
-            if model.existFrame(model.names[joint]):
-                names.setdefault(joint, model.names[joint])
-        return tuple(names.values())
+        return movable_bodies(self.scene)
 
     @property
     def targets(self) -> tuple[Target, ...]:

@@ -39,6 +39,8 @@ MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
 # The path across a surface: radii long at most, radii a second.
 PATH_RADII, PATH_RATE = 10.0, 3.0
 LEAD_IN = 0.5
+# Of the target's speed and acceleration, each [s].
+RAMP = 0.25
 # Turns of the part about the approach, tried in this order [rad], and how many places are kept
 # where the sphere touches no single face.
 _YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
@@ -86,6 +88,21 @@ class Press:
     """Whether the sphere touches one face along the whole path: all of `force` acts there."""
     posture_stiffness: tuple[float, ...]
     joint_damping: tuple[float, ...]
+
+    @property
+    def spline(self) -> bool:
+        """Whether the path bends."""
+        return len(self.path) > 2
+
+    @property
+    def acceleration(self) -> float | None:
+        """Limit of the target's acceleration [m/s2], where it moves."""
+        return _round(self.speed / RAMP) if len(self.path) > 1 else None
+
+    @property
+    def jerk(self) -> float | None:
+        """Limit of the target's jerk [m/s3], where it moves."""
+        return _round(self.speed / RAMP**2) if len(self.path) > 1 else None
 
 
 @dataclass(frozen=True)
@@ -269,7 +286,7 @@ def _press_plan(
     if len(path) < 2:
         reason = "it has no room" if stance.inertia else "its joints cannot keep it from rolling"
         why.append(f"the tip presses in one place and does not slide: {reason}")
-    duration = math.ceil(10 * (LEAD_IN + length / rate + 0.5)) / 10
+    duration = math.ceil(10 * (LEAD_IN + length / rate + 2 * RAMP + 0.5)) / 10
     return Plan((tip,), contact, control, duration, gap, placement, None, tuple(why))
 
 

@@ -89,5 +89,7 @@ class Rows:
             )
             for name, width in widths.items()
         }
-        forces = (np.concatenate([getattr(one, name) for one in pieces]) for name in ("t", *FORCES))
-        return cls(*forces, more)
+        columns = {
+            name: np.concatenate([getattr(one, name) for one in pieces]) for name in ("t", *FORCES)
+        }
+        return cls(**columns, more=more)

@@ -17,8 +17,14 @@ ASPECT = 1.2  # of the part of the window that legend and controls leave free
 REACH = 8.0  # in sizes of the action: what is farther away need not be in the picture
 MARGIN = 1.12  # joints are points, links have some width
 
-# From the target to the eye. From straight above there is no upright: y points up in the picture.
-DIRECTIONS = {"front": (1.0, 0.0, 0.0), "side": (0.0, -1.0, 0.0), "top": (0.0, -1e-3, 1.0)}
+# From the target to the eye, None where it is chosen. From straight above there is no upright: y
+# points up in the picture.
+DIRECTIONS: dict[str, FloatArray | None] = {
+    "fit": None,
+    "front": np.array([1.0, 0.0, 0.0]),
+    "side": np.array([0.0, -1.0, 0.0]),
+    "top": np.array([0.0, -1e-3, 1.0]) / np.hypot(1.0, 1e-3),
+}
 
 _CORNERS = np.array(np.meshgrid(*3 * [(-1.0, 1.0)])).reshape(3, -1).T
 

@@ -143,6 +143,7 @@ def render_film(
         speed=shown.speed,
         title=shown.title,
         span=times,
+        whole=True,
     )
     stage = _Stage(page, size, camera, chart, dark, told)
 
@@ -243,11 +244,9 @@ class _Stage:
                 self._page = context.new_page()
                 self._page.set_default_timeout(PATIENCE)
                 self._page.set_content(self._html)
-                self._page.wait_for_function(
-                    "window.recording || document.getElementById('fault').textContent"
-                )
-                fault = self._page.locator("#fault").text_content()
-                if fault:
+                self._page.wait_for_function("window.recording || window.recording_fault")
+                if not self._page.evaluate("Boolean(window.recording)"):
+                    fault = self._page.locator("#fault").text_content()
                     raise ResultError(path, f"cannot be drawn: {fault}")
                 self._page.evaluate(
                     "([camera, chart]) => recording.film(camera, chart)",

@@ -21,6 +21,9 @@ LEAST = 64  # shorter lists stay as they are
 LEVELS = 65_535  # steps between the least and the largest coordinate of a mesh
 LEVELS_OF_NORMALS = 1023
 STL_HEADER = 84  # bytes: a title of 80, then the number of facets
+_FACET = re.compile(rb"facet\s+(normal\s.*?)endfacet", re.DOTALL | re.IGNORECASE)
+_FACET_WORDS = (b"normal", b"outer", b"loop", b"vertex", b"endloop")
+_LEAST_NORMAL = 0.1  # a shorter normal is none
 STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -75,6 +78,44 @@ def pack_facets(data: bytes) -> Json | None:
         "points": pack_numbers(points[order].astype(float).reshape(-1), exact=False),
         "corners": pack_numbers(place[number.reshape(-1)].astype(float), exact=True),
     }
+
+
+def lit_facets(data: bytes) -> bytes:
+    """Return the STL file `data` with a normal for each facet that states none.
+
+    The page draws facets with the normals of the file, and black where they are zero, as many
+    writers leave them. A text file with such facets becomes a binary one; others stay as they are.
+    """
+    count = int.from_bytes(data[80:STL_HEADER], "little")
+    if len(data) == STL_HEADER + STL_FACET.itemsize * count:
+        facets = np.frombuffer(data, STL_FACET, count, STL_HEADER).copy()
+    else:
+        try:
+            numbers = [one.split() for one in _FACET.findall(data)]
+            values = np.array([[float(x) for x in one] for one in map(_numbers_of, numbers)], "<f4")
+        except ValueError:
+            return data
+        facets = np.zeros(len(values), STL_FACET)
+        if len(values):
+            facets["normal"], facets["corners"] = values[:, :3], values[:, 3:].reshape(-1, 3, 3)
+    with np.errstate(invalid="ignore"):
+        dark = ~(np.linalg.norm(facets["normal"], axis=1) > _LEAST_NORMAL)
+    if not dark.any():
+        return data
+    first, second, third = (facets["corners"][dark, k].astype(float) for k in range(3))
+    normals = np.cross(second - first, third - first)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    facets["normal"][dark] = normals / np.where(lengths > 0.0, lengths, 1.0)
+    title = b"normals computed from the corners".ljust(80)
+    return title + len(facets).to_bytes(4, "little") + facets.tobytes()
+
+
+def _numbers_of(words: list[bytes]) -> list[bytes]:
+    """Return the twelve numbers of a facet of a text file: its normal and corners."""
+    numbers = [word for word in words if word.lower() not in _FACET_WORDS]
+    if len(numbers) != 12:
+        raise ValueError("no facet of three corners")
+    return numbers
 
 
 def pack_numbers(values: NDArray[np.float64], *, exact: bool) -> Json:

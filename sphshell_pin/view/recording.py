@@ -22,6 +22,7 @@ from sphshell_pin.view.arrows import (
     largest_force,
 )
 from sphshell_pin.view.bodies import SPHERE_COLOR
+from sphshell_pin.view.camera import DIRECTIONS
 from sphshell_pin.view.contact_path import LARGEST, ContactRows, contact_paths, spaced
 from sphshell_pin.view.display import TRAIL_COLOR, Display, choose_view
 from sphshell_pin.view.distance import RAMP, Coloring, check_coloring
@@ -116,17 +117,15 @@ def render_recording(
     start, end = (float(t[0]), float(t[-1])) if span is None else span
     rows, times = choose_rows(t, contacts, fps, speed, span)
     # Of a part of a run, too: pictures of it have the same cameras and the same arrows.
-    all_rows = rows if span is None else choose_rows(t, contacts, fps, speed)[0]
-    shown = contacts.select(np.isin(contacts.row, all_rows))
+    of_run = rows if span is None else choose_rows(t, contacts, fps, speed)[0]
+    shown = contacts.select(np.isin(contacts.row, of_run))
     q = np.asarray(result.q, dtype=float)
-    view = choose_view(
-        scene,
-        q[all_rows],
-        contacts.point_world,
-        contacts.normal_world,
-        visual_model,
-        whole=whole,
-    )
+    places = contacts.point_world, contacts.normal_world
+    views = {
+        name: choose_view(scene, q[of_run], *places, visual_model, direction=toward, whole=whole)
+        for name, toward in DIRECTIONS.items()
+    }
+    view = views["fit"]
     radii = [one.radius for pair in scene.pairs for one in pair.spheres]
     length = min([0.16 * view.distance, *(12.0 * radius for radius in radii)])
     scale = ArrowScale.from_forces(_forces(shown, arrows), length)
@@ -153,7 +152,7 @@ def render_recording(
     window.frame = None
     trailed = _draw_trails(display, window, result, start, speed)
 
-    panel = run_panel(result, scene, visual_model, contacts, count, q[all_rows], q[rows], view)
+    panel = run_panel(result, scene, contacts, count, q[rows], views)
     clock = {
         "start": start,
         "end": end,

@@ -13,6 +13,7 @@ import pinocchio as pin
 from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.dynamics.models import find_frame, frame_on_joint
 from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.view.meshes import lit_facets
 from sphshell_pin.view.nodes import (
     HIDDEN_SCALE,
     FloatArray,
@@ -72,7 +73,16 @@ class GeometryRobot:
             from pinocchio.visualize import MeshcatVisualizer
 
         check_geometry_model(model, geometry_model)
-        viewer = MeshcatVisualizer(model, pin.GeometryModel(), geometry_model)
+
+        class Viewer(MeshcatVisualizer):  # type: ignore[misc]
+            def loadMeshFromFile(self, body: pin.GeometryObject) -> object:  # noqa: N802
+                loaded = super().loadMeshFromFile(body)
+                if getattr(loaded, "mesh_format", "") == "stl":
+                    packed = loaded.contents
+                    loaded.contents = type(packed)(packed.type, lit_facets(packed.data))
+                return loaded
+
+        viewer = Viewer(model, pin.GeometryModel(), geometry_model)
         viewer.initViewer(viewer=visualizer, open=False)
         with contextlib.redirect_stdout(io.StringIO()):
             viewer.loadViewerModel("robot")

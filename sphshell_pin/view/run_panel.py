@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.view.camera import ASPECT, DIRECTIONS, FIELD_OF_VIEW, View
+from sphshell_pin.view.camera import ASPECT, FIELD_OF_VIEW, View
 from sphshell_pin.view.curves import run_curves
-from sphshell_pin.view.display import choose_view
 from sphshell_pin.view.meshes import pack_numbers
 from sphshell_pin.view.nodes import FloatArray, Json
 
@@ -24,29 +24,15 @@ CLOSE = 8.0  # radii of the sphere around it that a close-up shows, at least
 def run_panel(
     result: Result,
     scene: Scene,
-    visual_model: pin.GeometryModel | None,
     contacts: ContactRows,
     count: int,
-    whole: FloatArray,
     frames: FloatArray,
-    view: View,
+    views: Mapping[str, View],
 ) -> Json:
     """Return the page's command "panel" for the first `count` rows of `result`.
 
-    `frames` (f, nq) are the configurations of the page's frames, `whole` (w, nq) those of the whole
-    run, to which the cameras fit; `view` is the first camera.
+    `frames` (f, nq) are the configurations of the page's frames, `views` its cameras.
     """
-    views = {"fit": view}
-    for name, toward in DIRECTIONS.items():
-        direction = np.array(toward) / np.linalg.norm(toward)
-        views[name] = choose_view(
-            scene,
-            whole,
-            contacts.point_world,
-            contacts.normal_world,
-            visual_model,
-            direction=direction,
-        )
     return {
         "type": "panel",
         "path": "",

@@ -296,7 +296,7 @@ def test_zeros_and_missing_limits_are_not_stated() -> None:
 
 def test_explain_lists_what_is_modelled_and_what_is_left_out() -> None:
     text = str(Scene(link(), joints=JointIngredients.from_model(link(), ["damping"])).explain())
-    modelled, absent = text.split("Not modelled:")
+    modelled, absent = text.split("Not modeled:")
     assert "damping of 'hinge'" in modelled
     assert "position limits that the robot's file states, of 'hinge'" in absent
     assert "damping" not in absent

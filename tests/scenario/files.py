@@ -28,7 +28,7 @@ dt = 1e-4
 """
 
 FINGER = """
-title = "a finger presses on a plate"
+title = "a finger bends over a plate"
 
 [robot]
 name = "three_link_finger"

@@ -24,7 +24,7 @@ def report(folder, error=None):
         "Queries",
         findings=[
             Finding("query_coal", "coal / ours", 33.8, "x", 29.9, 35.5, 15.0, ">="),
-            Finding("import", "a | b", 1.4, "x", aim=1.2),
+            Finding("step_touching", "a | b", 1.4, "x", aim=1.2),
         ],
         tables=[Table("times", "", (Column("code", "who"), Column("s", "s")), [("a|b", 43.785)])],
         error=error,

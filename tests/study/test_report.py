@@ -10,6 +10,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,7 +26,7 @@ from sphshell_pin.benchmarks.sizes import Row as SizeRow
 from sphshell_pin.benchmarks.timing import Spread
 from sphshell_pin.cli import app
 from sphshell_pin.errors import Interrupted
-from sphshell_pin.study.report import PAGE, making
+from sphshell_pin.study.report import PAGE, machine, making
 from sphshell_pin.study.report import forces as forces_section
 from sphshell_pin.study.report import hard_cases as hard_section
 from sphshell_pin.study.report import integrators as integrators_section
@@ -34,6 +35,7 @@ from sphshell_pin.study.report import queries as queries_section
 from sphshell_pin.study.report import steps as steps_section
 from sphshell_pin.study.report.contents import Column, Finding, Section, Table, number
 from sphshell_pin.study.report.drawing import spread_apart
+from sphshell_pin.study.report.page import Heading
 
 pytest.importorskip("matplotlib")
 KEYS = ["forces", "queries", "integrators", "steps", "hard_cases", "peers"]
@@ -60,7 +62,12 @@ def forces(*, quick, progress):
 
 
 def queries(*, quick, progress):
-    peers = {query.THIS: times(1e-6), query.COAL: times(4e-5), query.FCPW: times(2e-6)}
+    peers = {
+        query.THIS: times(1e-6),
+        query.FACETS: times(9e-7),
+        query.COAL: times(4e-5),
+        query.FCPW: times(2e-6),
+    }
     growth = {2048: times(1e-6), 2_000_000: times(3e-6)}
     cost = {"wavy sheet": {"facets": times(1e-6), "smooth": times(1.2e-6)}}
     rows = [
@@ -287,8 +294,10 @@ def test_numbers(value, text):
 
 
 def test_nothing_measured_meets_no_aim():
-    assert Finding("a", "a", math.nan, aim=1.0).met is False
-    assert Finding("a", "a", math.nan, aim=1.0, sense=">=").met is False
+    assert Finding("a", "a", math.nan, aim=1.0).met is None
+    assert Finding("a", "a", math.nan, aim=1.0, sense=">=").met is None
+    assert Finding("a", "a", math.nan, aim=1.0).unmeasured
+    assert not Finding("a", "a", math.nan).unmeasured
     assert Finding("a", "a", 1.0, aim=1.0).met is True
     assert Finding("a", "a", 1.0).met is None
 
@@ -319,6 +328,64 @@ def test_exit_code_and_table(stubs, tmp_path):
     assert ran.exit_code == 0, ran.output
     assert "at most 2" in ran.stdout
     assert str(tmp_path / "new" / PAGE) in ran.stdout
+
+
+def some(*findings, unmeasured=()):
+    return lambda *, quick, progress: Section(
+        "x", "X", findings=list(findings), unmeasured=list(unmeasured)
+    )
+
+
+def test_the_page_names_the_aims_that_are_not_met(stubs, tmp_path):
+    missed = Finding("a", "query: theirs / ours", 0.5, "x", aim=1.0, sense=">=")
+    same = replace(missed, what="the same with sand")
+    nothing = Finding("b", "cost of a step", math.nan, aim=2.0)
+    stubs(forces=some(missed, same, nothing), queries=some(unmeasured=["libigl: not installed"]))
+    ran = CliRunner().invoke(app, ["report", "--quick", "--out", str(tmp_path)])
+    assert "not measured: libigl: not installed" in ran.stderr
+    text = (tmp_path / PAGE).read_text(encoding="utf-8")
+    for line in (
+        "query: theirs / ours: 0.5 x, aim at least 1 x",
+        "query: theirs / ours; the same with sand: 0.5 x, aim at least 1 x",
+        "cost of a step, aim at most 2",
+        "libigl: not installed",
+        "bowl swing, CPU time at equal errors",
+    ):
+        assert f"<li>{line}" in text
+    assert "h is the mean length" in text.partition('<ul class="cards">')[0]
+
+
+@pytest.mark.parametrize("cores", [None, 0.0, machine.BUSY, 0.21, 1.5])
+def test_a_busy_machine_is_said_on_the_page(stubs, tmp_path, monkeypatch, cores):
+    monkeypatch.setattr(machine.OtherWork, "cores", lambda self: cores)
+    ran = CliRunner().invoke(app, ["report", "--out", str(tmp_path)])
+    busy = cores is not None and cores > machine.BUSY
+    page = (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert ("The machine was busy" in page) == busy
+    assert ("The machine was busy" in ran.stderr) == busy
+    if busy:
+        assert f"{cores:.2f} cores on average" in page
+        assert page.index("The machine was busy") < page.index('<ul class="cards">')
+    data = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert bool(data["caution"]) == busy
+
+
+def test_a_report_without_times_has_no_caution(stubs, tmp_path, monkeypatch):
+    monkeypatch.setattr(machine.OtherWork, "cores", lambda self: 1.5)
+    made = making.make_report(tmp_path, parts=making.PARTS, heading=Heading("A", "B"))
+    assert made.caution == ""
+
+
+@pytest.mark.skipif(not Path("/proc/stat").exists(), reason="needs Linux's /proc/stat")
+def test_the_work_of_others_is_not_this_process_s(monkeypatch):
+    clocks = iter([(10.0, 100.0, 4.0), (20.0, 118.0, 7.0)])
+    monkeypatch.setattr(machine, "_clocks", lambda: next(clocks))
+    # 18 s of the processors in 10 s, of which 3 s are this process's own.
+    assert machine.OtherWork().cores() == pytest.approx(1.5)
+    monkeypatch.undo()
+    elapsed, used, own = machine._clocks()
+    assert 0.0 < own < used
+    assert elapsed > 0.0
 
 
 @pytest.mark.parametrize("kind", [KeyboardInterrupt(), Interrupted(0.1, None)])

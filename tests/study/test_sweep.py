@@ -131,6 +131,9 @@ def test_units_stay_with_the_table(folder, tmp_path):
     assert axis.get_ylabel() == "final.q.root_joint.2 [m]"
     assert "2 runs, 0 failed, varied 'contact.law.stiffness [N/m^1.5]'" in repr(report)
     assert "pairs.ball-plate.peak_force [N]" in report._repr_html_()
+    start = "robot.start.root_joint.2"
+    moved = plan_sweep(folder / "resting.toml", {start: [0.012, 0.013]}, changes=changes)
+    assert moved.units[start] == "m"
     # Where the exponent varies, too, the unit of the stiffness does.
     both = {stiffness: [1e4], exponent: [1.5, 2.0]}
     varied = plan_sweep(folder / "resting.toml", both, changes=changes)

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sphshell_pin.contact import CoulombFriction
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.live import LiveRun
 from sphshell_pin.view.live import Live
-from tests.view.live_player import BallPlayer
+from tests.scenario.files import DROP, write
 
 pytestmark = pytest.mark.browser
 
@@ -17,7 +18,10 @@ DOCS = Path(__file__).parents[2] / "docs" / "view.md"
 LONG = 60_000  # [ms] on machines that draw without a graphics card
 NARROW = [(390, 844), (844, 390), (768, 1024), (320, 568)]
 WIDE = [(1440, 900), (1280, 720), (900, 500)]
-FRICTION = CoulombFriction(0.3, 0.2, v_static=0.01, v_dynamic=0.1)
+FRICTION = """damping = 20.0 }
+friction = { type = "coulomb", mu_static = 0.3 }"""
+KNOB = '\n[[knob]]\nkey = "contact.ball-plate.law.stiffness"\n'
+SCENARIO = DROP.replace("damping = 20.0 }", FRICTION) + KNOB
 
 # Everything that one can press or drag, and is seen, with its box in the page.
 TARGETS = """() => [...document.querySelectorAll(
@@ -63,8 +67,8 @@ VARIABLES = """(names) => {
 class Look:
     """One page for all tests of this file; `show` makes it as if newly opened."""
 
-    def __init__(self, browser):
-        self.live = Live(BallPlayer(friction=FRICTION), running=False).start()
+    def __init__(self, browser, folder):
+        self.live = Live(LiveRun(build(write(folder, SCENARIO))), running=False).start()
         self.context = browser.new_context(viewport={"width": 1440, "height": 900})
         self.page = self.context.new_page()
         self.complaints = []
@@ -89,8 +93,8 @@ class Look:
 
 
 @pytest.fixture(scope="module")
-def opened(browser):
-    look = Look(browser)
+def opened(browser, tmp_path_factory):
+    look = Look(browser, tmp_path_factory.mktemp("drop"))
     yield look
     look.context.close()
     look.live.stop()
@@ -116,8 +120,17 @@ def test_nothing_is_cut_off_and_no_control_lies_over_another(look, size):
         assert one["left"] >= -0.5, one
         assert one["right"] <= size[0] + 0.5, one
         assert not one["cut"], one
+    floating = look.page.evaluate(
+        """[...document.querySelectorAll("#status, #legend, #stage button")]
+        .filter((one) => one.checkVisibility({visibilityProperty: true})).map((one) => {
+            const {left, right, top, bottom} = one.getBoundingClientRect();
+            return {name: one.id, left, right, top, bottom};
+        })"""
+    )
+    assert {"status", "legend", "drag-mode"} <= {one["name"] for one in floating}
     fixed = [one for one in targets if not one["floats"]]
-    for a, b in itertools.combinations(fixed, 2):
+    pairs = itertools.chain(itertools.combinations(fixed, 2), itertools.combinations(floating, 2))
+    for a, b in pairs:
         apart_x = min(a["right"], b["right"]) - max(a["left"], b["left"]) <= 0.5
         apart_y = min(a["bottom"], b["bottom"]) - max(a["top"], b["top"]) <= 0.5
         assert apart_x or apart_y, (a, b)

@@ -7,12 +7,24 @@ import re
 import struct
 from pathlib import Path
 
+import meshcat
 import numpy as np
+import pinocchio as pin
 import pytest
 import umsgpack
 
 import sphshell_pin.view.page as page_module
-from sphshell_pin.view.meshes import LEVELS, MARK, pack_facets, pack_numbers, take_out_numbers
+from sphshell_pin.view.meshes import (
+    LEVELS,
+    MARK,
+    STL_FACET,
+    STL_HEADER,
+    lit_facets,
+    pack_facets,
+    pack_numbers,
+    take_out_numbers,
+)
+from sphshell_pin.view.robot import GeometryRobot
 
 PAGE = (
     Path(page_module.__file__)
@@ -176,3 +188,65 @@ def plain(value):
     if isinstance(value, dict):
         return {key: plain(one) for key, one in value.items()}
     return [plain(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+def stl_of(normals, corners):
+    """Return facets as a binary STL file, and as a text file."""
+    facets = np.zeros(len(corners), STL_FACET)
+    facets["normal"], facets["corners"] = normals, corners
+    binary = b"a title".ljust(80) + len(facets).to_bytes(4, "little") + facets.tobytes()
+    text = "solid a\n"
+    for normal, three in zip(facets["normal"], facets["corners"], strict=True):
+        text += f"facet normal {' '.join(map(repr, normal.tolist()))}\n outer loop\n"
+        text += "".join(f"  vertex {' '.join(map(repr, one.tolist()))}\n" for one in three)
+        text += " endloop\nendfacet\n"
+    return binary, (text + "endsolid a\n").encode()
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+def test_facets_without_normals_are_lit(kind):
+    corners = np.random.default_rng(3).normal(size=(40, 3, 3)).astype("<f4")
+    truth = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    truth /= np.linalg.norm(truth, axis=1)[:, None]
+    given = truth.copy()
+    given[::3] = 0.0
+    given[1::7] = np.nan
+    given[2] = (0.0, 0.0, 1.0)  # what the file says stays
+    made = np.frombuffer(lit_facets(stl_of(given, corners)[kind]), STL_FACET, -1, STL_HEADER)
+    expected = truth.copy()
+    expected[2] = given[2]
+    np.testing.assert_allclose(made["normal"], expected, atol=2e-6)
+    np.testing.assert_array_equal(made["corners"], corners)
+
+
+def test_files_with_normals_and_what_is_none_stay_as_they_are():
+    corners = np.random.default_rng(3).normal(size=(4, 3, 3))
+    for data in (*stl_of(np.full((4, 3), 0.6), corners), b"", b"solid a\nfacet normal 1\nendfacet"):
+        assert lit_facets(data) is data
+    # A facet without an area has no normal.
+    flat = stl_of(np.zeros((1, 3)), np.zeros((1, 3, 3)))[0]
+    made = np.frombuffer(lit_facets(flat), STL_FACET, -1, STL_HEADER)
+    assert np.isfinite(made["normal"]).all()
+
+
+def test_a_robot_s_mesh_is_sent_with_normals(tmp_path):
+    corners = [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 1, 0], [0, 0, 1]]]
+    (tmp_path / "dark.stl").write_bytes(stl_of(np.zeros((2, 3)), corners)[0])
+    (tmp_path / "dark.urdf").write_text(
+        '<robot name="dark"><link name="base"><visual><geometry>'
+        f'<mesh filename="{tmp_path / "dark.stl"}"/></geometry></visual></link></robot>'
+    )
+    model = pin.buildModelFromUrdf(str(tmp_path / "dark.urdf"))
+    visual = pin.buildGeomFromUrdf(model, str(tmp_path / "dark.urdf"), pin.GeometryType.VISUAL)
+    window = page_module.FilmWindow()
+    GeometryRobot(meshcat.Visualizer(window=window), model, visual)
+    meshes = [
+        geometry["data"].data
+        for command in window.commands(np.zeros(1))
+        if command["type"] == "set_object"
+        for geometry in command["object"]["geometries"]
+        if geometry.get("format") == "stl"
+    ]
+    (sent,) = meshes
+    facets = np.frombuffer(sent, STL_FACET, -1, STL_HEADER)
+    np.testing.assert_allclose(facets["normal"], [[0, 0, 1], [1, 0, 0]], atol=1e-7)

@@ -82,7 +82,14 @@ def test_the_frame_plays_in_a_page(result, tmp_path, browser):
     tab.on("pageerror", lambda fault: complaints.append(str(fault)))
     tab.goto(page.as_uri())
     frame = tab.frames[1]
-    frame.wait_for_function("window.recording_ready", timeout=60_000)
-    frame.wait_for_function("viewer.animator.time > 0.1", timeout=20_000)
+    frame.wait_for_function("window.recording", timeout=60_000)
+    frame.wait_for_function("recording.time > 0.1 * recording.span", timeout=20_000)
     tab.close()
     assert complaints == []
+
+
+def test_a_result_is_drawn_with_the_options_of_films(result, tmp_path):
+    with pytest.raises(InvalidParameter, match=r"time = 99 must be in the run"):
+        result.render(tmp_path / "late.png", time=99)
+    with pytest.raises(InvalidParameter, match=r"must end in \.png"):
+        result.render(tmp_path / "film.avi")

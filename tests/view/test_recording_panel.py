@@ -110,8 +110,9 @@ def test_chart_scrub_bar_and_scene_show_the_same_time(page, ball):
             """share => {
                 const canvas = element("chart"), pen = canvas.getContext("2d");
                 const at = Math.round(LEFT + share * (canvas.clientWidth - LEFT - RIGHT));
-                const gap = TOP + FORCE_SHARE * (canvas.clientHeight - TOP - BOTTOM - GAP) + GAP / 2;
-                return [...pen.getImageData(at - 2, Math.round(gap), 5, 1).data];
+                const room = canvas.clientHeight - TOP - BOTTOM - GAP;
+                const between = Math.round(TOP + FORCE_SHARE * room + GAP / 2);
+                return [...pen.getImageData(at - 2, between, 5, 1).data];
             }""",
             share,
         )
@@ -207,7 +208,7 @@ def test_cameras(page):
 @pytest.mark.browser
 def test_switches_hide_what_they_name(page):
     labels = page.locator("#parts label").all_inner_texts()
-    assert " ".join(labels).split() == "Robot Spheres Arrows Points Path Wireframe".split()
+    assert " ".join(labels) == "Robot Spheres Arrows Points Path Wireframe"
     visible = "viewer.scene_tree.find(['meshcat', 'spheres']).object.visible"
     box = page.locator("#parts label", has_text="Spheres").locator("input")
     box.uncheck()
@@ -229,13 +230,28 @@ def test_text_of_a_run_is_no_code(page, ball):
 
 
 @pytest.mark.browser
+def test_the_browser_itself_keeps_the_page_from_other_hosts(browser, ball):
+    page = browser.new_page()
+    page.goto(ball[1].resolve().as_uri())
+    refused = page.evaluate(
+        """() => new Promise((done) => {
+            document.addEventListener("securitypolicyviolation", (one) => done(one.blockedURI));
+            new Image().src = "http://texture.example/steel.png";
+        })"""
+    )
+    assert refused == "http://texture.example/steel.png"
+    page.close()
+
+
+@pytest.mark.browser
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_nothing_is_cut_off_or_overlaps(opened, size, scheme):
     page = opened(size, scheme)
     width, height = SIZES[size]
     parts = page.evaluate(
-        """() => [...document.querySelectorAll("h1, button, select, #scrub, #clock, .reading, summary")]
+        """() => [...document.querySelectorAll(
+                "h1, button, select, #scrub, #clock, .reading, summary")]
             .filter((one) => one.checkVisibility() && one.getClientRects().length)
             .map((one) => { const r = one.getBoundingClientRect();
                 return [one.id || one.textContent, r.left, r.top, r.right, r.bottom]; })"""

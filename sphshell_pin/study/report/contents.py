@@ -57,10 +57,15 @@ class Finding:
 
     @property
     def met(self) -> bool | None:
-        """Whether the aim is met; None without an aim. NaN does not meet any."""
-        if self.aim is None:
+        """Whether the aim is met; None without an aim, and where nothing was measured (NaN)."""
+        if self.aim is None or math.isnan(self.value):
             return None
         return bool(self.value <= self.aim if self.sense == "<=" else self.value >= self.aim)
+
+    @property
+    def unmeasured(self) -> bool:
+        """Whether there is an aim, and nothing was measured."""
+        return self.aim is not None and math.isnan(self.value)
 
     @property
     def text(self) -> str:
@@ -176,17 +181,23 @@ class Section:
     tables: list[Table] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     error: str | None = None
+    unmeasured: list[str] = field(default_factory=list)
+    """Aims that were not measured, and why."""
     seconds: float = 0.0  # that measuring it took
 
 
 def findings_table(findings: Sequence[Finding]) -> Table:
     """Return findings as a table; its verdict is empty for a finding without an aim."""
     words = {True: "met", False: "missed", None: ""}
+
+    def word(finding: Finding) -> str:
+        return "not measured" if finding.unmeasured else words[finding.met]
+
     return Table(
         "findings",
         "Findings.",
         columns("finding", "figure", "quartiles", "aim", "verdict"),
-        [(f.what, f.text, f.spread_text, f.aim_text, words[f.met]) for f in findings],
+        [(f.what, f.text, f.spread_text, f.aim_text, word(f)) for f in findings],
     )
 
 

@@ -41,13 +41,14 @@ LOOKS = {
 CURVED = ("bowl", "dome", "torus")
 AT = 0.3  # h / r at which errors are compared
 TEXT = """\
-A sphere of radius r lies 0.04 r deep in or on a surface, at 300 random places; its force of the
-law k depth^1.5 is compared, as a vector, with that of the exact surface. Bowl and dome are the
-inside and the outside of a sphere of 4 r, the torus (inside) has radii of 6 r and 3 r, the flat
-plate is made of random triangles. The method "smooth" bends the elements to the normals of their
-vertices, exact ones or those estimated from the mesh; "facets" is the exact polyhedron; "elements"
-sums over all elements, as SPHSHL3 did. On a faceted bowl the sphere is pushed by both sides of
-every edge, and refinement does not help; the sum over elements grows without limit."""
+A sphere of radius r lies 0.04 r deep in or on a surface whose elements have sides of the mean
+length h, at 300 random places; its force of the law k depth^1.5 is compared, as a vector, with that
+of the exact surface. Bowl and dome are the inside and the outside of a sphere of 4 r, the torus
+(inside) has radii of 6 r and 3 r, the flat plate is made of random triangles. The method "smooth"
+bends the elements to the normals of their vertices, exact ones or those estimated from the mesh;
+"facets" is the exact polyhedron; "elements" sums over all elements, as SPHSHL3 did. On a faceted
+bowl the sphere is pushed by both sides of every edge, and refinement does not help; the sum over
+elements grows without limit."""
 
 
 def section(*, quick: bool, progress: Progress) -> Section:

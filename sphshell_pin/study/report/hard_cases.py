@@ -40,7 +40,9 @@ def section(*, quick: bool, progress: Progress) -> Section:
     """Run the cases where there is a checkout, and return the section."""
     root = hard_cases.checkout()
     if root is None:
-        return Section(KEY, TITLE, TEXT, notes=[ABSENT.replace("\n", " ")])
+        absent = ABSENT.replace("\n", " ")
+        without = "hard cases (this package is no checkout)"
+        return Section(KEY, TITLE, TEXT, notes=[absent], unmeasured=[without])
     return assemble(hard_cases.measure(root, quick=quick, progress=progress), quick=quick)
 
 
@@ -70,6 +72,7 @@ def assemble(found: Found, *, quick: bool) -> Section:
             + (" The slow cases were left out (--quick)." if quick else ""),
             *(f"Out of bounds: {row.case}, {row.tried}: {row.measured}." for row in missed),
         ],
+        unmeasured=["the slow ones of the hard cases (left out by --quick)"] if quick else [],
     )
 
 

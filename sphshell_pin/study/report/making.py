@@ -19,7 +19,7 @@ from sphshell_pin.errors import ResultError, SphshellError, WeakLawWarning
 from sphshell_pin.plot.figure import new_figure
 from sphshell_pin.study.report import forces, hard_cases, integrators, peers, queries, steps
 from sphshell_pin.study.report.contents import Column, Progress, Section, Table, findings_table
-from sphshell_pin.study.report.machine import describe
+from sphshell_pin.study.report.machine import OtherWork, caution_of, describe
 from sphshell_pin.study.report.page import SPEED, Heading, render
 
 PAGE, DATA, FINDINGS = "report.html", "report.json", "findings"
@@ -63,6 +63,8 @@ class Report:
     sections: list[Section]
     machine: dict[str, str]
     heading: Heading = SPEED
+    caution: str = ""
+    """A sentence about a machine that was busy."""
 
     @property
     def failed(self) -> list[Section]:
@@ -98,6 +100,8 @@ def make_report(
         if parts is None:
             parts = (*PARTS, PEERS) if with_peers else PARTS
         report = dataclasses.replace(_measure(parts, quick, command, tell), heading=heading)
+        if not heading.timed:
+            report = dataclasses.replace(report, caution="")
         if heading is SPEED and not with_peers:
             report.sections.append(peers.left_out())
         _write(report, out, place)
@@ -118,7 +122,7 @@ def _report_folder(out: Path) -> Iterator[AtomicFolder]:
 
 
 def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell | None) -> Report:
-    begin = time.perf_counter()
+    begin, others = time.perf_counter(), OtherWork()
     machine = describe(command)
     whole = sum(part.seconds[not quick] for part in parts)
     sections, done = [], 0.0
@@ -135,7 +139,10 @@ def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell | None
         sections.append(measured(part, quick=quick, progress=progress))
         done += share
     machine["measured in"] = f"{time.perf_counter() - begin:.0f} s{', quick' if quick else ''}"
-    return Report(sections, machine)
+    cores = others.cores()
+    if cores is not None:
+        machine["other processes"] = f"used {cores:.2f} cores on average"
+    return Report(sections, machine, caution=caution_of(cores))
 
 
 def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
@@ -164,7 +171,7 @@ def _write(report: Report, out: Path, place: AtomicFolder) -> None:
     files = {name: text.encode() for name, text in texts.items()}
     files |= {f"{picture.name}.png": picture.png for picture in pictures}
     files[DATA] = json_text(report, sorted(files)).encode()
-    files[PAGE] = render(report.sections, report.machine, report.heading).encode()
+    files[PAGE] = render(report.sections, report.machine, report.heading, report.caution).encode()
     try:
         desk = place.desk()
         for name, content in files.items():
@@ -203,6 +210,7 @@ def json_text(report: Report, files: list[str]) -> str:
     """Return the report's data; its tables as Markdown, with all digits they are in `files`."""
     data = {
         "machine": report.machine,
+        "caution": report.caution,
         "files": files,
         "sections": [
             {
@@ -211,6 +219,7 @@ def json_text(report: Report, files: list[str]) -> str:
                 "error": section.error,
                 "seconds": section.seconds,
                 "notes": section.notes,
+                "unmeasured": section.unmeasured,
                 "findings": [
                     dataclasses.asdict(f) | {"met": f.met, "row": row}
                     for f, row in zip(

@@ -19,29 +19,76 @@ class Heading:
 
     title: str
     text: str
+    timed: bool = False
+    """Whether it is of times, which other work on the machine changes."""
 
 
 SPEED = Heading(
     "sphshell_pin: speed against error",
     "Contact of spheres with CAD surfaces, measured on this machine in one run. Figures are "
     "medians; ratios are taken round by round, of contestants that take turns on one core, and are "
-    "shown with their quartiles. Aims are those of the design.",
+    "shown with their quartiles. Aims are those of the design. In h / r, h is the mean length of "
+    "the elements' sides and r the radius of the sphere.",
+    timed=True,
 )
 
 
-def render(sections: list[Section], machine: dict[str, str], heading: Heading = SPEED) -> str:
-    """Return the page."""
-    findings = [f for section in sections for f in section.findings]
-    judged = [f.met for f in findings if f.met is not None]
+def tally_of(sections: list[Section]) -> str:
+    """Return how many aims are met, in a sentence or two."""
+    judged = [f.met for section in sections for f in section.findings if f.met is not None]
     failed = sum(section.error is not None for section in sections)
     tally = f"{sum(judged)} of {len(judged)} aims are met."
     if failed:
         tally += f" {failed} section{'s' * (failed > 1)} could not be measured."
+    return tally
+
+
+def not_met(sections: list[Section]) -> dict[str, list[str]]:
+    """Return the aims that were missed, and those that were not measured, each in a line."""
+    findings = [f for section in sections for f in section.findings]
+    named = [whole_name(findings, k) for k in range(len(findings))]
+    missed = [
+        f"{name}: {f.text}, aim {f.aim_text}"
+        for f, name in zip(findings, named, strict=True)
+        if f.met is False
+    ]
+    unmeasured = [
+        f"{name}, aim {f.aim_text}" for f, name in zip(findings, named, strict=True) if f.unmeasured
+    ]
+    unmeasured += [f"all of: {one.title}" for one in sections if one.error is not None]
+    unmeasured += [line for section in sections for line in section.unmeasured]
+    return {"Aims that are missed": missed, "Not measured in this run": unmeasured}
+
+
+def whole_name(findings: list[Finding], k: int) -> str:
+    """Return what finding k is, with the finding before it that "the same" refers to."""
+    what, first = findings[k].what, k
+    while first and findings[first].what.startswith("the same"):
+        first -= 1
+    return what if first == k else f"{findings[first].what}; {what}"
+
+
+def render(
+    sections: list[Section],
+    machine: dict[str, str],
+    heading: Heading = SPEED,
+    caution: str = "",
+) -> str:
+    """Return the page; `caution` is what a reader should know of the machine."""
+    findings = [f for section in sections for f in section.findings]
+    lists = "".join(
+        f'<p class="tally">{title}:</p><ul class="aims">'
+        f"{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>"
+        for title, lines in not_met(sections).items()
+        if lines
+    )
     missing = '<span class="missed"> not measured</span>'
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         title=escape(heading.title),
         introduction=escape(heading.text),
-        tally=tally,
+        caution=f'<p class="error" role="note">{escape(caution)}</p>' if caution else "",
+        tally=tally_of(sections),
+        lists=lists,
         cards="".join(_card(f) for f in findings if f.headline),
         links="".join(
             f'<li><a href="#{one.key}">{escape(one.title)}</a>{missing if one.error else ""}</li>'

@@ -74,7 +74,7 @@ def assemble(steps: Times, added: Times, imports: Times) -> Section:
             ),
             Finding.of_rounds(
                 "step_control",
-                "with joint PD and gravity compensation: touching / no contact at all",
+                "Panda with joint PD and gravity compensation: step touching / without any contact",
                 control / steps[step.CONTROL_FREE],
                 aim=1.35,
                 headline=True,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -41,6 +42,8 @@ from sphshell_pin.study.sweep.worker import changed, sweep_figures, verdict_name
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_START = re.compile(r"robot\.(?:\w+\.)?(start|speed)\.(.+)")
 
 
 @dataclass(frozen=True)
@@ -172,7 +175,15 @@ def plan_sweep(
         token=digest([str(path.absolute()), head]),
         curves=curves,
     )
-    units = figure_units(built) | _units_of_all(axes, runs, fixed, path)
+    units = figure_units(built)
+    if len(fixed.robot) == 1:
+        # A start value has the unit of the joint, which the built scene knows.
+        for axis in axes:
+            found = _START.fullmatch(axis.key)
+            end = found and f"final.{'q' if found[1] == 'start' else 'v'}.{found[2]}"
+            if end in units:
+                units[axis.key] = units[end]
+    units |= _units_of_all(axes, runs, fixed, path)
     return Plan(axes, points, runs, digests, tuple(figures), job, head, design, units)
 
 

@@ -2,6 +2,6 @@
 
 from sphshell_pin.view.live.loop import Live
 from sphshell_pin.view.live.opening import preview
-from sphshell_pin.view.live.player import Player
+from sphshell_pin.view.live.player import Interactive, Player
 
-__all__ = ["Live", "Player", "preview"]
+__all__ = ["Interactive", "Live", "Player", "preview"]

@@ -69,7 +69,8 @@ class Thinner:
     """
 
     def __init__(self) -> None:
-        self.clear()
+        self._piece, self._time, self._spacing = -math.inf, 0.0, 0.0
+        self._values: FloatArray | None = None
 
     def add(self, t: FloatArray, values: FloatArray, spacing: float) -> list[Point]:
         """Take rows at `t` (n,) [s] of `values` (n, k); return the points of finished pieces.
@@ -107,8 +108,7 @@ class Thinner:
 
     def clear(self) -> None:
         """Forget the piece that is not finished."""
-        self._piece, self._time, self._spacing = -math.inf, 0.0, 0.0
-        self._values: FloatArray | None = None
+        self._piece, self._values = -math.inf, None
 
 
 class Charts:
@@ -178,7 +178,8 @@ class Charts:
 
     def clear(self) -> None:
         """Forget the rows of the run, as where it goes on at another time."""
-        self._history, _ = History(), self._thinner.clear()
+        self._history = History()
+        self._thinner.clear()
 
     def start_anew(self) -> None:
         """Begin another run, and keep the one so far as the last one, if it went on at all."""

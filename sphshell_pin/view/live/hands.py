@@ -1,4 +1,4 @@
-"""What browsers do to a run with the mouse: drag bodies, move the targets of joints."""
+"""What browsers do to a run: push and drag bodies, move the targets of joints."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.view.live.events import BadMessage, Client, Event
-from sphshell_pin.view.live.picture import Picture
+from sphshell_pin.view.live.picture import Picture, PushShown, frame_point
 from sphshell_pin.view.live.player import Interactive
 from sphshell_pin.view.live.window import LiveWindow
-from sphshell_pin.view.nodes import Json
+from sphshell_pin.view.nodes import FloatArray, Json
 
 if TYPE_CHECKING:
     from sphshell_pin.scenario.drag import Dragged
@@ -26,39 +26,48 @@ NOT_HERE = "this run cannot be dragged or aimed: it is a finished one, or its pl
 
 
 class Hands:
-    """Hands the wishes of browsers to `player`, where it is Interactive; one drags at a time."""
+    """Hands the wishes of browsers to `player`; one browser drags at a time."""
 
     def __init__(self, player: Player, picture: Picture, window: LiveWindow | None) -> None:
-        self._player = player if isinstance(player, Interactive) else None
+        self._player = player
+        self._interactive = player if isinstance(player, Interactive) else None
         self._picture = picture
         # Where the picture is in a window of others, nothing is known of the mouse.
         self._window = window
         self._dragger: Client | None = None
+        self._holds: dict[Client, Event] = {}
+        self._pushed: tuple[str, FloatArray, float] | None = None  # until a time [s]
 
     @property
-    def dragging(self) -> bool:
-        """Whether a browser drags a body."""
-        return self._dragger is not None
+    def push(self) -> PushShown | None:
+        """The push of now."""
+        if self._pushed is None or self._player.time > self._pushed[2]:
+            self._pushed = None
+            return None
+        body, force, _ = self._pushed
+        display = self._picture.display
+        point = frame_point(display.scene.model, display.data, body)
+        return None if point is None else PushShown.at(point, force)
 
     @property
     def drag(self) -> Dragged | None:
         """What is dragged now."""
-        if self._player is None or self._dragger is None:
+        if self._interactive is None or self._dragger is None:
             return None
-        return self._player.drag
+        return self._interactive.drag
 
     @property
     def can_record_patches(self) -> bool:
         """Whether patches of contacts can be had."""
-        return self._player is not None and self._player.can_record_patches
+        return self._interactive is not None and self._interactive.can_record_patches
 
     def offer(self) -> Json:
         """Return what there is to do, for the first message to a browser."""
         drag = None
-        if self._player is not None and self._window is not None:
+        if self._interactive is not None and self._window is not None:
             stiffness = float(f"{G / (SAG * self._picture.view.distance):.2g}")
             drag = {"nodes": self._picture.display.grips(), "stiffness": stiffness}
-        targets = () if self._player is None else self._player.targets
+        targets = () if self._interactive is None else self._interactive.targets
         names = ("joint", "rotates", "low", "high", "limited", "value")
         return {
             "drag": drag,
@@ -67,7 +76,7 @@ class Hands:
 
     def state(self) -> Json:
         """Return what is done now, for the panel."""
-        drag, targets = self.drag, () if self._player is None else self._player.targets
+        drag, targets = self.drag, () if self._interactive is None else self._interactive.targets
         return {
             "targets": {one.joint: one.value for one in targets},
             "drag": drag
@@ -79,13 +88,42 @@ class Hands:
         }
 
     def do(self, client: Client, event: Event) -> None:
-        """Drag a body, or move the target of a joint."""
-        if self._player is None:
+        """Push or drag a body, or move the target of a joint."""
+        match event["type"]:
+            case "push":
+                self._push(event, event["seconds"])
+            case "hold":
+                self._check_body(event["body"])
+                self._holds[client] = event
+            case "target":
+                self._able().aim(event["joint"], event["value"])
+            case "drag":
+                self._pull(self._able(), client, event)
+
+    def push_on(self, seconds: float) -> None:
+        """Push for `seconds` [s] more what is held; a drag takes the place of pushes."""
+        if self._dragger is None:
+            for event in self._holds.values():
+                self._push(event, seconds)
+
+    def _push(self, event: Event, seconds: float) -> None:
+        player = self._player
+        self._check_body(event["body"])
+        force = event["newtons"] * np.array(event["direction"])
+        player.push(event["body"], force, seconds)
+        self._dragger = None
+        if force.any():
+            self._pushed = event["body"], force, player.time + seconds
+
+    def _check_body(self, body: str) -> None:
+        bodies = self._player.bodies
+        if body not in bodies:
+            raise NameNotFound("body to push", body, "this run", bodies)
+
+    def _able(self) -> Interactive:
+        if self._interactive is None:
             raise BadMessage(NOT_HERE)
-        if event["type"] == "target":
-            self._player.aim(event["joint"], event["value"])
-        else:
-            self._pull(self._player, client, event)
+        return self._interactive
 
     def _pull(self, player: Interactive, client: Client, event: Event) -> None:
         """Drag the body of a node by a point of the node towards a target."""
@@ -101,19 +139,20 @@ class Hands:
         seen = matrix[:3, :3] @ np.array(event["point"]) + matrix[:3, 3]
         point = (data.oMi[where.parentJoint] * where.placement).actInv(seen)
         player.pull(frame, point, np.array(event["target"]), event["stiffness"])
-        self._dragger = client
+        self._dragger, self._pushed = client, None
 
     def release(self, client: Client) -> None:
-        """End the drag of a browser."""
-        if self._player is not None and self._dragger is client:
+        """End the drag of a browser, and the push that it holds."""
+        self._holds.pop(client, None)
+        if self._interactive is not None and self._dragger is client:
             self._dragger = None
-            self._player.release()
+            self._interactive.release()
 
     def forget(self) -> None:
-        """Drop the drag, as the run has started anew."""
-        self._dragger = None
+        """Drop what acts, as the run has started anew."""
+        self._dragger = self._pushed = None
 
     def record_patches(self, on: bool) -> None:
         """Compute patches from now on, or no longer; where they were recorded, nothing is done."""
-        if self._player is not None and self._player.can_record_patches:
-            self._player.record_patches(on)
+        if self._interactive is not None and self._interactive.can_record_patches:
+            self._interactive.record_patches(on)

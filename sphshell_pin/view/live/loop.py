@@ -24,10 +24,10 @@ from sphshell_pin.view.live.greeting import (
 )
 from sphshell_pin.view.live.hands import Hands
 from sphshell_pin.view.live.panel import Panel, list_contacts, rows_now
-from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown, frame_point
+from sphshell_pin.view.live.picture import LIVE_PARTS, Picture
 from sphshell_pin.view.live.server import Server
 from sphshell_pin.view.live.window import LiveWindow
-from sphshell_pin.view.nodes import FloatArray, Json, new_visualizer
+from sphshell_pin.view.nodes import Json, new_visualizer
 
 if TYPE_CHECKING:
     from sphshell_pin.view.live.player import Player
@@ -82,8 +82,6 @@ class Live:
         self._clear_points = True
         self._factor = 1.0
         self._pace: deque[tuple[float, float]] = deque()
-        self._holds: dict[Client, Event] = {}
-        self._pushed: tuple[str, FloatArray, float] | None = None
         self._changed = True
         self._parameter_values = self._read_parameters()
         self._next_panel = 0.0
@@ -211,7 +209,7 @@ class Live:
             try:
                 # A diverging run is reported in the panel, not on the terminal.
                 with np.errstate(all="ignore"):
-                    self.picture.update(self.player, self._push_shown(), self._hands.drag)
+                    self.picture.update(self.player, self._hands.push, self._hands.drag)
             except Exception as fault:
                 # A picture that fails is reported in the panel, which goes on.
                 self.fault = fault
@@ -246,8 +244,7 @@ class Live:
 
     def _advance(self, duration: float, wall: float) -> None:
         player = self.player
-        for event in () if self._hands.dragging else self._holds.values():
-            self._push(event, 1.5 * duration)
+        self._hands.push_on(1.5 * duration)
         before = player.time
         try:
             rows = player.advance(duration, wall)
@@ -291,15 +288,9 @@ class Live:
                 self._pace.clear()
             case "parameter":
                 self._change(event["key"], event["value"])
-            case "push":
-                self._push(event, event["seconds"])
-            case "hold":
-                self._check_body(event["body"])
-                self._holds[client] = event
-            case "drag" | "target":
+            case "push" | "hold" | "drag" | "target":
                 self._hands.do(client, event)
             case "release":
-                self._holds.pop(client, None)
                 self._hands.release(client)
                 if client not in self.server.clients and self._charts.forget(client):
                     self._send_curves()
@@ -355,7 +346,6 @@ class Live:
 
     def _start_anew(self) -> None:
         self.fault = None
-        self._pushed = None
         self._hands.forget()
         self._ahead = 0.0
         if self.player.duration is None:
@@ -399,26 +389,6 @@ class Live:
         self._panel.post(
             name, {"type": "earlier", "name": name, "keys": self._charts.keys, "rows": points}
         )
-
-    def _check_body(self, body: str) -> None:
-        if body not in self.player.bodies:
-            raise NameNotFound("body to push", body, "this run", self.player.bodies)
-
-    def _push(self, event: Event, seconds: float) -> None:
-        self._check_body(event["body"])
-        force = event["newtons"] * np.array(event["direction"])
-        self.player.push(event["body"], force, seconds)
-        if force.any():
-            self._pushed = event["body"], force, self.player.time + seconds
-
-    def _push_shown(self) -> PushShown | None:
-        if self._pushed is None or self.player.time > self._pushed[2]:
-            self._pushed = None
-            return None
-        body, force, _ = self._pushed
-        display = self.picture.display
-        point = frame_point(display.scene.model, display.data, body)
-        return None if point is None else PushShown.at(point, force)
 
     # The panel
 

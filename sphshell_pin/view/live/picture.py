@@ -45,7 +45,7 @@ FRAMES_TO_SCALE = 45
 POINTS_OF_PIECE, PIECES = 48, 60
 
 LIVE_PARTS: tuple[str, ...] = (*get_args(Part), "cones", "pressure")
-DRAG_COLOR = 0x0B7A3B
+DRAG_COLOR = 0x16A34A
 SHOWN_AT_FIRST = frozenset({"robot", "spheres", "arrows", "points", "wireframe", "trails"})
 
 

@@ -206,6 +206,7 @@ class Panel {
       const hidden = document.body.classList.toggle("folded");
       element("fold").setAttribute("aria-pressed", !hidden);
     };
+    if (!curves.some((curve) => curve.figures.peak > 0)) element("fold").click();
     this.tell_figures();
   }
 
@@ -311,6 +312,7 @@ class Panel {
     });
   } catch (fault) {
     element("fault").textContent = `This recording cannot be shown: ${fault.message}`;
+    window.recording_fault = true;
     throw fault;
   }
 })();

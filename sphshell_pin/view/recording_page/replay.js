@@ -87,6 +87,7 @@ function resolve(value) {
 // Draw the scene; return what the page knows of the run besides.
 function replay(viewer, buffer) {
   let panel = null;
+  let lost = 0;
   const take = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
     if (command.type === "text") {
@@ -96,6 +97,9 @@ function replay(viewer, buffer) {
       panel = command;
     } else if (command.type === "set_target") {
       viewer.controls.target.fromArray(command.value);
+    } else if (command.type === "set_object") {
+      // The viewer cannot draw every mesh file: the others are worth seeing.
+      try { take(resolve(command)); } catch { lost += 1; }
     } else {
       take(resolve(command));
     }
@@ -105,6 +109,10 @@ function replay(viewer, buffer) {
     const length = lengths.getUint32(at, true);
     viewer.handle_command_bytearray(new Uint8Array(buffer.slice(at + 4, at + 4 + length)));
     at += 4 + length;
+  }
+  if (lost) {
+    const count = lost === 1 ? "One mesh" : `${lost} meshes`;
+    element("fault").textContent = `${count} cannot be drawn by this viewer.`;
   }
   return panel;
 }

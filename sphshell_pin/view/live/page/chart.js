@@ -6,6 +6,7 @@ import { color } from "./theme.js";
 
 const LEFT = 52, RIGHT = 14, TOP = 8, BOTTOM = 24;
 const DASHES = [6, 4];
+const NEAR = 0.01; // share of the window
 const GHOST = 0.55; // opacity of the curves of an earlier run
 
 export function nice(value) {
@@ -158,14 +159,16 @@ export class Chart {
     pen.setLineDash([]);
   }
 
-  // The values at the mouse: of each curve the point that is nearest in time.
+  // The values at the mouse: of each curve the point that is nearest in time, if it has one there.
   readout(pen, lines, { start, x, y, width, height }) {
     const t = start + ((this.mouse - LEFT) / (width - LEFT - RIGHT)) * this.span;
+    this.read = null;
     const found = [];
     for (const line of lines) {
       const k = first_at(line.rows, t);
       const near = [line.rows[k - 1], line.rows[k]].filter(Boolean)
         .reduce((a, b) => (Math.abs(a[0] - t) <= Math.abs(b[0] - t) ? a : b));
+      if (Math.abs(near[0] - t) > NEAR * this.span) continue;
       if (near[line.column] !== null) found.push({ ...line, t: near[0], value: near[line.column] });
     }
     if (!found.length) return;

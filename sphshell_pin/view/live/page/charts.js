@@ -11,7 +11,6 @@ import { color } from "./theme.js";
 const MOST_ROWS = 4000;
 const MOST_CURVES = 8; // as many colors as palette.css has
 const AT_FIRST = 8;
-const IN_THE_HEADER = 3; // names of more curves stand below it
 
 const chart = new Chart(element("chart"));
 const quantities = new Map(); // "Force [N]": { name, unit, series, chosen: keys }
@@ -81,7 +80,6 @@ function update() {
   legend();
   chart.draw();
   ask();
-  element("plot").classList.toggle("many", chart.curves.length > IN_THE_HEADER);
 }
 
 function legend() {
@@ -101,7 +99,16 @@ function legend() {
     key.append(swatch, name);
     node.append(key);
   }
+  arrange();
 }
+
+// Names that have no room in the header stand below it.
+function arrange() {
+  const { classList } = element("plot"), node = element("curve-legend");
+  classList.remove("many");
+  classList.toggle("many", node.scrollWidth > node.clientWidth + 1);
+}
+window.addEventListener("resize", arrange);
 
 function compare() {
   element("compare").hidden = !earlier.last && !earlier.kept;

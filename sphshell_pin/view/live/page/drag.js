@@ -120,7 +120,7 @@ function show({ drag, running }) {
   const { x, y } = to_page(drag.target).project(picture.viewer.camera);
   const { clientWidth, clientHeight } = picture.pane;
   label.style.left = `${0.5 * (1 + x) * clientWidth}px`;
-  label.style.top = `${0.5 * (1 - y) * clientHeight}px`;
+  label.style.top = `${picture.pane.offsetTop + 0.5 * (1 - y) * clientHeight}px`;
 }
 
 on("picture", (one) => { picture = one; });
