@@ -319,8 +319,8 @@ void bind_dynamics(nanobind::module_& m) {
       .def(
           "__init__",
           [](RunSettings* self, std::string integrator, double dt, double rtol, double atol,
-             double duration, double start_time, double control_dt, double record_dt,
-             bool patches, bool torques) {
+             double duration, double start_time, double control_dt, double record_dt, bool patches,
+             bool torques) {
             new (self) RunSettings{{std::move(integrator), dt, rtol, atol},
                                    duration,
                                    start_time,

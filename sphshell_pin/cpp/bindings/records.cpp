@@ -35,8 +35,7 @@ nb::dict to_dict(Record record, int nq, int nv) {
   out["energy"] = to_array(std::move(record.energy), {n, std::size_t(Record::kEnergies)});
   out["contact_row"] = to_array(std::move(record.contact_row));
   out["contacts"] = to_bytes(std::move(record.contacts));
-  if (record.torques)
-    out["torques"] = to_array(std::move(*record.torques), {n, std::size_t(nv)});
+  if (record.torques) out["torques"] = to_array(std::move(*record.torques), {n, std::size_t(nv)});
   if (record.patches) out["patches"] = to_bytes(std::move(*record.patches));
   out["event_t"] = to_array(std::move(event_t));
   out["event_pair"] = to_array(std::move(event_pair));

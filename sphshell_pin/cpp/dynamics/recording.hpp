@@ -82,8 +82,8 @@ class Recorder {
   // Rows every `record_dt` from `start` to `end` [s], and at `end`; 0: at the end of every step.
   Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches);
 
-  // Whether the rows from now on have the patches of their contacts; those of rows that are recorded
-  // already are unknown.
+  // Whether the rows from now on have the patches of their contacts; those of rows that are
+  // recorded already are unknown.
   void record_patches(bool on);
   void set_follower(RowFollower* follower) { follower_ = follower; }
 

@@ -250,8 +250,8 @@ void Simulation::hold_torques() {
 }
 
 void Simulation::record_torques() {
-  recorder_.record_torques([this](const State& at) -> const VectorX& { return recorded_torques(at); },
-                           tau_.size());
+  recorder_.record_torques(
+      [this](const State& at) -> const VectorX& { return recorded_torques(at); }, tau_.size());
 }
 
 // The first row stands before the first torque that is held.
