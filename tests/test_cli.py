@@ -11,6 +11,7 @@ import time
 import pytest
 from typer.testing import CliRunner
 
+import sphshell_pin
 from sphshell_pin.cli import app
 from tests.scenario.files import DROP, write
 
@@ -34,6 +35,10 @@ def test_every_help_has_an_example(command):
     told = call(*command, "--help")
     assert told.exit_code == 0
     assert "Example: sphshell-pin" in told.output
+
+
+def test_it_states_its_versions():
+    assert call("--version").output.startswith(f"sphshell-pin {sphshell_pin.__version__}, with pin")
 
 
 def test_help_is_quick_and_imports_nothing_heavy():

@@ -72,10 +72,31 @@ XacroArgOption = Annotated[
 ]
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        import coal
+        import pinocchio
+
+        import sphshell_pin
+
+        versions = f"pinocchio {pinocchio.__version__}, coal {coal.__version__}"
+        print(f"sphshell-pin {sphshell_pin.__version__}, with {versions}")
+        raise typer.Exit
+
+
 @app.callback()
 def options(
     context: typer.Context,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            callback=_print_version,
+            is_eager=True,
+            help="Print the versions of this package, Pinocchio and Coal.",
+        ),
+    ] = False,
 ) -> None:
     """Exact contact of spheres with CAD surfaces, for Pinocchio's robots.
 
