@@ -91,7 +91,7 @@ class Explanation:
             ):
                 if math.isfinite(value):
                     lines.append(f"  {label}: {value:.4g} {unit}")
-        lines.append(f"Recommended dt: {self.recommended_dt:.3g} s")
+        lines.append(f"Recommended dt of a fixed step: {self.recommended_dt:.3g} s")
         lines += [f"Warning: {w}" for w in self.warnings]
         return "\n".join(lines)
 

@@ -1,4 +1,4 @@
-"""A planned scenario as text: TOML with a comment beside each value that says where it is from."""
+"""A planned scenario as text: TOML with comments beside the values that say where they are from."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ stiffness = {contact.bristle[0]} # [N/m] as stiff as the law under the load
 damping = {contact.bristle[1]} # [N s/m] a tenth of critical
 """
 _PRESS = """
-# The tip follows a path on the surface and presses on it.
+# {told}
 [controller]
 type = "cartesian-impedance"
 frame = {tip.frame}
@@ -202,9 +202,10 @@ def draft_text(
     if isinstance(control, Press):
         path = _rounded(control.path, digits)
         offset = _rounded(plan.tips[0].offset, digits)
-        text += _fill(
-            _PRESS, tip=plan.tips[0], offset=offset, shell=shell, path=path, press=control
-        )
+        moves = "follows a path on the surface and presses on it"
+        told = f"The tip {moves if len(path) > 1 else 'presses on one place of the surface'}."
+        values = {"offset": offset, "path": path, "told": told}
+        text += _fill(_PRESS, tip=plan.tips[0], shell=shell, press=control, **values)
         if control.even:
             mean_force = {"value": control.force, "rtol": HELD}
     elif isinstance(control, Hold):
@@ -249,8 +250,10 @@ def _parameters(plan: Plan, pairs: Sequence[str]) -> dict[str, dict[str, float]]
         }
     if plan.control is None:
         return found | {"gravity.2": {"min": -20.0, "max": 0.0}}
-    press = isinstance(plan.control, Press)
-    keys = ("normal_force", "speed", "stiffness", "damping") if press else ("kp", "kd")
+    keys = ["kp", "kd"]
+    if isinstance(plan.control, Press):
+        speed = ["speed"] if len(plan.control.path) > 1 else []
+        keys = ["normal_force", *speed, "stiffness", "damping"]
     return found | {f"controller.{key}": {} for key in keys}
 
 
