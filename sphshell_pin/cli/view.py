@@ -43,7 +43,7 @@ def view(
         typer.Option("--scenario", help="Scenario that a finished run is shown in."),
     ] = None,
 ) -> None:
-    """Run a scenario in a page: pause, push, turn its knobs; or play a finished run.
+    """Run a scenario in a page: pause, push, change parameters; or play a finished run.
 
     Example: sphshell-pin view fingertip_on_blade --speed 0.5
     """
