@@ -2,8 +2,8 @@
 
 Each at 1440 x 900 and 390 x 844, light and dark: the live page of a scenario, its recording, and,
 where they were made before, the pages of the report (`sphshell-pin report`) and of these documents
-(`make docs`). `--picture` writes docs/pictures/live_page.png besides. Needs playwright and a
-Chromium.
+(`make docs`). `--picture` writes docs/pictures/live_page.png besides, which was made with
+`--time 5.9 --change contact.tip-blade.method=facets`. Needs playwright and a Chromium.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ def main() -> None:
     options.add_argument("folder", type=Path)
     options.add_argument("--scenario", default="fingertip_on_blade")
     options.add_argument("--time", type=float, default=3.0, help="shown on the live page [s]")
+    options.add_argument("--change", metavar="KEY=WORD", help="a menu changed at half that time")
     options.add_argument("--report", type=Path, default=ROOT / "results" / "report" / "index.html")
     options.add_argument("--site", type=Path, default=ROOT / "build" / "site" / "index.html")
     options.add_argument("--only", choices=("live", "recording", "report", "docs"), action="append")
@@ -48,7 +49,7 @@ def main() -> None:
     wanted = given.only or ["live", "recording", "report", "docs"]
     with browser() as chromium:
         if "live" in wanted:
-            with live_page(given.scenario, given.time) as url:
+            with live_page(given.scenario, given.time, given.change) as url:
                 shoot(chromium, given.folder, "live", url, "globalThis.state?.t > 0")
         if "recording" in wanted:
             with tempfile.TemporaryDirectory() as folder:
@@ -80,14 +81,19 @@ def browser() -> Iterator[Browser]:
 
 
 @contextmanager
-def live_page(scenario: str, time: float) -> Iterator[str]:
-    """Serve a scenario, which stands still after `time` [s]."""
-    live = Live(LiveRun(build(scenario)), running=False)
+def live_page(scenario: str, time: float, change: str | None = None) -> Iterator[str]:
+    """Serve a scenario, which stands still after `time` [s], with a change at half of it."""
+    run = LiveRun(build(scenario))
+    live = Live(run, running=False)
     try:
         # Before anybody looks: as it would be without waiting for pictures.
-        while live.player.time < time and live.player.ended is None:
+        while run.time < time and run.ended is None:
+            if change and run.time >= time / 2:
+                key, _, word = change.partition("=")
+                run.change(key, word)
+                change = None
             live._advance(1 / 60, 1.0)
-            live.picture.update(live.player, None)
+            live.picture.update(run, None)
         live.start()
         yield live.url
     finally:

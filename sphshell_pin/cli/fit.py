@@ -35,7 +35,7 @@ def fit(
     context: typer.Context,
     data: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[DATA.csv]...", help="Measured data: columns by name and unit."),
+        typer.Argument(metavar="DATA.csv", help="Measured data: columns by name and unit."),
     ] = None,
     scenario: ScenarioArgument,
     param: Annotated[
@@ -67,7 +67,7 @@ def fit(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the files.", show_default="results/<scenario>")
+        Path | None, typer.Option(help="Folder of the files; by default results/SCENARIO.")
     ] = None,
     picture: Annotated[
         bool, typer.Option("--picture/--no-picture", help="Draw fit and residuals.")

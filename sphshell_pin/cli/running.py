@@ -39,7 +39,7 @@ def run(
     context: typer.Context,
     scenario: ScenarioArgument,
     out: Annotated[
-        Path | None, typer.Option(help="Results folder.", show_default="results/<scenario>")
+        Path | None, typer.Option(help="Results folder; by default results/SCENARIO.")
     ] = None,
     dt: DtOption = None,
     duration: Annotated[

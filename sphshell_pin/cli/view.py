@@ -34,7 +34,7 @@ def view(
     color: Annotated[
         str,
         typer.Option(
-            help="Colours of the shells: surface, patches, or distance (of curved elements from "
+            help="Colors of the shells: surface, patches, or distance (of curved elements from "
             "the flat ones)."
         ),
     ] = "surface",

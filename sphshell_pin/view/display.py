@@ -186,15 +186,17 @@ class Display:
             return self.visualizer["trail"]
         return self._shells[shell_key(self.scene.pairs[pair])].node["trail"]
 
-    def replace_scene(self, scene: Scene, visual_model: pin.GeometryModel | None) -> None:
+    def replace_scene(self, scene: Scene, visual_model: pin.GeometryModel | None) -> bool:
         """Take `scene`, whose model has the same joints, for the one shown; draw what differs.
 
         Shells and spheres may be others, or sit elsewhere; `update` then places them.
+        Returns whether the shells were drawn anew, without trails.
         """
         self.scene = scene
         if scene.model is not self._model:
             self._model, self._data = scene.model, scene.model.createData()
-        if {shell_key(pair) for pair in scene.pairs if pair.shell} != set(self._shells):
+        anew = {shell_key(pair) for pair in scene.pairs if pair.shell} != set(self._shells)
+        if anew:
             self.visualizer["shells"].delete()
             self._draw_shells()
         if {sphere_key(one) for pair in scene.pairs for one in pair.spheres} != set(self._spheres):
@@ -205,6 +207,7 @@ class Display:
             self.visualizer["robot"].delete()
             self._robot = self._make_robot(visual_model)
             show(self.visualizer["robot"], "robot" not in self._hidden)
+        return anew
 
     def show(self, part: Part, on: bool) -> None:
         """Show or hide one part of the picture; see PARTS."""

@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin.contact import CoulombFriction
+from sphshell_pin.dynamics.scene_contacts import ROW, SceneContacts
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown
 from sphshell_pin.view.live.window import LiveWindow
 from tests.view.live_player import ArmPlayer, BallPlayer
@@ -118,6 +119,42 @@ def test_a_contact_that_jumps_starts_another_piece():
             data = drawn["geometries"][0]["data"]["attributes"]["position"]["array"].data
             x = np.frombuffer(data, "<f4")[::3]
             assert np.ptp(x) < 0.1
+
+
+def test_trails_outlast_a_shell_drawn_anew_and_pairs_on_one_shell_have_one_each():
+    player = BallPlayer()
+    (one,) = player.scene.pairs
+    two = SimpleNamespace(**vars(one) | {"name": "other"})
+    player.scene = SimpleNamespace(model=player.model, pairs=(one, two))
+    both = np.zeros(2, ROW)
+    both["pair"], both["normal_world"], both["normal_force"] = [0, 1], [0, 0, 1], 1.0
+    both["depth"] = 1e-3
+
+    class Touching:
+        """The player, with a contact of each pair."""
+
+        def __getattr__(self, name):
+            return getattr(player, name)
+
+        @property
+        def contacts(self):
+            both["point_world"] = [[player.q[0], 0, 0], [player.q[0], 0.2, 0]]
+            return SceneContacts.from_rows(both.tobytes())
+
+    easel = Easel(Touching())
+    for x in np.linspace(-0.1, 0.1, 20):
+        player.q = np.array([x, 0.0, 0.049])
+        easel.draw()
+    before = {path for path in easel.browser.objects if "/trail/" in path}
+    assert len(before) == 2
+    shell = plate()
+    pairs = tuple(SimpleNamespace(**vars(pair) | {"shell": shell}) for pair in (one, two))
+    player.scene = SimpleNamespace(model=player.model, pairs=pairs)
+    easel.draw()
+    assert {path for path in easel.browser.objects if "/trail/" in path} == before
+    easel.picture.clear()
+    easel.draw()
+    assert not any("/trail/" in path for path in easel.browser.objects)
 
 
 @pytest.mark.parametrize("part", LIVE_PARTS)

@@ -104,8 +104,8 @@ class Picture:
         if player.scene.pairs is not self._pairs:
             self._pairs = player.scene.pairs
             self._empty = _empty_parts(player.scene)
-            self.display.replace_scene(player.scene, player.visual_model)
-            self._trails.clear()
+            if self.display.replace_scene(player.scene, player.visual_model):
+                self._trails.draw_again()
         if not np.isfinite(player.q).all():
             return  # of a run that diverged the last sound state stays
         contacts = player.contacts
@@ -294,10 +294,15 @@ class _Trails:
     def clear(self) -> None:
         for pair in {pair for pair, _ in getattr(self, "_drawn", ())}:
             self._display.trail_node(pair).delete()
-        self._drawn: set[tuple[int, int]] = set()
+        self._drawn: dict[tuple[int, int], FloatArray] = {}
         self._points: dict[int, list[FloatArray]] = {}
         self._piece: dict[int, int] = {}
         self._undrawn: dict[int, int] = {}
+
+    def draw_again(self) -> None:
+        """Draw on shells that were drawn anew, without their trails."""
+        for (index, slot), path in self._drawn.items():
+            self._display.draw_trail(f"{index}_{slot}", path, index)
 
     def add(self, contacts: SceneContacts) -> None:
         """Go on to where `contacts` are now."""
@@ -336,8 +341,9 @@ class _Trails:
     def _draw(self, index: int) -> None:
         slot = self._piece.setdefault(index, 0) % PIECES
         self._undrawn[index] = 0
-        if self._display.draw_trail(str(slot), np.array(self._points[index]), index) is not None:
-            self._drawn.add((index, slot))
+        path = np.array(self._points[index])
+        if self._display.draw_trail(f"{index}_{slot}", path, index) is not None:
+            self._drawn[index, slot] = path
 
     def _finish(self, index: int) -> None:
         if self._undrawn.get(index, 0) and len(self._points[index]) > 1:
