@@ -232,7 +232,9 @@ def test_the_panda_on_the_blade(integrator: object) -> None:
         record_dt=0.01,
     )
     names = ["law.stiffness", "law.damping", "friction.mu_static", "sphere.radius", "placement"]
-    result = case.check([f"{pair}.{name}" for name in names] + ["v0"], depth=1e-4)
+    # The controller's torques are differenced; its decoupling solves for an inertia of 6 by 6.
+    columns = [f"{pair}.{name}" for name in names] + ["v0"]
+    result = case.check(columns, depth=1e-4, tolerance=3e-5)
     assert len(result.contacts.t)
 
 

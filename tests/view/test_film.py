@@ -104,12 +104,18 @@ def test_a_film_shows_the_pictures_in_their_order(rendered):
     ["run.mp4", *(pytest.param(one, marks=pytest.mark.slow) for one in ("run.gif", "frames"))],
 )
 def test_ctrl_c_leaves_nothing(rendered, tmp_path, name):
+    # Tests that run in the background inherit that Ctrl-C is to be ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+
     def press(done, _):
         if done == 2:
             os.kill(os.getpid(), signal.SIGINT)
 
-    with pytest.raises(KeyboardInterrupt):
-        rendered(name, fps=10, told=press)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            rendered(name, fps=10, told=press)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert list(tmp_path.iterdir()) == []
 
 
