@@ -180,6 +180,7 @@ def measured(label: str, result: Result, scene: Scene | None) -> Measured:
     parts += joints + [f"sensor {name}" for name in result.sensors]
     t = result.t[:count]
     settings = {} if result.origin is None else dict(_flat(result.origin.settings))
+    settings.pop("description", None)  # says what the run is, and changes nothing in it
     return Measured(
         label,
         tuple(parts),

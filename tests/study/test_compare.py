@@ -117,6 +117,7 @@ def test_settings_that_differ_are_listed_by_their_keys(finger):
     contact = {"name": "tip", "law": {"stiffness": 1e6, "exponent": 1.5}}
     settings = {"run": {"dt": 1e-4}, "contact": [contact], "gravity": [0, 0, -9.81]}
     other = {**settings, "contact": [{**contact, "law": {"stiffness": 2e6, "exponent": 1.5}}]}
+    settings["description"] = "what a run is called is not what it is"
     runs = [
         measured(label, replace(finger, origin=Origin("x", stated)), finger.scene)
         for label, stated in (("a", settings), ("b", other))
