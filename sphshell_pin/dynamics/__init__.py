@@ -1,12 +1,13 @@
 """Scenes of contact pairs on a Pinocchio model, and their motion."""
 
-from sphshell_pin.dynamics import controllers, integrators, sensors
+from sphshell_pin.dynamics import controllers, impedance, integrators, sensors
 from sphshell_pin.dynamics.controllers import *  # noqa: F403
 from sphshell_pin.dynamics.derivatives import (
     ContactForceDerivatives,
     DynamicsDerivatives,
     StepDerivatives,
 )
+from sphshell_pin.dynamics.impedance import *  # noqa: F403
 from sphshell_pin.dynamics.integrators import *  # noqa: F403
 from sphshell_pin.dynamics.joints import JointFriction, JointIngredients, JointLimits
 from sphshell_pin.dynamics.result import Result
@@ -44,5 +45,6 @@ __all__ = [
     "StepDerivatives",
 ]
 __all__ += controllers.__all__
+__all__ += impedance.__all__
 __all__ += integrators.__all__
 __all__ += sensors.__all__
