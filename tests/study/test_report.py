@@ -302,6 +302,14 @@ def test_nothing_measured_meets_no_aim():
     assert Finding("a", "a", 1.0).met is None
 
 
+def test_a_missed_figure_never_reads_like_its_aim():
+    assert Finding("a", "a", 1.8011613, "x", aim=1.8).text == "1.801 x"
+    assert Finding("a", "a", 1.8000004, "x", aim=1.8).text == "1.8000004 x"
+    assert Finding("a", "a", 14.9999, aim=15.0, sense=">=").text == "14.9999"
+    assert Finding("a", "a", 1.7999, "x", aim=1.8).text == "1.8 x"
+    assert Finding("a", "a", 1.8011, "x").text == "1.8 x"
+
+
 def test_labels_move_apart_as_little_as_needed():
     heights = spread_apart([0.1, 0.5, 0.51, 0.52, 0.9], 0.1)
     assert heights == pytest.approx([0.1, 0.41, 0.51, 0.61, 0.9], abs=1e-6)

@@ -69,8 +69,14 @@ class Finding:
 
     @property
     def text(self) -> str:
-        """The figure with its unit."""
-        return self.shown if self.shown is not None else with_unit(self.value, self.unit)
+        """The figure with its unit, in as many digits as show on which side of the aim it is."""
+        if self.shown is not None:
+            return self.shown
+        text = with_unit(self.value, self.unit)
+        if self.aim is None or self.met is not False or text != with_unit(self.aim, self.unit):
+            return text
+        several = (f"{self.value:.{digits}g}" for digits in range(4, 18))
+        return f"{next(one for one in several if float(one) != self.aim)} {self.unit}".strip()
 
     @property
     def aim_text(self) -> str:

@@ -1,12 +1,6 @@
 // Forces and depth of the run over time, with a cursor at the time that is shown.
-const LEFT = 54, RIGHT = 14, TOP = 6, BOTTOM = 20, GAP = 12;
+const TOP = 6, BOTTOM = 20, GAP = 12;
 const FORCE_SHARE = 0.62; // of the height; depth has the rest
-
-function nice(value) {
-  const power = 10 ** Math.floor(Math.log10(value));
-  const lead = value / power;
-  return (lead <= 1 ? 1 : lead <= 2 ? 2 : lead <= 5 ? 5 : 10) * power;
-}
 
 // Factor and name of the unit in which `largest` [base: N, m, s] reads well.
 function reading_unit(largest, base) {
@@ -66,62 +60,40 @@ class Chart {
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
+  // Where time t is [pixels].
+  x(t) {
+    const width = this.canvas.clientWidth - LEFT - RIGHT;
+    return LEFT + ((t - this.start) / (this.end - this.start || 1)) * width;
+  }
+
   draw() {
-    const { canvas, curve } = this;
-    const ratio = globalThis.devicePixelRatio || 1;
-    const width = canvas.clientWidth, height = canvas.clientHeight;
-    if (!width || !height) return;
-    const pixels = [Math.round(width * ratio), Math.round(height * ratio)];
-    if (canvas.width !== pixels[0] || canvas.height !== pixels[1]) [canvas.width, canvas.height] = pixels;
-    const pen = canvas.getContext("2d");
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.clearRect(0, 0, width, height);
-    pen.font = "11px system-ui, 'Segoe UI', 'DejaVu Sans', sans-serif";
+    const { canvas, curve, start, end } = this;
+    const area = blank(canvas);
+    if (!area) return;
+    const { pen, width, height } = area;
     const style = getComputedStyle(document.documentElement);
-    const color = (name) => style.getPropertyValue(`--${{ depth: "curve-1" }[name] || name}`).trim();
-    const span = this.end - this.start || 1;
-    const x = (t) => LEFT + ((t - this.start) / span) * (width - LEFT - RIGHT);
-    const room = height - TOP - BOTTOM - GAP;
+    const color = (name) => style.getPropertyValue(name).trim();
+    const room = height - TOP - BOTTOM - GAP, x = (t) => this.x(t);
     const strips = [
       { columns: ["friction", "normal"], unit: "N", top: TOP, height: FORCE_SHARE * room },
       { columns: ["depth"], unit: "m", top: TOP + FORCE_SHARE * room + GAP, height: (1 - FORCE_SHARE) * room },
     ];
-    this.time_axis(pen, color, { x, span, width, height });
-    for (const strip of strips) this.strip(pen, color, strip, x, width);
+    time_axis(pen, color, width, { start, end, x, top: TOP, bottom: height - BOTTOM });
+    for (const strip of strips) this.strip(pen, color, strip, width);
     const at = Math.round(x(this.now)) + 0.5;
-    pen.strokeStyle = color("ink");
-    pen.lineWidth = 1;
-    pen.beginPath(); pen.moveTo(at, TOP); pen.lineTo(at, height - BOTTOM); pen.stroke();
+    stroke(pen, color("--ink"), [at, TOP], [at, height - BOTTOM]);
     if (!curve) return;
     const row = curve.row(this.now);
     for (const { columns, y } of strips) {
       for (const column of columns) {
-        pen.fillStyle = color(column);
+        pen.fillStyle = color(`--${column}`);
         pen.beginPath(); pen.arc(at, y(curve[column][row]), 3.2, 0, 7); pen.fill();
       }
     }
   }
 
-  time_axis(pen, color, { x, span, width, height }) {
-    const tick = nice(span / Math.max(2, width / 110));
-    pen.textBaseline = "top";
-    pen.textAlign = "center";
-    pen.lineWidth = 1;
-    for (let k = Math.ceil(this.start / tick - 1e-9); k * tick <= this.end + 1e-9 * tick; k += 1) {
-      const at = Math.round(x(k * tick)) + 0.5;
-      pen.strokeStyle = color("grid");
-      pen.beginPath(); pen.moveTo(at, TOP); pen.lineTo(at, height - BOTTOM); pen.stroke();
-      if (at > width - 46) continue;
-      pen.fillStyle = color("faint");
-      pen.fillText(digits(k * tick, 9), at, height - BOTTOM + 5);
-    }
-    pen.fillStyle = color("faint");
-    pen.textAlign = "right";
-    pen.fillText("t [s]", width - RIGHT, height - BOTTOM + 5);
-  }
-
   // Draw one quantity; add to the strip its scale y.
-  strip(pen, color, strip, x, width) {
+  strip(pen, color, strip, width) {
     const { curve } = this;
     const ranges = curve ? strip.columns.map((column) => curve[`${column}_range`]) : [[0, 0]];
     const most = Math.max(...ranges.map((range) => range[1])), least = Math.min(...ranges.map((range) => range[0]));
@@ -131,15 +103,7 @@ class Chart {
     const high = Math.max(low + step, 1.04 * most);
     const y = (value) => strip.top + ((high - value) / (high - low)) * strip.height;
     strip.y = y;
-    pen.textAlign = "right";
-    pen.textBaseline = "middle";
-    for (let k = Math.round(low / step); k * step <= high * (1 + 1e-9); k += 1) {
-      const at = Math.round(y(k * step)) + 0.5;
-      pen.strokeStyle = color(k === 0 ? "axis" : "grid");
-      pen.beginPath(); pen.moveTo(LEFT, at); pen.lineTo(width - RIGHT, at); pen.stroke();
-      pen.fillStyle = color("faint");
-      pen.fillText(digits(k * step * factor, 9), LEFT - 6, at);
-    }
+    value_axis(pen, color, width, { low, high, step, y, text: (value) => digits(value * factor, 9) });
     pen.save();
     pen.translate(10, strip.top + 0.5 * strip.height);
     pen.rotate(-Math.PI / 2);
@@ -154,9 +118,9 @@ class Chart {
     pen.lineWidth = 1.5;
     pen.lineJoin = "round";
     for (const column of strip.columns) {
-      pen.strokeStyle = color(column);
+      pen.strokeStyle = color(`--${column}`);
       pen.beginPath();
-      curve.t.forEach((t, k) => pen.lineTo(x(t), y(curve[column][k])));
+      curve.t.forEach((t, k) => pen.lineTo(this.x(t), y(curve[column][k])));
       pen.stroke();
     }
     pen.restore();

@@ -1,19 +1,14 @@
 // Curves over time on a canvas.
 "use strict";
 
+import { LEFT, RIGHT, blank, nice, stroke, time_axis, value_axis } from "./axes.js";
 import { number } from "./controls.js";
 import { color } from "./theme.js";
 
-const LEFT = 52, RIGHT = 14, TOP = 8, BOTTOM = 24;
+const TOP = 8, BOTTOM = 24;
 const DASHES = [6, 4];
 const NEAR = 0.01; // share of the window
 const GHOST = 0.55; // opacity of the curves of an earlier run
-
-export function nice(value) {
-  const power = 10 ** Math.floor(Math.log10(value));
-  const lead = value / power;
-  return (lead <= 1 ? 1 : lead <= 2 ? 2 : lead <= 5 ? 5 : 10) * power;
-}
 
 // The first index of rows whose time is not before t.
 export function first_at(rows, t) {
@@ -50,18 +45,9 @@ export class Chart {
   forget_scale() { this.low = this.high = null; }
 
   draw() {
-    const { canvas } = this;
-    const ratio = globalThis.devicePixelRatio || 1;
-    const width = canvas.clientWidth, height = canvas.clientHeight;
-    if (!width || !height) return;
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
-    }
-    const pen = canvas.getContext("2d");
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.clearRect(0, 0, width, height);
-    pen.font = "11px system-ui, 'Segoe UI', 'DejaVu Sans', sans-serif";
+    const area = blank(this.canvas);
+    if (!area) return;
+    const { pen, width, height } = area;
     // At first the window stands still, then it follows.
     const start = Math.max(this.begin, this.now - this.span), end = start + this.span;
     const lines = this.lines(start, end);
@@ -114,30 +100,10 @@ export class Chart {
   }
 
   axes(pen, { start, end, x, y, width, height }) {
-    const step = nice((this.high - this.low) / 4.5);
-    pen.lineWidth = 1;
-    pen.textAlign = "right";
-    pen.textBaseline = "middle";
-    for (let k = Math.ceil(this.low / step - 1e-9); k * step <= this.high + 1e-9 * step; k += 1) {
-      const at = Math.round(y(k * step)) + 0.5;
-      pen.strokeStyle = color(k === 0 ? "--axis" : "--grid");
-      pen.beginPath(); pen.moveTo(LEFT, at); pen.lineTo(width - RIGHT, at); pen.stroke();
-      pen.fillStyle = color("--faint");
-      pen.fillText(number(Number((k * step).toPrecision(9)), 6), LEFT - 7, at);
-    }
-    const tick = nice(this.span / Math.max(2, Math.min(7, width / 90)));
-    pen.textBaseline = "top";
-    pen.textAlign = "center";
-    for (let k = Math.ceil(start / tick - 1e-9); k * tick <= end + 1e-9 * tick; k += 1) {
-      const at = Math.round(x(k * tick)) + 0.5;
-      pen.strokeStyle = color("--grid");
-      pen.beginPath(); pen.moveTo(at, TOP); pen.lineTo(at, height - BOTTOM); pen.stroke();
-      if (at < width - 56) {
-        pen.fillText(String(Number((k * tick).toPrecision(9))), at, height - BOTTOM + 6);
-      }
-    }
-    pen.textAlign = "right";
-    pen.fillText("t [s]", width - RIGHT, height - BOTTOM + 6);
+    const { low, high } = this;
+    const text = (value) => number(value, 6);
+    value_axis(pen, color, width, { low, high, step: nice((high - low) / 4.5), y, text });
+    time_axis(pen, color, width, { start, end, x, top: TOP, bottom: height - BOTTOM });
   }
 
   line(pen, { curve, column, rows, ghost }, x, y) {
@@ -173,8 +139,7 @@ export class Chart {
     }
     if (!found.length) return;
     const at = Math.round(x(found[0].t)) + 0.5;
-    pen.strokeStyle = color("--axis");
-    pen.beginPath(); pen.moveTo(at, TOP); pen.lineTo(at, height - BOTTOM); pen.stroke();
+    stroke(pen, color("--axis"), [at, TOP], [at, height - BOTTOM]);
     const most = Math.max(2, Math.floor((height - BOTTOM - TOP - 22) / 15));
     const texts = [`${found[0].t.toFixed(4)} s`];
     for (const { curve, value, ghost } of found.slice(0, most)) {
