@@ -25,10 +25,11 @@ class Cluster:
         self.processes: list[subprocess.Popen[bytes]] = []
         self.start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
         end = time.monotonic() + 60
-        while not self.file.exists():
+        # The file is there before it is written.
+        while not (written := self.file.exists() and self.file.read_text()):
             assert time.monotonic() < end, "the scheduler did not start"
             time.sleep(0.05)
-        self.address = json.loads(self.file.read_text())["address"]
+        self.address = json.loads(written)["address"]
 
     def start(self, kind: str, *options: str) -> None:
         command = [sys.executable, "-m", "dask", kind, "--scheduler-file", str(self.file), *options]
