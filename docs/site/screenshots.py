@@ -40,7 +40,7 @@ def main() -> None:
     options.add_argument("--scenario", default="fingertip_on_blade")
     options.add_argument("--time", type=float, default=3.0, help="shown on the live page [s]")
     options.add_argument("--change", metavar="KEY=WORD", help="a menu changed at half that time")
-    options.add_argument("--report", type=Path, default=ROOT / "results" / "report" / "index.html")
+    options.add_argument("--report", type=Path, default=ROOT / "results" / "report" / "report.html")
     options.add_argument("--site", type=Path, default=ROOT / "build" / "site" / "index.html")
     options.add_argument("--only", choices=("live", "recording", "report", "docs"), action="append")
     options.add_argument("--picture", action="store_true", help="write docs/pictures/live_page.png")
