@@ -21,6 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse, write_whole
+from sphshell_pin.checks import check_finite, check_vector
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
 from sphshell_pin.films import Pixels, check_film, write_film
 from sphshell_pin.view.recording import Shown, check_pace, render_recording, sound_rows
@@ -126,10 +127,9 @@ def render_film(
             raise InvalidParameter(name, value, "is for a film or a folder of pictures, not a .png")
     if not still and time is not None:
         raise InvalidParameter("time", time, "is for a .png: a film has a span")
-    if not all(LEAST_SIZE <= pixels <= MOST_SIZE for pixels in size):
-        must = f"must be between {LEAST_SIZE} and {MOST_SIZE} pixels"
-        raise InvalidParameter("size", f"{size[0]}x{size[1]}", must)
-    fps = fps or (20.0 if path.suffix.lower() == ".gif" else 30.0)
+    size = _checked_size(size)
+    if fps is None:
+        fps = 20.0 if path.suffix.lower() == ".gif" else 30.0
     shown = Shown.of(result, scene, visual_model, title, speed)
     check_pace(fps, shown.speed)
     if film:
@@ -164,14 +164,24 @@ def render_film(
     return path
 
 
+def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
+    width, height = check_vector("size", size, 2, ": width and height [pixels]")
+    if not all(one == round(one) and LEAST_SIZE <= one <= MOST_SIZE for one in (width, height)):
+        must = f"must be whole numbers between {LEAST_SIZE} and {MOST_SIZE} [pixels]"
+        raise InvalidParameter("size", f"{width:g}x{height:g}", must)
+    return int(width), int(height)
+
+
 def _times(
     result: Result, span: tuple[float | None, float | None], *, still: bool
 ) -> tuple[float, float]:
     t = np.asarray(result.t)[: sound_rows(result)]
     first, last = float(t[0]), float(t[-1])
+    name = "time" if still else "span"
+    if not isinstance(span, (tuple, list)) or len(span) != 2:
+        raise InvalidParameter(name, span, "must be two times of the run [s], or None for its ends")
     for value in span:
-        if value is not None and not first <= value <= last:
-            name = "time" if still else "span"
+        if value is not None and not first <= check_finite(name, value) <= last:
             raise InvalidParameter(name, value, f"must be in the run: {first:g} to {last:g} s")
     start, end = span
     if still:

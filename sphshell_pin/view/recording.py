@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.atomic import write_whole
+from sphshell_pin.checks import check_positive
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.view.arrows import (
     FRICTION_COLOR,
@@ -170,9 +171,8 @@ def render_recording(
 
 def check_pace(fps: float, speed: float) -> None:
     """Raise InvalidParameter for a pace that is not positive."""
-    for name, value in (("fps", fps), ("speed", speed)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise InvalidParameter(name, value, "must be positive")
+    check_positive("fps", fps)
+    check_positive("speed", speed)
 
 
 def sound_rows(result: Result) -> int:

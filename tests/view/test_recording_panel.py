@@ -263,7 +263,8 @@ def test_nothing_is_cut_off_or_overlaps(opened, size, scheme):
             assert apart, (name, other)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     backgrounds = page.evaluate(
-        """() => [getComputedStyle(document.getElementById("dock")).backgroundColor.match(/\\d+/g).map(Number),
+        """() => [
+            getComputedStyle(document.getElementById("dock")).backgroundColor.match(/\\d+/g).map(Number),
             viewer.scene_tree.find(["Background"]).object.top_color]"""
     )
     for color in backgrounds:
