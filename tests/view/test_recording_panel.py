@@ -263,9 +263,11 @@ def test_nothing_is_cut_off_or_overlaps(opened, size, scheme):
             assert apart, (name, other)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     backgrounds = page.evaluate(
-        """() => [
-            getComputedStyle(document.getElementById("dock")).backgroundColor.match(/\\d+/g).map(Number),
-            viewer.scene_tree.find(["Background"]).object.top_color]"""
+        """() => {
+            const dock = getComputedStyle(document.getElementById("dock"));
+            return [dock.backgroundColor.match(/\\d+/g).map(Number),
+                viewer.scene_tree.find(["Background"]).object.top_color];
+        }"""
     )
     for color in backgrounds:
         assert (np.mean(color) < 80) == (scheme == "dark")
