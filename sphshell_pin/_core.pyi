@@ -322,6 +322,7 @@ class Simulation:
     def change(
         self, pairs: list[Pair], joints: JointEffects | None, controller: Controller | None
     ) -> None: ...
+    def take_over(self, before: Simulation) -> None: ...
     def push(
         self,
         joint: int,

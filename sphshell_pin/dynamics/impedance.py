@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -36,6 +37,9 @@ Array = NDArray[np.float64]
 # Of a path's points from their shell, as a part of its size, and of the path from the moved point,
 # as a part of the robot's reach: what is farther is probably a mistake.
 OFF_PATH, OUT_OF_REACH = 0.1, 0.05
+# A step between neighboring knots, as a part of the shell's size: the nearest point has changed to
+# another side. And the part of the speed that the curvature of a spline leaves.
+JUMP, SLOW = 0.05, 0.2
 # Of the rows of a run, how many are looked at.
 _MOST_ROWS = 200
 
@@ -52,9 +56,10 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     the side where it is at the start.
 
     The target waits `lead_in` [s] at the first point, moves at `speed` [m/s], and waits at the
-    last. With `acceleration` [m/s2], `jerk` [m/s3] or both it sets out and stops softly, a spline
-    as a whole and straight pieces each; over a spline the speed is reduced to one at which the
-    curvature takes no more than `acceleration`. Without them its speed jumps, and a force with it.
+    last. With `acceleration` [m/s2], `jerk` [m/s3] or both it sets out and stops softly, at each
+    point of straight pieces, and of a spline where it turns back or goes over an edge of the shell;
+    over a spline the speed is reduced to one at which the curvature takes no more than
+    `acceleration`. Without them its speed jumps, and a force with it.
 
     `rotational_stiffness` [N m/rad] and `rotational_damping` [N m s/rad] hold the orientation of
     the start. `posture_stiffness` [N m/rad] pulls the joints to `q_ref` (default: the start) and
@@ -213,8 +218,9 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         return curve, Timing.along(curve, self.lead_in, self.speed, self.acceleration, self.jerk)
 
     def doubts(self, scene: Scene, q0: Array) -> list[str]:
-        """Say where the path is off the shell, or out of the robot's reach."""
+        """Say where the path is off the shell or jumps on it, and bends that take the speed."""
         said: list[str] = []
+        curve = self._motion()[0]
         if isinstance(self.shell, Shell):
             corners = check_points("path", self.path)
             off = np.abs(self.shell.closest_points(corners).distances)
@@ -224,6 +230,25 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
                     f"the controller's path is off the shell: path[{k}] is {off[k]:.3g} m from "
                     f"'{self.shell.name}', which measures {size:.3g} m; its nearest point is "
                     "taken: give points on the surface, in the shell's own coordinates [m]"
+                )
+            step, before, after = curve.jump
+            if off[k] <= OFF_PATH * size and step > JUMP * size:
+                said.append(
+                    f"the controller's path jumps by {step:.3g} m, from {_text(before)} to "
+                    f"{_text(after)} m: there the nearest point of '{self.shell.name}' is on "
+                    "another side: give points of the path on the surface in between"
+                )
+        if len(curve.tangents):
+            pieces = [
+                (curve.speed_limit(a, b, self.speed, self.acceleration), b - a)
+                for a, b in pairwise(curve.corners)
+            ]
+            least, length = min(pieces)
+            if least < SLOW * self.speed:
+                said.append(
+                    f"the controller's path bends so much that its target goes at {least:.3g} m/s, "
+                    f"not {self.speed:g} m/s, over {length:.3g} m: raise `acceleration`, or give "
+                    "points with wider bends"
                 )
         return said
 
@@ -271,3 +296,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     def duration(self) -> float:
         """Return the time [s] at which the target reaches the last point."""
         return float(self._motion()[1].times[-1])
+
+
+def _text(point: Array) -> str:
+    return "({:.3g}, {:.3g}, {:.3g})".format(*point)

@@ -167,6 +167,14 @@ class OpenRun:
         return True
 
     @one_at_a_time
+    def take_over(self, before: OpenRun) -> None:
+        """Go on where the controller of the run `before` is, which is at the same time.
+
+        A target stays where it is on the same path, and an orientation that is held is.
+        """
+        self._core.take_over(before._core)
+
+    @one_at_a_time
     def push(self, frame: str, force_world: ArrayLike) -> None:
         """Push at the origin of `frame` with a force (3,) [N] in the world, from now on.
 

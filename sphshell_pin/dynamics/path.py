@@ -9,14 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
 
 __all__ = ["Curve", "Timing", "core_path"]
 
 Array = NDArray[np.float64]
 
-# A path on a shell has a knot each `size` / KNOTS: pieces between points leave a curved surface.
-KNOTS = 500
+# A path on a shell has a knot each `size` / KNOTS: pieces between points leave a curved surface. A
+# spline has that many on its length, and some between two points.
+KNOTS, KNOTS_BETWEEN = 500, 8
+# Of a path on a shell, over the size of the shell: what is longer is in another unit.
+LONGEST = 2000.0
+# Of a spline: where it turns by more at a knot [rad] it has a corner, not a curvature. Knots that
+# are nearer than this part of their usual distance are one.
+CORNER, SAME = 0.2, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +31,8 @@ class Curve:
     """Knots (n, 3) [m] at the arc lengths `along` (n,) [m], with the surface's normals (n, 3).
 
     Between them the curve is a cubic with the given `tangents` (n, 3), or straight where there are
-    none (0, 3). At the arc lengths `corners` it turns.
+    none (0, 3). At the arc lengths `corners` it turns: a spline has two knots there, one with the
+    tangent that comes in and one with that which goes out.
     """
 
     along: Array
@@ -39,25 +47,40 @@ class Curve:
 
         A spline is the natural cubic one over the square roots of the distances (centripetal: Lee,
         Computer-Aided Design 21, 1989: no loops and little overshoot where distances differ), then
-        through the projected knots over their arc length.
+        through the projected knots over their arc length, from corner to corner.
+
+        Raises InvalidParameter for a path that is too long.
         """
+        _check_length(points, shell)
         if spline:
             points = points if shell is None else shell.closest_points(points).points
             points = _without_repetitions(points)
         step = np.inf if shell is None else shell.size / KNOTS
-        if spline and len(points) > 2:
-            steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-            step = min(step, float(steps.sum()) / KNOTS)
-            knots, at = _on_spline(points, step)
+        smooth = spline and len(points) > 1
+        if smooth:
+            step = min(step, float(_lengths(points)[-1]) / KNOTS)
+            knots = _on_spline(points, step)
         else:
             knots, at = _on_chords(points, step)
         normals = np.zeros_like(knots)
         if shell is not None:
             projected = shell.closest_points(knots)
             knots, normals = projected.points, projected.normals
+        if not smooth:
+            along = _lengths(knots)
+            return cls(along, knots, np.zeros((0, 3)), normals, along[at])
+        # Points beside the surface may all have the same nearest point.
+        apart = _apart(knots, SAME * step)
+        knots, normals = knots[apart], normals[apart]
+        ends = _corners(knots)
+        twice = np.sort(np.concatenate([np.arange(len(knots)), ends[1:-1]]))
         along = _lengths(knots)
-        tangents = _slopes(along, knots) if spline and len(knots) > 1 else np.zeros((0, 3))
-        return cls(along, knots, tangents, normals, along[at])
+        tangents = [_slopes(along[a : b + 1], knots[a : b + 1]) for a, b in pairwise(ends)]
+        if not tangents:
+            return cls(along, knots, np.zeros((0, 3)), normals, along)
+        return cls(
+            along[twice], knots[twice], np.concatenate(tangents), normals[twice], along[ends]
+        )
 
     @property
     def length(self) -> float:
@@ -65,12 +88,31 @@ class Curve:
         return float(self.along[-1])
 
     @property
-    def curvature(self) -> float:
-        """Largest curvature of a spline [1/m]; 0 of straight pieces."""
+    def jump(self) -> tuple[float, Array, Array]:
+        """The longest distance [m] of two neighboring knots, and the two (3,) [m]."""
+        if len(self.points) == 1:
+            return 0.0, self.points[0], self.points[0]
+        k = int(np.argmax(np.diff(self.along)))
+        return float(self.along[k + 1] - self.along[k]), self.points[k], self.points[k + 1]
+
+    def curvature(self, start: float, stop: float) -> float:
+        """Return the largest curvature of a spline between two corners [1/m]; 0 of chords."""
         if len(self.tangents) == 0:
             return 0.0
-        bends = np.diff(self.tangents, axis=0) / np.diff(self.along)[:, None]
-        return float(np.linalg.norm(bends, axis=1).max(initial=0.0))
+        first = np.searchsorted(self.along, start, side="right") - 1
+        last = np.searchsorted(self.along, stop, side="left") + 1
+        bends = np.diff(self.tangents[first:last], axis=0)
+        sizes = np.linalg.norm(bends, axis=1) / np.diff(self.along[first:last])
+        return float(sizes.max(initial=0.0))
+
+    def speed_limit(
+        self, start: float, stop: float, speed: float, acceleration: float | None
+    ) -> float:
+        """Return `speed` [m/s], or that at which the curvature takes the `acceleration` [m/s2]."""
+        curvature = 0.0 if acceleration is None else self.curvature(start, stop)
+        if acceleration is None or curvature == 0:
+            return speed
+        return min(speed, float(np.sqrt(acceleration / curvature)))
 
     def at(self, place: Array) -> Array:
         """Return points (m, 3) [m] at the arc lengths `place` (m,), by straight pieces."""
@@ -103,20 +145,25 @@ class Timing:
         """Move along `curve` from the time `begin` [s] on, as fast as the limits allow.
 
         Without limits the speed is the same all along. With them a motion begins and ends at
-        rest: that over a spline, and that over each piece between corners. The speed over a spline
-        is one at which its curvature takes no more than `acceleration`.
+        rest: that over each piece between corners. The speed over a piece of a spline is one at
+        which its curvature takes no more than `acceleration`.
+
+        Raises InvalidParameter where the limits are too small to come to an end.
         """
         limited = acceleration is not None or jerk is not None
-        stops = curve.corners if limited and len(curve.tangents) == 0 else curve.along[[0, -1]]
-        if acceleration is not None and curve.curvature > 0:
-            speed = min(speed, float(np.sqrt(acceleration / curve.curvature)))
         rows = [(begin, 0.0, 0.0, 0.0, 0.0)]
-        for start, stop in pairwise(stops):
+        for start, stop in pairwise(curve.corners if limited else curve.along[[0, -1]]):
             if stop > start:
+                most = curve.speed_limit(start, stop, speed, acceleration)
                 del rows[-1]
-                rows += _from_rest_to_rest(begin, start, stop, speed, acceleration, jerk)
+                rows += _from_rest_to_rest(begin, start, stop, most, acceleration, jerk)
                 begin = rows[-1][0]
-        return cls(*np.array(rows).T)
+        timing = cls(*np.array(rows).T)
+        if not np.isfinite(timing.times).all():
+            raise InvalidParameter(
+                "speed", speed, "is too small, or a limit is: the path has no end"
+            )
+        return timing
 
     def at(self, t: Array) -> Array:
         """Return the place [m] at the times `t` (m,) [s]."""
@@ -144,9 +191,8 @@ class Timing:
 
 def core_path(curve: Curve, timing: Timing) -> _core.Path:
     """Build the C++ path; steps of integrators with error control meet its kinks."""
-    kinks = timing.times
-    if len(curve.tangents) == 0:
-        kinks = np.unique(np.concatenate([kinks, timing.reaching(curve.along)]))
+    bends = curve.along if len(curve.tangents) == 0 else curve.corners
+    kinks = np.unique(np.concatenate([timing.times, timing.reaching(bends)]))
     return _core.Path(
         along=curve.along.tolist(),
         points=curve.points,
@@ -184,9 +230,10 @@ def _from_rest_to_rest(
     for duration, a, j in [*up, (even, 0.0, 0.0), *down]:
         if t + duration > t:
             rows.append((t, place, now, a, j))
-            place += duration * (now + duration * (a / 2 + duration * j / 6))
-            now += duration * (a + duration * j / 2)
-            t += duration
+        # Also in a phase that is too short for the clock the speed changes.
+        place += duration * (now + duration * (a / 2 + duration * j / 6))
+        now += duration * (a + duration * j / 2)
+        t += duration
     return [*rows, (t, stop, 0.0, 0.0, 0.0)]
 
 
@@ -198,28 +245,49 @@ def _peak(
     From rest the speed v takes the times T_j (jerk up), T_a - T_j (even), T_j (jerk down), that is
     `ramp` + `bend` with ramp = v / a and bend = T_j, and the distance v (ramp + bend) / 2.
     """
-
-    def times(v: float) -> tuple[float, float]:
-        bend = 0.0 if jerk is None else float(np.sqrt(v / jerk))
-        if most is None:
-            return bend, bend
-        if jerk is not None and most / jerk < bend:
-            bend = most / jerk
-        elif jerk is not None:
-            return bend, bend
-        return bend, v / most
-
-    bend, ramp = times(speed)
+    bend, ramp = _rise(speed, most, jerk)
     if speed * (ramp + bend) > length:
-        # The distance grows with the speed: halve until the doubles between are used up.
-        low, high = 0.0, speed
-        for _ in range(200):
-            speed = 0.5 * (low + high)
-            bend, ramp = times(speed)
-            low, high = (speed, high) if speed * (ramp + bend) <= length else (low, speed)
-        speed = low
-        bend, ramp = times(speed)
+        speed = _speed_reached(length, most, jerk)
+        bend, ramp = _rise(speed, most, jerk)
     return speed, bend, ramp
+
+
+def _rise(speed: float, most: float | None, jerk: float | None) -> tuple[float, float]:
+    bend = 0.0 if jerk is None else float(np.sqrt(speed / jerk))
+    if most is None:
+        return bend, bend
+    if jerk is not None and most / jerk < bend:
+        bend = most / jerk
+    elif jerk is not None:
+        return bend, bend
+    return bend, speed / most
+
+
+def _speed_reached(length: float, most: float | None, jerk: float | None) -> float:
+    """Return the v of v (ramp + bend) = length: without an even phase."""
+    if jerk is not None:
+        speed = float(np.cbrt(jerk) * np.cbrt(length / 2) ** 2)  # of 2 v sqrt(v / jerk) = length
+        if most is None or np.sqrt(speed / jerk) <= most / jerk:
+            return speed
+    if most is None:
+        raise ValueError("without limits every speed is reached")
+    bend = 0.0 if jerk is None else most / jerk
+    # Of v (v / most + bend) = length, without a difference of near numbers.
+    return float(2 * length / (bend + np.sqrt(bend * bend + 4 * length / most)))
+
+
+def _check_length(points: Array, shell: Shell | None) -> None:
+    with np.errstate(over="ignore"):
+        length = float(_lengths(points)[-1])
+    if not np.isfinite(length):
+        raise InvalidParameter("path", f"{length:g} m", "is too long to compute with")
+    if shell is not None and length > LONGEST * shell.size:
+        raise InvalidParameter(
+            "path",
+            f"{length:.3g} m",
+            f"is over {LONGEST:g} times as long as '{shell.name}', which measures "
+            f"{shell.size:.3g} m: give points in the shell's own coordinates [m]",
+        )
 
 
 def _without_repetitions(points: Array) -> Array:
@@ -242,22 +310,40 @@ def _on_chords(points: Array, step: float) -> tuple[Array, NDArray[np.intp]]:
     return np.concatenate(pieces), np.array(at)
 
 
-def _on_spline(points: Array, step: float) -> tuple[Array, NDArray[np.intp]]:
+def _apart(points: Array, least: float) -> NDArray[np.intp]:
+    """Return which points are farther than `least` [m] from the one before that is taken."""
+    if (np.linalg.norm(np.diff(points, axis=0), axis=1) > least).all():
+        return np.arange(len(points))
+    taken = [0]
+    for k in range(1, len(points)):
+        if np.linalg.norm(points[k] - points[taken[-1]]) > least:
+            taken.append(k)
+    return np.array(taken)
+
+
+def _corners(knots: Array) -> NDArray[np.intp]:
+    """Return the first knot, those at which the chords turn by more than CORNER, and the last."""
+    chords = np.diff(knots, axis=0)
+    chords /= np.linalg.norm(chords, axis=1, keepdims=True)
+    turns = np.einsum("ij,ij->i", chords[:-1], chords[1:]) < np.cos(CORNER)
+    return np.unique(np.concatenate([[0], np.flatnonzero(turns) + 1, [len(knots) - 1]]))
+
+
+def _on_spline(points: Array, step: float) -> Array:
     """Divide the spline through `points` into parts of about `step`."""
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     x = np.concatenate([[0.0], np.cumsum(np.sqrt(chords))])
     slopes = _slopes(x, points)
-    pieces, at = [points[:1]], [0]
+    pieces = [points[:1]]
     for k, chord in enumerate(chords):
-        n = max(1, int(np.ceil(chord / step)))
+        n = max(KNOTS_BETWEEN, int(np.ceil(chord / step)))
         u = (np.arange(1, n + 1) / n)[:, None]
         h, w, rise = x[k + 1] - x[k], 1 - u, points[k + 1] - points[k]
         pieces.append(
             points[k]
             + u * (rise + w * (w * (h * slopes[k] - rise) - u * (h * slopes[k + 1] - rise)))
         )
-        at.append(at[-1] + n)
-    return np.concatenate(pieces), np.array(at)
+    return np.concatenate(pieces)
 
 
 def _slopes(x: Array, y: Array) -> Array:

@@ -286,6 +286,7 @@ class LiveRun:
         """Go on with `run`, which is in the state of this one: with its push and its audit."""
         residual, exchanged = self.residual, self._exchanged
         push, drag = self._push, self._drag
+        run.take_over(self._run)
         self._begin(run)
         self._total -= residual
         self._exchanged = exchanged

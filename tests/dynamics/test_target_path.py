@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.path import Curve, Timing
+from sphshell_pin.dynamics.path import Curve, Timing, core_path
 from sphshell_pin.errors import InvalidParameter
 from tests import meshes, models
 
@@ -63,11 +63,99 @@ def test_straight_pieces_stop_at_corners_and_a_spline_does_not() -> None:
     for spline in (False, True):
         curve = Curve.through(POINTS, None, spline=spline)
         timing = Timing.along(curve, 0.0, 0.05, 0.5, 5.0)
-        at = timing.reaching(curve.corners)
+        at = timing.reaching(_places_of(curve, POINTS))
         near = np.array([np.diff(timing.at(np.array([t - 1e-6, t + 1e-6])))[0] for t in at[1:-1]])
         speeds = near / 2e-6
         assert (speeds > 0.04).all() if spline else (speeds < 1e-4).all()
-        np.testing.assert_allclose(curve.at(curve.corners), POINTS, atol=1e-12)
+        assert len(curve.corners) == (2 if spline else len(POINTS))
+
+
+def _places_of(curve: Curve, points) -> np.ndarray:
+    """Return the arc lengths at which the curve goes through `points`."""
+    away = np.linalg.norm(points[:, None] - curve.points[None], axis=2)
+    assert away.min(axis=1).max() < 1e-12
+    return curve.along[away.argmin(axis=1)]
+
+
+def test_a_spline_that_turns_back_stops_there() -> None:
+    """And it is as quick as straight pieces are; with the same limits."""
+    there_and_back = np.array([[0.0, 0.0, 0.0], [0.04, 0.04, 0.0], [0.0, 0.0, 0.0]])
+    chords, curve = (Curve.through(there_and_back, None, spline=one) for one in (False, True))
+    ends = [Timing.along(one, 0.0, 0.036, 0.14, 0.58).times[-1] for one in (chords, curve)]
+    assert ends[1] == pytest.approx(ends[0], rel=1e-6)
+    assert curve.corners == pytest.approx(chords.corners, rel=1e-6)
+    core = core_path(curve, Timing.along(curve, 0.0, 0.036, 0.14, 0.58))
+    assert core is not None
+    # Without limits the velocity jumps at the corner: a kink, for integrators with error control.
+    jumps = Timing.along(curve, 0.0, 0.036, None, None)
+    assert jumps.reaching(curve.corners)[1] == pytest.approx(curve.corners[1] / 0.036)
+
+
+def test_a_spline_over_an_edge_of_a_box_slows_down_there_alone() -> None:
+    shell = sp.Shell(*meshes.cube(0.2))
+    path = [[0.05, 0.0, 0.1], [0.1, 0.0, 0.08], [0.1, 0.0, -0.05]]
+    curve = Curve.through(np.array(path), shell, spline=True)
+    assert len(curve.corners) > 2
+    timing = Timing.along(curve, 0.0, 0.05, 0.1, None)
+    assert timing.times[-1] < 4 * curve.length / 0.05
+
+
+def test_points_beside_the_surface_may_share_their_nearest_one() -> None:
+    shell = sp.Shell([[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0]], elements=[[0, 1, 2]])
+    path = [[0.0, 0, 0], [0.2, 0, 0], [0, 0.2, 0], [0, 0, 0]]
+    curve = Curve.through(np.array(path), shell, spline=True)
+    assert np.isfinite(curve.tangents).all()
+    assert np.isfinite(curve.points).all()
+    inside = shell.closest_points(curve.points)
+    assert inside.distances == pytest.approx(0.0, abs=1e-12)
+    assert 0.5 < curve.length < 0.8
+
+
+@pytest.mark.parametrize("acceleration", [1e3, 1e15, 1e300])
+@pytest.mark.parametrize("jerk", [None, 1e40])
+@pytest.mark.parametrize("begin", [0.0, 0.5])
+def test_a_limit_that_is_never_felt_leaves_the_speed(begin, acceleration, jerk) -> None:
+    timing = Timing.along(straight(0.1), begin, 0.05, acceleration, jerk)
+    places = timing.at(begin + np.array([0.0, 0.5, 1.0, 1.5, 2.0]))
+    assert places == pytest.approx([0.0, 0.025, 0.05, 0.075, 0.1], abs=1e-4)
+    assert timing.times[-1] == pytest.approx(begin + 2.0, abs=1e-3)
+
+
+def test_a_speed_that_is_never_reached() -> None:
+    """The distance is one half of a ramp up, one of a ramp down: 2 sqrt(length / acceleration)."""
+    for speed in (1e3, 1e60, 1e300):
+        timing = Timing.along(straight(0.1), 0.0, speed, 1.0, None)
+        assert timing.times[-1] == pytest.approx(2 * np.sqrt(0.1), rel=1e-12)
+
+
+def test_paths_that_cannot_be_followed_are_refused() -> None:
+    shell = models.plate()
+    far = np.array([[0.0, 0, 0], [1e200, 0, 0]])
+    with pytest.raises(InvalidParameter, match="is too long to compute with"):
+        Curve.through(far, None, spline=False)
+    with pytest.raises(InvalidParameter, match="over 2000 times as long as"):
+        Curve.through(np.array([[0.0, 0, 0], [1e8, 0, 0]]), shell, spline=False)
+
+
+def doubts(**more) -> str:
+    scene = sp.Scene(models.arm())
+    frame = scene.model.frames[scene.model.nframes - 1].name
+    controller = sp.CartesianImpedance(frame, stiffness=50.0, damping=5.0, **more)
+    return " ".join(controller.doubts(scene, models.ARM_Q))
+
+
+def test_a_path_through_a_body_and_a_tight_bend_are_said() -> None:
+    box = sp.Shell(*meshes.cube(0.2), name="box")
+    through = [[0.1, 0.03, 0.0], [-0.1, 0.03, 0.0]]
+    said = doubts(path=through, shell=box)
+    assert "path jumps by" in said
+    assert "is on another side" in said
+    assert doubts(path=[[0.1, 0.03, 0.0], [0.1, -0.03, 0.02]], shell=box, spline=True) == ""
+    angles = np.linspace(0, 1.5 * np.pi, 60)
+    ring = 0.002 * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    said = doubts(path=ring, spline=True, speed=0.5, acceleration=0.5)
+    assert "bends so much that its target goes at 0.0" in said
+    assert doubts(path=ring, spline=True, speed=0.5) == ""
 
 
 def test_a_spline_through_a_circle_is_one() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
@@ -179,3 +180,40 @@ def test_what_changes_add_is_booked(live: LiveRun) -> None:
         live.change(key, value)
         settle(live, 0.2)
     assert abs(live.residual) < 1e-2 * live.exchanged
+
+
+def tip_of(live: LiveRun) -> np.ndarray:
+    """Return where the point that follows the path is [m]."""
+    model = live.scene.model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, live.q)
+    controller = live.built.controller
+    return data.oMf[model.getFrameId(controller.frame)].act(np.asarray(controller.offset))
+
+
+@pytest.mark.slow
+@pytest.mark.robots
+def test_another_gravity_leaves_the_target_where_it_is() -> None:
+    pytest.importorskip("example_robot_data", reason="needs the example-robot-data loaders")
+    live = LiveRun(build("fingertip_on_blade"))
+    settle(live, 2.0)
+    live.change("controller.speed", 0.02)
+    settle(live, 1.0)
+    before = tip_of(live)
+    live.change("gravity.2", -9.8)
+    settle(live, 0.1)
+    assert np.linalg.norm(tip_of(live) - before) == pytest.approx(0.002, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.robots
+def test_a_target_whose_wait_is_cut_short_sets_out_from_its_start() -> None:
+    pytest.importorskip("example_robot_data", reason="needs the example-robot-data loaders")
+    live = LiveRun(build("fingertip_on_blade", {"controller.lead_in": "3.0"}))
+    settle(live, 2.5)
+    before = tip_of(live)
+    live.change("controller.lead_in", 0.5)
+    settle(live, 0.1)
+    assert np.linalg.norm(tip_of(live) - before) < 0.001  # 87 mm of the path are behind 0.5 s
+    settle(live, 2.0)
+    assert 0.05 < np.linalg.norm(tip_of(live) - before) < 0.12

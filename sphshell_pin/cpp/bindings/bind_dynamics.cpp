@@ -391,6 +391,13 @@ void bind_dynamics(nanobind::module_& m) {
           },
           nb::arg("pairs"), nb::arg("joints").none(), nb::arg("controller").none())
       .def(
+          "take_over",
+          [](Run& self, const Run& before) {
+            const Use use(self.user, "take_over");
+            self.simulation.take_over(before.simulation);
+          },
+          nb::arg("before"))
+      .def(
           "push",
           [](Run& self, int joint, const Vec3& point, const Vec3& force, const Vec3& anchor,
              double stiffness, double damping, int frame) {

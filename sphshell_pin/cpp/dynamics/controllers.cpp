@@ -1,6 +1,7 @@
 #include "dynamics/controllers.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <pinocchio/spatial.hpp>
 #include <utility>
 
@@ -145,7 +146,8 @@ void CartesianImpedance::take_over(const Controller& before, double t) {
   hold_ = other->hold_;
   started_ = other->started_;
   const double place = other->path_.place_at(t - other->late_);
-  late_ = place > 0 ? t - path_.time_of(place) : other->late_;
+  // Where it still waits it sets out at once if its time has come, from the start of the path.
+  late_ = place > 0 ? t - path_.time_of(place) : std::max(other->late_, t - path_.begin());
 }
 
 }  // namespace sphshell

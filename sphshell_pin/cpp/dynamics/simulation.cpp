@@ -306,6 +306,12 @@ void Simulation::push(int joint, const Vec3& point, const PointForce& force, int
   if (sensors_) sensors_->jump();
 }
 
+void Simulation::take_over(const Simulation& before) {
+  if (!controller_ || !before.controller_) return;
+  controller_->take_over(*before.controller_, time());
+  next_control_ = time();
+}
+
 void Simulation::change(std::vector<Pair> pairs, JointForces::Effects joints,
                         std::shared_ptr<Controller> controller) {
   if (!started_) start();

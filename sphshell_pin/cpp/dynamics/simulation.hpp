@@ -84,6 +84,8 @@ class Simulation : private Torques {
   // energy this brings counts as the controller's work.
   void change(std::vector<Pair> pairs, JointForces::Effects joints,
               std::shared_ptr<Controller> controller);
+  // Go on where the controller of `before` is, which is at the same time.
+  void take_over(const Simulation& before);
   // From now on a force acts at a point of the joint's frame; zero ends it. Its work counts as the
   // controller's. `frame`: the number of the one to whose body the point belongs.
   void push(int joint, const Vec3& point, const PointForce& force, int frame);

@@ -34,6 +34,8 @@ class TargetPath {
   bool moves() const { return s_.times.size() > 1; }
   bool same_curve(const TargetPath& other) const { return s_.along == other.s_.along; }
   double next_kink(double t) const;
+  // When the target sets out.
+  double begin() const { return s_.times.front(); }
   // The arc length at time t, and the first time at which it is `place`.
   double place_at(double t) const;
   double time_of(double place) const;
