@@ -192,6 +192,18 @@ def test_a_step_on_a_linear_spring_in_closed_form(stepper: str) -> None:
     assert np.abs((got.by_state - expected) / scale).max() <= 1e-12
 
 
+@pytest.mark.parametrize("depth", [-3e-8, 3e-8])
+def test_a_linearly_implicit_step_near_a_touch_is_that_of_its_side(depth: float) -> None:
+    """Its matrix has second derivatives of the rates, which a touch must not come into."""
+    k, m = 4e5, 2.0
+    scene = models.on_plate(models.slider(gravity=0.0, mass=m), sp.ImpactLaw(k, 1.0))
+    q = [0.05 - depth]
+    assert len(scene.contacts(np.array(q), np.zeros(1))) == (depth > 0)
+    got = sp.Simulation(scene, STEPPERS["linearly implicit"]).step_derivatives(q, [-0.3])
+    a = np.array([[0.0, 1.0], [-k / m if depth > 0 else 0.0, 0.0]])
+    np.testing.assert_allclose(got.by_state, np.linalg.inv(np.eye(2) - DT * a), rtol=1e-9)
+
+
 def test_a_state_with_bristles() -> None:
     """One step of the own loop, with what ten steps have stretched; the next step's state moves."""
     (scene, q, v), state = stuck()

@@ -1,4 +1,7 @@
 // Derivatives of the steps of each method: of what it computes, not of what it approximates.
+#include <cmath>
+#include <utility>
+
 #include "dynamics/derivatives/step_slopes.hpp"
 #include "dynamics/integrators/explicit.hpp"
 #include "dynamics/integrators/implicit.hpp"
@@ -12,6 +15,17 @@ void add(Changes& to, double share, const Changes& rates) {
   to.u += share * rates.u;
   to.w += share * rates.w;
   to.z += share * rates.z;
+}
+
+// The differences to both sides: alike where the slopes are smooth. Where a kink is on one side, as
+// a touch within what is differenced, that of the other side.
+MatrixX beside_kinks(const MatrixX& before, const MatrixX& here, const MatrixX& after) {
+  constexpr double kAlike = 3;
+  return (here - before).binaryExpr(after - here, [](double back, double on) {
+    if (std::abs(on) > kAlike * std::abs(back)) return back;
+    if (std::abs(back) > kAlike * std::abs(on)) return on;
+    return 0.5 * (back + on);
+  });
 }
 
 }  // namespace
@@ -57,13 +71,16 @@ void LinearlyImplicitEuler::carry(StepSlopes& slopes, Chart& chart, double h,
   constexpr double kShare = 1e-3;  // of the step
   const double t = chart.origin().t;
   const Changes start = slopes.at_origin();
-  Changes right, bent;
+  Changes right, before, after;
   slopes.rates(chart, t, start_, start, right);
-  for (const double sign : {1.0, -1.0}) {
+  for (const auto& [sign, bent] : {std::pair(-1.0, &before), std::pair(1.0, &after)}) {
     const VectorX y = start_ + sign * kShare * (y_ - start_);
-    slopes.rates(chart, t + sign * kShare * h, y, start, bent);
-    add(right, sign / (2 * kShare), bent);
+    slopes.rates(chart, t + sign * kShare * h, y, start, *bent);
   }
+  const Changes bend{beside_kinks(before.u, right.u, after.u),
+                     beside_kinks(before.w, right.w, after.w),
+                     beside_kinks(before.z, right.z, after.z)};
+  add(right, 1 / kShare, bend);
   const Eigen::Index nv = chart.nv(), nz = chart.nz();
   MatrixX all(2 * nv + nz, right.u.cols());
   all << right.u, right.w, right.z;
