@@ -165,19 +165,21 @@ def _write(
     from sphshell_pin.scenario.knobs import check_knobs
     from sphshell_pin.scenario.reading import read_scenario
 
+    # What fails in the making leaves no file behind.
+    made = {"fit.json": found.to_json().encode()}
+    if picture:
+        from sphshell_pin.plot.figure import png
+
+        try:
+            made["fit.png"] = png(found.plot())
+        except MissingExtra as missing:
+            typer.echo(str(missing), err=True)
     fitted = found.write_scenario(folder / f"{path.stem}.fitted.toml", changes)
-    files = [fitted, write_whole(folder / "fit.json", found.to_json().encode())]
+    files = [fitted, *(write_whole(folder / name, data) for name, data in made.items())]
     try:
         check_knobs(read_scenario(fitted), fitted, ranges=True)
     except ScenarioError as fault:
         typer.echo(f"note: the fitted scenario needs a change before it runs: {fault}", err=True)
-    if picture:
-        from sphshell_pin.plot.figure import write_figure
-
-        try:
-            files.append(write_figure(folder / "fit.png", found.plot()))
-        except MissingExtra as missing:
-            typer.echo(str(missing), err=True)
     return files
 
 

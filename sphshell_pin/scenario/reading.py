@@ -298,6 +298,11 @@ def _explain(
         reason, value = "is missing", None
     elif kind in ("model_type", "dataclass_type"):
         reason = "must be a table { key = value, ... }"
+    elif kind in ("list_type", "tuple_type", "sequence_str") or context.get("class") == "Sequence":
+        reason = "must be a list [ ... ]"
+    elif kind == "too_short":
+        least, count = context["min_length"], context["actual_length"]
+        reason = f"must have {least} item{'s' * (least != 1)} at least, not {count}"
     if len(details) > 1:
         reason += f" (and {len(details) - 1} more: first repair this one)"
     if kind not in ("model_type", "dataclass_type", "unknown_key"):

@@ -48,6 +48,7 @@ BARE = (
 )
 MOST_ARROWS = 24
 MOST_PIECES = 80  # of a trail
+MOST_FRAMES = 1_000_000
 
 
 def write_recording(
@@ -116,6 +117,13 @@ def render_recording(
     contacts = contacts.select(contacts.row < count)
     t = np.asarray(result.t)[:count]
     start, end = (float(t[0]), float(t[-1])) if span is None else span
+    frames = (t[-1] - t[0]) * fps / speed
+    if frames > MOST_FRAMES:
+        raise InvalidParameter(
+            "fps",
+            fps,
+            f"gives {frames:.2g} frames, of {MOST_FRAMES} at most, at the speed {speed:g}",
+        )
     rows, times = choose_rows(t, contacts, fps, speed, span)
     # Of a part of a run, too: pictures of it have the same cameras and the same arrows.
     of_run = rows if span is None else choose_rows(t, contacts, fps, speed)[0]

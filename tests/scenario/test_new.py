@@ -66,6 +66,12 @@ def arm_urdf(folder: Path, axes: str = "zyyzyz", low: float = -2.8) -> Path:
     return path
 
 
+def test_a_radius_in_millimeters_is_noticed(tmp_path) -> None:
+    with pytest.raises(InvalidParameter, match=r"radius = 12.0 .* is more than the robot's reach"):
+        new_scenario(arm_urdf(tmp_path), "plane", radius=12.0, out=tmp_path / "a.toml")
+    assert not (tmp_path / "a.toml").exists()
+
+
 CASES = [
     ("panda", BLADE, {"unit": "mm"}),
     ("panda", "plane", {"material": "steel"}),

@@ -19,6 +19,7 @@ from sphshell_pin.benchmarks.fitting import SCENARIO, TRUTH, many_sets
 from sphshell_pin.cli import app
 from sphshell_pin.errors import DataError, InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
+from sphshell_pin.scenario.reading import find_scenario
 from sphshell_pin.study.fit import runs
 from sphshell_pin.study.fit.data import read_experiment
 from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
@@ -289,6 +290,64 @@ def test_what_is_seen_stands_out_from_the_error_of_slopes():
     assert np.isfinite(spread_of(jacobian, error).deviations).tolist() == [True, False, False]
 
 
+def test_rows_with_inexact_slopes_take_nothing_from_the_others():
+    """What some rows determine, all determine; what no rows determine stays open."""
+    rng = np.random.default_rng(1)
+    exact, groups = rng.normal(size=(40, 2)), np.repeat([0, 1], [60, 40])
+    jacobian = np.vstack((5.0 * rng.normal(size=(60, 2)), exact))
+    error = np.vstack((4.0 * rng.normal(size=(60, 2)), 1e-3 * rng.normal(size=(40, 2))))
+    assert np.isinf(spread_of(jacobian, error).deviations).all()
+    found = spread_of(jacobian, error, groups)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(exact.T @ exact), rtol=1e-9)
+    assert found.left_out == (0,)
+    # The inexact rows may be needed for the first x: the second is open in both groups.
+    error[60:, 1] *= 1e4
+    assert np.isfinite(spread_of(jacobian, error, groups).deviations).tolist() == [True, False]
+    # Where all rows together determine everything, all count.
+    everything = spread_of(jacobian, 1e-3 * error, groups)
+    expected = np.linalg.inv(jacobian.T @ jacobian)
+    np.testing.assert_allclose(everything.covariance, expected, rtol=1e-9)
+    assert everything.left_out == ()
+
+
+@pytest.mark.parametrize("columns", [[HEIGHT], [HEIGHT, FORCE]])
+def test_inexact_slopes_of_one_column_do_not_hide_what_another_says(columns):
+    """The height is measured itself; the pulses of the force are so short that slopes fail."""
+    height = "robot.ball.start.root_joint.2"
+    t = np.linspace(0.0, 0.12, 601)
+    law = {"contact.law.k": "2e3", "contact.law.c": "0.2"}
+    force = "pairs.ball-bowl.normal_force"
+    names = [force if name == FORCE else name for name in columns]
+    exact = columns_of(find_scenario("sphere_on_shell"), t, names, law)
+    rng = np.random.default_rng(1)
+    sigma = {f"{HEIGHT} [m]": 1e-5, f"{force} [N]": 1.0}
+    data = {name: one + sigma[name] * rng.normal(size=601) for name, one in exact.items()}
+    start = {"contact.law.k": 2e3, "contact.law.c": 0.19, height: 0.0732}
+    found = sp.fit("sphere_on_shell", {"t [s]": t, **data}, [height], changes=start)
+    assert found.determined
+    assert found[height].value == pytest.approx(0.073, abs=2e-5)
+    sentence = f"the slopes of {force} of experiment 1 are inexact: intervals follow from the other"
+    said = [one.startswith(sentence) for one in found.remarks if "inexact" in one]
+    assert said == [True] * (len(columns) - 1)
+
+
+def test_inexact_slopes_keep_the_value_and_are_said():
+    """The force alone feels the height, by slopes that are as long as their error."""
+    height = "robot.ball.start.root_joint.2"
+    t = np.linspace(0.0, 0.12, 601)
+    force = "pairs.ball-bowl.normal_force"
+    law = {"contact.law.k": "2e3", "contact.law.c": "0.2"}
+    exact = columns_of(find_scenario("sphere_on_shell"), t, [force], law)
+    data = {"t [s]": t, **noisy(exact, 0.01, 1)}
+    start = {"contact.law.k": 3e3, "contact.law.c": 0.3, height: 0.0732}
+    found = sp.fit("sphere_on_shell", data, [height], changes=start)
+    one = found[height]
+    assert not one.determined
+    assert one.value != one.start
+    assert any("slopes of what was measured by it are inexact" in said for said in found.remarks)
+    assert not any("changes nothing" in said for said in found.remarks)
+
+
 def test_false_alarms_of_the_test_for_noise_are_rare():
     rng = np.random.default_rng(0)
     alarms = sum(not serial_of(rng.normal(size=60)).independent for _ in range(2000))
@@ -421,3 +480,50 @@ def test_the_command_ends_with_1_where_the_data_do_not_determine(bounce, tmp_pat
     done = CliRunner().invoke(app, [*command, "--set", f"{STIFFNESS}=-1"])
     assert done.exit_code == 2
     assert parse_wanted(["a=1:2", "b"]) == {"a": (1.0, 2.0), "b": None}
+
+
+# The ball's place along x is measured to 40 mm, of which friction does less in 0.05 s.
+SLIDE = ["t [s]", "q.root_joint.0 [m]"]
+
+
+def slide(path):
+    t = np.linspace(0.0, 0.05, 201)
+    (x,) = columns_of(path, t, ["q.root_joint.0"]).values()
+    return dict(zip(SLIDE, (t, x + 0.04 * np.random.default_rng(3).normal(size=201)), strict=True))
+
+
+def test_what_is_not_told_from_0_is_a_result_like_others(bounce):
+    """Its types are those of JSON."""
+    found = sp.fit(bounce, slide(bounce), [FRICTION])
+    assert any("they do not tell it from 0" in one for one in found.remarks)
+    one = json.loads(found.to_json())["parameters"][0]
+    assert one["determined"] is found[FRICTION].determined is False
+    assert one["low"] == 0.0
+    assert {type(value) for value in (found[FRICTION].low, found[FRICTION].high)} <= {int, float}
+
+
+def test_the_command_writes_what_is_not_told_from_0(bounce, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    data = slide(bounce)
+    table = np.column_stack(list(data.values()))
+    np.savetxt("slide.csv", table, header=",".join(data), delimiter=",", comments="")
+    command = ["fit", "slide.csv", str(bounce), "--param", FRICTION, "--out", "out"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 1, done.output
+    assert "they do not tell it from 0" in done.output
+    names = ["bounce.fitted.toml", "fit.json", "fit.png"]
+    assert sorted(path.name for path in Path("out").iterdir()) == names
+
+
+@pytest.mark.parametrize("maker", ["to_json", "plot", "write_scenario"])
+def test_a_file_that_cannot_be_made_leaves_none(bounce, tmp_path, monkeypatch, maker):
+    monkeypatch.chdir(tmp_path)
+
+    def fail(*_):
+        raise sp.SphshellError("no such thing")
+
+    monkeypatch.setattr(f"sphshell_pin.study.fit.report.Fit.{maker}", fail)
+    Path("fall.csv").write_text(f"t [ms],{HEIGHT} [mm]\n0,17\n1,16.5\n2,16.0\n5,14.4\n")
+    done = CliRunner().invoke(app, ["fit", "fall.csv", str(bounce), "--param", "gravity.2"])
+    assert done.exit_code == 2
+    assert not Path("results").exists()

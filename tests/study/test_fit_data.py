@@ -123,12 +123,27 @@ def test_wrong_data_get_a_sentence(read, case):
         ({"t [s]": [0.0, 0.0], f"{HEIGHT} [m]": [0.0, 1.0]}, "row 1: time 0 s is the same"),
         ({"t [s]": [0.0, math.nan], f"{HEIGHT} [m]": [0.0, 1.0]}, "row 1: the time is missing"),
         ({"t [s]": ["a"], f"{HEIGHT} [m]": [0.0]}, "columns of numbers"),
+        ({"t [s]": [0.0, math.inf], f"{HEIGHT} [m]": [0.0, 1.0]}, "row 1: 'inf' in .*number$"),
+        (
+            {"t [s]": [0.0, 0.1], f"{HEIGHT} [mm]": [-math.inf, 1.0]},
+            rf"row 0: '-inf' in column '{HEIGHT} \[mm\]' is not a finite number; put nan where",
+        ),
+        (
+            {"t [s]": [0.0], f"{HEIGHT} [m]": [0.0], f"{HEIGHT}.sigma [m]": [math.inf]},
+            rf"row 0: 'inf' in column '{HEIGHT}.sigma \[m\]' is not a finite number",
+        ),
         (7, "must be a csv file, or a mapping"),
     ],
 )
 def test_wrong_columns_get_a_sentence(read, columns, said):
     with pytest.raises(DataError, match=said):
         read(columns)
+
+
+def test_nan_is_no_value(read):
+    (column,) = read({"t [s]": [0.0, 0.1], f"{HEIGHT} [m]": [math.nan, 1.0]}).columns
+    assert column.rows.tolist() == [1]
+    assert column.values.tolist() == [1.0]
 
 
 def test_no_file_gets_a_sentence(built, tmp_path):
@@ -157,6 +172,16 @@ def test_an_experiment_cannot_set_what_is_fitted(built):
     data = sp.Experiment({"t [s]": [0.1], f"{HEIGHT} [m]": [0.01]}, {"gravity.2": -9.0})
     with pytest.raises(InvalidParameter, match="is fitted, so no experiment can set it"):
         sp.fit(built.path, data, ["gravity.2"])
+
+
+def test_an_experiment_cannot_set_what_is_fitted_by_a_shorter_name(built):
+    """Names that may be left out of a key name the same value."""
+    data = {"t [s]": [0.1], f"{HEIGHT} [m]": [0.01]}
+    short, whole = (f"contact.{name}law.stiffness" for name in ("", "tip."))
+    for given, wanted in ((short, whole), (short, short), (whole, short)):
+        one = sp.Experiment(data, {given: 5.0})
+        with pytest.raises(InvalidParameter, match="is fitted, so no experiment can set it"):
+            sp.fit(built.path, one, [wanted])
 
 
 def test_the_command_ends_with_2(built, tmp_path, monkeypatch):

@@ -131,6 +131,7 @@ def test_ctrl_c_leaves_nothing(rendered, tmp_path, name):
         ("run.gif", {"fps": 60.0}, "fps = 60.0 must be at most 50"),
         ("run.mp4", {"fps": -1.0}, "fps = -1.0 must be positive"),
         ("run.gif", {"fps": 0}, "fps = 0 must be positive"),
+        ("run.mp4", {"fps": 1e9}, "fps = 1000000000.0 gives 3e\\+09 frames, of 1000000 at most"),
         ("run.gif", {"speed": "fast"}, "speed = 'fast' must be a number"),
         ("run.png", {"size": "big"}, "size = 'big' must hold 2 numbers"),
         ("run.png", {"size": (100,)}, "size has shape"),

@@ -77,6 +77,16 @@ class _Table:
     columns: dict[str, Array]
     lines: Sequence[int] | None
 
+    def values(self, header: str) -> Array:
+        """Return the values (n,) of a column; DataError for one that is infinite."""
+        values = self.columns[header]
+        for row in np.flatnonzero(np.isinf(values)):
+            reason = f"'{values[row]}' in column '{header}' is not a finite number"
+            if header.partition(" ")[0] != TIME:
+                reason += "; put nan where nothing was measured"
+            raise self.fault(reason, int(row))
+        return values
+
     def fault(self, reason: str, row: int | None = None) -> DataError:
         if row is None:
             return DataError(self.source, reason)
@@ -149,10 +159,10 @@ def _times(table: _Table, units: Mapping[str, tuple[str, str | None]], duration:
             f"has no column '{TIME} [s]'; its columns are: {', '.join(units) or 'none'}"
         )
     header, unit = units[TIME]
-    t = table.columns[header] * _factor(table, TIME, unit, "s")
+    t = table.values(header) * _factor(table, TIME, unit, "s")
     if not len(t):
         raise table.fault("has no rows of data")
-    for row in np.flatnonzero(~np.isfinite(t)):
+    for row in np.flatnonzero(np.isnan(t)):
         raise table.fault("the time is missing", int(row))
     for row in np.flatnonzero(np.diff(t) <= 0.0) + 1:
         how = "is the same as" if t[row] == t[row - 1] else "is before"
@@ -182,14 +192,14 @@ def _column(
 ) -> Column:
     name = quantity.name
     header, unit = units[name]
-    values = table.columns[header] * _factor(table, name, unit, quantity.unit)
-    rows = np.flatnonzero(np.isfinite(values))
+    values = table.values(header) * _factor(table, name, unit, quantity.unit)
+    rows = np.flatnonzero(~np.isnan(values))
     if not len(rows):
         raise table.fault(f"column '{name}' has no value")
     given = None if sigma is None else np.full(len(rows), sigma)
     if name + SIGMA in units:
         header, unit = units[name + SIGMA]
-        deviations = table.columns[header] * _factor(table, name + SIGMA, unit, quantity.unit)
+        deviations = table.values(header) * _factor(table, name + SIGMA, unit, quantity.unit)
         for row in rows[~(deviations[rows] > 0.0)]:
             raise table.fault(
                 f"'{name}{SIGMA}' must be positive wherever '{name}' has a value", int(row)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.fit.report import Fitted, Series
@@ -13,6 +14,8 @@ from sphshell_pin.study.fit.statistics import Spread, serial_of, variance_is
 
 # A pair of which one explains so much of the variance of the other is told.
 _SHARED = 0.9
+# Of a list, so many names are told.
+_MOST_NAMES = 3
 
 
 def remarks_on(
@@ -23,16 +26,29 @@ def remarks_on(
     dof: int,
     tolerance: float,
     *,
+    still: NDArray[np.bool_],
+    inexact: Sequence[str],
     converged: bool,
 ) -> list[str]:
-    """Return what is to be said of a fit; `tolerance` is the relative error of its runs."""
+    """Return what is to be said of a fit; `tolerance` is the relative error of its runs.
+
+    `still` (p,) are parameters that change nothing, `inexact` columns whose slopes were left out.
+    """
     out = []
     if not converged:
         out.append(
             "the search ended before the residuals were least: start nearer to the solution, or "
             "run the fit again from these values"
         )
-    out += _undetermined(fitted, free, spread)
+    out += _undetermined(fitted, free, spread, still)
+    if inexact:
+        names = list(inexact)
+        if len(names) > _MOST_NAMES:
+            names[_MOST_NAMES:] = [f"{len(names) - _MOST_NAMES} more"]
+        out.append(
+            f"the slopes of {' and '.join(names)} are inexact: intervals follow from the other "
+            "columns alone, and are rather too wide; a smaller run.rtol or run.dt may help"
+        )
     out += [
         f"{one.key} stands at its bound, {one.value:.6g} {one.unit}".rstrip()
         + ": the data would have it beyond; it has no interval, and those of others hold for it so"
@@ -43,7 +59,9 @@ def remarks_on(
     return out + _residuals(series, dof, tolerance)
 
 
-def _undetermined(fitted: Sequence[Fitted], free: Sequence[Free], spread: Spread) -> list[str]:
+def _undetermined(
+    fitted: Sequence[Fitted], free: Sequence[Free], spread: Spread, still: NDArray[np.bool_]
+) -> list[str]:
     out = []
     together: set[int] = set()
     for direction in spread.blind:
@@ -57,6 +75,9 @@ def _undetermined(fitted: Sequence[Fitted], free: Sequence[Free], spread: Spread
             continue
         if math.isinf(one.low) and math.isinf(one.high):
             why = "a change of it changes nothing that was measured"
+            if not still[k]:
+                why = "the slopes of what was measured by it are inexact, so it has no interval, "
+                why += "and others' take it for known; a smaller run.rtol or run.dt may help"
         elif free[k].log or one.low <= 0.0 <= one.high:
             why = f"they do not tell it from 0, and allow up to {one.high:.4g} {one.unit}"
             if free[k].log:

@@ -31,6 +31,8 @@ _SMALL_ERROR, _MOST_HALVINGS = 0.01, 8
 _STAGES = (0.125, 0.25, 0.5)
 # A value feels the parameters if its slope is so large a part of the largest.
 _FELT = 1e-3
+# Slopes of fewer values may agree by chance: such columns are judged with others of their name.
+_FEW = 10
 # How far the first step may go in x.
 _FIRST_STEP = 0.5
 
@@ -110,23 +112,37 @@ class Search:
 
     def report(self, scenario: str, level: float) -> Fit:
         """Return the fit at the values found."""
-        jacobian, error = self._final_slopes()
+        jacobian, error, still = self._final_slopes()
+        groups, called = self._groups()
         dof = len(self.measured) - len(self.free)
         factor = student_factor(dof, level)
-        spread = spread_of(jacobian, error)
+        spread = spread_of(jacobian, error, groups)
         middle, held = self._beyond(jacobian, factor * spread.deviations)
         if held.any():
-            spread = _with_held(spread_of(jacobian[:, ~held], error[:, ~held]), held)
-        self._leave_unfelt(spread)
+            spread = _with_held(spread_of(jacobian[:, ~held], error[:, ~held], groups), held)
+        self._leave_unfelt(spread, still)
         fitted = tuple(
             _fitted(one, x, (center - half, center + half), held=bool(bound))
             for one, x, center, half, bound in zip(
-                self.free, self.x.tolist(), middle, factor * spread.deviations, held, strict=True
+                self.free,
+                self.x.tolist(),
+                middle.tolist(),
+                (factor * spread.deviations).tolist(),
+                held,
+                strict=True,
             )
         )
         series = self._series()
         remarks = remarks_on(
-            fitted, self.free, spread, series, dof, self.runs.tolerance, converged=self.converged
+            fitted,
+            self.free,
+            spread,
+            series,
+            dof,
+            self.runs.tolerance,
+            still=still,
+            inexact=[called[group] for group in spread.left_out],
+            converged=self.converged,
         )
         notes = [note for trial in self.runs.trials for note in trial.data.notes]
         return Fit(
@@ -155,9 +171,22 @@ class Search:
         weighted = (self.measured - values) / sigma
         return float(np.sum(np.log(sigma)) + 0.5 * weighted @ weighted)
 
-    def _leave_unfelt(self, spread: Spread) -> None:
+    def _groups(self) -> tuple[NDArray[np.intp], list[str]]:
+        """Return the group (N,) of each value: its column; and what the groups are called."""
+        called: list[str] = []
+        groups = np.zeros(len(self.measured), dtype=np.intp)
+        for part in self.parts:
+            name = part.name
+            if part.at.stop - part.at.start >= _FEW:
+                name = f"{part.name} of {part.trial.data.name}"
+            if name not in called:
+                called.append(name)
+            groups[part.at] = called.index(name)
+        return groups, called
+
+    def _leave_unfelt(self, spread: Spread, still: NDArray[np.bool_]) -> None:
         """Put parameters that change nothing that was measured back to where they started."""
-        unfelt = (np.abs(spread.blind) == 1.0).any(axis=0)
+        unfelt = still & (np.abs(spread.blind) == 1.0).any(axis=0)
         start = np.array([one.to_x(one.start) for one in self.free])
         x = np.where(unfelt, start, self.x)
         if unfelt.any() and self.runs.predict(x) is not None:
@@ -238,15 +267,17 @@ class Search:
         slopes = self.runs.slopes(x, self.low, self.high, forward_step(self.runs.tolerance))
         return np.asarray(slopes * (use / self.sigma)[:, None])
 
-    def _final_slopes(self) -> tuple[Array, Array]:
-        """Return the weighted slopes (N, p) at the solution and their error.
+    def _final_slopes(self) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return the weighted slopes (N, p) at the solution, their error, and which x do nothing.
 
         The error is by how much differences over one step and over twice the step differ, and a
         column's step is halved as long as that makes it less. An error of truncation is a third of
         it; one of rounding, of which neither difference knows the other's, is about that much. It
-        is no less than what the tolerance of a run does to a difference.
+        is no less than what the tolerance of a run does to a difference. An x (p,) of which no
+        column's slope is longer than twice that does nothing; of any other, an error that is as
+        long as the slope leaves open what it does.
         """
-        slopes, errors = [], []
+        slopes, errors, still = [], [], []
         values = self.runs.predict(self.x)
         assert values is not None
         rounding = self.runs.tolerance * np.abs(values) / self.sigma
@@ -264,8 +295,12 @@ class Search:
                     break
                 near, error = nearer, less
             slopes.append(near)
-            errors.append(np.maximum(np.abs(error), rounding / step))
-        return np.column_stack(slopes), np.column_stack(errors)
+            least = rounding / step
+            errors.append(np.maximum(np.abs(error), least))
+            # Of each column: one of large values would hide what another feels.
+            lengths = [np.linalg.norm([near[one.at], least[one.at]], axis=1) for one in self.parts]
+            still.append(all(length <= 2.0 * noise for length, noise in lengths))
+        return np.column_stack(slopes), np.column_stack(errors), np.array(still)
 
     def _slope(self, k: int, step: float) -> Array:
         return self.runs.slope(self.x, k, self.low, self.high, step, central=True) / self.sigma
@@ -342,7 +377,7 @@ def _with_held(spread: Spread, held: NDArray[np.bool_]) -> Spread:
     covariance[held, held] = np.nan
     blind = np.zeros((len(spread.blind), count))
     blind[:, kept] = spread.blind
-    return Spread(covariance, blind)
+    return Spread(covariance, blind, spread.left_out)
 
 
 def _fitted(one: Free, x: float, span: tuple[float, float], *, held: bool) -> Fitted:
