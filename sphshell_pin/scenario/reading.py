@@ -302,7 +302,7 @@ def _explain(
         reason = "must be a list [ ... ]"
     elif kind == "too_short":
         least, count = context["min_length"], context["actual_length"]
-        reason = f"must have {least} item{'s' * (least != 1)} at least, not {count}"
+        reason = f"must have at least {least} item{'s' * (least != 1)}, not {count}"
     if len(details) > 1:
         reason += f" (and {len(details) - 1} more: first repair this one)"
     if kind not in ("model_type", "dataclass_type", "unknown_key"):
