@@ -156,6 +156,8 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         if self.normal_force and self.shell is None:
             raise InvalidParameter("normal_force", self.normal_force, "needs a shell to press on")
         frame = model.frames[frame_index]
+        if not frame.parentJoint:
+            raise InvalidParameter("frame", self.frame, "is fixed to the world: nothing would move")
         carrier_name, placement = self._shell_place(scene)
         carrier_index = find_frame(model, carrier_name, "shell_frame")
         carrier = model.frames[carrier_index]

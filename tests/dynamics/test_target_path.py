@@ -137,6 +137,14 @@ def test_paths_that_cannot_be_followed_are_refused() -> None:
         Curve.through(np.array([[0.0, 0, 0], [1e8, 0, 0]]), shell, spline=False)
 
 
+def test_a_frame_of_the_world_is_refused() -> None:
+    controller = sp.CartesianImpedance("universe", POINTS, 1.0, 1.0)
+    with pytest.raises(InvalidParameter, match="frame = 'universe' is fixed to the world"):
+        sp.Simulation(sp.Scene(models.arm()), sp.Implicit()).run(
+            models.ARM_Q, duration=0.1, controller=controller
+        )
+
+
 def doubts(**more) -> str:
     scene = sp.Scene(models.arm())
     frame = scene.model.frames[scene.model.nframes - 1].name
