@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 pytest.importorskip("scipy")
 pytest.importorskip("matplotlib")
@@ -16,13 +13,12 @@ from scipy import stats
 
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.fitting import SCENARIO, TRUTH, many_sets
-from sphshell_pin.cli import app
 from sphshell_pin.errors import DataError, InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
 from sphshell_pin.scenario.reading import find_scenario
 from sphshell_pin.study.fit import runs
 from sphshell_pin.study.fit.data import read_experiment
-from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
+from sphshell_pin.study.fit.parameters import free_parameters
 from sphshell_pin.study.fit.quantities import quantities_of, row_step
 from sphshell_pin.study.fit.runs import Runs, ready
 from sphshell_pin.study.fit.statistics import serial_of, spread_of
@@ -30,13 +26,6 @@ from sphshell_pin.study.fit.statistics import serial_of, spread_of
 STIFFNESS, DISSIPATION, FRICTION = TRUTH
 HEIGHT = "q.root_joint.2"
 FORCE = "pairs.tip.normal_force"
-
-
-@pytest.fixture
-def bounce(tmp_path):
-    path = tmp_path / "bounce.toml"
-    path.write_text(SCENARIO, encoding="utf-8")
-    return path
 
 
 def columns_of(path, t, names, changes=None):
@@ -419,111 +408,3 @@ def test_a_wrong_parameter_gets_a_sentence(bounce, wanted, said):
     data = {"t [s]": [0.0, 0.1], f"{HEIGHT} [m]": [0.0, 0.1]}
     with pytest.raises((ScenarioError, InvalidParameter), match=said):
         sp.fit(bounce, data, wanted)
-
-
-def test_the_command_writes_values_in_place(bounce, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    t = np.linspace(0.0, 0.1, 201)
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
-    rows = [",".join(data), *(",".join(map(repr, row)) for row in zip(*data.values(), strict=True))]
-    Path("drop.csv").write_text("\n".join(rows).replace("np.float64(", "").replace(")", ""))
-    fast = "robot.ball.speed.root_joint=[0.0,0.0,-1.0,0.0,0.0,0.0]"
-    changes = dict([fast.split("=")])
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE], changes), 0.02)}
-    np.savetxt(
-        "fast.csv",
-        np.column_stack(list(data.values())),
-        header=",".join(data),
-        delimiter=",",
-        comments="",
-    )
-    command = [
-        "fit",
-        "drop.csv",
-        str(bounce),
-        "--param",
-        STIFFNESS,
-        "--param",
-        f"{DISSIPATION}=0:1",
-    ]
-    command += ["--experiment", f"fast.csv {fast}", "--set", f"{STIFFNESS}=8e4"]
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 0, done.output
-    assert "2 experiments" in done.output
-    out = Path("results/bounce")
-    assert sorted(path.name for path in out.iterdir()) == [
-        "bounce.fitted.toml",
-        "fit.json",
-        "fit.png",
-    ]
-    fit = json.loads((out / "fit.json").read_text())
-    text = (out / "bounce.fitted.toml").read_text()
-    changed = [
-        (old, new)
-        for old, new in zip(SCENARIO.split("\n"), text.split("\n"), strict=True)
-        if old != new
-    ]
-    assert len(changed) == 1
-    law = read_scenario(out / "bounce.fitted.toml").contact[0].law
-    values = {one["key"]: one["value"] for one in fit["parameters"]}
-    assert law.stiffness == pytest.approx(values[STIFFNESS], rel=1e-8)
-    assert law.stiffness == pytest.approx(1e5, rel=0.02)
-
-
-def test_the_command_ends_with_1_where_the_data_do_not_determine(bounce, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("fall.csv").write_text(f"t [ms],{HEIGHT} [mm]\n0,17\n1,16.5\n2,16.0\n5,14.4\n")
-    command = ["fit", "fall.csv", str(bounce), "--param", STIFFNESS, "--no-picture"]
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 1, done.output
-    assert f"the data do not determine {STIFFNESS}" in done.output
-    done = CliRunner().invoke(app, [*command, "--set", f"{STIFFNESS}=-1"])
-    assert done.exit_code == 2
-    assert parse_wanted(["a=1:2", "b"]) == {"a": (1.0, 2.0), "b": None}
-
-
-# The ball's place along x is measured to 40 mm, of which friction does less in 0.05 s.
-SLIDE = ["t [s]", "q.root_joint.0 [m]"]
-
-
-def slide(path):
-    t = np.linspace(0.0, 0.05, 201)
-    (x,) = columns_of(path, t, ["q.root_joint.0"]).values()
-    return dict(zip(SLIDE, (t, x + 0.04 * np.random.default_rng(3).normal(size=201)), strict=True))
-
-
-def test_what_is_not_told_from_0_is_a_result_like_others(bounce):
-    """Its types are those of JSON."""
-    found = sp.fit(bounce, slide(bounce), [FRICTION])
-    assert any("they do not tell it from 0" in one for one in found.remarks)
-    one = json.loads(found.to_json())["parameters"][0]
-    assert one["determined"] is found[FRICTION].determined is False
-    assert one["low"] == 0.0
-    assert {type(value) for value in (found[FRICTION].low, found[FRICTION].high)} <= {int, float}
-
-
-def test_the_command_writes_what_is_not_told_from_0(bounce, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    data = slide(bounce)
-    table = np.column_stack(list(data.values()))
-    np.savetxt("slide.csv", table, header=",".join(data), delimiter=",", comments="")
-    command = ["fit", "slide.csv", str(bounce), "--param", FRICTION, "--out", "out"]
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 1, done.output
-    assert "they do not tell it from 0" in done.output
-    names = ["bounce.fitted.toml", "fit.json", "fit.png"]
-    assert sorted(path.name for path in Path("out").iterdir()) == names
-
-
-@pytest.mark.parametrize("maker", ["to_json", "plot", "write_scenario"])
-def test_a_file_that_cannot_be_made_leaves_none(bounce, tmp_path, monkeypatch, maker):
-    monkeypatch.chdir(tmp_path)
-
-    def fail(*_):
-        raise sp.SphshellError("no such thing")
-
-    monkeypatch.setattr(f"sphshell_pin.study.fit.report.Fit.{maker}", fail)
-    Path("fall.csv").write_text(f"t [ms],{HEIGHT} [mm]\n0,17\n1,16.5\n2,16.0\n5,14.4\n")
-    done = CliRunner().invoke(app, ["fit", "fall.csv", str(bounce), "--param", "gravity.2"])
-    assert done.exit_code == 2
-    assert not Path("results").exists()

@@ -33,7 +33,7 @@ from sphshell_pin.study.report import integrators as integrators_section
 from sphshell_pin.study.report import peers as peers_section
 from sphshell_pin.study.report import queries as queries_section
 from sphshell_pin.study.report import steps as steps_section
-from sphshell_pin.study.report.contents import Column, Finding, Section, Table, number
+from sphshell_pin.study.report.contents import Column, Finding, Section, Table
 from sphshell_pin.study.report.drawing import spread_apart
 from sphshell_pin.study.report.page import Heading
 
@@ -280,34 +280,6 @@ def test_order_and_error_of_a_power_law():
     assert forces_section.order(line) == pytest.approx(4.0)
     assert forces_section.error_at(line) == pytest.approx(0.7 * 0.3**4)
     assert forces_section.error_at(line, "largest") == pytest.approx(3 * 0.3**4)
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (1.2345, "1.23"), (0.0, "0"), (2.66e-15, "2.7\u00d710⁻¹⁵"), (199712, "199\u202f712"),
-        (12345.6, "12\u202f346"), (math.nan, "-"), (None, ""),
-    ],
-)  # fmt: skip
-def test_numbers(value, text):
-    assert number(value) == text
-
-
-def test_nothing_measured_meets_no_aim():
-    assert Finding("a", "a", math.nan, aim=1.0).met is None
-    assert Finding("a", "a", math.nan, aim=1.0, sense=">=").met is None
-    assert Finding("a", "a", math.nan, aim=1.0).unmeasured
-    assert not Finding("a", "a", math.nan).unmeasured
-    assert Finding("a", "a", 1.0, aim=1.0).met is True
-    assert Finding("a", "a", 1.0).met is None
-
-
-def test_a_missed_figure_never_reads_like_its_aim():
-    assert Finding("a", "a", 1.8011613, "x", aim=1.8).text == "1.801 x"
-    assert Finding("a", "a", 1.8000004, "x", aim=1.8).text == "1.8000004 x"
-    assert Finding("a", "a", 14.9999, aim=15.0, sense=">=").text == "14.9999"
-    assert Finding("a", "a", 1.7999, "x", aim=1.8).text == "1.8 x"
-    assert Finding("a", "a", 1.8011, "x").text == "1.8 x"
 
 
 def test_labels_move_apart_as_little_as_needed():
