@@ -2,11 +2,12 @@
 
 import pytest
 
-from sphshell_pin.benchmarks.fitting import SCENARIO
-
 
 @pytest.fixture
 def bounce(tmp_path):
+    """The file of a scenario whose ball bounces, for fits."""
+    from sphshell_pin.benchmarks.fitting import SCENARIO
+
     path = tmp_path / "bounce.toml"
     path.write_text(SCENARIO, encoding="utf-8")
     return path
