@@ -59,7 +59,7 @@ PYTEST = $(BIN)/python -m pytest -n auto --dist worksteal $(ARGS)
 test: $(VENV)/.test ## build into .venv and run all tests, on all cores
 	$(PYTEST)
 
-quick: $(VENV)/.test ## the tests that are not slow and need no browser: a minute
+quick: $(VENV)/.test ## the tests that are not slow and need no browser: three minutes
 	$(PYTEST) -m "not slow and not browser" --durations=10
 
 lint: $(VENV)/.test ## check style and types
