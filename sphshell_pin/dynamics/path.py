@@ -191,7 +191,8 @@ class Timing:
 
 def core_path(curve: Curve, timing: Timing) -> _core.Path:
     """Build the C++ path; steps of integrators with error control meet its kinks."""
-    bends = curve.along if len(curve.tangents) == 0 else curve.corners
+    # The ends are times of phases already.
+    bends = curve.along if len(curve.tangents) == 0 else curve.corners[1:-1]
     kinks = np.unique(np.concatenate([timing.times, timing.reaching(bends)]))
     return _core.Path(
         along=curve.along.tolist(),
@@ -253,6 +254,7 @@ def _peak(
 
 
 def _rise(speed: float, most: float | None, jerk: float | None) -> tuple[float, float]:
+    """Return `bend` and `ramp` [s] of a rise from rest to `speed` [m/s]."""
     bend = 0.0 if jerk is None else float(np.sqrt(speed / jerk))
     if most is None:
         return bend, bend
@@ -264,19 +266,19 @@ def _rise(speed: float, most: float | None, jerk: float | None) -> tuple[float, 
 
 
 def _speed_reached(length: float, most: float | None, jerk: float | None) -> float:
-    """Return the v of v (ramp + bend) = length: without an even phase."""
+    """Return the speed v [m/s] of v (ramp + bend) = length [m]: without an even phase."""
     if jerk is not None:
         speed = float(np.cbrt(jerk) * np.cbrt(length / 2) ** 2)  # of 2 v sqrt(v / jerk) = length
         if most is None or np.sqrt(speed / jerk) <= most / jerk:
             return speed
-    if most is None:
-        raise ValueError("without limits every speed is reached")
+    assert most is not None  # without limits every speed is reached
     bend = 0.0 if jerk is None else most / jerk
     # Of v (v / most + bend) = length, without a difference of near numbers.
     return float(2 * length / (bend + np.sqrt(bend * bend + 4 * length / most)))
 
 
 def _check_length(points: Array, shell: Shell | None) -> None:
+    """Raise InvalidParameter for a path of another unit: its knots would fill the memory."""
     with np.errstate(over="ignore"):
         length = float(_lengths(points)[-1])
     if not np.isfinite(length):

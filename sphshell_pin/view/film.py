@@ -165,6 +165,7 @@ def render_film(
 
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Return width and height [pixels]; InvalidParameter unless both are whole and in bounds."""
     width, height = check_vector("size", size, 2, ": width and height [pixels]")
     if not all(one == round(one) and LEAST_SIZE <= one <= MOST_SIZE for one in (width, height)):
         must = f"must be whole numbers between {LEAST_SIZE} and {MOST_SIZE} [pixels]"

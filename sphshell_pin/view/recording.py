@@ -108,7 +108,7 @@ def render_recording(
     the camera takes in all of the robot, else the surroundings of the contacts.
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
-    positive, another `color`, or a geometry model that does not fit.
+    positive, more than MOST_FRAMES frames, another `color`, or a geometry model that does not fit.
     """
     check_coloring(color)
     check_pace(fps, speed)
