@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick lint format bench report robots hard-cases work-precision rollouts \
-  real-surfaces new-study fuzz kills sweep-survival sampling-survival sanitize wheel notebooks docs docs-serve clean
+  real-surfaces new-study parts fuzz kills sweep-survival sampling-survival sanitize wheel notebooks docs docs-serve clean
 
 help:
 	@sed -nE 's/^([a-z-]+):.* ## (.*)/make \1\t\2/p' Makefile | expand -t 22
@@ -96,6 +96,9 @@ real-surfaces: $(VENV)/.test ## jumps and energies over the surfaces of FOLDER=.
 
 new-study: $(VENV)/.test ## what `new` writes for 14 robots and the parts of FOLDER=...
 	$(BIN)/python -m benchmarks.new_study $(or $(FOLDER),tests/data/corpus)
+
+parts: $(VENV)/.test ## what STL files of 300 generated parts cost against their CAD faces (COUNT=300 SEED=1)
+	$(BIN)/python -m tests.parts --count $(or $(COUNT),300) --seed $(or $(SEED),1)
 
 fuzz: $(VENV)/.test ## damaged files for every reader, until one breaks it (SECONDS=600 SEED=1)
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)

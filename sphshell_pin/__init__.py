@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from sphshell_pin.patches import TaxelImages as TaxelImages
     from sphshell_pin.patches import WearMap as WearMap
     from sphshell_pin.patches import wear_maps as wear_maps
+    from sphshell_pin.shell import Face as Face
     from sphshell_pin.shell import Shell as Shell
     from sphshell_pin.study.fit import Experiment as Experiment
     from sphshell_pin.study.fit import Fit as Fit
@@ -68,6 +69,7 @@ _HOME = {
     "ContactSwitch": "dynamics",
     "CoulombFriction": "contact",
     "Experiment": "study.fit",
+    "Face": "shell",
     "Feature": "contact",
     "Fit": "study.fit",
     "ForceTorqueSensor": "dynamics",

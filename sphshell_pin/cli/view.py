@@ -34,8 +34,8 @@ def view(
     color: Annotated[
         str,
         typer.Option(
-            help="Colors of the shells: surface, patches, or distance (of curved elements from "
-            "the flat ones)."
+            help="Colors of the shells: surface, patches, faces (by kind), or distance (of curved "
+            "elements from the flat ones)."
         ),
     ] = "surface",
     of: Annotated[

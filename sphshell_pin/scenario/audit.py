@@ -187,7 +187,7 @@ def _feet(
     options = CadOptions(
         section.chord_error,
         section.bodies,
-        section.faces,
+        section.faces if isinstance(section.faces, list) else None,
         time_limit=section.time_limit,
         memory_limit=section.memory_limit,
     )

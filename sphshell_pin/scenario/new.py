@@ -203,9 +203,7 @@ def _sided(shell: ShellSection, built: Built, word: str | None) -> tuple[ShellSe
     side: Literal["inside", "outside"] = "inside" if word == "bowl" else "outside"
     section = shell.model_copy(update={"side": side})
     # The surface is not read again.
-    turned = type(made).from_surface(
-        made.surface(), made.crease_angle, side, made.name, made.source, made.unit
-    )
+    turned = made.from_surface(made.surface(), **{**made.options, "side": side})
     scenario = built.scenario.model_copy(update={"shell": [section]})
     return section, replace(built, scenario=scenario, shells={shell.name: turned})
 

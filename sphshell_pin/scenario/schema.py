@@ -108,7 +108,7 @@ class ShellSection(Section):
     primitive: Annotated[Primitive, OneOf(Primitive)] | None = None
     chord_error: Positive | None = None
     bodies: Annotated[list[str], Field(min_length=1)] | None = None
-    faces: Annotated[list[str | int], Field(min_length=1)] | None = None
+    faces: Annotated[list[str | int], Field(min_length=1)] | bool | None = None
     time_limit: Positive | None = None
     memory_limit: Positive | None = None
     segments: Count | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import cached_property
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from sphshell_pin import _core
 from sphshell_pin.checks import read_only
 from sphshell_pin.shell.cleaned import CleanedSurface
+from sphshell_pin.shell.faces import Face, faces_of
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.options import SIDES, check_size
 from sphshell_pin.shell.raw import Bytes, Floats, Ints, Mask
@@ -37,6 +38,8 @@ class ShellBase(Summarized):
     element_face: Ints | None
     face_names: tuple[str, ...]
     straight: Mask | None
+    rounding: float
+    finds_faces: bool
     box: Floats
     size: float
     health: ShellHealth
@@ -51,10 +54,11 @@ class ShellBase(Summarized):
         name: str = "shell",
         source: str | None = None,
         unit: str | None = None,
+        finds_faces: bool = True,
     ) -> Self:
         """Build a shell of a surface that is clean; the options are not checked."""
         shell = cls.__new__(cls)
-        shell._set(surface, crease_angle, side, name, source, unit)
+        shell._set(surface, crease_angle, side, name, source, unit, finds_faces)
         return shell
 
     def _set(
@@ -65,9 +69,11 @@ class ShellBase(Summarized):
         name: str,
         source: str | None = None,
         unit: str | None = None,
+        finds_faces: bool = True,
     ) -> None:
         self.name, self.side, self.source, self.unit = str(name), side, source, unit
-        self.crease_angle = float(crease_angle)
+        self.crease_angle, self.finds_faces = float(crease_angle), finds_faces
+        self.rounding = surface.rounding
         vertices = np.ascontiguousarray(surface.vertices, np.float64)
         triangles = np.ascontiguousarray(surface.triangles, np.int32)
         triangle_element = np.ascontiguousarray(surface.triangle_element, np.int32)
@@ -86,27 +92,38 @@ class ShellBase(Summarized):
         check_size(self.size)
         self.health = surface.health.labelled(name=self.name, size=self.size)
         # The CAD face of each triangle and the corner normals say what is smooth.
-        faces, normals = None, None
+        cad_face, normals = None, None
         if self.element_face is not None and self.normals is not None and self.crease_angle > 0.0:
-            faces, normals = self.element_face[triangle_element], self.normals.reshape(-1, 3)
+            cad_face, normals = self.element_face[triangle_element], self.normals.reshape(-1, 3)
         self.core = _core.Shell(
             vertices,
             triangles,
             triangle_element,
             self.crease_angle,
             SIDES.index(side),
-            faces,
+            cad_face,
             normals,
         )
         # The compiled surface has its own copies: these are views of them.
         self.vertices = self.core.vertices
         self.triangles = self.core.triangles
         self.triangle_element = self.core.triangle_element
+        pinched = self.core.pinched_vertices
+        self.health = self.health.labelled(
+            pinched_vertices=len(pinched),
+            pinched_at=tuple(self.vertices[pinched[0]].tolist()) if len(pinched) else None,
+        )
 
     def surface(self) -> CleanedSurface:
         """Return the arrays that the shell is made of."""
         held = {one.name: getattr(self, one.name) for one in fields(CleanedSurface)}
         return CleanedSurface(**held)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What `from_surface` takes besides the surface."""
+        names = ("crease_angle", "side", "name", "source", "unit", "finds_faces")
+        return {one: getattr(self, one) for one in names}
 
     def core_for(self, method: str) -> _core.Shell:
         """Return the compiled surface, with curved elements if `method` is "smooth"."""
@@ -115,8 +132,19 @@ class ShellBase(Summarized):
             given = self.normals if self.crease_angle > 0 else None
             exact = self.element_face is not None  # CAD's own
             straight = None if self.straight is None else self.straight.ravel().view(np.uint8)
-            self.core.curve(None if given is None else given.reshape(-1, 3), exact, straight)
+            given = None if given is None else given.reshape(-1, 3)
+            self.core.curve(given, exact, straight, self.rounding, self.finds_faces)
         return self.core
+
+    @cached_property
+    def faces(self) -> tuple[Face, ...]:
+        """Planes, cylinders, cones, spheres and tori on which elements lie.
+
+        They are recognized in meshes whose vertices lie on them to the rounding of their numbers,
+        not in CAD, whose faces `element_face` names, and not if `finds_faces` is False or the
+        crease angle 0. It makes the curved elements, if no query has.
+        """
+        return faces_of(self.core_for("smooth"))
 
     @property
     def num_elements(self) -> int:
@@ -160,8 +188,7 @@ class ShellBase(Summarized):
 
     def __getstate__(self) -> dict[str, object]:
         """Everything but the compiled surface, which is made again."""
-        options = ("crease_angle", "side", "name", "source", "unit")
-        return {"surface": self.surface(), **{one: getattr(self, one) for one in options}}
+        return {"surface": self.surface(), **self.options}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         """Rebuild from arrays that are clean already."""

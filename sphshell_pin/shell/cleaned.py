@@ -24,6 +24,7 @@ class CleanedSurface:
     element_face : (m,) row in `face_names` of the CAD face each element lies on, or None
     face_names : of the CAD faces
     straight : (t, 3) sides that stay straight whatever the normals say, or None
+    rounding : half the step to which the coordinates are known [m], 0 if they show none
     """
 
     vertices: Floats
@@ -36,6 +37,7 @@ class CleanedSurface:
     element_face: Ints | None = None
     face_names: tuple[str, ...] = ()
     straight: Mask | None = None
+    rounding: float = 0.0
 
     def moved(self, scale: float, rotation: Floats, translation: Floats) -> CleanedSurface:
         """Return the surface made larger, then turned by (3, 3), then moved by (3,) [m]."""
@@ -44,4 +46,5 @@ class CleanedSurface:
             vertices=(self.vertices * scale) @ rotation.T + translation,
             normals=None if self.normals is None else self.normals @ rotation.T,
             health=self.health.moved(scale, rotation, translation),
+            rounding=self.rounding * scale,
         )

@@ -76,7 +76,7 @@ def clean_surface(raw: RawSurface) -> CleanedSurface:
     # Those merged into another vertex are counted there.
     found["unused_vertices"] = len(raw.vertices) - welded - len(vertices)
     oriented = replace(oriented, polygons=polygons)
-    return _with_faces(_assemble(oriented, vertices, table, found), raw)
+    return _with_origin(_assemble(oriented, vertices, table, found), raw)
 
 
 def take_surface(raw: RawSurface) -> CleanedSurface:
@@ -104,7 +104,7 @@ def take_surface(raw: RawSurface) -> CleanedSurface:
     found = _given(raw)
     found["cleaned"] = False
     table = unit_normals(raw, found)
-    return _with_faces(_assemble(as_given, raw.vertices, table, found, turn_normals=False), raw)
+    return _with_origin(_assemble(as_given, raw.vertices, table, found, turn_normals=False), raw)
 
 
 def _given(raw: RawSurface) -> Found:
@@ -332,8 +332,9 @@ def _assemble(
     )
 
 
-def _with_faces(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
-    """With the CAD faces of the input, if it has any."""
+def _with_origin(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
+    """With the rounding of the input, and its CAD faces, if it has any."""
+    surface = replace(surface, rounding=raw.rounding)
     if raw.faces is None:
         return surface
     faces = raw.faces[surface.source_element]

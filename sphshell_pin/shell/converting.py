@@ -23,6 +23,12 @@ from sphshell_pin.units import METRES_PER_UNIT, metres_per_unit
 SAMPLES = 5000
 """Points taken of each surface to measure how far it is from the other."""
 
+NO_NORMALS = (
+    "{} files hold no normals, which are lost, nor on which faces the elements lie: planes, "
+    "cylinders, cones, spheres and tori are recognized again when it is read, other normals "
+    "estimated; .obj, .ply and .shl files keep them"
+)
+
 
 @dataclass(frozen=True)
 class Held:
@@ -49,7 +55,7 @@ class Conversion:
     source, target : what was read, and what was written and read back
     forth : distances (n,) of points of the source from the surface of the target [m]
     back : distances (n,) of points of the target from the surface of the source [m]
-    notes : of the reader of the source
+    notes : of the reader of the source, and what the format of the target does not hold
     """
 
     source: Held
@@ -143,13 +149,14 @@ def exchange(
     carried = suffix == ".shl" or suffix in CAD_SUFFIXES
     stated = unit if suffix in BREP_SUFFIXES or not carried else None
     second = _surface(target, stated, CadOptions())
+    lost = (NO_NORMALS.format(suffix),) if suffix in (".stl", ".off") and first.has_normals else ()
     rng = np.random.default_rng(0)
     return Conversion(
         first.held,
         replace(second.held, unit=unit),
         second.distances(first.samples(SAMPLES, rng)),
         first.distances(second.samples(SAMPLES, rng)),
-        first.notes,
+        (*first.notes, *lost),
     )
 
 
@@ -182,7 +189,7 @@ class _Mesh:
         self.held = Held(
             path, shell.unit or "m", shell.num_elements, "elements", shell.size, shell.health.area
         )
-        self.notes = shell.health.notes
+        self.notes, self.has_normals = shell.health.notes, shell.normals is not None
 
     def shell(self) -> Shell:
         """Return the elements as they are."""
@@ -210,7 +217,7 @@ class _Faces:
 
         cad = load_cad(path, unit, options)
         self._faces, self._meters, self._raw = TrimmedFaces(cad), cad.model.meters, cad.polygons()
-        self.model, self.notes = cad.whole, cad.notes()
+        self.model, self.notes, self.has_normals = cad.whole, cad.notes(), True
         size, area = self._faces.extent
         self.held = Held(
             path,

@@ -10,8 +10,9 @@ import numpy as np
 
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.curved import points_on
-from sphshell_pin.shell.health import LARGE_OF_HEIGHT, CurvatureReport, Place
-from sphshell_pin.shell.raw import Bytes, Floats, Longs, area_vectors
+from sphshell_pin.shell.faces import described
+from sphshell_pin.shell.health import LARGE_OF_TURNS, CurvatureReport, Place
+from sphshell_pin.shell.raw import Bytes, Floats, Ints, Longs, Mask, area_vectors
 
 CURVED, OFF_FACE = 0, 3
 FLAT_BECAUSE = {
@@ -21,9 +22,15 @@ FLAT_BECAUSE = {
 }
 """What the codes of `_core.Shell.bending` mean where they are not CURVED, and one more."""
 
-LARGE_OF_LENGTH = 0.05
-"""It must also be that share of its longest side off: along a bend, a needle is correctly off by
-more than its own height."""
+LEAST_OF_SIZE = 1e-6
+"""A curved element is one to look at only if it is off its flat one by this share of the box."""
+
+SAME_NORMAL = 1e-4
+"""Normals that differ by less are one."""
+
+LARGE_OF_LENGTH = 0.07
+"""Beside creases and borders the turns do not show all that bends. There it must also be off by
+this share of its longest side, as sides are that turn by 30 degrees, the most within a patch."""
 
 COARSE, FINE = 6, 30
 """Pieces into which sides are cut to find the triangle with the largest distance, and its place."""
@@ -41,10 +48,11 @@ def curvature_report(shell: ShellBase) -> CurvatureReport:
     sides = np.roll(corners, -1, axis=1) - corners
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
     height = np.linalg.norm(area_vectors(corners), axis=1) / longest
-    worst, largest, at = _largest_distance(shell, bound)
-    limit = np.maximum(LARGE_OF_HEIGHT * height, LARGE_OF_LENGTH * longest)
+    worst, largest, at = _largest_distance(shell, np.arange(len(bound)), bound)
+    limit = _limits(shell, longest)
     rows = np.flatnonzero(bound > limit)
     large = rows[_distances(shell, rows, COARSE).max(axis=1, initial=0.0) > limit[rows]]
+    _, most, most_at = _largest_distance(shell, large, bound)
     code = _bending(shell)
     aside = (
         np.flatnonzero(core.normals_set_aside) if shell.normals is not None else np.zeros(0, int)
@@ -63,8 +71,12 @@ def curvature_report(shell: ShellBase) -> CurvatureReport:
         of_size=largest / shell.size,
         of_height=largest / float(height[worst]),
         large=len(np.unique(shell.triangle_element[large])),
+        large_distance=most,
+        large_at=_place(most_at) if most else None,
         normals_set_aside=len(aside),
         set_aside_at=first,
+        share_set_aside=len(aside) / shell.triangles.size,
+        faces=described(shell.faces, shell.num_elements) if _recognizes(shell) else "",
     )
 
 
@@ -82,15 +94,41 @@ def _distances(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
     return np.concatenate([_off_flat(shell, some, divisions)[0] for some in parts])
 
 
-def _largest_distance(shell: ShellBase, bound: Floats) -> tuple[int, float, Floats]:
-    """Return the triangle with the largest distance, that distance [m], and its place (3,).
+def _limits(shell: ShellBase, longest: Floats) -> Floats:
+    """(t,) how far from its flat one each curved triangle may be [m]."""
+    triangles, normals = shell.triangles, shell.core.corner_normals
+    limit = np.maximum(LARGE_OF_TURNS * shell.core.chord_errors, LEAST_OF_SIZE * shell.size)
+    # Beside corners at which the normals differ not all turns were taken into account.
+    one, turn = np.zeros_like(shell.vertices), np.zeros(len(shell.vertices))
+    one[triangles] = normals
+    differ = ~(np.linalg.norm(normals - one[triangles], axis=2) <= SAME_NORMAL)
+    np.maximum.at(turn, shell.edge_vertices, np.abs(shell.edge_angle)[:, None])
+    turned = turn[triangles].max(axis=1) * longest
+    limit = np.where(_any_at(shell, triangles[differ]), np.maximum(limit, turned), limit)
+    ends = _any_at(shell, shell.edge_vertices[shell.edge_class != 0])
+    return np.where(ends, np.maximum(limit, LARGE_OF_LENGTH * longest), limit)
+
+
+def _any_at(shell: ShellBase, vertices: Ints) -> Mask:
+    """(t,) which triangles have one of `vertices`."""
+    found = np.zeros(len(shell.vertices), np.bool_)
+    found[vertices] = True
+    return np.asarray(found[shell.triangles].any(axis=1))
+
+
+def _recognizes(shell: ShellBase) -> bool:
+    return shell.finds_faces and shell.element_face is None and shell.crease_angle > 0.0
+
+
+def _largest_distance(shell: ShellBase, some: Longs, bound: Floats) -> tuple[int, float, Floats]:
+    """Return the triangle of `some` with the largest distance, that [m], and its place (3,).
 
     bound : (t,) no triangle is farther off than that [m]
     """
-    order = np.argsort(-bound, kind="stable")
+    order = some[np.argsort(-bound[some], kind="stable")]
     largest, worst = 0.0, 0
     for rows in np.split(order, range(AT_ONCE, len(order), AT_ONCE)):
-        if bound[rows[0]] <= largest:
+        if len(rows) == 0 or bound[rows[0]] <= largest:
             break
         found = _off_flat(shell, rows, COARSE)[0].max(axis=1)
         if found.max() > largest:

@@ -11,9 +11,17 @@ from sphshell_pin.shell.raw import Floats
 
 Place = tuple[float, float, float]
 
-LARGE_OF_HEIGHT = 0.2
-"""A curved element this far off, as a share of its smallest height, is one to look at. Sides that
-turn by 30 degrees, the most within a patch, are off by 0.07 of their length."""
+LARGE_OF_TURNS = 8.0
+"""A curved element farther off, over what the turns around it account for, is one to look at: on
+round surfaces it is up to 3."""
+
+LARGE_SHARE = 0.5
+"""Of the given normals: if more than that are not used, they are not those of the surface."""
+
+_WRONG_NORMALS = (
+    "the normals are wrong (noisy, averaged over sharp edges, or of another surface): correct them "
+    "or leave them out"
+)
 
 _REPAIRS = (
     (
@@ -70,6 +78,11 @@ _PROBLEMS = (
         "{non_manifold_at:place}: inside and outside are not defined there",
     ),
     (
+        "pinched_vertices",
+        "{pinched_vertices:vertex} at which elements meet that share no edge there (pinched), one "
+        "at {pinched_at:place}: unless it is meant, an element is missing beside it",
+    ),
+    (
         "one_sided_components",
         "{one_sided_components:component} one-sided (like a Moebius strip): only "
         'side="both" makes sense',
@@ -117,9 +130,12 @@ class CurvatureReport:
     at : that point [m]; None if all elements are flat
     of_size, of_height : the same as a share of the box diagonal, and of the smallest height of the
         triangle it is in
-    large : elements whose distance is large for their own height: their normals are doubtful
+    large : elements whose distance is large for the turns around them, which say how far the flat
+        elements are from the surface: their normals are doubtful
+    large_distance, large_at : the largest distance of these [m], and where [m]
     normals_set_aside : corners whose given normal was not used, as the elements contradict it
-    set_aside_at : one of them [m], or None
+    set_aside_at : one of them [m], or None; share_set_aside : how many of all given ones
+    faces : the faces recognized in a mesh, in words
     """
 
     elements: int
@@ -132,6 +148,10 @@ class CurvatureReport:
     large: int
     normals_set_aside: int
     set_aside_at: Place | None
+    large_distance: float = 0.0
+    large_at: Place | None = None
+    share_set_aside: float = 0.0
+    faces: str = ""
 
     @property
     def flat(self) -> int:
@@ -140,16 +160,22 @@ class CurvatureReport:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """One sentence, if curved elements are so far off that their normals are doubtful."""
-        if not self.large:
-            return ()
-        are = "element bends" if self.large == 1 else "elements bend"
-        return (
-            f"{self.large} curved {are} by more than {LARGE_OF_HEIGHT:g} of their height, up to "
-            f"{self._distance()}: unless the surface is meant to be that round, its normals are "
-            "wrong (averaged over sharp edges, or noisy); crease_angle=0 or method "
-            '"facets" keep it flat',
-        )
+        """A sentence about elements that bend too much, and one about normals not used."""
+        found = []
+        if self.large:
+            are = "element bends" if self.large == 1 else "elements bend"
+            found.append(
+                f"{self.large} curved {are} by more than {LARGE_OF_TURNS:g} times what the turns "
+                f"around account for, the worst by {self.large_distance:.3g} m at "
+                f"{_fill('{:place}', self.large_at)}: {_WRONG_NORMALS}; crease_angle=0 or method "
+                '"facets" keep the elements flat'
+            )
+        if self.share_set_aside > LARGE_SHARE:
+            found.append(
+                f"{self.share_set_aside:.0%} of the given normals are not used, as the elements "
+                f"contradict them: {_WRONG_NORMALS}"
+            )
+        return tuple(found)
 
     def rows(self) -> tuple[tuple[str, str], ...]:
         """Labels and texts for a table."""
@@ -158,6 +184,8 @@ class CurvatureReport:
             text += f", off the flat ones by up to {self._distance()}"
         rows = [("curved", text)]
         rows += [("flat", _fill("{:element}: {}", count, why)) for why, count in self.flat_because]
+        if self.faces:
+            rows.append(("faces", self.faces))
         if self.normals_set_aside:
             rows.append(
                 (
@@ -208,6 +236,8 @@ class ShellHealth:
     holes, largest_hole_area, hole_at, hole_edges : boundary loops so small that an element may be
         missing; the largest [m^2], its middle, its edges
     non_manifold_at : middle of one non-manifold edge
+    pinched_vertices, pinched_at : vertices whose elements are not all connected across the edges
+        that meet there, counted by `Shell`; one of them
     euler_number : vertices - edges + elements
     worst_shape : smallest 2 area / longest edge^2 of a triangle
     has_normals : normals were given
@@ -261,6 +291,8 @@ class ShellHealth:
     largest_hole_area: float = 0.0
     hole_at: Place | None = None
     non_manifold_at: Place | None = None
+    pinched_vertices: int = 0
+    pinched_at: Place | None = None
     euler_number: int = 0
     worst_shape: float = 0.0
     has_normals: bool = False
@@ -382,6 +414,7 @@ class ShellHealth:
             largest_hole_area=self.largest_hole_area * scale**2,
             hole_at=place(self.hole_at),
             non_manifold_at=place(self.non_manifold_at),
+            pinched_at=place(self.pinched_at),
         )
 
     def to_dict(self) -> dict[str, object]:

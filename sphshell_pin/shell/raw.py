@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from sphshell_pin.checks import as_floats
 from sphshell_pin.errors import InvalidShell
+from sphshell_pin.shell.rounding import SCALES, rounding
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -33,6 +34,7 @@ class RawSurface:
     notes : sentences a reader has to say about the file
     faces : (m,) row in `face_names` of the CAD face each polygon lies on, or None
     face_names : of the CAD faces
+    rounding : half the step to which the coordinates are known [m], 0 if they show none
     """
 
     vertices: Floats
@@ -42,6 +44,7 @@ class RawSurface:
     notes: tuple[str, ...] = ()
     faces: Ints | None = None
     face_names: tuple[str, ...] = ()
+    rounding: float = 0.0
 
     @property
     def num_polygons(self) -> int:
@@ -50,7 +53,7 @@ class RawSurface:
 
     def scaled(self, factor: float) -> RawSurface:
         """Return the same surface, `factor` times larger."""
-        return replace(self, vertices=self.vertices * factor)
+        return replace(self, vertices=self.vertices * factor, rounding=self.rounding * factor)
 
     def noting(self, *sentences: str) -> RawSurface:
         """Return the same surface with more `notes`."""
@@ -80,7 +83,8 @@ def raw_surface(vertices: object, elements: object, normals: object = None) -> R
     points = _vertices(vertices)
     offsets, corners = _polygons(elements)
     check_indices(offsets, corners, len(points))
-    return RawSurface(points, offsets, corners, _corner_normals(normals, points, offsets, corners))
+    given = _corner_normals(normals, points, offsets, corners)
+    return RawSurface(points, offsets, corners, given, rounding=rounding(points, SCALES))
 
 
 def check_indices(offsets: Longs, corners: Ints, num_vertices: int) -> None:

@@ -43,6 +43,7 @@ class Shell(Queries):
     side : where spheres may be: "both", "outside" (where the winding's normals point), "inside"
     name : how messages call it
     clean : False takes the elements as they are: no welding, no repair, no reorientation
+    faces : False recognizes no `faces`: all curved elements are then of normals, given or estimated
 
     Attributes
     ----------
@@ -56,6 +57,8 @@ class Shell(Queries):
     face_names : of the CAD faces
     straight : (t, 3) sides kept straight whatever the normals say, as curved ones would leave the
         exact CAD faces; or None
+    rounding : half the step to which the coordinates are known [m], found by their digits, 0 if
+        they show none; finds_faces : whether it recognizes `faces`
     box : (2, 3) lowest and highest corner [m]; size : its diagonal [m]
     health : ShellHealth; source : path of the file, or None; unit : its unit, or None
     core : the compiled surface that queries run on
@@ -78,6 +81,7 @@ class Shell(Queries):
         *,
         name: str = "shell",
         clean: bool = True,
+        faces: bool = True,
     ) -> None:
         from sphshell_pin.shell.cleaning import clean_surface, take_surface
         from sphshell_pin.shell.raw import raw_surface
@@ -85,7 +89,7 @@ class Shell(Queries):
         check_options(crease_angle, side)
         made = clean_surface if check_flag("clean", clean) else take_surface
         surface = made(raw_surface(vertices, elements, normals))
-        self._set(surface, crease_angle, side, name)
+        self._set(surface, crease_angle, side, name, finds_faces=check_flag("faces", faces))
 
     @classmethod
     def from_file(
@@ -96,7 +100,7 @@ class Shell(Queries):
         *,
         chord_error: float | None = None,
         bodies: Sequence[str] | None = None,
-        faces: Sequence[str | int] | None = None,
+        faces: Sequence[str | int] | bool | None = None,
         sew: float | None = None,
         time_limit: float | None = None,
         memory_limit: float | None = None,
@@ -122,7 +126,7 @@ class Shell(Queries):
             surface [m], 1e-3 of the box diagonal unless given; `health` says what was measured
         bodies : of CAD: names of the bodies to take; all unless given
         faces : of CAD: names of the faces to take, or their numbers in the file (from 1); all
-            unless given
+            unless given. Of a mesh, False recognizes no `Shell.faces`
         sew : of CAD: faces whose borders are nearer than this are joined [m], 0 joins none; unless
             given, within up to 1e-4 of the box diagonal, if that closes gaps
         time_limit, memory_limit : of CAD: after which OpenCASCADE is ended [s], 600 unless given;
@@ -149,12 +153,14 @@ class Shell(Queries):
         from sphshell_pin.shell.loading import load_surface
 
         check_options(crease_angle, side)
-        options = CadOptions(chord_error, bodies, faces, sew, time_limit, memory_limit)
+        named = None if isinstance(faces, bool) else faces
+        options = CadOptions(chord_error, bodies, named, sew, time_limit, memory_limit)
         surface, taken_unit, factor = load_surface(path, unit, scale, options, crease_angle)
         found = surface.health.labelled(source=str(path), unit=taken_unit, scale=factor)
         called = Path(path).stem if name is None else name
         cleaned = replace(surface, health=found)
-        return cls.from_surface(cleaned, crease_angle, side, called, str(path), taken_unit)
+        source, finds = str(path), faces is not False
+        return cls.from_surface(cleaned, crease_angle, side, called, source, taken_unit, finds)
 
     @classmethod
     def from_geometry(
@@ -230,16 +236,15 @@ class Shell(Queries):
                     "placement", placement, "must be a pinocchio.SE3 or a scale"
                 ) from None
         surface = self.surface().moved(scale, rotation, translation)
-        return type(self).from_surface(
-            surface, self.crease_angle, self.side, self.name, self.source, self.unit
-        )
+        return self.from_surface(surface, **self.options)
 
     def to_file(self, path: str | os.PathLike[str], unit: str = "m") -> None:
         """Write the shell in the format its suffix names: .shl, .stl, .obj, .ply, .off.
 
-        The numbers are in `unit`; .shl files also carry it, as SCALE, and are of version 2 if the
-        shell has normals. Quads stay quads, except in .stl. A file that was there before is
-        replaced only when the new one is complete.
+        The numbers are in `unit`; .shl files also carry it, as SCALE. Quads stay quads, except in
+        .stl. Normals of the shell go to .obj, .ply and .shl files, of version 2 then, for each
+        corner. No others are written: `faces` are recognized again when the file is read. A file
+        that was there before is replaced only when the new one is complete.
 
         Raises
         ------
@@ -269,6 +274,7 @@ class Shell(Queries):
             Fact("surface", "closed" if self.is_closed else "open"),
             Fact("size", float(self.size), "m"),
             Fact("side", self.side),
+            *([Fact("faces", len(self.faces))] if "faces" in vars(self) else []),
             Fact("smooth patches", self.num_patches, brief=False),
             Fact("file", self.source or "none", brief=False),
             Fact("to look at", "; ".join(self.health.problems) or "nothing", brief=False),

@@ -17,7 +17,7 @@ from sphshell_pin.view.nodes import (
     show,
     sphere,
 )
-from sphshell_pin.view.surface import draw_patches, draw_shell, great_circles
+from sphshell_pin.view.surface import draw_faces, draw_patches, draw_shell, great_circles
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 SPHERE_COLOR = 0x2F6FDE
 
-COLORINGS = ("distance", "patches")
+COLORINGS = ("distance", "faces", "patches")
 """Ways to color a shell; of several that are on the first is seen."""
 
 ShellKey = tuple[int, int, bytes, bool]
@@ -77,6 +77,8 @@ class DrawnShell:
         if on and part not in self._colorings:
             if part == "patches":
                 draw_patches(self.node, self.shell, curved=self._curved)
+            elif part == "faces":
+                draw_faces(self.node, self.shell, curved=self._curved)
             elif self._curved:
                 draw_distance(self.node, self.shell, largest)
             else:

@@ -20,7 +20,7 @@ from sphshell_pin.view.bodies import (
     sphere_key,
 )
 from sphshell_pin.view.camera import REACH, View, ball_around, look, set_surroundings
-from sphshell_pin.view.distance import range_text
+from sphshell_pin.view.distance import Painting, range_text
 from sphshell_pin.view.nodes import (
     FloatArray,
     material,
@@ -32,7 +32,7 @@ from sphshell_pin.view.nodes import (
 )
 from sphshell_pin.view.patches import PatchPool, PatchRows, PatchScale
 from sphshell_pin.view.robot import GeometryRobot, SkeletonRobot, check_geometry_model
-from sphshell_pin.view.surface import tube
+from sphshell_pin.view.surface import FACE_COLORS, tube
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -45,7 +45,7 @@ _WIDTH = 0.05  # of links, in sizes of the robot
 _FAR = 2.0  # in sizes of the robot: corners of shells that are farther away may leave the picture
 
 
-Part = Literal["robot", "spheres", "arrows", "points", "wireframe", "patches", "distance", "trails"]
+Part = Literal["robot", "spheres", "arrows", "points", "wireframe", "trails", Painting]
 PARTS: tuple[Part, ...] = get_args(Part)
 """What `Display.show` can show and hide; all but COLORINGS are shown at first."""
 
@@ -85,7 +85,7 @@ class Display:
             view = choose_view(scene, neutral[None, :], visual_model=visual_model)
         self.view = view
         self.arrow_scale = ArrowScale() if arrow_scale is None else arrow_scale
-        self._hidden: set[Part] = {"patches", "distance"}
+        self._hidden: set[Part] = set(get_args(Painting))
         self._shells: dict[ShellKey, DrawnShell] = {}
         self._spheres: dict[SphereKey, DrawnSphere] = {}
         self._draw_shells()
@@ -151,6 +151,13 @@ class Display:
         if "distance" in self._hidden:
             return None
         return range_text(self.largest_distance)
+
+    @property
+    def face_keys(self) -> list[tuple[str, str]]:
+        """The colors of the kinds of faces and their names, if "faces" is shown."""
+        names = {"none": "on no face recognized"}
+        keys = [(color, names.get(kind, kind)) for kind, color in FACE_COLORS.items()]
+        return [] if "faces" in self._hidden else keys
 
     @property
     def draws_patches(self) -> bool:
@@ -262,7 +269,7 @@ class Display:
                 for part in ("wireframe", "trails"):
                     if part in self._hidden:
                         self._show_of_shell(drawn, part, False)
-        colorings: tuple[Part, ...] = ("patches", "distance")
+        colorings: tuple[Part, ...] = get_args(Painting)
         for coloring in colorings:
             if coloring not in self._hidden:
                 for drawn in self._shells.values():

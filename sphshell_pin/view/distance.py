@@ -8,7 +8,7 @@ import numpy as np
 
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.nodes import FloatArray
-from sphshell_pin.view.surface import divisions, draw_colored, is_curved
+from sphshell_pin.view.surface import divisions, draw_colored, hex_colors, is_curved
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 RAMP = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")
 """From no distance to the largest: five colors of matplotlib's viridis, evenly spaced."""
 
-Coloring = Literal["surface", "patches", "distance"]
+Painting = Literal["patches", "distance", "faces"]
+Coloring = Literal["surface", Painting]
 """What the colors of shells can show."""
 
 FEW = 2
@@ -47,7 +48,7 @@ def draw_distance(node: Visualizer, shell: Shell, largest: float) -> None:
 
 def ramp_colors(values: FloatArray, largest: float) -> FloatArray:
     """Return colors (n, 3) from 0 to 1 for `values` (n,) between 0 and `largest`."""
-    stops = np.array([[int(name[k : k + 2], 16) for k in (1, 3, 5)] for name in RAMP]) / 255.0
+    stops = hex_colors(RAMP)
     share = np.clip(values / largest, 0.0, 1.0) if largest > 0.0 else np.zeros(len(values))
     at = np.linspace(0.0, 1.0, len(RAMP))
     return np.stack([np.interp(share, at, stops[:, k]) for k in range(3)], axis=1)

@@ -103,7 +103,8 @@ def render_recording(
     it. Each frame shows the recorded row nearest in time, or, where a touch begins and ends between
     two frames, that touch at its peak. `arrows` is "components" (normal and friction) or "total".
     `color` is what the colors of the shells show: nothing ("surface"), the patches ("patches"),
-    or how far curved elements are from the flat ones ("distance"). Of a `span` from and to a time
+    how far curved elements are from the flat ones ("distance"), or the kinds of their faces
+    ("faces"). Of a `span` from and to a time
     of the run [s] the scene has that part alone, in one frame where both are the same. With `whole`
     the camera takes in all of the robot, else the surroundings of the contacts.
 
@@ -393,7 +394,8 @@ def _color_keys(display: Display, shown: ContactRows) -> list[tuple[str, str]]:
         keys.append((RAMP, display.coloring))
     if shown.patches is not None and len(shown.row):
         keys.append((PRESSURE_RAMP, str(display.patch_scale)))
-    return [(f"linear-gradient(90deg, {', '.join(ramp)})", meaning) for ramp, meaning in keys]
+    found = [(f"linear-gradient(90deg, {', '.join(ramp)})", meaning) for ramp, meaning in keys]
+    return found + display.face_keys
 
 
 def _css(color: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,14 @@ if TYPE_CHECKING:
 
 SURFACE_COLORS = (0x7FA8A0, 0xC4A878, 0x9A94C0, 0xB58C8C)
 EDGE_COLOR = 0x22302E
+FACE_COLORS = {
+    "plane": "#9fb4c7",
+    "cylinder": "#e0a458",
+    "cone": "#6a9e78",
+    "sphere": "#b5656a",
+    "torus": "#8d7bb0",
+    "none": "#dddddd",
+}
 # The surface is pushed back a little, so that lines on it are not drawn half inside it.
 PUSHED_BACK: Json = {"polygonOffset": True, "polygonOffsetFactor": 1.0, "polygonOffsetUnits": 1.0}
 MOST_OUTLINED_EDGES = 60_000
@@ -39,8 +48,8 @@ class SurfaceMesh:
     """A shell as triangles that share vertices within a patch only, and the lines on it.
 
     The page averages normals over shared vertices: patches then look smooth and creases sharp.
-    `vertices` (n, 3) [m] of the patches `patch` (n,), `triangles` (t, 3); `segments` (s, 2) between
-    the points `outline` (p, 3) [m].
+    `vertices` (n, 3) [m] of the patches `patch` (n,), or of what else tells elements apart,
+    `triangles` (t, 3); `segments` (s, 2) between the points `outline` (p, 3) [m].
     """
 
     vertices: FloatArray
@@ -50,8 +59,14 @@ class SurfaceMesh:
     segments: IntArray
 
     @classmethod
-    def of(cls, shell: Shell, *, curved: bool = False) -> SurfaceMesh:
-        """Build from `shell`; with `curved` from its elements as the method "smooth" has them."""
+    def of(
+        cls, shell: Shell, *, curved: bool = False, patch: IntArray | None = None
+    ) -> SurfaceMesh:
+        """Build from `shell`; with `curved` from its elements as the method "smooth" has them.
+
+        patch : (m,) of each element, other than `element_patch`
+        """
+        patch = np.asarray(shell.element_patch) if patch is None else patch
         if not is_curved(shell, curved):
             points, triangles = np.asarray(shell.vertices), np.asarray(shell.triangles)
             owner = np.arange(len(triangles), dtype=np.int32)
@@ -67,7 +82,7 @@ class SurfaceMesh:
             sides = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
             edges, count = np.unique(sides, axis=0, return_counts=True)
             segments = edges[count == 1]
-        patch = np.asarray(shell.element_patch)[np.asarray(shell.triangle_element)][owner]
+        patch = patch[np.asarray(shell.triangle_element)][owner]
         keys = patch[:, None].astype(np.int64) * len(points) + same[triangles]
         unique, first, corners = np.unique(keys, return_index=True, return_inverse=True)
         vertices = points[triangles.reshape(-1)[first]]
@@ -113,6 +128,22 @@ def draw_patches(node: Visualizer, shell: Shell, *, curved: bool = False) -> Non
     mesh = SurfaceMesh.of(shell, curved=curved)
     colors = patch_colors(int(mesh.patch.max(initial=0)) + 1)[mesh.patch]
     draw_colored(node["patches"], mesh.vertices, mesh.triangles, colors)
+
+
+def draw_faces(node: Visualizer, shell: Shell, *, curved: bool = False) -> None:
+    """Draw `shell` below `node` with a color for each kind of face in FACE_COLORS, as "faces"."""
+    kinds, count = tuple(FACE_COLORS), len(FACE_COLORS)
+    kind = np.full(shell.num_elements, count - 1)
+    for face in shell.faces:
+        kind[face.elements] = kinds.index(face.kind)
+    mesh = SurfaceMesh.of(shell, curved=curved, patch=shell.element_patch * count + kind)
+    colors = hex_colors(tuple(FACE_COLORS.values()))[mesh.patch % count]
+    draw_colored(node["faces"], mesh.vertices, mesh.triangles, colors)
+
+
+def hex_colors(names: Sequence[str]) -> FloatArray:
+    """Return colors (n, 3) from 0 to 1 for names like "#7fa8a0"."""
+    return np.array([[int(name[k : k + 2], 16) for k in (1, 3, 5)] for name in names]) / 255.0
 
 
 def draw_colored(

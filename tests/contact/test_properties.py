@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -56,8 +58,20 @@ def test_triangles_of_coarse_coordinates(triangles, center) -> None:
     # The cleaning drops duplicates and divides elements at T-junctions: rows are then others.
     assume(np.array_equal(shell.source_element, np.arange(len(elements))))
     for radius in (0.3, 1.1):
-        expected = oracle.facets(np.array(center), radius, corners, owner)
-        why = oracle.mismatch(shell.contacts(center, radius, method="facets"), expected, 1e-11)
+        # At pinched vertices each fan counts: tests/contact/test_pinched.py.
+        pinched = shell.vertices[shell.core.pinched_vertices]
+        expected = [
+            touch
+            for touch in oracle.facets(np.array(center), radius, corners, owner)
+            if not (np.abs(pinched - touch.point) < 1e-9).all(axis=1).any()
+        ]
+        found = shell.contacts(center, radius, method="facets")
+        away = np.abs(pinched - found.point[:, None]).max(axis=2, initial=0) >= 1e-9
+        kept = np.flatnonzero(away.all(axis=1))
+        others = {
+            name: getattr(found, name)[kept] for name in ("depth", "point", "element", "normal")
+        }
+        why = oracle.mismatch(SimpleNamespace(**others), expected, 1e-11)
         assert not why, why
 
 

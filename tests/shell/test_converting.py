@@ -47,6 +47,42 @@ def test_cad_to_mesh_stays_within_the_chord_error(plate, tmp_path):
     assert 0.0 < done.rms < done.largest
 
 
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".shl"])
+def test_exact_normals_reach_the_file_corner_by_corner(plate, suffix, tmp_path):
+    exact = Shell.from_file(plate)
+    done = convert(plate, tmp_path / f"out{suffix}")
+    assert not any("normals" in note for note in done.notes)
+    shell = Shell.from_file(tmp_path / f"out{suffix}", None if suffix == ".shl" else "mm")
+    middles = [one.vertices[one.triangles].mean(axis=1) for one in (exact, shell)]
+    same = np.linalg.norm(middles[0] - middles[1][:, None], axis=2).argmin(axis=1)
+    assert np.array_equal(np.sort(same), np.arange(len(exact.triangles)))
+    for k in range(3):
+        corners = (
+            exact.vertices[exact.triangles[same]] - shell.vertices[shell.triangles[:, k, None]]
+        )
+        corner = np.linalg.norm(corners, axis=2).argmin(axis=1)
+        assert shell.normals[:, k] == pytest.approx(exact.normals[same, corner], abs=1e-7)
+    # The curved elements are then as near.
+    places = exact.closest_points(middles[0]).distances
+    assert shell.closest_points(middles[0]).distances == pytest.approx(
+        places, abs=1e-7 * shell.size
+    )
+    report = shell.curvature_report()
+    assert report.largest == pytest.approx(exact.curvature_report().largest, rel=1e-5)
+    assert not report.problems
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".off"])
+def test_what_a_format_does_not_hold_is_stated(plate, suffix, tmp_path):
+    done = convert(plate, tmp_path / f"out{suffix}")
+    assert f"{suffix} files hold no normals" in done.notes[-1]
+    assert "recognized again" in done.notes[-1]
+    (face,) = [one for one in Shell.from_file(tmp_path / f"out{suffix}", "mm").faces if one.radius]
+    assert face.radius == pytest.approx(0.010, rel=1e-6)
+    again = convert(tmp_path / f"out{suffix}", tmp_path / "copy.off", "mm")
+    assert not any("normals" in note for note in again.notes)
+
+
 @pytest.mark.parametrize("suffix", [".step", ".iges", ".brep"])
 def test_meshes_become_planar_faces(suffix, tmp_path):
     vertices, elements = meshes.icosphere(1, 0.02)

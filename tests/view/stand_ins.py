@@ -35,6 +35,9 @@ def quad_shell(vertices, elements, name="shell", patches=None):
         edge_vertices=edges.astype(np.int32),
         edge_class=np.full(len(edges), 1, dtype=np.uint8),
         element_patch=patch.astype(np.int32),
+        element_face=None,
+        faces=(),
+        num_elements=len(elements),
     )
 
 

@@ -193,6 +193,29 @@ Array<std::uint8_t> bending(const Shell& shell) {
   return to_array(std::move(out));
 }
 
+// Per triangle the face it lies on, -1: none; and of each face its kind and numbers (8): a point,
+// the axis, the two radii.
+Array<int> triangle_face(const Shell& shell) {
+  std::vector<int> out;
+  if (shell.curved()) out = shell.curved()->faces().of;
+  out.resize(shell.curved() ? shell.triangles().size() : 0, -1);
+  return to_array(std::move(out));
+}
+
+nb::tuple faces(const Shell& shell) {
+  std::vector<int> kind;
+  std::vector<double> numbers;
+  if (shell.curved())
+    for (const Primitive& face : shell.curved()->faces().shapes) {
+      kind.push_back(static_cast<int>(face.kind));
+      append(numbers, face.point);
+      append(numbers, face.axis);
+      numbers.insert(numbers.end(), {face.radius, face.second});
+    }
+  const std::size_t n = kind.size();
+  return nb::make_tuple(to_array(std::move(kind)), to_array(std::move(numbers), {n, 8}));
+}
+
 Array<std::uint8_t> normals_set_aside(const Shell& shell) {
   std::vector<std::uint8_t> out;
   if (shell.curved())
@@ -218,15 +241,18 @@ void bind_shell(nanobind::module_& m) {
            })
       .def(
           "curve",
-          [](Shell& shell, std::optional<Points> normals, bool exact,
-             std::optional<Bytes> straight) {
-            std::vector<std::uint8_t> sides;
-            if (straight) sides.assign(straight->data(), straight->data() + straight->shape(0));
+          [](Shell& shell, std::optional<Points> normals, bool exact, std::optional<Bytes> straight,
+             double rounding, bool faces) {
+            CurveOptions options{{}, exact, {}, rounding, faces};
+            if (normals) options.normals = rows(*normals);
+            if (straight)
+              options.straight.assign(straight->data(), straight->data() + straight->shape(0));
             // Under the GIL: two threads may ask for the first curved query at once.
-            shell.curve(normals ? rows(*normals) : std::vector<Vec3>(), exact, sides);
+            shell.curve(std::move(options));
           },
           nb::arg("normals").none(), nb::arg("exact") = false,
-          nb::arg("straight").none() = nb::none())
+          nb::arg("straight").none() = nb::none(), nb::arg("rounding") = 0.0,
+          nb::arg("faces") = true)
       .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"),
            nb::arg("gradient") = false)
       .def("contacts_batch", &contacts_batch, nb::arg("centers"), nb::arg("radii"),
@@ -241,6 +267,14 @@ void bind_shell(nanobind::module_& m) {
                      return std::count_if(edges.begin(), edges.end(),
                                           [](const Edge& e) { return !e.inner; });
                    })
+      .def_prop_ro(
+          "pinched_vertices",
+          [](const Shell& s) {
+            std::vector<int> out;
+            for (const Pinch& p : s.topology().pinches) out.push_back(p.vertex);
+            return to_array(std::move(out));
+          },
+          nb::rv_policy::automatic)
       .def_prop_ro("creases", [](const Shell& s) { return s.curved() ? s.curved()->creases() : 0; })
       .def_prop_ro("bytes", &Shell::bytes);
   // Arrays own their memory, or keep the shell alive: no policy of nanobind's own applies.
@@ -260,6 +294,11 @@ void bind_shell(nanobind::module_& m) {
   array("control_point_offsets", &control_point_offsets);
   array("corner_normals", &corner_normals);
   array("bending", &bending);
+  array("triangle_face", &triangle_face);
+  array("chord_errors", [](const Shell& s) {
+    return to_array(s.curved() ? s.curved()->chord_errors(s) : std::vector<double>());
+  });
+  shell.def_prop_ro("faces", &faces);
   array("normals_set_aside", &normals_set_aside);
   array("element_patch", [](const Shell& s) { return to_array(s.topology().patch); });
   array("edge_vertices", &edge_vertices);

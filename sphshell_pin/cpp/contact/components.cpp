@@ -102,8 +102,7 @@ void Components::reset_components(std::size_t minima) {
   std::iota(deepest_.begin(), deepest_.begin() + minima, 0);
 }
 
-// Sheets that lie on each other, and fans that share no more than a corner, are one where they have
-// one closest point.
+// Sheets that lie on each other are one where they have one closest point.
 void Components::connect_equal_points(const Sphere& sphere, const std::vector<Minimum>& minima) {
   const double same = kSamePlace * sphere.radius;
   const auto point = [&](int i) -> const Vec3& { return minima[i].contact.point; };
@@ -134,6 +133,20 @@ void Components::add_candidates(const Shell& shell, const Sphere& sphere, int f,
   const CellBounds& bounds = shell.curved()->cells()[f];
   const double reach = sphere.radius + bounds.bulge;
   std::vector<SaddleCandidate>& open = components_[component].open;
+  const Topology& topology = shell.topology();
+  for (int k = 0; k < 3 && !topology.pinches.empty(); ++k) {
+    const Pinch* pinch = topology.pinch_at(shell.triangles()[shell.triangle_of_facet(f)][k]);
+    const double depth = sphere.radius - (facet.corner[k] - sphere.center).norm();
+    if (pinch == nullptr || depth <= 0) continue;
+    const int name = shell.facet_half_edge(pinch->fans[0][0]);
+    for (const std::vector<int>& fan : pinch->fans) {
+      const int to = triangle_of(shell.facet_half_edge(fan[0]));
+      if (belongs_to(to, component)) continue;
+      open.push_back(
+          {depth, SaddleCandidate::Kind::Side, cell, to, triangle_of(name), side_of(name), 0, 0});
+      std::push_heap(open.begin(), open.end(), lower);
+    }
+  }
   for (int k = 0; k < 3; ++k) {
     const int beyond = bounds.beyond[k];
     if (beyond == kBoundary || (beyond >= 0 && belongs_to(triangle_of(beyond), component)))
@@ -155,7 +168,6 @@ void Components::add_candidates(const Shell& shell, const Sphere& sphere, int f,
       add_candidate(beyond, first ? here : beyond);
       continue;
     }
-    const Topology& topology = shell.topology();
     const int h = 3 * shell.triangle_of_facet(f) + k;
     const Edge& edge = topology.edges[topology.edge_of[h]];
     const int name = shell.facet_half_edge(topology.incidence[edge.begin]);

@@ -2,12 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <map>
 #include <numeric>
 
 #include "contact/regions.hpp"
 #include "shell/triangle.hpp"
 
 namespace sphshell {
+namespace {
+
+// Whether a minimum is found at a vertex, on a triangle that one of a fan's corners belongs to.
+bool has_minimum(const Shell& shell, const std::vector<Minimum>& minima, int vertex,
+                 const std::vector<int>& fan, double tolerance) {
+  return std::any_of(minima.begin(), minima.end(), [&](const Minimum& at) {
+    const Vec3 away = at.contact.point - shell.vertices()[vertex];
+    const int t = shell.triangle_of_facet(at.facet);
+    return away.squaredNorm() <= tolerance * tolerance &&
+           std::any_of(fan.begin(), fan.end(), [t](int c) { return triangle_of(c) == t; });
+  });
+}
+
+}  // namespace
 
 FlatQuery::FlatQuery() {
   faces_.reserve(64);
@@ -22,10 +38,14 @@ void FlatQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& broad
   if (faces_.empty() && edges_.empty() && vertices_.empty()) return;
   drop_neighbors(shell);
   add_minima(shell, sphere, want_dn_dc, minima);
-  if (minima.size() < 2) return;
   const double same = kSamePoint * sphere.radius + 16 * sphere.tolerance;
-  merge_equal_points(same, minima);
-  drop_crossed(shell, sphere, broad.overlapping, same, minima);
+  const bool pinched = !shell.topology().pinches.empty();
+  if (pinched) find_pinched(shell, sphere, broad.overlapping, kPinched * same, minima);
+  if (minima.size() > 1) {
+    merge_equal_points(same, minima);
+    drop_crossed(shell, sphere, broad.overlapping, same, minima);
+  }
+  if (pinched) add_pinched(shell, sphere, want_dn_dc, kPinched * same, minima);
 }
 
 // A face, an edge or a vertex holds a minimum where the center lies in its normal cone with respect
@@ -197,6 +217,59 @@ void FlatQuery::drop_crossed(const Shell& shell, const Sphere& sphere,
     dropped_[i] = crossed(point, use_tree ? at_point_ : overlapping);
   }
   remove_dropped(minima);
+}
+
+// Where fans share a vertex and no side, each has its own minimum there: when that goes over to a
+// face, it counts whatever the other fans do. Between pieces of the surface that are not connected
+// otherwise the vertex is a saddle, of those between the same two the deepest (Kruskal).
+void FlatQuery::find_pinched(const Shell& shell, const Sphere& sphere,
+                             const std::vector<int>& overlapping, double tolerance,
+                             const std::vector<Minimum>& minima) {
+  pinched_.clear();
+  for (int f : overlapping)
+    for (int vertex : shell.triangles()[shell.triangle_of_facet(f)])
+      if (const Pinch* at = shell.topology().pinch_at(vertex)) {
+        const double depth = sphere.radius - (shell.vertices()[vertex] - sphere.center).norm();
+        if (depth > 0) pinched_.push_back({at, depth, {}, 0});
+      }
+  std::sort(pinched_.begin(), pinched_.end(), [](const Pinched& x, const Pinched& y) {
+    return x.depth != y.depth ? x.depth > y.depth : x.at < y.at;
+  });
+  const auto same = [](const Pinched& x, const Pinched& y) { return x.at == y.at; };
+  pinched_.erase(std::unique(pinched_.begin(), pinched_.end(), same), pinched_.end());
+  std::map<int, int> joined;  // a piece to another one, nearer to the first of those joined
+  const auto root = [&](int piece) {
+    for (auto at = joined.find(piece); at != joined.end(); at = joined.find(piece))
+      piece = at->second;
+    return piece;
+  };
+  for (Pinched& pinched : pinched_)
+    for (std::size_t i = 0; i < pinched.at->fans.size(); ++i) {
+      const std::vector<int>& fan = pinched.at->fans[i];
+      if (has_minimum(shell, minima, pinched.at->vertex, fan, tolerance) ||
+          fan_is_minimum(shell, fan, sphere.center, sphere.tolerance))
+        pinched.fans.push_back(&fan);
+      const int one = root(pinched.at->piece[0]), other = root(pinched.at->piece[i]);
+      if (one != other) joined[other] = one, ++pinched.saddles;
+    }
+}
+
+// Adds the minima of fans that were taken for one with another's, or dropped as no minimum of the
+// whole; and the saddles, each of which takes one of these away.
+void FlatQuery::add_pinched(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+                            double tolerance, std::vector<Minimum>& minima) const {
+  for (const auto& [at, depth, fans, saddles] : pinched_) {
+    int more = -saddles;
+    for (const std::vector<int>* fan : fans)
+      more += !has_minimum(shell, minima, at->vertex, *fan, tolerance);
+    const int h = shell.facet_half_edge(at->fans[0][0]);
+    const Facet& facet = shell.facets()[triangle_of(h)];
+    Contact contact = contact_at(shell.vertices()[at->vertex], facet.normal, sphere, facet.element,
+                                 Feature::Vertex);
+    contact.weight = more < 0 ? -1 : 1;
+    if (want_dn_dc) contact.dn_dc = contact.weight * dn_dc_of(contact, sphere.radius, Mat3::Zero());
+    minima.insert(minima.end(), std::abs(more), {contact, triangle_of(h), side_of(h), false});
+  }
 }
 
 }  // namespace sphshell

@@ -33,6 +33,19 @@ class FlatQuery {
   void drop_crossed(const Shell& shell, const Sphere& sphere, const std::vector<int>& overlapping,
                     double tolerance, std::vector<Minimum>& minima);
   void remove_dropped(std::vector<Minimum>& minima) const;
+  void find_pinched(const Shell& shell, const Sphere& sphere, const std::vector<int>& overlapping,
+                    double tolerance, const std::vector<Minimum>& minima);
+  void add_pinched(const Shell& shell, const Sphere& sphere, bool want_dn_dc, double tolerance,
+                   std::vector<Minimum>& minima) const;
+
+  // A pinched vertex inside the sphere. The fans there that have a minimum, each by itself; and how
+  // many saddles are between them.
+  struct Pinched {
+    const Pinch* at;
+    double depth;
+    std::vector<const std::vector<int>*> fans;
+    int saddles;
+  };
 
   std::vector<int> faces_;  // facets that the center projects into
   std::vector<OnEdge> edges_;
@@ -40,6 +53,7 @@ class FlatQuery {
   std::vector<std::pair<int, int>> taken_edges_;
   std::vector<int> taken_vertices_, by_x_, at_point_;
   std::vector<char> dropped_;
+  std::vector<Pinched> pinched_;
 };
 
 }  // namespace sphshell

@@ -52,17 +52,32 @@ inline bool edge_is_minimum(const Shell& shell, int code, const Vec3& center, do
   return std::all_of(all.begin(), all.end(), holds);
 }
 
+// True where the distance does not fall along the edge from one vertex to another.
+inline bool rises_along(const Vec3& edge, const Vec3& from, double tolerance) {
+  const double along = from.dot(edge);
+  return !(along > 0 && along * along > tolerance * tolerance * edge.squaredNorm());
+}
+
 inline bool vertex_is_minimum(const Shell& shell, int vertex, const Vec3& center,
                               double tolerance) {
   const std::vector<Vec3>& p = shell.vertices();
   const Topology& topology = shell.topology();
   const Vec3 from = center - p[vertex];
-  for (int i = topology.neighbor_begin[vertex]; i < topology.neighbor_begin[vertex + 1]; ++i) {
-    const Vec3 edge = p[topology.neighbors[i]] - p[vertex];
-    const double along = from.dot(edge);
-    if (along > 0 && along * along > tolerance * tolerance * edge.squaredNorm()) return false;
-  }
+  for (int i = topology.neighbor_begin[vertex]; i < topology.neighbor_begin[vertex + 1]; ++i)
+    if (!rises_along(p[topology.neighbors[i]] - p[vertex], from, tolerance)) return false;
   return true;
+}
+
+// The same among the triangles of one fan (corners 3 triangle + k) alone.
+inline bool fan_is_minimum(const Shell& shell, const std::vector<int>& fan, const Vec3& center,
+                           double tolerance) {
+  const std::vector<Vec3>& p = shell.vertices();
+  return std::all_of(fan.begin(), fan.end(), [&](int c) {
+    const Triangle& t = shell.triangles()[triangle_of(c)];
+    const Vec3 &at = p[t[side_of(c)]], from = center - at;
+    return rises_along(p[t[next_corner(side_of(c))]] - at, from, tolerance) &&
+           rises_along(p[t[previous_corner(side_of(c))]] - at, from, tolerance);
+  });
 }
 
 }  // namespace sphshell

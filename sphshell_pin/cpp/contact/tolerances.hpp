@@ -10,6 +10,10 @@ constexpr double kRoundOff = 1e-14;
 
 // "facets": two minima of the distance closer than this share of the radius are one.
 constexpr double kSamePoint = 1e-10;
+// ... and a minimum this much farther from a vertex that fans share, but no side, is still at it:
+// the others are within the former distance of it, where the angle between them is not below 0.01
+// rad.
+constexpr double kPinched = 100;
 // "smooth": closest points of two cells nearer than this share of the radius are one.
 constexpr double kSamePlace = 1e-8;
 

@@ -25,7 +25,7 @@ struct Shell::Impl {
       std::call_once(curved, [&] {
         // With no smooth edges every element is flat, whatever normals came with it.
         const bool smooth = shell->crease_angle() > 0;
-        shell->curve(smooth ? normals : std::vector<Eigen::Vector3d>(), false);
+        shell->curve({smooth ? normals : std::vector<Eigen::Vector3d>(), false, {}, 0, true});
       });
     return shell;
   }

@@ -27,16 +27,18 @@ CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge) 
     const double u = (p[0] + q[0]) / 2, v = (p[1] + q[1]) / 2;
     along[i][0] = patch.along_u(u, v), along[i][1] = patch.along_v(u, v);
   }
-  double stretch = 0, slope = 0;
+  double stretch2 = 0, slope2 = 0;
   for (int i = 0; i < 6; ++i) {
     Vec3 d[2];
     for (int k = 0; k < 2; ++k)
       d[k] = i < 3 ? along[i][k]
                    : Vec3(2 * along[i][k] - (along[i % 3][k] + along[(i + 1) % 3][k]) / 2);
     axes.first(d[0], d[1]);
-    slope = std::max(slope, std::hypot(n.dot(d[0]), n.dot(d[1])));
-    stretch = std::max(stretch, std::hypot(std::hypot(axes.x.dot(d[0]) - 1, axes.y.dot(d[0])),
-                                           std::hypot(axes.x.dot(d[1]), axes.y.dot(d[1]) - 1)));
+    const double up[2] = {n.dot(d[0]), n.dot(d[1])};
+    slope2 = std::max(slope2, up[0] * up[0] + up[1] * up[1]);
+    const double xx = axes.x.dot(d[0]) - 1, yx = axes.y.dot(d[0]);
+    const double xy = axes.x.dot(d[1]), yy = axes.y.dot(d[1]) - 1;
+    stretch2 = std::max(stretch2, xx * xx + yx * yx + (xy * xy + yy * yy));
   }
   constexpr double kThird = 1.0 / 3;
   Vec3 x = patch.along_u(kThird, kThird), y = patch.along_v(kThird, kThird);
@@ -49,8 +51,8 @@ CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge) 
   CellBounds out{-up(-low),
                  up(high),
                  up(std::sqrt(std::max(0.0, sway))),
-                 up(stretch) + 1e-12f,
-                 up(slope),
+                 up(std::sqrt(stretch2)) + 1e-12f,
+                 up(std::sqrt(slope2)),
                  up(bulge),
                  {},
                  {},

@@ -1,6 +1,8 @@
 // Estimates of the surface by single elements, and the evidence that an edge is smooth.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "shell/crease_search.hpp"
 #include "shell/in_parallel.hpp"
@@ -19,6 +21,8 @@ constexpr double kChance = 1.5, kLeastProbability = 0.01, kEnough = 7;  // of -l
 constexpr int kLongestRun = 6;                                          // to either side
 // Coordinates are known to this share of the box at best: single precision.
 constexpr double kRounded = 1.2e-7;
+// A mean as a file has it: to so much, and so much of the lean; and a share of all normals.
+constexpr double kDigits = 2e-6, kSurelyMean = 1e-3, kMostMeans = 0.9;
 // A fan goes on beyond its corner where a side leads away from the opposite edge by this sine.
 constexpr double kBeyond = 0.3;
 // A given normal is a mean of its elements' if it is nearer to one than this share of what they
@@ -27,30 +31,51 @@ constexpr double kAveraged = 0.1;
 
 }  // namespace
 
-// Given normals that are no mean of the elements' are independent evidence.
-void CreaseSearch::find_independent_normals(const Fans& fans) {
-  independent_.assign(original_.size(), 0);
-  const std::vector<Vec3>& facet_normal = shell_.topology().face_normal;
+namespace {
+
+// How far a fan's normal is from the nearest mean of those of its elements, and how much it leans
+// from them.
+std::array<double, 2> off_mean(const Shell& shell, const Fans& fans, int f, const Vec3& normal) {
+  const auto point = [&](int corner) -> const Vec3& {
+    return shell.vertices()[fans.vertex(corner)];
+  };
+  Vec3 alike = Vec3::Zero(), by_area = Vec3::Zero(), by_angle = Vec3::Zero();
+  double lean = 0, off = std::numeric_limits<double>::infinity();
+  for (const int* c = fans.begin(f); c != fans.end(f); ++c) {
+    const Vec3 a = point(Fans::after(*c)) - point(*c), b = point(Fans::before(*c)) - point(*c);
+    const Vec3& n = shell.topology().face_normal[*c / 3];
+    const double area = a.cross(b).norm();
+    alike += n, by_area += area * n, by_angle += std::atan2(area, a.dot(b)) * n;
+    lean = std::max(lean, (normal - n).norm());
+  }
+  for (const Vec3& mean : {alike, by_area, by_angle, max_normal(shell, fans.begin(f), fans.end(f))})
+    off = std::min(off, (mean.normalized() - normal).norm());
+  return {off, lean};
+}
+
+}  // namespace
+
+std::vector<char> independent_normals(const Shell& shell, const Fans& fans,
+                                      const std::vector<Vec3>& normals) {
+  std::vector<char> out(normals.size(), 0);
   for (int f = 0; f < fans.size(); ++f) {
     if (fans.count(f) == 0) continue;
-    const Vec3& normal = original_[*fans.begin(f)];
-    Vec3 alike = Vec3::Zero(), by_area = Vec3::Zero(), by_angle = Vec3::Zero();
-    double lean = 0;
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) {
-      const Vec3& p = points()[vertex(*c)];
-      const Vec3 a = points()[vertex(Fans::after(*c))] - p,
-                 b = points()[vertex(Fans::before(*c))] - p;
-      const Vec3& n = facet_normal[*c / 3];
-      const double area = a.cross(b).norm();
-      alike += n, by_area += area * n, by_angle += std::atan2(area, a.dot(b)) * n;
-      lean = std::max(lean, (normal - n).norm());
-    }
-    bool is_mean = false;
-    for (const Vec3& mean :
-         {alike, by_area, by_angle, max_normal(shell_, fans.begin(f), fans.end(f))})
-      is_mean = is_mean || (mean.normalized() - normal).norm() <= kAveraged * lean;
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) independent_[*c] = !is_mean;
+    const auto [off, lean] = off_mean(shell, fans, f, normals[*fans.begin(f)]);
+    for (const int* c = fans.begin(f); c != fans.end(f); ++c) out[*c] = !(off <= kAveraged * lean);
   }
+  return out;
+}
+
+bool are_means(const Shell& shell, const Fans& fans, const std::vector<Vec3>& normals) {
+  int leaning = 0, means = 0;
+  for (int f = 0; f < fans.size(); ++f) {
+    if (fans.count(f) == 0) continue;
+    const auto [off, lean] = off_mean(shell, fans, f, normals[*fans.begin(f)]);
+    if (lean <= kSameNormal) continue;
+    ++leaning;
+    means += off <= kDigits + kSurelyMean * lean;
+  }
+  return means > kMostMeans * leaning;
 }
 
 // The surface at a side, from the normal at the opposite corner, if each of the two chords from
@@ -109,6 +134,10 @@ void CreaseSearch::classify_joints() {
   for_each_in_parallel(count, [&](std::size_t e) {
     const Joint& joint = joints_[e];
     if (crease_[e] || joint.angle == 0) return;  // planar: nothing turns
+    if (is_settled(e)) {
+      smooth_[e] = 1;
+      return;
+    }
     const SideEstimate a = estimate_side(now, joint.half_edge[0]),
                        b = estimate_side(now, joint.half_edge[1]);
     estimates_[e] = {a, b};
@@ -133,7 +162,7 @@ void CreaseSearch::classify_joints() {
   weigh_runs();
   // At the end of a run only one side is known.
   for (std::size_t e = 0; e < count; ++e) {
-    if (crease_[e]) continue;
+    if (crease_[e] || smooth_[e]) continue;
     smooth_[e] = core_[e];
     if (core_[e] || !explained_[e]) continue;
     const int far = vertex(opposite(joints_[e].half_edge[curved_side(estimates_[e])]));

@@ -36,8 +36,8 @@ inline int curved_side(const std::array<SideEstimate, 2>& estimates) {
 
 class CreaseSearch {
  public:
-  CreaseSearch(const Shell& shell, std::vector<Vec3> normals, bool given)
-      : shell_(shell), given_(given), original_(std::move(normals)) {
+  CreaseSearch(const Shell& shell, std::vector<Vec3> normals, bool given, const Faces& faces)
+      : shell_(shell), given_(given), faces_(faces), original_(std::move(normals)) {
     list_joints();
     start();
   }
@@ -47,11 +47,15 @@ class CreaseSearch {
  private:
   const std::vector<Vec3>& points() const { return shell_.vertices(); }
   int vertex(int corner) const { return shell_.triangles()[corner / 3][corner % 3]; }
+  bool is_known(int corner) const { return faces_.of_triangle(corner / 3) >= 0; }
+  // Whether the faces at both sides of a joint are known.
+  bool is_settled(std::size_t e) const {
+    return is_known(joints_[e].half_edge[0]) && is_known(joints_[e].half_edge[1]);
+  }
   // The corner opposite a half-edge.
   static int opposite(int h) { return Fans::before(h); }
 
   void list_joints();
-  void find_independent_normals(const Fans& fans);
   void start();
   Fans fans() const;
   void normals_of(const Fans& fans);
@@ -76,10 +80,11 @@ class CreaseSearch {
 
   const Shell& shell_;
   bool given_;
+  const Faces& faces_;
   std::vector<Vec3> original_, normals_;
   std::vector<int> original_count_;  // per corner: of its fan before it was divided
   std::vector<char> divided_;        // per corner
-  std::vector<char> independent_;    // per corner: its given normal is no mean of its elements'
+  std::vector<char> independent_;    // per corner, of given normals
   std::vector<Joint> joints_;        // per edge
   std::vector<int> edge_at_;         // beside Topology::neighbors
   std::vector<char> crease_;         // per edge, as all that follows

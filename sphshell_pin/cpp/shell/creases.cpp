@@ -10,8 +10,6 @@
 namespace sphshell {
 namespace {
 
-// Where joints turn this much [rad], no normals of a file make one surface of them.
-constexpr double kSurelySharp = 1.2;
 // A wall ends in a fillet where its element bends by less than this share of the fillet's, and is
 // longer by this factor.
 constexpr double kWall = 0.1, kLongWall = 2.5;
@@ -53,20 +51,22 @@ void CreaseSearch::start() {
     if (!joints_[e].exists()) continue;
     const auto [h, g] = joints_[e].half_edge;
     crease_[e] = given_ ? differ(h, Fans::after(g)) && differ(Fans::after(h), g)
-                        : !topology.edges[e].inner && topology.edges[e].kind != EdgeClass::Smooth;
+                 : is_settled(e)
+                     ? differ(h, Fans::after(g)) || differ(Fans::after(h), g)
+                     : !topology.edges[e].inner && topology.edges[e].kind != EdgeClass::Smooth;
   }
   const Fans before = fans();
   original_count_.resize(original_.size());
   for (std::size_t c = 0; c < original_.size(); ++c)
     original_count_[c] = before.count(before.of(static_cast<int>(c)));
   if (!given_) return;
-  find_independent_normals(before);
+  independent_ = independent_normals(shell_, before, original_);
   // Averaged normals of a cube are those of a sphere: only the angle can tell. Where it is moderate
   // the normals stand, unless they were averaged over a sharper edge beside it.
   const auto sharpen = [&](double angle, auto&& also) {
     bool any = false;
     for (std::size_t e = 0; e < joints_.size(); ++e)
-      if (!crease_[e] && std::abs(joints_[e].angle) >= angle && also(joints_[e]))
+      if (!crease_[e] && !is_settled(e) && std::abs(joints_[e].angle) >= angle && also(joints_[e]))
         crease_[e] = any = true;
     return any;
   };
@@ -95,7 +95,7 @@ void CreaseSearch::normals_of(const Fans& fans) {
   divided_.assign(original_.size(), 0);
   const int corners = static_cast<int>(original_.size());
   for (int c = 0; c < corners; ++c) divided_[c] = fans.count(fans.of(c)) < original_count_[c];
-  std::vector<char> beside(original_.size(), 0), joined(original_.size(), 0);  // per fan
+  std::vector<char> beside(original_.size(), 0);  // per fan
   if (!given_) {
     for (int c = 0; c < corners; ++c)
       if (divided_[c])
@@ -110,7 +110,9 @@ void CreaseSearch::normals_of(const Fans& fans) {
     for (int f = 0; f < corners; ++f) beside[f] = beside[f] && joints[f] < fans.count(f);
   }
   for (int f = 0; f < fans.size(); ++f) {
-    if (fans.count(f) == 0 || !(divided_[*fans.begin(f)] || beside[f])) continue;
+    if (fans.count(f) == 0 || !(divided_[*fans.begin(f)] || beside[f]) ||
+        std::any_of(fans.begin(f), fans.end(f), [&](int c) { return is_known(c); }))
+      continue;
     const Vec3 normal = max_normal(shell_, fans.begin(f), fans.end(f));
     for (const int* c = fans.begin(f); c != fans.end(f); ++c) normals_[*c] = normal;
   }
@@ -208,11 +210,13 @@ void CreaseSearch::separate_straight_walls() {
 // Divided fans lean along each side that leads across smooth joints as the side's other end does;
 // else as their own elements.
 void CreaseSearch::lean_as_other_ends(const Fans& fans) {
-  const std::vector<Vec3> plain = normals_;
+  std::vector<std::pair<int, Vec3>> found;  // first all, as they are estimated from each other
   for (int f = 0; f < fans.size(); ++f) {
-    if (fans.count(f) == 0 || !divided_[*fans.begin(f)]) continue;
+    if (fans.count(f) == 0 || !divided_[*fans.begin(f)] ||
+        std::any_of(fans.begin(f), fans.end(f), [&](int c) { return is_known(c); }))
+      continue;
     constexpr double kTrust = 0.01;  // in the fan's own elements
-    const Vec3& own = plain[*fans.begin(f)];
+    const Vec3& own = normals_[*fans.begin(f)];
     Eigen::Matrix3d square = kTrust * Eigen::Matrix3d::Identity();
     Vec3 along = kTrust * own;
     double before = 0;
@@ -222,14 +226,15 @@ void CreaseSearch::lean_as_other_ends(const Fans& fans) {
         if (divided_[w]) continue;
         const Vec3 d = (points()[vertex(w)] - points()[vertex(*c)]).normalized();
         square += d * d.transpose();
-        along -= d * plain[w].dot(d);
+        along -= d * normals_[w].dot(d);
       }
     }
     const Vec3 normal = square.ldlt().solve(along).normalized();
     // No farther from its elements' than before it was divided.
-    if (!((normal - own).norm() <= 1.5 * before)) continue;
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) normals_[*c] = normal;
+    if ((normal - own).norm() <= 1.5 * before) found.push_back({f, normal});
   }
+  for (const auto& [f, normal] : found)
+    for (const int* c = fans.begin(f); c != fans.end(f); ++c) normals_[*c] = normal;
 }
 
 CornerNormals CreaseSearch::divide() {
@@ -239,6 +244,9 @@ CornerNormals CreaseSearch::divide() {
     if (!add_creases()) break;
   }
   if (!given_) separate_straight_walls();
+  // Building takes the most memory here.
+  std::vector<std::array<SideEstimate, 2>>().swap(estimates_);
+  std::vector<std::array<float, 2>>().swap(run_);
   const Fans now = fans();
   normals_of(now);
   lean_as_other_ends(now);
@@ -249,8 +257,9 @@ CornerNormals CreaseSearch::divide() {
   return out;
 }
 
-CornerNormals divide_at_creases(const Shell& shell, std::vector<Vec3> normals, bool given) {
-  return CreaseSearch(shell, std::move(normals), given).divide();
+CornerNormals divide_at_creases(const Shell& shell, std::vector<Vec3> normals, bool given,
+                                const Faces& faces) {
+  return CreaseSearch(shell, std::move(normals), given, faces).divide();
 }
 
 }  // namespace sphshell

@@ -10,12 +10,17 @@
 #include "shell/creases.hpp"
 #include "shell/free_memory.hpp"
 #include "shell/in_parallel.hpp"
+#include "shell/limiter.hpp"
 #include "shell/vertex_normals.hpp"
 
 namespace sphshell {
 namespace {
 
 constexpr double kAny = std::numeric_limits<double>::infinity();
+// Coordinates are known to this share of the box at best: single precision, with a margin.
+constexpr double kSinglePrecision = 2e-7;
+// And vertices are moved by sqrt(3) times the rounding of their coordinates at most.
+constexpr double kOfRounding = 1.8;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 
@@ -224,23 +229,36 @@ SharedNormals::SharedNormals(const Shell& shell, const std::vector<Vec3>& normal
   }
 }
 
-CurvedShell::CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact,
-                         const std::vector<std::uint8_t>& straight) {
-  const bool given = !normals.empty();
+CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
+  const bool given = !options.normals.empty();
+  std::vector<Vec3> normals = std::move(options.normals);
+  std::vector<Trust> trust;
+  std::optional<CoplanarRegions> regions;
   exact_ = given;
-  if (!given) normals = estimate_normals(shell);
-  divided_.assign(normals.size(), 0);
-  if (!exact) {
-    CornerNormals found = divide_at_creases(shell, std::move(normals), given);
-    normals = std::move(found.normals);
+  divided_.assign(3 * shell.triangles().size(), 0);
+  if (!options.exact) {
+    const double tolerance =
+        std::max(kSinglePrecision * shell.size(), kOfRounding * options.rounding);
+    regions.emplace(shell, tolerance);
+    if (options.faces && shell.crease_angle() > 0)
+      faces_ = recognize_faces(shell, *regions, tolerance);
+    EstimatedNormals settled = given ? settle_given_normals(shell, *regions, normals, faces_)
+                                     : estimate_normals(shell, *regions, faces_);
+    trust = std::move(settled.trust);
+    CornerNormals found =
+        divide_at_creases(shell, std::move(settled.normals), settled.given, faces_);
     divided_ = std::move(found.set_aside);
     creases_ = found.creases;
+    for (std::size_t c = 0; c < normals.size(); ++c)
+      divided_[c] = divided_[c] || (normals[c] - found.normals[c]).norm() > kSameNormal;
+    normals = std::move(found.normals);
   }
   normals_ = SharedNormals(shell, normals);
   // A large part of what building takes at its highest.
   std::vector<Vec3>().swap(normals);
   give_back_freed_memory(shell.triangles().size());
-  bend_edges(shell, straight);
+  bend_edges(shell, options.straight, regions ? &*regions : nullptr, trust);
+  std::vector<Trust>().swap(trust);
   raise_centers(shell);
   normals_ = {};
   build_cones(shell);
@@ -253,8 +271,36 @@ Bending CurvedShell::bending(const Shell& shell, int triangle) const {
   return corner[0] || corner[1] || corner[2] ? Bending::Crease : Bending::Planar;
 }
 
+std::vector<double> CurvedShell::chord_errors(const Shell& shell) const {
+  const Topology& topology = shell.topology();
+  const auto normal_at = [&](int corner) {
+    const int f = triangle_of(shell.facet_half_edge(3 * triangle_of(corner)));
+    static constexpr double kU[3] = {0, 1, 0}, kV[3] = {0, 0, 1};
+    const double u = kU[side_of(corner)], v = kV[side_of(corner)];
+    const CubicPatch patch = facets_[f].patch(shell.facets()[f]);
+    return patch.along_u(u, v).cross(patch.along_v(u, v)).normalized();
+  };
+  const CoplanarRegions regions(shell, kSinglePrecision * shell.size());
+  const SagittaWitness witness(shell, regions, [&](const Edge& edge) {
+    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    return (normal_at(h) - normal_at(Fans::after(g))).norm() <= 10 * kSameNormal &&
+           (normal_at(Fans::after(h)) - normal_at(g)).norm() <= 10 * kSameNormal;
+  });
+  std::vector<double> out;
+  for (int t = 0; t < static_cast<int>(facets_.size()); ++t) {
+    out.push_back(witness.of(t));
+    for (int k = 0; k < 3; ++k) {
+      const Edge& edge = topology.edges[topology.edge_of[3 * t + k]];
+      for (int i = edge.begin; i < edge.begin + edge.count; ++i)
+        out.back() = std::max(out.back(), witness.of(triangle_of(topology.incidence[i])));
+    }
+  }
+  return out;
+}
+
 // One curve per edge, from the normals of all facets that meet there, so that they share it.
-void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight) {
+void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight,
+                             const CoplanarRegions* regions, const std::vector<Trust>& trust) {
   const Topology& topology = shell.topology();
   const std::vector<Triangle>& triangles = shell.triangles();
   const std::vector<Vec3>& p = shell.vertices();
@@ -264,6 +310,16 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
   tangents_.spoke_.resize(topology.neighbors.size());
   LargeArray<int> fill(topology.neighbor_begin.begin(), topology.neighbor_begin.end() - 1);
   const std::vector<Vec3> borders = border_directions(shell);
+  const auto goes_on = [&](const Edge& edge) {
+    const int h = topology.incidence[edge.begin],
+              g = topology.incidence[edge.begin + edge.count - 1];
+    const bool opposed = triangles[h / 3][h % 3] != triangles[g / 3][g % 3];
+    const int h1 = Fans::after(h), g1 = Fans::after(g);
+    return edge.count == 2 && (normals_[h] - normals_[opposed ? g1 : g]).norm() <= kSameNormal &&
+           (normals_[h1] - normals_[opposed ? g : g1]).norm() <= kSameNormal;
+  };
+  std::optional<SagittaWitness> witness;
+  if (regions) witness.emplace(shell, *regions, goes_on);
   std::vector<Vec3> first, last;
   for (const Edge& edge : topology.edges) {
     first.clear();
@@ -285,6 +341,21 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
     std::array<Vec3, 2> offset =
         control_offsets(d, {first, border ? borders[edge.first_vertex] : d, limited},
                         {last, border ? borders[edge.last_vertex] : d, limited});
+    if (witness) {
+      Trust least = Trust::Own, most = Trust::Facet;
+      for (int i = edge.begin; i < edge.begin + edge.count; ++i)
+        for (int c : {topology.incidence[i], Fans::after(topology.incidence[i])}) {
+          least = std::min(least, divided_[c] ? Trust::Facet : trust[c]);
+          most = std::max(most, trust[c]);
+        }
+      const double bulge = 0.75 * std::max(offset[0].norm(), offset[1].norm());
+      const bool smooth = goes_on(edge);
+      const double limit = (smooth ? most : least) == Trust::Own
+                               ? bulge
+                               : witness->most(shell, edge, smooth, least >= Trust::Fitted);
+      if (bulge > limit)
+        for (Vec3& one : offset) one *= limit / bulge;
+    }
     for (int i = 0; i < edge.count && !straight.empty(); ++i)
       if (straight[topology.incidence[edge.begin + i]]) offset = {Vec3::Zero(), Vec3::Zero()};
     for (int i = 0; i < edge.count; ++i) {

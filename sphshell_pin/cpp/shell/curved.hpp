@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "shell/cell_bounds.hpp"
+#include "shell/faces/recognition.hpp"
 #include "shell/shell.hpp"
 
 namespace sphshell {
@@ -106,41 +108,45 @@ class SharedNormals {
   LargeArray<int> which_;
 };
 
+enum class Trust : char;
+
 class CurvedShell {
  public:
   CurvedShell(const CurvedShell&) = delete;  // tangents_ refers to facets_
   CurvedShell& operator=(const CurvedShell&) = delete;
 
-  // normals: unit, per triangle corner (3 per triangle), wound like the triangles; empty:
-  // estimated within smooth patches. exact: they are the surface's own and stand; others are
-  // divided where the elements around contradict them. straight: per half-edge (3 triangle + side)
-  // 1 for sides to stay straight whatever the normals; empty: none.
-  CurvedShell(const Shell& shell, std::vector<Vec3> normals, bool exact,
-              const std::vector<std::uint8_t>& straight);
+  CurvedShell(const Shell& shell, CurveOptions options);
 
   const LargeArray<CurvedFacet>& facets() const { return facets_; }  // in the order of the tree
   const LargeArray<NormalCone>& cones() const { return cones_; }
   const LargeArray<CellBounds>& cells() const { return cells_; }
   double bulge() const { return bulge_; }  // the largest of them [m]
   const Tangents& tangents() const { return tangents_; }
+  // The faces that were recognized: none where the normals are exact.
+  const Faces& faces() const { return faces_; }
   // Whether the normals are the surface's own, and not estimated.
   bool exact() const { return exact_; }
   // Per corner: its normal was set aside, as a crease that the elements show divides its fan.
   const std::vector<char>& divided() const { return divided_; }
   int creases() const { return creases_; }  // edges that became creases so
   Bending bending(const Shell& shell, int triangle) const;
+  // Per triangle the largest sagitta [m] that the turns between it and its neighbors, or between
+  // those and theirs, account for: what the flat elements are off the surface there, about.
+  std::vector<double> chord_errors(const Shell& shell) const;
   std::size_t bytes() const {
     return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone) + sizeof(CellBounds)) +
-           tangents_.spoke_.size() * sizeof(int) + divided_.size();
+           tangents_.spoke_.size() * sizeof(int) + divided_.size() + faces_.of.size() * sizeof(int);
   }
 
  private:
-  void bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight);
+  void bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight,
+                  const CoplanarRegions* regions, const std::vector<Trust>& trust);
   void raise_centers(const Shell& shell);
   int corner_beyond(const Shell& shell, int half_edge) const;
   void build_cones(const Shell& shell);
   void bound_cells(const Shell& shell);
 
+  Faces faces_;
   SharedNormals normals_;  // let go when the elements are bent
   std::vector<char> divided_;
   int creases_ = 0;

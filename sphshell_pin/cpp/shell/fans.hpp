@@ -53,26 +53,41 @@ class Fans {
   // and not past a sharp vertex.
   void vertices_around(int fan, const std::vector<char>& sharp, std::vector<int>& out) const {
     const int own = vertex(*begin(fan));
+    const auto sort = [&out](std::size_t from) {
+      std::sort(out.begin() + from, out.end());
+      out.erase(std::unique(out.begin() + from, out.end()), out.end());
+    };
     out.clear();
     for (const int* c = begin(fan); c != end(fan); ++c)
-      for (int k = 0; k < 3; ++k) {
-        const int beside = fan_of_[*c / 3 * 3 + k];
-        if (sharp[beside]) continue;
-        for (const int* d = begin(beside); d != end(beside); ++d)
-          for (int l = 0; l < 3; ++l) out.push_back(vertex(*d / 3 * 3 + l));
-      }
-    std::sort(out.begin(), out.end());
-    out.erase(std::unique(out.begin(), out.end()), out.end());
-    out.erase(std::remove(out.begin(), out.end(), own), out.end());
+      for (int k = 0; k < 3; ++k) out.push_back(fan_of_[*c / 3 * 3 + k]);
+    sort(0);
+    // The fans, and behind them the vertices around each, of which most are found several times.
+    // The fans' own vertices are around `fan`, which is not sharp.
+    const std::size_t fans = out.size();
+    for (std::size_t i = 0; i < fans; ++i) {
+      if (sharp[out[i]]) continue;
+      for (const int *d = begin(out[i]), *last = end(out[i]); d != last; ++d)
+        for (const int other : {after(*d), before(*d)}) {
+          const int v = vertex(other);
+          if (v != own && (out.size() > fans + kFew ||
+                           std::find(out.begin() + fans, out.end(), v) == out.end()))
+            out.push_back(v);
+        }
+    }
+    sort(fans);
+    out.erase(out.begin(), out.begin() + fans);
   }
 
  private:
+  static constexpr std::size_t kFew = 64;  // numbers that are looked through one by one
+
   const Shell& shell_;
   std::vector<int> begin_, fan_of_, members_;
 };
 
-// The normal of a fan, exact where the vertices lie on a sphere (Max, J. Graphics Tools 4 (1999)
-// 1).
+// What a facet counts for at its corner, and the normal of a fan, exact where the vertices lie on a
+// sphere (Max, J. Graphics Tools 4 (1999) 1).
+double max_weight(const Shell& shell, int corner);
 Vec3 max_normal(const Shell& shell, const int* begin, const int* end);
 
 }  // namespace sphshell

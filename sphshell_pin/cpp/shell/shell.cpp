@@ -182,10 +182,9 @@ SurfacePoint Shell::closest_point(const Vec3& point) const {
   return {at.point, normal, sign * distance, facet.element};
 }
 
-void Shell::curve(std::vector<Vec3> normals, bool exact,
-                  const std::vector<std::uint8_t>& straight) {
+void Shell::curve(CurveOptions options) {
   if (curved_) return;
-  curved_ = std::make_shared<const CurvedShell>(*this, std::move(normals), exact, straight);
+  curved_ = std::make_shared<const CurvedShell>(*this, std::move(options));
   ready_.store(curved_.get(), std::memory_order_release);
   give_back_freed_memory(triangles_.size());
 }

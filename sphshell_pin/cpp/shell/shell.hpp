@@ -59,6 +59,20 @@ struct SurfacePoint {
   int element;
 };
 
+// What curved elements are made of.
+struct CurveOptions {
+  // Unit, per triangle corner (3 per triangle), wound like the triangles; empty: estimated.
+  std::vector<Vec3> normals;
+  // The normals are the surface's own and stand; others are divided where the elements around
+  // contradict them.
+  bool exact = false;
+  // Per half-edge (3 triangle + side) 1 for sides to stay straight whatever the normals; or empty.
+  std::vector<std::uint8_t> straight;
+  // The coordinates are known to this [m] where more is not said: single precision.
+  double rounding = 0;
+  bool faces = true;  // recognize planes, cylinders, cones, spheres and tori
+};
+
 class CurvedShell;
 struct Sheets;
 class Tangents;
@@ -90,9 +104,8 @@ class Shell {
   // edges at the vertex; `tangents` (beside Topology::neighbors) replace the straight edges.
   double tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tangents = nullptr) const;
 
-  // Curved elements, made at first use: unit normals per triangle corner, or none; exact:
-  // they are the surface's own; `straight` as of CurvedShell.
-  void curve(std::vector<Vec3> normals, bool exact, const std::vector<std::uint8_t>& straight = {});
+  // Curved elements, made at first use.
+  void curve(CurveOptions options);
   // Null before that; threads may ask while one makes them.
   const CurvedShell* curved() const { return ready_.load(std::memory_order_acquire); }
 

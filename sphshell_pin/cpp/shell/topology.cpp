@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <utility>
 
@@ -186,6 +187,39 @@ void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangl
     }
 }
 
+void find_pinches(std::size_t vertices, const std::vector<Triangle>& triangles, Topology& out) {
+  const int corners = static_cast<int>(3 * triangles.size());
+  DisjointSets fans(corners), pieces(triangles.size());
+  const auto vertex = [&](int c) { return triangles[triangle_of(c)][side_of(c)]; };
+  const auto after = [](int c) { return c - side_of(c) + next_corner(side_of(c)); };
+  for (const Edge& edge : out.edges)
+    for (int i = edge.begin + 1; i < edge.begin + edge.count; ++i) {
+      const int h = out.incidence[edge.begin], g = out.incidence[i];
+      const bool opposed = vertex(h) != vertex(g);
+      fans.merge(h, opposed ? after(g) : g);
+      fans.merge(after(h), opposed ? g : after(g));
+    }
+  // The first corner of a fan stands for it: a vertex with two of those is pinched.
+  std::vector<char> fans_at(vertices, 0);
+  std::map<int, std::map<int, std::vector<int>>> found;
+  for (int c = 0; c < corners; ++c)
+    if (fans.find(c) == c && fans_at[vertex(c)]++ == 1) fans_at[vertex(c)] = 2, found[vertex(c)];
+  if (found.empty()) return;
+  for (int c = 0; c < corners; ++c)
+    if (fans_at[vertex(c)] > 1) found[vertex(c)][fans.find(c)].push_back(c);
+  for (const Edge& edge : out.edges)
+    for (int i = edge.begin + 1; i < edge.begin + edge.count; ++i)
+      pieces.merge(triangle_of(out.incidence[edge.begin]), triangle_of(out.incidence[i]));
+  for (auto& [at, around] : found) {
+    Pinch& pinch = out.pinches.emplace_back();
+    pinch.vertex = at;
+    for (auto& [first, members] : around) {
+      pinch.piece.push_back(pieces.find(triangle_of(first)));
+      pinch.fans.push_back(std::move(members));
+    }
+  }
+}
+
 }  // namespace
 
 Eigen::AlignedBox3d bounds(const std::vector<Vec3>& vertices,
@@ -206,6 +240,12 @@ double Topology::angle(const std::vector<Vec3>& vertices, const std::vector<Tria
   return (far - vertices[edge.first_vertex]).dot(m) <= 0 ? angle : -angle;
 }
 
+const Pinch* Topology::pinch_at(int vertex) const {
+  const auto at = std::lower_bound(pinches.begin(), pinches.end(), vertex,
+                                   [](const Pinch& p, int v) { return p.vertex < v; });
+  return at == pinches.end() || at->vertex != vertex ? nullptr : &*at;
+}
+
 bool CadFaces::smooth(int h, int g) const {
   const int t = triangle_of(h), u = triangle_of(g);
   if (face[t] == face[u]) return true;
@@ -223,6 +263,7 @@ Topology::Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle
   classify_edges(triangles, crease_angle, cad, *this);
   build_patches(element, *this);
   build_vertices(vertices, triangles, *this);
+  find_pinches(vertices.size(), triangles, *this);
 }
 
 }  // namespace sphshell

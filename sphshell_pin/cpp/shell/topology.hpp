@@ -33,6 +33,14 @@ struct Edge {
   bool on_rim() const { return kind == EdgeClass::Boundary || kind == EdgeClass::NonManifold; }
 };
 
+// A vertex that several fans of triangles share, but no side: it joins them like a side of length
+// zero.
+struct Pinch {
+  int vertex;
+  std::vector<std::vector<int>> fans;  // the corners (3 triangle + k) of each
+  std::vector<int> piece;              // of each: its part of the surface, connected across edges
+};
+
 // What CAD knows of the joints between its faces; empty where the surface came without.
 struct CadFaces {
   std::vector<int> face;      // per triangle
@@ -58,6 +66,10 @@ struct Topology {
   std::vector<char> vertex_on_rim;  // touches a boundary or non-manifold edge
   std::vector<char> vertex_sharp;   // touches an edge that is not smooth
   int num_patches = 0;
+  std::vector<Pinch> pinches;  // in ascending order of their vertices
+
+  // Null of a vertex that is none.
+  const Pinch* pinch_at(int vertex) const;
 
   // Of an edge with two half-edges, the one that is not h.
   int other_half_edge(const Edge& edge, int h) const {

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "shell/creases.hpp"
 #include "shell/fans.hpp"
 #include "shell/in_parallel.hpp"
+#include "shell/limiter.hpp"
 
 namespace sphshell {
 namespace {
@@ -20,40 +22,14 @@ constexpr double kLeastPivot = 1e-6;
 constexpr double kSettledTilt = 1e-7;
 // Normals agree within this angle [rad] and share of the spread of the normals around.
 constexpr double kSmallTurn = 0.005, kLikely = 0.25;
-// Edges are long beyond this many times those that lead on from them: surely, and where no fit says
-// otherwise.
-constexpr double kFarLonger = 4, kLonger = 2.5;
-
-// Where a long edge of a fan bends that goes on in short ones only, the normal is turned upright on
-// it. Max's would make a wall bulge that ends in a fillet; but a tessellation has long edges where
-// its surface is flat along them. False where there is none.
-bool straighten_wall(const Shell& shell, const int* begin, const int* end, double longer,
-                     Vec3& normal) {
-  std::vector<Vec3> edges;
-  for (const int* c = begin; c != end; ++c) {
-    const Triangle& t = shell.triangles()[*c / 3];
-    const Vec3& origin = shell.vertices()[t[*c % 3]];
-    for (int k : {next_corner(*c % 3), previous_corner(*c % 3)})
-      edges.push_back(shell.vertices()[t[k]] - origin);
-  }
-  const auto slope = [&](const Vec3& edge) { return std::abs(edge.dot(normal)) / edge.norm(); };
-  double steepest = 0;
-  for (const Vec3& edge : edges) steepest = std::max(steepest, slope(edge));
-  Vec3 along = Vec3::Zero();
-  for (const Vec3& edge : edges) {
-    double onward = 0;
-    for (const Vec3& other : edges)
-      if (other.dot(edge) < -0.5 * other.norm() * edge.norm())
-        onward = std::max(onward, other.norm());
-    if (slope(edge) > 0.5 * steepest && onward > 0 && longer * onward < edge.norm() &&
-        along.dot(edge) >= 0)
-      along += edge;
-  }
-  if (along.isZero(0)) return false;
-  along.normalize();
-  normal = (normal - normal.dot(along) * along).normalized();
-  return true;
-}
+// Where a facet is much higher than its neighbors the surface may be smooth all the same, if it was
+// sampled unevenly: up to this ratio of heights, if two fits leave little and agree within a share
+// of the spread.
+constexpr double kMostUnevenHeights = 10, kLittle = 0.02, kSurelyAlike = 0.1;
+// A given normal contradicts a face that is off by more than this.
+constexpr double kContradiction = 0.01;
+// Corners take the normal of a face in their fan within this angle [rad] of their own facet's.
+constexpr double kTakesOver = 0.44;
 
 // True where the surface falls away from a fan's vertex along straight lines, as from the tip of a
 // cone: seen from the vertices around it does not bend that much.
@@ -79,7 +55,8 @@ bool is_cone_apex(const Shell& shell, const std::vector<Vec3>& normals, const in
 // spheres are exact; with 9 terms the cubics too. False where the points do not determine it, or do
 // not fit.
 template <int Terms>
-bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& normal) {
+bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& normal,
+                double most_uneven = kMostUneven) {
   using Row = Eigen::Matrix<double, Terms, 1>;
   using Square = Eigen::Matrix<double, Terms, Terms>;
   if (points.size() < Terms + 3) return false;
@@ -114,7 +91,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
                                      size.cwiseInverse().asDiagonal());
     if (!(solver.vectorD().cwiseAbs().minCoeff() > kLeastPivot)) return false;
     const Row fit = solver.solve(along.cwiseQuotient(size)).cwiseQuotient(size);
-    if (round > 0 && heights2 - fit.dot(along) > kMostUneven * heights2) return false;
+    if (round > 0 && heights2 - fit.dot(along) > most_uneven * heights2) return false;
     n = (n - fit[0] * east - fit[1] * north).normalized();
     // What a further round would turn it by is smaller than this by as much as it is small.
     if (round > 0 && fit.template head<2>().squaredNorm() < kSettledTilt * kSettledTilt) break;
@@ -125,93 +102,180 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
 
 }  // namespace
 
+double max_weight(const Shell& shell, int corner) {
+  const Triangle& t = shell.triangles()[corner / 3];
+  const int k = corner % 3;
+  const std::vector<Vec3>& p = shell.vertices();
+  const Vec3 a = p[t[next_corner(k)]] - p[t[k]], b = p[t[previous_corner(k)]] - p[t[k]];
+  return a.cross(b).norm() / (a.squaredNorm() * b.squaredNorm());
+}
+
 Vec3 max_normal(const Shell& shell, const int* begin, const int* end) {
   Vec3 sum = Vec3::Zero();
-  for (const int* c = begin; c != end; ++c) {
-    const Triangle& t = shell.triangles()[*c / 3];
-    const int k = *c % 3;
-    const std::vector<Vec3>& p = shell.vertices();
-    const Vec3 a = p[t[next_corner(k)]] - p[t[k]], b = p[t[previous_corner(k)]] - p[t[k]];
-    const double weight = a.cross(b).norm() / (a.squaredNorm() * b.squaredNorm());
-    sum += weight * shell.topology().face_normal[*c / 3];
-  }
+  for (const int* c = begin; c != end; ++c)
+    sum += max_weight(shell, *c) * shell.topology().face_normal[*c / 3];
   return sum.normalized();
 }
 
-std::vector<Vec3> estimate_normals(const Shell& shell) {
+EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& regions,
+                                  const Faces& faces) {
   const Topology& topology = shell.topology();
-  const Fans fans(shell,
-                  [](const Edge& edge) { return edge.inner || edge.kind == EdgeClass::Smooth; });
+  const int corners = 3 * static_cast<int>(shell.triangles().size());
+  std::vector<Vec3> out(static_cast<std::size_t>(corners));
+  std::vector<Trust> trust(out.size(), Trust::Averaged);
+  const auto known = [&](int c) { return faces.of_triangle(c / 3) >= 0; };
+  for (int c = 0; c < corners; ++c)
+    if (known(c)) out[c] = faces.normal(shell, c / 3, c % 3), trust[c] = Trust::Own;
+  // Faces with normals of their own meet at a crease, whatever the angle.
+  const Fans fans(shell, [&](const Edge& edge) {
+    if (!edge.inner && edge.kind != EdgeClass::Smooth) return false;
+    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    return !known(h) || !known(g) ||
+           (out[h] - out[Fans::after(g)]).norm() + (out[Fans::after(h)] - out[g]).norm() <
+               kSameNormal;
+  });
   const int count = fans.size();
-  std::vector<Vec3> normals(static_cast<std::size_t>(count));
-  const auto set = [&](std::vector<Vec3>& to, int fan, const Vec3& normal) {
-    for (const int* c = fans.begin(fan); c != fans.end(fan); ++c) to[*c] = normal;
+  const auto set = [&](int fan, const Vec3& normal, Trust how) {
+    for (const int* c = fans.begin(fan); c != fans.end(fan); ++c)
+      if (!known(*c)) out[*c] = normal, trust[*c] = how;
   };
-  for (int fan = 0; fan < count; ++fan)
-    if (fans.begin(fan) != fans.end(fan))
-      set(normals, fan, max_normal(shell, fans.begin(fan), fans.end(fan)));
   // Largest angle [rad] from a fan's normal to those of its triangles and of the fans beside it.
+  std::vector<Vec3> plain;
   const auto spread = [&](int fan, bool beside) {
     double cosine = 1;
     for (const int* c = fans.begin(fan); c != fans.end(fan); ++c) {
-      cosine = std::min(cosine, normals[*c].dot(topology.face_normal[*c / 3]));
+      cosine = std::min(cosine, plain[*c].dot(topology.face_normal[*c / 3]));
       for (int k = 0; beside && k < 3; ++k)
-        cosine = std::min(cosine, normals[*c].dot(normals[*c / 3 * 3 + k]));
+        cosine = std::min(cosine, plain[*c].dot(plain[*c / 3 * 3 + k]));
     }
     return std::acos(std::clamp(cosine, -1.0, 1.0));
   };
-  // What is flat or sharp (its triangles spread more than creases may) keeps its triangles' own.
-  std::vector<Vec3> out = normals;
+  for (int fan = 0; fan < count; ++fan)
+    if (fans.begin(fan) != fans.end(fan))
+      set(fan, max_normal(shell, fans.begin(fan), fans.end(fan)), Trust::Averaged);
+  plain = out;
+  std::vector<int> around;
+  std::vector<Vec3> points;
+  const std::vector<char> none(out.size(), 0);
+  const auto gather = [&](int fan, const std::vector<char>& sharp, std::vector<int>& vertices,
+                          std::vector<Vec3>& at) {
+    fans.vertices_around(fan, sharp, vertices);
+    at.clear();
+    for (int v : vertices) at.push_back(shell.vertices()[v]);
+    return shell.vertices()[fans.vertex(*fans.begin(fan))];
+  };
+  const auto fits_surely = [&](int fan) {
+    const Vec3 origin = gather(fan, none, around, points);
+    Vec3 quadratic = plain[*fans.begin(fan)], cubic = quadratic;
+    return fit_normal<5>(origin, points, quadratic, kLittle) &&
+           fit_normal<9>(origin, points, cubic, kLittle) &&
+           quadratic.cross(cubic).norm() <= kSurelyAlike * spread(fan, false);
+  };
+  // Takes the normals of the faces in a fan over: the one that a facet has too, else their mean.
+  const auto take_over = [&](int fan) {
+    Vec3 sum = Vec3::Zero();
+    const int *begin = fans.begin(fan), *end = fans.end(fan);
+    for (const int* c = begin; c != end; ++c)
+      if (known(*c)) sum += out[*c];
+    if (sum.isZero(0)) return false;
+    sum.normalize();
+    for (const int* c = begin; c != end; ++c) {
+      if (known(*c)) continue;
+      const Vec3& own = topology.face_normal[*c / 3];
+      const bool alike = std::any_of(begin, end, [&](int d) {
+        return known(d) && (out[d] - own).squaredNorm() < kSameNormal * kSameNormal;
+      });
+      out[*c] = !alike && sum.dot(own) > std::cos(kTakesOver) ? sum : own;
+      trust[*c] = Trust::Limited;
+    }
+    return true;
+  };
+  // What is flat or sharp (its triangles spread more than creases may) keeps its triangles' own. No
+  // fit looks past what is sharp, a face, or limited.
+  const Dominance dominance(shell, regions);
   std::vector<char> settled(out.size(), 0), sharp(out.size(), 0);
   for (int fan = 0; fan < count; ++fan) {
     const int *begin = fans.begin(fan), *end = fans.end(fan);
+    if (begin == end) continue;
+    if (take_over(fan)) {
+      settled[fan] = sharp[fan] = 1;
+      continue;
+    }
     const double angle = spread(fan, false), limit = shell.crease_angle();
-    sharp[fan] = angle > limit || (angle > limit / 2 && is_cone_apex(shell, normals, begin, end));
+    sharp[fan] = angle > limit || (angle > limit / 2 && is_cone_apex(shell, plain, begin, end));
     settled[fan] = sharp[fan] || std::all_of(begin, end, [&](int c) {
                      return topology.planar_face[c / 3] == topology.planar_face[*begin / 3];
                    });
-    if (settled[fan])
-      for (const int* c = begin; c != end; ++c) out[*c] = topology.face_normal[*c / 3];
-    Vec3 normal = normals[fan];
-    if (!settled[fan] && straighten_wall(shell, begin, end, kFarLonger, normal)) {
-      set(out, fan, normal);
-      settled[fan] = 1;
+    Vec3 normal;
+    double ratio;
+    if (settled[fan]) {
+      for (const int* c = begin; c != end; ++c)
+        out[*c] = topology.face_normal[*c / 3], trust[*c] = Trust::Facet;
+    } else if (dominance.normal(begin, end, normal, ratio) &&
+               (ratio > kMostUnevenHeights || !fits_surely(fan))) {
+      set(fan, normal, Trust::Limited);
+      settled[fan] = sharp[fan] = 1;
     }
   }
-  normals = out;
-  const auto fit = [&](int fan, std::vector<int>& around, std::vector<Vec3>& points) {
-    fans.vertices_around(fan, sharp, around);
-    points.clear();
-    for (int v : around) points.push_back(shell.vertices()[v]);
-    const Vec3& origin = shell.vertices()[fans.vertex(*fans.begin(fan))];
-    const Vec3& plain = normals[fan];
-    Vec3 quadratic = plain, cubic = plain;
-    const bool fits = fit_normal<5>(origin, points, quadratic);
-    const bool fits_better = fit_normal<9>(origin, points, cubic);
+  plain = out;
+  const auto fit = [&](int fan, std::vector<int>& near, std::vector<Vec3>& at) {
+    const Vec3 origin = gather(fan, sharp, near, at);
+    const Vec3 own = plain[*fans.begin(fan)];
+    Vec3 quadratic = own, cubic = own;
+    const bool fits = fit_normal<5>(origin, at, quadratic);
+    const bool fits_better = fit_normal<9>(origin, at, cubic);
     const auto agree = [](const Vec3& a, const Vec3& b, double angle) {
       return a.cross(b).norm() <= kSmallTurn + angle;
     };
     // Two fits that agree are right. One alone has to stay close to the triangles; seen from one
     // side only, a normal may lie somewhat beyond them.
     const bool open = topology.vertex_sharp[fans.vertex(*fans.begin(fan))];
-    Vec3 normal = plain;
     if (fits && fits_better ? agree(quadratic, cubic, kLikely * spread(fan, true))
-                            : fits_better && agree(cubic, plain, kLikely * spread(fan, false)))
-      normal = cubic;
+                            : fits_better && agree(cubic, own, kLikely * spread(fan, false)))
+      set(fan, cubic, Trust::Fitted);
     else if (fits && !fits_better &&
-             agree(quadratic, plain, open ? 1.1 * spread(fan, true) : kLikely * spread(fan, false)))
-      normal = quadratic;
-    else
-      straighten_wall(shell, fans.begin(fan), fans.end(fan), kLonger, normal);
-    set(out, fan, normal);
+             agree(quadratic, own, open ? 1.1 * spread(fan, true) : kLikely * spread(fan, false)))
+      set(fan, quadratic, Trust::Fitted);
   };
   in_parallel(static_cast<std::size_t>(count), kAllCores, kGrain,
               [&](std::size_t begin, std::size_t end) {
-                std::vector<int> around;
-                std::vector<Vec3> points;
+                std::vector<int> near;
+                std::vector<Vec3> at;
                 for (std::size_t fan = begin; fan < end; ++fan)
-                  if (!settled[fan]) fit(static_cast<int>(fan), around, points);
+                  if (fans.begin(fan) != fans.end(fan) && !settled[fan])
+                    fit(static_cast<int>(fan), near, at);
               });
+  return {std::move(out), std::move(trust), false};
+}
+
+EstimatedNormals settle_given_normals(const Shell& shell, const CoplanarRegions& regions,
+                                      const std::vector<Vec3>& given, Faces& faces) {
+  const Topology& topology = shell.topology();
+  const auto alike = [&](int i, int j) { return (given[i] - given[j]).norm() <= kSameNormal; };
+  const Fans fans(shell, [&](const Edge& edge) {
+    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    return alike(h, Fans::after(g)) && alike(Fans::after(h), g);
+  });
+  // Means over edges beyond the crease angle, as on a coarse ball, are better than none.
+  int within = 0, beyond = 0;
+  for (const Edge& edge : topology.edges) {
+    const double turn = std::abs(topology.angle(shell.vertices(), shell.triangles(), edge));
+    within += turn > kSameNormal && edge.kind == EdgeClass::Smooth;
+    beyond += turn < kSurelySharp && edge.kind == EdgeClass::Crease;
+  }
+  if (beyond <= within && are_means(shell, fans, given))
+    return estimate_normals(shell, regions, faces);
+  std::vector<char> contradicted(faces.shapes.size(), 0);
+  const int corners = static_cast<int>(given.size());
+  for (int c = 0; c < corners; ++c) {
+    const int face = faces.of_triangle(c / 3);
+    if (face >= 0 && (faces.normal(shell, c / 3, c % 3) - given[c]).norm() > kContradiction)
+      contradicted[face] = 1;
+  }
+  faces.give_up(contradicted);
+  EstimatedNormals out{given, std::vector<Trust>(given.size(), Trust::Own), true};
+  for (int c = 0; c < corners; ++c)
+    if (faces.of_triangle(c / 3) >= 0) out.normals[c] = faces.normal(shell, c / 3, c % 3);
   return out;
 }
 

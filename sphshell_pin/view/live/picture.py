@@ -358,6 +358,7 @@ def _empty_parts(scene: Scene) -> frozenset[str]:
     has = {
         "patches": any(np.ptp(shell.element_patch) for shell, _ in shells),
         "distance": any(method == "smooth" for _, method in shells),
+        "faces": any(shell.element_face is None for shell, _ in shells),
         "pressure": bool(scene.pairs),
     }
     return frozenset(part for part, some in has.items() if not some)

@@ -35,7 +35,7 @@ def test_order_of_the_normals(name: str) -> None:
     errors, sides = [], []
     for h in (0.6, 0.3, 0.15):
         vertices, elements, exact = SURFACES[name].mesh(h)
-        shell = Shell(vertices, elements)
+        shell = Shell(vertices, elements, faces=False)  # a torus is recognized, and exact
         corners = exact[elements]
         error = np.linalg.norm(np.cross(corner_normals(shell), corners), axis=2)
         border = np.unique(shell.edge_vertices[shell.edge_class == 2])

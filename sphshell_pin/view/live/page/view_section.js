@@ -7,7 +7,7 @@ import { element, number, Slider } from "./controls.js";
 const PARTS = {
   robot: "Robot", spheres: "Spheres", arrows: "Force arrows", points: "Contact points",
   trails: "Trails", cones: "Friction cones", wireframe: "Wireframe", patches: "Patch colors",
-  distance: "Curved-flat distance", pressure: "Pressure patches",
+  distance: "Curved-flat distance", faces: "Face colors", pressure: "Pressure patches",
 };
 const boxes = new Map();
 let arrows = null, picture = null, framed = false;

@@ -1,0 +1,35 @@
+// Regions of connected coplanar triangles: however a plane was divided, it is one facet.
+#pragma once
+
+#include <vector>
+
+#include "shell/shell.hpp"
+
+namespace sphshell {
+
+class CoplanarRegions {
+ public:
+  // Triangles within `tolerance` [m] of the plane of the largest of them.
+  CoplanarRegions(const Shell& shell, double tolerance);
+
+  int of(int triangle) const { return of_[triangle]; }
+  int size() const { return static_cast<int>(regions_.size()); }
+  int count(int region) const { return regions_[region].count; }
+  double area(int region) const { return regions_[region].area; }
+  const Vec3& normal(int region) const { return regions_[region].normal; }
+  // How far the region of a half-edge (3 triangle + side) reaches from that side [m].
+  double height(int half_edge) const;
+
+ private:
+  struct Region {
+    Vec3 normal;  // unit, of its largest triangle
+    double area;
+    double extent;  // diagonal of its box
+    int count;
+  };
+  const Shell& shell_;
+  LargeArray<int> of_;
+  std::vector<Region> regions_;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,171 @@
+// Whether the vertices of a region over-determine its primitive: three points lie on a circle, two
+// circles on a sphere, any three rings on a torus.
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "shell/faces/recognizer.hpp"
+
+namespace sphshell {
+namespace {
+
+constexpr std::size_t kMoreThanParameters = 3;
+// Flat sides stand off by this many tolerances: less is rounding.
+constexpr double kLeastDeviation = 4;
+// Within so many tolerances a vertex has left slowly; a share of those beside a region.
+constexpr double kDrift = 4, kMostDrifting = 0.3;
+// The tolerance may tilt a facet by this share of what it leans.
+constexpr double kMostTilt = 0.05;
+// Equal steps agree to this share.
+constexpr double kEqualSteps = 2e-3;
+// Regions that are larger have vertices inside.
+constexpr std::size_t kSmall = 400;
+// The smallest singular value of a sphere's equations over the largest: below, a flat cap.
+constexpr double kLeastSingular = 2e-3;
+
+// The values that differ by more than `gap`.
+std::vector<double> distinct(std::vector<double> values, double gap) {
+  std::sort(values.begin(), values.end());
+  std::size_t kept = 0;
+  double last = 0;
+  for (const double x : values) {
+    if (kept == 0 || x - last > gap) values[kept++] = x;
+    last = x;
+  }
+  values.resize(kept);
+  return values;
+}
+
+// Angles that follow each other in equal steps, but for the gap where a part of the circle ends.
+bool are_equal_steps(const std::vector<double>& angles) {
+  std::vector<double> steps;
+  for (std::size_t i = 0; i < angles.size(); ++i)
+    steps.push_back(i + 1 < angles.size() ? angles[i + 1] - angles[i]
+                                          : angles[0] + 2 * M_PI - angles[i]);
+  steps.erase(std::max_element(steps.begin(), steps.end()));
+  const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
+  double mean = 0;
+  for (const double s : steps) mean += s / double(steps.size());
+  return *most - *least < kEqualSteps * mean;
+}
+
+bool enough(const std::vector<double>& angles, std::size_t many) {
+  return angles.size() >= many || (angles.size() + 1 == many && are_equal_steps(angles));
+}
+
+}  // namespace
+
+std::vector<int> Recognizer::inner_vertices(const Growth& growth) {
+  mark(growth.triangles);
+  const Topology& topology = shell_.topology();
+  std::vector<int> border;
+  for (const int t : growth.triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Edge& edge = topology.edges[topology.edge_of[3 * t + k]];
+      if (edge.count == 2 && is_marked(triangle_of(topology.other_half_edge(edge, 3 * t + k))))
+        continue;
+      border.push_back(edge.first_vertex);
+      border.push_back(edge.last_vertex);
+    }
+  std::sort(border.begin(), border.end());
+  std::vector<int> out;
+  for (const int v : vertices_of(growth.triangles))
+    if (!std::binary_search(border.begin(), border.end(), v)) out.push_back(v);
+  return out;
+}
+
+// A single strip of facets, all of its vertices on its border: perhaps a zone of something rounder.
+bool Recognizer::is_weak(const Growth& growth) {
+  return (growth.shape.kind == FaceKind::Cylinder || growth.shape.kind == FaceKind::Cone) &&
+         growth.triangles.size() < kSmall && inner_vertices(growth).empty();
+}
+
+// A region that ends where the surface slowly leaves the shape osculates a free one: beyond the
+// border of a face the next vertices are several tolerances off at once.
+bool Recognizer::drifts_away(const Growth& growth) {
+  mark(growth.triangles);
+  std::size_t leaving = 0, slowly = 0;
+  for (const int t : growth.triangles)
+    for (int k = 0; k < 3; ++k) {
+      const int u = beside_[3 * t + k];
+      if (u < 0 || is_marked(u)) continue;
+      double most = 0;
+      for (const int v : corners(u))
+        most = std::max(most, std::abs(growth.shape.distance(point(v))));
+      if (most <= growth.window) continue;
+      ++leaving;
+      slowly += most < kDrift * growth.window;
+    }
+  return double(slowly) > kMostDrifting * double(leaving);
+}
+
+bool Recognizer::is_over_determined(const Growth& growth) {
+  const Primitive& s = growth.shape;
+  const std::vector<int>& triangles = growth.triangles;
+  const std::vector<int> vertices = vertices_of(triangles);
+  if (triangles.size() < 3 ||
+      vertices.size() < std::size_t(num_parameters(s.kind)) + kMoreThanParameters ||
+      growth.deviation < kLeastDeviation * growth.window || !(s.radius > 0) || drifts_away(growth))
+    return false;
+  std::vector<double> leans, tilts;
+  for (const int t : triangles) {
+    leans.push_back(lean(t, s));
+    tilts.push_back(growth.window * longest_side(t) / std::max(2 * area(t), 1e-300));
+  }
+  const auto median = [](std::vector<double>& x) {
+    std::nth_element(x.begin(), x.begin() + std::ptrdiff_t(x.size() / 2), x.end());
+    return x[x.size() / 2];
+  };
+  if (median(tilts) > kMostTilt * median(leans)) return false;
+  const bool round = s.kind == FaceKind::Sphere || s.kind == FaceKind::Torus;
+  if (round && triangles.size() < kSmall && inner_vertices(growth).size() < 2) return false;
+  if (s.kind == FaceKind::Sphere) {
+    if (vertices.size() < 9) return false;
+    Eigen::Matrix4d square = Eigen::Matrix4d::Zero();
+    Mat3 spread = Mat3::Zero(), turn = Mat3::Zero();
+    Vec3 middle = Vec3::Zero(), mean = Vec3::Zero(), n;
+    for (const int v : vertices) middle += point(v) / double(vertices.size());
+    for (const int t : triangles) mean += facet_normal(t) / double(triangles.size());
+    for (const int v : vertices) {
+      s.distance(point(v), n);
+      const Eigen::Vector4d row(n.x(), n.y(), n.z(), 1);
+      square += row * row.transpose();
+      spread += (point(v) - middle) * (point(v) - middle).transpose();
+    }
+    for (const int t : triangles)
+      turn += (facet_normal(t) - mean) * (facet_normal(t) - mean).transpose();
+    const Eigen::Vector4d values =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(square, Eigen::EigenvaluesOnly)
+            .eigenvalues();
+    if (!(values[0] > kLeastSingular * kLeastSingular * values[3])) return false;
+    // Two parallel circles lie on a sphere, and so do three that are symmetric.
+    std::vector<Vec3> axes;
+    for (const Mat3& m : {spread, turn}) {
+      const Mat3 vectors = Eigen::SelfAdjointEigenSolver<Mat3>(m).eigenvectors();
+      for (int k = 0; k < 3; ++k) axes.push_back(vectors.col(k));
+    }
+    for (const Primitive& ring : guess_primitives(FaceKind::Torus, sample(triangles)))
+      axes.push_back(ring.axis);
+    return std::all_of(axes.begin(), axes.end(), [&](const Vec3& axis) {
+      std::vector<double> levels;
+      for (const int v : vertices) levels.push_back(point(v).dot(axis));
+      return distinct(std::move(levels), 20 * growth.window).size() >= 4;
+    });
+  }
+  const Vec3 u = s.axis.unitOrthogonal(), v = s.axis.cross(u);
+  std::vector<double> around, across, offs;
+  for (const int vertex : vertices) {
+    const Vec3 y = point(vertex) - s.point;
+    const double a = y.dot(u), b = y.dot(v), off = std::hypot(a, b);
+    if (off > 10 * growth.window) around.push_back(std::atan2(b, a)), offs.push_back(off);
+    if (s.kind == FaceKind::Torus) across.push_back(std::atan2(y.dot(s.axis), off - s.radius));
+  }
+  if (offs.empty()) return false;
+  const double gap = std::max(1e-3, 10 * growth.window / std::max(median(offs), 1e-300));
+  around = distinct(std::move(around), gap);
+  if (s.kind != FaceKind::Torus) return enough(around, 5);
+  across = distinct(std::move(across), std::max(1e-3, 10 * growth.window / s.second));
+  return around.size() >= 4 && enough(across, 5);
+}
+
+}  // namespace sphshell

@@ -1,0 +1,46 @@
+// Planes, cylinders, cones, spheres and tori in closed form, and how they are fitted to points.
+#pragma once
+
+#include <vector>
+
+#include "shell/topology.hpp"
+
+namespace sphshell {
+
+using Mat3 = Eigen::Matrix3d;
+
+enum class FaceKind : int { Plane = 0, Cylinder = 1, Cone = 2, Sphere = 3, Torus = 4 };
+
+struct Primitive {
+  FaceKind kind = FaceKind::Plane;
+  Vec3 point = Vec3::Zero();  // on the axis; the center of a sphere or torus; on a plane
+  Vec3 axis = Vec3::UnitZ();  // unit; the normal of a plane
+  double radius = 0;          // [m]; of a cone: at `point`; of a torus: of the circle of centers
+  double second = 0;          // of a cone: its half-angle [rad]; of a torus: the minor radius [m]
+
+  // Signed distance of x [m] and its gradient, which points away from the axis (sphere: center,
+  // torus: circle of centers).
+  double distance(const Vec3& x, Vec3& normal) const;
+  double distance(const Vec3& x) const {
+    Vec3 normal;
+    return distance(x, normal);
+  }
+};
+
+// How many numbers describe a primitive of a kind.
+int num_parameters(FaceKind kind);
+
+// What is known of some facets of a surface, to guess a primitive from.
+struct FacetSample {
+  std::vector<Vec3> vertices;
+  std::vector<Vec3> centroids, normals;  // of the facets, unit
+  std::vector<double> areas;
+};
+
+// Primitives of a kind (none of them a plane) that come near the facets.
+std::vector<Primitive> guess_primitives(FaceKind kind, const FacetSample& facets);
+
+// Gauss-Newton on the distances of the points. False unless all of them come within `tolerance`.
+bool fit_primitive(const std::vector<Vec3>& points, double tolerance, Primitive& primitive);
+
+}  // namespace sphshell

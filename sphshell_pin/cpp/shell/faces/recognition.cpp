@@ -1,0 +1,347 @@
+#include "shell/faces/recognition.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "shell/faces/recognizer.hpp"
+
+namespace sphshell {
+namespace {
+
+// Where nothing has been found from so many seeds, nothing is looked for any longer; and so many
+// triangles per seed more.
+constexpr std::size_t kPatience = 60, kTrianglesPerSeed = 3000;
+// Growths that lead to nothing look at so many triangles in all, and at so many times those that
+// there are: else seeds on a large free shape cost the square of its size.
+constexpr std::size_t kFewVisits = 300'000, kMostVisits = 4;
+// Vertices to guess from: enough for the kinds of up to six parameters, and for a torus.
+constexpr std::size_t kFewVertices = 8, kManyVertices = 12;
+// Planes have so many triangles, if they join what was not recognized smoothly. And they reach so
+// many times farther from a smooth side than what goes on beyond it.
+constexpr int kFewOfPlane = 4;
+constexpr double kFarther = 3, kFarLarger = 6;
+// A prism with sides that turn by this share of the crease angle may be meant as one.
+constexpr double kMostTurn = 0.95;
+// A turn [rad] that is none.
+constexpr double kNoTurn = 1e-5;
+// Simpler kinds win ties (cylinder, cone, sphere, torus).
+constexpr double kSimpler[] = {0, 1, 0.98, 0.97, 0.95};
+
+}  // namespace
+
+void Faces::give_up(const std::vector<char>& gone) {
+  std::vector<int> number(shapes.size(), -1);
+  std::vector<Primitive> kept;
+  for (std::size_t f = 0; f < shapes.size(); ++f) {
+    if (gone[f]) continue;
+    number[f] = static_cast<int>(kept.size());
+    kept.push_back(shapes[f]);
+  }
+  shapes = std::move(kept);
+  for (int& face : of)
+    if (face >= 0) face = number[face];
+}
+
+Recognizer::Recognizer(const Shell& shell, const CoplanarRegions& regions, double tolerance)
+    : shell_(shell),
+      regions_(regions),
+      tolerance_(tolerance),
+      wide_(std::max(3 * tolerance, 1e-6 * shell.size())),
+      tries_(shell.triangles().size(), 0),
+      of_(shell.triangles().size(), -1),
+      mark_(shell.triangles().size(), 0) {
+  list_neighbors();
+  find_candidates();
+}
+
+Vec3 Recognizer::centroid(int t) const {
+  const Triangle& c = corners(t);
+  return (point(c[0]) + point(c[1]) + point(c[2])) / 3;
+}
+
+double Recognizer::area(int t) const {
+  const Triangle& c = corners(t);
+  return (point(c[1]) - point(c[0])).cross(point(c[2]) - point(c[0])).norm() / 2;
+}
+
+double Recognizer::longest_side(int t) const {
+  const Triangle& c = corners(t);
+  double longest = 0;
+  for (int k = 0; k < 3; ++k)
+    longest = std::max(longest, (point(c[next_corner(k)]) - point(c[k])).norm());
+  return longest;
+}
+
+double Recognizer::turn(int t, int u) const {
+  const Vec3 &a = facet_normal(t), &b = facet_normal(u);
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+std::vector<int> Recognizer::vertices_of(const std::vector<int>& triangles) const {
+  std::vector<int> out;
+  out.reserve(3 * triangles.size());
+  for (const int t : triangles) out.insert(out.end(), corners(t).begin(), corners(t).end());
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+FacetSample Recognizer::sample(const std::vector<int>& triangles) const {
+  FacetSample out;
+  for (const int v : vertices_of(triangles)) out.vertices.push_back(point(v));
+  for (const int t : triangles) {
+    out.centroids.push_back(centroid(t));
+    out.normals.push_back(facet_normal(t));
+    out.areas.push_back(area(t));
+  }
+  return out;
+}
+
+void Recognizer::mark(const std::vector<int>& triangles) {
+  ++round_;
+  for (const int t : triangles) mark_[t] = round_;
+}
+
+void Recognizer::list_neighbors() {
+  const Topology& topology = shell_.topology();
+  beside_.assign(topology.edge_of.size(), -1);
+  for (const Edge& edge : topology.edges) {
+    if (edge.count != 2 || !(edge.inner || edge.kind == EdgeClass::Smooth)) continue;
+    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    if (turn(triangle_of(h), triangle_of(g)) > kMostTurn * shell_.crease_angle()) continue;
+    beside_[h] = triangle_of(g), beside_[g] = triangle_of(h);
+  }
+}
+
+// What turns smoothly somewhere, and is no part of a plane: of few coplanar triangles, or of
+// a strip all of which turn, and not far larger than what lies beside it.
+void Recognizer::find_candidates() {
+  const int count = static_cast<int>(of_.size());
+  turn_.assign(of_.size(), 0);
+  std::vector<char> straight(static_cast<std::size_t>(regions_.size()), 0);
+  std::vector<double> around(straight.size(), 0);
+  for (int t = 0; t < count; ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const int u = beside_[3 * t + k];
+      if (u < 0 || regions_.of(u) == regions_.of(t)) continue;
+      turn_[t] = std::max(turn_[t], static_cast<float>(turn(t, u)));
+      double& most = around[regions_.of(t)];
+      most = std::max(most, regions_.area(regions_.of(u)));
+    }
+    if (!(turn_[t] > kNoTurn)) straight[regions_.of(t)] = 1;
+  }
+  curved_.assign(of_.size(), 0);
+  for (int t = 0; t < count; ++t) {
+    const int r = regions_.of(t);
+    const bool few = regions_.count(r) <= 2;
+    const bool wall = few && regions_.area(r) > kFarLarger * around[r];
+    curved_[t] = turn_[t] > kNoTurn && (few || !straight[r]) && !wall;
+  }
+}
+
+// The best of the kinds that the patch lies on. False where it lies on none.
+bool Recognizer::try_kinds(int seed, const std::vector<int>& patch, bool torus, bool others,
+                           Growth& best, double& score) {
+  bool any = false;
+  const FacetSample facets = sample(patch);
+  for (const FaceKind kind :
+       {FaceKind::Cylinder, FaceKind::Cone, FaceKind::Sphere, FaceKind::Torus}) {
+    if (!(kind == FaceKind::Torus ? torus : others) ||
+        facets.vertices.size() < std::size_t(num_parameters(kind)) + 1)
+      continue;
+    for (Primitive guess : guess_primitives(kind, facets)) {
+      if (!fit_primitive(facets.vertices, tolerance_, guess)) continue;
+      any = true;
+      Growth growth = grow_and_refit(seed, guess);
+      const Primitive shape = growth.shape;
+      leave_own_faces_out(growth);
+      if (!is_over_determined(growth)) {
+        // Fine meshes stand off so little that only the closest vertices count.
+        growth = grow(seed, shape, tolerance_);
+        leave_own_faces_out(growth);
+        if (!is_over_determined(growth)) continue;
+      }
+      const double worth = double(growth.triangles.size()) * kSimpler[static_cast<int>(kind)];
+      if (worth > score) score = worth, best = std::move(growth);
+      break;
+    }
+  }
+  return any;
+}
+
+bool Recognizer::recognize_from(int seed) {
+  Growth best;
+  double score = 0;
+  std::vector<int> tried;
+  for (const bool along : {false, true}) {
+    const std::vector<int> few = patch(seed, kFewVertices, along);
+    if (few.size() < 3) return false;
+    const std::vector<int> many = patch(seed, kManyVertices, along);
+    // What no kind fits it fits no better with more triangles.
+    const bool fits = try_kinds(seed, few, false, true, best, score);
+    if (fits) try_kinds(seed, many, false, true, best, score);
+    try_kinds(seed, many, true, false, best, score);
+    if (best.triangles.size() > 2 * many.size()) break;
+    tried = many;
+  }
+  // What one kind explains is a better sample for the others than the patch was.
+  for (std::size_t size = 0; best.triangles.size() > size;) {
+    size = best.triangles.size();
+    std::vector<int> region = best.triangles;
+    try_kinds(seed, region, true, true, best, score);
+    if (!is_weak(best)) continue;
+    // A strip may be a zone of something rounder: with the strips beside it.
+    mark(region);
+    for (std::size_t i = 0; i < size; ++i)
+      for (int k = 0; k < 3; ++k) {
+        const int u = beside_[3 * region[i] + k];
+        if (u < 0 || is_marked(u) || !curved_[u]) continue;
+        mark_[u] = round_;
+        region.push_back(u);
+      }
+    try_kinds(seed, region, true, true, best, score);
+  }
+  if (take(std::move(best))) return true;
+  tries_[seed] = 2;
+  for (const int t : tried) ++tries_[t];
+  return false;
+}
+
+// What lies on faces found before is taken from them as a whole, or not at all.
+bool Recognizer::take(Growth growth) {
+  std::vector<int>& all = growth.triangles;
+  std::vector<int> shared(faces_.size(), 0);
+  for (const int t : all)
+    if (of_[t] >= 0) ++shared[of_[t]];
+  const auto stays = [&](int f) {
+    const double own = double(faces_[f].triangles.size());
+    return shared[f] < 0.9 * own || double(all.size()) < 1.3 * own;
+  };
+  all.erase(
+      std::remove_if(all.begin(), all.end(), [&](int t) { return of_[t] >= 0 && stays(of_[t]); }),
+      all.end());
+  if (all.size() < 3) return false;
+  if (!is_weak(growth)) absorb_slivers(growth);
+  for (const int t : all) of_[t] = static_cast<int>(faces_.size());
+  faces_.push_back(std::move(growth));
+  return true;
+}
+
+// Short strips beside what is smooth and was not recognized, or beside each other, are zones of a
+// free shape: they look like cones.
+void Recognizer::drop_zones_of_free_shapes() {
+  std::vector<char> weak(faces_.size(), 0);
+  for (std::size_t f = 0; f < faces_.size(); ++f) {
+    std::vector<int>& all = faces_[f].triangles;
+    all.erase(std::remove_if(all.begin(), all.end(), [&](int t) { return of_[t] != int(f); }),
+              all.end());
+    weak[f] = !all.empty() && is_weak(faces_[f]);
+  }
+  std::vector<int> dropped;
+  for (std::size_t f = 0; f < faces_.size(); ++f) {
+    if (!weak[f]) continue;
+    const Growth& face = faces_[f];
+    int smooth = 0, vague = 0;
+    std::vector<double> shortest;
+    double low = 0, high = 0, mean = 0;
+    for (const int t : face.triangles) mean += area(t) / double(face.triangles.size());
+    for (const int t : face.triangles) {
+      double least = longest_side(t);
+      for (int k = 0; k < 3; ++k) {
+        const Vec3& here = point(corners(t)[k]);
+        least = std::min(least, (point(corners(t)[next_corner(k)]) - here).norm());
+        const double along = (here - face.shape.point).dot(face.shape.axis);
+        if (shortest.empty() && k == 0) low = high = along;
+        low = std::min(low, along), high = std::max(high, along);
+        const int u = beside_[3 * t + k];
+        if (u < 0 || of_[u] == int(f)) continue;
+        ++smooth;
+        vague += of_[u] >= 0 ? weak[of_[u]]
+                             : curved_[u] && regions_.area(regions_.of(u)) < 2 * kFarLarger * mean;
+      }
+      shortest.push_back(least);
+    }
+    const auto middle = shortest.begin() + std::ptrdiff_t(shortest.size() / 2);
+    std::nth_element(shortest.begin(), middle, shortest.end());
+    if (smooth > 0 && 2 * vague >= smooth && high - low < 6 * *middle)
+      dropped.push_back(static_cast<int>(f));
+  }
+  for (const int f : dropped)
+    for (const int t : faces_[f].triangles) of_[t] = -1;
+}
+
+// Coplanar triangles with a vertex more than a plane needs, that reach farther from each smooth
+// side than what turns away from them there: the long side of a turn does not bend.
+void Recognizer::add_planes(Faces& faces) const {
+  const Topology& topology = shell_.topology();
+  const auto count = static_cast<std::size_t>(regions_.size());
+  std::vector<char> plane(count, 1);
+  std::vector<int> number(count, -1), some(count, -1);
+  for (std::size_t t = 0; t < of_.size(); ++t) {
+    char& is_plane = plane[regions_.of(int(t))];
+    some[regions_.of(int(t))] = static_cast<int>(t);
+    if (of_[t] >= 0 || regions_.count(regions_.of(int(t))) < 2) is_plane = 0;
+    for (int k = 0; k < 3 && is_plane; ++k) {
+      const int h = 3 * static_cast<int>(t) + k, u = beside_[h];
+      if (u < 0 || regions_.of(u) == regions_.of(int(t))) continue;
+      const int g = topology.other_half_edge(topology.edges[topology.edge_of[h]], h);
+      if (of_[u] >= 0) continue;  // its normals are known
+      is_plane = regions_.count(regions_.of(int(t))) >= kFewOfPlane &&
+                 regions_.height(h) > kFarther * regions_.height(g);
+    }
+  }
+  for (std::size_t t = 0; t < of_.size(); ++t) {
+    const int r = regions_.of(int(t));
+    if (!plane[r]) continue;
+    if (number[r] < 0) {
+      number[r] = static_cast<int>(faces.shapes.size());
+      faces.shapes.push_back(
+          {FaceKind::Plane, point(corners(some[r])[0]), regions_.normal(r), 0, 0});
+    }
+    faces.of[t] = number[r];
+  }
+}
+
+Faces Recognizer::run() {
+  std::vector<int> seeds;
+  for (std::size_t t = 0; t < of_.size(); ++t)
+    if (curved_[t]) seeds.push_back(static_cast<int>(t));
+  // Any order will do, as long as it is the same one and visits all places soon.
+  std::uint64_t state = 1;
+  for (std::size_t i = seeds.size(); i > 1; --i) {
+    state = state * 6364136223846793005u + 1442695040888963407u;
+    std::swap(seeds[i - 1], seeds[(state >> 33) % i]);
+  }
+  std::size_t failures = 0, fruitless = 0;
+  for (const int seed : seeds) {
+    if (failures >= kPatience + seeds.size() / kTrianglesPerSeed) break;
+    if (fruitless > kFewVisits + kMostVisits * of_.size()) break;
+    if (of_[seed] >= 0 || tries_[seed] >= 2) continue;
+    const std::size_t before = visits_;
+    const bool found = recognize_from(seed);
+    failures = found ? 0 : failures + 1;
+    fruitless += found ? 0 : visits_ - before;
+  }
+  drop_zones_of_free_shapes();
+  Faces out;
+  out.of.assign(of_.size(), -1);
+  std::vector<int> number(faces_.size(), -1);
+  for (std::size_t t = 0; t < of_.size(); ++t) {
+    if (of_[t] < 0) continue;
+    int& at = number[of_[t]];
+    if (at < 0)
+      at = static_cast<int>(out.shapes.size()), out.shapes.push_back(faces_[of_[t]].shape);
+    out.of[t] = at;
+  }
+  add_planes(out);
+  if (out.shapes.empty()) out.of.clear();
+  return out;
+}
+
+Faces recognize_faces(const Shell& shell, const CoplanarRegions& regions, double tolerance) {
+  return Recognizer(shell, regions, tolerance).run();
+}
+
+}  // namespace sphshell

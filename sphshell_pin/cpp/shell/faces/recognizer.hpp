@@ -1,0 +1,85 @@
+// Inside of recognition.cpp, growth.cpp and evidence.cpp: the search for faces in a mesh.
+#pragma once
+
+#include <vector>
+
+#include "shell/faces/recognition.hpp"
+
+namespace sphshell {
+
+// A connected part of the mesh that a primitive explains.
+struct Growth {
+  Primitive shape;
+  std::vector<int> triangles;
+  int sign = 1;          // of the triangles' normals along the shape's
+  double deviation = 0;  // of the flat sides from the shape, the largest [m]
+  double window = 0;     // the vertices are as close as that to the shape [m]
+};
+
+class Recognizer {
+ public:
+  Recognizer(const Shell& shell, const CoplanarRegions& regions, double tolerance);
+
+  Faces run();
+
+ private:
+  // What one triangle says of a primitive.
+  struct Explained {
+    bool explained;
+    int sign;
+    double deviation;
+  };
+
+  const Triangle& corners(int t) const { return shell_.triangles()[t]; }
+  const Vec3& point(int vertex) const { return shell_.vertices()[vertex]; }
+  const Vec3& facet_normal(int t) const { return shell_.topology().face_normal[t]; }
+  Vec3 centroid(int t) const;
+  double area(int t) const;
+  double longest_side(int t) const;
+  double turn(int t, int u) const;  // [rad]
+  std::vector<int> vertices_of(const std::vector<int>& triangles) const;
+  FacetSample sample(const std::vector<int>& triangles) const;
+  void mark(const std::vector<int>& triangles);
+  bool is_marked(int t) const { return mark_[t] == round_; }
+
+  // growth.cpp
+  std::vector<int> patch(int seed, std::size_t vertices, bool along);
+  Explained explain(int t, const Primitive& shape, double tolerance, double most_lean) const;
+  double lean(int t, const Primitive& shape) const;
+  Growth grow(int seed, const Primitive& shape, double tolerance);
+  bool refit(Growth& growth) const;
+  Growth grow_and_refit(int seed, const Primitive& shape);
+  void leave_own_faces_out(Growth& growth);
+  void absorb_slivers(Growth& growth);
+
+  // evidence.cpp
+  std::vector<int> inner_vertices(const Growth& growth);
+  bool drifts_away(const Growth& growth);
+  bool is_over_determined(const Growth& growth);
+  bool is_weak(const Growth& growth);
+
+  // recognition.cpp
+  void list_neighbors();
+  void find_candidates();
+  bool try_kinds(int seed, const std::vector<int>& patch, bool torus, bool others, Growth& best,
+                 double& score);
+  bool recognize_from(int seed);
+  bool take(Growth growth);
+  void drop_zones_of_free_shapes();
+  void add_planes(Faces& faces) const;
+
+  const Shell& shell_;
+  const CoplanarRegions& regions_;
+  const double tolerance_, wide_;
+  std::vector<int> beside_;    // per half-edge: the triangle across a smooth edge, else -1
+  std::vector<float> turn_;    // per triangle: the largest turn at its smooth edges [rad]
+  std::vector<char> curved_;   // per triangle: may belong to a curved face
+  std::vector<char> tries_;    // per triangle: in how many failures
+  std::vector<int> of_;        // per triangle: in faces_
+  std::vector<Growth> faces_;  // triangles as they were found; others may have taken some since
+  std::vector<int> mark_;
+  int round_ = 0;
+  std::size_t visits_ = 0;  // of triangles, by all growths
+};
+
+}  // namespace sphshell

@@ -1,0 +1,85 @@
+"""The faces that a mesh was made from, as the core recognizes them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sphshell_pin import _core
+from sphshell_pin.checks import read_only
+from sphshell_pin.shell.raw import Floats, Ints
+
+KINDS = ("plane", "cylinder", "cone", "sphere", "torus")
+MOST_GROUPS = 5  # in words
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """A plane, cylinder, cone, sphere or torus that elements of a shell lie on, in its frame.
+
+    Attributes
+    ----------
+    kind : "plane", "cylinder", "cone", "sphere" or "torus"
+    point : (3,) on the plane or the axis; the center of a sphere or torus [m]
+    axis : (3,) unit vector along the axis, or the normal of a plane; None of a sphere
+    radius : of a cylinder or sphere; of a cone at `point`; of a torus from its center to those of
+        its tube [m]; None of a plane
+    minor_radius : of the tube of a torus [m], else None
+    half_angle : of a cone, between its axis and its surface: negative where its radius decreases
+        along the axis [rad], else None
+    elements : (k,) indices of the elements on it
+    """
+
+    kind: str
+    point: Floats
+    axis: Floats | None
+    radius: float | None
+    minor_radius: float | None
+    half_angle: float | None
+    elements: Ints
+
+
+def faces_of(core: _core.Shell) -> tuple[Face, ...]:
+    """Return the faces that a compiled surface with curved elements has recognized."""
+    of_element = np.full(core.num_elements, -1, np.int32)
+    of_element[core.triangle_element] = core.triangle_face
+    kinds, numbers = core.faces
+    order = np.argsort(of_element, kind="stable").astype(np.int32)
+    rows, starts = np.unique(of_element[order], return_index=True)
+    parts = zip(rows.tolist(), np.split(order, starts[1:]), strict=True)
+    return tuple(_face(KINDS[kinds[k]], numbers[k], some) for k, some in parts if k >= 0)
+
+
+def _face(kind: str, numbers: Floats, elements: Ints) -> Face:
+    point, axis = read_only(numbers[:3].copy()), read_only(numbers[3:6].copy())
+    radius, second = numbers[6:].tolist()
+    return Face(
+        kind,
+        point,
+        None if kind == "sphere" else axis,
+        None if kind == "plane" else radius,
+        second if kind == "torus" else None,
+        second if kind == "cone" else None,
+        read_only(elements.copy()),
+    )
+
+
+def described(faces: Sequence[Face], elements: int) -> str:
+    """Return how many faces there are by kind and radius, and the share of elements on none."""
+    groups = Counter(map(_named, faces)).most_common()
+    parts = [f"{n} {name[n > 1]}" for name, n in groups[:MOST_GROUPS]]
+    if more := sum(n for _, n in groups[MOST_GROUPS:]):
+        parts.append(f"and {more} more")
+    left = 100.0 * (1.0 - sum(len(face.elements) for face in faces) / elements)
+    share = f"; {left:.3g} % of the elements on none" if left > 0.0 else ""
+    return (", ".join(parts) or "none recognized") + share
+
+
+def _named(face: Face) -> tuple[str, str]:
+    """Return the kind of a face and its radius in words, and the plural of it."""
+    radii = [f"{r * 1e3:.4g}" for r in (face.radius, face.minor_radius) if r is not None]
+    of = "" if face.kind in ("plane", "cone") else f" of radius {' and '.join(radii)} mm"
+    return face.kind + of, ("tori" if face.kind == "torus" else f"{face.kind}s") + of

@@ -1,0 +1,176 @@
+"""Generate parts, write them as files, and compare what is read with their exact CAD faces.
+
+python -m tests.parts [--count 300] [--seed 1] [--only 123 peg] [--show] [--write PAGE]
+python -m tests.parts --files FOLDER
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections import Counter
+from dataclasses import asdict
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+
+from tests.parts import tables
+from tests.parts.cad_mesh import KINDS
+from tests.parts.earlier import against
+from tests.parts.files import KINDS_OF_FILE
+from tests.parts.judge import METHODS, Part, Verdict, distance_errors, loaded, random_part
+from tests.parts.real import press_on_files
+from tests.parts.running import Outcome, run
+from tests.parts.solids import FAMILIES, family_of, random_solid
+
+INTRODUCTION = """\
+# What mesh files of parts cost
+
+Most CAD programs export meshes without normals. Here are {count} random parts of {families}
+families, made with OpenCASCADE, meshed with deflections of 1e-4 to 1e-2 of their size, written to
+files in several ways, and compared with their exact CAD faces. OpenCASCADE failed on {skipped} of
+them, which were skipped.
+
+- **worse than flat**: parts whose largest error of the closest distance with the curved elements
+  exceeds 1.5 times that with the flat ones by more than 1e-4 of the size.
+- **mean error over flat's**: geometric mean over the parts.
+- **planes off**: parts with a force on a planar face whose error exceeds 1.5 times that of the
+  flat elements by more than 1 %; **force on them**: smallest and largest, over the exact ones.
+- **spoiled**: files whose flat elements are off by more than 2 % of the size; they are left out.
+
+`{command}` wrote this page.
+"""
+
+
+def main() -> int:
+    """Run, print and write; return 1 where a file is refused."""
+    options = arguments()
+    if options.files:
+        print(press_on_files(options.files))
+        return 0
+    kinds = tuple(kind for kind in KINDS_OF_FILE if kind not in options.without)
+    if "decimated" in kinds and find_spec("fast_simplification") is None:
+        print("No decimated files: they need fast-simplification (pip install fast-simplification)")
+        kinds = tuple(kind for kind in kinds if kind != "decimated")
+    numbers = chosen(options.count, options.only)
+    begin, outcomes = time.perf_counter(), []
+    for outcome in run(numbers, options.seed, kinds):
+        outcomes.append(outcome)
+        report(outcome)
+        if options.show and not outcome.skipped:
+            show(random_part(outcome.number, options.seed), kinds)
+        if options.keep and not outcome.skipped:
+            keep(outcome.number, options.seed, options.keep)
+    verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
+    print("\n\n".join(sections(verdicts)))
+    failed = Counter(f"{family_of(one.number)}: {one.skipped}" for one in outcomes if one.skipped)
+    print(f"\n{len(outcomes)} parts, {failed.total()} skipped {dict(failed)}")
+    print(f"{time.perf_counter() - begin:.0f} s")
+    if options.against:
+        print(against(options.against, verdicts))
+    if options.json:
+        rows = [asdict(verdict) for verdict in verdicts]
+        options.json.write_text(json.dumps(rows, default=np.ndarray.tolist), encoding="utf-8")
+    if options.write:
+        text = INTRODUCTION.format(
+            count=len(outcomes),
+            families=len(FAMILIES),
+            skipped=failed.total(),
+            command=f"python -m tests.parts --count {options.count} --seed {options.seed} --write",
+        )
+        options.write.write_text("\n\n".join([text.strip(), *sections(verdicts)]) + "\n", "utf-8")
+        print(f"wrote {options.write}")
+    return 1 if any(outcome.refused for outcome in outcomes) else 0
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.parts", description=(__doc__ or "").partition("\n")[0]
+    )
+    parser.add_argument("--count", type=int, default=300, help="number of parts")
+    parser.add_argument("--seed", type=int, default=1, help="of all parts together")
+    parser.add_argument("--only", nargs="+", default=[], help="numbers of parts, or families")
+    parser.add_argument("--without", nargs="+", default=[], help="kinds of files to leave out")
+    parser.add_argument("--show", action="store_true", help="where the errors are")
+    parser.add_argument("--keep", type=Path, help="folder for the STEP files of the parts")
+    parser.add_argument("--json", type=Path, help="all figures, to a file")
+    parser.add_argument("--against", type=Path, help="figures of an earlier run to compare with")
+    parser.add_argument("--write", type=Path, help="the tables as a page, to a file")
+    parser.add_argument("--files", type=Path, help="a folder of files to press on, instead")
+    options = parser.parse_args()
+    unknown = {*options.without} - {*KINDS_OF_FILE}
+    if unknown:
+        parser.error(f"unknown {sorted(unknown)}: --without takes {list(KINDS_OF_FILE)}")
+    names = [one for one in options.only if not one.isdigit()]
+    if not set(names) <= set(FAMILIES):
+        parser.error(f"--only takes numbers, and the families {', '.join(FAMILIES)}")
+    return options
+
+
+def chosen(count: int, only: list[str]) -> list[int]:
+    """Return the numbers of parts: all below `count`, those of families, or those named."""
+    numbers = [int(one) for one in only if one.isdigit()]
+    families = [one for one in only if not one.isdigit()]
+    if only:
+        return numbers + [k for k in range(count) if family_of(k) in families]
+    return list(range(count))
+
+
+def report(outcome: Outcome) -> None:
+    for verdict in outcome.verdicts:
+        print(tables.line(verdict), flush=True)
+    for text in outcome.refused:
+        print(f"{outcome.number:4d} REFUSED {text}", flush=True)
+    if outcome.skipped:
+        print(f"{outcome.number:4d} {family_of(outcome.number)} skipped: {outcome.skipped}")
+
+
+def sections(verdicts: list[Verdict]) -> list[str]:
+    """Return headings and tables."""
+    first = next((kind for kind in KINDS_OF_FILE if any(v.file == kind for v in verdicts)), "")
+    own = [verdict for verdict in verdicts if verdict.file == first]
+    found = ["## Kinds of files", tables.by_file(verdicts)]
+    found += [f"## Families: {first}", tables.by_family(own)]
+    for name, group in tables.groups(verdicts, "file"):
+        faces = tables.by_face(group)
+        if faces and (name == first or any(v.recognized is not None for v in group)):
+            found += [f"## Triangles by their CAD face: {name}", faces]
+    return [*found, "## The worst", tables.worst(verdicts)]
+
+
+def show(part: Part, kinds: tuple[str, ...]) -> None:
+    """Print where the largest errors of a part's files are, by the kind of the CAD face."""
+    counts = np.bincount(part.mesh.kind, minlength=len(KINDS))
+    triangles = ", ".join(f"{n} {k}" for k, n in zip(KINDS, counts.tolist(), strict=True) if n)
+    print(
+        f"     deflection {part.deflection:.0e} of {part.mesh.size:.1f} mm; triangles: "
+        f"{triangles}; {len(part.places.points)} places, {part.places.dropped} dropped"
+    )
+    for kind in kinds:
+        shell, _, _ = loaded(part, kind)
+        curved, flat = (distance_errors(shell, part, method)[0] for method in METHODS)
+        for k in np.unique(part.places.kinds).tolist():
+            own = np.flatnonzero(part.places.kinds == k)
+            row = own[curved[own].argmax()]
+            at = ", ".join(f"{x:.4f}" for x in part.places.points[row])
+            away = part.places.distances[row]
+            print(
+                f"     {kind}, beside a {KINDS[k]}: {curved[row]:.1e}, largest flat "
+                f"{flat[own].max():.1e}, at ({at}) mm, {away:.4f} mm from it"
+            )
+
+
+def keep(number: int, seed: int, folder: Path) -> None:
+    """Write the solid of a part as a STEP file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    writer = STEPControl_Writer()
+    writer.Transfer(random_solid(number, seed), STEPControl_AsIs)
+    writer.Write(str(folder / f"{family_of(number)}_{seed}_{number}.step"))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

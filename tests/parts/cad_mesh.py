@@ -1,0 +1,145 @@
+"""Triangles of a solid's faces as OpenCASCADE meshes them, with what CAD knows of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.BRepTools import BRepTools
+from OCP.GeomAbs import (
+    GeomAbs_Cone,
+    GeomAbs_Cylinder,
+    GeomAbs_Plane,
+    GeomAbs_Sphere,
+    GeomAbs_Torus,
+)
+
+from sphshell_pin.shell.cad.face_mesh import FaceMesh, take_mesh
+from tests.parts.occ import OccFailed, Solid
+from tests.shell.cad_shapes import faces
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MM = 1e-3
+"""Parts are in millimeters, shells in meters."""
+
+KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "spline")
+"""Of the surfaces below faces; all that is none of the first five counts as the last."""
+
+_KIND_OF = dict(
+    zip(
+        (GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_Torus),
+        KINDS,
+        strict=False,
+    )
+)
+
+MOST_TRIANGLES = 30_000
+
+
+@dataclass(frozen=True)
+class Face:
+    """One CAD face: its `shape`, its `kind`, and the triangles `mesh` that are laid on it."""
+
+    shape: Solid
+    kind: str
+    mesh: FaceMesh
+
+
+@dataclass(frozen=True)
+class CadMesh:
+    """The triangles of all faces, welded [mm].
+
+    Attributes
+    ----------
+    vertices : (n, 3); triangles : (t, 3), outer sides out
+    face : (t,) row of the CAD face; kind : (t,) row in KINDS of its surface
+    normals : (t, 3, 3) exact ones of the CAD faces at the corners
+    """
+
+    vertices: Array
+    triangles: Ints
+    face: Ints
+    kind: Ints
+    normals: Array
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box."""
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+    @property
+    def areas(self) -> Array:
+        return np.asarray(np.linalg.norm(area_vectors(self.vertices, self.triangles), axis=1))
+
+
+def area_vectors(vertices: Array, triangles: Ints) -> Array:
+    """Normals (t, 3), as long as the triangles have area."""
+    corners = vertices[triangles]
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+
+
+def meshed_faces(solid: Solid, deflection: float, angle: float) -> list[Face]:
+    """Mesh a solid [mm, rad]; OpenCASCADE's deflection is no guarantee.
+
+    Raises
+    ------
+    OccFailed
+        If a face gets no triangles.
+    """
+    BRepTools.Clean_s(solid)
+    BRepMesh_IncrementalMesh(solid, deflection, False, angle, False)
+    found = []
+    for shape in faces(solid):
+        mesh = take_mesh(shape)
+        if mesh is None:
+            raise OccFailed("a face without triangles")
+        kind = _KIND_OF.get(BRepAdaptor_Surface(shape).GetType(), "spline")
+        found.append(Face(shape, kind, mesh))
+    return found
+
+
+def coarse_enough(solid: Solid, deflection: float, angle: float) -> tuple[list[Face], float]:
+    """Mesh with the deflection stated, or the first larger one of few enough triangles."""
+    while True:
+        found = meshed_faces(solid, deflection, angle)
+        if sum(len(face.mesh.triangles) for face in found) <= MOST_TRIANGLES:
+            return found, deflection
+        deflection, angle = 2 * deflection, min(1.4 * angle, 0.6)
+
+
+def joined(found: list[Face]) -> CadMesh:
+    """Weld the triangles of faces; those that become lines are left out."""
+    points = np.concatenate([face.mesh.points for face in found])
+    size = np.linalg.norm(np.ptp(points, axis=0))
+    cells = np.round(points / (1e-8 * size))
+    _, first, place = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    rows = np.concatenate(list(_rows_of(found)))
+    triangles = place.ravel()[rows]
+    there = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    count = [len(face.mesh.triangles) for face in found]
+    return CadMesh(
+        vertices=points[first],
+        triangles=triangles[there],
+        face=np.repeat(np.arange(len(found)), count)[there],
+        kind=np.repeat([KINDS.index(face.kind) for face in found], count)[there],
+        normals=np.concatenate([face.mesh.corner_normals()[:, _turn(face)] for face in found])[
+            there
+        ],
+    )
+
+
+def _rows_of(found: list[Face]) -> Iterator[Ints]:
+    start = 0
+    for face in found:
+        yield face.mesh.triangles[:, _turn(face)] + start
+        start += len(face.mesh.points)
+
+
+def _turn(face: Face) -> list[int]:
+    return [0, 2, 1] if face.mesh.reversed else [0, 1, 2]

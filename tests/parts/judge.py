@@ -1,0 +1,191 @@
+"""What one file of a part costs: errors of distances, and of forces on planes."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from sphshell_pin import ImpactLaw, Shell
+from tests.parts.cad_mesh import MM, Array, CadMesh, Ints, coarse_enough, joined
+from tests.parts.files import KINDS_OF_FILE
+from tests.parts.found import Found, faces_found, share_recognized
+from tests.parts.solids import family_of, random_solid
+from tests.parts.truth import ExactFaces, Places, Touches
+
+METHODS = ("smooth", "facets")
+LAW = ImpactLaw(1.0, exponent=1.5)
+
+DEFLECTIONS = tuple(np.geomspace(1e-4, 1e-2, 5).tolist())
+"""Of meshes over the size: a part has one of them."""
+
+ANGLES = 0.1, 0.6
+"""Largest angles between neighboring triangles [rad]: a part has one between these."""
+
+PLACES, TOUCHES = 400, 24
+
+FLOOR = 2e-7
+"""Mean errors over the size below that of single precision count as that."""
+
+FACTOR, MARGIN = 1.5, 1e-4
+"""A file is worse where the largest curved error exceeds the factor times the flat one, and the
+margin over the size."""
+
+PLANE_MARGIN = 0.01
+"""The same for forces on planes, over the exact ones."""
+
+SPOILED = 0.02
+"""A file whose flat elements are farther from the solid, over the size, is left out."""
+
+SAME_DISTANCE = 0.05
+"""Relative difference of a distance whose sign is wrong from the exact one, at most."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A random part: its mesh, a finer one, and what is exactly known of the solid [mm]."""
+
+    number: int
+    family: str
+    deflection: float
+    mesh: CadMesh
+    fine: CadMesh
+    places: Places
+    touches: Touches
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One file. Lengths are over the size, by method in METHODS; forces over the exact ones.
+
+    Attributes
+    ----------
+    number, family, file, triangles, deflection, touches : of the part and its file
+    largest, mean : errors of distances; wrong_signs : distances right but for their sign
+    off_plane : touches of planes whose curved force is off by more than the flat one's
+    forces : smallest and largest on planes
+    lost : touches of planes that are not found
+    ok : what `health` says; seconds : of processor time to load and curve it
+    recognized : share of the triangles in faces that were found, None where none are looked for
+    found : by CAD face; None of a file with other triangles
+    """
+
+    number: int
+    family: str
+    file: str
+    triangles: int
+    deflection: float
+    largest: dict[str, float]
+    mean: dict[str, float]
+    wrong_signs: dict[str, int]
+    touches: int
+    off_plane: int
+    forces: dict[str, tuple[float, float]]
+    lost: dict[str, int]
+    ok: bool
+    seconds: float
+    recognized: float | None = None
+    found: Found | None = field(default=None, repr=False)
+
+    @property
+    def worse(self) -> bool:
+        """Whether the largest curved error is beyond the flat one's."""
+        return self.largest["smooth"] > FACTOR * self.largest["facets"] + MARGIN
+
+    @property
+    def ratio(self) -> float:
+        """Mean error, curved over flat."""
+        return max(self.mean["smooth"], FLOOR) / max(self.mean["facets"], FLOOR)
+
+    @property
+    def spoiled(self) -> bool:
+        """Whether the file is another part: its flat elements are far off."""
+        return self.largest["facets"] > SPOILED
+
+
+def random_part(number: int, seed: int = 1) -> Part:
+    """Return the part of a number; raises where OpenCASCADE fails on it."""
+    solid = random_solid(number, seed)
+    rng = np.random.default_rng([seed, number, 1])
+    exact = ExactFaces(solid)
+    places = exact.places(PLACES, rng)
+    share, angle = float(rng.choice(DEFLECTIONS)), float(rng.uniform(*ANGLES))
+    faces, deflection = coarse_enough(solid, share * exact.size, angle)
+    # A sphere that touches a plane alone has the facets of its neighbors out of reach, too.
+    touches = exact.touches(TOUCHES, rng, 2.0 * deflection)
+    return Part(
+        number=number,
+        family=family_of(number),
+        deflection=deflection / exact.size,
+        mesh=joined(faces),
+        fine=exact.mesh,
+        places=places,
+        touches=touches,
+    )
+
+
+def judged(part: Part, kind: str) -> Verdict:
+    """Write the file of that kind, load and measure it."""
+    shell, rows, seconds = loaded(part, kind)
+    errors, signs = {}, {}
+    for method in METHODS:
+        errors[method], signs[method] = distance_errors(shell, part, method)
+    forces = {method: forces_on_planes(shell, part.touches, method) for method in METHODS}
+    off = {method: np.abs(forces[method] - 1.0) for method in METHODS}
+    return Verdict(
+        number=part.number,
+        family=part.family,
+        file=kind,
+        triangles=len(rows),
+        deflection=part.deflection,
+        largest={method: float(error.max()) for method, error in errors.items()},
+        mean={method: float(error.mean()) for method, error in errors.items()},
+        wrong_signs=signs,
+        touches=len(part.touches.depths),
+        off_plane=int((off["smooth"] > FACTOR * off["facets"] + PLANE_MARGIN).sum()),
+        forces={m: (float(f.min(initial=1)), float(f.max(initial=1))) for m, f in forces.items()},
+        lost={method: int((force == 0.0).sum()) for method, force in forces.items()},
+        ok=shell.health.ok,
+        seconds=seconds,
+        recognized=share_recognized(shell),
+        found=faces_found(shell, part.mesh, rows) if (rows >= 0).all() else None,
+    )
+
+
+def loaded(part: Part, kind: str) -> tuple[Shell, Ints, float]:
+    """Write a file and load it: the shell, its triangles as rows of the mesh, the time [s]."""
+    # Few would decimate a coarse mesh.
+    mesh = part.fine if kind == "decimated" else part.mesh
+    with TemporaryDirectory() as folder:
+        rng = np.random.default_rng([part.number, 2])
+        path, rows = KINDS_OF_FILE[kind](Path(folder), mesh, rng)
+        begin = time.process_time()
+        shell = Shell.from_file(path, unit="mm")
+        shell.core_for("smooth")
+        return shell, rows, time.process_time() - begin
+
+
+def distance_errors(shell: Shell, part: Part, method: str) -> tuple[Array, int]:
+    """Errors (n,) of the distances of a part's places over the size, and how many signs are wrong.
+
+    A place that the surface swallows has a negative distance; a sign is wrong where the distance
+    is right but for it.
+    """
+    found = shell.closest_points(part.places.points * MM, method=method).distances / MM
+    exact = part.places.distances
+    flipped = (found < 0.0) & (np.abs(-found - exact) <= SAME_DISTANCE * exact)
+    return np.abs(np.where(flipped, -found, found) - exact) / part.mesh.size, int(flipped.sum())
+
+
+def forces_on_planes(shell: Shell, touches: Touches, method: str) -> Array:
+    """Forces (n,) over the exact ones; 0 where no touch is found."""
+    found = np.zeros(len(touches.depths))
+    columns = zip(touches.centers * MM, touches.radii * MM, touches.depths * MM, strict=True)
+    for k, (center, radius, depth) in enumerate(columns):
+        contacts = shell.contacts(center, radius, method=method)
+        if len(contacts):
+            found[k] = np.linalg.norm(contacts.force(LAW)) / depth**1.5
+    return found

@@ -1,0 +1,276 @@
+"""OpenCASCADE's operations on solids, in a few words each [mm]."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_MakeEdge,
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakePolygon,
+    BRepBuilderAPI_MakeWire,
+    BRepBuilderAPI_Transform,
+)
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepFilletAPI import BRepFilletAPI_MakeChamfer, BRepFilletAPI_MakeFillet
+from OCP.BRepOffsetAPI import BRepOffsetAPI_MakePipe, BRepOffsetAPI_ThruSections
+from OCP.BRepPrimAPI import (
+    BRepPrimAPI_MakeBox,
+    BRepPrimAPI_MakeCone,
+    BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakePrism,
+    BRepPrimAPI_MakeRevol,
+    BRepPrimAPI_MakeSphere,
+    BRepPrimAPI_MakeTorus,
+)
+from OCP.collections import Array1_gp_Pnt
+from OCP.GeomAPI import GeomAPI_PointsToBSpline
+from OCP.gp import gp_Ax1, gp_Ax2, gp_Circ, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_SOLID
+from OCP.TopoDS import TopoDS
+
+from tests.shell.cad_shapes import area_and_volume, parts
+
+Solid = Any
+Edge = Any
+Rng = np.random.Generator
+
+ORIGIN, UP = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+class OccFailed(Exception):
+    """OpenCASCADE made no valid solid."""
+
+
+def checked(solid: Solid) -> Solid:
+    """Return the solid, if it is a valid one with a volume."""
+    if solid is None or solid.IsNull() or not parts(solid, TopAbs_SOLID):
+        raise OccFailed("no solid")
+    if not BRepCheck_Analyzer(solid).IsValid():
+        raise OccFailed("an invalid solid")
+    if not area_and_volume(solid)[1] > 0.0:
+        raise OccFailed("a solid without volume")
+    return solid
+
+
+def box(low: ArrayLike, high: ArrayLike) -> Solid:
+    return BRepPrimAPI_MakeBox(_point(low), _point(high)).Shape()
+
+
+def cylinder(radius: float, length: float, at: ArrayLike = ORIGIN, axis: ArrayLike = UP) -> Solid:
+    return BRepPrimAPI_MakeCylinder(_frame(at, axis), radius, length).Shape()
+
+
+def cone(
+    low: float, high: float, length: float, at: ArrayLike = ORIGIN, axis: ArrayLike = UP
+) -> Solid:
+    """Radius `low` at the place `at`, `high` at the other end."""
+    return BRepPrimAPI_MakeCone(_frame(at, axis), low, high, length).Shape()
+
+
+def ball(radius: float, at: ArrayLike = ORIGIN, axis: ArrayLike = UP) -> Solid:
+    return BRepPrimAPI_MakeSphere(_frame(at, axis), radius).Shape()
+
+
+def torus(ring: float, tube: float, at: ArrayLike = ORIGIN, axis: ArrayLike = UP) -> Solid:
+    return BRepPrimAPI_MakeTorus(_frame(at, axis), ring, tube).Shape()
+
+
+def extruded(outline: ArrayLike, height: float) -> Solid:
+    """The polygon `outline` (k, 2) from z = 0 to `height`."""
+    points = np.asarray(outline, float)
+    face = _face(_polygon(np.c_[points, np.zeros(len(points))]))
+    return BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 0.0, height)).Shape()
+
+
+def turned(profile: ArrayLike, angle: float = 2 * np.pi) -> Solid:
+    """The polygon `profile` (k, 2) of radii and heights about z."""
+    points = np.asarray(profile, float)
+    face = _face(_polygon(np.c_[points[:, 0], np.zeros(len(points)), points[:, 1]]))
+    return BRepPrimAPI_MakeRevol(face, gp_Ax1(gp_Pnt(), gp_Dir(*UP)), angle).Shape()
+
+
+def turned_spline(profile: ArrayLike) -> Solid:
+    """A spline near the points (k, 2) of radii and heights, closed by two lids, about z."""
+    points = np.asarray(profile, float)
+    curve = _spline(np.c_[points[:, 0], np.zeros(len(points)), points[:, 1]])
+    ends = [gp_Pnt(r, 0.0, z) for r, z in (points[-1], (0.0, points[-1, 1]), (0.0, points[0, 1]))]
+    wire = BRepBuilderAPI_MakeWire(curve)
+    for one, other in zip(ends, [*ends[1:], gp_Pnt(points[0, 0], 0.0, points[0, 1])], strict=True):
+        wire.Add(BRepBuilderAPI_MakeEdge(one, other).Edge())
+    return BRepPrimAPI_MakeRevol(_face(wire.Wire()), gp_Ax1(gp_Pnt(), gp_Dir(*UP))).Shape()
+
+
+def extruded_spline(points: ArrayLike, height: float, depth: float) -> Solid:
+    """Below a spline near points (k, 2) that rise along x: `depth` below zero, `height` along z."""
+    outline = np.asarray(points, float)
+    first, last = outline[0], outline[-1]
+    ends = [gp_Pnt(x, y, 0.0) for x, y in (last, (last[0], -depth), (first[0], -depth), first)]
+    wire = BRepBuilderAPI_MakeWire(_spline(np.c_[outline, np.zeros(len(outline))]))
+    for one, other in pairwise(ends):
+        wire.Add(BRepBuilderAPI_MakeEdge(one, other).Edge())
+    return BRepPrimAPI_MakePrism(_face(wire.Wire()), gp_Vec(0.0, 0.0, height)).Shape()
+
+
+def piped(path: ArrayLike, radius: float) -> Solid:
+    """A circle along a spline near points (k, 3)."""
+    points = np.asarray(path, float)
+    frame = gp_Ax2(_point(points[0]), gp_Dir(*(points[1] - points[0]).tolist()))
+    circle = BRepBuilderAPI_MakeEdge(gp_Circ(frame, radius)).Edge()
+    spine = BRepBuilderAPI_MakeWire(_spline(points)).Wire()
+    return BRepOffsetAPI_MakePipe(spine, _face(BRepBuilderAPI_MakeWire(circle).Wire())).Shape()
+
+
+def lofted(sections: Iterable[ArrayLike], ruled: bool) -> Solid:
+    """Through polygons (k, 3) of equally many corners."""
+    loft = BRepOffsetAPI_ThruSections(True, ruled)
+    for section in sections:
+        loft.AddWire(_polygon(np.asarray(section, float)))
+    loft.Build()
+    return loft.Shape()
+
+
+def fuse(first: Solid, *others: Solid) -> Solid:
+    """Return the union, without borders between faces on one surface."""
+    return _combined(BRepAlgoAPI_Fuse, first, others)
+
+
+def cut(first: Solid, *others: Solid) -> Solid:
+    return _combined(BRepAlgoAPI_Cut, first, others)
+
+
+def common(first: Solid, *others: Solid) -> Solid:
+    return _combined(BRepAlgoAPI_Common, first, others)
+
+
+def torus_part(ring: float, tube: float, angle: float) -> Solid:
+    """The part of a torus about z from the x axis to `angle`."""
+    return BRepPrimAPI_MakeTorus(_frame(ORIGIN, UP), ring, tube, angle).Shape()
+
+
+def moved(solid: Solid, by: ArrayLike) -> Solid:
+    move = gp_Trsf()
+    move.SetTranslation(gp_Vec(*np.asarray(by, float).tolist()))
+    return BRepBuilderAPI_Transform(solid, move, True).Shape()
+
+
+def points_of(edge: Edge) -> np.ndarray:
+    """Nine points (9, 3) along an edge."""
+    curve = BRepAdaptor_Curve(edge)
+    at = np.linspace(curve.FirstParameter(), curve.LastParameter(), 9)
+    return np.array([curve.Value(t).Coord() for t in at.tolist()])
+
+
+def span(edge: Edge) -> np.ndarray:
+    """Extent (3,) of an edge along the axes."""
+    return np.asarray(np.ptp(points_of(edge), axis=0))
+
+
+def lowest(solid: Solid) -> float:
+    """Lowest height of an edge."""
+    return min(float(points_of(edge)[:, 2].min()) for edge in edges_where(solid, lambda p: True))
+
+
+def edges_where(solid: Solid, wanted: Callable[[np.ndarray], bool]) -> list[Edge]:
+    """Return the edges of which nine points (9, 3) are as wanted."""
+    edges = [TopoDS.Edge(part) for part in parts(solid, TopAbs_EDGE)]
+    there = [edge for edge in edges if not BRep_Tool.Degenerated_s(edge)]
+    return [edge for edge in there if wanted(points_of(edge))]
+
+
+def edges_at(solid: Solid, height: float) -> list[Edge]:
+    return edges_where(solid, lambda p: bool(np.abs(p[:, 2] - height).max() < 1e-3))
+
+
+def upright_edges(solid: Solid) -> list[Edge]:
+    return edges_where(
+        solid, lambda p: bool(np.ptp(p[:, :2], axis=0).max() < 1e-6 < np.ptp(p[:, 2]))
+    )
+
+
+def edges_about_axis(solid: Solid, radius: float, height: float) -> list[Edge]:
+    """Return the edges that lie on a circle about z."""
+    return edges_where(
+        solid,
+        lambda p: bool(
+            np.abs(np.hypot(p[:, 0], p[:, 1]) - radius).max() < 1e-3
+            and np.abs(p[:, 2] - height).max() < 1e-3
+        ),
+    )
+
+
+def filleted(solid: Solid, edges: Iterable[Edge], *radii: float) -> Solid:
+    """Round the edges with one radius, or with one that changes along each from first to second."""
+    fillet = BRepFilletAPI_MakeFillet(solid)
+    for edge in edges:
+        fillet.Add(*radii, edge)
+    if fillet.NbContours() == 0:
+        raise OccFailed("no edge to round")
+    return fillet.Shape()
+
+
+def filleted_each(solid: Solid, radii: Iterable[tuple[Edge, float]]) -> Solid:
+    """Round each edge with its own radius."""
+    fillet = BRepFilletAPI_MakeFillet(solid)
+    for edge, radius in radii:
+        fillet.Add(radius, edge)
+    return fillet.Shape()
+
+
+def chamfered(solid: Solid, edges: Iterable[Edge], width: float) -> Solid:
+    chamfer = BRepFilletAPI_MakeChamfer(solid)
+    for edge in edges:
+        chamfer.Add(width, edge)
+    return chamfer.Shape()
+
+
+def placed(solid: Solid, rng: Rng, reach: float) -> Solid:
+    """Turned at random, and moved by up to `reach`."""
+    turn, move = gp_Trsf(), gp_Trsf()
+    axis = gp_Ax1(gp_Pnt(), gp_Dir(*rng.normal(size=3).tolist()))
+    turn.SetRotation(axis, float(rng.uniform(0.0, 2 * np.pi)))
+    move.SetTranslation(gp_Vec(*rng.uniform(-reach, reach, 3).tolist()))
+    return BRepBuilderAPI_Transform(solid, move.Multiplied(turn), True).Shape()
+
+
+def _combined(kind: Any, first: Solid, others: tuple[Solid, ...]) -> Solid:
+    for other in others:
+        first = kind(first, other).Shape()
+    unify = ShapeUpgrade_UnifySameDomain(first, True, True, False)
+    unify.Build()
+    return unify.Shape()
+
+
+def _point(at: ArrayLike) -> gp_Pnt:
+    return gp_Pnt(*np.asarray(at, float).tolist())
+
+
+def _frame(at: ArrayLike, axis: ArrayLike) -> gp_Ax2:
+    return gp_Ax2(_point(at), gp_Dir(*np.asarray(axis, float).tolist()))
+
+
+def _polygon(points: np.ndarray) -> Any:
+    polygon = BRepBuilderAPI_MakePolygon()
+    for point in points:
+        polygon.Add(_point(point))
+    polygon.Close()
+    return polygon.Wire()
+
+
+def _face(wire: Any) -> Any:
+    return BRepBuilderAPI_MakeFace(wire).Face()
+
+
+def _spline(points: np.ndarray) -> Any:
+    row = Array1_gp_Pnt(1, len(points))
+    for k, point in enumerate(points, 1):
+        row.SetValue(k, _point(point))
+    return BRepBuilderAPI_MakeEdge(GeomAPI_PointsToBSpline(row).Curve()).Edge()

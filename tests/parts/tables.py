@@ -1,0 +1,158 @@
+"""The verdicts as tables of Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from tests.parts.cad_mesh import KINDS
+from tests.parts.found import Found
+from tests.parts.judge import MARGIN, Verdict
+
+FILE_COLUMNS = (
+    "file",
+    "parts",
+    "worse than flat",
+    "mean error over flat's",
+    "largest over flat's",
+    "planes off",
+    "force on them, curved",
+    "flat",
+    "touches lost, curved / flat",
+    "wrong signs, curved / flat",
+    "health not ok (of the worse)",
+    "recognized",
+    "ms per 1000 triangles",
+)
+FACE_COLUMNS = (
+    "CAD face",
+    "triangles",
+    "normals off by > 1 degree",
+    "recognized",
+    "of these, same kind",
+    "of these, off by > 1 degree",
+    "of these, within 0.05 degrees",
+    "faces found on a CAD face",
+)
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def by_file(verdicts: list[Verdict]) -> str:
+    """One row for each kind of file."""
+    return table(FILE_COLUMNS, [[name, *summary(own)] for name, own in groups(verdicts, "file")])
+
+
+def by_family(verdicts: list[Verdict]) -> str:
+    columns = ("family", *FILE_COLUMNS[1:])
+    return table(columns, [[name, *summary(own)] for name, own in groups(verdicts, "family")])
+
+
+def groups(verdicts: list[Verdict], key: str) -> list[tuple[str, list[Verdict]]]:
+    names = dict.fromkeys(getattr(verdict, key) for verdict in verdicts)
+    return [(name, [v for v in verdicts if getattr(v, key) == name]) for name in names]
+
+
+def summary(verdicts: list[Verdict]) -> list[str]:
+    """Cells of the columns after the first."""
+    kept = [verdict for verdict in verdicts if not verdict.spoiled]
+    if not kept:
+        return ["0", *["-"] * (len(FILE_COLUMNS) - 2)]
+    worse = [verdict for verdict in kept if verdict.worse]
+    ratio = np.exp(np.mean([np.log(verdict.ratio) for verdict in kept]))
+    planes = [verdict for verdict in kept if verdict.touches]
+    shares = [verdict.recognized for verdict in kept if verdict.recognized is not None]
+    seconds, triangles = sum(v.seconds for v in kept), sum(v.triangles for v in kept)
+    not_ok = sum(not verdict.ok for verdict in kept)
+    return [
+        str(len(kept))
+        + (f" ({len(verdicts) - len(kept)} spoiled)" if len(kept) < len(verdicts) else ""),
+        str(len(worse)),
+        f"{ratio:.3f}",
+        f"{max(largest_ratio(verdict) for verdict in kept):.3g}",
+        f"{sum(v.off_plane > 0 for v in planes)} of {len(planes)}",
+        forces(planes, "smooth"),
+        forces(planes, "facets"),
+        f"{sum(v.lost['smooth'] for v in kept)} / {sum(v.lost['facets'] for v in kept)}"
+        f" of {sum(v.touches for v in kept)}",
+        f"{sum(v.wrong_signs['smooth'] for v in kept)} / "
+        f"{sum(v.wrong_signs['facets'] for v in kept)}",
+        f"{not_ok} ({sum(not verdict.ok for verdict in worse)})",
+        f"{np.mean(shares):.2f}" if shares else "-",
+        f"{1e6 * seconds / triangles:.1f}",
+    ]
+
+
+def forces(verdicts: list[Verdict], method: str) -> str:
+    if not verdicts:
+        return "-"
+    low = min(verdict.forces[method][0] for verdict in verdicts)
+    return f"{low:.3f} to {max(verdict.forces[method][1] for verdict in verdicts):.4g}"
+
+
+def largest_ratio(verdict: Verdict) -> float:
+    """Largest error, curved over flat; flat ones below the margin count as that."""
+    return verdict.largest["smooth"] / max(verdict.largest["facets"], MARGIN)
+
+
+def by_face(verdicts: list[Verdict]) -> str:
+    """One row for each kind of CAD face; the last columns need faces that were found."""
+    found = [v.found for v in verdicts if v.found is not None and not v.spoiled]
+    looked = any(verdict.recognized is not None for verdict in verdicts)
+    if not found:
+        return ""
+    whole = sum(found[1:], start=found[0])
+    return table(FACE_COLUMNS, [[kind, *_faces(whole, k, looked)] for k, kind in enumerate(KINDS)])
+
+
+def _faces(found: Found, k: int, looked: bool) -> list[str]:
+    def share(part: int, whole: int, digits: int = 4) -> str:
+        return f"{part / whole:.{digits}f}" if whole else "-"
+
+    count, taken = int(found.triangles[k]), int(found.recognized[k])
+    cells = [str(count), share(int(found.off[k]), count)]
+    if not looked:
+        return [*cells, *["-"] * (len(FACE_COLUMNS) - 3)]
+    parts = (found.same, found.recognized_off, found.recognized_exact)
+    pieces = share(int(found.pieces[k]), int(found.faces[k]), 2)
+    return [*cells, share(taken, count), *(share(int(part[k]), taken) for part in parts), pieces]
+
+
+def worst(verdicts: list[Verdict], count: int = 25) -> str:
+    """Show the worst file of the worst parts, and the numbers to repeat them."""
+    worse = sorted((v for v in verdicts if v.worse and not v.spoiled), key=largest_ratio)
+    rows = sorted({v.number: v for v in worse}.values(), key=largest_ratio, reverse=True)[:count]
+    columns = ("number", "family", "file", "triangles", "largest error", "flat", "force", "health")
+    return table(
+        columns,
+        [
+            [
+                str(v.number),
+                v.family,
+                v.file,
+                str(v.triangles),
+                f"{v.largest['smooth']:.1e}",
+                f"{v.largest['facets']:.1e}",
+                forces([v], "smooth") if v.touches else "-",
+                "ok" if v.ok else "not ok",
+            ]
+            for v in rows
+        ],
+    )
+
+
+def line(verdict: Verdict) -> str:
+    """Return one line for one file."""
+    v = verdict
+    remark = "spoiled" if v.spoiled else "WORSE" if v.worse else ""
+    force = f"planes {forces([v], 'smooth')}, {v.lost['smooth']} lost" if v.touches else ""
+    share = "" if v.recognized is None else f"recognized {v.recognized:.2f}"
+    return (
+        f"{v.number:4d} {v.family:18s} {v.file:18s} {v.triangles:6d} largest "
+        f"{v.largest['smooth']:.1e} flat {v.largest['facets']:.1e} mean {v.mean['smooth']:.1e} "
+        f"flat {v.mean['facets']:.1e} {force} {share} {'' if v.ok else 'not ok'} {remark}"
+    ).rstrip()

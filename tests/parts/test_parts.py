@@ -1,0 +1,193 @@
+"""The study of mesh files measures what it says: its solids, its exact distances, its files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+
+from sphshell_pin import Shell
+from tests.oracle.cad import ExactShape
+from tests.parts import tables
+from tests.parts.__main__ import chosen, sections
+from tests.parts.cad_mesh import KINDS, area_vectors, joined, meshed_faces
+from tests.parts.earlier import against
+from tests.parts.files import KINDS_OF_FILE
+from tests.parts.found import Found, faces_found
+from tests.parts.judge import (
+    Part,
+    Verdict,
+    forces_on_planes,
+    judged,
+    loaded,
+    random_part,
+)
+from tests.parts.real import judged_file, planes_of
+from tests.parts.running import outcome
+from tests.parts.solids import FAMILIES, family_of, random_solid
+from tests.parts.truth import ExactFaces
+from tests.shell.cad_shapes import area_and_volume
+
+EXPORTED = tuple(kind for kind in KINDS_OF_FILE if kind != "decimated")
+
+
+@pytest.fixture(scope="module")
+def part() -> Part:
+    """A box with thin walls, rounded."""
+    return random_part(tuple(FAMILIES).index("thin_box"))
+
+
+@pytest.mark.slow
+def test_every_family_makes_a_closed_mesh_of_its_volume() -> None:
+    for number, family in enumerate(FAMILIES):
+        assert family_of(number) == family
+        solid = random_solid(number)
+        size = joined(meshed_faces(solid, 1.0, 0.5)).size
+        mesh = joined(meshed_faces(solid, 1e-3 * size, 0.3))
+        _, volume = area_and_volume(solid)
+        inside = np.einsum(
+            "tx,tx->",
+            area_vectors(mesh.vertices, mesh.triangles),
+            mesh.vertices[mesh.triangles[:, 0]],
+        )
+        assert inside / 3 == pytest.approx(volume, rel=0.05), family
+
+
+def test_a_number_makes_the_same_part_again() -> None:
+    first, second = (random_part(3) for _ in range(2))
+    np.testing.assert_array_equal(first.mesh.vertices, second.mesh.vertices)
+    np.testing.assert_array_equal(first.places.points, second.places.points)
+    assert area_and_volume(random_solid(3)) != area_and_volume(random_solid(3, seed=2))
+
+
+@pytest.mark.parametrize("family", ["rounded_box", "thin_box", "crossing_cylinders", "loft"])
+def test_places_are_as_far_as_they_say(family: str) -> None:
+    solid = random_solid(tuple(FAMILIES).index(family))
+    exact = ExactFaces(solid)
+    places = exact.places(25, np.random.default_rng(0))
+    found = ExactShape(solid, meters=1.0).closest(places.points).distances
+    assert len(found) >= 15
+    np.testing.assert_allclose(found, places.distances, rtol=1e-6)
+
+
+def test_flat_elements_are_exact_on_planes(part: Part) -> None:
+    shell, _, _ = loaded(part, "exact normals")
+    forces = forces_on_planes(shell, part.touches, "facets")
+    assert len(forces) > 10
+    np.testing.assert_allclose(forces, 1.0, rtol=0.01)
+
+
+def test_exact_normals_are_not_worse_than_flat(part: Part) -> None:
+    verdict = judged(part, "exact normals")
+    assert not verdict.worse
+    assert verdict.ratio < 0.2
+    assert verdict.off_plane == 0
+
+
+@pytest.mark.parametrize("kind", EXPORTED)
+def test_a_file_has_the_triangles_of_the_mesh(part: Part, kind: str) -> None:
+    shell, rows, seconds = loaded(part, kind)
+    assert seconds > 0.0
+    assert shell.is_closed
+    source = rows[shell.source_element[shell.triangle_element]]
+    middle = 1e3 * shell.vertices[shell.triangles].mean(axis=1)
+    there = part.mesh.vertices[part.mesh.triangles[source]].mean(axis=1)
+    assert np.abs(middle - there).max() < 1e-4 * part.mesh.size
+
+
+def test_a_decimated_file_has_fewer_triangles(part: Part) -> None:
+    pytest.importorskip("fast_simplification")
+    _, rows, _ = loaded(part, "decimated")
+    assert 0.25 < len(rows) / len(part.fine.triangles) < 0.8
+    assert (rows == -1).all()
+
+
+def test_faces_are_counted_by_their_cad_face(part: Part, monkeypatch: pytest.MonkeyPatch) -> None:
+    shell, rows, _ = loaded(part, "exact normals")
+    by_itself = faces_found(shell, part.mesh, rows)
+    assert by_itself.triangles.sum() == len(shell.triangles)
+    assert by_itself.recognized.sum() > 0.8 * by_itself.triangles.sum() > 0
+    assert by_itself.off.sum() == 0
+    kind = part.mesh.kind[shell.source_element]
+    cylinders, tori = (np.flatnonzero(kind == KINDS.index(name)) for name in ("cylinder", "torus"))
+    found = (
+        SimpleNamespace(kind="cylinder", elements=cylinders),
+        SimpleNamespace(kind="sphere", elements=tori[:5]),
+    )
+    monkeypatch.setitem(shell.__dict__, "faces", found)
+    counted = faces_found(shell, part.mesh, rows)
+    assert counted.recognized.tolist() == [0, len(cylinders), 0, 0, 5, 0]
+    assert counted.same.tolist() == [0, len(cylinders), 0, 0, 0, 0]
+    assert counted.recognized_exact.tolist() == counted.recognized.tolist()
+    on_cylinders = len(np.unique(part.mesh.face[shell.source_element[cylinders]]))
+    assert counted.faces.tolist()[:2] == counted.pieces.tolist()[:2] == [0, on_cylinders]
+
+
+def verdict(number: int, curved: float, flat: float, lost: int = 0) -> Verdict:
+    return Verdict(
+        number=number,
+        family="peg",
+        file="binary STL",
+        triangles=100,
+        deflection=1e-3,
+        largest={"smooth": curved, "facets": flat},
+        mean={"smooth": curved / 2, "facets": flat / 2},
+        wrong_signs={"smooth": 0, "facets": 0},
+        touches=10,
+        off_plane=lost,
+        forces={"smooth": (0.0 if lost else 1.0, 1.0), "facets": (1.0, 1.0)},
+        lost={"smooth": lost, "facets": 0},
+        ok=True,
+        seconds=0.01,
+        found=Found(*(np.ones(6, int) for _ in range(8))),
+    )
+
+
+def test_tables_count_what_is_worse() -> None:
+    verdicts = [verdict(0, 1e-4, 1e-3), verdict(1, 4e-3, 1e-3, lost=2), verdict(2, 0.05, 0.05)]
+    assert [one.worse for one in verdicts] == [False, True, False]
+    cells = tables.summary(verdicts)
+    assert cells[:3] == ["2 (1 spoiled)", "1", f"{(0.1 * 4.0) ** 0.5:.3f}"]
+    assert cells[4] == "1 of 2"
+    for text in sections(verdicts):
+        lines = [line.count(" | ") for line in text.splitlines() if line.startswith("|")]
+        assert len(set(lines)) <= 1
+
+
+def test_runs_are_compared(tmp_path: Path) -> None:
+    path = tmp_path / "then.json"
+    then = [verdict(0, 1e-3, 1e-3), verdict(1, 4e-3, 1e-3), verdict(5, 1.0, 1e-3)]
+    path.write_text(json.dumps([asdict(one) for one in then], default=np.ndarray.tolist))
+    text = against(path, [verdict(0, 2e-3, 1e-3), verdict(1, 1e-3, 1e-3)])
+    cells = text.splitlines()[-1].split(" | ")
+    assert cells[1:5] == ["2", "1", "1", "0"]
+    assert cells[5:] == [f"{0.5**0.5:.3f}", "0 |"]
+
+
+def test_only_takes_numbers_and_families() -> None:
+    assert chosen(3, []) == [0, 1, 2]
+    assert chosen(60, ["7", "rounded_box"]) == [7, 0, 26, 52]
+
+
+def test_a_part_that_fails_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise RuntimeError("StdFail_NotDone")
+
+    monkeypatch.setattr("tests.parts.running.random_part", fails)
+    assert outcome(5, 1, ()).skipped == "RuntimeError: StdFail_NotDone"
+
+
+def test_planes_of_a_file_are_pressed_on(tmp_path: Path) -> None:
+    path = tmp_path / "block.stl"
+    trimesh.creation.box((0.3, 0.2, 0.1)).export(path)
+    assert np.bincount(planes_of(Shell.from_file(path, unit="mm"))).tolist() == [2] * 6
+    found = judged_file(path)
+    assert (found.planes, found.triangles) == (6, 12)
+    assert len(found.forces) > 100
+    np.testing.assert_allclose(found.forces, 1.0, rtol=1e-2)
+    assert found.off == 0.0

@@ -1,0 +1,196 @@
+"""Places beside a solid whose distances are exact, and spheres that touch one plane of it.
+
+A place is a point of a face, taken at parameters inside its trimming and offset along the exact
+normal: its distance from that point is known. That no other point is nearer is checked with a finer
+mesh, whose own error is measured: the surface below every face that comes nearly as near is
+projected on, and a place is dropped if one is nearer, within the face or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepLProp import BRepLProp_SLProps
+from OCP.gp import gp_Pnt2d
+from OCP.IntTools import IntTools_FClass2d
+from OCP.TopAbs import TopAbs_IN
+
+from sphshell_pin import Shell
+from sphshell_pin.shell.cad.surface import corner_weights
+from tests.parts.cad_mesh import (
+    KINDS,
+    Array,
+    CadMesh,
+    Ints,
+    area_vectors,
+    joined,
+    meshed_faces,
+)
+from tests.parts.occ import OccFailed, Rng, Solid
+
+FINE, FINE_ANGLE = 2e-4, 0.2
+"""Deflection of the finer mesh, over the size; its angle [rad]."""
+
+OFFSETS = 2e-3, 1e-2
+"""Of places from the surface, over the size."""
+
+LEAST_OFFSET = 5e-4
+"""Where the surface is so bent that a place has to be nearer, it is left out."""
+
+BEND = 0.4
+"""A place is nearer than that share of the smaller radius of curvature."""
+
+EXACT = 1e-6
+"""Relative difference of two distances that are the same."""
+
+RADII = 0.05, 0.02, 0.01, 0.005
+"""Of spheres, over the size; the largest that touches nothing but its plane is taken."""
+
+DEPTHS = 2e-5, 1e-4
+"""Of spheres in planes, over the size."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Points (n, 3) outside the solid and their exact distances (n,) [mm].
+
+    `kinds` (n,) rows in KINDS of the faces they are beside, and how many were dropped.
+    """
+
+    points: Array
+    distances: Array
+    kinds: Ints
+    dropped: int
+
+
+@dataclass(frozen=True)
+class Touches:
+    """Spheres that touch one planar face: centers (n, 3), radii (n,), exact depths (n,) [mm]."""
+
+    centers: Array
+    radii: Array
+    depths: Array
+
+
+class ExactFaces:
+    """The faces of a solid with their finer mesh [mm]."""
+
+    def __init__(self, solid: Solid) -> None:
+        coarse = joined(meshed_faces(solid, 1.0, 0.5)).size
+        self.faces = meshed_faces(solid, FINE * coarse, FINE_ANGLE)
+        self.mesh: CadMesh = joined(self.faces)
+        self.size = self.mesh.size
+        # Every face has its own points: nothing is repaired, so no triangle loses its face.
+        corners = [face.mesh.points[face.mesh.triangles] for face in self.faces]
+        self._corners = np.concatenate(corners)
+        self._starts = np.cumsum([0, *map(len, corners)])
+        rows = np.arange(3 * len(self._corners)).reshape(-1, 3)
+        # In meters for the shell, which only has to find what is near.
+        self._shell = Shell(self._corners.reshape(-1, 3), rows, crease_angle=0.0)
+        self.error = 0.0
+        self._trimming = cache(lambda k: IntTools_FClass2d(self.faces[k].shape, 1e-9))
+        self._adaptor = cache(lambda k: BRepAdaptor_Surface(self.faces[k].shape))
+
+    def places(self, count: int, rng: Rng) -> Places:
+        """Return up to `count` places beside faces of all sizes."""
+        rows, owners = [], []
+        for k in self._faces_at_random(count, rng).tolist():
+            if (found := self._beside(k, rng)) is not None:
+                rows.append(found)
+                owners.append(KINDS.index(self.faces[k].kind))
+        if not rows:
+            raise OccFailed("no place beside its faces")
+        on, normal, offset = (np.array(column) for column in zip(*rows, strict=True))
+        nearest = self._shell.closest_points(on, method="facets")
+        self.error = 2.0 * float(np.abs(nearest.distances).max()) + 1e-9 * self.size
+        points = on + offset[:, None] * normal
+        kept = self._is_nearest(points, offset)
+        return Places(points[kept], offset[kept], np.array(owners)[kept], int((~kept).sum()))
+
+    def touches(self, count: int, rng: Rng, clear: float) -> Touches:
+        """Return up to `count` spheres that touch a plane, each by more than `clear` nothing else.
+
+        clear : largest distance of a mesh from the faces [mm]
+        """
+        planes = [k for k, face in enumerate(self.faces) if face.kind == "plane"]
+        rows = []
+        for k in rng.permutation(np.resize(planes, count)).tolist() if planes else []:
+            at, normal = self._inside_plane(k, rng)
+            depth = self.size * np.exp(rng.uniform(*np.log(DEPTHS)))
+            for radius in self.size * np.array(RADII):
+                center = at + (radius - depth) * normal
+                if set(self._faces_within(center, radius + clear + self.error)) == {k}:
+                    rows.append((center, radius, depth))
+                    break
+        columns = zip(*rows, strict=True) if rows else (np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+        return Touches(*(np.array(column) for column in columns))
+
+    def _faces_at_random(self, count: int, rng: Rng) -> Ints:
+        """Half by area, half the same number on every face."""
+        area = np.bincount(self.mesh.face, self.mesh.areas, len(self.faces))
+        return rng.choice(len(area), count, p=area / area.sum() / 2 + 0.5 / len(area))
+
+    def _beside(self, k: int, rng: Rng) -> tuple[Array, Array, float] | None:
+        """Return a random point of a face, the normal there and an offset that the bend allows."""
+        mesh = self.faces[k].mesh
+        areas = np.linalg.norm(area_vectors(mesh.points, mesh.triangles), axis=1)
+        row = rng.choice(len(areas), p=areas / areas.sum())
+        uv = rng.dirichlet((1.0, 1.0, 1.0)) @ mesh.parameters(mesh.triangles[row : row + 1])[0]
+        if self._trimming(k).Perform(gp_Pnt2d(*uv.tolist())) != TopAbs_IN:
+            return None
+        bend = BRepLProp_SLProps(self._adaptor(k), *uv.tolist(), 2, 1e-9)
+        if not bend.IsNormalDefined() or not bend.IsCurvatureDefined():
+            return None
+        curvature = max(abs(bend.MaxCurvature()), abs(bend.MinCurvature()), 1e-300)
+        offset = min(self.size * rng.uniform(*OFFSETS), BEND / curvature)
+        if offset < LEAST_OFFSET * self.size:
+            return None
+        normal = np.array(bend.Normal().Coord()) * (-1.0 if mesh.reversed else 1.0)
+        return np.array(bend.Value().Coord()), normal, offset
+
+    def _inside_plane(self, k: int, rng: Rng) -> tuple[Array, Array]:
+        mesh = self.faces[k].mesh
+        areas = np.linalg.norm(area_vectors(mesh.points, mesh.triangles), axis=1)
+        row = rng.choice(len(areas), p=areas / areas.sum())
+        at = rng.dirichlet((1.0, 1.0, 1.0)) @ mesh.points[mesh.triangles[row]]
+        return at, mesh.corner_normals()[row, 0]
+
+    def _is_nearest(self, points: Array, offset: Array) -> np.ndarray:
+        """Whether no face is nearer to points (n, 3) than `offset` (n,)."""
+        place, triangle, near = [], [], []
+        for row, (point, radius) in enumerate(zip(points, offset, strict=True)):
+            for one, at in self._nearest_of_faces(point, radius + self.error).values():
+                place.append(row)
+                triangle.append(one)
+                near.append(at)
+        rows, owner = np.array(place), self._face_of(np.array(triangle))
+        distance = np.full(len(rows), np.inf)
+        for k in np.unique(owner).tolist():
+            own = np.flatnonzero(owner == k)
+            mesh = self.faces[k].mesh
+            nodes = mesh.triangles[np.array(triangle)[own] - self._starts[k]]
+            weights = corner_weights(mesh.points[nodes], np.array(near)[own])
+            uv = np.einsum("nk,nkx->nx", weights, mesh.parameters(nodes))
+            distance[own] = mesh.surface.distances(points[rows[own]], uv, 1e-9 * self.size)
+        nearest = np.full(len(points), np.inf)
+        np.minimum.at(nearest, rows, distance)
+        return np.asarray(np.abs(nearest - offset) <= EXACT * offset)
+
+    def _nearest_of_faces(self, point: Array, radius: float) -> dict[int, tuple[int, Array]]:
+        """Nearest triangle of each face within `radius` of a point, and its closest point."""
+        touched = self._shell.contacts(point, radius, method="elements")
+        triangles = self._shell.source_element[touched.element]
+        # Contacts come deepest first: the first of each face is the nearest.
+        faces, first = np.unique(self._face_of(triangles), return_index=True)
+        return {
+            int(k): (int(triangles[i]), touched.point[i]) for k, i in zip(faces, first, strict=True)
+        }
+
+    def _faces_within(self, point: Array, radius: float) -> list[int]:
+        return list(self._nearest_of_faces(point, radius))
+
+    def _face_of(self, triangles: Ints) -> Ints:
+        return np.searchsorted(self._starts, triangles, side="right") - 1
