@@ -158,8 +158,9 @@ def measure(
     rows, contestants = [], {}
     meshes = surface.meshes()[:finest]
     for k, mesh in enumerate(meshes):
-        estimated = Shell(mesh.vertices, mesh.triangles)
-        exact = Shell(mesh.vertices, mesh.triangles, normals=mesh.normals)
+        # Free shapes are meant: these would be recognized as spheres and tori, and be exact.
+        estimated = Shell(mesh.vertices, mesh.triangles, faces=False)
+        exact = Shell(mesh.vertices, mesh.triangles, normals=mesh.normals, faces=False)
         for label, (method, exact_normals) in RULES.items():
             shell = exact if exact_normals else estimated
             rows.append(row_of(name, label, mesh, relative_forces(shell, method, centers), normals))

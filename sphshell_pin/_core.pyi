@@ -32,6 +32,8 @@ class Shell:
         straight: _Bytes | None = None,
         rounding: float = 0.0,
         faces: bool = True,
+        known: _Ints | None = None,
+        shapes: _Doubles | None = None,
     ) -> None: ...
     def contacts(
         self, center: _Doubles, radius: float, method: int, gradient: bool = False
@@ -70,6 +72,8 @@ class Shell:
     def triangle_face(self) -> _Ints: ...
     @property
     def chord_errors(self) -> _Doubles: ...
+    @property
+    def exact_faces(self) -> _Bytes: ...
     @property
     def creases(self) -> int: ...
     @property

@@ -37,6 +37,7 @@ class ShellBase(Summarized):
     source_element: Ints
     element_face: Ints | None
     face_names: tuple[str, ...]
+    face_shapes: Floats | None
     straight: Mask | None
     rounding: float
     finds_faces: bool
@@ -82,6 +83,7 @@ class ShellBase(Summarized):
         self.normals = _owned_if(surface.normals, np.float64)
         self.element_face = _owned_if(surface.element_face, np.int32)
         self.face_names = tuple(surface.face_names)
+        self.face_shapes = _owned_if(surface.face_shapes, np.float64)
         self.straight = None if surface.straight is None else read_only(surface.straight.copy())
         # Without cleaning there may be vertices no element uses.
         in_use = np.zeros(len(vertices), np.bool_)
@@ -133,18 +135,23 @@ class ShellBase(Summarized):
             exact = self.element_face is not None  # CAD's own
             straight = None if self.straight is None else self.straight.ravel().view(np.uint8)
             given = None if given is None else given.reshape(-1, 3)
-            self.core.curve(given, exact, straight, self.rounding, self.finds_faces)
+            known = shapes = None
+            if self.finds_faces and self.element_face is not None and given is not None:
+                known, shapes = self.element_face[self.triangle_element], self.face_shapes
+            if shapes is None:
+                known = None
+            self.core.curve(given, exact, straight, self.rounding, self.finds_faces, known, shapes)
         return self.core
 
     @cached_property
     def faces(self) -> tuple[Face, ...]:
         """Planes, cylinders, cones, spheres and tori on which elements lie.
 
-        They are recognized in meshes whose vertices lie on them to the rounding of their numbers,
-        not in CAD, whose faces `element_face` names, and not if `finds_faces` is False or the
-        crease angle 0. It makes the curved elements, if no query has.
+        Those of CAD, or recognized in meshes whose vertices lie on them to the rounding of their
+        numbers; none if `finds_faces` is False or the crease angle 0. It makes the curved elements,
+        if no query has.
         """
-        return faces_of(self.core_for("smooth"))
+        return faces_of(self.core_for("smooth"), self.face_names)
 
     @property
     def num_elements(self) -> int:

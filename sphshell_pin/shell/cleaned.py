@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from sphshell_pin.shell.health import ShellHealth
-from sphshell_pin.shell.raw import Floats, Ints, Mask
+from sphshell_pin.shell.raw import Floats, Ints, Mask, moved_shapes
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,8 @@ class CleanedSurface:
     health : what was found and done
     element_face : (m,) row in `face_names` of the CAD face each element lies on, or None
     face_names : of the CAD faces
+    face_shapes : (f, 9) of the CAD faces: the row of the kind in faces.KINDS, -1 of none of these;
+        a point, the axis, the radius and the second number, as of `Face` [m, rad]; or None
     straight : (t, 3) sides that stay straight whatever the normals say, or None
     rounding : half the step to which the coordinates are known [m], 0 if they show none
     """
@@ -36,6 +38,7 @@ class CleanedSurface:
     health: ShellHealth
     element_face: Ints | None = None
     face_names: tuple[str, ...] = ()
+    face_shapes: Floats | None = None
     straight: Mask | None = None
     rounding: float = 0.0
 
@@ -45,6 +48,7 @@ class CleanedSurface:
             self,
             vertices=(self.vertices * scale) @ rotation.T + translation,
             normals=None if self.normals is None else self.normals @ rotation.T,
+            face_shapes=moved_shapes(self.face_shapes, scale, rotation, translation),
             health=self.health.moved(scale, rotation, translation),
             rounding=self.rounding * scale,
         )

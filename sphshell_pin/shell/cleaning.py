@@ -341,7 +341,13 @@ def _with_origin(surface: CleanedSurface, raw: RawSurface) -> CleanedSurface:
     normals = surface.normals
     if normals is not None:
         normals = settle_joints(normals, surface.triangles, faces[surface.triangle_element])
-    return replace(surface, normals=normals, element_face=faces, face_names=raw.face_names)
+    return replace(
+        surface,
+        normals=normals,
+        element_face=faces,
+        face_names=raw.face_names,
+        face_shapes=raw.face_shapes,
+    )
 
 
 def _holes(borders: Borders) -> Found:

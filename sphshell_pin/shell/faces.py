@@ -31,6 +31,10 @@ class Face:
     half_angle : of a cone, between its axis and its surface: negative where its radius decreases
         along the axis [rad], else None
     elements : (k,) indices of the elements on it
+    exact : whether contacts on it are those of the face in closed form; else its vertices, or its
+        borders with what is no such face, are farther from it than 4e-9 of the size, and contacts
+        are those of curved elements with its normals
+    name : of the CAD face; None of one that was recognized
     """
 
     kind: str
@@ -40,20 +44,27 @@ class Face:
     minor_radius: float | None
     half_angle: float | None
     elements: Ints
+    exact: bool
+    name: str | None = None
 
 
-def faces_of(core: _core.Shell) -> tuple[Face, ...]:
-    """Return the faces that a compiled surface with curved elements has recognized."""
+def faces_of(core: _core.Shell, names: Sequence[str] = ()) -> tuple[Face, ...]:
+    """Return the faces of a compiled surface with curved elements; `names`: of those of CAD."""
     of_element = np.full(core.num_elements, -1, np.int32)
     of_element[core.triangle_element] = core.triangle_face
     kinds, numbers = core.faces
     order = np.argsort(of_element, kind="stable").astype(np.int32)
     rows, starts = np.unique(of_element[order], return_index=True)
+    exact = core.exact_faces
     parts = zip(rows.tolist(), np.split(order, starts[1:]), strict=True)
-    return tuple(_face(KINDS[kinds[k]], numbers[k], some) for k, some in parts if k >= 0)
+    return tuple(
+        _face(KINDS[kinds[k]], numbers[k], some, bool(exact[k]), names[k] if names else None)
+        for k, some in parts
+        if k >= 0
+    )
 
 
-def _face(kind: str, numbers: Floats, elements: Ints) -> Face:
+def _face(kind: str, numbers: Floats, elements: Ints, exact: bool, name: str | None) -> Face:
     point, axis = read_only(numbers[:3].copy()), read_only(numbers[3:6].copy())
     radius, second = numbers[6:].tolist()
     return Face(
@@ -64,6 +75,8 @@ def _face(kind: str, numbers: Floats, elements: Ints) -> Face:
         second if kind == "torus" else None,
         second if kind == "cone" else None,
         read_only(elements.copy()),
+        exact,
+        name,
     )
 
 

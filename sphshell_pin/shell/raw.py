@@ -21,6 +21,24 @@ Mask = npt.NDArray[np.bool_]
 LARGEST_COUNT = np.iinfo(np.int32).max
 
 
+TORUS = 4
+"""The last of the kinds of faces.KINDS: both of its radii are lengths."""
+
+
+def moved_shapes(
+    shapes: Floats | None, scale: float, rotation: Floats, translation: Floats
+) -> Floats | None:
+    """Shapes (f, 9) of faces made larger, then turned by (3, 3), then moved by (3,) [m]."""
+    if shapes is None:
+        return None
+    out = shapes.copy()
+    out[:, 1:4] = (shapes[:, 1:4] * scale) @ rotation.T + translation
+    out[:, 4:7] = shapes[:, 4:7] @ rotation.T
+    out[:, 7] *= scale
+    out[shapes[:, 0] == TORUS, 8] *= scale
+    return out
+
+
 @dataclass(frozen=True)
 class RawSurface:
     """Polygons before cleaning.
@@ -34,6 +52,7 @@ class RawSurface:
     notes : sentences a reader has to say about the file
     faces : (m,) row in `face_names` of the CAD face each polygon lies on, or None
     face_names : of the CAD faces
+    face_shapes : (f, 9) of the CAD faces, as of CleanedSurface, or None
     rounding : half the step to which the coordinates are known [m], 0 if they show none
     """
 
@@ -44,6 +63,7 @@ class RawSurface:
     notes: tuple[str, ...] = ()
     faces: Ints | None = None
     face_names: tuple[str, ...] = ()
+    face_shapes: Floats | None = None
     rounding: float = 0.0
 
     @property
@@ -53,7 +73,12 @@ class RawSurface:
 
     def scaled(self, factor: float) -> RawSurface:
         """Return the same surface, `factor` times larger."""
-        return replace(self, vertices=self.vertices * factor, rounding=self.rounding * factor)
+        return replace(
+            self,
+            vertices=self.vertices * factor,
+            face_shapes=moved_shapes(self.face_shapes, factor, np.eye(3), np.zeros(3)),
+            rounding=self.rounding * factor,
+        )
 
     def noting(self, *sentences: str) -> RawSurface:
         """Return the same surface with more `notes`."""

@@ -78,9 +78,9 @@ def test_audit_agrees_with_formulas(name, tmp_path):
     assert (pair.contacts, pair.unmatched) == (len(log.depth), 0)
     assert pair.depth_largest == np.abs(audit.depth_error).max()
     assert pair.depth_rms <= pair.depth_largest
-    # What the audit finds is what elements of that size have, not nothing.
-    assert 0.0 < pair.depth_largest < 2e-5
-    assert 1e-8 < pair.normal_largest < 1e-2
+    # The faces are closed forms; the flat elements below show that the audit finds what is off.
+    assert pair.depth_largest < 1e-12 * size
+    assert pair.normal_largest < 1e-7
 
 
 @pytest.mark.slow

@@ -118,7 +118,7 @@ def test_curved_elements_do_not_overshoot_at_narrow_bends():
 
 
 @pytest.mark.parametrize("name", KNOWN)
-def test_smooth_forces_converge_to_those_on_the_exact_surface(name, tmp_path):
+def test_smooth_forces_are_or_converge_to_those_on_the_exact_surface(name, tmp_path):
     known = KNOWN[name]
     path = shapes.write_brep(tmp_path / "part.brep", known.make())
     found, chords = [], []
@@ -126,5 +126,8 @@ def test_smooth_forces_converge_to_those_on_the_exact_surface(name, tmp_path):
         shell = Shell.from_file(path, "mm", chord_error=chord_error)
         found.append(force_errors(shell, known))
         chords.append(stated_and_measured(shell)[1])
+    if all(face.exact for face in shell.faces) and shell.faces:
+        assert max(one.max() for one in found) < 1e-11
+        return
     assert order((rms(found[0]), rms(found[1])), tuple(chords)) >= 2.9
     assert found[1].max() < 4e-4

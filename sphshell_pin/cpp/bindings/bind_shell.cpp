@@ -193,12 +193,44 @@ Array<std::uint8_t> bending(const Shell& shell) {
   return to_array(std::move(out));
 }
 
+// Rows of kind, point, axis and the two radii, as CleanedSurface.face_shapes in Python has them.
+using FaceShapes = nb::ndarray<const double, nb::shape<-1, 9>, nb::c_contig, nb::device::cpu>;
+
+std::shared_ptr<const Faces> known_faces(const Ints& of, const FaceShapes& shapes) {
+  auto out = std::make_shared<Faces>();
+  for (std::size_t i = 0; i < shapes.shape(0); ++i) {
+    const auto vector = [&](int k) {
+      return Vec3(shapes(i, k), shapes(i, k + 1), shapes(i, k + 2));
+    };
+    const int kind = std::max(0, static_cast<int>(shapes(i, 0)));
+    out->shapes.push_back(
+        {static_cast<FaceKind>(kind), vector(1), vector(4), shapes(i, 7), shapes(i, 8)});
+  }
+  for (std::size_t t = 0; t < of.shape(0); ++t)
+    out->of.push_back(of(t) >= 0 && shapes(of(t), 0) >= 0 ? of(t) : -1);
+  return out;
+}
+
 // Per triangle the face it lies on, -1: none; and of each face its kind and numbers (8): a point,
 // the axis, the two radii.
 Array<int> triangle_face(const Shell& shell) {
   std::vector<int> out;
   if (shell.curved()) out = shell.curved()->faces().of;
   out.resize(shell.curved() ? shell.triangles().size() : 0, -1);
+  return to_array(std::move(out));
+}
+
+// Per face whether it gives the closest points of its elements.
+Array<std::uint8_t> exact_faces(const Shell& shell) {
+  std::vector<std::uint8_t> out;
+  if (shell.curved()) {
+    // Where no face has to, all are flat or none gives anything.
+    for (const Primitive& face : shell.curved()->faces().shapes)
+      out.push_back(face.kind == FaceKind::Plane);
+    if (!shell.curved()->face_cells().empty()) std::fill(out.begin(), out.end(), 1);
+    for (const FaceCell& cell : shell.curved()->face_cells())
+      if (cell.face >= 0) out[cell.face] = out[cell.face] && cell.exact;
+  }
   return to_array(std::move(out));
 }
 
@@ -242,8 +274,10 @@ void bind_shell(nanobind::module_& m) {
       .def(
           "curve",
           [](Shell& shell, std::optional<Points> normals, bool exact, std::optional<Bytes> straight,
-             double rounding, bool faces) {
-            CurveOptions options{{}, exact, {}, rounding, faces};
+             double rounding, bool faces, std::optional<Ints> known,
+             std::optional<FaceShapes> shapes) {
+            CurveOptions options{{}, exact, {}, rounding, faces, nullptr};
+            if (known && shapes) options.known = known_faces(*known, *shapes);
             if (normals) options.normals = rows(*normals);
             if (straight)
               options.straight.assign(straight->data(), straight->data() + straight->shape(0));
@@ -252,7 +286,8 @@ void bind_shell(nanobind::module_& m) {
           },
           nb::arg("normals").none(), nb::arg("exact") = false,
           nb::arg("straight").none() = nb::none(), nb::arg("rounding") = 0.0,
-          nb::arg("faces") = true)
+          nb::arg("faces") = true, nb::arg("known").none() = nb::none(),
+          nb::arg("shapes").none() = nb::none())
       .def("contacts", &contacts, nb::arg("center"), nb::arg("radius"), nb::arg("method"),
            nb::arg("gradient") = false)
       .def("contacts_batch", &contacts_batch, nb::arg("centers"), nb::arg("radii"),
@@ -295,6 +330,7 @@ void bind_shell(nanobind::module_& m) {
   array("corner_normals", &corner_normals);
   array("bending", &bending);
   array("triangle_face", &triangle_face);
+  array("exact_faces", &exact_faces);
   array("chord_errors", [](const Shell& s) {
     return to_array(s.curved() ? s.curved()->chord_errors(s) : std::vector<double>());
   });

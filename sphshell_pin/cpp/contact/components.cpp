@@ -5,6 +5,7 @@
 
 #include "contact/closest_on_cell.hpp"
 #include "contact/closest_on_side.hpp"
+#include "contact/faces/face_feet.hpp"
 #include "shell/curved.hpp"
 
 namespace sphshell {
@@ -12,14 +13,17 @@ namespace {
 
 Minimum on_side(const Shell& shell, int f, int k, double t, const Sphere& sphere, bool want_dn_dc) {
   const Facet& facet = shell.facets()[f];
-  const CubicCurve side = shell.curved()->facets()[f].side(facet, k);
   const bool vertex = t == 0 || t == 1;
-  Contact contact = contact_at(side.point(t), facet.normal, sphere, facet.element,
+  const int corner = t == 1 ? next_corner(k) : k;
+  SideFoot foot{t, facet.corner[corner], Vec3::Zero()};
+  if (!vertex) foot = nearest_on_side(shell, f, k, sphere.center);
+  Contact contact = contact_at(foot.point, facet.normal, sphere, facet.element,
                                vertex ? Feature::Vertex : Feature::Edge);
   if (want_dn_dc)
-    contact.dn_dc = dn_dc_of(contact, sphere.radius,
-                             vertex ? Mat3(Mat3::Zero()) : dx_dc_of(side, t, sphere.center));
-  return {contact, f, t == 1 ? next_corner(k) : k, false};
+    contact.dn_dc =
+        dn_dc_of(contact, sphere.radius,
+                 vertex ? Mat3(Mat3::Zero()) : dx_dc_of(shell, f, k, foot, sphere.center));
+  return {contact, f, vertex ? corner : k, false};
 }
 
 }  // namespace
@@ -211,10 +215,9 @@ int Components::expand(const Shell& shell, const Sphere& sphere, int component) 
   }
   if (belongs_to(candidate.to, component)) return component;
   if (candidate.kind == SaddleCandidate::Kind::Bound) {
-    const Facet& facet = shell.facets()[candidate.facet];
-    const CubicCurve side = shell.curved()->facets()[candidate.facet].side(facet, candidate.side);
-    candidate.t = nearest_on_side(side, sphere.center);
-    candidate.depth = sphere.radius - (side.point(candidate.t) - sphere.center).norm();
+    const SideFoot foot = nearest_on_side(shell, candidate.facet, candidate.side, sphere.center);
+    candidate.t = foot.t;
+    candidate.depth = sphere.radius - (foot.point - sphere.center).norm();
     candidate.kind = SaddleCandidate::Kind::Side;
     open.push_back(candidate);
     std::push_heap(open.begin(), open.end(), lower);

@@ -13,7 +13,7 @@ namespace sphshell {
 namespace {
 
 // Of the radius: a step of the center for second derivatives, and a distance without direction.
-constexpr double kStep = 1e-5, kNoDistance = 1e-6;
+constexpr double kMove = 1e-5, kNoDistance = 1e-6;
 
 double angle_between(const Vec3& a, const Vec3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
@@ -42,7 +42,8 @@ ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double
   const Shell& shell = field_.shell();
   const CurvedFacet& curved = shell.curved()->facets()[contact.facet];
   // Of a flat element nothing depends on the place.
-  if (contact.feature == Feature::Face && curved.flat) {
+  if (contact.feature == Feature::Face && curved.flat &&
+      shell.curved()->face_of(contact.facet) == nullptr) {
     ContactShape out = shape_of_gap(Mat3::Identity() / radius, contact.normal, radius);
     out.depth = contact.depth;
     return out;
@@ -53,7 +54,7 @@ ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double
   Motion motion;
   ContactShape out = shape_at(place, contact.depth, center, contact.normal, radius, motion);
   if (!want_second || motion.normal.isZero(0)) return out;
-  const double step = kStep * radius;
+  const double step = kMove * radius;
   for (int i = 0; i < 3; ++i) {
     out.second.col(i).setZero(), out.tilt_by.col(i).setZero();
     for (int sign : {1, -1}) {
@@ -92,10 +93,17 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
       const double t = place.index == 0 ? u : place.index == 1 ? v : 1 - v;
       dx_dc = dx_dc_of(shell.curved()->facets()[place.facet].side(facet, place.index), t, center);
     }
+    motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;
+    const Primitive* face = field_.shell().curved()->face_of(place.facet);
+    if (face != nullptr && place.feature == Feature::Face) {
+      Vec3 outward;
+      face->distance(center, outward);
+      motion.normal = (outward.dot(normal) < 0 ? -1 : 1) * face->hessian(center);
+      dx_dc = Mat3::Identity() - normal * normal.transpose() - distance * motion.normal;
+    }
     Eigen::Matrix<double, 3, 2> along;
     along << patch.along_u(u, v), patch.along_v(u, v);
     motion.parameters = (along.transpose() * along).inverse() * along.transpose() * dx_dc;
-    motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;
   }
   CurvatureField::Local local;
   Eigen::Matrix<double, 7, 3> local_by;
@@ -107,7 +115,7 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
   } else {
     local = between_walls(place, normal);
     local_by.setZero();
-    const double step = kStep * radius;
+    const double step = kMove * radius;
     for (int i = 0; i < 3 && moves; ++i)
       for (int sign : {1, -1}) {
         Place there = place;

@@ -18,6 +18,8 @@ constexpr double kJump = 1.5;
 // What elements leave of a surface that they resolve is a small share of their own bulge: more is
 // noise.
 constexpr double kLargestRise = 0.1;
+// A step of an element's parameters for the derivatives of a face's curvature.
+constexpr double kStep = 1e-4;
 
 // Whether two half-edges of one edge begin at its other ends.
 bool is_reversed(const Shell& shell, int half_edge, int other) {
@@ -101,6 +103,17 @@ void CurvatureField::Rise::set_side(int k, const double (&at)[4]) {
 
 CurvatureField::Expansion CurvatureField::at(int facet, double u, double v) {
   Expansion out = Expansion::Zero();
+  if (const Primitive* face = shell_->curved()->face_of(facet)) {
+    const CubicPatch patch = shell_->curved()->facets()[facet].patch(shell_->facets()[facet]);
+    const int sign = shell_->curved()->face_cells()[facet].sign;
+    const auto tensor_at = [&](double a, double b) {
+      return Tensor(sign * tensor(face->hessian(face->onto(patch.point(a, b)))));
+    };
+    out.topRows<6>() << tensor_at(u, v),
+        (tensor_at(u + kStep, v) - tensor_at(u - kStep, v)) / (2 * kStep),
+        (tensor_at(u, v + kStep) - tensor_at(u, v - kStep)) / (2 * kStep);
+    return out;
+  }
   if (shell_->curved()->facets()[facet].flat) return out;
   const Cell& here = cell(facet);
   out.topRows<6>() << here.tensor.point(u, v), here.tensor.along_u(u, v), here.tensor.along_v(u, v);

@@ -16,8 +16,15 @@ void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& bro
   const CellBounds* cells = surface.bulge() > 0 ? surface.cells().data() : nullptr;
   const CellBounds flat{};
   broad.find(shell, surface.cones(), surface.bulge(), sphere, cells);
-  outlooks_.clear();
+  outlooks_.clear(), borders_.clear();
+  const LargeArray<FaceCell>& faces = surface.face_cells();
+  if (!faces.empty()) feet_.clear(surface);
   for (int f : broad.candidates) {
+    if (!faces.empty() && faces[f].closed) {
+      feet_.add(shell, f, sphere, want_dn_dc, minima);
+      borders_.push_back(f);
+      continue;
+    }
     const Outlook outlook(f, shell.facets()[f], surface.cones()[f], cells ? cells[f] : flat,
                           sphere);
     if (outlook.empty()) continue;
@@ -39,6 +46,7 @@ void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& bro
       if (outlook.corner[k] && owned.vertex[k] >= 0) add_vertex(task, outlook.facet, k);
     }
   }
+  for (const int f : borders_) add_border(task, f);
   if (minima.size() > 1) components_.merge(shell, sphere, want_dn_dc, minima);
 }
 
@@ -143,23 +151,37 @@ void CurvedQuery::add_flat(const Task& task, const Outlook& outlook) {
        height < 0});
 }
 
+// Within a face there is nothing to look for but its own closest point: beside it the sides and
+// corners of its border.
+void CurvedQuery::add_border(const Task& task, int f) {
+  const auto& [shell, sphere, want_dn_dc, minima] = task;
+  const Facet& facet = shell.facets()[f];
+  const Owned& owned = shell.curved()->facets()[f].owned;
+  const FaceCell& cell = shell.curved()->face_cells()[f];
+  for (int k = 0; k < 3; ++k) {
+    if (owned.vertex[k] >= 0) add_vertex(task, f, k);
+    if (owned.twin[k] == kNotOwned) continue;
+    const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k],
+               c = sphere.center - facet.corner[k];
+    const double t = std::clamp(c.dot(d) / d.squaredNorm(), 0.0, 1.0);
+    const double reach = sphere.radius + double(cell.bulge[k]);
+    if ((c - t * d).squaredNorm() < reach * reach) add_edge(task, f, k);
+  }
+}
+
 // The closest point of a side between its ends, if the distance falls into none of the elements
 // that meet there.
 void CurvedQuery::add_edge(const Task& task, int f, int k) {
   const auto& [shell, sphere, want_dn_dc, minima] = task;
   const Facet& facet = shell.facets()[f];
-  const CubicCurve side = shell.curved()->facets()[f].side(facet, k);
-  const double t = nearest_on_side(side, sphere.center);
-  if (t <= 0 || t >= 1) return;
-  const Vec3 point = side.point(t), along = side.tangent(t).normalized();
+  const SideFoot foot = nearest_on_side(shell, f, k, sphere.center);
+  if (foot.t <= 0 || foot.t >= 1) return;
+  const Vec3 &point = foot.point, along = foot.tangent.normalized();
   if (!sphere.reaches(point)) return;
   const auto rises = [&, &shell = shell, &sphere = sphere](int h) {
-    const Facet& other = shell.facets()[triangle_of(h)];
-    const double s = other.corner[side_of(h)] == facet.corner[k] ? t : 1 - t;
-    const CubicPatch patch = shell.curved()->facets()[triangle_of(h)].patch(other);
-    const Vec3 in = patch.inward(side_of(h), s);
-    return (sphere.center - point).dot((in - in.dot(along) * along).normalized()) <=
-           sphere.tolerance;
+    const bool same = shell.facets()[triangle_of(h)].corner[side_of(h)] == facet.corner[k];
+    const Vec3 in = inward(shell, h, same ? foot.t : 1 - foot.t, point, along);
+    return (sphere.center - point).dot(in) <= sphere.tolerance + shell.curved()->gap();
   };
   const int code = shell.curved()->facets()[f].owned.twin[k];
   if (!rises(3 * f + k) || (code >= 0 && !rises(code))) return;
@@ -169,7 +191,7 @@ void CurvedQuery::add_edge(const Task& task, int f, int k) {
   }
   Contact contact = contact_at(point, facet.normal, sphere, facet.element, Feature::Edge);
   if (want_dn_dc)
-    contact.dn_dc = dn_dc_of(contact, sphere.radius, dx_dc_of(side, t, sphere.center));
+    contact.dn_dc = dn_dc_of(contact, sphere.radius, dx_dc_of(shell, f, k, foot, sphere.center));
   minima.push_back({contact, f, k, false});
 }
 
@@ -183,8 +205,9 @@ void CurvedQuery::add_vertex(const Task& task, int f, int k) {
   const Tangents& tangents = shell.curved()->tangents();
   const int vertex = shell.curved()->facets()[f].owned.vertex[k];
   const Vec3 from = sphere.center - facet.corner[k];
+  const double tolerance = sphere.tolerance + shell.curved()->gap();
   for (int i = topology.neighbor_begin[vertex]; i < topology.neighbor_begin[vertex + 1]; ++i)
-    if (from.dot(tangents[i]) > sphere.tolerance * tangents[i].norm()) return;
+    if (from.dot(tangents[i]) > tolerance * tangents[i].norm()) return;
   Contact contact =
       contact_at(facet.corner[k], facet.normal, sphere, facet.element, Feature::Vertex);
   if (want_dn_dc) contact.dn_dc = dn_dc_of(contact, sphere.radius, Mat3::Zero());

@@ -5,6 +5,7 @@
 
 #include "contact/broad_phase.hpp"
 #include "contact/components.hpp"
+#include "contact/faces/face_feet.hpp"
 #include "contact/minimum.hpp"
 #include "shell/curved.hpp"
 
@@ -41,10 +42,13 @@ class CurvedQuery {
 
   void add_flat(const Task& task, const Outlook& outlook);
   void add_bent(const Task& task, const Outlook& outlook);
+  void add_border(const Task& task, int facet);
   void add_edge(const Task& task, int facet, int side);
   void add_vertex(const Task& task, int facet, int corner);
 
   std::vector<Outlook> outlooks_;
+  std::vector<int> borders_;  // facets that lie on faces
+  FaceFeet feet_;
   Components components_;
 };
 

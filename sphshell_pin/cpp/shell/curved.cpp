@@ -235,12 +235,13 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   std::vector<Trust> trust;
   std::optional<CoplanarRegions> regions;
   exact_ = given;
+  if (options.known) faces_ = *options.known;
   divided_.assign(3 * shell.triangles().size(), 0);
   if (!options.exact) {
     const double tolerance =
         std::max(kSinglePrecision * shell.size(), kOfRounding * options.rounding);
     regions.emplace(shell, tolerance);
-    if (options.faces && shell.crease_angle() > 0)
+    if (options.faces && !options.known && shell.crease_angle() > 0)
       faces_ = recognize_faces(shell, *regions, tolerance);
     EstimatedNormals settled = given ? settle_given_normals(shell, *regions, normals, faces_)
                                      : estimate_normals(shell, *regions, faces_);
@@ -261,6 +262,12 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   std::vector<Trust>().swap(trust);
   raise_centers(shell);
   normals_ = {};
+  face_cells_ = make_face_cells(shell, faces_, facets_);
+  if (std::any_of(face_cells_.begin(), face_cells_.end(),
+                  [](const FaceCell& cell) { return cell.closed; }))
+    gap_ = kMostGap * shell.size();
+  else
+    face_cells_ = {};
   build_cones(shell);
   bound_cells(shell);
 }
@@ -420,7 +427,21 @@ void CurvedShell::build_cones(const Shell& shell) {
   const auto is_flat = [&](int t) {
     return facets_[triangle_of(shell.facet_half_edge(3 * t))].flat;
   };
+  // The tip of a cone is one of its vertices that counts.
+  const auto at_tip = [&](int t, const Primitive& shape) {
+    return shape.kind == FaceKind::Cone &&
+           std::any_of(shell.triangles()[t].begin(), shell.triangles()[t].end(), [&](int v) {
+             const Vec3 y = shell.vertices()[v] - shape.point;
+             return y.cross(shape.axis).norm() <= 1e-6 * shell.size();
+           });
+  };
   const std::vector<Owned> owned = shell.assign_owners([&](int t, int u) {
+    const int face = faces_.of_triangle(t);
+    const auto closed = [&](int one) {
+      return face_of(triangle_of(shell.facet_half_edge(3 * one))) != nullptr;
+    };
+    if (face >= 0 && face == faces_.of_triangle(u) && closed(t) && closed(u))
+      return !at_tip(t, faces_.shapes[face]) && !at_tip(u, faces_.shapes[face]);
     return topology.planar_face[t] == topology.planar_face[u] && is_flat(t) && is_flat(u);
   });
   for (std::size_t f = 0; f < facets_.size(); ++f) facets_[f].owned = owned[f];
@@ -443,17 +464,27 @@ void CurvedShell::build_cones(const Shell& shell) {
       if (mine.vertex[k] >= 0)
         tangent = std::max(tangent, shell.tan_vertex_cone(mine.vertex[k], axis, &tangents_));
     }
+    const bool closed = !face_cells_.empty() && face_cells_[f].closed;
+    const Primitive* face = closed ? &faces_.shapes[face_cells_[f].face] : nullptr;
+    for (int i = 0; face != nullptr && i < 6; ++i) {
+      const Vec3 &p = facet.corner[i % 3], &q = facet.corner[i < 3 ? i : next_corner(i - 3)];
+      Vec3 n;
+      face->distance((p + q) / 2, n);
+      const double along = std::abs(n.dot(axis)), across = n.cross(axis).norm();
+      tangent = std::max(tangent, along > 0 ? 1.001 * across / along + 1e-6 : kAny);
+    }
+    const double sagitta = face != nullptr ? sagitta_of(facet, *face) : 0;
     NormalCone& cone = cones_[f];
     const Vec3 middle = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
     double reach = cone.reach;
     for (int i = 0; i < 4; ++i)
       for (int j = 0; i + j < 4; ++j)
         reach = std::max(reach, (net[i][j] - middle).norm() + 1e-6 * shell.size());
-    cone.reach = static_cast<float>(reach);
+    cone.reach = static_cast<float>(reach + sagitta);
     cone.tan_opening = widened_opening(tangent);
     // The offset points weigh 1 - b0^3 - b1^3 - b2^3 <= 8/9 in all.
     const double largest = std::max(facets_[f].middle(facet).norm(), facets_[f].largest_offset());
-    facets_[f].bulge = static_cast<float>(largest * (8.0 / 9 + 1e-6));
+    facets_[f].bulge = static_cast<float>(std::max(largest * (8.0 / 9 + 1e-6), sagitta));
   });
   for (const CurvedFacet& curved : facets_) bulge_ = std::max<double>(bulge_, curved.bulge);
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "shell/cell_bounds.hpp"
+#include "shell/faces/face_cells.hpp"
 #include "shell/faces/recognition.hpp"
 #include "shell/shell.hpp"
 
@@ -122,8 +123,17 @@ class CurvedShell {
   const LargeArray<CellBounds>& cells() const { return cells_; }
   double bulge() const { return bulge_; }  // the largest of them [m]
   const Tangents& tangents() const { return tangents_; }
-  // The faces that were recognized: none where the normals are exact.
+  // The faces that elements lie on: those of CAD, or recognized.
   const Faces& faces() const { return faces_; }
+  // Per facet what it is of its face; empty where there are no faces.
+  const LargeArray<FaceCell>& face_cells() const { return face_cells_; }
+  // By so much regions of features overlap where faces give closest points [m].
+  double gap() const { return gap_; }
+  // That which gives the closest points of a facet; null: the facet's own cubic does.
+  const Primitive* face_of(int facet) const {
+    if (face_cells_.empty() || !face_cells_[facet].closed) return nullptr;
+    return &faces_.shapes[face_cells_[facet].face];
+  }
   // Whether the normals are the surface's own, and not estimated.
   bool exact() const { return exact_; }
   // Per corner: its normal was set aside, as a crease that the elements show divides its fan.
@@ -135,7 +145,8 @@ class CurvedShell {
   std::vector<double> chord_errors(const Shell& shell) const;
   std::size_t bytes() const {
     return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone) + sizeof(CellBounds)) +
-           tangents_.spoke_.size() * sizeof(int) + divided_.size() + faces_.of.size() * sizeof(int);
+           tangents_.spoke_.size() * sizeof(int) + divided_.size() +
+           faces_.of.size() * sizeof(int) + face_cells_.size() * sizeof(FaceCell);
   }
 
  private:
@@ -147,6 +158,8 @@ class CurvedShell {
   void bound_cells(const Shell& shell);
 
   Faces faces_;
+  LargeArray<FaceCell> face_cells_;
+  double gap_ = 0;
   SharedNormals normals_;  // let go when the elements are bent
   std::vector<char> divided_;
   int creases_ = 0;

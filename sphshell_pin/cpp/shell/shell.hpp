@@ -59,6 +59,8 @@ struct SurfacePoint {
   int element;
 };
 
+struct Faces;
+
 // What curved elements are made of.
 struct CurveOptions {
   // Unit, per triangle corner (3 per triangle), wound like the triangles; empty: estimated.
@@ -71,6 +73,8 @@ struct CurveOptions {
   // The coordinates are known to this [m] where more is not said: single precision.
   double rounding = 0;
   bool faces = true;  // recognize planes, cylinders, cones, spheres and tori
+  // Those that the surface is known to have: then none are recognized.
+  std::shared_ptr<const Faces> known;
 };
 
 class CurvedShell;

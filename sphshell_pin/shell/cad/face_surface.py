@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.GeomAbs import GeomAbs_C0, GeomAbs_Plane
+from OCP.GeomAbs import (
+    GeomAbs_C0,
+    GeomAbs_Cone,
+    GeomAbs_Cylinder,
+    GeomAbs_Plane,
+    GeomAbs_Sphere,
+    GeomAbs_Torus,
+)
 from OCP.gp import gp_Pnt, gp_Vec
 
 from sphshell_pin.shell.cad.options import Occ
@@ -18,6 +25,18 @@ MOST_STATIONARY_STEPS = 40
 
 SINGULAR = 1e-10
 """Where |du x dv| is below this share of the largest |du| |dv|, a surface has no normal."""
+
+
+PLANE, CYLINDER, CONE, SPHERE, TORUS = range(5)
+"""Rows of faces.KINDS."""
+
+_SHAPES = {
+    GeomAbs_Plane: (PLANE, BRepAdaptor_Surface.Plane),
+    GeomAbs_Cylinder: (CYLINDER, BRepAdaptor_Surface.Cylinder),
+    GeomAbs_Cone: (CONE, BRepAdaptor_Surface.Cone),
+    GeomAbs_Sphere: (SPHERE, BRepAdaptor_Surface.Sphere),
+    GeomAbs_Torus: (TORUS, BRepAdaptor_Surface.Torus),
+}
 
 
 class FaceSurface:
@@ -35,6 +54,29 @@ class FaceSurface:
         self._scale = 0.0
         self.flat = surface.GetType() == GeomAbs_Plane
         self.kinked = GeomAbs_C0 in (surface.UContinuity(), surface.VContinuity())
+
+    def shape(self) -> list[float]:
+        """Kind, point, axis and two radii of it, as `CleanedSurface.face_shapes` has them (9,)."""
+        kind, read = _SHAPES.get(self._surface.GetType(), (-1, None))
+        if read is None:
+            return [-1.0, *np.zeros(8)]
+        shape = read(self._surface)
+        radius = second = 0.0
+        if kind == CONE:
+            radius, second = shape.RefRadius(), shape.SemiAngle()
+            # Of its two halves that which the face is on has a positive radius.
+            middle = 0.5 * (self.low[1] + self.high[1])
+            if radius + middle * np.sin(second) < 0.0:
+                radius, second = -radius, -second
+        elif kind == TORUS:
+            radius, second = shape.MajorRadius(), shape.MinorRadius()
+            if radius <= second:
+                return [-1.0, *np.zeros(8)]  # it cuts itself
+        elif kind != PLANE:
+            radius = shape.Radius()
+        place = shape.Location().Coord()
+        axis = (0.0, 0.0, 1.0) if kind == SPHERE else shape.Axis().Direction().Coord()
+        return [float(kind), *place, *axis, radius, second]
 
     def nodes(self, uv: Floats) -> tuple[Floats, Floats]:
         """Points and unit normals (n, 3) at parameters uv (n, 2); zero where there is no normal."""

@@ -16,7 +16,7 @@ from sphshell_pin.shell.cad.options import CadOptions
 from sphshell_pin.shell.cad.reading import read_model
 from sphshell_pin.shell.cad.tessellation import Sewn, Tessellation, sew, tessellate
 from sphshell_pin.shell.cad.units import take_unit
-from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface, area_vectors
+from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface, area_vectors, moved_shapes
 
 CHORD_ERROR = 1e-3
 """Share of the box diagonal that the elements may be off the exact surface, unless stated."""
@@ -77,7 +77,14 @@ class CadSurface:
             normals=np.concatenate(normals).reshape(-1, 3),
             faces=np.concatenate(faces),
             face_names=tuple(face.name for face in self.model.faces),
+            face_shapes=moved_shapes(self._shapes(), self.model.meters, np.eye(3), np.zeros(3)),
         )
+
+    def _shapes(self) -> Floats:
+        """(f, 9) shapes of the faces [units of the model]."""
+        none = [-1.0, *np.zeros(8)]
+        meshes = self.found.meshes
+        return np.array([none if mesh is None else mesh.surface.shape() for mesh in meshes])
 
     @cached_property
     def starts(self) -> Longs:

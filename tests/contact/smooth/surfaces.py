@@ -203,7 +203,8 @@ SIDES = (1.2, 0.6, 0.3, 0.15)
 @cache
 def _shell(mesh: Callable[..., object], h: float, exact: bool) -> tuple[Shell, float]:
     vertices, elements, normals = mesh(h)  # type: ignore[misc]
-    shell = Shell(vertices, elements, normals=normals if exact else None)
+    # What the curved elements are worth by themselves: these surfaces are recognized otherwise.
+    shell = Shell(vertices, elements, normals=normals if exact else None, faces=False)
     return shell, mean_edge(vertices, elements)
 
 

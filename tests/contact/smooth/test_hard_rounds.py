@@ -129,7 +129,6 @@ def test_bowl_of_the_radius_of_the_sphere() -> None:
             assert np.abs(found.normal[0] + aside).max() <= 1e-3 / np.sqrt(depth)
 
 
-@fails(RING)
 def test_concentric_in_a_bowl() -> None:
     """Sphere of 1.1 R at the centre of a spherical bowl, all equally near; one contact's energy."""
     vertices, elements = meshes.icosphere(3)
@@ -174,7 +173,6 @@ def test_tube_of_the_radius_of_the_sphere() -> None:
             assert stored(tube(), depth * out, depth) == pytest.approx(1.0, abs=1e-2)
 
 
-@fails(RING)
 def test_concentric_in_a_tube() -> None:
     """Sphere of 1.05 R on the axis of a tube, touched all round; the potential of one contact."""
     for aside in (0.0, 1e-9, 1e-6, 1e-3):

@@ -287,5 +287,6 @@ def test_no_query_is_slow(name: str) -> None:
     for size in np.unique(sizes):
         alike = np.flatnonzero(sizes == size)
         median = np.median(costs[alike])
-        for i in alike[costs[alike] > 30 * median]:
-            assert min(some.cost(int(i)) for _ in range(10)) < 60 * median, int(i)
+        # Where faces are exact most queries take a tenth of those beside them.
+        for i in alike[costs[alike] > 60 * median]:
+            assert min(some.cost(int(i)) for _ in range(10)) < 120 * median, int(i)

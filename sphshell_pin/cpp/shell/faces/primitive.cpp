@@ -147,6 +147,41 @@ double Primitive::distance(const Vec3& x, Vec3& normal) const {
   return q - second;
 }
 
+// The principal directions are those around the axis and of the meridian.
+Mat3 Primitive::hessian(const Vec3& x) const {
+  const Vec3 y = x - point;
+  if (kind == FaceKind::Plane) return Mat3::Zero();
+  Vec3 n;
+  distance(x, n);
+  if (kind == FaceKind::Sphere)
+    return (Mat3::Identity() - n * n.transpose()) / std::max(y.norm(), 1e-300);
+  const Vec3 across = y - y.dot(axis) * axis;
+  const double off = std::max(across.norm(), 1e-300);
+  const Vec3 e = across / off, around = axis.cross(e);
+  Mat3 out = n.dot(e) / off * around * around.transpose();
+  if (kind == FaceKind::Torus) {
+    const Vec3 meridian = n.cross(around);
+    const double q = std::hypot(off - radius, y.dot(axis));
+    out += meridian * meridian.transpose() / std::max(q, 1e-300);
+  }
+  return out;
+}
+
+double Primitive::radius_at(const Vec3& x) const {
+  if (kind == FaceKind::Cone) return radius + (x - point).dot(axis) * std::tan(second);
+  return kind == FaceKind::Plane ? 1 : radius;
+}
+
+bool Primitive::singular(const Vec3& x, double share) const {
+  if (kind == FaceKind::Plane) return false;
+  const Vec3 y = x - point;
+  if (kind == FaceKind::Sphere) return y.norm() < share * radius;
+  const double h = y.dot(axis), off = (y - h * axis).norm();
+  const double size = std::max(std::abs(radius), std::abs(h));
+  return off < share * size ||
+         (kind == FaceKind::Torus && std::hypot(off - radius, h) < share * second);
+}
+
 int num_parameters(FaceKind kind) {
   static constexpr int kCount[] = {3, 5, 6, 4, 7};
   return kCount[static_cast<int>(kind)];

@@ -25,6 +25,20 @@ struct Primitive {
     Vec3 normal;
     return distance(x, normal);
   }
+  // Of a cone: beside a point of it, negative beyond its tip; of others the radius, which is
+  // positive.
+  double radius_at(const Vec3& x) const;
+  // The point next to x where it is zero.
+  Vec3 onto(const Vec3& x) const {
+    Vec3 normal;
+    const double off = distance(x, normal);
+    return x - off * normal;
+  }
+  // The second derivatives of the distance at x [1/m]: how its gradient turns.
+  Mat3 hessian(const Vec3& x) const;
+  // Whether x is so near the axis or the center, to this share of the radius, that the gradient has
+  // no direction there.
+  bool singular(const Vec3& x, double share) const;
 };
 
 // How many numbers describe a primitive of a kind.

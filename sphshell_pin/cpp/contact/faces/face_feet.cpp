@@ -1,0 +1,204 @@
+#include "contact/faces/face_feet.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/closest_on_cell.hpp"
+#include "contact/closest_on_side.hpp"
+#include "shell/faces/face_cells.hpp"
+
+namespace sphshell {
+namespace {
+
+// Nearer to an axis than this share of the distance from the surface, a center has no direction.
+constexpr double kOnAxis = 1e-12;
+constexpr int kMostRepeats = 8;
+
+// How the curve between two shapes goes at a point where both are zero.
+struct Intersection {
+  Vec3 tangent, curvature;  // unit; the derivative of the tangent along the curve [1/m]
+  Vec3 offset;              // from the point onto both, where they are not quite zero
+};
+
+Intersection intersection_at(const Primitive& one, const Primitive& other, const Vec3& x) {
+  Vec3 n, m;
+  const double a = one.distance(x, n), b = other.distance(x, m), c = n.dot(m);
+  const double square = std::max(1 - c * c, 1e-12);
+  const auto solve = [&](double p, double q) -> Vec3 {  // the vector v in their plane: n.v, m.v
+    return ((p - c * q) * n + (q - c * p) * m) / square;
+  };
+  Intersection out;
+  out.tangent = n.cross(m).normalized();
+  const Vec3 along = out.tangent;
+  out.curvature = solve(-along.dot(one.hessian(x) * along), -along.dot(other.hessian(x) * along));
+  out.offset = solve(-a, -b);
+  return out;
+}
+
+}  // namespace
+
+void FaceFeet::clear(const CurvedShell& surface) {
+  if (feet_.size() != surface.faces().shapes.size() || of_ != &surface || ++round_ == 0) {
+    feet_.assign(surface.faces().shapes.size(), Foot());
+    of_ = &surface;
+    round_ = 1;
+  }
+}
+
+void FaceFeet::add(const Shell& shell, int f, const Sphere& sphere, bool want_dn_dc,
+                   std::vector<Minimum>& minima) {
+  const CurvedShell& surface = *shell.curved();
+  const FaceCell& cell = surface.face_cells()[f];
+  const Primitive& shape = surface.faces().shapes[cell.face];
+  Foot& foot = feet_[cell.face];
+  if (foot.round != round_) {
+    foot.round = round_;
+    foot.distance = shape.distance(sphere.center, foot.normal);
+    foot.anywhere = shape.singular(sphere.center, kOnAxis);
+    foot.point = sphere.center - foot.distance * foot.normal;
+    foot.claimed = !(std::abs(foot.distance) < sphere.radius) || !(shape.radius_at(foot.point) > 0);
+  }
+  if (foot.claimed) return;
+  const NormalCone& cone = surface.cones()[f];
+  const Vec3 middle = shell.origin() + Vec3(cone.middle[0], cone.middle[1], cone.middle[2]);
+  Vec3 point = foot.point, normal = foot.normal;
+  if (foot.anywhere) {
+    shape.distance(sphere.center + 1e-6 * (middle - sphere.center), normal);
+    point = sphere.center - foot.distance * normal;
+  }
+  const double reach = cone.reach + 1e-6 * shell.size();
+  if ((point - middle).squaredNorm() > reach * reach) return;
+  const Vec3 outward = cell.sign < 0 ? Vec3(-normal) : normal;
+  const Facet& facet = shell.facets()[f];
+  if (!holds(shell, f, point, outward, sphere.tolerance + surface.gap())) return;
+  foot.claimed = true;
+  // Away from the face; where the center is on it, to the facet's side.
+  const bool within = foot.distance < 0;
+  const Vec3 away = foot.distance == 0 ? outward : within ? Vec3(-normal) : normal;
+  Contact contact{point, away, sphere.radius - std::abs(foot.distance), facet.element,
+                  Feature::Face};
+  // All around an axis the normal has no derivative.
+  if (want_dn_dc && !foot.anywhere)
+    contact.dn_dc = (within ? -1 : 1) * shape.hessian(sphere.center);
+  minima.push_back({contact, f, 0, foot.distance * cell.sign < 0});
+}
+
+bool holds(const Shell& shell, int f, const Vec3& point, const Vec3& outward, double tolerance) {
+  const CurvedShell& surface = *shell.curved();
+  const std::vector<Primitive>& shapes = surface.faces().shapes;
+  const FaceCell& cell = surface.face_cells()[f];
+  const Facet& facet = shell.facets()[f];
+  // Not on the other side of the axis.
+  if (!(outward.dot(Vec3(cell.upright[0], cell.upright[1], cell.upright[2])) > 0)) return false;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)], d = q - p;
+    if (cell.side[k] == FaceCell::Side::Inner) {
+      // Facets of a face are divided by the planes through their chords and the face's normals.
+      Vec3 n;
+      shapes[cell.face].distance((p + q) / 2, n);
+      const double inside = cell.sign * n.cross(d).dot(point - p);
+      if (inside < 0 && inside * inside > tolerance * tolerance * d.squaredNorm()) return false;
+      continue;
+    }
+    const Vec3 in = outward.cross(d).normalized();
+    const double inside = in.dot(point - p);
+    if (inside > cell.bulge[k]) continue;
+    if (inside < -double(cell.bulge[k])) return false;
+    if (cell.side[k] == FaceCell::Side::Shared) {
+      Vec3 m;
+      const double away = shapes[cell.beyond[k]].distance(point, m);
+      if ((m.dot(in) < 0 ? -away : away) < -tolerance) return false;
+      continue;
+    }
+    if (cell.side[k] == FaceCell::Side::Tangent) {
+      const double turn = cell.turn[k] * turn_between(shapes, cell.face, cell.beyond[k], d, point);
+      if (turn < -kMostGap * d.norm()) return false;
+      continue;
+    }
+    const CubicCurve side = surface.facets()[f].side(facet, k);
+    const double t = nearest_on_side(side, point);
+    if (outward.cross(side.tangent(t)).normalized().dot(point - side.point(t)) < -tolerance)
+      return false;
+  }
+  return true;
+}
+
+SideFoot nearest_on_side(const Shell& shell, int f, int k, const Vec3& center) {
+  const CurvedShell& surface = *shell.curved();
+  const CubicCurve side = surface.facets()[f].side(shell.facets()[f], k);
+  SideFoot out;
+  out.t = nearest_on_side(side, center);
+  out.point = side.point(out.t);
+  out.tangent = side.tangent(out.t);
+  if (surface.face_cells().empty() || surface.face_cells()[f].face < 0) return out;
+  const std::vector<Primitive>& shapes = surface.faces().shapes;
+  const FaceCell& cell = surface.face_cells()[f];
+  const Primitive& shape = shapes[cell.face];
+  if (cell.side[k] == FaceCell::Side::Inner && out.t > 0 && out.t < 1)
+    out.point = shape.onto(out.point);
+  if (cell.across[k] < 0 || cell.side[k] == FaceCell::Side::Cubic) return out;
+  const Primitive& other = shapes[cell.across[k]];
+  const Vec3 &p = shell.facets()[f].corner[k], &q = shell.facets()[f].corner[next_corner(k)];
+  const Vec3 chord = q - p;
+  const auto tangent_at = [&](const Vec3& x) -> Vec3 {
+    const Vec3 tangent = intersection_at(shape, other, x).tangent;
+    // At an end where both are tangent.
+    if (!(tangent.squaredNorm() > 0.5)) return Vec3(chord.normalized());
+    return tangent.dot(chord) < 0 ? Vec3(-tangent) : tangent;
+  };
+  const double most = chord.norm() / 2;
+  Vec3 x = out.point;
+  for (int i = 0; i < kMostRepeats; ++i) {
+    const Intersection here = intersection_at(shape, other, x);
+    const Vec3 from = x - center;
+    const double bend = 1 + from.dot(here.curvature);
+    const double step =
+        std::clamp(-from.dot(here.tangent) / (bend > 0.05 ? bend : 1.0), -most, most);
+    const Vec3 moved = here.offset + step * (here.tangent + step / 2 * here.curvature);
+    x += moved;
+    if (moved.squaredNorm() < 1e-30 * from.squaredNorm()) break;
+  }
+  // Beyond an end that end is the nearest.
+  const double gap = surface.gap();
+  if ((center - p).dot(tangent_at(p)) <= -gap || (x - p).dot(chord) <= -gap * chord.norm()) {
+    out.t = 0, out.point = p;
+  } else if ((center - q).dot(tangent_at(q)) >= gap || (q - x).dot(chord) <= -gap * chord.norm()) {
+    out.t = 1, out.point = q;
+  } else {
+    if (out.t <= 0 || out.t >= 1) out.t = 0.5;
+    out.point = x;
+    out.tangent = tangent_at(x);
+  }
+  return out;
+}
+
+Mat3 dx_dc_of(const Shell& shell, int f, int k, const SideFoot& foot, const Vec3& center) {
+  const CurvedShell& surface = *shell.curved();
+  if (!surface.face_cells().empty() && surface.face_cells()[f].side[k] != FaceCell::Side::Cubic &&
+      surface.face_cells()[f].across[k] >= 0) {
+    const FaceCell& cell = surface.face_cells()[f];
+    const std::vector<Primitive>& shapes = surface.faces().shapes;
+    const Intersection at = intersection_at(shapes[cell.face], shapes[cell.across[k]], foot.point);
+    const double bend = 1 + (foot.point - center).dot(at.curvature);
+    return bend == 0 ? Mat3(Mat3::Zero()) : Mat3(at.tangent * at.tangent.transpose() / bend);
+  }
+  return dx_dc_of(surface.facets()[f].side(shell.facets()[f], k), foot.t, center);
+}
+
+Vec3 inward(const Shell& shell, int h, double t, const Vec3& point, const Vec3& along) {
+  const CurvedShell& surface = *shell.curved();
+  const int f = triangle_of(h), k = side_of(h);
+  const Facet& facet = shell.facets()[f];
+  Vec3 in;
+  if (const Primitive* face = surface.face_of(f)) {
+    Vec3 n;
+    face->distance(point, n);
+    in = n.cross(along);
+    if (in.dot(facet.normal.cross(facet.corner[next_corner(k)] - facet.corner[k])) < 0) in = -in;
+  } else {
+    in = surface.facets()[f].patch(facet).inward(k, t);
+  }
+  return (in - in.dot(along) * along).normalized();
+}
+
+}  // namespace sphshell

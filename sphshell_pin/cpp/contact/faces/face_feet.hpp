@@ -1,0 +1,52 @@
+// Closest points on the faces that facets lie on, in closed form.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "contact/minimum.hpp"
+#include "shell/curved.hpp"
+
+namespace sphshell {
+
+// The closest point of each face is found once a query, whatever the number of its facets; the
+// facet that holds it claims it.
+class FaceFeet {
+ public:
+  void clear(const CurvedShell& surface);
+  // Adds the closest point of the face that a facet lies on, if it is in the facet and no other has
+  // claimed it.
+  void add(const Shell& shell, int facet, const Sphere& sphere, bool want_dn_dc,
+           std::vector<Minimum>& minima);
+
+ private:
+  struct Foot {
+    std::uint32_t round = 0;
+    bool claimed;   // or out of reach
+    bool anywhere;  // all around the axis, or the center
+    double distance;
+    Vec3 point, normal;  // the normal as the shape has it
+  };
+  std::vector<Foot> feet_;  // beside the faces
+  std::uint32_t round_ = 0;
+  const CurvedShell* of_ = nullptr;
+};
+
+// Whether a point of a face, with its unit normal on the facet's side, is in a facet.
+bool holds(const Shell& shell, int facet, const Vec3& point, const Vec3& outward, double tolerance);
+
+// The point of a side nearest to a center: of the curve that it is between two faces, or within
+// one, or of its cubic.
+struct SideFoot {
+  double t;  // of the cubic
+  Vec3 point, tangent;
+};
+SideFoot nearest_on_side(const Shell& shell, int facet, int side, const Vec3& center);
+// How it follows the center (3, 3).
+Mat3 dx_dc_of(const Shell& shell, int facet, int side, const SideFoot& foot, const Vec3& center);
+
+// The unit direction that leaves a half-edge's side at a point of it into the facet, across the
+// unit tangent; t along the side.
+Vec3 inward(const Shell& shell, int half_edge, double t, const Vec3& point, const Vec3& along);
+
+}  // namespace sphshell

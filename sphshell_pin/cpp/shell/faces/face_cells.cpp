@@ -1,0 +1,209 @@
+#include "shell/faces/face_cells.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "shell/curved.hpp"
+
+namespace sphshell {
+namespace {
+
+// Faces that meet at less than this angle (its sine) do not determine where.
+constexpr double kLeastAngle = 0.003;
+// What is measured at a few places may be larger between them.
+constexpr double kMargin = 1.5;
+constexpr int kMostRepeats = 12;
+// Tangent faces turn from each other within a facet by this at least.
+constexpr double kLeastTurn = 1e-6;
+
+}  // namespace
+
+bool onto_both(const Primitive& one, const Primitive& other, Vec3& x) {
+  for (int i = 0; i < kMostRepeats; ++i) {
+    Vec3 n, m;
+    const double a = one.distance(x, n), b = other.distance(x, m), c = n.dot(m);
+    const double square = 1 - c * c;
+    if (!(square > kLeastAngle * kLeastAngle)) return false;
+    const Vec3 step = ((c * b - a) * n + (c * a - b) * m) / square;
+    const Vec3 before = x;
+    x += step;
+    if (x == before || step.squaredNorm() < 1e-30 * x.squaredNorm()) break;
+  }
+  return x.allFinite();
+}
+
+double turn_between(const std::vector<Primitive>& shapes, int face, int other, const Vec3& chord,
+                    const Vec3& x) {
+  Vec3 n, m;
+  shapes[face].distance(x, n), shapes[other].distance(x, m);
+  return chord.dot(n.cross(m));
+}
+
+double sagitta_of(const Facet& facet, const Primitive& shape) {
+  const Vec3* p = facet.corner;
+  double most = std::abs(shape.distance((p[0] + p[1] + p[2]) / 3));
+  for (int k = 0; k < 3; ++k)
+    most = std::max(most, std::abs(shape.distance((p[k] + p[next_corner(k)]) / 2)));
+  return kMargin * most;
+}
+
+namespace {
+
+// A plane or a cylinder through three points of a line or circle that is upright on a face with
+// normal n there.
+Primitive cutting(const Vec3& p, const Vec3& middle, const Vec3& q, const Vec3& n) {
+  const Vec3 d = q - p, up = (middle - p).cross(q - middle);
+  Primitive out{FaceKind::Plane, p, d.cross(n).normalized(), 0, 0};
+  if (!(up.norm() > 1e-7 * d.squaredNorm())) return out;
+  // The center of the circle, from the middle of its chord.
+  const Vec3 axis = up.normalized(), toward = axis.cross(d).normalized();
+  const double half = d.norm() / 2, rise = (middle - (p + q) / 2).dot(toward);
+  const double away = (rise * rise - half * half) / (2 * rise);
+  const Vec3 center = (p + q) / 2 + away * toward;
+  if (std::abs(n.dot(axis)) < 0.7) return {FaceKind::Plane, center, axis, 0, 0};
+  return {FaceKind::Cylinder, center, axis, (p - center).norm(), 0};
+}
+
+// Whether two faces touch along side k of a facet; sets its bulge and turn.
+bool is_tangent(const Shell& shell, std::vector<Primitive>& shapes, int other, const Facet& facet,
+                int k, FaceCell& cell) {
+  const Vec3 &p = facet.corner[k], &q = facet.corner[next_corner(k)];
+  const Primitive face = shapes[cell.face];
+  const Vec3 inward = facet.normal.cross(q - p).normalized();
+  const double height = inward.dot(facet.corner[previous_corner(k)] - p);
+  double bulge = 0;
+  Vec3 middle;
+  for (const double s : {0.0, 0.25, 0.75, 1.0, 0.5}) {
+    // The border by the rule of false position: the turn grows evenly across it.
+    Vec3 x = face.onto(p + s * (q - p));
+    const Vec3 within = face.onto(x + 0.1 * height * inward);
+    const double here = turn_between(shapes, cell.face, other, q - p, x);
+    const double there = turn_between(shapes, cell.face, other, q - p, within);
+    const double rise = (there - here) / (0.1 * height);
+    const Vec3 start = x;
+    for (int i = 0; i < 4; ++i)
+      x = face.onto(x - turn_between(shapes, cell.face, other, q - p, x) / rise * inward);
+    const double off = (x - start).norm();
+    if (!(std::abs(rise) * height > kLeastTurn * (q - p).norm()) || !(off < 0.9 * height))
+      return false;
+    if (!(std::abs(shapes[other].distance(x)) <= kMostGap * shell.size())) return false;
+    bulge = std::max(bulge, off);
+    middle = x;
+    cell.turn[k] = rise < 0 ? -1 : 1;
+  }
+  cell.bulge[k] = static_cast<float>(kMargin * bulge + kMostGap * shell.size());
+  cell.across[k] = static_cast<int>(shapes.size());
+  Vec3 n;
+  face.distance(middle, n);
+  shapes.push_back(cutting(p, middle, q, n));
+  return true;
+}
+
+}  // namespace
+
+LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
+                                     const LargeArray<CurvedFacet>& facets) {
+  LargeArray<FaceCell> out;
+  if (faces.of.empty()) return out;
+  const Topology& topology = shell.topology();
+  out.resize(facets.size());
+  for (std::size_t f = 0; f < out.size(); ++f) {
+    out[f] = FaceCell();
+    out[f].face = faces.of_triangle(shell.triangle_of_facet(static_cast<int>(f)));
+  }
+  // What is bent, or has borders that ought to be.
+  std::vector<char> bent(out.size(), 0);
+  const auto is_round = [&](int face) {
+    return face >= 0 && faces.shapes[face].kind != FaceKind::Plane;
+  };
+  for (std::size_t f = 0; f < out.size(); ++f) {
+    if (out[f].face < 0) continue;
+    bent[f] = is_round(out[f].face) || !facets[f].flat;
+    const int t = shell.triangle_of_facet(static_cast<int>(f));
+    for (int k = 0; k < 3; ++k) {
+      const Edge& edge = topology.edges[topology.edge_of[3 * t + k]];
+      const int g = edge.count == 2 ? topology.other_half_edge(edge, 3 * t + k) : -1;
+      if (g >= 0 && is_round(faces.of_triangle(triangle_of(g)))) bent[f] = 1;
+    }
+  }
+  const auto is_bent = [&](int f) { return bool(bent[f]); };
+  std::vector<char> open(faces.shapes.size(), 0);
+  std::vector<float> off(3 * out.size(), 0);  // of a cubic side from the face [m]
+  for (std::size_t f = 0; f < out.size(); ++f) {
+    const Facet& facet = shell.facets()[f];
+    const int t = shell.triangle_of_facet(static_cast<int>(f));
+    FaceCell& cell = out[f];
+    if (cell.face < 0) continue;
+    const Primitive shape = faces.shapes[cell.face];
+    Vec3 n;
+    shape.distance((facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3, n);
+    cell.sign = n.dot(facet.normal) < 0 ? -1 : 1;
+    for (int i = 0; i < 3; ++i) cell.upright[i] = static_cast<float>(cell.sign * n[i]);
+    for (const Vec3& p : facet.corner)
+      if (!(std::abs(shape.distance(p)) <= kMostGap * shell.size())) open[cell.face] = 1;
+    for (int k = 0; k < 3; ++k) {
+      const Edge& edge = topology.edges[topology.edge_of[3 * t + k]];
+      const int g = edge.count == 2 ? topology.other_half_edge(edge, 3 * t + k) : -1;
+      const bool wound =
+          g >= 0 && shell.triangles()[t][k] != shell.triangles()[triangle_of(g)][side_of(g)];
+      const int beyond = wound ? triangle_of(shell.facet_half_edge(g)) : -1;
+      const int other = beyond >= 0 ? out[beyond].face : -1;
+      if (other == cell.face) cell.side[k] = FaceCell::Side::Inner;
+      if (other == cell.face || !(is_bent(int(f)) || (beyond >= 0 && is_bent(beyond)))) continue;
+      const Vec3 one = facets[f].control_offset(k, 0), two = facets[f].control_offset(k, 1);
+      double bulge = std::max(one.norm(), two.norm()), apart = 0;
+      bool shared = other >= 0;
+      const CubicCurve side = facets[f].side(facet, k);
+      for (const Vec3& end : {facet.corner[k], facet.corner[next_corner(k)]})
+        shared = shared && std::abs(faces.shapes[other].distance(end)) <= kMostGap * shell.size();
+      for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85}) {
+        // Where both hold at the ends, in which they may be tangent, and cut each other between.
+        const Vec3 x = side.point(s);
+        Vec3 both = x;
+        shared = shared && onto_both(shape, faces.shapes[other], both);
+        bulge = std::max(bulge, (both - x).norm() + std::max(one.norm(), two.norm()));
+        apart = std::max(apart, std::abs(shape.distance(x)));
+      }
+      const double length = (facet.corner[next_corner(k)] - facet.corner[k]).norm();
+      off[3 * f + k] = static_cast<float>(apart);
+      if (shared && bulge < length) {
+        cell.side[k] = FaceCell::Side::Shared;
+        cell.beyond[k] = cell.across[k] = other;
+      } else if (other >= 0 && is_tangent(shell, faces.shapes, other, facet, k, cell)) {
+        cell.side[k] = FaceCell::Side::Tangent;
+        cell.beyond[k] = other;
+        continue;
+      } else if (apart > kMostGap * shell.size()) {
+        open[cell.face] = 1;
+      }
+      cell.bulge[k] = static_cast<float>(kMargin * bulge + kMostGap * shell.size());
+    }
+  }
+  // A side is what it is for the sake of faces that give closest points.
+  const auto gives = [&](int face) { return face >= 0 && !open[face]; };
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::size_t f = 0; f < out.size(); ++f)
+      for (int k = 0; k < 3; ++k) {
+        FaceCell& cell = out[f];
+        const bool here = gives(cell.face), there = gives(cell.beyond[k]);
+        const bool tangent = cell.side[k] == FaceCell::Side::Tangent;
+        if (tangent ? here && there : here || there) continue;
+        cell.side[k] = FaceCell::Side::Cubic;
+        if (here && off[3 * f + k] > kMostGap * shell.size()) open[cell.face] = changed = true;
+      }
+  }
+  for (std::size_t f = 0; f < out.size(); ++f) {
+    FaceCell& cell = out[f];
+    if (cell.face < 0) continue;
+    const auto curved = [&](int face) { return is_round(face) && gives(face); };
+    const bool needed =
+        is_round(cell.face) || !facets[f].flat || std::any_of(cell.beyond, cell.beyond + 3, curved);
+    cell.exact = !needed || gives(cell.face);
+    cell.closed = needed && gives(cell.face);
+    for (int k = 0; k < 3 && !cell.closed; ++k) cell.side[k] = FaceCell::Side::Cubic;
+  }
+  return out;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,168 @@
+"""Contacts on the exact faces of CAD files and of meshes: closed forms, and OpenCASCADE's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import coal
+import numpy as np
+import pytest
+from OCP.BRep import BRep_Builder
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+from OCP.gp import gp_Pnt
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader, STEPControl_Writer
+from OCP.TopAbs import TopAbs_FACE
+from OCP.TopoDS import TopoDS_Compound
+
+import sphshell_pin as sp
+from tests.contact.walks import jumps, paths
+from tests.parts import occ
+from tests.shell.cad_shapes import parts
+
+MM = 1e-3
+VALVE_BODY = Path(__file__).parents[2] / "scenarios" / "surfaces" / "valve_body.step"
+
+
+def block():
+    """A block with a bore, a countersink, a spherical socket, its upper edges rounded [mm]."""
+    solid = occ.box([0, 0, 0], [60, 40, 20])
+    solid = occ.filleted(solid, occ.edges_at(solid, 20.0), 3.0)
+    bore, sink = occ.cylinder(5.0, 30.0, [15, 20, -1]), occ.cone(2.0, 8.0, 10.0, [35, 20, 10])
+    return occ.cut(solid, bore, sink, occ.ball(5.0, [50, 20, 22]))
+
+
+@pytest.fixture(scope="module")
+def step(tmp_path_factory):
+    path = tmp_path_factory.mktemp("faces") / "block.step"
+    writer = STEPControl_Writer()
+    writer.Transfer(block(), STEPControl_AsIs)
+    writer.Write(str(path))
+    return path
+
+
+def faces_in(path: Path):
+    """The trimmed faces of a file, without what is inside."""
+    reader = STEPControl_Reader()
+    reader.ReadFile(str(path))
+    reader.TransferRoots()
+    builder, out = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(out)
+    for face in parts(reader.OneShape(), TopAbs_FACE):
+        builder.Add(out, face)
+    return out
+
+
+def spheres(shell: sp.Shell, count: int, radius: float, seed: int = 0):
+    """Centers (count, 3) near a surface, deep and shallow, over its faces and beside its edges."""
+    rng = np.random.default_rng(seed)
+    corners = shell.vertices[shell.triangles]
+    areas = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    which = rng.choice(len(areas), count, p=areas / areas.sum())
+    on = np.einsum("nk,nkx->nx", rng.dirichlet([1.0, 1.0, 1.0], count), corners[which])
+    away = 0.9 * shell.core.triangle_normals[which]
+    aside = rng.normal(size=(count, 3))
+    aside *= 0.6 / np.linalg.norm(aside, axis=1, keepdims=True)
+    return on + radius * np.where(rng.random(count)[:, None] < 0.5, away, aside)
+
+
+def deepest(shell: sp.Shell, centers, radius: float):
+    return shell.contacts_batch(centers, np.full(len(centers), radius))[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["block", "valve_body"])
+def test_depth_is_that_of_the_trimmed_faces(name, step):
+    path = step if name == "block" else VALVE_BODY
+    shell, exact = sp.Shell.from_file(path), faces_in(path)
+    assert all(face.exact for face in shell.faces)
+    radius = 0.04 * shell.size
+    centers = spheres(shell, 400, radius)
+    errors = []
+    for center, depth in zip(centers, deepest(shell, centers, radius), strict=True):
+        vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*(center / MM))).Vertex()
+        true = radius - BRepExtrema_DistShapeShape(vertex, exact).Value() * MM
+        errors.append(abs(depth - true) / radius)
+    # OpenCASCADE's own steps end a little earlier than ours.
+    assert np.quantile(errors, 0.98) <= 1e-12
+    assert max(errors) <= 2e-9
+
+
+def test_chord_error_does_not_matter(step):
+    coarse, fine = (sp.Shell.from_file(step, chord_error=e) for e in (7e-4, 7e-6))
+    assert len(fine.triangles) > 5 * len(coarse.triangles)
+    for radius in (1e-3, 4e-3):
+        centers = spheres(fine, 2000, radius)
+        apart = np.abs(deepest(coarse, centers, radius) - deepest(fine, centers, radius))
+        assert apart.max() <= 1e-10 * radius
+
+
+def test_faces_of_a_file(step):
+    shell = sp.Shell.from_file(step)
+    kinds = sorted(face.kind for face in shell.faces)
+    assert kinds.count("cone") == 1
+    assert {"plane", "cylinder", "cone", "sphere"} <= set(kinds)
+    (cone,) = (face for face in shell.faces if face.kind == "cone")
+    assert abs(cone.half_angle) == pytest.approx(np.arctan2(6.0, 10.0), abs=1e-12)
+    assert cone.name == shell.face_names[shell.element_face[cone.elements[0]]]
+    assert sum(len(face.elements) for face in shell.faces) == len(shell.elements)
+    larger = shell.transformed(2.0)
+    assert [face.kind for face in larger.faces] == [face.kind for face in shell.faces]
+    assert all(face.exact for face in larger.faces)
+    assert sp.Shell.from_file(step, faces=["Face 1"]).faces[0].name == "Face 1"
+
+
+@pytest.mark.parametrize("radius", [1e-3, 3e-3, 4.9e-3])
+def test_the_potential_does_not_jump(step, radius):
+    shell = sp.Shell.from_file(step)
+    for path in paths(shell, 12, 150, radius, 0.05 * radius):
+        assert jumps(shell, "smooth", path, radius, 1e-7) == []
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9, 0.99, 0.999])
+@pytest.mark.parametrize("made", ["file", "mesh"])
+def test_a_ball_in_a_bore_touches_once(made, share, step):
+    """The file's bore, or one whose vertices alone tell what it is."""
+    if made == "file":
+        shell, size, axis, middle = sp.Shell.from_file(step), 5e-3, [15e-3, 20e-3], 8e-3
+    else:
+        solid = sp.Shell.from_geometry(coal.Cylinder(5e-3, 40e-3))
+        shell = sp.Shell(solid.vertices, solid.elements)
+        size, axis, middle = 5e-3, [0.0, 0.0], 0.0
+    radius = share * size
+    for turn in np.random.default_rng(0).uniform(0, 2 * np.pi, 20):
+        aside = (size - radius + 0.01 * radius) * np.array([np.cos(turn), np.sin(turn)])
+        found = shell.contacts([*(axis + aside), middle], radius)
+        assert len(found) == 1
+        assert found.depth[0] == pytest.approx(0.01 * radius, abs=1e-9 * radius)
+        assert found.normal[0, :2] == pytest.approx(-aside / np.linalg.norm(aside), abs=1e-8)
+
+
+def test_normals_turn_as_the_faces_say(step):
+    """The derivative of weight * normal, against differences."""
+    core = sp.Shell.from_file(step).core_for("smooth")
+    shell = sp.Shell.from_file(step)
+    radius, move, compared = 2e-3, 1e-8, 0
+    for center in spheres(shell, 60, radius):
+        shown, terms = core.contacts(center, radius, 2, True)
+        if terms is not None or len(shown[2]) != 1 or shown[2][0] > 0.9 * radius:
+            continue
+        for k in range(3):
+            ends = [core.contacts(center + s * move * np.eye(3)[k], radius, 2)[0] for s in (1, -1)]
+            if any(len(one[2]) != 1 for one in ends):
+                continue
+            slope = (ends[0][1][0] - ends[1][1][0]) / (2 * move)
+            assert shown[6][0][:, k] == pytest.approx(slope, abs=1e-4 / radius)
+            compared += 1
+    assert compared > 60
+
+
+def test_no_faces_no_closed_forms():
+    ball = sp.Shell.from_geometry(coal.Sphere(0.1), segments=24)
+    curved = sp.Shell(ball.vertices, ball.triangles, normals=ball.normals, faces=False)
+    shell = sp.Shell(ball.vertices, ball.triangles, normals=ball.normals)
+    center = 0.119 * np.array([0.6, 0.48, 0.64])
+    assert shell.contacts(center, 0.02).depth[0] == pytest.approx(1e-3, abs=1e-12)
+    assert abs(curved.contacts(center, 0.02).depth[0] - 1e-3) > 1e-9
