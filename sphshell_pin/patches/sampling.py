@@ -114,11 +114,12 @@ class _Surface:
     """Points of a shell's triangles at barycentric weights, flat or curved."""
 
     def __init__(self, shell: Shell, curved: bool) -> None:
-        self._corners = np.asarray(shell.vertices, dtype=float)[np.asarray(shell.triangles)]
+        core = shell.core_for("smooth" if curved else "facets")
+        self._corners = np.asarray(core.vertices, dtype=float)[np.asarray(core.triangles)]
         self._offsets: Array | None = None
         self.bulge = 0.0
         if curved:
-            offsets = np.asarray(shell.core_for("smooth").control_point_offsets)
+            offsets = np.asarray(core.control_point_offsets)
             if offsets.any():
                 self._offsets = offsets
                 self.bulge = float(np.linalg.norm(offsets, axis=2).max())

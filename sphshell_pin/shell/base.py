@@ -97,6 +97,7 @@ class ShellBase(Summarized):
         cad_face, normals = None, None
         if self.element_face is not None and self.normals is not None and self.crease_angle > 0.0:
             cad_face, normals = self.element_face[triangle_element], self.normals.reshape(-1, 3)
+        self._smooth: _core.Shell | None = None
         self.core = _core.Shell(
             vertices,
             triangles,
@@ -129,19 +130,22 @@ class ShellBase(Summarized):
 
     def core_for(self, method: str) -> _core.Shell:
         """Return the compiled surface, with curved elements if `method` is "smooth"."""
-        if method == "smooth":
+        if method != "smooth":
+            return self.core
+        if self._smooth is None:
             # With no smooth edges every element is flat, whatever normals came with it.
             given = self.normals if self.crease_angle > 0 else None
-            exact = self.element_face is not None  # CAD's own
+            exact = self.element_face is not None and given is not None  # CAD's own
             straight = None if self.straight is None else self.straight.ravel().view(np.uint8)
             given = None if given is None else given.reshape(-1, 3)
-            known = shapes = None
-            if self.finds_faces and self.element_face is not None and given is not None:
-                known, shapes = self.element_face[self.triangle_element], self.face_shapes
-            if shapes is None:
-                known = None
-            self.core.curve(given, exact, straight, self.rounding, self.finds_faces, known, shapes)
-        return self.core
+            known, shapes = None, self.face_shapes
+            if self.finds_faces and given is not None and shapes is not None:
+                assert self.element_face is not None  # both come from CAD
+                known = self.element_face[self.triangle_element]
+            self._smooth = self.core.curve(
+                given, exact, straight, self.rounding, self.finds_faces, known, shapes
+            )
+        return self._smooth
 
     @cached_property
     def faces(self) -> tuple[Face, ...]:

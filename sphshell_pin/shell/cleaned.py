@@ -23,7 +23,7 @@ class CleanedSurface:
     health : what was found and done
     element_face : (m,) row in `face_names` of the CAD face each element lies on, or None
     face_names : of the CAD faces
-    face_shapes : (f, 9) of the CAD faces: the row of the kind in faces.KINDS, -1 of none of these;
+    face_shapes : (f, 9) of the CAD faces: the row of the kind in raw.KINDS, -1 of none of these;
         a point, the axis, the radius and the second number, as of `Face` [m, rad]; or None
     straight : (t, 3) sides that stay straight whatever the normals say, or None
     rounding : half the step to which the coordinates are known [m], 0 if they show none

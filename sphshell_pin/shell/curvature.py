@@ -76,7 +76,7 @@ def curvature_report(shell: ShellBase) -> CurvatureReport:
         normals_set_aside=len(aside),
         set_aside_at=first,
         share_set_aside=len(aside) / shell.triangles.size,
-        faces=described(shell.faces, shell.num_elements) if _recognizes(shell) else "",
+        faces=described(shell.faces, shell.num_elements) if _has_faces(shell) else "",
     )
 
 
@@ -96,8 +96,9 @@ def _distances(shell: ShellBase, rows: Longs, divisions: int) -> Floats:
 
 def _limits(shell: ShellBase, longest: Floats) -> Floats:
     """(t,) how far from its flat one each curved triangle may be [m]."""
-    triangles, normals = shell.triangles, shell.core.corner_normals
-    limit = np.maximum(LARGE_OF_TURNS * shell.core.chord_errors, LEAST_OF_SIZE * shell.size)
+    core = shell.core_for("smooth")
+    triangles, normals = shell.triangles, core.corner_normals
+    limit = np.maximum(LARGE_OF_TURNS * core.chord_errors, LEAST_OF_SIZE * shell.size)
     # Beside corners at which the normals differ not all turns were taken into account.
     one, turn = np.zeros_like(shell.vertices), np.zeros(len(shell.vertices))
     one[triangles] = normals
@@ -116,8 +117,8 @@ def _any_at(shell: ShellBase, vertices: Ints) -> Mask:
     return np.asarray(found[shell.triangles].any(axis=1))
 
 
-def _recognizes(shell: ShellBase) -> bool:
-    return shell.finds_faces and shell.element_face is None and shell.crease_angle > 0.0
+def _has_faces(shell: ShellBase) -> bool:
+    return shell.finds_faces and shell.crease_angle > 0.0
 
 
 def _largest_distance(shell: ShellBase, some: Longs, bound: Floats) -> tuple[int, float, Floats]:

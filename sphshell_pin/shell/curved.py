@@ -24,10 +24,8 @@ def points_at(shell: ShellBase, rows: Longs, weights: Floats) -> Floats:
     # Bernstein's polynomials of the control points, with their offsets from the flat triangle.
     sides = [3 * a * b * c for a, b in ((w, u), (u, v), (v, w)) for c in (a, b)]
     inner = np.stack([*sides, 6 * u * v * w])
-    corners, lifts = (
-        shell.vertices[shell.triangles[rows]],
-        shell.core_for("smooth").control_point_offsets[rows],
-    )
+    core = shell.core_for("smooth")
+    corners, lifts = core.vertices[core.triangles[rows]], core.control_point_offsets[rows]
     points = np.einsum("kc,tcx->tkx", weights, corners) + np.einsum("bk,tbx->tkx", inner, lifts)
     return np.asarray(points)
 

@@ -1,18 +1,17 @@
-"""The faces that a mesh was made from, as the core recognizes them."""
+"""The planes, cylinders, cones, spheres and tori of a surface, of CAD or recognized in its mesh."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.checks import read_only
-from sphshell_pin.shell.raw import Floats, Ints
+from sphshell_pin.shell.raw import KINDS, Floats, Ints
 
-KINDS = ("plane", "cylinder", "cone", "sphere", "torus")
 MOST_GROUPS = 5  # in words
 
 
@@ -43,7 +42,7 @@ class Face:
     radius: float | None
     minor_radius: float | None
     half_angle: float | None
-    elements: Ints
+    elements: Ints = field(repr=False)
     exact: bool
     name: str | None = None
 
@@ -88,6 +87,8 @@ def described(faces: Sequence[Face], elements: int) -> str:
         parts.append(f"and {more} more")
     left = 100.0 * (1.0 - sum(len(face.elements) for face in faces) / elements)
     share = f"; {left:.3g} % of the elements on none" if left > 0.0 else ""
+    if curved := sum(not face.exact for face in faces):
+        share += f"; {curved} of {len(faces)} as curved elements"
     return (", ".join(parts) or "none recognized") + share
 
 

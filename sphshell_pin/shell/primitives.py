@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.shell.raw import Floats, RawSurface, raw_surface
+from sphshell_pin.shell.raw import RawSurface, raw_surface
 from sphshell_pin.shell.revolution import Revolution, arc
 
 DEFAULT_CHORD_ERROR = 1e-3
@@ -73,12 +73,9 @@ def geometry_surface(
         return _square(shape, DEFAULT_EXTENT if extent is None else extent)
     for kind, build in _BUILDERS.items():
         if isinstance(shape, kind):
-            return raw_surface(*build(shape, chord_error, segments))
+            return build(shape, chord_error, segments)
     known = ["mesh (BVHModel)", "Convex", "Halfspace", "Plane", *(k.__name__ for k in _BUILDERS)]
     raise InvalidParameter("geometry", type(shape).__name__, f"must be one of: {', '.join(known)}")
-
-
-Arrays = tuple[Floats, npt.ArrayLike, Floats]
 
 
 def _mesh(mesh: coal.BVHModelBase) -> RawSurface:
@@ -129,7 +126,7 @@ def _ball(radius: float) -> Callable[[int], float]:
     return lambda n: 2.0 * _sagitta(radius)(n)
 
 
-def _box(shape: coal.Box, _: float | None, __: int | None) -> Arrays:
+def _box(shape: coal.Box, _: float | None, __: int | None) -> RawSurface:
     half = np.array(shape.halfSide, np.float64)
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     elements = [
@@ -141,12 +138,12 @@ def _box(shape: coal.Box, _: float | None, __: int | None) -> Arrays:
         [1, 5, 7, 3],
     ]
     faces = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], float)
-    return signs * half, elements, np.repeat(faces[:, None, :], 4, axis=1)
+    return raw_surface(signs * half, elements, np.repeat(faces[:, None, :], 4, axis=1))
 
 
 def _ball_shape(
     shape: coal.Sphere | coal.Ellipsoid, chord_error: float | None, segments: int | None
-) -> Arrays:
+) -> RawSurface:
     """Build a coal.Sphere or coal.Ellipsoid: a unit sphere that is stretched."""
     radii = np.array(
         shape.radii if isinstance(shape, coal.Ellipsoid) else 3 * [shape.radius], np.float64
@@ -154,19 +151,19 @@ def _ball_shape(
     longest = float(radii.max())
     body = Revolution(_round(longest, _ball(longest), chord_error, segments, MOST_OF_BALL))
     profile = arc(-0.5 * math.pi, 0.5 * math.pi, max(2, math.ceil(body.segments / 2)))
+    if radii.min() == longest:
+        body.face("ball", "sphere", 0.0, longest)
+    else:
+        body.face("ellipsoid", None, 0.0)
     rings = [body.ring(c, s) for c, s in profile]
     for k in range(len(profile) - 1):
         body.strip(rings[k], rings[k + 1], profile[k], profile[k + 1])
-    points, elements, normals = body.arrays()
-    # Normals go with the inverse transpose of the stretching; unused fourth corners stay zero.
-    stretched = normals / radii
-    length = np.linalg.norm(stretched, axis=2, keepdims=True)
-    return radii * points, elements, stretched / np.where(length > 0.0, length, 1.0)
+    return body.surface(radii)
 
 
 def _rod(
     shape: coal.Cylinder | coal.Cone, chord_error: float | None, segments: int | None
-) -> Arrays:
+) -> RawSurface:
     """Build a coal.Cylinder or coal.Cone."""
     r, h = float(shape.radius), float(shape.halfLength)
     top_radius = 0.0 if isinstance(shape, coal.Cone) else r
@@ -174,14 +171,20 @@ def _rod(
     bottom, top = body.ring(r, -h), body.ring(top_radius, h)
     slant = math.hypot(r - top_radius, 2.0 * h)
     normal = (2.0 * h / slant, (r - top_radius) / slant)
+    if top_radius > 0.0:
+        body.face("side", "cylinder", 0.0, r)
+    else:
+        body.face("side", "cone", -h, r, -math.atan2(r, 2.0 * h))
     body.strip(bottom, top, normal, normal)
+    body.face("bottom", "plane", -h)
     body.disc(bottom, up=False)
     if top_radius > 0.0:
+        body.face("top", "plane", h)
         body.disc(top, up=True)
-    return body.arrays()
+    return body.surface()
 
 
-def _capsule(shape: coal.Capsule, chord_error: float | None, segments: int | None) -> Arrays:
+def _capsule(shape: coal.Capsule, chord_error: float | None, segments: int | None) -> RawSurface:
     r, h = float(shape.radius), float(shape.halfLength)
     body = Revolution(_round(r, _ball(r), chord_error, segments, MOST_OF_BALL))
     steps = max(1, math.ceil(body.segments / 4))
@@ -192,16 +195,22 @@ def _capsule(shape: coal.Capsule, chord_error: float | None, segments: int | Non
         profile = profile[: len(south)] + profile[len(south) + 1 :]
     rings = [body.ring(r * c, r * s + middle) for c, s, middle in profile]
     for k in range(len(profile) - 1):
+        if k == 0:
+            body.face("bottom" if h > 0.0 else "ball", "sphere", -h, r)
+        elif k == steps and h > 0.0:
+            body.face("side", "cylinder", 0.0, r)
+        elif k == steps + 1 and h > 0.0:
+            body.face("top", "sphere", h, r)
         body.strip(rings[k], rings[k + 1], profile[k][:2], profile[k + 1][:2])
-    return body.arrays()
+    return body.surface()
 
 
-def _triangle(shape: coal.TriangleP, _: float | None, __: int | None) -> Arrays:
+def _triangle(shape: coal.TriangleP, _: float | None, __: int | None) -> RawSurface:
     points = np.array([shape.a, shape.b, shape.c], np.float64)
     normal = np.cross(points[1] - points[0], points[2] - points[0])
     length = float(np.linalg.norm(normal))
     normals = np.broadcast_to(normal / (length if length > 0.0 else 1.0), (1, 3, 3)).copy()
-    return points, [[0, 1, 2]], normals
+    return raw_surface(points, [[0, 1, 2]], normals)
 
 
 def _square(shape: coal.Halfspace | coal.Plane, extent: float) -> RawSurface:
@@ -219,7 +228,7 @@ def _square(shape: coal.Halfspace | coal.Plane, extent: float) -> RawSurface:
     return raw.noting(f"a square of {extent:.6g} m stands for the endless {type(shape).__name__}")
 
 
-_BUILDERS: dict[type, Callable[..., Arrays]] = {
+_BUILDERS: dict[type, Callable[..., RawSurface]] = {
     coal.Box: _box,
     coal.Sphere: _ball_shape,
     coal.Cylinder: _rod,

@@ -21,8 +21,11 @@ Mask = npt.NDArray[np.bool_]
 LARGEST_COUNT = np.iinfo(np.int32).max
 
 
-TORUS = 4
-"""The last of the kinds of faces.KINDS: both of its radii are lengths."""
+KINDS = ("plane", "cylinder", "cone", "sphere", "torus")
+"""Of faces, in the order of FaceKind in C++."""
+
+NO_SHAPE = (-1.0,) + (0.0,) * 8
+"""The row of `face_shapes` of a face of another kind."""
 
 
 def moved_shapes(
@@ -35,7 +38,7 @@ def moved_shapes(
     out[:, 1:4] = (shapes[:, 1:4] * scale) @ rotation.T + translation
     out[:, 4:7] = shapes[:, 4:7] @ rotation.T
     out[:, 7] *= scale
-    out[shapes[:, 0] == TORUS, 8] *= scale
+    out[shapes[:, 0] == KINDS.index("torus"), 8] *= scale  # of a cone it is an angle
     return out
 
 

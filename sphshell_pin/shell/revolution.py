@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from sphshell_pin.shell.raw import Floats, Longs
+from sphshell_pin.shell.raw import KINDS, NO_SHAPE, Floats, Longs, RawSurface, raw_surface
 
 Slope = tuple[float, float]
 """A unit normal as (radial, axial)."""
 
 
 class Revolution:
-    """Collects rings around the z axis, strips between them and discs inside them.
+    """Collects rings around the z axis, strips between them and discs inside them, face by face.
 
     Strips are added with their bottom first, so that the winding is outward. Rings of radius 0 are
     single points, which makes triangles of the elements beside them: none is without area.
@@ -29,6 +30,20 @@ class Revolution:
         self._vertices: list[Floats] = []
         self._elements: list[Longs] = []
         self._normals: list[Floats] = []
+        self._names: list[str] = []
+        self._shapes: list[tuple[float, ...]] = []
+        self._faces: list[Longs] = []
+
+    def face(
+        self, name: str, kind: str | None, height: float, radius: float = 0.0, second: float = 0.0
+    ) -> None:
+        """Begin a face to which what follows belongs; `kind` of raw.KINDS, None of another.
+
+        Its point is at `height` on the axis [m]; its numbers are as of `Face` [m, rad].
+        """
+        self._names.append(name)
+        place = (0.0, 0.0, height, 0.0, 0.0, 1.0, radius, second)
+        self._shapes.append(NO_SHAPE if kind is None else (float(KINDS.index(kind)), *place))
 
     def ring(self, radius: float, height: float) -> Longs:
         """Add a ring of vertices (radius, height) [m], or a single one on the axis.
@@ -57,8 +72,7 @@ class Revolution:
         normals = np.empty((self.segments, 4, 3))
         normals[:, :, :2] = radial[:, None] * self._circle[places]
         normals[:, :, 2] = axial
-        self._elements.append(corners)
-        self._normals.append(normals)
+        self._add(corners, normals)
 
     def disc(self, ring: Longs, up: bool) -> None:
         """Close a ring with a flat disc of quads from rim to rim (no needles in its middle)."""
@@ -68,14 +82,28 @@ class Revolution:
             corners = list(dict.fromkeys(cycle))
             corners = corners if up else corners[::-1]
             rows.append([*(ring[i] for i in corners), -1][:4])
-        self._elements.append(np.array(rows))
-        self._normals.append(np.tile([0.0, 0.0, 1.0 if up else -1.0], (len(rows), 4, 1)))
+        self._add(np.array(rows), np.tile([0.0, 0.0, 1.0 if up else -1.0], (len(rows), 4, 1)))
 
-    def arrays(self) -> tuple[Floats, Longs, Floats]:
-        """Vertices (n, 3), elements (m, 4), and normals (m, 4, 3) of their corners."""
-        parts = self._vertices, self._normals
-        vertices, normals = (np.concatenate(one) for one in parts)
-        return vertices, np.concatenate(self._elements), normals
+    def _add(self, elements: Longs, normals: Floats) -> None:
+        self._elements.append(elements)
+        self._normals.append(normals)
+        self._faces.append(np.full(len(elements), len(self._names) - 1))
+
+    def surface(self, stretch: Floats | None = None) -> RawSurface:
+        """All that was added, larger by the factors `stretch` (3,) along the axes."""
+        vertices, normals = np.concatenate(self._vertices), np.concatenate(self._normals)
+        if stretch is not None:
+            # Normals go with the inverse transpose; unused fourth corners stay zero.
+            vertices, normals = stretch * vertices, normals / stretch
+            length = np.linalg.norm(normals, axis=2, keepdims=True)
+            normals /= np.where(length > 0.0, length, 1.0)
+        raw = raw_surface(vertices, np.concatenate(self._elements), normals)
+        return replace(
+            raw,
+            faces=np.concatenate(self._faces).astype(np.int32),
+            face_names=tuple(self._names),
+            face_shapes=np.array(self._shapes),
+        )
 
 
 def arc(start: float, stop: float, steps: int) -> list[tuple[float, float]]:

@@ -203,8 +203,8 @@ class Core:
 def test_reasons_and_normals_set_aside_are_counted_by_element():
     points, quads = plate(3)
     shell = sp.Shell(points, quads, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
-    shell.core = Core(
-        shell.core,
+    shell._smooth = Core(
+        shell.core_for("smooth"),
         # Two triangles to an element: one that is curved makes it curved.
         bending=np.array([1, 1, 2, 2, 2, 2, 0, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1], np.uint8),
         normals_set_aside=np.isin(np.arange(54), (40, 41)).reshape(18, 3),

@@ -99,6 +99,31 @@ def test_recognition_can_be_switched_off(tmp_path):
     assert not mesh(coal.Cylinder(0.1, 0.3), crease_angle=0.0).faces
 
 
+SOLIDS = {
+    "box": (coal.Box(0.1, 0.2, 0.3), ""),
+    "ball": (coal.Sphere(0.1), "ball"),
+    "cylinder": (coal.Cylinder(0.1, 0.3), "side bottom top"),
+    "cone": (coal.Cone(0.1, 0.3), "side bottom"),
+    "capsule": (coal.Capsule(0.1, 0.3), "bottom side top"),
+    "no rod": (coal.Capsule(0.1, 0.0), "ball"),
+    "round ellipsoid": (coal.Ellipsoid(0.1, 0.1, 0.1), "ball"),
+    "ellipsoid": (coal.Ellipsoid(0.1, 0.2, 0.3), ""),
+}
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_solids_tell_their_faces(name):
+    solid, names = SOLIDS[name]
+    shell = sp.Shell.from_geometry(solid)
+    told = [face for face in shell.faces if face.name]
+    assert " ".join(face.name for face in told) == names
+    for face in told:
+        assert face.exact
+        vertices = shell.elements[face.elements]
+        points = shell.vertices[vertices[vertices >= 0]]
+        assert distances(face, points) == pytest.approx(np.zeros(len(points)), abs=1e-15)
+
+
 def test_words():
     shell = mesh(coal.Cylinder(0.006, 0.03))
     assert "faces" not in repr(shell)

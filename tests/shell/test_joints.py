@@ -91,3 +91,12 @@ def test_faces_go_with_a_shell_that_is_moved_or_stored() -> None:
         np.testing.assert_array_equal(other.element_face, shell.element_face)
         np.testing.assert_array_equal(other.edge_class, shell.edge_class)
         assert other.face_names == shell.face_names
+
+
+def test_curved_without_smooth_edges_is_flat():
+    sharp = bent_sheet(crease_angle=0.0)
+    assert sharp.curvature_report().curved == 0
+    center = sharp.vertices.mean(axis=0) + [0.0, 0.0, 0.1]
+    flat, smooth = (sharp.contacts(center, 0.3, method=m) for m in ("facets", "smooth"))
+    assert np.array_equal(np.sort(flat.depth), np.sort(smooth.depth))
+    assert len(flat) > 0

@@ -273,16 +273,16 @@ void bind_shell(nanobind::module_& m) {
            })
       .def(
           "curve",
-          [](Shell& shell, std::optional<Points> normals, bool exact, std::optional<Bytes> straight,
-             double rounding, bool faces, std::optional<Ints> known,
+          [](const std::shared_ptr<Shell>& shell, std::optional<Points> normals, bool exact,
+             std::optional<Bytes> straight, double rounding, bool faces, std::optional<Ints> known,
              std::optional<FaceShapes> shapes) {
-            CurveOptions options{{}, exact, {}, rounding, faces, nullptr};
+            CurveOptions options{{}, exact, {}, rounding, faces, nullptr, nullptr};
             if (known && shapes) options.known = known_faces(*known, *shapes);
             if (normals) options.normals = rows(*normals);
             if (straight)
               options.straight.assign(straight->data(), straight->data() + straight->shape(0));
             // Under the GIL: two threads may ask for the first curved query at once.
-            shell.curve(std::move(options));
+            return curve(shell, std::move(options));
           },
           nb::arg("normals").none(), nb::arg("exact") = false,
           nb::arg("straight").none() = nb::none(), nb::arg("rounding") = 0.0,

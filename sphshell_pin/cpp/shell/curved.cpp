@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "shell/creases.hpp"
+#include "shell/faces/snapping.hpp"
 #include "shell/free_memory.hpp"
 #include "shell/in_parallel.hpp"
 #include "shell/limiter.hpp"
@@ -16,11 +17,12 @@
 namespace sphshell {
 namespace {
 
-constexpr double kAny = std::numeric_limits<double>::infinity();
 // Coordinates are known to this share of the box at best: single precision, with a margin.
 constexpr double kSinglePrecision = 2e-7;
 // And vertices are moved by sqrt(3) times the rounding of their coordinates at most.
 constexpr double kOfRounding = 1.8;
+// On faces that meet at an angle, they are moved farther by their fits' deviations and the angle.
+constexpr double kMostMoved = 3;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 
@@ -127,44 +129,6 @@ std::vector<Vec3> border_directions(const Shell& shell) {
   return sum;
 }
 
-// The ten control points of a patch, [i][j] with i steps from corner 0 to 1 and j to corner 2.
-using Net = std::array<std::array<Vec3, 4>, 4>;
-
-Net control_points(const Facet& f, const CurvedFacet& curved) {
-  Net net;
-  for (int i = 0; i < 4; ++i)
-    for (int j = 0; i + j < 4; ++j)
-      net[i][j] = ((3 - i - j) * f.corner[0] + i * f.corner[1] + j * f.corner[2]) / 3;
-  const auto offset = [&](int k, int i) { return curved.control_offset(k, i); };
-  net[1][0] += offset(0, 0), net[2][0] += offset(0, 1);
-  net[2][1] += offset(1, 0), net[1][2] += offset(1, 1);
-  net[0][2] += offset(2, 0), net[0][1] += offset(2, 1);
-  net[1][1] += curved.middle(f);
-  return net;
-}
-
-// Bound on the tangent of the angle between `axis` and any normal of the patch: its normal field
-// lies in the hull of products of the tangents' control vectors.
-double tan_opening_of(const Net& net, const Vec3& axis) {
-  std::array<Vec3, 6> a, b;
-  int n = 0;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; i + j < 3; ++j, ++n) {
-      a[n] = net[i + 1][j] - net[i][j];
-      b[n] = net[i][j + 1] - net[i][j];
-    }
-  double most = 0, beside = 1;  // of the widest: squares of what is across the axis, and along it
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j) {
-      const Vec3 normal = a[i].cross(b[j]) + a[j].cross(b[i]);
-      const double along = normal.dot(axis);
-      if (!(along > 0)) return kAny;
-      const double across2 = normal.cross(axis).squaredNorm(), along2 = along * along;
-      if (across2 * beside > most * along2) most = across2, beside = along2;
-    }
-  return std::sqrt(most / beside);
-}
-
 // Where a patch, continued beyond its sides, misses a vertex with its normal, and what lifting its
 // middle by `a` along the facet's normal would do about it: a least-squares problem in `a`.
 class Continuation {
@@ -229,20 +193,43 @@ SharedNormals::SharedNormals(const Shell& shell, const std::vector<Vec3>& normal
   }
 }
 
+namespace {
+
+double tolerance_of(const Shell& shell, const CurveOptions& options) {
+  return std::max(kSinglePrecision * shell.size(), kOfRounding * options.rounding);
+}
+
+}  // namespace
+
+std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions options) {
+  const double tolerance = tolerance_of(*shell, options);
+  std::shared_ptr<Shell> out = shell;
+  if (options.faces && !options.known && !options.exact && shell->crease_angle() > 0) {
+    options.regions = std::make_shared<const CoplanarRegions>(*shell, tolerance);
+    Faces faces = recognize_faces(*shell, *options.regions, tolerance);
+    std::vector<Vec3> moved = snapped_vertices(*shell, faces, kMostMoved * tolerance);
+    if (!faces.of.empty()) options.known = std::make_shared<const Faces>(std::move(faces));
+    if (!moved.empty()) {
+      options.regions = nullptr;
+      out = std::make_shared<Shell>(std::move(moved), shell->triangles(), shell->element(),
+                                    shell->crease_angle(), shell->side());
+    }
+  }
+  out->curve(std::move(options));
+  return out;
+}
+
 CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   const bool given = !options.normals.empty();
   std::vector<Vec3> normals = std::move(options.normals);
   std::vector<Trust> trust;
-  std::optional<CoplanarRegions> regions;
+  std::shared_ptr<const CoplanarRegions> regions = options.regions;
   exact_ = given;
   if (options.known) faces_ = *options.known;
   divided_.assign(3 * shell.triangles().size(), 0);
   if (!options.exact) {
-    const double tolerance =
-        std::max(kSinglePrecision * shell.size(), kOfRounding * options.rounding);
-    regions.emplace(shell, tolerance);
-    if (options.faces && !options.known && shell.crease_angle() > 0)
-      faces_ = recognize_faces(shell, *regions, tolerance);
+    if (!regions)
+      regions = std::make_shared<const CoplanarRegions>(shell, tolerance_of(shell, options));
     EstimatedNormals settled = given ? settle_given_normals(shell, *regions, normals, faces_)
                                      : estimate_normals(shell, *regions, faces_);
     trust = std::move(settled.trust);
@@ -258,7 +245,7 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   // A large part of what building takes at its highest.
   std::vector<Vec3>().swap(normals);
   give_back_freed_memory(shell.triangles().size());
-  bend_edges(shell, options.straight, regions ? &*regions : nullptr, trust);
+  bend_edges(shell, options.straight, regions.get(), trust);
   std::vector<Trust>().swap(trust);
   raise_centers(shell);
   normals_ = {};
@@ -418,92 +405,6 @@ int CurvedShell::corner_beyond(const Shell& shell, int h) const {
   };
   if (differ(h, 3 * u + next_corner(l)) || differ(3 * t + next_corner(k), g)) return -1;
   return 3 * u + previous_corner(l);
-}
-
-// Bounds from Bezier control points: the patch lies in their hull.
-void CurvedShell::build_cones(const Shell& shell) {
-  const LargeArray<Facet>& flat = shell.facets();
-  const Topology& topology = shell.topology();
-  const auto is_flat = [&](int t) {
-    return facets_[triangle_of(shell.facet_half_edge(3 * t))].flat;
-  };
-  // The tip of a cone is one of its vertices that counts.
-  const auto at_tip = [&](int t, const Primitive& shape) {
-    return shape.kind == FaceKind::Cone &&
-           std::any_of(shell.triangles()[t].begin(), shell.triangles()[t].end(), [&](int v) {
-             const Vec3 y = shell.vertices()[v] - shape.point;
-             return y.cross(shape.axis).norm() <= 1e-6 * shell.size();
-           });
-  };
-  const std::vector<Owned> owned = shell.assign_owners([&](int t, int u) {
-    const int face = faces_.of_triangle(t);
-    const auto closed = [&](int one) {
-      return face_of(triangle_of(shell.facet_half_edge(3 * one))) != nullptr;
-    };
-    if (face >= 0 && face == faces_.of_triangle(u) && closed(t) && closed(u))
-      return !at_tip(t, faces_.shapes[face]) && !at_tip(u, faces_.shapes[face]);
-    return topology.planar_face[t] == topology.planar_face[u] && is_flat(t) && is_flat(u);
-  });
-  for (std::size_t f = 0; f < facets_.size(); ++f) facets_[f].owned = owned[f];
-  cones_ = shell.cones();
-  for_each_in_parallel(cones_.size(), [&](std::size_t f) {
-    const Facet& facet = flat[f];
-    const Vec3& axis = facet.normal;
-    const Net net = control_points(facet, facets_[f]);
-    double tangent = tan_opening_of(net, axis);
-    const Owned& mine = facets_[f].owned;
-    for (int k = 0; k < 3; ++k) {
-      if (mine.twin[k] >= 0) {
-        const std::size_t g = static_cast<std::size_t>(triangle_of(mine.twin[k]));
-        tangent = std::max(tangent, facet.normal.dot(flat[g].normal) > 0.05
-                                        ? tan_opening_of(control_points(flat[g], facets_[g]), axis)
-                                        : kAny);
-      } else if (mine.twin[k] != kNotOwned) {
-        tangent = kAny;
-      }
-      if (mine.vertex[k] >= 0)
-        tangent = std::max(tangent, shell.tan_vertex_cone(mine.vertex[k], axis, &tangents_));
-    }
-    const bool closed = !face_cells_.empty() && face_cells_[f].closed;
-    const Primitive* face = closed ? &faces_.shapes[face_cells_[f].face] : nullptr;
-    for (int i = 0; face != nullptr && i < 6; ++i) {
-      const Vec3 &p = facet.corner[i % 3], &q = facet.corner[i < 3 ? i : next_corner(i - 3)];
-      Vec3 n;
-      face->distance((p + q) / 2, n);
-      const double along = std::abs(n.dot(axis)), across = n.cross(axis).norm();
-      tangent = std::max(tangent, along > 0 ? 1.001 * across / along + 1e-6 : kAny);
-    }
-    const double sagitta = face != nullptr ? sagitta_of(facet, *face) : 0;
-    NormalCone& cone = cones_[f];
-    const Vec3 middle = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
-    double reach = cone.reach;
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; i + j < 4; ++j)
-        reach = std::max(reach, (net[i][j] - middle).norm() + 1e-6 * shell.size());
-    cone.reach = static_cast<float>(reach + sagitta);
-    cone.tan_opening = widened_opening(tangent);
-    // The offset points weigh 1 - b0^3 - b1^3 - b2^3 <= 8/9 in all.
-    const double largest = std::max(facets_[f].middle(facet).norm(), facets_[f].largest_offset());
-    facets_[f].bulge = static_cast<float>(std::max(largest * (8.0 / 9 + 1e-6), sagitta));
-  });
-  for (const CurvedFacet& curved : facets_) bulge_ = std::max<double>(bulge_, curved.bulge);
-}
-
-void CurvedShell::bound_cells(const Shell& shell) {
-  const Topology& topology = shell.topology();
-  cells_.assign(facets_.size(), CellBounds{});
-  for_each_in_parallel(facets_.size(), [&](std::size_t f) {
-    const Facet& facet = shell.facets()[f];
-    if (!facets_[f].flat) cells_[f] = bounds_of(facet, facets_[f].patch(facet), facets_[f].bulge);
-    for (int k = 0; k < 3; ++k) {
-      const int h = 3 * shell.triangle_of_facet(static_cast<int>(f)) + k;
-      const Edge& edge = topology.edges[topology.edge_of[h]];
-      cells_[f].beyond[k] = edge.count == 1 ? kBoundary
-                            : edge.count > 2
-                                ? kNotOwned
-                                : shell.facet_half_edge(topology.other_half_edge(edge, h));
-    }
-  });
 }
 
 }  // namespace sphshell

@@ -59,6 +59,7 @@ struct SurfacePoint {
   int element;
 };
 
+class CoplanarRegions;
 struct Faces;
 
 // What curved elements are made of.
@@ -75,6 +76,7 @@ struct CurveOptions {
   bool faces = true;  // recognize planes, cylinders, cones, spheres and tori
   // Those that the surface is known to have: then none are recognized.
   std::shared_ptr<const Faces> known;
+  std::shared_ptr<const CoplanarRegions> regions;  // where they have been found
 };
 
 class CurvedShell;

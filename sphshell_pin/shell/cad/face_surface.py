@@ -15,7 +15,7 @@ from OCP.GeomAbs import (
 from OCP.gp import gp_Pnt, gp_Vec
 
 from sphshell_pin.shell.cad.options import Occ
-from sphshell_pin.shell.raw import Floats
+from sphshell_pin.shell.raw import KINDS, NO_SHAPE, Floats
 
 MOST_STEPS = 8
 """Of Newton's method to a closest point; it starts next to it."""
@@ -27,15 +27,12 @@ SINGULAR = 1e-10
 """Where |du x dv| is below this share of the largest |du| |dv|, a surface has no normal."""
 
 
-PLANE, CYLINDER, CONE, SPHERE, TORUS = range(5)
-"""Rows of faces.KINDS."""
-
 _SHAPES = {
-    GeomAbs_Plane: (PLANE, BRepAdaptor_Surface.Plane),
-    GeomAbs_Cylinder: (CYLINDER, BRepAdaptor_Surface.Cylinder),
-    GeomAbs_Cone: (CONE, BRepAdaptor_Surface.Cone),
-    GeomAbs_Sphere: (SPHERE, BRepAdaptor_Surface.Sphere),
-    GeomAbs_Torus: (TORUS, BRepAdaptor_Surface.Torus),
+    GeomAbs_Plane: ("plane", BRepAdaptor_Surface.Plane),
+    GeomAbs_Cylinder: ("cylinder", BRepAdaptor_Surface.Cylinder),
+    GeomAbs_Cone: ("cone", BRepAdaptor_Surface.Cone),
+    GeomAbs_Sphere: ("sphere", BRepAdaptor_Surface.Sphere),
+    GeomAbs_Torus: ("torus", BRepAdaptor_Surface.Torus),
 }
 
 
@@ -57,26 +54,26 @@ class FaceSurface:
 
     def shape(self) -> list[float]:
         """Kind, point, axis and two radii of it, as `CleanedSurface.face_shapes` has them (9,)."""
-        kind, read = _SHAPES.get(self._surface.GetType(), (-1, None))
-        if read is None:
-            return [-1.0, *np.zeros(8)]
+        if self._surface.GetType() not in _SHAPES:
+            return list(NO_SHAPE)
+        kind, read = _SHAPES[self._surface.GetType()]
         shape = read(self._surface)
         radius = second = 0.0
-        if kind == CONE:
+        if kind == "cone":
             radius, second = shape.RefRadius(), shape.SemiAngle()
             # Of its two halves that which the face is on has a positive radius.
             middle = 0.5 * (self.low[1] + self.high[1])
             if radius + middle * np.sin(second) < 0.0:
                 radius, second = -radius, -second
-        elif kind == TORUS:
+        elif kind == "torus":
             radius, second = shape.MajorRadius(), shape.MinorRadius()
             if radius <= second:
-                return [-1.0, *np.zeros(8)]  # it cuts itself
-        elif kind != PLANE:
+                return list(NO_SHAPE)  # it cuts itself
+        elif kind != "plane":
             radius = shape.Radius()
         place = shape.Location().Coord()
-        axis = (0.0, 0.0, 1.0) if kind == SPHERE else shape.Axis().Direction().Coord()
-        return [float(kind), *place, *axis, radius, second]
+        axis = (0.0, 0.0, 1.0) if kind == "sphere" else shape.Axis().Direction().Coord()
+        return [float(KINDS.index(kind)), *place, *axis, radius, second]
 
     def nodes(self, uv: Floats) -> tuple[Floats, Floats]:
         """Points and unit normals (n, 3) at parameters uv (n, 2); zero where there is no normal."""

@@ -16,7 +16,15 @@ from sphshell_pin.shell.cad.options import CadOptions
 from sphshell_pin.shell.cad.reading import read_model
 from sphshell_pin.shell.cad.tessellation import Sewn, Tessellation, sew, tessellate
 from sphshell_pin.shell.cad.units import take_unit
-from sphshell_pin.shell.raw import Floats, Ints, Longs, RawSurface, area_vectors, moved_shapes
+from sphshell_pin.shell.raw import (
+    NO_SHAPE,
+    Floats,
+    Ints,
+    Longs,
+    RawSurface,
+    area_vectors,
+    moved_shapes,
+)
 
 CHORD_ERROR = 1e-3
 """Share of the box diagonal that the elements may be off the exact surface, unless stated."""
@@ -82,9 +90,9 @@ class CadSurface:
 
     def _shapes(self) -> Floats:
         """(f, 9) shapes of the faces [units of the model]."""
-        none = [-1.0, *np.zeros(8)]
-        meshes = self.found.meshes
-        return np.array([none if mesh is None else mesh.surface.shape() for mesh in meshes])
+        return np.array(
+            [NO_SHAPE if mesh is None else mesh.surface.shape() for mesh in self.found.meshes]
+        )
 
     @cached_property
     def starts(self) -> Longs:

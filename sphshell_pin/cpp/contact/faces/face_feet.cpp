@@ -10,30 +10,9 @@
 namespace sphshell {
 namespace {
 
-// Nearer to an axis than this share of the distance from the surface, a center has no direction.
+// Nearer to an axis than this share of the radius, a center has no direction.
 constexpr double kOnAxis = 1e-12;
 constexpr int kMostRepeats = 8;
-
-// How the curve between two shapes goes at a point where both are zero.
-struct Intersection {
-  Vec3 tangent, curvature;  // unit; the derivative of the tangent along the curve [1/m]
-  Vec3 offset;              // from the point onto both, where they are not quite zero
-};
-
-Intersection intersection_at(const Primitive& one, const Primitive& other, const Vec3& x) {
-  Vec3 n, m;
-  const double a = one.distance(x, n), b = other.distance(x, m), c = n.dot(m);
-  const double square = std::max(1 - c * c, 1e-12);
-  const auto solve = [&](double p, double q) -> Vec3 {  // the vector v in their plane: n.v, m.v
-    return ((p - c * q) * n + (q - c * p) * m) / square;
-  };
-  Intersection out;
-  out.tangent = n.cross(m).normalized();
-  const Vec3 along = out.tangent;
-  out.curvature = solve(-along.dot(one.hessian(x) * along), -along.dot(other.hessian(x) * along));
-  out.offset = solve(-a, -b);
-  return out;
-}
 
 }  // namespace
 
@@ -142,8 +121,7 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Vec3& center) {
   const Vec3 chord = q - p;
   const auto tangent_at = [&](const Vec3& x) -> Vec3 {
     const Vec3 tangent = intersection_at(shape, other, x).tangent;
-    // At an end where both are tangent.
-    if (!(tangent.squaredNorm() > 0.5)) return Vec3(chord.normalized());
+    if (tangent.isZero(0)) return chord.normalized();  // an end where both are tangent
     return tangent.dot(chord) < 0 ? Vec3(-tangent) : tangent;
   };
   const double most = chord.norm() / 2;

@@ -8,8 +8,6 @@
 namespace sphshell {
 namespace {
 
-// Faces that meet at less than this angle (its sine) do not determine where.
-constexpr double kLeastAngle = 0.003;
 // What is measured at a few places may be larger between them.
 constexpr double kMargin = 1.5;
 constexpr int kMostRepeats = 12;
@@ -20,14 +18,10 @@ constexpr double kLeastTurn = 1e-6;
 
 bool onto_both(const Primitive& one, const Primitive& other, Vec3& x) {
   for (int i = 0; i < kMostRepeats; ++i) {
-    Vec3 n, m;
-    const double a = one.distance(x, n), b = other.distance(x, m), c = n.dot(m);
-    const double square = 1 - c * c;
-    if (!(square > kLeastAngle * kLeastAngle)) return false;
-    const Vec3 step = ((c * b - a) * n + (c * a - b) * m) / square;
-    const Vec3 before = x;
-    x += step;
-    if (x == before || step.squaredNorm() < 1e-30 * x.squaredNorm()) break;
+    const Intersection here = intersection_at(one, other, x);
+    if (!(here.sine > kLeastAngle)) return false;
+    x += here.offset;
+    if (here.offset.squaredNorm() < 1e-30 * x.squaredNorm()) break;
   }
   return x.allFinite();
 }
@@ -126,7 +120,6 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
       if (g >= 0 && is_round(faces.of_triangle(triangle_of(g)))) bent[f] = 1;
     }
   }
-  const auto is_bent = [&](int f) { return bool(bent[f]); };
   std::vector<char> open(faces.shapes.size(), 0);
   std::vector<float> off(3 * out.size(), 0);  // of a cubic side from the face [m]
   for (std::size_t f = 0; f < out.size(); ++f) {
@@ -149,7 +142,7 @@ LargeArray<FaceCell> make_face_cells(const Shell& shell, Faces& faces,
       const int beyond = wound ? triangle_of(shell.facet_half_edge(g)) : -1;
       const int other = beyond >= 0 ? out[beyond].face : -1;
       if (other == cell.face) cell.side[k] = FaceCell::Side::Inner;
-      if (other == cell.face || !(is_bent(int(f)) || (beyond >= 0 && is_bent(beyond)))) continue;
+      if (other == cell.face || !(bent[f] || (beyond >= 0 && bent[beyond]))) continue;
       const Vec3 one = facets[f].control_offset(k, 0), two = facets[f].control_offset(k, 1);
       double bulge = std::max(one.norm(), two.norm()), apart = 0;
       bool shared = other >= 0;

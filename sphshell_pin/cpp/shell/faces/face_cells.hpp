@@ -15,6 +15,8 @@ struct Faces;
 // A face gives closest points where it holds its vertices, and the borders that are cubic curves,
 // to this share of the size: so much the potential may jump there.
 constexpr double kMostGap = 4e-9;
+// Faces that meet at less than this angle (its sine) do not determine where.
+constexpr double kLeastAngle = 0.003;
 
 struct FaceCell {
   // What a side is: within one face; between two that meet at an angle, the curve on which both are

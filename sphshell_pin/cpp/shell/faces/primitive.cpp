@@ -27,8 +27,8 @@ Eigen::VectorXd least_squares(const Matrix& a, const Vector& b) {
 }
 
 // The primitive of a kind with a known axis through `point`: its radii follow from points.
-bool with_axis(FaceKind kind, const Vec3& point, const Vec3& axis, const std::vector<Vec3>& points,
-               Primitive& out) {
+Primitive with_axis(FaceKind kind, const Vec3& point, const Vec3& axis,
+                    const std::vector<Vec3>& points) {
   const auto n = static_cast<Eigen::Index>(points.size());
   Eigen::ArrayXd along(n), off(n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -36,7 +36,7 @@ bool with_axis(FaceKind kind, const Vec3& point, const Vec3& axis, const std::ve
     along[i] = y.dot(axis);
     off[i] = (y - along[i] * axis).norm();
   }
-  out = {kind, point, axis, off.mean(), 0};
+  Primitive out{kind, point, axis, off.mean(), 0};
   if (kind == FaceKind::Cone) {
     const Eigen::ArrayXd from_mean = along - along.mean();
     const double slope = (from_mean * off).sum() / std::max(from_mean.square().sum(), 1e-300);
@@ -51,7 +51,7 @@ bool with_axis(FaceKind kind, const Vec3& point, const Vec3& axis, const std::ve
     out.radius = x[0];
     out.second = radius_or_zero(x[2] + x[0] * x[0] + x[1] * x[1]);
   }
-  return true;
+  return out;
 }
 
 // One row of the Jacobian: how the distance of a point changes with shifts of `point` along two
@@ -182,6 +182,18 @@ bool Primitive::singular(const Vec3& x, double share) const {
          (kind == FaceKind::Torus && std::hypot(off - radius, h) < share * second);
 }
 
+Intersection intersection_at(const Primitive& one, const Primitive& other, const Vec3& x) {
+  Vec3 n, m;
+  const double a = one.distance(x, n), b = other.distance(x, m), c = n.dot(m);
+  const double square = std::max(1 - c * c, 1e-12);
+  const auto solve = [&](double p, double q) -> Vec3 {  // the vector v in their plane: n.v, m.v
+    return ((p - c * q) * n + (q - c * p) * m) / square;
+  };
+  const Vec3 across = n.cross(m), along = across.normalized();
+  return {along, solve(-along.dot(one.hessian(x) * along), -along.dot(other.hessian(x) * along)),
+          solve(-a, -b), across.norm()};
+}
+
 int num_parameters(FaceKind kind) {
   static constexpr int kCount[] = {3, 5, 6, 4, 7};
   return kCount[static_cast<int>(kind)];
@@ -241,10 +253,8 @@ std::vector<Primitive> guess_primitives(FaceKind kind, const FacetSample& facets
     right += weight * e * e.dot((facets.centroids[i] - middle) / size);
   }
   const auto add = [&](const Vec3& point, const Vec3& direction) {
-    Primitive guess;
-    if (point.allFinite() && direction.allFinite() &&
-        with_axis(kind, middle + size * point, direction.normalized(), points, guess))
-      out.push_back(guess);
+    if (point.allFinite() && direction.allFinite())
+      out.push_back(with_axis(kind, middle + size * point, direction.normalized(), points));
   };
   add(square.ldlt().solve(right), axis);
   if (kind != FaceKind::Torus) return out;

@@ -41,6 +41,15 @@ struct Primitive {
   bool singular(const Vec3& x, double share) const;
 };
 
+// How the curve goes on which two shapes are zero, at a point next to it: the derivatives of the
+// distances along the curve vanish, n . k = -t . H t for both.
+struct Intersection {
+  Vec3 tangent, curvature;  // t, unit; k, its derivative along the curve [1/m]
+  Vec3 offset;              // from the point onto both [m]
+  double sine;              // of the angle between the shapes
+};
+Intersection intersection_at(const Primitive& one, const Primitive& other, const Vec3& x);
+
 // How many numbers describe a primitive of a kind.
 int num_parameters(FaceKind kind);
 

@@ -1,0 +1,77 @@
+#include "shell/faces/snapping.hpp"
+
+#include <algorithm>
+
+#include "shell/faces/face_cells.hpp"
+
+namespace sphshell {
+namespace {
+
+constexpr int kMostSnaps = 8;
+// A triangle may turn by 25 degrees (cosine): beyond that, its height is of the rounding.
+constexpr double kLeastAlike = 0.9;
+
+// Moves x onto all shapes by Newton's method, each along what earlier ones leave free: those that
+// are tangent to earlier ones are left out. False if it goes farther than `tolerance`.
+bool onto_all(const std::vector<Primitive>& shapes, const std::vector<int>& faces, double tolerance,
+              Vec3& x) {
+  const Vec3 before = x;
+  for (int i = 0; i < kMostSnaps; ++i) {
+    Vec3 step = Vec3::Zero(), free[3];
+    int count = 0;
+    for (const int f : faces) {
+      Vec3 n;
+      const double off = shapes[f].distance(x, n) + n.dot(step);
+      Vec3 along = n;
+      for (int k = 0; k < count; ++k) along -= along.dot(free[k]) * free[k];
+      const double sine = along.norm();
+      if (count == 3 || !(sine > kLeastAngle)) continue;
+      free[count] = along / sine;
+      step -= off / sine * free[count++];
+    }
+    x += step;
+    if (!((x - before).norm() <= tolerance)) return false;
+    if (step.squaredNorm() < 1e-32 * x.squaredNorm()) break;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<Vec3> snapped_vertices(const Shell& shell, const Faces& faces, double tolerance) {
+  const auto flat = [](const Primitive& one) { return one.kind == FaceKind::Plane; };
+  if (std::all_of(faces.shapes.begin(), faces.shapes.end(), flat)) return {};
+  const std::vector<Vec3>& before = shell.vertices();
+  std::vector<std::vector<int>> around(before.size());
+  for (std::size_t t = 0; t < shell.triangles().size(); ++t)
+    for (const int v : shell.triangles()[t]) {
+      const int f = faces.of_triangle(static_cast<int>(t));
+      if (f >= 0 && std::find(around[v].begin(), around[v].end(), f) == around[v].end())
+        around[v].push_back(f);
+    }
+  std::vector<Vec3> out = before;
+  bool any = false;
+  for (std::size_t v = 0; v < out.size(); ++v) {
+    std::stable_partition(around[v].begin(), around[v].end(),
+                          [&](int f) { return flat(faces.shapes[f]); });
+    if (!onto_all(faces.shapes, around[v], tolerance, out[v])) out[v] = before[v];
+    any = any || (out[v] - before[v]).norm() > kMostGap * shell.size();
+  }
+  if (!any) return {};
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const Triangle& t : shell.triangles()) {
+      const auto normal = [&](const std::vector<Vec3>& p) {
+        return (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).normalized();
+      };
+      const bool moved =
+          out[t[0]] != before[t[0]] || out[t[1]] != before[t[1]] || out[t[2]] != before[t[2]];
+      if (!moved || normal(out).dot(normal(before)) > kLeastAlike) continue;
+      for (const int v : t) out[v] = before[v];
+      changed = true;
+    }
+  }
+  return out;
+}
+
+}  // namespace sphshell
