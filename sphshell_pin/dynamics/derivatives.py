@@ -227,7 +227,7 @@ def contact_force_derivatives(at: Place) -> ContactForceDerivatives:
     rows, force, normal, depth = at.core.contact_force_derivatives(at.q, at.v, at.parameters)
     contacts = SceneContacts.from_rows(rows)
     nv, p = len(at.v), len(at.columns)
-    force = read_only(force.reshape(len(contacts.depth), 3, -1))
+    force = read_only(force.reshape(len(contacts.depth), 3, normal.shape[1]))
     normal, depth = read_only(normal), read_only(depth)
     # What there is between v and the parameters are bristles.
     first = force.shape[-1] - p

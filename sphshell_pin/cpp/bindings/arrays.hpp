@@ -37,6 +37,18 @@ Array<T> to_array(std::vector<T> values) {
   return to_array(std::move(values), {n});
 }
 
+// nanobind's own conversion of small vectors and matrices calls numpy.copy, which is written in
+// Python: a daemon thread may end in it when the interpreter does (see gil.hpp).
+inline Array<double> to_array(const Eigen::VectorXd& x) {
+  return to_array(std::vector<double>(x.begin(), x.end()));
+}
+
+inline Array<double> to_array(const Eigen::MatrixXd& x) {
+  const auto by_rows = x.reshaped<Eigen::RowMajor>();
+  return to_array(std::vector<double>(by_rows.begin(), by_rows.end()),
+                  {std::size_t(x.rows()), std::size_t(x.cols())});
+}
+
 inline void append(std::vector<double>& out, const Eigen::Vector3d& x) {
   out.insert(out.end(), x.data(), x.data() + 3);
 }

@@ -59,10 +59,11 @@ void bind(nb::class_<T>& bound) {
               }
               linearization.set_parameters({});
               const Eigen::Index nv = v.size();
-              return nb::make_tuple(acceleration, MatrixX(jacobian.topLeftCorner(nv, nv)),
-                                    MatrixX(jacobian.block(0, nv, nv, nv)),
-                                    MatrixX(linearization.inverse_mass()),
-                                    MatrixX(linearization.by_parameters().topRows(nv)));
+              return nb::make_tuple(to_array(acceleration),
+                                    to_array(MatrixX(jacobian.topLeftCorner(nv, nv))),
+                                    to_array(MatrixX(jacobian.block(0, nv, nv, nv))),
+                                    to_array(MatrixX(linearization.inverse_mass())),
+                                    to_array(MatrixX(linearization.by_parameters().topRows(nv))));
             });
           },
           nb::arg("q"), nb::arg("v"), nb::arg("tau"), nb::arg("parameters"), nb::arg("repeat") = 1)
@@ -78,8 +79,9 @@ void bind(nb::class_<T>& bound) {
                linearization.set_parameters({});
                std::vector<ContactRow> rows;
                scene.log(q, v, rows);
-               return nb::make_tuple(to_bytes(std::move(rows)), out.force_world, out.normal_force,
-                                     out.depth);
+               return nb::make_tuple(to_bytes(std::move(rows)), to_array(MatrixX(out.force_world)),
+                                     to_array(MatrixX(out.normal_force)),
+                                     to_array(MatrixX(out.depth)));
              });
            })
       .def("step_derivatives", [](T& self, const std::string& integrator, double dt,
@@ -111,8 +113,9 @@ void bind(nb::class_<T>& bound) {
           scene.restart();
           MatrixX by(2 * nv, all);
           by << tangent.q, tangent.v;
-          return nb::make_tuple(end.q, end.v, MatrixX(by.middleCols(first, 2 * nv)),
-                                MatrixX(by.rightCols(nv)), MatrixX(by.leftCols(first)));
+          return nb::make_tuple(
+              to_array(end.q), to_array(end.v), to_array(MatrixX(by.middleCols(first, 2 * nv))),
+              to_array(MatrixX(by.rightCols(nv))), to_array(MatrixX(by.leftCols(first))));
         });
       });
 }

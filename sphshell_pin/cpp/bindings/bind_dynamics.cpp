@@ -134,7 +134,7 @@ void bind_evaluations(nb::class_<T>& bound) {
              return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
                evaluate();
                const JointForces& joints = scene.joints();
-               return joints.act() ? joints.torque() : VectorX(VectorX::Zero(v.size()));
+               return to_array(joints.act() ? joints.torque() : VectorX(VectorX::Zero(v.size())));
              });
            })
       .def("contacts",
@@ -152,7 +152,7 @@ void bind_evaluations(nb::class_<T>& bound) {
           evaluate();
           MatrixX by_q, by_v;
           linearization.forces(q, v, by_q, by_v);
-          return std::pair(by_q, by_v);
+          return std::pair(to_array(by_q), to_array(by_v));
         });
       });
 }
@@ -226,7 +226,7 @@ void bind_dynamics(nanobind::module_& m) {
                scene.evaluate(q, v, z);
                VectorX out(v.size() + z.size());
                out << scene.acceleration(q, v, tau), scene.bristle_rates();
-               return out;
+               return to_array(out);
              });
            })
       .def(
@@ -241,7 +241,7 @@ void bind_dynamics(nanobind::module_& m) {
               scene.evaluate(q, v, z);
               MatrixX jacobian;
               for (int i = 0; i < repeat; ++i) linearization.rates(q, v, z, tau, jacobian);
-              return jacobian;
+              return to_array(jacobian);
             });
           },
           nb::arg("q"), nb::arg("v"), nb::arg("z"), nb::arg("tau"), nb::arg("repeat") = 1);
@@ -433,8 +433,12 @@ void bind_dynamics(nanobind::module_& m) {
       .def_prop_ro("controller_remembers", &alone<&Simulation::controller_remembers>)
       .def_prop_ro("progress", &alone<&Simulation::progress>)
       .def_prop_ro("time", &alone<&Simulation::time>)
-      .def_prop_ro("q", &alone<&Simulation::q>)
-      .def_prop_ro("v", &alone<&Simulation::v>)
+      .def_prop_ro(
+          "q", [](Run& self) { return to_array(alone<&Simulation::q>(self)); },
+          nb::rv_policy::automatic)
+      .def_prop_ro(
+          "v", [](Run& self) { return to_array(alone<&Simulation::v>(self)); },
+          nb::rv_policy::automatic)
       .def_prop_ro("counts", [](Run& self) { return to_dict(alone<&Simulation::counts>(self)); })
       .def_prop_ro("last_step", &alone<&Simulation::last_step>)
       .def_prop_ro("wall_time", &alone<&Simulation::wall_time>)

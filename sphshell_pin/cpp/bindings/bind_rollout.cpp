@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "bindings/arrays.hpp"
 #include "bindings/gil.hpp"
 #include "bindings/own_errors.hpp"
 #include "bindings/records.hpp"
@@ -45,8 +46,10 @@ void bind_rollout(nanobind::module_& m) {
       .def_ro("last_step", &Outcome::last_step)
       .def_ro("wall_time", &Outcome::wall_time)
       .def_prop_ro("counts", [](const Outcome& self) { return to_dict(self.counts); })
-      .def_prop_ro("q", [](const Outcome& self) { return self.q; })
-      .def_prop_ro("v", [](const Outcome& self) { return self.v; })
+      .def_prop_ro(
+          "q", [](const Outcome& self) { return to_array(self.q); }, nb::rv_policy::automatic)
+      .def_prop_ro(
+          "v", [](const Outcome& self) { return to_array(self.v); }, nb::rv_policy::automatic)
       .def_prop_ro("summaries", [](const Outcome& self) { return to_list(self.summaries); })
       .def_prop_ro("limits", [](const Outcome& self) { return to_list(self.limits); })
       .def_prop_ro("residual", [](const Outcome& self) { return residual(self.record.energy); })

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "contact/closest_on_cell.hpp"
+#include "contact/closest_on_side.hpp"
 #include "contact/element_corners.hpp"
 #include "contact/query.hpp"
 
@@ -19,38 +20,83 @@ double angle_between(const Vec3& a, const Vec3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
+// Tangents along one line (the sine of their angle), as at the common corner of two curved sides
+// that go on into each other, are one.
+constexpr double kOneLine = 1e-8;
+
+// What changes a point of an element by `move`: the least change of its parameters that comes
+// nearest to it.
+Eigen::Matrix<double, 2, 3> parameters_by(const CubicPatch& patch, double u, double v) {
+  const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v);
+  const double a = xu.dot(xu), b = xu.dot(xv), c = xv.dot(xv), trace = a + c;
+  const double det = xu.cross(xv).squaredNorm();
+  Eigen::Matrix2d inverse;
+  inverse << c, -b, -b, a;
+  inverse /= det;
+  if (!(det > kOneLine * kOneLine * trace * trace)) {
+    inverse << a, b, b, c;
+    inverse /= std::max(trace * trace, 1e-300);
+  }
+  Eigen::Matrix<double, 2, 3> tangents;
+  tangents << xu.transpose(), xv.transpose();
+  return inverse * tangents;
+}
+
+// x - (1 - exp(-x)), from x = 0 on without cancellation.
+double beyond_linear(double x) {
+  return x < 1e-3 ? x * x * (0.5 - x * (1.0 / 6 - x / 24)) : x + std::expm1(-x);
+}
+
 // The point of an element nearest to one that is on it but for round-off.
-std::pair<double, double> parameters_of(const CubicPatch& patch, const Facet& facet,
-                                        const Vec3& point) {
+Eigen::Vector2d parameters_of(const CubicPatch& patch, const Facet& facet, const Vec3& point) {
   auto [u, v] = closest_on_facet(facet, point);
   for (int i = 0; i < 8; ++i) {
-    const Vec3 from = point - patch.point(u, v);
-    const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v);
-    const double a = xu.dot(xu), b = xu.dot(xv), c = xv.dot(xv), det = a * c - b * b;
-    const double gu = xu.dot(from), gv = xv.dot(from);
-    const double du = (c * gu - b * gv) / det, dv = (a * gv - b * gu) / det;
-    u += du, v += dv;
-    if (std::abs(du) + std::abs(dv) < 1e-13) break;
+    const Eigen::Vector2d step = parameters_by(patch, u, v) * (point - patch.point(u, v));
+    u += step[0], v += step[1];
+    if (step.cwiseAbs().sum() < 1e-13) break;
   }
   return {u, v};
 }
 
 }  // namespace
 
+Vec3 Curvature::Place::point() const {
+  if (feature != Feature::Edge) return patch.point(at[0], at[1]);
+  const auto [u, v] = on_side(index, at[0]);
+  return patch.point(u, v);
+}
+
+const Primitive* Curvature::face_at(const Place& place) const {
+  return place.feature == Feature::Face ? field_.shell().curved()->face_of(place.facet) : nullptr;
+}
+
+Vec3 Curvature::direction_of(const Place& place, const Vec3& center) const {
+  Vec3 out;
+  if (const Primitive* face = face_at(place)) {
+    face->distance(center, out);
+    return out;
+  }
+  return (center - place.point()).normalized();
+}
+
 ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double radius,
                               bool want_second) {
   const Shell& shell = field_.shell();
   const CurvedFacet& curved = shell.curved()->facets()[contact.facet];
+  const Facet& facet = shell.facets()[contact.facet];
+  Place place{contact.facet, contact.feature, contact.index, {0, 0}, curved.patch(facet)};
   // Of a flat element nothing depends on the place.
-  if (contact.feature == Feature::Face && curved.flat &&
-      shell.curved()->face_of(contact.facet) == nullptr) {
+  const Primitive* face = face_at(place);
+  if (contact.feature == Feature::Face &&
+      (face ? face->kind == FaceKind::Plane : bool(curved.flat))) {
     ContactShape out = shape_of_gap(Mat3::Identity() / radius, contact.normal, radius);
     out.depth = contact.depth;
     return out;
   }
-  const Facet& facet = shell.facets()[contact.facet];
-  Place place{contact.facet, contact.feature, contact.index, 0, 0, curved.patch(facet)};
-  std::tie(place.u, place.v) = parameters_of(place.patch, facet, contact.point);
+  if (contact.feature == Feature::Edge)
+    place.at[0] = nearest_on_side(curved.side(facet, contact.index), contact.point);
+  else
+    place.at = parameters_of(place.patch, facet, contact.point);
   Motion motion;
   ContactShape out = shape_at(place, contact.depth, center, contact.normal, radius, motion);
   if (!want_second || motion.normal.isZero(0)) return out;
@@ -60,9 +106,8 @@ ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double
     for (int sign : {1, -1}) {
       const Vec3 moved = sign * step * Vec3::Unit(i);
       Place there = place;
-      there.u += motion.parameters.row(0).dot(moved);
-      there.v += motion.parameters.row(1).dot(moved);
-      Vec3 normal = (center + moved - place.patch.point(there.u, there.v)).normalized();
+      there.at += motion.parameters * moved;
+      Vec3 normal = direction_of(there, center + moved);
       if (normal.dot(contact.normal) < 0) normal = -normal;
       Motion unused;
       const ContactShape other = shape_at(there, contact.depth - contact.normal.dot(moved),
@@ -78,49 +123,55 @@ ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double
 ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& center,
                                  const Vec3& normal, double radius, Motion& motion) {
   const CubicPatch& patch = place.patch;
-  const double u = place.u, v = place.v;
-  const Vec3 from = center - patch.point(u, v);
-  const double distance = from.dot(normal);  // negative of a sphere that is pushed back out
+  const double distance = (center - place.point()).dot(normal);  // negative if pushed back out
   motion.parameters.setZero(), motion.normal.setZero();
   const bool moves = std::abs(distance) > kNoDistance * radius;
-  if (moves) {
-    Mat3 dx_dc = Mat3::Zero();
-    if (place.feature == Feature::Face) {
-      dx_dc = dx_dc_of(patch, u, v, center);
-    } else if (place.feature == Feature::Edge) {
-      const Shell& shell = field_.shell();
-      const Facet& facet = shell.facets()[place.facet];
-      const double t = place.index == 0 ? u : place.index == 1 ? v : 1 - v;
-      dx_dc = dx_dc_of(shell.curved()->facets()[place.facet].side(facet, place.index), t, center);
-    }
-    motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;
-    const Primitive* face = field_.shell().curved()->face_of(place.facet);
-    if (face != nullptr && place.feature == Feature::Face) {
-      Vec3 outward;
-      face->distance(center, outward);
-      motion.normal = (outward.dot(normal) < 0 ? -1 : 1) * face->hessian(center);
-      dx_dc = Mat3::Identity() - normal * normal.transpose() - distance * motion.normal;
-    }
-    Eigen::Matrix<double, 3, 2> along;
-    along << patch.along_u(u, v), patch.along_v(u, v);
-    motion.parameters = (along.transpose() * along).inverse() * along.transpose() * dx_dc;
-  }
   CurvatureField::Local local;
   Eigen::Matrix<double, 7, 3> local_by;
-  if (place.feature == Feature::Face) {
+  local_by.setZero();
+  if (const Primitive* face = face_at(place)) {
+    const double sign = direction_of(place, center).dot(normal) < 0 ? -1 : 1;
+    const auto tensor_at = [&](const Vec3& from) -> CurvatureField::Tensor {
+      return sign * CurvatureField::tensor(face->hessian(face->onto(from)));
+    };
+    local << tensor_at(center), 0;
+    const double step = kMove * radius;
+    for (int i = 0; i < 3 && moves; ++i) {
+      const Vec3 moved = step * Vec3::Unit(i);
+      local_by.col(i).head<6>() =
+          (tensor_at(center + moved) - tensor_at(center - moved)) / (2 * step);
+    }
+    if (moves) motion.normal = sign * face->hessian(center);
+  } else if (place.feature == Feature::Face) {
+    const double u = place.at[0], v = place.at[1];
+    if (moves) {
+      const Mat3 dx_dc = dx_dc_of(patch, u, v, center);
+      motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;
+      motion.parameters = parameters_by(patch, u, v) * dx_dc;
+    }
     const double sign = normal_of(patch, u, v).dot(normal) < 0 ? -1 : 1;
     const CurvatureField::Expansion here = sign * field_.at(place.facet, u, v);
     local = here.col(0);
     local_by = here.rightCols<2>() * motion.parameters;
   } else {
+    if (moves) {
+      Mat3 dx_dc = Mat3::Zero();
+      if (place.feature == Feature::Edge) {
+        const Shell& shell = field_.shell();
+        const CubicCurve side =
+            shell.curved()->facets()[place.facet].side(shell.facets()[place.facet], place.index);
+        const Vec3 along = side.tangent(place.at[0]);
+        dx_dc = dx_dc_of(side, place.at[0], center);
+        motion.parameters.row(0) = along.transpose() * dx_dc / along.squaredNorm();
+      }
+      motion.normal = (Mat3::Identity() - normal * normal.transpose() - dx_dc) / distance;
+    }
     local = between_walls(place, normal);
-    local_by.setZero();
     const double step = kMove * radius;
     for (int i = 0; i < 3 && moves; ++i)
       for (int sign : {1, -1}) {
         Place there = place;
-        there.u += sign * step * motion.parameters(0, i);
-        there.v += sign * step * motion.parameters(1, i);
+        there.at += sign * step * motion.parameters.col(i);
         const Vec3 turned = (normal + sign * step * motion.normal.col(i)).normalized();
         local_by.col(i) += sign / (2 * step) * between_walls(there, turned);
       }
@@ -137,11 +188,13 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
   // The rise comes on with the depth, so that a touch begins where it is found.
   const double rise = local[6];
   depth = std::max(depth, 0.0);  // where a difference reaches beyond it
-  const double share = rise == 0 ? 0 : std::exp(-depth / std::abs(rise));
-  out.depth = depth + rise * (1 - share);
+  const double size = std::abs(rise), x = rise == 0 ? 0 : depth / size;
+  const double share = rise == 0 ? 0 : std::exp(-x);
+  out.depth = rise == 0  ? depth
+              : rise < 0 ? size * beyond_linear(x)
+                         : depth - rise * std::expm1(-x);
   out.tilt =
-      (rise < 0 ? -share : share) * normal -
-      (1 - share * (1 + (rise == 0 ? 0 : depth / std::abs(rise)))) * local_by.row(6).transpose();
+      (rise < 0 ? -share : share) * normal - (1 - share * (1 + x)) * local_by.row(6).transpose();
   return out;
 }
 
@@ -150,12 +203,14 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
 CurvatureField::Local Curvature::between_walls(const Place& place, const Vec3& normal) {
   walls_.clear();
   if (place.feature == Feature::Edge)
-    find_walls_of_side(place.facet, place.index,
-                       place.index == 0   ? place.u
-                       : place.index == 1 ? place.v
-                                          : 1 - place.v);
+    find_walls_of_side(place.facet, place.index, place.at[0]);
   else
     find_walls_of_vertex(place.facet, place.index);
+  if (walls_.size() == 1 && walls_[0].first.normal == walls_[0].second.normal) {
+    // A border: from one side of the only wall to its other side.
+    const Wall& only = walls_[0].first;
+    return only.normal.dot(normal) * only.local;
+  }
   Vec3 outward = Vec3::Zero();
   for (const auto& [a, b] : walls_) outward += a.normal + b.normal;
   const double sign = outward.dot(normal) < 0 ? -1 : 1;

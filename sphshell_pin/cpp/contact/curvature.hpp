@@ -26,20 +26,26 @@ class Curvature {
     CurvatureField::Local local;
     Vec3 normal;
   };
-  // A point of an element; `index` is that of the side or corner that a contact stays on.
+  // A point of an element; `index` is that of the side or corner that a contact stays on. Of a side
+  // the first parameter is that along it, and the second is not used.
   struct Place {
     int facet;
     Feature feature;
     int index;
-    double u, v;
+    Eigen::Vector2d at;
     CubicPatch patch;
+
+    Vec3 point() const;
   };
-  // How a place, and the contact's normal there, follow the sphere's center.
+  // How a place's parameters, and the contact's normal there, follow the sphere's center.
   struct Motion {
     Eigen::Matrix<double, 2, 3> parameters;
     Mat3 normal;
   };
 
+  // The face whose curvature is that of the contact, or null.
+  const Primitive* face_at(const Place& place) const;
+  Vec3 direction_of(const Place& place, const Vec3& center) const;  // of either sign
   ContactShape shape_at(const Place& place, double depth, const Vec3& center, const Vec3& normal,
                         double radius, Motion& motion);
   CurvatureField::Local between_walls(const Place& place, const Vec3& normal);

@@ -34,6 +34,7 @@ class CurvatureField {
   Expansion at(int facet, double u, double v);
 
   static Mat3 matrix(const Tensor& t);
+  static Tensor tensor(const Mat3& m);
 
  private:
   // How far the surface lies beyond an element: zero at the corners, and as the fits at both ends
@@ -67,8 +68,6 @@ class CurvatureField {
   std::pair<Tensor, Tensor> along_side(int facet, int side);
   double beyond(int facet, double u, double v);
   Rise rise_of(int facet);
-
-  static Tensor tensor(const Mat3& m);
 
   const Shell* shell_;
   std::unordered_map<int, int> fan_of_, cell_of_;  // of corners (3 facet + k), of facets

@@ -7,8 +7,12 @@
 
 namespace sphshell {
 
+// Where two sides go on into each other at their corner, that of a point next to it.
 inline Vec3 normal_of(const CubicPatch& patch, double u, double v) {
-  return patch.along_u(u, v).cross(patch.along_v(u, v)).normalized();
+  const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v), n = xu.cross(xv);
+  if (n.squaredNorm() > 1e-16 * xu.squaredNorm() * xv.squaredNorm()) return n.normalized();
+  const double a = u + 1e-3 * (1.0 / 3 - u), b = v + 1e-3 * (1.0 / 3 - v);
+  return patch.along_u(a, b).cross(patch.along_v(a, b)).normalized();
 }
 
 inline std::pair<double, double> corner_parameters(int k) {

@@ -92,8 +92,8 @@ def onto(face: Face, points: Array) -> Array:
 
 
 def places(shell: Shell, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-    """Places (n, 3) on the faces and curved elements, with the normals of the flat ones; half of them as the
-    area is, half as the elements are; a tenth at corners, a tenth on sides."""
+    """Places (n, 3) on the faces and curved elements, with the normals of the flat ones; half of
+    them as the area is, half as the elements are; a tenth at corners, a tenth on sides."""
     core = shell.core_for("smooth")
     corners = core.vertices[core.triangles]
     spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
