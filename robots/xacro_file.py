@@ -9,6 +9,7 @@ from xml.parsers.expat import ExpatError
 
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.robots.packages import Folders
+from sphshell_pin.robots.xacro_expressions import checked
 
 # xacro keeps its state in its module.
 _ONE_AT_A_TIME = threading.Lock()
@@ -42,7 +43,8 @@ def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> byt
         substitution_args._eval_find = known["find"] = find
         try:
             stated = {name: _text(value) for name, value in arguments.items()}
-            document = xacro.process_file(str(file), mappings=stated)
+            with checked(xacro, substitution_args):
+                document = xacro.process_file(str(file), mappings=stated)
         except (xacro.XacroException, ExpatError, OSError) as error:
             reason = " ".join(str(error).split())
             where = Path((xacro.filestack or [file])[-1]).name

@@ -54,6 +54,56 @@ def test_xacro_has_arguments_and_finds_packages():
     assert model.inertias[1].mass == pytest.approx(mass)
 
 
+OS = "[c for c in ().__class__.__base__.__subclasses__() if c.__name__ == '_wrap_close'][0]"
+HOSTILE = {
+    "lambda": "${(lambda: " + OS + ".__init__.__globals__['system']('touch FILE'))()}",
+    "comprehension": "${[" + OS + ".__init__.__globals__['system']('touch FILE') for i in [1]]}",
+    "frame": "${[g.gi_frame.f_back.f_builtins for g in [(1 for i in [1])]]}",
+    "underscore": "${len.__self__}",
+    "eval": "$(eval eval('_'*2 + 'import' + '_'*2 + '(\"os\").system(\"touch FILE\")'))",
+    "open": "$(eval open('FILE', 'w'))",
+    "argument": "$(eval (lambda: open('FILE', 'w'))())",
+    "walrus": "${[y := 1, y]}",
+}
+
+
+@pytest.mark.parametrize("how", HOSTILE)
+def test_xacro_expressions_compute_and_do_nothing_else(how, tmp_path):
+    made, path = tmp_path / "made", tmp_path / "r.xacro"
+    expression = (
+        HOSTILE[how].replace("FILE", str(made)).replace("'", "&apos;").replace('"', "&quot;")
+    )
+    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    link = "<link name='a'/>"
+    path.write_text(
+        f"{head}<xacro:property name='p' value='{expression}'/>{link}<link name='${{p}}'/></robot>"
+    )
+    # What is in $(eval ...) ends at the first parenthesis, and is no expression then.
+    why = "is refused in the expression" if HOSTILE[how].startswith("${") else "xacro cannot expand"
+    with pytest.raises(robots.RobotError, match=why):
+        robots.load_file(path)
+    assert not made.exists()
+
+
+def test_xacro_expressions_compute(tmp_path):
+    path = tmp_path / "r.xacro"
+    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    names = [
+        "${'a'.upper() + str(max([round(x) for x in (1.2, 3.7)]))}",
+        "$(eval 'b2')",
+    ]
+    links = "".join(f'<link name="{name}"/>' for name in names)
+    joint = (
+        '<joint name="j" type="revolute"><parent link="A4"/><child link="b2"/>'
+        '<limit lower="${-pi/2}" upper="${radians(90) if 1 &lt; 2 else 0}" effort="1" '
+        'velocity="1"/></joint>'
+    )
+    path.write_text(f"{head}{links}{joint}</robot>")
+    model = robots.load_file(path).model
+    assert model.existFrame("A4")
+    assert model.upperPositionLimit[0] == -model.lowerPositionLimit[0] == pytest.approx(np.pi / 2)
+
+
 def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):
     head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
     path = tmp_path / "r.xacro"
