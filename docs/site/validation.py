@@ -18,7 +18,7 @@ HEAD = """\
 
 Measurements and solutions that others published, computed with the published materials and
 geometry. Nothing is fitted. `error` is our distance from what was published, `bound` the scatter of
-those data. Where an error is beyond its bound, the case says which physics the theory leaves out.
+those data. Where an error is out of bounds, the case says which physics the theory leaves out.
 
 `sphshell-pin report --validation` runs all of this from a checkout, and writes a page with the same
 pictures; `--quick` leaves out the slow cases. The published data are in `tests/data/validation`,
@@ -34,7 +34,7 @@ def page(ran: list[tuple[Case, Outcome]]) -> str:
             f"[{one.title}](#{anchor(one.title)})" if k == 0 else "",
             f.what,
             f.text,
-            *judged(found, f),
+            *judged(f),
         )
         for one, found in ran
         for k, f in enumerate(found.findings)
@@ -51,12 +51,11 @@ def anchor(title: str) -> str:
     return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
-def judged(found: Outcome, finding: Finding) -> tuple[str, str]:
+def judged(finding: Finding) -> tuple[str, str]:
     """Return the bound and whether the figure is within it; nothing where there is none."""
     if finding.met is None:
         return "", ""
-    out = "explained" if finding.key in found.explained else "OUT"
-    return finding.aim_text.removeprefix("at most "), "within" if finding.met else out
+    return finding.aim_text.removeprefix("at most "), "within" if finding.met else "out of bounds"
 
 
 def section(one: Case, found: Outcome) -> str:
