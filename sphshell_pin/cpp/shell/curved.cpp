@@ -21,7 +21,8 @@ namespace {
 constexpr double kSinglePrecision = 2e-7;
 // And vertices are moved by sqrt(3) times the rounding of their coordinates at most.
 constexpr double kOfRounding = 1.8;
-// On faces that meet at an angle, they are moved farther by their fits' deviations and the angle.
+// Vertices are moved onto faces by so many times single precision: faces that are fitted to coarser
+// numbers are not that exact.
 constexpr double kMostMoved = 3;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
@@ -207,7 +208,8 @@ std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions o
   if (options.faces && !options.known && !options.exact && shell->crease_angle() > 0) {
     options.regions = std::make_shared<const CoplanarRegions>(*shell, tolerance);
     Faces faces = recognize_faces(*shell, *options.regions, tolerance);
-    std::vector<Vec3> moved = snapped_vertices(*shell, faces, kMostMoved * tolerance);
+    std::vector<Vec3> moved =
+        snapped_vertices(*shell, faces, kMostMoved * kSinglePrecision * shell->size());
     if (!faces.of.empty()) options.known = std::make_shared<const Faces>(std::move(faces));
     if (!moved.empty()) {
       options.regions = nullptr;

@@ -112,7 +112,8 @@ class SharedNormals {
 enum class Trust : char;
 
 // Makes the curved elements of the shell, and returns it. Where faces are recognized that vertices
-// lie next to, for coordinates of few digits, it returns a copy that has its vertices on them.
+// lie next to, for coordinates in single precision, it returns a copy that has its vertices on
+// them.
 std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions options);
 
 class CurvedShell {

@@ -1,4 +1,4 @@
-// Vertices of files of few digits, moved onto the faces that they were rounded from.
+// Vertices in single precision, moved onto the faces that they were rounded from.
 #pragma once
 
 #include <vector>
