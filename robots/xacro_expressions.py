@@ -44,11 +44,12 @@ _BUILTINS = {name: getattr(builtins, name) for name in _FUNCTIONS.split()}
 
 
 def check(expression: str) -> None:
-    """Raise ValueError if the expression does more than compute."""
+    """Raise ValueError if the expression does more than compute, SyntaxError if it is none."""
     try:
         tree = ast.parse(expression.strip(), mode="eval")
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return  # which the evaluation reports
+    except (RecursionError, MemoryError):
+        # Python might still evaluate what is nested too deeply to be looked at.
+        raise ValueError(f"the expression '{_short(expression)}' is nested too deeply") from None
     for node in ast.walk(tree):
         name = {ast.Name: "id", ast.Attribute: "attr"}.get(type(node))
         used = getattr(node, name) if name else ""

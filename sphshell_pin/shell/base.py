@@ -129,7 +129,10 @@ class ShellBase(Summarized):
         return {one: getattr(self, one) for one in names}
 
     def core_for(self, method: str) -> _core.Shell:
-        """Return the compiled surface, with curved elements if `method` is "smooth"."""
+        """Return the compiled surface, with curved elements if `method` is "smooth".
+
+        These may have vertices of their own: see "Exact faces" in docs/contact.md.
+        """
         if method != "smooth":
             return self.core
         if self._smooth is None:
