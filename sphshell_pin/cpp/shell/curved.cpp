@@ -205,9 +205,14 @@ double tolerance_of(const Shell& shell, const CurveOptions& options) {
 std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions options) {
   const double tolerance = tolerance_of(*shell, options);
   std::shared_ptr<Shell> out = shell;
+  options.estimate =
+      !options.exact && !options.normals.empty() && estimated_elsewhere(*shell, options.normals);
   if (options.faces && !options.known && !options.exact && shell->crease_angle() > 0) {
     options.regions = std::make_shared<const CoplanarRegions>(*shell, tolerance);
     Faces faces = recognize_faces(*shell, *options.regions, tolerance);
+    // Nothing is moved onto faces that are given up.
+    if (!options.normals.empty() && !options.estimate)
+      settle_given_normals(*shell, options.normals, faces);
     std::vector<Vec3> moved =
         snapped_vertices(*shell, faces, kMostMoved * kSinglePrecision * shell->size());
     if (!faces.of.empty()) options.known = std::make_shared<const Faces>(std::move(faces));
@@ -232,8 +237,9 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   if (!options.exact) {
     if (!regions)
       regions = std::make_shared<const CoplanarRegions>(shell, tolerance_of(shell, options));
-    EstimatedNormals settled = given ? settle_given_normals(shell, *regions, normals, faces_)
-                                     : estimate_normals(shell, *regions, faces_);
+    EstimatedNormals settled = given && !options.estimate
+                                   ? settle_given_normals(shell, normals, faces_)
+                                   : estimate_normals(shell, *regions, faces_);
     trust = std::move(settled.trust);
     CornerNormals found =
         divide_at_creases(shell, std::move(settled.normals), settled.given, faces_);

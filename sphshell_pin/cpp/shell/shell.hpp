@@ -77,6 +77,7 @@ struct CurveOptions {
   // Those that the surface is known to have: then none are recognized.
   std::shared_ptr<const Faces> known;
   std::shared_ptr<const CoplanarRegions> regions;  // where they have been found
+  bool estimate = false;  // the normals that are given are estimates as well: ours are taken
 };
 
 class CurvedShell;

@@ -248,8 +248,7 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   return {std::move(out), std::move(trust), false};
 }
 
-EstimatedNormals settle_given_normals(const Shell& shell, const CoplanarRegions& regions,
-                                      const std::vector<Vec3>& given, Faces& faces) {
+bool estimated_elsewhere(const Shell& shell, const std::vector<Vec3>& given) {
   const Topology& topology = shell.topology();
   const auto alike = [&](int i, int j) { return (given[i] - given[j]).norm() <= kSameNormal; };
   const Fans fans(shell, [&](const Edge& edge) {
@@ -263,8 +262,11 @@ EstimatedNormals settle_given_normals(const Shell& shell, const CoplanarRegions&
     within += turn > kSameNormal && edge.kind == EdgeClass::Smooth;
     beyond += turn < kSurelySharp && edge.kind == EdgeClass::Crease;
   }
-  if (beyond <= within && are_means(shell, fans, given))
-    return estimate_normals(shell, regions, faces);
+  return beyond <= within && are_means(shell, fans, given);
+}
+
+EstimatedNormals settle_given_normals(const Shell& shell, const std::vector<Vec3>& given,
+                                      Faces& faces) {
   std::vector<char> contradicted(faces.shapes.size(), 0);
   const int corners = static_cast<int>(given.size());
   for (int c = 0; c < corners; ++c) {

@@ -23,10 +23,13 @@ struct EstimatedNormals {
 EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& regions,
                                   const Faces& faces);
 
-// Normals that came with the surface stand, but where a face has the same, exactly. If they are all
-// means of the elements' they are estimates like others: ours take their place. Faces that they
+// Whether normals that came with the surface are nearly all means of the elements' around: then
+// they are estimates like others, and ours are better.
+bool estimated_elsewhere(const Shell& shell, const std::vector<Vec3>& given);
+
+// Normals that came with the surface stand, but where a face has the same, exactly. Faces that they
 // contradict are given up.
-EstimatedNormals settle_given_normals(const Shell& shell, const CoplanarRegions& regions,
-                                      const std::vector<Vec3>& given, Faces& faces);
+EstimatedNormals settle_given_normals(const Shell& shell, const std::vector<Vec3>& given,
+                                      Faces& faces);
 
 }  // namespace sphshell
