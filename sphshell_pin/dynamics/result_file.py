@@ -352,7 +352,7 @@ def _check_values(path: str | PathLike[str], arrays: Columns, pairs: int) -> Non
         ("contacts.row", 0, len(arrays["t"]) - 1),
         ("contacts.pair", 0, pairs - 1),
         ("contacts.element", -1, np.iinfo(INT).max),
-        ("contacts.feature", 0, 2),
+        ("contacts.feature", 0, 3),
     ):
         wrong = np.flatnonzero((arrays[name] < least) | (arrays[name] > most))
         if wrong.size:

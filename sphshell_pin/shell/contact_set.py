@@ -21,6 +21,7 @@ class Feature(IntEnum):
     FACE = 0
     EDGE = 1
     VERTEX = 2
+    RING = 3
 
 
 class Method(IntEnum):
@@ -57,12 +58,12 @@ class ContactSet(Summarized):
     """Contacts, deepest first, in the shell's frame.
 
     With k contacts: `point` (k, 3) on the shell [m]; `normal` (k, 3) unit, from the shell to the
-    sphere's center; `depth` (k,) > 0 [m]; `element` (k,) row of shell.elements (of an edge or a
-    vertex, one of those that share it); `patch` (k,) smooth piece of the surface; `feature` (k,)
-    values of Feature; `weight` (k,) by which a contact's force counts: 1, but -1 at a saddle,
-    where two components of the surface inside the sphere merge (method "smooth" only, where the
-    sphere reaches a concave crease between them); `turn` (k, 3, 3), if asked for: derivative of
-    weight * normal with respect to the center [1/m].
+    sphere's center, of a ring the mean of those all around; `depth` (k,) > 0 [m]; `element` (k,)
+    row of shell.elements (of an edge or a vertex, one of those that share it); `patch` (k,) smooth
+    piece of the surface; `feature` (k,) values of Feature; `weight` (k,) by which a contact's force
+    counts: 1, but -1 at a saddle, where two components of the surface inside the sphere merge
+    (method "smooth" only, where the sphere reaches a concave crease between them); `turn`
+    (k, 3, 3), if asked for: derivative of weight * normal with respect to the center [1/m].
 
     Minima that are nearly one, as beside the joint of two curved elements, are shown as one
     contact. `terms` are the minima and saddles themselves: force and energy are their sums.

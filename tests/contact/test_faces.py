@@ -6,6 +6,7 @@ from pathlib import Path
 
 import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
@@ -184,3 +185,74 @@ def test_no_faces_no_closed_forms():
     center = 0.119 * np.array([0.6, 0.48, 0.64])
     assert shell.contacts(center, 0.02).depth[0] == pytest.approx(1e-3, abs=1e-12)
     assert abs(curved.contacts(center, 0.02).depth[0] - 1e-3) > 1e-9
+
+
+def touch(shell: sp.Shell, center, radius: float) -> sp.ContactSet:
+    found = shell.contacts(center, radius)
+    assert len(found) == 1, found
+    return found
+
+
+@pytest.mark.parametrize("place", ["seat", "rim", "mesh"])
+def test_a_sphere_on_an_axis_touches_a_ring(place, step):
+    """One contact whose force is that along the axis, and none across it."""
+    radius, depth, law = 6.0 * MM, 0.1 * MM, sp.ImpactLaw(1e5, exponent=1.5)
+    if place == "mesh":
+        radius, sine = 1.0 * MM, -np.sqrt(0.2)
+        shell = sp.Shell.from_geometry(coal.Cone(5e-3, 10e-3), segments=32)
+        center = np.array([0.0, 0.0, 5e-3 + (radius - depth) / sine])
+    else:
+        shell, half_angle = sp.Shell.from_file(step), np.arctan(0.6)
+        center = np.array([35.0, 20.0, 10.0]) * MM
+        if place == "seat":
+            sine = np.sin(half_angle)
+            center[2] += (radius - depth) / sine - 2.0 * MM / np.tan(half_angle)
+        else:
+            radius, border = 10.0 * MM, 8.0 * MM
+            height = np.sqrt((radius - depth) ** 2 - border**2)
+            center[2], sine = center[2] + 10.0 * MM + height, height / (radius - depth)
+    found = touch(shell, center, radius)
+    assert found.feature[0] == sp.Feature.RING
+    assert abs(found.depth[0] - depth) <= 1e-9 * radius
+    force = law.normal_force(depth) * sine
+    np.testing.assert_allclose(found.force(law), [0.0, 0.0, force], atol=1e-9 * abs(force))
+    # It goes over continuously to that of the nearest point.
+    across = [
+        np.hypot(*touch(shell, center + [off * radius, 0, 0], radius).normal[0, :2])
+        for off in (1e-10, 3e-10, 5e-10, 1e-8)
+    ]
+    assert 0 < across[0] < across[1] < across[2] < across[3]
+    assert np.isclose(np.hypot(across[3], sine), 1, atol=1e-9)
+
+
+def test_a_ring_that_a_border_cuts_is_none(tmp_path):
+    """A groove along half of a cylinder: its axis is as far from all of it, and only from that."""
+    solid = occ.cut(occ.box([0, 0, 0], [30, 40, 20]), occ.cylinder(5.0, 50.0, [15, 20, -1]))
+    writer = STEPControl_Writer()
+    writer.Transfer(occ.cut(solid, occ.box([-1, 20, -1], [40, 30, 30])), STEPControl_AsIs)
+    writer.Write(str(tmp_path / "groove.step"))
+    shell = sp.Shell.from_file(tmp_path / "groove.step")
+    found = touch(shell, [15 * MM, 20 * MM, 10 * MM], 5.1 * MM)
+    assert found.feature[0] != sp.Feature.RING
+    assert np.isclose(np.linalg.norm(found.normal[0]), 1)
+
+
+@pytest.mark.parametrize("friction", [None, sp.CoulombFriction()])
+def test_a_ball_that_falls_into_a_seat_rests_on_its_axis(friction, step):
+    radius, shell = 6.0 * MM, sp.Shell.from_file(step)
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.05, radius), pin.SE3.Identity())
+    frame = pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
+    model.addFrame(frame)
+    scene = sp.Scene(model)
+    law = sp.ImpactLaw(1e6, exponent=1.5, damping=50.0, full_damping_depth=1e-5)
+    friction = {} if friction is None else {"friction": friction}
+    scene.add_contact(sp.Sphere(radius, "ball"), shell, law=law, **friction)
+    half_angle = np.arctan(0.6)
+    touching = 10.0 * MM + radius / np.sin(half_angle) - 2.0 * MM / np.tan(half_angle)
+    start = np.array([35 * MM, 20 * MM, touching + 2 * MM])
+    result = sp.Simulation(scene, sp.Adaptive()).run(start, np.zeros(3), 0.3)
+    depth = (0.05 * 9.81 / np.sin(half_angle) / 1e6) ** (1 / 1.5)
+    assert np.array_equal(result.q[-1][:2], start[:2])
+    assert np.isclose(touching - result.q[-1][2], depth / np.sin(half_angle), rtol=0.05)

@@ -265,7 +265,10 @@ void Components::find_saddles(const Shell& shell, const Sphere& sphere, bool wan
     deepest_[a] = i < 0 ? j : j < 0 ? i : std::min(i, j);
     if (i < 0 || j < 0) continue;
     const int deeper = std::min(i, j), shallower = std::max(i, j);
-    if (candidate.depth >= minima[shallower].contact.depth - kNoSaddle * sphere.radius) {
+    // Between two parts of a ring there is none: its corners are on the circle to that gap.
+    const bool one_ring = minima[deeper].off_axis < 1 && minima[shallower].off_axis < 1;
+    const double least = one_ring ? shell.curved()->gap() : kNoSaddle * sphere.radius;
+    if (candidate.depth >= minima[shallower].contact.depth - least) {
       absorbed_[shallower] = 1;
       continue;
     }

@@ -10,13 +10,15 @@ using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 
 enum class Method : int { Facets = 0, Elements = 1, Smooth = 2 };
-enum class Feature : std::uint8_t { Face = 0, Edge = 1, Vertex = 2 };
+enum class Feature : std::uint8_t { Face = 0, Edge = 1, Vertex = 2, Ring = 3 };
 
 // A minimum of the distance from the sphere's center to the shell, or a saddle between two. The
 // elastic energy is the sum of weight * U(depth), the force that of weight * F(depth) * normal.
 struct Contact {
-  Vec3 point;    // on the shell
-  Vec3 normal;   // unit, from the shell to the sphere's center: a push along it
+  Vec3 point;  // on the shell; of a ring the mean of its points, on its axis
+  // From the shell to the sphere's center: a push along it. Unit; of a ring, which pushes along its
+  // axis, the mean of the unit normals all around.
+  Vec3 normal;
   double depth;  // radius - distance > 0 [m]
   int element;
   Feature feature;

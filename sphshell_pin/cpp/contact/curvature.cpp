@@ -87,9 +87,12 @@ ContactShape Curvature::shape(const Contact& contact, const Vec3& center, double
   Place place{contact.facet, contact.feature, contact.index, {0, 0}, curved.patch(facet)};
   // Of a flat element nothing depends on the place.
   const Primitive* face = face_at(place);
-  if (contact.feature == Feature::Face &&
-      (face ? face->kind == FaceKind::Plane : bool(curved.flat))) {
-    ContactShape out = shape_of_gap(Mat3::Identity() / radius, contact.normal, radius);
+  const bool flat = contact.feature == Feature::Face &&
+                    (face ? face->kind == FaceKind::Plane : bool(curved.flat));
+  // A ring is touched along a line, where there is no elliptic contact: the sphere's own curvature.
+  if (flat || contact.feature == Feature::Ring) {
+    const Vec3 normal = flat ? contact.normal : facet.normal;
+    ContactShape out = shape_of_gap(Mat3::Identity() / radius, normal, radius);
     out.depth = contact.depth;
     return out;
   }

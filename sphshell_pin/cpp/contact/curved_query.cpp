@@ -5,6 +5,7 @@
 
 #include "contact/closest_on_cell.hpp"
 #include "contact/closest_on_side.hpp"
+#include "contact/faces/rings.hpp"
 #include "contact/regions.hpp"
 
 namespace sphshell {
@@ -47,6 +48,7 @@ void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& bro
     }
   }
   for (const int f : borders_) add_border(task, f);
+  if (!faces.empty() && !minima.empty()) find_rings(shell, sphere, broad.candidates, minima);
   if (minima.size() > 1) components_.merge(shell, sphere, want_dn_dc, minima);
 }
 

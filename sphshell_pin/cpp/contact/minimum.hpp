@@ -14,6 +14,9 @@ struct Minimum {
   int facet;    // that holds it
   int index;    // its side or corner, of an edge or a vertex
   bool behind;  // of a face: the center is on its inner side
+  // Of a ring: its axis, unit, and how far off it the center is, below 1 (see ring_of()).
+  Vec3 axis = Vec3::Zero();
+  double off_axis = 1;
 };
 
 inline Vec3 direction(const Vec3& point, const Vec3& center, const Vec3& if_equal) {

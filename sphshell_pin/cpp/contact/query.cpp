@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contact/curved_query.hpp"
+#include "contact/faces/rings.hpp"
 #include "contact/flat_query.hpp"
 #include "shell/triangle.hpp"
 
@@ -153,6 +154,7 @@ const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& center, 
   for (const Minimum& minimum : minima) {
     Contact& contact = contacts.emplace_back(minimum.contact);
     contact.rim = contact.feature != Feature::Face && feature_normal(shell, minimum).rim;
+    if (minimum.off_axis < 1) contact = ring_of(minimum, sphere);
     contact.facet = minimum.facet, contact.index = minimum.index;
   }
   // Deepest first, saddles last: the order must not depend on the numbering of the elements.

@@ -14,14 +14,15 @@ namespace sphshell_pin {
 /// surface inside the sphere once.
 enum class Method { Facets = 0, Elements = 1, Smooth = 2 };
 
-enum class Feature { Face = 0, Edge = 1, Vertex = 2 };
+enum class Feature { Face = 0, Edge = 1, Vertex = 2, Ring = 3 };
 
 /// A place where the sphere touches, in the shell's frame.
 struct Contact {
-  Eigen::Vector3d point;   ///< on the shell [m]
-  Eigen::Vector3d normal;  ///< unit, from the shell to the sphere's center: a push along it
-  double depth;            ///< radius less distance, > 0 [m]
-  int element;             ///< its number in the elements that the shell was made of
+  Eigen::Vector3d point;  ///< on the shell [m]
+  /// Unit, from the shell to the sphere's center: a push along it. Of a ring the mean all around.
+  Eigen::Vector3d normal;
+  double depth;  ///< radius less distance, > 0 [m]
+  int element;   ///< its number in the elements that the shell was made of
   Feature feature;
   double weight;  ///< 1; -1 of a saddle, where two pieces of surface in the sphere merge
 };
