@@ -15,24 +15,29 @@ import pinocchio as pin
 from sphshell_pin.errors import SphshellError, UnitWarning
 from sphshell_pin.scenario.build import Built
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
+from sphshell_pin.shell.contact_set import Feature
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.result_parts import ContactLog
     from sphshell_pin.scenario.schema import ShellSection
 
 Array = npt.NDArray[np.float64]
 
 NOWHERE, ON_FACE = 0, 2
-"""Kinds of places next to a contact, as `cad.jobs.feet` returns them."""
+"""Kinds of places next to a contact, as `cad.jobs.stationary_points` returns them."""
+
+_CANCELS, _ALIKE = 0.01, 0.03
+"""A minimum and a saddle cancel whose depths differ by this share, and their normals by that."""
 
 
 @dataclass(frozen=True)
 class PairAudit:
     """How far the contacts of one pair are from those on the exact faces.
 
-    `contacts` recorded, of them `unmatched` that no place of the faces corresponds to; of the
-    others the largest and the root mean square difference in depth [m] and in normal [rad], 0 if
-    there are none; `file` that the faces are of.
+    `contacts` recorded that count, of them `unmatched` that no place of the faces corresponds to;
+    of the others the largest and the root mean square difference in depth [m] and in normal [rad],
+    0 if there are none; `file` that the faces are of.
     """
 
     name: str
@@ -50,7 +55,8 @@ class CadAudit:
     """The audit of a run: figures by pair, and per logged contact what it is off.
 
     `depth_error` (m,) [m], positive where a contact is too deep, and `normal_error` (m,) [rad]; nan
-    where the shell is no CAD surface, or where no place of the faces corresponds to the contact.
+    where the shell is no CAD surface, or where no place of the faces corresponds to the contact;
+    of rings, of saddles, and of minima that a saddle cancels.
     """
 
     pairs: tuple[PairAudit, ...]
@@ -106,16 +112,17 @@ def audit_cad(built: Built, result: Result) -> CadAudit:
     """
     check_audit(built)
     log = result.contacts
+    counts = _counts(log)
     depth_error, normal_error = (np.full(len(log.depth), np.nan) for _ in range(2))
     by_shell: dict[str, tuple[ShellSection, list[int]]] = {}
     for index, section in _cad_pairs(built):
         by_shell.setdefault(section.name, (section, []))[1].append(index)
     for section, indices in by_shell.values():
-        own = np.flatnonzero(np.isin(log.pair, indices))
+        own = np.flatnonzero(np.isin(log.pair, indices) & counts)
         depth_error[own], normal_error[own] = _audit_shell(built, result, section, own).T
     pairs: list[PairAudit] = []
     for index, section in _cad_pairs(built):
-        errors = np.stack([depth_error, normal_error])[:, log.pair == index]
+        errors = np.stack([depth_error, normal_error])[:, (log.pair == index) & counts]
         known = errors[:, np.isfinite(errors[0])]
         pairs.append(
             PairAudit(
@@ -139,6 +146,24 @@ def _cad_pairs(built: Built) -> Iterator[tuple[int, ShellSection]]:
         section = sections[pair.shell.name]
         if section.file is not None and Path(section.file).suffix.lower() in CAD_SUFFIXES:
             yield index, section
+
+
+def _counts(log: ContactLog) -> npt.NDArray[np.bool_]:
+    """Return which logged contacts (m,) are minima of their own.
+
+    A saddle lies between two of them, where the faces need have nothing; a minimum as deep as its
+    saddle adds nothing to the force: an element is bent a little too little there.
+    """
+    counts: npt.NDArray[np.bool_] = (log.normal_force >= 0.0) & (log.feature != Feature.RING)
+    for i in np.flatnonzero(log.normal_force < 0.0):
+        begin, end = np.searchsorted(log.row, log.row[i] + np.arange(2))
+        near = np.arange(begin, end)
+        near = near[counts[near] & (log.pair[near] == log.pair[i])]
+        alike = np.abs(log.normal_world[near] - log.normal_world[i]).max(axis=1) < _ALIKE
+        alike &= np.abs(log.depth[near] - log.depth[i]) < _CANCELS * log.depth[i]
+        # One saddle cancels one minimum, and the deepest always counts.
+        counts[near[1:][alike[1:]][:1]] = False
+    return counts
 
 
 def _audit_shell(

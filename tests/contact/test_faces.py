@@ -255,4 +255,7 @@ def test_a_ball_that_falls_into_a_seat_rests_on_its_axis(friction, step):
     result = sp.Simulation(scene, sp.Adaptive()).run(start, np.zeros(3), 0.3)
     depth = (0.05 * 9.81 / np.sin(half_angle) / 1e6) ** (1 / 1.5)
     assert np.array_equal(result.q[-1][:2], start[:2])
+    log = result.contacts
+    assert log.feature[-1] == sp.Feature.RING
+    assert np.isclose(log.normal_force[-1] * np.sin(half_angle), 0.05 * 9.81, rtol=0.05)
     assert np.isclose(touching - result.q[-1][2], depth / np.sin(half_angle), rtol=0.05)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ pytest.importorskip("OCP")
 from sphshell_pin.cli import app
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, run_built
-from sphshell_pin.scenario.audit import audit_cad
+from sphshell_pin.scenario.audit import _counts, audit_cad
 from sphshell_pin.shell.cad import CadOptions, require_kernel
 from tests.scenario.files import DROP, write
 from tests.shell import cad_shapes as shapes
@@ -176,3 +177,17 @@ def test_a_scenario_without_cad_is_refused_before_it_runs(tmp_path):
     built = build(write(tmp_path))
     with pytest.raises(SphshellError, match="CAD surface"):
         audit_cad(built, None)
+
+
+def test_what_counts():
+    """Saddles, what they cancel, and rings are not judged; the deepest of a pair always is."""
+    depths = np.array([3e-4, 2e-4, 1.999e-4, 2e-4, 2e-4, 1e-4, 1e-4])
+    log = SimpleNamespace(
+        row=np.array([0, 0, 0, 0, 1, 1, 2]),
+        pair=np.array([0, 0, 0, 1, 0, 0, 0]),
+        depth=depths,
+        normal_force=np.array([3.0, 2.0, -2.0, 2.0, 2.0, -1.0, 1.0]),
+        normal_world=np.tile([0.0, 0.0, 1.0], (7, 1)),
+        feature=np.array([0, 0, 1, 0, 0, 1, 3]),
+    )
+    assert _counts(log).tolist() == [True, False, False, True, True, False, False]

@@ -38,7 +38,8 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     write(row.point, point);
     write(row.normal, normal);
     row.depth = active.shape < 0 ? whole.depth : whole.group < 0 ? active.kinematics.depth : depth;
-    row.normal_force = push.dot(normal);
+    // Around a ring the normals cancel in part.
+    row.normal_force = whole.feature == Feature::Ring ? active.force.normal : push.dot(normal);
     write(row.friction_force, friction);
     write(row.slip_velocity, relative - relative.dot(normal) * normal);
     row.pair = active.pair;
