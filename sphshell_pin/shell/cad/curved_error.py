@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
 from OCP.gp import gp_Pnt, gp_Vec
 
 from sphshell_pin.shell.base import ShellBase
@@ -101,7 +102,7 @@ class _Places:
         self.corners = surface.vertices[surface.triangles] / factor
         self._sides = _own_sides(surface.triangles, cad.face_of(polygon))
         self._of_face: list[tuple[FaceMesh, Longs, Floats]] = []
-        self._curves: list[tuple[int, int, Occ, float, float]] = []
+        self._curves: list[tuple[Occ, Longs, Floats]] = []  # sides (n, 2), their parameters
         corner_rows = np.repeat(polygon, 3)
         for face, mesh, rows, uv in cad.locate(corner_rows, self.corners.reshape(-1, 3)):
             own = rows[::3] // 3
@@ -137,29 +138,34 @@ class _Places:
             found[wanted] = mesh.surface.distances(points[own][wanted], uv[wanted], self._tolerance)
             sides[own] = found[:, :-1].reshape(-1, 3, len(ALONG)).max(axis=2)
             middles[own] = found[:, -1]
-        for triangle, side, curve, start, end in self._curves:
-            if on_sides[triangle, side]:
-                first = side * len(ALONG)
-                along = points[triangle, first : first + len(ALONG)]
-                near = SETTLED * self._tolerance
-                borders[triangle, side] = _from_curve(curve, along, start, end, near)
+        of_sides = points[:, : 3 * len(ALONG)].reshape(count, 3, len(ALONG), 3)
+        for curve, places, ends in self._curves:
+            wanted = on_sides[tuple(places.T)]
+            triangle, side = places[wanted].T
+            along, near = of_sides[triangle, side], SETTLED * self._tolerance
+            borders[triangle, side] = _from_curve(curve, along, ends[wanted], near)
         return Errors(self._sides.spread(sides), middles, borders)
 
     def _find_curves(self, mesh: FaceMesh, own: Longs, nodes: Longs, near: float) -> None:
         """Find the exact curve of each side on the border of a face, and its parameters there."""
         known = {}
-        for border in mesh.borders:
+        for number, border in enumerate(mesh.borders):
             ends = zip(border.nodes[:-1].tolist(), border.nodes[1:].tolist(), strict=True)
             for k, (a, b) in enumerate(ends):
-                known[a, b] = border.curve, border.at[k], border.at[k + 1]
-                known[b, a] = border.curve, border.at[k + 1], border.at[k]
+                known[a, b] = number, (border.at[k], border.at[k + 1])
+                known[b, a] = number, (border.at[k + 1], border.at[k])
         away = np.linalg.norm(self.corners[own][:, :, None] - mesh.points[nodes][:, None], axis=3)
         node = np.take_along_axis(nodes, away.argmin(axis=2), axis=1)
         node[away.min(axis=2) > near] = -1  # a corner that cleaning has put into a side
+        found: list[list[tuple[tuple[int, int], tuple[float, float]]]] = [[] for _ in mesh.borders]
         for row, side in np.argwhere(self._sides.on_border[own]).tolist():
             pair = int(node[row, side]), int(node[row, (side + 1) % 3])
             if pair in known:
-                self._curves.append((int(own[row]), side, *known[pair]))
+                number, at = known[pair]
+                found[number].append(((int(own[row]), side), at))
+        for border, sides in zip(mesh.borders, found, strict=True):
+            if sides:
+                self._curves.append((border.curve, *map(np.array, zip(*sides, strict=True))))
 
 
 @dataclass(frozen=True)
@@ -229,11 +235,28 @@ def _note(found: Errors, stated: float, factor: float, count: int, bent: float) 
     return note
 
 
-def _from_curve(curve: Occ, points: Floats, start: float, end: float, settled: float) -> float:
-    """Largest distance of points (k, 3) along a side from the curve between two parameters.
+def _from_curve(curve: Occ, points: Floats, ends: Floats, settled: float) -> Floats:
+    """Largest distances (n,) of points (n, k, 3) along sides from a curve, `ends` (n, 2) on it.
 
-    Gauss-Newton steps shorter than `settled` are the last.
+    Gauss-Newton steps shorter than `settled` are the last, where there is no closed form.
     """
+    if curve.GetType() == GeomAbs_Circle:
+        circle = curve.Circle()
+        axis = np.array(circle.Axis().Direction().Coord())
+        from_middle = points - circle.Location().Coord()
+        along = from_middle @ axis
+        outward = np.linalg.norm(from_middle - along[..., None] * axis, axis=2) - circle.Radius()
+        return np.asarray(np.hypot(outward, along).max(axis=1))
+    if curve.GetType() == GeomAbs_Line:
+        line = curve.Line()
+        aside = np.cross(points - line.Location().Coord(), line.Direction().Coord())
+        return np.asarray(np.linalg.norm(aside, axis=2).max(axis=1))
+    rows = zip(points, ends.tolist(), strict=True)
+    return np.array([_side_from_curve(curve, side, a, b, settled) for side, (a, b) in rows])
+
+
+def _side_from_curve(curve: Occ, points: Floats, start: float, end: float, settled: float) -> float:
+    """Largest distance of points (k, 3) along a side from the curve between two parameters."""
     place, tangent = gp_Pnt(), gp_Vec()
     # Its speed may be anything: the middle of the side need not be near that of the parameters.
     seeds = np.linspace(start, end, CURVE_SEEDS)

@@ -50,6 +50,7 @@ class FaceSurface:
         self._highest = np.where(endless, np.inf, self.high)
         self._scale = 0.0
         self.flat = surface.GetType() == GeomAbs_Plane
+        self._shape = self.shape()
         self.kinked = GeomAbs_C0 in (surface.UContinuity(), surface.VContinuity())
 
     def shape(self) -> list[float]:
@@ -101,12 +102,11 @@ class FaceSurface:
         """Distances (n,) of points next to the surface at uv (n, 2), without its trimming.
 
         Newton's steps go on while they are longer than `tolerance`: less changes the distance by
-        far less, as the surface is nearly flat within it.
+        far less, as the surface is nearly flat within it. Five kinds have closed forms.
         """
-        if self.flat and len(points):
-            place, by_u, by_v = (row[0] for row in self.derivatives(uv[:1]))
-            normal = np.cross(by_u, by_v)
-            return np.asarray(np.abs((points - place) @ (normal / np.linalg.norm(normal))))
+        kind, *shape = self._shape
+        if kind >= 0:
+            return _distances_from(KINDS[int(kind)], np.array(shape), points)
         distance = np.full(len(points), np.inf)
         at, left = uv.copy(), np.arange(len(points))
         for _ in range(MOST_STEPS):
@@ -187,3 +187,20 @@ def stationary_parameter(
 def dot(a: Floats, b: Floats) -> Floats:
     """Scalar products (n,) of vectors (n, k)."""
     return np.asarray(np.einsum("ij,ij->i", a, b))
+
+
+def _distances_from(kind: str, shape: Floats, points: Floats) -> Floats:
+    """Distances (n,) of points (n, 3) from a shape (8,): point, axis, and two radii."""
+    axis, (radius, second) = shape[3:6], shape[6:]
+    from_point = points - shape[:3]
+    along = from_point @ axis
+    if kind == "plane":
+        return np.asarray(np.abs(along))
+    if kind == "sphere":
+        return np.asarray(np.abs(np.linalg.norm(from_point, axis=1) - radius))
+    outward = np.linalg.norm(from_point - along[:, None] * axis, axis=1) - radius
+    if kind == "cone":
+        outward = outward * np.cos(second) - along * np.sin(second)
+    elif kind == "torus":
+        outward = np.hypot(outward, along) - second
+    return np.asarray(np.abs(outward))
