@@ -19,8 +19,6 @@ constexpr double kUneven = 0.3, kAlike = 5;
 // kChance * s, and is worth no more than the least probability, so that a run has two at least.
 constexpr double kChance = 1.5, kLeastProbability = 0.01, kEnough = 7;  // of -log of the product
 constexpr int kLongestRun = 6;                                          // to either side
-// Coordinates are known to this share of the box at best: single precision.
-constexpr double kRounded = 1.2e-7;
 // A mean as a file has it: to so much, and so much of the lean; and a share of all normals.
 constexpr double kDigits = 2e-6, kSurelyMean = 1e-3, kMostMeans = 0.9;
 // A fan goes on beyond its corner where a side leads away from the opposite edge by this sine.

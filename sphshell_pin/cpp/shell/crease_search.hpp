@@ -12,6 +12,9 @@
 
 namespace sphshell {
 
+// Coordinates are known to this share of the box at best: single precision.
+constexpr double kRounded = 1.2e-7;
+
 // The surface at one side of an element, estimated from that element alone.
 struct SideEstimate {
   float turn;       // from its plane to the side [rad], > 0 convex

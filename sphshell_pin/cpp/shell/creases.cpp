@@ -173,13 +173,16 @@ bool CreaseSearch::add_creases() {
   };
   for (std::size_t e = 0; e < count; ++e)
     if (smooth_[e]) raise_around(e, std::abs(joints_[e].angle) * height(e));
+  // A side bulges by an eighth of its turn times its length: nothing that is less than the rounding
+  // of the coordinates needs a crease.
+  const double least = 8 * kRounded * shell_.size();
   std::vector<std::pair<std::size_t, double>> doubtful;
   for (std::size_t e = 0; e < count; ++e) {
     const float angle = std::abs(joints_[e].angle);
     if (crease_[e] || smooth_[e] || angle == 0) continue;
     // A crease can mend no more than the joint's own turn.
     const double harm = (explained_[e] ? angle : std::min(off_[e], angle)) * height(e);
-    if (harm > largest(e)) doubtful.push_back({e, harm});
+    if (harm > least && harm > largest(e)) doubtful.push_back({e, harm});
   }
   if (doubtful.empty()) return false;
   std::fill(around.begin(), around.end(), 0.0);
