@@ -64,7 +64,7 @@ Linearization::Answer Linearization::answer_of(const Parameter& parameter,
     out.plain_depth = 1;
     out.depth = site.shape ? 1 + site.shape->tilt.dot(site.contact.normal) : 1;
     if (active.row < 0) out.wrench = out.depth * slopes_.by_depth;
-    for (int i = 0; i < rings; ++i)
+    for (int i = 0; i < rings && active.row < 0; ++i)
       out.rates[i] = out.depth * (ring_of(i) ? ring_of(i)->rate_by_depth : slopes_.rate_by_depth);
   }
   add_differences(parameter, active, site, out);
