@@ -89,7 +89,7 @@ class RobotWarning(UserWarning):
 
 
 class SetupWarning(UserWarning):
-    """Input that is allowed and probably a mistake: a path off its shell, a press on nothing."""
+    """Input that is allowed and probably a mistake: a path off its shell, a step too long."""
 
 
 class InvalidShell(SphshellError, ValueError):

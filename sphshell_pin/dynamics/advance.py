@@ -22,7 +22,13 @@ from sphshell_pin.checks import (
 )
 from sphshell_pin.dynamics.callables import reads_sensors
 from sphshell_pin.dynamics.controllers import Callback, Controller, wrap_callable
-from sphshell_pin.dynamics.explain import DEFAULT_SPEED, explain_pairs, relaxation_time, weakness
+from sphshell_pin.dynamics.explain import (
+    DEFAULT_SPEED,
+    coarseness,
+    explain_pairs,
+    relaxation_time,
+    weakness,
+)
 from sphshell_pin.dynamics.integrators import Integrator
 from sphshell_pin.dynamics.models import find_joint
 from sphshell_pin.dynamics.patches import check_record
@@ -65,7 +71,7 @@ def start_run(
 
     `prepare` is called with it before its first row is recorded. With `warn`, a law that cannot
     stop its sphere causes a WeakLawWarning, and a controller whose parameters are probably a
-    mistake a SetupWarning.
+    mistake, or steps that are longer than recommended, a SetupWarning.
     """
     q, v = scene.check_state(q0, v0)
     duration = check_not_negative("duration", duration, "s")
@@ -76,7 +82,7 @@ def start_run(
     settings = run_settings(
         scene, integrator, duration, hold, record_dt=record_dt, record=record, t0=t0
     )
-    pairs = core_pairs(scene, q, v, warn=warn)
+    pairs = core_pairs(scene, q, v, warn=warn, limited_dt=integrator.limited_dt)
     joints = scene.joints.to_core(scene.model)
     core = _core.Simulation(
         scene.model, pairs, joints, core_controller, q, v, settings, sensors.core
@@ -168,8 +174,13 @@ def bind_controller(
     )
 
 
-def core_pairs(scene: Scene, q0: Array, v0: Array, *, warn: bool) -> list[_core.Pair]:
-    """Build the C++ pairs for a run from q0 (nq,), v0 (nv,); `warn` as of `start_run`."""
+def core_pairs(
+    scene: Scene, q0: Array, v0: Array, *, warn: bool, limited_dt: float | None = None
+) -> list[_core.Pair]:
+    """Build the C++ pairs for a run from q0 (nq,), v0 (nv,).
+
+    `warn` as of `start_run`; `limited_dt` [s] is that of the run's integrator.
+    """
     pairs = [pair.to_core() for pair in scene.pairs]
     # Only bristles need to know how fast an impact is.
     has_state = any(pair.friction is not None and pair.friction.has_state for pair in scene.pairs)
@@ -182,6 +193,9 @@ def core_pairs(scene: Scene, q0: Array, v0: Array, *, warn: bool) -> list[_core.
         # A sphere at rest in touch has no speed to judge by.
         if warn and weak is not None and figure.approach_speed != DEFAULT_SPEED:
             warnings.warn(weak, WeakLawWarning, stacklevel=4)
+    coarse = coarseness(scene, figures, limited_dt) if warn else None
+    if coarse is not None:
+        warnings.warn(coarse, SetupWarning, stacklevel=4)
     return pairs
 
 

@@ -127,14 +127,9 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
             f" (and {_count(len(alike) - 1, 'other')} of '{group}')" if group and alike[1:] else ""
         )
         warnings.append(f"{alike[0]}{more}")
-    scales = [p.shortest_time for p in pairs if math.isfinite(p.shortest_time)]
-    scales += scene.joints.time_scales(model).values()
-    recommended = _round_down(min(scales) / STEPS_PER_SCALE) if scales else 1e-3
-    if dt is not None and dt > 1.0001 * recommended:
-        warnings.append(
-            f"dt = {dt:.3g} s is larger than the recommended {recommended:.3g} s: the shortest "
-            f"time scale {min(scales):.3g} s would get {min(scales) / dt:.2g} steps"
-        )
+    coarse = coarseness(scene, pairs, dt)
+    if coarse is not None:
+        warnings.append(coarse)
     free = sum(1 for j in model.joints[1:] if j.nv)
     modelled = [
         f"{_count(free, 'joint')} with {_count(model.nv, 'degree')} of freedom",
@@ -145,7 +140,30 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
     absent = ["contact between other pairs of bodies", *_joints_stated(scene)]
     if scene.lock:
         absent.append(f"motion of the locked joints {', '.join(scene.lock)}")
+    recommended = _recommended_dt(_shortest_scale(scene, pairs))
     return Explanation(tuple(modelled), tuple(absent), pairs, recommended, tuple(warnings))
+
+
+def coarseness(scene: Scene, pairs: tuple[PairExplanation, ...], dt: float | None) -> str | None:
+    """Say so where steps of `dt` [s] are longer than recommended; `pairs` are those of `scene`."""
+    shortest = _shortest_scale(scene, pairs)
+    recommended = _recommended_dt(shortest)
+    if dt is None or dt <= 1.0001 * recommended or math.isinf(shortest):
+        return None
+    return (
+        f"dt = {dt:.3g} s is larger than the recommended {recommended:.3g} s: the shortest "
+        f"time scale {shortest:.3g} s would get {shortest / dt:.2g} steps"
+    )
+
+
+def _shortest_scale(scene: Scene, pairs: tuple[PairExplanation, ...]) -> float:
+    """Return the shortest time scale [s] of pairs and joints, inf where there is none."""
+    scales = [pair.shortest_time for pair in pairs if math.isfinite(pair.shortest_time)]
+    return min([*scales, *scene.joints.time_scales(scene.model).values()], default=math.inf)
+
+
+def _recommended_dt(shortest: float) -> float:
+    return 1e-3 if math.isinf(shortest) else _round_down(shortest / STEPS_PER_SCALE)
 
 
 # What a model may state of its joints, as a reader calls it.

@@ -32,7 +32,8 @@ class PairFigures(FormerDict):
     `contact_time` [s] spent in touch; `impulse` [N s] of the normal force; `peak_force` [N] the
     largest sum of the pair's normal forces, at `peak_force_time` [s]; `max_depth` [m], at
     `max_depth_time` [s]; `touches` how often it came into touch; `mean_force` [N] the impulse over
-    the contact time, 0 without contact.
+    the contact time, 0 without contact. Adaptive and Implicit find peaks between the ends of their
+    steps, on the dense output; peaks of fixed steps are the largest at the ends of steps.
     """
 
     # Of files: what has another type is refused.

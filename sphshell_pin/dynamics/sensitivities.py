@@ -153,13 +153,13 @@ class Asked:
                 "sensitivities", names, "must be names, as ('PAIR.law.stiffness', 'v0')"
             )
         self._scene, self._names, self._controller = scene, tuple(names), controller
-        self.by_q0, self.by_v0 = (one in names for one in _START)
-        for one in _START:
-            if names.count(one) > 1:
+        starts = [column for name in names for column in self._columns_of_start(name)]
+        for one in starts:
+            if starts.count(one) > 1:
                 raise InvalidParameter("sensitivities", one, "must not be named twice")
-        self._columns = parameter_columns(
-            scene, [one for one in names if one not in _START], _START
-        )
+        self._by_start = [any(column.startswith(f"{one}.") for column in starts) for one in _START]
+        others = [name for name in names if not self._columns_of_start(name)]
+        self._columns = parameter_columns(scene, others, _START)
         if callable(controller) and reads_sensors(controller):
             must = (
                 "cannot be differentiated, as it reads sensors, which have a memory: take one that "
@@ -168,7 +168,7 @@ class Asked:
             raise InvalidParameter("controller", controller, must)
 
     def __bool__(self) -> bool:
-        return bool(self._columns) or self.by_q0 or self.by_v0
+        return bool(self._columns) or any(self._by_start)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -176,15 +176,18 @@ class Asked:
         return tuple(column for name in self._names for column in self._columns_of(name))
 
     def _columns_of(self, name: str) -> tuple[str, ...]:
-        if name in _START:
-            return tuple(f"{name}.{k}" for k in range(self._scene.model.nv))
-        return parameter_columns(self._scene, [name])
+        return self._columns_of_start(name) or parameter_columns(self._scene, [name])
+
+    def _columns_of_start(self, name: object) -> tuple[str, ...]:
+        """Return the columns of a name of the start, as "v0" or "v0.3"; none of another name."""
+        every = [f"{one}.{k}" for one in _START for k in range(self._scene.model.nv)]
+        return tuple(column for column in every if name in (column, column.split(".")[0]))
 
     def begin(self, core: _core.Simulation) -> None:
         """Let a compiled run, which has not begun, follow its derivatives."""
         start = np.array(core.q), np.array(core.v)
         parameters = core_parameters(self._scene, self._columns, start)
-        core.differentiate(parameters, self.by_q0, self.by_v0)
+        core.differentiate(parameters, *self._by_start)
 
     def check(self, core: _core.Simulation) -> None:
         """Raise InvalidParameter if the controller was seen to have a memory."""
@@ -200,13 +203,14 @@ class Asked:
         self.check(core)
         record = core.take_sensitivities()
         nv, columns = self._scene.model.nv, self.columns
-        # The core has the parameters first, then the start.
-        starts = [one for name in _START if name in self._names for one in self._columns_of(name)]
+        # The core has the parameters first, then all columns of the start.
+        asked = [name for name, is_asked in zip(_START, self._by_start, strict=True) if is_asked]
+        starts = [column for name in asked for column in self._columns_of_start(name)]
         recorded = [*self._columns, *starts]
         order = [recorded.index(column) for column in columns]
 
         def rows(name: str, *shape: int) -> Array:
-            return read_only(record[name].reshape(-1, *shape, len(columns))[..., order])
+            return read_only(record[name].reshape(-1, *shape, len(recorded))[..., order])
 
         return Sensitivities(
             columns,

@@ -183,5 +183,23 @@ def test_names_may_be_an_array_and_bytes_are_none() -> None:
         scene.dynamics_derivatives(q, v, parameters=b"x")  # type: ignore[arg-type]
     with pytest.raises(InvalidParameter, match="must be names"):
         Simulation(scene).run(q, v, 0.1, sensitivities=np.array(names))  # type: ignore[arg-type]
-    with pytest.raises(NameNotFound, match=r"tip\.placement, q0, v0"):
-        Simulation(scene).run(q, v, 0.1, sensitivities=["v"])
+    for name in ("v", "v0.3", "v0.", "q0.x"):
+        with pytest.raises(NameNotFound, match=r"tip\.placement, q0, v0"):
+            Simulation(scene).run(q, v, 0.1, sensitivities=[name])
+
+
+def test_single_columns_of_the_start_of_a_run() -> None:
+    scene, q, v = in_bowl(LAWS["impact"], COULOMB)
+    names = ["v0.2", "tip.placement.vz", "q0.0", "v0.0"]
+    every = ["q0", "v0", "tip.placement"]
+    some, all_of_them = (
+        Simulation(scene).run(q, v, 0.01, sensitivities=one).sensitivities for one in (names, every)
+    )
+    assert some is not None
+    assert all_of_them is not None
+    assert some.parameters == tuple(names)
+    at = [all_of_them.column(name) for name in names]
+    np.testing.assert_array_equal(some.v, all_of_them.v[..., at])
+    np.testing.assert_array_equal(some.force_world, all_of_them.force_world[..., at])
+    with pytest.raises(InvalidParameter, match=r"v0\.1.*twice"):
+        Simulation(scene).run(q, v, 0.01, sensitivities=["v0.1", "v0"])

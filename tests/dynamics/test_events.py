@@ -96,3 +96,52 @@ def test_the_first_of_several_events_ends_the_step() -> None:
     assert [pair for pair, _ in first] == ["low", "high"]
     speed = np.sqrt(2 * 9.81 * DROP)
     assert first[1][1] - first[0][1] == pytest.approx(3e-6 / speed, rel=1e-3)
+
+
+def thrown(integrator: object, law: object, duration: float, **more: object) -> sp.Result:
+    """Throw a ball of 1 kg at a plate with 0.6 m/s, without gravity."""
+    scene = models.on_plate(models.ball(gravity=0.0), law)
+    q = models.free_q([0.0, 0.0, RADIUS + 1e-3])
+    velocity = [0.0, 0.0, -0.6, 0.0, 0.0, 0.0]
+    return sp.Simulation(scene, integrator).run(q, velocity, duration, **more)
+
+
+@both
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-6])
+def test_peaks_lie_between_steps(kind, rtol: float) -> None:
+    """All energy is in the spring: m v^2 / 2 = k depth^2.5 / 2.5."""
+    figures = thrown(kind(rtol), LAWS["hertz"], 0.02).stats.pairs["ball-plate"]
+    depth = (2.5 * 0.6**2 / (2 * 1e6)) ** 0.4
+    assert figures.max_depth == pytest.approx(depth, rel=10 * rtol)
+    assert figures.peak_force == pytest.approx(1e6 * depth**1.5, rel=10 * rtol)
+    # Half of the contact time, 2.9432 depth / v (Johnson, Contact Mechanics, 11.4).
+    turn = 1e-3 / 0.6 + 0.5 * 2.9432 * depth / 0.6
+    assert figures.max_depth_time == pytest.approx(turn, rel=max(10 * rtol, 1e-3))
+
+
+@both
+def test_the_peak_of_a_damped_force_comes_before_that_of_the_depth(kind) -> None:
+    law = sp.HuntCrossleyLaw(1e6, 1.5, dissipation=2.0)
+    fine = thrown(kind(1e-10), law, 0.02).stats.pairs["ball-plate"]
+    assert fine.peak_force_time < fine.max_depth_time - 1e-4
+    coarse = thrown(kind(1e-4), law, 0.02).stats.pairs["ball-plate"]
+    assert coarse.peak_force == pytest.approx(fine.peak_force, rel=1e-3)
+    assert coarse.max_depth == pytest.approx(fine.max_depth, rel=1e-3)
+    assert coarse.peak_force_time == pytest.approx(fine.peak_force_time, rel=1e-2)
+
+
+def test_the_peak_of_a_stop_lies_between_steps() -> None:
+    """A mass on a joint runs into the end of its range: F = v sqrt(k m)."""
+    stop = {"ball_joint": sp.JointLimits(-0.01, 0.01, sp.ImpactLaw(1e4, 1.0))}
+    scene = sp.Scene(models.slider(gravity=0.0), joints=sp.JointIngredients(limits=stop))
+    result = sp.Simulation(scene, sp.Adaptive(1e-4)).run([0.0], [-0.6], 0.06)
+    figures = result.stats.joints["ball_joint"]
+    assert figures.peak_stop_force == pytest.approx(0.6 * np.sqrt(1e4), rel=1e-3)
+    assert figures.max_stop_depth == pytest.approx(0.6 / np.sqrt(1e4), rel=1e-3)
+
+
+def test_fixed_steps_take_peaks_at_their_ends() -> None:
+    result = thrown(sp.RungeKutta4(1e-4), LAWS["hertz"], 0.02)
+    figures = result.stats.pairs["ball-plate"]
+    assert figures.peak_force == result.contacts.normal_force.max()
+    assert figures.peak_force_time in result.t

@@ -149,6 +149,28 @@ def test_derivatives_agree_with_differences(name: str) -> None:
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * abs(expected).max())
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_derivatives_without_contact_are_exact(name: str) -> None:
+    """Against differences of order 4; the acceleration is quadratic in v and linear in tau."""
+    model, _ = CASES[name][0]()
+    scene, random, h = Scene(model), np.random.default_rng(6), 3e-4
+    for _ in range(3):
+        q = random.uniform(-0.3, 0.3, model.nq)
+        v, tau = random.standard_normal(model.nv), random.standard_normal(model.nv)
+        found = scene.dynamics_derivatives(q, v, tau)
+        parts = ((found.by_q, (1, 0, 0)), (found.by_v, (0, 1, 0)), (found.by_tau, (0, 0, 1)))
+        for derivative, of in parts:
+            for k, axis in enumerate(np.eye(model.nv)):
+
+                def ahead(step: float, of=of, axis=axis, q=q, v=v, tau=tau) -> Array:
+                    moved = (x + step * one * axis for x, one in zip((q, v, tau), of, strict=True))
+                    return scene.dynamics_derivatives(*moved).acceleration
+
+                slope = (8 * (ahead(h) - ahead(-h)) - ahead(2 * h) + ahead(-2 * h)) / (12 * h)
+                scale = abs(derivative).max() + abs(found.acceleration).max()
+                np.testing.assert_allclose(derivative[:, k], slope, rtol=0, atol=1e-9 * scale)
+
+
 @pytest.mark.parametrize("integrator", [Adaptive(1e-8, 1e-10), Implicit(1e-7, 1e-9)])
 def test_a_closing_grasp_keeps_its_energy(integrator: Adaptive | Implicit) -> None:
     model, full = gripper()

@@ -117,8 +117,7 @@ PatchRow FoundationPair::patch(const Pair& pair, std::size_t i, const Mat3& rota
   return out;
 }
 
-// Where a bristle acts, the row is taken for a spring of its stiffness at its present force. The
-// quadrature points stay where they are on the shell: there the pressure follows the center, and
+// The quadrature points stay where they are on the shell: there the pressure follows the center, and
 // the border of the overlap adds nothing, as it bears no pressure.
 void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
                             const ContactSite& site, double normal_force,
@@ -128,28 +127,11 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
   const FoundationRow& row = foundation_.rows()[i];
   const Vec3 force = kappa * row.sum.force;
   const Mat3 slope = kappa * row.sum.slope;
-  if (pair.friction.has_state()) {
-    ContactSite spring = site;
-    const Vec3& n = site.contact.normal;
-    const double size = std::max(normal_force, 1e-300);
-    double stiffness = -n.dot(slope * n);
-    if (!(stiffness > 0)) stiffness = size / pair.radius;
-    // Along the shell its force changes by that of its length, too.
-    spring.contact.dn_dc = (slope + stiffness * n * n.transpose()) / size;
-    // A power of the depth with this force and this stiffness there.
-    const double depth = row.depth, exponent = stiffness * depth / size;
-    NormalLaw power;
-    power.law = ImpactLaw({size / std::pow(depth, exponent), exponent, 0, 1});
-    spring.disc_radius = 2 * pair.disc_radius();
-    contact_slopes(power, pair.friction, relaxation, spring, out);
-    out.wrench.tail<3>() += (center_ - row.center).cross(force);
-  } else {
-    out.wrench << force, center_.cross(force);
-    out.by_place << slope, cross_matrix(center_) * slope - cross_matrix(force);
-    out.by_twist.setZero();
-    out.depth_by_place = -site.contact.normal.transpose();
-    out.normal_by_place = site.contact.dn_dc;
-  }
+  out.wrench << force, center_.cross(force);
+  out.by_place << slope, cross_matrix(center_) * slope - cross_matrix(force);
+  out.by_twist.setZero();
+  out.depth_by_place = -site.contact.normal.transpose();
+  out.normal_by_place = site.contact.dn_dc;
   const CoulombFriction* friction = sliding_friction(pair);
   for (const FoundationPoint& point : foundation_.points()) {
     if (point.row != static_cast<int>(i) || point.area == 0) continue;
@@ -183,6 +165,48 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
     out.by_twist.topRightCorner<3, 3>() -= by_velocity * arm;
     out.by_twist.bottomLeftCorner<3, 3>() += arm * by_velocity;
     out.by_twist.bottomRightCorner<3, 3>() -= arm * by_velocity * arm;
+  }
+  if (pair.friction.has_state()) add_bristle(pair, relaxation, site, normal_force, out);
+}
+
+// The bristle's part of the wrench, and its rates. It follows from a contact whose normal force
+// depends on nothing, less what that does without friction; the normal force's own derivatives,
+// which are those of the pressure, pass through that of the friction by it.
+void FoundationPair::add_bristle(const Pair& pair, double relaxation, const ContactSite& site,
+                                 double normal_force, ContactSlopes& out) const {
+  const Vec3& n = site.contact.normal;
+  const double size = std::max(normal_force, 1e-300), depth = site.contact.depth;
+  // Of the pressure's force along the normal.
+  const Vec3 push = out.wrench.head<3>();
+  const Eigen::RowVector3d by_place =
+      n.transpose() * out.by_place.topRows<3>() + push.transpose() * site.contact.dn_dc;
+  const Eigen::Matrix<double, 1, 6> by_twist = n.transpose() * out.by_twist.topRows<3>();
+  ContactSite at = site;
+  at.disc_radius = 2 * pair.disc_radius();
+  NormalLaw held, steep;  // the same force here, constant, and in proportion to the depth
+  held.law = ImpactLaw({size, 0, 0, 1});
+  steep.law = ImpactLaw({size / depth, 1, 0, 1});
+  ContactSlopes all, without, more;
+  contact_slopes(held, pair.friction, relaxation, at, all);
+  contact_slopes(held, FrictionLaw(), relaxation, at, without);
+  contact_slopes(steep, pair.friction, relaxation, at, more);
+  Vector6 normal_by_depth;
+  normal_by_depth << n, site.contact.point.cross(n);
+  const Vector6 by_force = (more.by_depth - all.by_depth) * (depth / size) - normal_by_depth;
+  out.wrench += all.wrench - without.wrench;
+  out.by_place += all.by_place - without.by_place + by_force * by_place;
+  out.by_twist += all.by_twist - without.by_twist + by_force * by_twist;
+  out.by_stretch = all.by_stretch;
+  out.rate = all.rate;
+  const Vec3 rate_by_force = (more.rate_by_depth - all.rate_by_depth) * (depth / size);
+  out.rate_by_place = all.rate_by_place + rate_by_force * by_place;
+  out.rate_by_twist = all.rate_by_twist + rate_by_force * by_twist;
+  out.rate_by_stretch = all.rate_by_stretch;
+  for (int k = 0; k + 1 < pair.friction.rings(); ++k) {
+    ContactSlopes::Ring& ring = out.outer[k] = all.outer[k];
+    const Vec3 by = (more.outer[k].rate_by_depth - ring.rate_by_depth) * (depth / size);
+    ring.rate_by_place += by * by_place;
+    ring.rate_by_twist += by * by_twist;
   }
 }
 

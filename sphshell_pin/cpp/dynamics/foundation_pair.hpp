@@ -39,6 +39,9 @@ class FoundationPair {
               double normal_force, ContactSlopes& out) const;
 
  private:
+  void add_bristle(const Pair& pair, double relaxation, const ContactSite& site,
+                   double normal_force, ContactSlopes& out) const;
+
   Vec3 center_ = Vec3::Zero();
   Foundation foundation_;
 };

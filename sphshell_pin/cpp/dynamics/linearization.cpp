@@ -99,7 +99,6 @@ void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* ja
   const std::vector<ActiveContact>& active = scene_.active();
   for (std::size_t first = 0, next; first < active.size(); first = next) {
     const int p = active[first].pair;
-    const Pair& pair = scene_.pairs()[p];
     Chain& chain = chains_[p];
     chain.place(scene_.body(), scene_.states()[p].world_from_j, v);
     Sum sum{Vector6::Zero(), Matrix6::Zero(), Matrix6::Zero()};

@@ -15,6 +15,9 @@ struct ContactForceSlopes {
   MatrixX force_world;   // three rows a contact: on the sphere [N]
   MatrixX normal_force;  // one row a contact [N]
   MatrixX depth;         // [m]
+  // The same but for the rise of a curved shell, which comes on with the square of the depth where
+  // it is negative: what passes through zero with a rate where a contact begins [m].
+  MatrixX plain_depth;
 };
 
 // At the state of the scene's last evaluate(), or accept(). Derivatives with respect to q are in
@@ -57,11 +60,13 @@ class Linearization {
   void add_bristle(const ActiveContact& active, const ContactSite& site, const Chain& chain,
                    MatrixX& jacobian);
   void find_slopes(const ActiveContact& active, const ContactSite& site);
+  Eigen::RowVector3d plain_depth_by_place(
+      const ContactSite& site) const;  // of the slopes found last
   // How the slopes found last, and the depth, answer a parameter of their pair.
   struct Answer {
     Vector6 wrench = Vector6::Zero();  // in the shell's frame
     Vec3 rates[kMostRings];            // of the rings of a bristle
-    double depth = 0;
+    double depth = 0, plain_depth = 0;
     Vec3 normal = Vec3::Zero();
     Vector6 moved = Vector6::Zero();  // the twist by which the shell's frame moves
   };

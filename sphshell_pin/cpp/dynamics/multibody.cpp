@@ -8,6 +8,7 @@
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
+#include <pinocchio/algorithm/rnea-derivatives.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 #include <string>
 
@@ -104,7 +105,20 @@ void Multibody::acceleration_derivatives(const VectorX& q, const VectorX& v, con
                                          Eigen::Ref<MatrixX> by_q, Eigen::Ref<MatrixX> by_v,
                                          Eigen::Ref<MatrixX> by_tau) {
   if (!differences_) {
-    pinocchio::computeABADerivatives(model_, data_, q, v, tau, by_q, by_v, by_tau);
+    if (!unlocked_) {
+      pinocchio::computeABADerivatives(model_, data_, q, v, tau, by_q, by_v, by_tau);
+      return;
+    }
+    // With G the ratios, tau = G^T id(q_all, G v, G a): differentiated at a held torque.
+    const VectorX a = acceleration(q, v, tau);
+    place_unlocked(q);
+    auto& [model, data, ratios, id_by_q, id_by_v, id_by_a, q_all] = *unlocked_;
+    pinocchio::computeRNEADerivatives(model, data, q_all, VectorX(ratios * v), VectorX(ratios * a),
+                                      id_by_q, id_by_v, id_by_a);
+    by_tau.setIdentity();
+    mass_.solveInPlace(by_tau);
+    by_q.noalias() = -by_tau * (ratios.transpose() * id_by_q * ratios);
+    by_v.noalias() = -by_tau * (ratios.transpose() * id_by_v * ratios);
     return;
   }
   by_q.setZero();
@@ -138,7 +152,41 @@ void Multibody::want_derivatives() {
     turn_axes(q, axes);
     if (axes.by_q.cwiseAbs().maxCoeff() > 1e-6) turning_.push_back(axes);
   }
-  differences_ = mimics_ || !turning_.empty() || !depth_first(model_);
+  differences_ = !turning_.empty() || !depth_first(model_);
+  if (mimics_ && !differences_) unlock();
+}
+
+void Multibody::unlock() {
+  pinocchio::Model all;
+  all.gravity = model_.gravity;
+  for (int j = 1; j < model_.njoints; ++j) {
+    const auto* mimic = boost::get<pinocchio::JointModelMimic>(&model_.joints[j]);
+    all.addJoint(model_.parents[j], mimic ? mimic->jmodel() : model_.joints[j],
+                 model_.jointPlacements[j], model_.names[j]);
+    all.inertias[j] = model_.inertias[j];
+  }
+  MatrixX ratios = MatrixX::Zero(all.nv, model_.nv);
+  for (int j = 1; j < model_.njoints; ++j) {
+    const auto* mimic = boost::get<pinocchio::JointModelMimic>(&model_.joints[j]);
+    for (int i = 0; i < all.nvs[j]; ++i)
+      ratios(all.idx_vs[j] + i, model_.joints[j].idx_v() + i) = mimic ? mimic->scaling() : 1;
+  }
+  const MatrixX zero = MatrixX::Zero(all.nv, all.nv);
+  unlocked_.emplace(
+      Unlocked{all, pinocchio::Data(all), ratios, zero, zero, zero, pinocchio::neutral(all)});
+}
+
+void Multibody::place_unlocked(const VectorX& q) {
+  const pinocchio::Model& all = unlocked_->model;
+  for (int j = 1; j < model_.njoints; ++j) {
+    const auto from = q.segment(model_.joints[j].idx_q(), all.nqs[j]);
+    auto to = unlocked_->q.segment(all.idx_qs[j], all.nqs[j]);
+    if (const auto* mimic = boost::get<pinocchio::JointModelMimic>(&model_.joints[j]))
+      pinocchio::configVectorAffineTransform(mimic->jmodel(), from, mimic->scaling(),
+                                             mimic->offset(), to);
+    else
+      to = from;
+  }
 }
 
 void Multibody::turn_axes(const VectorX& q, TurningAxes& axes) {

@@ -3,6 +3,7 @@
 
 #include <pinocchio/multibody.hpp>
 
+#include <optional>
 #include <vector>
 
 namespace sphshell {
@@ -43,8 +44,8 @@ class Multibody {
   const VectorX& acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
                               const Forces& external);
   // Derivatives (nv, nv) of acceleration(q, v, tau), with respect to q in its tangent space, v and
-  // tau. Pinocchio's derivatives leave out how axes turn and mimic joints, and want joints in
-  // depth-first order: for other models they are central differences, right to nine digits.
+  // tau. Pinocchio's derivatives leave out how axes turn, and want joints in depth-first order: for
+  // other models they are central differences, right to nine digits.
   void acceleration_derivatives(const VectorX& q, const VectorX& v, const VectorX& tau,
                                 Eigen::Ref<MatrixX> by_q, Eigen::Ref<MatrixX> by_v,
                                 Eigen::Ref<MatrixX> by_tau);
@@ -107,6 +108,17 @@ class Multibody {
   const std::vector<CurvedSegment>& curved() const { return curved_; }
 
  private:
+  // The model in which joints that mimic others move by themselves, and how fast its joints move
+  // for each velocity of this one.
+  struct Unlocked {
+    pinocchio::Model model;
+    pinocchio::Data data;
+    MatrixX ratios, by_q, by_v, by_a;
+    VectorX q;
+  };
+  void unlock();
+  void place_unlocked(const VectorX& q);
+
   void turn_axes(const VectorX& q, TurningAxes& axes);
   const VectorX& solve(const VectorX& tau, const VectorX& bias);
 
@@ -119,7 +131,8 @@ class Multibody {
   VectorX solution_;
   std::vector<TurningAxes> turning_;
   bool differences_ = false;
-  VectorX step_, moved_;  // scratch of the differences
+  std::optional<Unlocked> unlocked_;  // of models with mimic joints, for derivatives
+  VectorX step_, moved_;              // scratch of the differences
   std::vector<CurvedSegment> curved_;
   std::vector<int> needed_;  // joints, parents first
 };

@@ -1,20 +1,35 @@
 #include "dynamics/recording.hpp"
 
 #include <algorithm>
+#include <boost/math/tools/minima.hpp>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <utility>
 
 #include "dynamics/patch.hpp"
 
 namespace sphshell {
+namespace {
+
+// A step holds a peak that counts only where one of its ends comes this near to the largest so far;
+// what raises that by less than this share of it does not count.
+constexpr double kNearPeak = 0.5, kSamePeak = 1e-10;
+// Where within a step its rate is seen beside an end, as a share of it.
+constexpr double kBeside = 1e-4;
+// Of the share at which a peak is, and looks until it is found: the value is off by the square.
+constexpr int kPeakBits = 16;
+constexpr std::uintmax_t kMostPeakLooks = 50;
+
+}  // namespace
 
 Recorder::Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches)
     : start_(start),
       end_(end),
       record_dt_(record_dt),
       summaries_(scene.pairs().size() + scene.joints().stops().size()),
-      status_(summaries_.size()) {
+      status_(summaries_.size()),
+      touches_(summaries_.size()) {
   const JointEffects* joints = scene.joints().effects();
   if (joints) limits_.resize(std::max(joints->most_effort.size(), joints->speed.size()));
   limit_status_.resize(limits_.size());
@@ -102,20 +117,70 @@ void Recorder::add_touch(std::size_t k, const Touch& now, double t, double h, in
                          Event::Kind begin) {
   PairSummary& summary = summaries_[k];
   PairStatus& status = status_[k];
-  if (status.touching) summary.contact_time += h;
-  summary.impulse += 0.5 * h * (status.normal_force + now.normal_force);
-  status.normal_force = now.normal_force;
-  if (now.touching != status.touching) {
+  const Touch before = std::exchange(status.touch, now);
+  if (before.touching) summary.contact_time += h;
+  summary.impulse += 0.5 * h * (before.normal_force + now.normal_force);
+  if (now.touching != before.touching) {
     const int kind = static_cast<int>(begin) + (now.touching ? 0 : 1);
     record_.events.push_back({t, number, static_cast<Event::Kind>(kind)});
-    status.touching = now.touching;
     status.deep = false;
     if (now.touching) ++summary.touches;
   }
+  raise_peaks(summary, now, t);
+}
+
+void Recorder::raise_peaks(PairSummary& summary, const Touch& now, double t) {
   if (!now.touching) return;
   if (now.normal_force > summary.peak_force)
     summary.peak_force = now.normal_force, summary.peak_force_time = t;
   if (now.depth > summary.max_depth) summary.max_depth = now.depth, summary.max_depth_time = t;
+}
+
+Recorder::Touch Recorder::touch_of(const SceneData& scene, std::size_t k) const {
+  const std::size_t pairs = scene.pairs().size();
+  if (k < pairs) {
+    const PairState& now = scene.states()[k];
+    return {now.count > 0, now.normal_force, now.depth};
+  }
+  const StopState& now = scene.joints().stops()[k - pairs];
+  return {now.touching, now.force, now.depth};
+}
+
+void Recorder::add_peaks(SceneData& scene, const Chart& chart, const Stepper& stepper,
+                         const State& from, const State& to) {
+  bool moved = false;
+  const auto look = [&](double share, std::size_t k) {
+    moved = true;
+    stepper.interpolate(share, y_);
+    chart.finish(from.t + share * (to.t - from.t), y_, between_);
+    scene.evaluate(between_.q, between_.v, between_.z);
+    return touch_of(scene, k);
+  };
+  for (std::size_t k = 0; k < summaries_.size(); ++k) touches_[k] = touch_of(scene, k);
+  for (std::size_t k = 0; k < summaries_.size(); ++k) {
+    PairSummary& summary = summaries_[k];
+    const Touch &first = status_[k].touch, &last = touches_[k];
+    if (!first.touching && !last.touching) continue;
+    for (const auto& [of, most] : {std::pair(&Touch::normal_force, &PairSummary::peak_force),
+                                   std::pair(&Touch::depth, &PairSummary::max_depth)}) {
+      // Towards its higher end a rate that has changed its sign falls.
+      const bool rises = last.*of > first.*of;
+      const double higher = rises ? last.*of : first.*of;
+      if (!(higher > 0) || higher < kNearPeak * summary.*most) continue;
+      const double rate = (look(rises ? 1 - kBeside : kBeside, k).*of - higher) / kBeside;
+      // Where the peak is concave it stays below its tangent.
+      if (!(rate > 0 && higher + rate > (1 + kSamePeak) * summary.*most)) continue;
+      std::uintmax_t looks = kMostPeakLooks;
+      const double at =
+          boost::math::tools::brent_find_minima([&](double share) { return -(look(share, k).*of); },
+                                                0.0, 1.0, kPeakBits, looks)
+              .first;
+      raise_peaks(summary, look(at, k), between_.t);
+    }
+  }
+  if (!moved) return;
+  scene.restart();
+  scene.evaluate(to.q, to.v, to.z);
 }
 
 void Recorder::add_step(const SceneData& scene, double t, double h) {
@@ -125,7 +190,7 @@ void Recorder::add_step(const SceneData& scene, double t, double h) {
     const int number = static_cast<int>(k);
     const auto add_event = [&](Event::Kind kind) { record_.events.push_back({t, number, kind}); };
     PairStatus& status = status_[k];
-    add_touch(k, {now.count > 0, now.normal_force, now.depth}, t, h, number, Event::Kind::Touch);
+    add_touch(k, touch_of(scene, k), t, h, number, Event::Kind::Touch);
     const bool beyond = now.conformity > kMostConformal || now.half_axis > kLargestEllipse;
     if (beyond && !status.beyond_hertz) add_event(Event::Kind::BeyondHertz);
     status.beyond_hertz = beyond;
@@ -138,10 +203,8 @@ void Recorder::add_step(const SceneData& scene, double t, double h) {
       add_event(Event::Kind::Deep);
     }
   }
-  const std::vector<StopState>& stops = scene.joints().stops();
-  for (std::size_t i = 0; i < stops.size(); ++i)
-    add_touch(pairs + i, {stops[i].touching, stops[i].force, stops[i].depth}, t, h,
-              static_cast<int>(i), Event::Kind::Stop);
+  for (std::size_t k = pairs; k < summaries_.size(); ++k)
+    add_touch(k, touch_of(scene, k), t, h, static_cast<int>(k - pairs), Event::Kind::Stop);
 }
 
 void Recorder::add_limits(const SceneData& scene, const VectorX& v, const std::vector<char>& cut,

@@ -97,6 +97,10 @@ class Recorder {
   // Leaves the forces evaluated at `to`.
   void add_rows(SceneData& scene, const Chart& chart, const Stepper& stepper, const State& from,
                 const State& to);
+  // The largest force and depth of each pair and stop within the same step, where its dense output
+  // has them between its ends. The scene's last evaluate() was at `to`, and it is left there.
+  void add_peaks(SceneData& scene, const Chart& chart, const Stepper& stepper, const State& from,
+                 const State& to);
   // Events and figures of a step of h [s] that ends at t; the scene has accepted its end.
   void add_step(const SceneData& scene, double t, double h);
 
@@ -112,19 +116,21 @@ class Recorder {
   const std::vector<LimitSummary>& limits() const { return limits_; }
 
  private:
-  struct PairStatus {
-    double normal_force = 0;
-    bool touching = false, deep = false, through = false, beyond_hertz = false;
-  };
-  // A pair or a stop at the end of a step.
+  // A pair or a stop at one state.
   struct Touch {
-    bool touching;
-    double normal_force, depth;
+    bool touching = false;
+    double normal_force = 0, depth = 0;
+  };
+  struct PairStatus {
+    Touch touch;  // at the end of the last step
+    bool deep = false, through = false, beyond_hertz = false;
   };
   struct LimitStatus {
     bool cut = false, too_fast = false;
   };
 
+  Touch touch_of(const SceneData& scene, std::size_t k) const;
+  static void raise_peaks(PairSummary& summary, const Touch& now, double t);
   void add_touch(std::size_t k, const Touch& now, double t, double h, int number,
                  Event::Kind begin);
 
@@ -134,6 +140,7 @@ class Recorder {
   Record record_;
   std::vector<PairSummary> summaries_;
   std::vector<PairStatus> status_;
+  std::vector<Touch> touches_;  // at the end of the step that was made
   std::vector<LimitSummary> limits_;
   std::vector<LimitStatus> limit_status_;
   long rows_ = 0, next_row_ = 1;

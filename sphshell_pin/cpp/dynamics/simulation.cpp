@@ -196,6 +196,8 @@ bool Simulation::make_controlled(double end) {
                        stepping_.next());
     ++steps_;
   }
+  recorder_.add_peaks(scene_, stepping_.chart(), stepping_.stepper(), stepping_.state(),
+                      stepping_.next());
   accept();
   return true;
 }

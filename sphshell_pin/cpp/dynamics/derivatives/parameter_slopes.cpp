@@ -23,6 +23,12 @@ Vector6 foundation_wrench(const FoundationPair& foundation, const Pair& pair, in
 
 }  // namespace
 
+Eigen::RowVector3d Linearization::plain_depth_by_place(const ContactSite& site) const {
+  Eigen::RowVector3d out = slopes_.depth_by_place;
+  if (site.shape) out += site.shape->tilt.transpose();
+  return out;
+}
+
 Linearization::Answer Linearization::answer_of(const Parameter& parameter,
                                                const ActiveContact& active,
                                                const ContactSite& site) {
@@ -46,6 +52,7 @@ Linearization::Answer Linearization::answer_of(const Parameter& parameter,
     }
     out.wrench = slopes_.by_place * moved + slopes_.by_twist * twist;
     out.depth = slopes_.depth_by_place * moved;
+    out.plain_depth = plain_depth_by_place(site) * moved;
     out.normal = slopes_.normal_by_place * moved;
     for (int i = 0; i < rings; ++i)
       out.rates[i] =
@@ -54,10 +61,11 @@ Linearization::Answer Linearization::answer_of(const Parameter& parameter,
     return out;
   }
   if (parameter.kind != Kind::Field) {
-    out.depth = 1;
-    if (active.row < 0) out.wrench = slopes_.by_depth;
-    for (int i = 0; i < rings; ++i)
-      out.rates[i] = ring_of(i) ? ring_of(i)->rate_by_depth : slopes_.rate_by_depth;
+    out.plain_depth = 1;
+    out.depth = site.shape ? 1 + site.shape->tilt.dot(site.contact.normal) : 1;
+    if (active.row < 0) out.wrench = out.depth * slopes_.by_depth;
+    for (int i = 0; i < rings && active.row < 0; ++i)
+      out.rates[i] = out.depth * (ring_of(i) ? ring_of(i)->rate_by_depth : slopes_.rate_by_depth);
   }
   add_differences(parameter, active, site, out);
   return out;
@@ -88,7 +96,6 @@ void Linearization::add_differences(const Parameter& parameter, const ActiveCont
       other.disc_radius = pair.disc_radius();
       if (site.shape) {
         shape = scene_.shape_of(active.pair, pair, site.contact);
-        if (parameter.kind != Kind::Field) answer.depth += share * shape.depth;
         shape.depth = site.shape->depth;
         other.shape = &shape;
         other.disc_radius = shape.disc_radius();
@@ -129,6 +136,7 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
   out.force_world.setZero(3 * rows, columns);
   out.normal_force.setZero(rows, columns);
   out.depth.setZero(rows, columns);
+  out.plain_depth.setZero(rows, columns);
   if (rows == 0) return;
   Multibody& body = scene_.body();
   body.place_axes(q);
@@ -146,21 +154,23 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
     const double weight = site.contact.weight;
     auto world = out.force_world.middleRows<3>(3 * row_of[i]);
     auto along = out.normal_force.row(row_of[i]);
-    auto depth = out.depth.row(row_of[i]);
+    auto depth = out.depth.row(row_of[i]), plain = out.plain_depth.row(row_of[i]);
     // One column, from changes in the shell's frame.
     const auto add = [&](Eigen::Index column, const Vec3& force_by, const Vec3& normal_by,
-                         double depth_by) {
+                         double depth_by, double plain_by) {
       world.col(column) += turn * force_by;
       along[column] += force_by.dot(normal) + force.dot(normal_by);
       depth[column] += weight * depth_by;
+      plain[column] += weight * plain_by;
     };
     for (int m = 0; m < chain.size(); ++m) {
       const Vector6 axis = chain.axes().col(m), rate = chain.twist_by_q().col(m);
       const Vec3 moved = motion_of(axis, site.place);
       const Vec3 by_q =
           slopes_.by_place.topRows<3>() * moved + slopes_.by_twist.topRows<3>() * rate;
-      add(chain.velocity(m), by_q, slopes_.normal_by_place * moved, slopes_.depth_by_place * moved);
-      add(nv + chain.velocity(m), slopes_.by_twist.topRows<3>() * axis, Vec3::Zero(), 0);
+      add(chain.velocity(m), by_q, slopes_.normal_by_place * moved, slopes_.depth_by_place * moved,
+          plain_depth_by_place(site) * moved);
+      add(nv + chain.velocity(m), slopes_.by_twist.topRows<3>() * axis, Vec3::Zero(), 0, 0);
     }
     // The shell's frame turns with its body.
     const Vec3 force_world = turn * force;
@@ -173,13 +183,13 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
     for (int r = 0; r < rings_of(active); ++r)
       for (int k = 0; k < 3; ++k) {
         const Matrix63& by = r == 0 ? slopes_.by_stretch : slopes_.outer[r - 1].by_stretch;
-        add(2 * nv + 3 * (active.slot + r) + k, by.topRows<3>().col(k), Vec3::Zero(), 0);
+        add(2 * nv + 3 * (active.slot + r) + k, by.topRows<3>().col(k), Vec3::Zero(), 0, 0);
       }
     for (std::size_t c = 0; c < parameters_.size(); ++c) {
       if (parameters_[c].pair != active.pair) continue;
       const Answer answer = answer_of(parameters_[c], active, site);
       const Eigen::Index column = first + static_cast<Eigen::Index>(c);
-      add(column, answer.wrench.head<3>(), answer.normal, answer.depth);
+      add(column, answer.wrench.head<3>(), answer.normal, answer.depth, answer.plain_depth);
       world.col(column) += turn * answer.moved.tail<3>().cross(force);
     }
   }

@@ -113,7 +113,7 @@ Eigen::RowVectorXd Sensitivities::time_of(const State& at, const std::vector<cha
   std::vector<int> row_of;
   scene_.rows_of_contacts(row_of);
   const auto parameters = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
-  const auto row = contacts_.depth.row(row_of[found]);
+  const auto row = contacts_.plain_depth.row(row_of[found]);
   const double rate = row.head(at.v.size()).dot(at.v);
   if (rate == 0) return {};
   return applied(row, now_, parameters) / -rate;
@@ -129,10 +129,10 @@ void Sensitivities::begin_contacts(const State& to) {
   std::vector<int> row_of;
   scene_.rows_of_contacts(row_of);
   const auto parameters = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
-  const MatrixX depth_by = applied(contacts_.depth, now_, parameters);
+  const MatrixX depth_by = applied(contacts_.plain_depth, now_, parameters);
   for (std::size_t i = 0; i < active.size(); ++i) {
     if (!is_new(active[i])) continue;
-    const double rate = contacts_.depth.row(row_of[i]).head(to.v.size()).dot(to.v);
+    const double rate = contacts_.plain_depth.row(row_of[i]).head(to.v.size()).dot(to.v);
     if (!(rate > 0) || active[i].contact.depth > kJustBegun * rate * h_) continue;
     const int rings = scene_.pairs()[active[i].pair].friction.rings();
     const Eigen::Index at = 3 * active[i].slot, size = 3 * rings;

@@ -1,0 +1,149 @@
+"""The step that is recommended: time scales from the forces themselves, and what it resolves."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.errors import SetupWarning
+from tests import models
+
+RADIUS, MASS, SPEED = 0.05, 1.0, 0.4
+STEEL = {"young": 2e8, "poisson": 0.3}
+# Damped so heavily that their decay is the shortest time scale.
+DAMPED = {
+    "impact": sp.ImpactLaw(1e5, 1.5, 3e4, 1e-6),
+    "impact, a part of its damping": sp.ImpactLaw(1e5, 1.0, 3e5, 4 * SPEED * math.sqrt(MASS / 1e5)),
+    "hunt-crossley": sp.HuntCrossleyLaw(1e6, 1.5, 80.0),
+    "hertz": sp.HertzLaw(**STEEL, restitution=0.01, speed=0.01, radius=RADIUS),
+    "foundation": sp.FoundationLaw(1e7, 0.05, 60.0),
+    "viscoelastic": sp.HertzLaw(**STEEL, loss_tangent=0.5, frequency=3.0, radius=RADIUS),
+}
+TABLE = sp.TableLaw([0.0, 1e-3, 2e-3, 3e-3], [0.0, 80.0, 200.0, 360.0])
+ELASTIC = {
+    "linear": sp.ImpactLaw(1e5, 1.0),
+    "power": sp.ImpactLaw(1e6, 2.2),
+    "table": TABLE,
+    "layer": sp.FoundationLaw(1e7, 0.05),
+}
+laws = pytest.mark.parametrize("law", ELASTIC | DAMPED)
+
+
+def falling(law: object, friction: object = None, gravity: float = 0.0) -> sp.Scene:
+    return models.on_plate(models.slider(gravity, MASS), law, friction)
+
+
+def block(law: object, friction: object) -> sp.Scene:
+    """A mass that slides but does not turn, at rest on a plate."""
+    model = models.empty()
+    inertia = models.pin.Inertia.FromSphere(MASS, RADIUS)
+    models.add_body(model, "ball", models.pin.JointModelTranslation(), inertia=inertia)
+    return models.on_plate(model, law, friction)
+
+
+def shortest(scene: sp.Scene, q: list[float], v: list[float]) -> float:
+    """Return the shortest time scale [s]; the step is a thirtieth of it, rounded down."""
+    explanation = scene.explain(q, v)
+    figures, dt = explanation.pairs[0], explanation.recommended_dt
+    digits = dt / 10.0 ** math.floor(math.log10(dt * (1 + 1e-9)))
+    assert min(abs(digits - one) for one in (1, 2, 5)) < 1e-9
+    assert 30 * dt <= figures.shortest_time * (1 + 1e-9) < 30 * 2.5 * dt * (1 + 1e-9)
+    return figures.shortest_time
+
+
+@pytest.mark.parametrize("law", DAMPED)
+def test_the_decay_follows_from_the_force(law: str) -> None:
+    """20 decays at the largest depth: a mass on a damper c slows down by e in m / c."""
+    scene = falling(DAMPED[law])
+    one = scene.pairs[0].plane_law
+    depth = one.depth_of(0.5 * MASS * SPEED**2)
+    h = 1e-7
+    damping = (one.normal_force(depth, -h) - one.normal_force(depth, h)) / (2 * h)
+    found = shortest(scene, [RADIUS], [-SPEED])
+    assert found == pytest.approx(20 * MASS / damping, rel=1e-6)
+    assert found < 0.5 * one.contact_time(depth, SPEED)
+
+
+@pytest.mark.parametrize("law", ELASTIC)
+def test_without_damping_it_is_the_contact_time(law: str) -> None:
+    """That of a run with error control."""
+    scene = falling(ELASTIC[law])
+    run = sp.Simulation(scene, sp.Adaptive(1e-9)).run([RADIUS + 1e-4], [-SPEED], 0.2)
+    contact_time = run.stats.pairs["ball-plate"].contact_time
+    assert shortest(scene, [RADIUS], [-SPEED]) == pytest.approx(contact_time, rel=2e-3)
+
+
+def test_under_load_it_is_half_an_oscillation() -> None:
+    law = sp.ImpactLaw(1e8, 2.0)
+    depth = 5e-3  # pressed there, far deeper than an impact at 0.1 m/s
+    scene = falling(law, gravity=9.81)
+    half = math.pi * math.sqrt(MASS / (2 * 1e8 * depth))
+    assert shortest(scene, [RADIUS - depth], [0.0]) == pytest.approx(half, rel=1e-6)
+
+
+def test_slow_slip_of_coulomb_friction_decays_under_the_load() -> None:
+    law, friction = sp.ImpactLaw(1e7, 1.0), sp.CoulombFriction(0.5, 0.3, 1e-4, 0.1)
+    load = MASS * 9.81
+    slow = 1e-6 * friction.v_static
+    damping = load * friction.coefficient(slow) / slow
+    found = shortest(block(law, friction), [0.0, 0.0, RADIUS - law.depth_at(load)], [0.0] * 3)
+    assert found == pytest.approx(20 * MASS / damping, rel=1e-4)
+    # A ball rolls: 2/7 of its mass resist a slip.
+    ball = models.on_plate(models.ball(mass=MASS), law, friction)
+    q = models.free_q([0.0, 0.0, RADIUS - law.depth_at(load)])
+    assert shortest(ball, q, [0.0] * 6) == pytest.approx(2 / 7 * found, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("friction", "time"),
+    [
+        (sp.BristleFriction(0.5, 0.5, 1e6), math.pi * math.sqrt(MASS / 1e6)),
+        (sp.BristleFriction(0.5, 0.5, 1e6, 1e5), 20 * MASS / 1e5),
+    ],
+)
+def test_bristles_ring_or_decay(friction: sp.BristleFriction, time: float) -> None:
+    law = sp.ImpactLaw(1e4, 1.0)
+    q = [0.0, 0.0, RADIUS - law.depth_at(MASS * 9.81)]
+    assert shortest(block(law, friction), q, [0.0] * 3) == pytest.approx(time, rel=1e-6)
+
+
+@laws
+def test_the_recommended_step_resolves_an_impact(law: str) -> None:
+    one = (ELASTIC | DAMPED)[law]
+    scene = falling(one)
+    q, v = [RADIUS + 1e-4], [-SPEED]
+    dt = scene.explain(q, v).recommended_dt
+    fine = sp.Simulation(scene, sp.Adaptive(1e-9)).run(q, v, 0.2)
+    coarse = sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(q, v, 0.2)
+    assert coarse.v[-1, 0] == pytest.approx(fine.v[-1, 0], abs=0.05 * SPEED)
+    peaks = [run.stats.pairs["ball-plate"].peak_force for run in (coarse, fine)]
+    assert peaks[0] == pytest.approx(peaks[1], rel=0.15)
+
+
+def test_a_run_warns_in_the_words_of_the_explanation() -> None:
+    scene = falling(ELASTIC["linear"])
+    q, v = [RADIUS], [-SPEED]
+    dt = 50 * scene.explain(q, v).recommended_dt
+    (sentence,) = (one for one in scene.explain(q, v, dt=dt).warnings if "recommended" in one)
+    with pytest.warns(SetupWarning) as caught:
+        sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(q, v, 10 * dt)
+    assert [str(one.message) for one in caught] == [sentence]
+    assert caught[0].filename == __file__
+
+
+def test_steps_that_are_short_enough_earn_no_warning() -> None:
+    scene = falling(ELASTIC["linear"])
+    q, v = [RADIUS], [-SPEED]
+    dt = scene.explain(q, v).recommended_dt
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(q, v, 10 * dt)
+        # No stiffness limits these.
+        for integrator in (sp.LinearlyImplicitEuler(50 * dt), sp.Adaptive(), sp.Implicit()):
+            sp.Simulation(scene, integrator).run(q, v, 10 * dt)
+        free = sp.Scene(models.slider())
+        sp.Simulation(free, sp.SemiImplicitEuler(0.1)).run([0.0], np.ones(1), 1.0)
