@@ -79,7 +79,8 @@ def shell_of(
     surface = replace(
         surface,
         **{key: array for key, array in given.items() if key not in ("vertices", "elements")},
-        face_names=face_names,
+        # Names count the rows of face_shapes, which count only with normals.
+        face_names=face_names if kinds is not None and "normals" in given else (),
         rounding=rounding,
         health=surface.health.labelled(cleaned=True),
     )
