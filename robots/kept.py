@@ -93,8 +93,8 @@ def load_kept(
     robot = LoadedRobot(name, model, spheres, visual, description.q0(model))
     robot = exactly(robot, description, mimic=mimic, warn=False)
     q = np.array(q0)
-    if q.shape != (robot.model.nq,):
-        raise RobotError(f"{file}: a posture has {q.size} numbers, the robot {robot.model.nq}")
+    if q.shape != (robot.model.nq,) or not np.isfinite(q).all():
+        raise RobotError(f"{file}: its posture {q0} is not one of {robot.model.nq} numbers")
     if missing:
         warnings.warn(
             f"{file}: without these visual meshes, which the results do not hold: "

@@ -124,6 +124,8 @@ def changed(result: sp.Result, what: str) -> Kept:
         mjcf["text"] = mjcf["text"].replace("<asset>", '<include file="/etc/passwd"/><asset>')
     elif what == "posture":
         urdf["q0"] = [0.0]
+    elif what == "no number":
+        urdf["q0"] = [float("nan"), 0.0]
     elif what == "no robot":
         contents["robots"] = [None] * 3
     elif what == "fewer robots":
@@ -155,7 +157,8 @@ def changed(result: sp.Result, what: str) -> Kept:
 
 WRONG = {
     "include": "it includes other files",
-    "posture": "a posture has 1 numbers, the robot 2",
+    "posture": r"its posture \[0\.0\] is not one of 2 numbers",
+    "no number": r"its posture \[nan, 0\.0\] is not one of 2 numbers",
     "no robot": "does not hold the robot 'arm/arm.urdf.xacro'",
     "fewer robots": "it has 0 robots, not 3",
     "part": "a wrong part, 'robots'",
