@@ -103,6 +103,8 @@ class LoadedRobot:
     """A posture (nq,): the robot's reference posture where it has one, else neutral."""
     notes: tuple[str, ...] = ()
     """What its file states that is not modeled, one sentence each."""
+    description: Description | None = None
+    """Its file, as it was read; None of a robot of example-robot-data."""
 
 
 def names() -> list[str]:
@@ -198,7 +200,13 @@ def load_file(
         one, without = build_geometry(description, model, kind)
         geometry.append(one)
         missing += without
-    robot = LoadedRobot(name or model.name, model, *geometry, description.q0(model))
+    robot = LoadedRobot(
+        name or model.name,
+        model,
+        *geometry,
+        description.q0(model),
+        description=description,
+    )
     if missing:
         warnings.warn(
             f"{path}: without these visual meshes, which are missing: {', '.join(missing)}; "

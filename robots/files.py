@@ -74,6 +74,8 @@ class Description:
     """Of ball joints of MJCF, which pinocchio reads without damping and dry friction."""
     sites: tuple[Site, ...] = ()
     """Of MJCF."""
+    stated: ET.Element | None = None
+    """An MJCF as it was before it was brought into the plain form, with what it includes."""
 
     def q0(self, model: pin.Model) -> Array:
         """Return the configuration (nq,) that the file draws, of the model of `build_model`."""
@@ -105,16 +107,24 @@ def read(
     for folder in folders.given:
         if not os.path.isdir(folder):
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
-    what = "URDF"
     try:
         if file.suffix.lower() == ".xacro":
             from sphshell_pin.robots.xacro_file import expand
 
             text = expand(file, folders, xacro_args or {})
+        elif xacro_args:
+            raise ValueError("arguments are for files that end in .xacro")
         else:
             text = file.read_bytes()
-            if xacro_args:
-                raise ValueError("arguments are for files that end in .xacro")
+    except (ValueError, OSError) as error:
+        raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
+    return described(text, folders)
+
+
+def described(text: bytes, folders: Folders) -> Description:
+    """Return the description that `text`, of the file of `folders`, is; see `read`."""
+    file, what = folders.file, "URDF"
+    try:
         tag = check_size(text)
         if tag == "sdf":
             raise RobotError(f"{file}: {_reason('.sdf')}")
@@ -125,7 +135,7 @@ def read(
             from sphshell_pin.robots.mjcf import plain as in_plain_form
 
             what = "MJCF"
-            plain = in_plain_form(root, file)
+            plain = in_plain_form(root, folders)
             return Description(
                 file,
                 folders,
@@ -136,6 +146,7 @@ def read(
                 plain.start,
                 plain.extras,
                 tuple(plain.sites),
+                root,
             )
         _check_tree(root)
         return Description(file, folders, root, tuple(_mimics(root)))
@@ -257,7 +268,7 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
                 mesh = assets.get(geom.get("mesh"))
                 if mesh is None or os.path.isfile(mesh.get("file", "")):
                     continue
-                if _is_visual(geom):
+                if _is_visual(geom) or description.folders.kept is not None:
                     missing[mesh.get("file", "")] = None
                     body.remove(geom)
                 else:

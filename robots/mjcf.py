@@ -11,7 +11,6 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +30,7 @@ from sphshell_pin.robots.mjcf_values import (
     text_of,
     unit_of_angles,
 )
+from sphshell_pin.robots.packages import Folders
 
 Array = NDArray[np.float64]
 
@@ -92,9 +92,12 @@ class Plain:
     sites: list[Site] = field(default_factory=list)
 
 
-def plain(root: ET.Element, file: Path) -> Plain:
-    """Return the plain form of an MJCF; ValueError says what in it cannot be read."""
-    return _Reader(root, file).read()
+def plain(root: ET.Element, folders: Folders) -> Plain:
+    """Return the plain form of an MJCF; ValueError says what in it cannot be read.
+
+    What it includes is put into `root`.
+    """
+    return _Reader(root, folders).read()
 
 
 def _check_name(what: str, name: str, known: Collection[str]) -> None:
@@ -110,8 +113,12 @@ def _check_name(what: str, name: str, known: Collection[str]) -> None:
 class _Reader:
     """What one MJCF says, gathered body by body."""
 
-    def __init__(self, root: ET.Element, file: Path) -> None:
-        include(root, file, [file.resolve()])
+    def __init__(self, root: ET.Element, folders: Folders) -> None:
+        file = folders.file
+        if folders.kept is None:
+            include(root, file, [file.resolve()])
+        elif root.find(".//include") is not None:
+            raise ValueError("it includes other files")
         for tag in _UNKNOWN:
             if root.find(f".//{tag}") is not None:
                 raise ValueError(
@@ -126,7 +133,7 @@ class _Reader:
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for one in root.findall("default"):
             self._read_class(one, "main", self.classes["main"])
-        self.meshes = Meshes(root, file, self.compiler, self._with_defaults)
+        self.meshes = Meshes(root, folders, self.compiler, self._with_defaults)
         self.extras: dict[str, Extras] = {}
         self.parents: dict[str, str] = {}
         self.joints_of: dict[str, list[str]] = {"world": []}

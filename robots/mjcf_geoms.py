@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.robots.mjcf_values import numbers, turned_to
+from sphshell_pin.robots.packages import Folders
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ class Meshes:
     def __init__(
         self,
         root: ET.Element,
-        file: Path,
+        folders: Folders,
         compiler: Mapping[str, str],
         resolved: Callable[[ET.Element, str], dict[str, str]],
     ) -> None:
@@ -43,7 +44,7 @@ class Meshes:
             path = Path(Path(stated["file"]).name if strip else stated["file"])
             name = stated.get("name", path.stem)
             scale = numbers(stated.get("scale", "1 1 1"), 3)
-            self.files[name] = ((file.absolute().parent / folder / path), scale)
+            self.files[name] = (folders.beside(str(folder / path)), scale)
             self._kinds[name] = stated.get("inertia", "legacy")
             if "refpos" in stated or "refquat" in stated:
                 self._moved.add(name)

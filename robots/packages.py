@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from os import PathLike
@@ -25,6 +25,8 @@ class Folders:
 
     file: Path
     given: tuple[Path, ...] = ()
+    kept: Mapping[str, Path] | None = None
+    """Of a description that is no file any more: its meshes by name, the only files to read."""
 
     @classmethod
     def of(cls, file: Path, given: Iterable[str | PathLike[str]] = ()) -> Folders:
@@ -52,6 +54,8 @@ class Folders:
 
     def find(self, uri: str) -> Path | None:
         """Return the file that a description calls `uri`, or None: package://, file://, a path."""
+        if self.kept is not None:
+            return self.kept.get(uri)
         scheme, colon, rest = uri.partition("://")
         if colon and scheme in ("package", "model"):
             name, _, inner = rest.partition("/")
@@ -62,6 +66,13 @@ class Folders:
             roots = (self.file.parent, *self.given)
             places = (folder / uri for folder in roots)  # of an absolute path, itself
         return next((place for place in places if os.path.isfile(place)), None)
+
+    def beside(self, name: str) -> Path:
+        """Return the path that an MJCF calls `name`; nothing is there if it may not be read."""
+        place = self.file.absolute().parent / name
+        if self.kept is None:
+            return place
+        return self.kept.get(str(place), Path(os.devnull) / place.name)
 
     def searched(self) -> str:
         """Say where has been searched."""

@@ -1,58 +1,88 @@
-"""Xacro files, expanded to a URDF by the package xacro."""
+"""Xacro files, expanded to a URDF by the package xacro, in a process of its own.
+
+A xacro file is code: its expressions are Python's. They are checked (`xacro_expressions`), and the
+process that evaluates them has limits of time and memory.
+"""
 
 from __future__ import annotations
 
-import threading
+import importlib.util
+import json
+import os
+import signal
+import subprocess
+import sys
 from collections.abc import Mapping
+from multiprocessing import spawn
 from pathlib import Path
-from xml.parsers.expat import ExpatError
 
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.robots.packages import Folders
-from sphshell_pin.robots.xacro_expressions import checked
 
-# xacro keeps its state in its module.
-_ONE_AT_A_TIME = threading.Lock()
+TIME_LIMIT = 5.0
+"""Of the processor, to expand a file [s]; large robots take one or two."""
+
+WAIT = 60.0
+"""How long the process is waited for [s], on a busy machine too."""
+
+MEMORY_LIMIT = 1e9
+"""What a file may take [bytes]."""
+
+_START = """
+import sys
+sys.path[:] = sys.argv[1:]
+from sphshell_pin.robots.xacro_child import serve
+serve()
+"""
 
 
 def expand(file: Path, folders: Folders, arguments: Mapping[str, object]) -> bytes:
     """Return the URDF that the xacro file makes with `arguments`.
 
     `$(find package)` is searched in `folders`. Raises MissingExtra without the package xacro, and
-    ValueError with the reason of a file that cannot be expanded.
+    ValueError with the reason of a file that cannot be expanded, or not within the limits.
     """
+    if importlib.util.find_spec("xacro") is None:
+        raise MissingExtra("xacro", "robots", f"the xacro file {file}")
+    request = {
+        "file": str(file),
+        "folders": [str(one) for one in folders.given],
+        "arguments": {name: _text(value) for name, value in arguments.items()},
+        "time_limit": TIME_LIMIT,
+        "memory_limit": MEMORY_LIMIT,
+    }
+    program = [os.fsdecode(spawn.get_executable() or sys.executable), "-P", "-c", _START]
+    long = f"xacro takes more than {TIME_LIMIT:g} s to expand it: check its expressions and loops"
     try:
-        import xacro
-        from xacro import substitution_args
-    except ImportError:
-        raise MissingExtra("xacro", "robots", f"the xacro file {file}") from None
-
-    def find(name: str) -> str:
-        folder = folders.package(name)
-        if folder is None:
-            raise substitution_args.ArgException(
-                f"there is no package '{name}' in {folders.searched()}: give the folder above it "
-                "with --package-dir, or package_dirs in a scenario or in Python"
-            )
-        return str(folder)
-
-    known: dict[str, object] = substitution_args._eval_dict  # $(eval find('name'))
-    with _ONE_AT_A_TIME:
-        # It asks ament alone, which few machines have.
-        usual = substitution_args._eval_find
-        substitution_args._eval_find = known["find"] = find
-        try:
-            stated = {name: _text(value) for name, value in arguments.items()}
-            with checked(xacro, substitution_args):
-                document = xacro.process_file(str(file), mappings=stated)
-        except (xacro.XacroException, ExpatError, OSError) as error:
-            reason = " ".join(str(error).split())
-            where = Path((xacro.filestack or [file])[-1]).name
-            of = f" (in {where})" if where != file.name else ""
-            raise ValueError(f"xacro cannot expand it{of}: {reason}") from None
-        finally:
-            substitution_args._eval_find = known["find"] = usual
-    return bytes(document.toxml(encoding="utf-8"))
+        done = subprocess.run(
+            [*program, *map(str, sys.path)],
+            input=json.dumps(request).encode(),
+            capture_output=True,
+            timeout=WAIT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise ValueError(long) from None
+    if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        raise ValueError(long)
+    try:
+        answer = json.loads(done.stdout)
+        urdf, fault = answer.get("urdf"), answer.get("fault")
+    except (ValueError, AttributeError):
+        lines = done.stderr.decode(errors="replace").split("\n")
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "no reason given")
+        fault = "memory" if "MemoryError" in last else f"failed ({last})"
+    if fault == "memory":
+        raise ValueError(
+            f"xacro takes more than {MEMORY_LIMIT / 1e9:g} GB of memory to expand it: check its "
+            "expressions and loops"
+        )
+    if fault == "file":
+        raise ValueError(str(answer.get("reason")))
+    if fault is not None or not isinstance(urdf, str):
+        raise ValueError(f"xacro cannot expand it: its process {fault or 'gave no answer'}")
+    sys.stderr.write(done.stderr.decode(errors="replace"))  # xacro's warnings
+    return urdf.encode()
 
 
 def _text(value: object) -> str:

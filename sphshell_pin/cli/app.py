@@ -67,7 +67,7 @@ XacroArgOption = Annotated[
     typer.Option(
         "--xacro-arg",
         metavar="NAME=VALUE",
-        help="Argument of a xacro file; may be given several times.",
+        help="Argument of a xacro file, which is code; may be given several times.",
     ),
 ]
 

@@ -40,7 +40,8 @@ def check_robot_(
     robot: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of shipped robots (sphshell-pin list), or URDF, xacro or MJCF files."
+            help="Names of shipped robots (sphshell-pin list), or URDF, xacro (which is code) or "
+            "MJCF files."
         ),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Check every robot there is.")] = False,

@@ -42,7 +42,9 @@ def export(
     ] = "0",
     of: Annotated[
         str | None,
-        typer.Option("--scenario", help="Scenario that the run is from, where it is not found."),
+        typer.Option(
+            "--scenario", help="Scenario that the run is from, if it holds no robots and surfaces."
+        ),
     ] = None,
 ) -> None:
     """Write a finished run as messages for Foxglove, RViz and Rerun, or as tables.

@@ -27,7 +27,10 @@ def new(
     context: typer.Context,
     robot: Annotated[
         str,
-        typer.Option(help="A shipped robot (sphshell-pin list), or a URDF, xacro or MJCF file."),
+        typer.Option(
+            help="A shipped robot (sphshell-pin list), or a URDF, xacro (which is code) or MJCF "
+            "file."
+        ),
     ],
     surface: Annotated[
         str,

@@ -151,9 +151,10 @@ class Result(Summarized):
         return self.patch_rows
 
     def save(self, path: str | PathLike[str], *, home: str | PathLike[str] | None = None) -> Path:
-        """Write everything but the scene to a compressed .npz file, whole or not at all.
+        """Write a compressed .npz file, whole or not at all.
 
-        The path of a scenario is written relative to the folder `home`, where the results will stay
+        It has the robots and surfaces of a scenario, to show them, but no scene of one's own. The
+        path of a scenario is written relative to the folder `home`, where the results will stay
         (default: that of `path`).
         """
         from sphshell_pin.dynamics.result_file import save_result
@@ -249,7 +250,7 @@ class Result(Summarized):
         drawn in the world.
 
         Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where
-        there is no scene for the map or the scenario cannot be built again.
+        there is no scene for the map or it cannot be built again.
         """
         from sphshell_pin.plot import plot_result
 

@@ -14,6 +14,7 @@ import warnings
 import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, fields
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -25,7 +26,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.patches import PATCH
-from sphshell_pin.dynamics.result_parts import ContactLog, EnergyAudit, Event, Origin
+from sphshell_pin.dynamics.result_parts import ContactLog, EnergyAudit, Event, Kept, Origin
 from sphshell_pin.dynamics.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.scene_contacts import Columns
 from sphshell_pin.dynamics.sensitivities import Sensitivities
@@ -95,9 +96,13 @@ TORQUE_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
 }
 """The same of a run that recorded the controller's torques."""
 
+KEPT = "kept."
+"""Begins the names of the arrays of `Origin.keep`."""
+
 _OPTIONAL = SENSOR_ARRAYS | PATCH_ARRAYS | SENSITIVITY_ARRAYS | TORQUE_ARRAYS
 _IN_FILE = {name: name for name in ARRAYS | _OPTIONAL}
 _IN_FILE["contacts.contact_id"] = "contacts.number"
+_KEPT_KINDS = (FLOAT, INT, BYTE, np.dtype(bool))
 
 
 class _Part(BaseModel):
@@ -110,6 +115,7 @@ class _Origin(_Part):
     scenario: str
     settings: dict[str, object]
     path: str = ""
+    kept: dict[str, object] | None = None
 
     def found_from(self, home: Path) -> str:
         """Return the scenario's name, or its path as seen from a file in the folder `home`."""
@@ -141,6 +147,10 @@ def save_result(result: Result, path: Path, home: str | PathLike[str] | None) ->
     if result.origin is not None:
         home = Path(path.parent if home is None else home)
         origin = _origin_in_file(result.origin, home)
+        if result.origin.keep is not None:
+            kept = result.origin.keep()
+            origin["kept"] = kept.contents
+            arrays |= {KEPT + name: array for name, array in kept.arrays.items()}
     header = {
         "pairs": result.pairs,
         "stats": asdict(result.stats),
@@ -179,7 +189,7 @@ def _origin_in_file(origin: Origin, home: Path) -> dict[str, object]:
 
 def _write(path: Path, header: Mapping[str, object], arrays: Columns) -> None:
     """Write a compressed .npz file, whole or not at all; ResultError where that fails."""
-    named = {_IN_FILE[name]: array for name, array in arrays.items()}
+    named = {_IN_FILE.get(name, name): array for name, array in arrays.items()}
     named["header"] = np.array(json.dumps({"format": 1, **header}))
     try:
         with atomic_file(path) as stream:
@@ -205,7 +215,12 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
         sensitivities = Sensitivities(tuple(header.sensitivities), **rows, result=None)
     origin = None
     if header.origin is not None:
-        origin = Origin(header.origin.found_from(Path(path).parent), header.origin.settings)
+        keep = None
+        if header.origin.kept is not None:
+            inside = {k.removeprefix(KEPT): v for k, v in arrays.items() if k.startswith(KEPT)}
+            keep = partial(Kept, header.origin.kept, inside)
+        scenario = header.origin.found_from(Path(path).parent)
+        origin = Origin(scenario, header.origin.settings, keep)
     return kind(
         t=arrays["t"],
         q=arrays["q"],
@@ -269,6 +284,13 @@ def _read(
         elif kind != arrays_in[name][0]:
             raise _refused(path, f"'{name}' holds {kind}, not {arrays_in[name][0]}")
     _check_shapes(path, shapes, arrays_in)
+    for part, file in files.items():
+        name = part.removesuffix(".npy")
+        if part.startswith(KEPT) and name != part:
+            kind, _ = _announced(path, archive, file, name)
+            if kind not in _KEPT_KINDS:
+                raise _refused(path, f"'{name}' holds {kind}")
+            parts[name] = part
     size = sum(files[part].file_size for part in parts.values())
     if size > max_size:
         raise ResultError(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,14 +125,24 @@ class EnergyAudit(Summarized):
 
 
 @dataclass(frozen=True)
+class Kept:
+    """What is kept of a scene, so that it can be shown without its files: JSON, and arrays."""
+
+    contents: dict[str, object]
+    arrays: Mapping[str, NDArray[np.generic]]
+
+
+@dataclass(frozen=True)
 class Origin:
     """The scenario that ran: `scenario`, a shipped name or a path, with all its `settings`.
 
-    The settings, as JSON knows them, are those of the run, changed ones included.
+    The settings, as JSON knows them, are those of the run, changed ones included. `keep` gives the
+    robots and surfaces as they were used; None where an earlier version saved the result.
     """
 
     scenario: str
     settings: dict[str, object]
+    keep: Callable[[], Kept] | None = field(default=None, repr=False, compare=False)
 
 
 def _last(values: Array) -> float:

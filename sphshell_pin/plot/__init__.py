@@ -80,7 +80,7 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
 def scene_of(result: Result, scene: Scene | None = None) -> Scene | None:
     """Return `scene`, or the one that ran, or that of the scenario that `result` came from.
 
-    None if there is none of them; ResultError if the scenario cannot be built again.
+    None if there is none of them; ResultError if its scene cannot be built again.
     """
     scene = result.scene if scene is None else scene
     if scene is not None or result.origin is None:

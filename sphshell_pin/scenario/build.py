@@ -27,6 +27,7 @@ from sphshell_pin.errors import (
     UnitWarning,
 )
 from sphshell_pin.parameters import Ingredient, parameters_of
+from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.scenario import schema
 from sphshell_pin.scenario.bodies import (
     Assembly,
@@ -140,14 +141,17 @@ def build_scenario(
     reuse: Built | None = None,
     *,
     function: Callable[[str, Path, str], Function] = load_function,
+    robots: Mapping[tuple[object, ...], LoadedRobot] | None = None,
+    surfaces: Mapping[str, sp.Shell] | None = None,
 ) -> Built:
     """Build a scenario that is already read; `path` is its file, which others stand beside.
 
     Robots, shells and functions of `reuse` are taken over where their tables are the same.
     `function(where, path, key)` gives what "file.py:function" names: `load_function` runs the file,
-    `functions.unloaded` does not.
+    `functions.unloaded` does not. `robots` at hand, by the `origin` of their table, and `surfaces`,
+    by name, are not read from files.
     """
-    assembly = _assemble(scenario, path, reuse)
+    assembly = _assemble(scenario, path, reuse, robots)
     functions = {} if reuse is None else dict(reuse.functions)
 
     def load(where: str, key: str) -> Function:
@@ -161,7 +165,8 @@ def build_scenario(
         scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock, joints=joints)
     shells = {
         section.name: (
-            _kept_shell(section, reuse)
+            (surfaces or {}).get(section.name)
+            or _kept_shell(section, reuse)
             or _build_shell(section, path, item_key("shell", scenario.shell, i)),
             section,
         )
@@ -213,9 +218,14 @@ def build_scenario(
     )
 
 
-def _assemble(scenario: schema.Scenario, path: Path, reuse: Built | None) -> Assembly:
+def _assemble(
+    scenario: schema.Scenario,
+    path: Path,
+    reuse: Built | None,
+    robots: Mapping[tuple[object, ...], LoadedRobot] | None,
+) -> Assembly:
     if reuse is None:
-        return assemble(scenario, path)
+        return assemble(scenario, path, robots)
     if reuse.scenario.robot != scenario.robot:
         loaded = zip(map(origin, reuse.scenario.robot), reuse.assembly.loaded, strict=True)
         return assemble(scenario, path, dict(loaded))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from os import PathLike
@@ -19,6 +18,7 @@ from sphshell_pin.dynamics.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
 from sphshell_pin.scenario.build import Built, build_scenario
 from sphshell_pin.scenario.functions import load_function, unloaded
+from sphshell_pin.scenario.kept import restore
 from sphshell_pin.scenario.knobs import Knob
 from sphshell_pin.scenario.player import Rows
 from sphshell_pin.scenario.reading import find_scenario, read_scenario, shipped_scenarios
@@ -43,12 +43,14 @@ class Replay:
     """Plays the rows of a Result: a player whose motion is known already.
 
     `result` is a Result or the path of one that was saved. The scene and its visual model are
-    built from the scenario it came from, with the settings of the run; `scenario`, a shipped name
-    or a path, takes its place. A Result of one's own scene is played in that scene.
+    built from the settings of the run, and the robots and surfaces that the result holds; no other
+    file is read, but those of this package and of example-robot-data. `scenario`, a shipped name or
+    a path, takes their place. A Result of one's own scene is played in that scene.
 
-    No Python code that a scenario names is executed, as the recorded contacts need none: a file of
-    results may be somebody else's. A pair of `scene` whose contacts a routine finds then raises an
-    error where it is evaluated. With `trust_code` the routine is loaded.
+    No code that a scenario names, a xacro file or a Python routine, is executed, as the recorded
+    contacts need none: a file of results may be somebody else's. A pair of `scene` whose contacts a
+    routine finds then raises an error where it is evaluated. With `trust_code` the routine is
+    loaded, and `scenario` may have a xacro file.
 
     Raises
     ------
@@ -223,7 +225,10 @@ class Replay:
         function = load_function if trust_code else unloaded
         if scenario is not None:
             path = find_scenario(scenario)
-            return build_scenario(_shown(read_scenario(path)), path, function=function)
+            shown = _shown(read_scenario(path))
+            if not trust_code:
+                _check_without_code(shown, path)
+            return build_scenario(shown, path, function=function)
         origin = self.result.origin
         return None if origin is None else _build_again(origin, self._name, function)
 
@@ -262,23 +267,39 @@ def _shown(scenario: Scenario) -> Scenario:
     return Scenario.model_validate({k: v for k, v in given.items() if k not in UNSHOWN})
 
 
+def _check_without_code(scenario: Scenario, path: Path) -> None:
+    """Refuse a xacro file, whose expressions are Python's."""
+    for one in scenario.robot:
+        if Path(one.path or "").suffix.lower() == ".xacro":
+            raise SphshellError(
+                f"{path}: the robot '{one.path}' is not read, as a xacro file is code, and no code "
+                "is executed to show a finished run: run the scenario again, or, if you trust it, "
+                "use Replay(result, scenario, trust_code=True)"
+            )
+
+
 def _build_again(
     origin: Origin, name: str, function: Callable[[str, Path, str], Callable[..., object]]
 ) -> Built:
-    """Build the scenario of `origin` with its settings; `name` is the result's."""
+    """Build the scene of `origin` from what is kept with it; `name` is the result's."""
+    if origin.keep is None:
+        why = "an earlier version saved it without its robots and surfaces: run it again, or "
+        raise ResultError(name, f"{why}{HOW}")
     path = Path(origin.scenario)
     if path.suffix != ".toml":
-        shipped = shipped_scenarios()
-        if origin.scenario not in shipped:
-            raise ResultError(name, f"its scenario '{origin.scenario}' is not shipped: {HOW}")
-        path = shipped[origin.scenario]
+        path = shipped_scenarios().get(origin.scenario, path)
     settings = {k: v for k, v in origin.settings.items() if k not in UNSHOWN}
     try:
-        return build_scenario(Scenario.model_validate(settings), path, function=function)
+        restored = restore(Scenario.model_validate(settings), origin.keep())
+        return build_scenario(
+            restored.scenario,
+            path,
+            function=function,
+            robots=restored.robots,
+            surfaces=restored.surfaces,
+        )
     except SphshellError as fault:
-        gone = "" if os.path.exists(path) else f"{path} is no longer there, and "
-        why = f"{gone}its scenario cannot be built again ({fault}): {HOW}"
-        raise ResultError(name, why) from fault
+        raise ResultError(name, f"its scene cannot be built again ({fault}): {HOW}") from fault
     except ValueError as fault:
         why = f"its settings are none that this version knows: {HOW}"
         raise ResultError(name, why) from fault

@@ -8,6 +8,7 @@ import json
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -30,6 +31,7 @@ from sphshell_pin.scenario.audit import CadAudit, check_audit
 from sphshell_pin.scenario.audit import audit_cad as compare_with_cad
 from sphshell_pin.scenario.build import Built, build
 from sphshell_pin.scenario.figures import Verdict, check_expectations, judge, measure_energy
+from sphshell_pin.scenario.kept import keep
 from sphshell_pin.scenario.reading import shipped_scenarios
 from sphshell_pin.tables import csv_text
 
@@ -204,7 +206,13 @@ def origin_of(built: Built) -> Origin:
     shipped = shipped_scenarios().get(built.name)
     scenario = built.name if shipped == built.path else str(built.path.absolute())
     settings = built.scenario.model_dump(mode="json")
-    return Origin(scenario, {key: _plain(value) for key, value in settings.items()})
+    plain = {key: _plain(value) for key, value in settings.items()}
+    folder = built.path.absolute().parent
+    return Origin(
+        scenario,
+        plain,
+        partial(keep, built.scenario, folder, built.assembly.loaded, dict(built.shells)),
+    )
 
 
 @contextlib.contextmanager

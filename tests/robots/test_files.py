@@ -1,5 +1,6 @@
 """Robots' files: xacro, package paths, poses, mimic joints, and what is refused."""
 
+import contextlib
 import shutil
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from sphshell_pin import robots
 from sphshell_pin.dynamics.mimic import mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning
+from sphshell_pin.robots import xacro_file
 
 FOLDER = Path(__file__).parents[1] / "data" / "xacro"
 INERTIAL = (
@@ -84,6 +86,41 @@ def test_xacro_expressions_compute_and_do_nothing_else(how, tmp_path):
     with pytest.raises(robots.RobotError, match=why):
         robots.load_file(path)
     assert not made.exists()
+
+
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [
+        ("9**9**9", "takes more than 1 s to expand"),
+        ("len('a'*(3*10**9))", "takes more than 1 GB of memory"),
+    ],
+)
+def test_what_a_xacro_file_takes_is_limited(tmp_path, monkeypatch, expression, words):
+    monkeypatch.setattr(xacro_file, "TIME_LIMIT", 1.0)
+    path = tmp_path / "r.xacro"
+    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    path.write_text(f'{head}<link name="${{{expression}}}"/></robot>')
+    with pytest.raises(robots.RobotError, match=words):
+        robots.load_file(path)
+
+
+def test_what_the_check_of_expressions_misses_is_in_a_process_that_writes_nothing(
+    tmp_path, monkeypatch
+):
+    """Without the check, an expression reaches open()."""
+    path, made = tmp_path / "r.xacro", tmp_path / "made"
+    call = OS.replace("'", '"') + '.__init__.__globals__["__builtins__"]["open"]'
+    path.write_text(
+        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+        f'<link name=\'${{(lambda: {call}("{made}", "w").write("executed"))()}}\'/></robot>'
+    )
+    without = "from sphshell_pin.robots import xacro_expressions as x; x.check = lambda _: None"
+    first, serve = xacro_file._START.strip().rsplit("\n", 1)
+    monkeypatch.setattr(xacro_file, "_START", f"{first}\n{without}\n{serve}")
+    with contextlib.suppress(robots.RobotError):
+        robots.load_file(path)
+    assert made.exists()  # it was opened
+    assert not made.read_bytes()
 
 
 def test_xacro_expressions_compute(tmp_path):

@@ -12,9 +12,9 @@ import traceback
 import warnings
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from pathlib import Path
 
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.limits import limit_memory
 from sphshell_pin.shell.cad.messages import ALIVE, pack
 from sphshell_pin.shell.cad.options import require_kernel
 
@@ -84,7 +84,7 @@ def _answer(answers: Connection, message: bytes) -> bytes:
 
             if folder:
                 os.chdir(folder)
-            _limit_memory(memory_limit)
+            limit_memory(memory_limit)
             kind, content = "done", JOBS[job](alive, *arguments)
         except SphshellError as error:
             kind, content = "error", error.with_traceback(None)
@@ -95,26 +95,8 @@ def _answer(answers: Connection, message: bytes) -> bytes:
             else:
                 reason = " ".join(str(error).split()) or type(error).__name__
                 content = reason, traceback.format_exc()
-    _limit_memory(None)
+    limit_memory(None)
     return pack((kind, content, [one.message for one in caught]))
-
-
-def _limit_memory(limit: float | None) -> None:
-    """Let the address space grow by `limit` more [bytes]; None lifts the limit.
-
-    macOS takes the limit but does not enforce it.
-    """
-    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-    soft = hard
-    if limit is not None:
-        try:
-            pages = int(Path("/proc/self/statm").read_text().split()[0])
-        except OSError:
-            pages = 0
-        soft = pages * resource.getpagesize() + int(limit)
-        soft = soft if hard == resource.RLIM_INFINITY else min(soft, hard)
-    with suppress(OSError, ValueError, OverflowError):
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 def _of_memory(error: BaseException | None) -> bool:

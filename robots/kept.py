@@ -1,0 +1,105 @@
+"""Robots that are kept with the results of a run: shown later from what is kept, and no other file.
+
+Kept are the description as it was read (a xacro file expanded, an MJCF with what it includes) and
+the meshes that show the robot. Whoever gives the results away may have changed both.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin.errors import RobotWarning
+from sphshell_pin.robots import LoadedRobot, exactly
+from sphshell_pin.robots.description import check_size
+from sphshell_pin.robots.files import (
+    Description,
+    RobotError,
+    build_geometry,
+    build_model,
+    described,
+    keep_spheres,
+)
+from sphshell_pin.robots.packages import Folders
+
+ALONE = (".stl", ".dae", ".obj", ".ply")
+"""Formats of meshes that can be shown without other files."""
+
+_MATERIALS = re.compile(rb"^[ \t]*mtllib\b.*$", re.MULTILINE)
+_IMAGES = re.compile(rb"<library_images\b.*?</library_images\s*>|<library_images\s*/>", re.DOTALL)
+
+
+def text_of(description: Description) -> str:
+    """Return the URDF or MJCF of a description."""
+    root = description.root if description.stated is None else description.stated
+    return ET.tostring(root, encoding="unicode")
+
+
+def meshes_of(description: Description) -> dict[str, Path | None]:
+    """Return the files of the meshes that show the robot by name, None for one that is missing."""
+    if description.is_mjcf:
+        paths = [Path(one.get("file", "")) for one in description.root.iter("mesh")]
+        return {str(path): path if path.is_file() else None for path in paths}
+    names = [one.get("filename", "") for one in description.root.iterfind("link/visual//mesh")]
+    return {name: description.folders.find(name) for name in names}
+
+
+def without_references(name: str, content: bytes) -> bytes | None:
+    """Return a mesh file without the names of textures and materials; None if that fails.
+
+    Those who draw a mesh read what it names, which may be any file.
+    """
+    if name.endswith(".obj"):
+        return _MATERIALS.sub(b"", content)
+    if not name.endswith(".dae"):
+        return content
+    content = _IMAGES.sub(b"", content)
+    try:
+        check_size(content)
+        root = ET.fromstring(content)
+    except (ValueError, ET.ParseError):
+        return None
+    named = [one for one in root.iter() if str(one.tag).endswith("library_images") and len(one)]
+    return None if named else content
+
+
+def load_kept(
+    text: str,
+    file: str,
+    meshes: Mapping[str, Path],
+    q0: Sequence[float],
+    *,
+    free_flyer: bool,
+    mimic: bool,
+    name: str,
+) -> LoadedRobot:
+    """Return the robot that `text_of` gave, `file` was its name.
+
+    No file is read but `meshes`, by their names. Warns with RobotWarning of those that are missing.
+    Raises RobotError as `robots.load_file` does.
+    """
+    description = described(text.encode(), Folders(Path(file), kept=meshes))
+    model = build_model(description, free_flyer=free_flyer)
+    visual, missing = build_geometry(description, model, pin.GeometryType.VISUAL)
+    keep_spheres(description)
+    spheres, _ = build_geometry(description, model, pin.GeometryType.COLLISION)
+    robot = LoadedRobot(name, model, spheres, visual, description.q0(model))
+    robot = exactly(robot, description, mimic=mimic, warn=False)
+    q = np.array(q0)
+    if q.shape != (robot.model.nq,) or not np.isfinite(q).all():
+        raise RobotError(f"{file}: its posture {q0} is not one of {robot.model.nq} numbers")
+    if missing:
+        warnings.warn(
+            f"{file}: without these visual meshes, which the results do not hold: "
+            f"{', '.join(missing)}",
+            RobotWarning,
+            stacklevel=2,
+        )
+    return replace(robot, q0=pin.normalize(robot.model, q))

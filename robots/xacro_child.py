@@ -1,0 +1,73 @@
+"""The process in which a xacro file is expanded: with limits, and without files to write.
+
+The answer is JSON: a xacro file is code, so nothing that comes from its process is unpickled.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import resource
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from xml.parsers.expat import ExpatError
+
+from sphshell_pin.limits import limit_memory
+from sphshell_pin.robots.packages import Folders
+from sphshell_pin.robots.xacro_expressions import checked
+
+
+def serve() -> None:
+    """Expand the file that standard input names, and write the answer to standard output."""
+    request = json.load(sys.stdin)
+    answers, sys.stdout = sys.stdout, sys.stderr  # xacro may print
+    sys.dont_write_bytecode = True
+    time = int(request["time_limit"])
+    for kind, most in (
+        (resource.RLIMIT_CPU, time),
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_FSIZE, 0),
+        (resource.RLIMIT_NPROC, 0),
+    ):
+        with contextlib.suppress(OSError, ValueError):  # a lower limit is set already
+            resource.setrlimit(kind, (most, most))
+    limit_memory(request["memory_limit"])
+    file = Path(request["file"])
+    try:
+        folders = Folders.of(file, request["folders"])
+        answer = {"urdf": _expanded(file, folders, request["arguments"])}
+    except MemoryError:
+        answer = {"fault": "memory"}
+    except ValueError as error:
+        answer = {"fault": "file", "reason": str(error)}
+    json.dump(answer, answers)
+
+
+def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str:
+    """Return the URDF; ValueError with the reason of a file that cannot be expanded."""
+    import xacro
+    from xacro import substitution_args
+
+    def find(name: str) -> str:
+        folder = folders.package(name)
+        if folder is None:
+            raise substitution_args.ArgException(
+                f"there is no package '{name}' in {folders.searched()}: give the folder above it "
+                "with --package-dir, or package_dirs in a scenario or in Python"
+            )
+        return str(folder)
+
+    # xacro asks ament alone, which few machines have. $(eval find('name')) looks in the dictionary.
+    substitution_args._eval_find = substitution_args._eval_dict["find"] = find
+    try:
+        with checked(xacro, substitution_args):
+            document = xacro.process_file(str(file), mappings=dict(arguments))
+    except (xacro.XacroException, ExpatError, OSError) as error:
+        if isinstance(error.__cause__ or error.__context__, MemoryError):
+            raise MemoryError from None
+        reason = " ".join(str(error).split())
+        where = Path((xacro.filestack or [file])[-1]).name
+        of = f" (in {where})" if where != file.name else ""
+        raise ValueError(f"xacro cannot expand it{of}: {reason}") from None
+    return str(document.toxml())

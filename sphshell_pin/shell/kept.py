@@ -1,0 +1,127 @@
+"""Shells as arrays, to be kept in a file, and shells of such arrays, which may be anybody's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.errors import InvalidShell
+from sphshell_pin.shell.raw import KINDS
+from sphshell_pin.shell.shell import Shell
+
+Array: TypeAlias = NDArray[Any]
+Arrays = Mapping[str, Array]
+
+# Numbers and shape of each, with n vertices, m elements, t triangles and f faces.
+_ARRAYS: dict[str, tuple[str, tuple[str | int, ...]]] = {
+    "vertices": ("f8", ("n", 3)),
+    "elements": ("i4", ("m", 4)),
+    "triangles": ("i4", ("t", 3)),
+    "normals": ("f8", ("t", 3, 3)),
+    "element_face": ("i4", ("m",)),
+    "face_shapes": ("f8", ("f", 9)),
+    "straight": ("b1", ("t", 3)),
+}
+_ALWAYS = ("vertices", "elements", "triangles")
+
+
+def arrays_of(shell: Shell) -> dict[str, Array]:
+    """Return the arrays that a shell is made of, which `shell_of` takes."""
+    found = {name: getattr(shell, name) for name in _ARRAYS}
+    return {name: array for name, array in found.items() if array is not None}
+
+
+def shell_of(
+    arrays: Arrays,
+    *,
+    name: str,
+    side: str,
+    crease_angle: float,
+    rounding: float,
+    finds_faces: bool,
+    face_names: tuple[str, ...],
+) -> Shell:
+    """Return the shell that `arrays_of` took apart: the same bits, with all queries.
+
+    Raises
+    ------
+    InvalidShell
+        The arrays are of no shell: the compiled surface relies on their indices.
+    InvalidParameter
+        An option is out of range.
+    """
+    given = {key: arrays[key] for key in _ARRAYS if key in arrays}
+    _check_shapes(given)
+    # It checks indices, areas and the options.
+    base = Shell(given["vertices"], given["elements"], None, crease_angle, side, clean=False)
+    surface = base.surface()
+    owners = surface.elements[surface.triangle_element]
+    triangles = given["triangles"]
+    faces = len(given["face_shapes"]) if "face_shapes" in given else len(face_names)
+    kinds, of_face = given.get("face_shapes"), given.get("element_face")
+    for fits, what in (
+        (np.array_equal(surface.elements, given["elements"]), "elements"),
+        (triangles.shape == surface.triangles.shape, "triangles"),
+        (_are_corners(triangles, owners), "triangles"),
+        (_are_units(given.get("normals")), "normals"),
+        (of_face is None or _within(of_face, faces), "element_face"),
+        (of_face is not None or kinds is None, "element_face"),
+        (len(face_names) in (0, faces), "face_names"),
+        (kinds is None or _are_faces(kinds), "face_shapes"),
+        (0.0 <= rounding < np.inf, "rounding"),
+    ):
+        if not fits:
+            raise InvalidShell(f"the shell '{name}' cannot be made again: its {what} do not fit")
+    surface = replace(
+        surface,
+        **{key: array for key, array in given.items() if key not in ("vertices", "elements")},
+        # Names count the rows of face_shapes, which count only with normals.
+        face_names=face_names if kinds is not None and "normals" in given else (),
+        rounding=rounding,
+        health=surface.health.labelled(cleaned=True),
+    )
+    return Shell.from_surface(surface, crease_angle, side, name, finds_faces=finds_faces)
+
+
+def _check_shapes(given: Arrays) -> None:
+    sizes: dict[str | int, int] = {3: 3, 4: 4, 9: 9}
+    for name, (kind, wanted) in _ARRAYS.items():
+        if name not in given:
+            if name in _ALWAYS:
+                raise InvalidShell(f"it has no {name}")
+            continue
+        array = given[name]
+        fits = array.dtype == np.dtype(kind) and array.ndim == len(wanted)
+        if not fits or any(
+            sizes.setdefault(letter, size) != size
+            for letter, size in zip(wanted, array.shape, strict=True)
+        ):
+            raise InvalidShell(f"its {name} are {array.dtype} {array.shape}, not {kind} {wanted}")
+
+
+def _are_corners(triangles: Array, owners: Array) -> bool:
+    """Whether each triangle has three different corners of its element."""
+    if len(triangles) != len(owners):
+        return False
+    of_element = (triangles[:, :, None] == owners[:, None, :]).any(axis=2).all()
+    a, b, c = triangles.T
+    return bool(of_element and ((a != b) & (b != c) & (c != a) & (triangles >= 0).all(1)).all())
+
+
+def _are_units(normals: Array | None) -> bool:
+    if normals is None:
+        return True
+    return bool((np.abs(np.linalg.norm(normals.astype(float), axis=2) - 1.0) < 1e-6).all())
+
+
+def _within(indices: Array, count: int) -> bool:
+    return bool(((indices >= -1) & (indices < count)).all())
+
+
+def _are_faces(shapes: Array) -> bool:
+    numbers = shapes.astype(float)
+    return bool(np.isfinite(numbers).all() and np.isin(numbers[:, 0], range(-1, len(KINDS))).all())

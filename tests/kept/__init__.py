@@ -1,0 +1,1 @@
+"""Results that are shown from what is kept with them."""

@@ -1,0 +1,178 @@
+"""Looks at the results in the current folder, and writes what it did beyond reading them.
+
+Run as a program: `looking.py REPOSITORY OUTPUT SCENARIO`. A hook of the interpreter
+(sys.addaudithook) hears of every file that is opened, every program that is started and all code
+that is executed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import io
+import json
+import os
+import signal
+import site
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from types import CodeType, FrameType
+
+STARTS = {"subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork"}
+STARTS |= {"pty.spawn", "os.forkpty", "socket.connect", "webbrowser.open"}
+
+
+class Watch:
+    """What happens, by the name of the look that is going on."""
+
+    def __init__(self, allowed: list[Path]) -> None:
+        self.found: dict[str, list[str]] = {}
+        self.look = ""
+        self.browser = False
+        """Whether the programs of Playwright may be started."""
+        self._allowed = [os.path.realpath(one) + os.sep for one in allowed]
+
+    def __call__(self, event: str, arguments: tuple[object, ...]) -> None:
+        """Hear of an event."""
+        if not self.look:
+            return
+        if event == "open" and isinstance(arguments[0], str | bytes):
+            path = os.fsdecode(arguments[0])
+            if not self._is_allowed(path):
+                self._tell(event, path)
+        elif event == "exec" and isinstance(arguments[0], CodeType):
+            self._check_code(event, arguments[0].co_filename)
+        elif event == "compile":
+            self._check_code(event, str(arguments[1]))
+        elif event in STARTS:
+            program = str(arguments[0])
+            if not (self.browser and self._is_allowed(program)):
+                self._tell(event, program)
+
+    def _check_code(self, event: str, file: str) -> None:
+        if not file.startswith("<"):
+            if not self._is_allowed(file):
+                self._tell(event, file)
+            return
+        # Made of text: by whom? The libraries make classes in this way, xacro evaluates.
+        frame: FrameType | None = sys._getframe(2)
+        while frame is not None:
+            maker = frame.f_code.co_filename
+            if not maker.startswith("<") and not self._is_allowed(maker):
+                self._tell(event, f"text, by {maker}")
+            if f"{os.sep}xacro{os.sep}" in maker:
+                self._tell(event, f"an expression, by {maker}")
+            frame = frame.f_back
+
+    def _is_allowed(self, path: str) -> bool:
+        # realpath() opens nothing.
+        return (os.path.realpath(path) + os.sep).startswith(tuple(self._allowed))
+
+    def _tell(self, event: str, what: str) -> None:
+        self.found[self.look].append(f"{event}: {what}")
+
+
+def looks(scenario: str) -> dict[str, Callable[[], object]]:
+    """Return every way to look at the results in `run`, and the ways that must be noticed."""
+    from sphshell_pin import Result
+    from sphshell_pin.cli import main
+    from sphshell_pin.patches import TaxelGrid
+    from sphshell_pin.patches.wear import wear_maps
+    from sphshell_pin.scenario.replay import Replay
+
+    def command(*words: str) -> Callable[[], None]:
+        def run() -> None:
+            sys.argv = ["sphshell-pin", *words]
+            try:
+                main()
+            except SystemExit as end:
+                if end.code:
+                    raise RuntimeError(f"exit code {end.code}") from None
+
+        return run
+
+    def live() -> None:
+        """End the page after a second, as Ctrl-C does."""
+        signal.signal(signal.SIGALRM, signal.default_int_handler)
+        signal.setitimer(signal.ITIMER_REAL, 2.0)
+        command("view", "run", "--no-open")()
+
+    def load() -> Result:
+        return Result.load("run/run.npz")
+
+    def wear() -> None:
+        replay = Replay("run/run.npz")
+        wear_maps(replay.result, 1e-9, replay.scene)
+
+    def taxels() -> None:
+        replay = Replay("run/run.npz")
+        TaxelGrid("ball-plate", (8, 8)).images(replay.result, replay.scene)
+
+    found: dict[str, Callable[[], object]] = {
+        f"export {to}": command("export", "run", "--to", to, "--out", f"out.{to}")
+        for to in ("mcap", "csv", "parquet")
+    }
+    found |= {f"plot {kind}": lambda kind=kind: load().plot(kind) for kind in KINDS}
+    return found | {
+        "compare": command("compare", "run", "run", "--out", "compared"),
+        "taxels": command("taxels", "run", "--contact", "ball-plate"),
+        "render": command("render", "run", "--out", "picture.png"),
+        "view": live,
+        "Replay": lambda: Replay("run/run.npz").advance(1.0),
+        "Result.view": lambda: load().view().save("page.html"),
+        "Result.to_mcap": lambda: load().to_mcap("again.mcap"),
+        "Result.save": lambda: load().save("again.npz"),
+        "wear": wear,
+        "TaxelGrid": taxels,
+        "trusted": lambda: Replay("run/run.npz", trust_code=True),
+        "another scenario": lambda: Replay("run/run.npz", scenario, trust_code=True),
+    }
+
+
+KINDS = ("overview", "force", "energy", "sensors", "path", "map")
+
+
+def look(repository: Path, out: Path, scenario: str) -> None:
+    """Look at the results in every way."""
+    import matplotlib.font_manager  # noqa: F401  # asks the system for its fonts, once
+
+    package = importlib.util.find_spec("sphshell_pin")
+    assert package is not None
+    assert package.origin is not None
+    places = [
+        Path.cwd(),
+        Path("run"),
+        Path(sys.prefix),
+        Path(sys.base_prefix),
+        Path(tempfile.gettempdir()),
+    ]
+    places += [
+        Path(package.origin).parent,
+        Path(__file__).parent,
+        *map(Path, site.getsitepackages()),
+    ]
+    places += [repository / one for one in ("robots", "scenarios", "build")]
+    places += [Path(one) for one in ("/dev", "/proc", "/sys", "/usr", "/lib", "/etc/mime.types")]
+    watch = Watch(places)
+    ways = looks(scenario)
+    sys.addaudithook(watch)
+    said: dict[str, str] = {}
+    for name, way in ways.items():
+        watch.found[name] = []
+        watch.browser = name == "render"
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+            try:
+                watch.look = name
+                way()
+            except Exception as error:
+                said[name] = f"{type(error).__name__}: {error} {printed.getvalue()}"
+            finally:
+                watch.look = ""
+    out.write_text(json.dumps({"found": watch.found, "failed": said}))
+
+
+if __name__ == "__main__":
+    look(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])

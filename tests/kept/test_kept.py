@@ -1,0 +1,225 @@
+"""What results hold of their scene is what ran; whoever changes it gets an error, and no file."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import hashlib
+import os
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.dynamics.result_parts import Kept, Origin
+from sphshell_pin.errors import ResultError, RobotWarning, SphshellError
+from sphshell_pin.robots.kept import without_references
+from sphshell_pin.scenario import Built, build, kept
+from sphshell_pin.scenario.replay import Replay
+from sphshell_pin.scenario.run import origin_of, simulate
+from tests.kept.scenes import DATA, write
+
+CUBE = DATA / "xacro" / "finger_description" / "meshes" / "cube.stl"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    return build(write(tmp_path_factory.mktemp("home")))
+
+
+@pytest.fixture(scope="module")
+def result(built: Built) -> sp.Result:
+    found, stopped = simulate(built)
+    assert stopped is None
+    return found
+
+
+def kept_of(result: sp.Result) -> Kept:
+    assert result.origin is not None
+    assert result.origin.keep is not None
+    return copy.deepcopy(result.origin.keep())
+
+
+def with_kept(result: sp.Result, changed: Kept) -> sp.Result:
+    assert result.origin is not None
+    origin = dataclasses.replace(result.origin, keep=lambda: changed)
+    return dataclasses.replace(result, origin=origin)
+
+
+def test_the_scene_is_the_one_that_ran(built: Built, result: sp.Result, tmp_path: Path) -> None:
+    result.save(tmp_path / "first.npz")
+    sp.Result.load(tmp_path / "first.npz").save(tmp_path / "run.npz")
+    replay = Replay(tmp_path / "run.npz")
+    ran, shown = built.scene, replay.scene
+    assert list(shown.model.names) == list(ran.model.names)
+    # Locked joints are at the pose of the SRDF, whose file is not kept.
+    for one, other in zip(ran.model.jointPlacements, shown.model.jointPlacements, strict=True):
+        np.testing.assert_array_equal(one.homogeneous, other.homogeneous)
+    for one, other in zip(ran.model.inertias, shown.model.inertias, strict=True):
+        np.testing.assert_array_equal(one.toDynamicParameters(), other.toDynamicParameters())
+    assert replay.visual_model is not None
+    drawn = replay.visual_model.geometryObjects
+    for one, other in zip(built.visual_model.geometryObjects, drawn, strict=True):
+        assert (one.name, one.parentJoint) == (other.name, other.parentJoint)
+        np.testing.assert_array_equal(one.placement.homogeneous, other.placement.homogeneous)
+        np.testing.assert_array_equal(one.meshScale, other.meshScale)
+        if os.path.isfile(one.meshPath):  # of a primitive, it is the name of its kind
+            assert Path(other.meshPath).read_bytes() == Path(one.meshPath).read_bytes()
+            assert one.meshPath != other.meshPath
+    assert [pair.name for pair in shown.pairs] == [pair.name for pair in ran.pairs]
+    with pytest.raises(SphshellError, match="trust_code"):
+        shown.contacts(result.q[0])  # it needs the routine
+    for one, other in zip(ran.pairs, shown.pairs, strict=True):
+        assert (one.law, one.friction, one.sphere) == (other.law, other.friction, other.sphere)
+
+
+@pytest.mark.parametrize("method", ["facets", "smooth", "elements"])
+@pytest.mark.parametrize("name", ["plate", "valve"])
+def test_surfaces_are_the_same_bits(
+    built: Built, result: sp.Result, name: str, method: str
+) -> None:
+    before, after = built.shells[name], None
+    for pair in Replay(result).scene.pairs:
+        if pair.shell is not None and pair.shell.name == name:
+            after = pair.shell
+    assert after is not None
+    assert (after.side, after.crease_angle, after.size) == (
+        before.side,
+        before.crease_angle,
+        before.size,
+    )
+    centers = np.random.default_rng(0).uniform(*before.box, (200, 3))
+    for center in centers:
+        one, other = (shell.contacts(center, 0.02, method=method) for shell in (before, after))
+        assert pickle.dumps(one) == pickle.dumps(other)
+    assert len(before.faces) == len(after.faces)
+
+
+def test_meshes_beyond_the_limit_are_named(
+    result: sp.Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept, "MOST_FILES", 100)
+    few = kept_of(result)
+    assert not [name for name in few.arrays if name.startswith("file.") and len(name) > 100]
+    (digest,) = few.contents["robots"][0]["meshes"].values()
+    assert digest == hashlib.sha256(CUBE.read_bytes()).hexdigest()
+    assert f"file.{digest}" not in few.arrays
+    monkeypatch.undo()
+    whole = kept_of(result)
+    assert f"file.{digest}" in whole.arrays
+    urdf = whole.contents["robots"][0]
+    urdf["meshes"] = dict.fromkeys(urdf["meshes"], "0" * 64)  # of one that is not kept
+    with pytest.warns(RobotWarning, match=r"which the results do not hold: package://finger.*cube"):
+        Replay(with_kept(result, whole))
+
+
+def changed(result: sp.Result, what: str) -> Kept:
+    """Return what is kept, with one thing in it as it must not be."""
+    found = kept_of(result)
+    contents, arrays = found.contents, dict(found.arrays)
+    urdf, _, mjcf = contents["robots"]
+    if what == "include":
+        mjcf["text"] = mjcf["text"].replace("<asset>", '<include file="/etc/passwd"/><asset>')
+    elif what == "posture":
+        urdf["q0"] = [0.0]
+    elif what == "no number":
+        urdf["q0"] = [float("nan"), 0.0]
+    elif what == "no robot":
+        contents["robots"] = [None] * 3
+    elif what == "fewer robots":
+        contents["robots"] = []
+    elif what == "part":
+        contents["robots"] = "x"
+    elif what == "urdf":
+        urdf["text"] = "<robot"
+    elif what == "no surface":
+        del contents["surfaces"]["plate"]
+    elif what == "no table":
+        contents["tables"] = {}
+    elif what == "crease angle":
+        contents["surfaces"]["plate"]["crease_angle"] = -1.0
+    elif what == "index":
+        arrays["shell.plate.elements"] = arrays["shell.plate.elements"] + np.int32(100)
+    elif what == "triangle":
+        arrays["shell.plate.triangles"] = arrays["shell.plate.triangles"] + np.int32(7)
+    elif what == "face":
+        arrays["shell.valve.element_face"] = arrays["shell.valve.element_face"] + np.int32(999)
+    elif what == "normal":
+        arrays["shell.valve.normals"] = arrays["shell.valve.normals"] * np.nan
+    elif what == "kind of face":
+        arrays["shell.valve.face_shapes"] = arrays["shell.valve.face_shapes"] + 77.0
+    elif what == "numbers":
+        arrays["shell.plate.vertices"] = arrays["shell.plate.vertices"].astype(np.int32)
+    return Kept(contents, arrays)
+
+
+WRONG = {
+    "include": "it includes other files",
+    "posture": r"its posture \[0\.0\] is not one of 2 numbers",
+    "no number": r"its posture \[nan, 0\.0\] is not one of 2 numbers",
+    "no robot": "does not hold the robot 'arm/arm.urdf.xacro'",
+    "fewer robots": "it has 0 robots, not 3",
+    "part": "a wrong part, 'robots'",
+    "urdf": "not well-formed XML",
+    "no surface": "does not hold the surface 'plate'",
+    "no table": "does not hold the file 'law.csv' of a law",
+    "crease angle": "crease_angle",
+    "index": "element 0 uses vertex 100",
+    "triangle": "its triangles do not fit",
+    "face": "its element_face do not fit",
+    "normal": "its normals do not fit",
+    "kind of face": "its face_shapes do not fit",
+    "numbers": r"its vertices are int32 \(4, 3\), not f8",
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_does_not_fit_is_said(result: sp.Result, what: str) -> None:
+    with pytest.raises(ResultError, match=WRONG[what] + r".*--scenario"):
+        Replay(with_kept(result, changed(result, what)))
+
+
+@pytest.mark.parametrize("place", [str(CUBE), f"file://{CUBE}", "package://finger/cube.stl"])
+def test_a_mesh_that_is_not_kept_is_not_read_from_elsewhere(result: sp.Result, place: str) -> None:
+    found = kept_of(result)
+    urdf = found.contents["robots"][0]
+    urdf["text"] = urdf["text"].replace("package://finger_description/meshes/cube.stl", place)
+    with pytest.warns(RobotWarning, match=f"do not hold: {place}"):
+        replay = Replay(with_kept(result, found))
+    assert replay.visual_model is not None
+    assert str(CUBE) not in [one.meshPath for one in replay.visual_model.geometryObjects]
+    # The inertia of a body of the MJCF is that of its mesh.
+    found = kept_of(result)
+    mjcf = found.contents["robots"][2]
+    mjcf["text"] = mjcf["text"].replace("cube.stl", str(CUBE))
+    with pytest.raises(ResultError, match=r"mesh 'cube', which cannot be read"):
+        Replay(with_kept(result, found))
+
+
+def test_meshes_name_no_textures() -> None:
+    """Those who draw a Collada file read the pictures that it names."""
+    head = '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">'
+    images = "<library_images><image><init_from>/etc/passwd</init_from></image></library_images>"
+    plain = f"{head}<asset/></COLLADA>".encode()
+    assert without_references(".dae", f"{head}{images}<asset/></COLLADA>".encode()) == plain
+    other = f"{head}{images}<asset/></COLLADA>".replace("library", "c:library")
+    named = other.replace("xmlns=", 'xmlns:c="http://www.collada.org/2005/11/COLLADASchema" xmlns=')
+    assert without_references(".dae", named.encode()) is None
+    assert without_references(".obj", b"mtllib /etc/passwd\nv 1 2 3\n") == b"\nv 1 2 3\n"
+
+
+def test_arrays_that_are_none_of_these_are_refused(result: sp.Result, tmp_path: Path) -> None:
+    found = kept_of(result)
+    text = Kept(found.contents, {**found.arrays, "file.x": np.array(["a"])})
+    with_kept(result, text).save(tmp_path / "run.npz")
+    with pytest.raises(ResultError, match=r"'kept\.file\.x' holds <U1"):
+        sp.Result.load(tmp_path / "run.npz")
+
+
+def test_a_run_without_files_keeps_none() -> None:
+    origin = origin_of(build("ball_on_turntable"))
+    assert isinstance(origin, Origin)
+    assert origin.keep is not None
+    assert not origin.keep().arrays

@@ -1,0 +1,85 @@
+"""Looking at results reads no file but theirs, starts no program and executes no code."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.kept.looking import looks
+from tests.kept.scenes import run
+
+pytestmark = pytest.mark.slow
+
+TRUSTED = ("trusted", "another scenario")
+WAYS = [name for name in looks("") if name not in TRUSTED]
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a scenario and its results."""
+    home = tmp_path_factory.mktemp("home")
+    run(home)
+    return home
+
+
+@pytest.fixture(scope="module", params=["beside their scenario", "alone"])
+def seen(
+    home: Path, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
+) -> dict[str, dict[str, object]]:
+    """What was noticed while the results were looked at, and what failed."""
+    work = tmp_path_factory.mktemp("looking")
+    (work / "temporary").mkdir()
+    (work / "here").mkdir()
+    if request.param == "alone":
+        shutil.copytree(home / "results", work / "here" / "run")
+        hidden = home.with_name("hidden")
+        home.rename(hidden)
+    else:
+        (work / "here" / "run").symlink_to(home / "results")
+    out = work / "noticed.json"
+    program = Path(__file__).with_name("looking.py")
+    repository = Path(__file__).parents[2]
+    try:
+        done = subprocess.run(
+            [sys.executable, program, repository, out, home / "all.toml"],
+            cwd=work / "here",
+            env={**os.environ, "TMPDIR": str(work / "temporary")},
+            capture_output=True,
+            check=False,
+        )
+    finally:
+        if request.param == "alone":
+            hidden.rename(home)
+    assert out.exists(), done.stderr.decode()
+    noticed: dict[str, dict[str, object]] = json.loads(out.read_text())
+    noticed["place"] = {"is": request.param}
+    return noticed
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_nothing_else_is_read_and_nothing_executed(
+    seen: dict[str, dict[str, object]], way: str
+) -> None:
+    failed = str(seen["failed"].get(way, ""))
+    if "Chromium" in failed:
+        pytest.skip("no Chromium on this machine")
+    assert not failed
+    assert seen["found"][way] == []
+
+
+def test_what_is_done_with_trust_is_noticed(seen: dict[str, dict[str, object]], home: Path) -> None:
+    """The hook hears of a routine, of the process of a xacro file, and of what they read."""
+    if seen["place"]["is"] == "alone":
+        assert "no such file" in str(seen["failed"][TRUSTED[1]])
+        return
+    routine, scenario = (str(seen["found"][one]) for one in TRUSTED)
+    for event in ("open", "compile", "exec"):
+        assert f"{event}: {home / 'routine.py'}" in routine
+    assert "subprocess.Popen: " in scenario
+    assert f"open: {home / 'all.toml'}" in scenario
