@@ -122,7 +122,7 @@ PLACES = {
 }
 
 
-@pytest.mark.parametrize("friction", [None, COULOMB], ids=["free", "coulomb"])
+@pytest.mark.parametrize("friction", [None, COULOMB, BRISTLE], ids=["free", "coulomb", "bristle"])
 @pytest.mark.parametrize("law", [LAW, DAMPED], ids=["elastic", "damped"])
 @pytest.mark.parametrize("place", list(PLACES))
 def test_derivatives(place: str, law: sp.FoundationLaw, friction) -> None:

@@ -147,7 +147,7 @@ void bind_evaluations(nb::class_<T>& bound) {
              });
            })
       .def("contact_derivatives", [](T& self, const VectorX& q, const VectorX& v) {
-        return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
+        return self.at(q, v, [&](SceneData&, auto&& evaluate) {
           Linearization& linearization = evaluate.linearization();
           evaluate();
           MatrixX by_q, by_v;

@@ -116,6 +116,7 @@ void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double re
     normal_by = (contact.dn_dc - n * weight_by) / weight;
     depth_by *= std::abs(weight);
     point_by = Mat3::Identity() + n * depth_by - (site.radius - contact.depth) * normal_by;
+    if (site.point_by) point_by = *site.point_by;
     if (site.shape) depth_by -= site.shape->tilt.transpose();
   }
   out.depth_by_place = depth_by;

@@ -32,6 +32,8 @@ struct ContactSite {
   Vec3 stretch;                         // of the bristle [m]
   Vec3 outer[kMostRings - 1];           // of its rings behind the first
   const ContactShape* shape = nullptr;  // of Hertz's law
+  // By its place, of a contact point that is no point of the sphere's normal.
+  const Mat3* point_by = nullptr;
 };
 
 struct ContactSlopes {

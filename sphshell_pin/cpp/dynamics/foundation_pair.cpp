@@ -29,13 +29,20 @@ const CoulombFriction* sliding_friction(const Pair& pair) {
   return std::get_if<CoulombFriction>(&pair.friction.law);
 }
 
+// The derivative of the pressure at a point this far from the sphere's center by that center.
+Vec3 pressure_by_center(const Vec3& from, double radius) {
+  const double rho = from.norm();
+  return (radius * radius / (rho * rho) + 1) / (2 * rho) * from;
+}
+
 }  // namespace
 
 void FoundationPair::find(const Pair& pair, const Vec3& center, bool slopes,
                           std::vector<Contact>& contacts) {
   contacts.clear();
   center_ = center;
-  const bool points = pair.law.needs_rate() || sliding_friction(pair);
+  const bool points =
+      pair.law.needs_rate() || sliding_friction(pair) || (slopes && pair.friction.has_state());
   if (pair.ball > 0)
     foundation_.find_on_ball(pair.ball, center, pair.radius, points);
   else
@@ -117,8 +124,8 @@ PatchRow FoundationPair::patch(const Pair& pair, std::size_t i, const Mat3& rota
   return out;
 }
 
-// The quadrature points stay where they are on the shell: there the pressure follows the center, and
-// the border of the overlap adds nothing, as it bears no pressure.
+// The quadrature points stay where they are on the shell: there the pressure follows the center,
+// and the border of the overlap adds nothing, as it bears no pressure.
 void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
                             const ContactSite& site, double normal_force,
                             ContactSlopes& out) const {
@@ -153,9 +160,7 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
       }
     }
     by_velocity *= area * point.pressure;
-    const Vec3 from = x - center_;
-    const double rho = from.norm();
-    const Vec3 pressure_by = (pair.radius * pair.radius / (rho * rho) + 1) / (2 * rho) * from;
+    const Vec3 pressure_by = pressure_by_center(x - center_, pair.radius);
     const Mat3 arm = cross_matrix(x), by_place = unit * pressure_by.transpose();
     out.wrench.head<3>() += point.pressure * unit;
     out.wrench.tail<3>() += point.pressure * x.cross(unit);
@@ -166,14 +171,31 @@ void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
     out.by_twist.bottomLeftCorner<3, 3>() += arm * by_velocity;
     out.by_twist.bottomRightCorner<3, 3>() -= arm * by_velocity * arm;
   }
-  if (pair.friction.has_state()) add_bristle(pair, relaxation, site, normal_force, out);
+  if (pair.friction.has_state()) add_bristle(pair, i, relaxation, site, normal_force, out);
+}
+
+// Of the center of pressure, by the sphere's center.
+Mat3 FoundationPair::center_slopes(std::size_t i, double radius) const {
+  double all = 0;
+  Vec3 first = Vec3::Zero(), all_by = Vec3::Zero();
+  Mat3 first_by = Mat3::Zero();
+  for (const FoundationPoint& point : foundation_.points()) {
+    if (point.row != static_cast<int>(i)) continue;
+    const Vec3 from = point.point - center_, by = point.area * pressure_by_center(from, radius);
+    const double share = point.area * point.pressure;
+    all += share, first += share * from;
+    all_by += by, first_by += from * by.transpose();
+  }
+  if (!(all > 0)) return Mat3::Identity();
+  return (first_by - first / all * all_by.transpose()) / all;
 }
 
 // The bristle's part of the wrench, and its rates. It follows from a contact whose normal force
 // depends on nothing, less what that does without friction; the normal force's own derivatives,
 // which are those of the pressure, pass through that of the friction by it.
-void FoundationPair::add_bristle(const Pair& pair, double relaxation, const ContactSite& site,
-                                 double normal_force, ContactSlopes& out) const {
+void FoundationPair::add_bristle(const Pair& pair, std::size_t i, double relaxation,
+                                 const ContactSite& site, double normal_force,
+                                 ContactSlopes& out) const {
   const Vec3& n = site.contact.normal;
   const double size = std::max(normal_force, 1e-300), depth = site.contact.depth;
   // Of the pressure's force along the normal.
@@ -183,6 +205,8 @@ void FoundationPair::add_bristle(const Pair& pair, double relaxation, const Cont
   const Eigen::Matrix<double, 1, 6> by_twist = n.transpose() * out.by_twist.topRows<3>();
   ContactSite at = site;
   at.disc_radius = 2 * pair.disc_radius();
+  const Mat3 point_by = center_slopes(i, pair.radius);
+  at.point_by = &point_by;
   NormalLaw held, steep;  // the same force here, constant, and in proportion to the depth
   held.law = ImpactLaw({size, 0, 0, 1});
   steep.law = ImpactLaw({size / depth, 1, 0, 1});

@@ -39,7 +39,8 @@ class FoundationPair {
               double normal_force, ContactSlopes& out) const;
 
  private:
-  void add_bristle(const Pair& pair, double relaxation, const ContactSite& site,
+  Mat3 center_slopes(std::size_t i, double radius) const;
+  void add_bristle(const Pair& pair, std::size_t i, double relaxation, const ContactSite& site,
                    double normal_force, ContactSlopes& out) const;
 
   Vec3 center_ = Vec3::Zero();
