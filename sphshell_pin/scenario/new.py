@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive, check_vector
+from sphshell_pin.contact.materials import find_material
 from sphshell_pin.dynamics.models import model_reach
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import is_path
@@ -21,7 +22,6 @@ from sphshell_pin.scenario.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.drafting import draft_text
 from sphshell_pin.scenario.hand import every_tip, hold_in_hand
 from sphshell_pin.scenario.knobs import check_knobs
-from sphshell_pin.scenario.materials import find_material
 from sphshell_pin.scenario.part import part_file, word_primitive
 from sphshell_pin.scenario.plan import Hold, Plan, Press
 from sphshell_pin.scenario.primitives import Ball, Box, Cylinder, HalfSpace, Primitive
