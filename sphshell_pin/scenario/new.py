@@ -15,7 +15,7 @@ import numpy.typing as npt
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive, check_vector
 from sphshell_pin.contact.materials import find_material
-from sphshell_pin.dynamics.models import model_reach
+from sphshell_pin.dynamics.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import is_path
 from sphshell_pin.scenario.build import Built, build_scenario, explain_built
@@ -143,11 +143,9 @@ def new_scenario(
         section = section.model_copy(update={"free_flyer": True})
         bare = _build_bare(section, path)
     loaded = bare.assembly.loaded[0]
-    reach = model_reach(bare.assembly.model)
-    if radius is not None and 0 < reach < radius:
-        raise InvalidParameter(
-            "radius", radius, f"[m] is more than the robot's reach, {reach:.3g} m: is it in mm?"
-        )
+    too_large = radius and radius_fault(bare.assembly.model, radius)
+    if radius and too_large:
+        raise InvalidParameter("radius", radius, too_large)
     center = None if offset is None else check_vector("offset", offset, 3, " [m]")
     if center is not None and frame is None:
         raise SphshellError("an offset is in a frame: state that with --frame")

@@ -251,7 +251,10 @@ def _repairs(plan: Plan, fault: Fault) -> list[Plan]:
         repairs.append(replace(plan, control=loose, repair="loose"))
     stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
     duration = _CALM_LEAD_IN + 0.5
-    return [*repairs, replace(plan, control=stays, duration=duration, repair="stays")]
+    why = plan.why
+    if len(control.path) > 1:
+        why = (*why, f"the tip presses in one place and does not slide: with a path {fault.text}")
+    return [*repairs, replace(plan, control=stays, duration=duration, repair="stays", why=why)]
 
 
 def _drop(

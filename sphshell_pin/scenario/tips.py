@@ -52,9 +52,10 @@ def find_tips(
     if frame is not None:
         find_frame(robot.model, frame)
         found = [one for one in known if one.frame == frame]
-        if offset is not None:
-            return [_sized(Tip(frame, 0.0, offset, "as it was asked for"), radius)]
-        return [_sized(found[0] if found else Tip(frame, 0.0, np.zeros(3), ""), radius)]
+        if offset is not None or not found:
+            asked = np.zeros(3) if offset is None else offset
+            return [_sized(Tip(frame, 0.0, asked, "as it was asked for"), radius)]
+        return [_sized(found[0], radius)]
     if known:
         chosen = known if floats(robot.model) else known[:1]
         return [_sized(one, radius) for one in chosen]

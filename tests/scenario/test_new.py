@@ -231,6 +231,15 @@ def test_materials_give_hertzs_law(tmp_path):
     assert turned.built.scene.pairs[0].friction == pair.friction
 
 
+def test_each_value_has_its_digits_and_each_sphere_its_reason(tmp_path):
+    made = new_scenario(arm_urdf(tmp_path), "plane", radius=0.009, out=tmp_path / "a.toml")
+    assert tomllib.loads(made.text)["contact"][0]["friction"]["v_dynamic"] == 0.027
+    assert any("on frame 'link_5': the only end of the robot" in one for one in made.why)
+    named = {"frame": "link_5", "radius": 0.009, "force": True}
+    made = new_scenario(arm_urdf(tmp_path), "plane", out=tmp_path / "a.toml", **named)
+    assert any("on frame 'link_5': as it was asked for" in one for one in made.why)
+
+
 def test_the_ball_comes_back_as_high_as_its_material_says(tmp_path):
     built = new_scenario("ball", "plane", material="wood", out=tmp_path / "a.toml").built
     result, _ = simulate(built)
