@@ -147,8 +147,6 @@ def new_scenario(
     if radius and too_large:
         raise InvalidParameter("radius", radius, too_large)
     center = None if offset is None else check_vector("offset", offset, 3, " [m]")
-    if center is not None and frame is None:
-        raise SphshellError("an offset is in a frame: state that with --frame")
     if tips == "all":
         found = every_tip(loaded, frame, radius, place)
     else:

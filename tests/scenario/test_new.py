@@ -276,7 +276,6 @@ def test_its_knobs_turn(tmp_path):
         (("ball",), {"against": "iron"}, NameNotFound, "steel, aluminium"),
         (("ball",), {"place": "left"}, NameNotFound, "below, above"),
         (("ball",), {"free_flyer": True}, SphshellError, "belong to a file, not to ball"),
-        (("turntable",), {}, SphshellError, "--radius 0.012"),
         (("ball", BLADE), {"unit": "um"}, SphshellError, "less than the sphere's radius"),
         (("gear_pair",), {}, SphshellError, "one of gear_1, gear_2"),
         (("three_link_finger",), {"press": 1e4}, SphshellError, "allow a push of"),
