@@ -45,6 +45,7 @@ urdf = {robot.urdf!o}
 file = {robot.file!o}
 package_dirs = {robot.package_dirs!o}
 xacro_args = {robot.xacro_args!o}
+base = {robot.base!o} # the root link
 free_flyer = {robot.free_flyer!o} # the root link floats
 # They do not move the tip: locked, they cost nothing.
 lock = {robot.lock!o}

@@ -91,7 +91,7 @@ def hold_in_hand(
     """
     model = built.assembly.model
     if floats(model):
-        raise SphshellError("a hand with a free root cannot hold a part: leave out --free-flyer")
+        raise SphshellError("a hand with a free root cannot hold a part: leave out --base")
     (shell,) = built.shells.values()
     part = Part.of(shell, materials[1])
     hand = Hand(model, tips)

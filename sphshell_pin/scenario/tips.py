@@ -66,7 +66,8 @@ def find_tips(
         names = _ends(robot.model) if frame is None else [(frame, _ASKED)]
         known = [_at_end(robot, *one, radius, offset, asked=frame is not None) for one in names]
     found = [_sized(one, radius) for one in known]
-    for one in found:
+    # The sphere of a shipped robot is where it belongs, whatever size is asked for.
+    for one in found if shipped is None or offset is not None else ():
         _check_outside(robot, one)
     return found
 
@@ -159,4 +160,5 @@ def _ends(model: pin.Model) -> list[tuple[str, str]]:
             "the robot has several ends: state which frame carries the sphere with --frame, for "
             f"instance one of {', '.join(names[:8]) or ', '.join(f.name for f in model.frames)}"
         )
-    return [(str(model.names[last]), f"the end of the longest of {len(leaves)} limbs")]
+    which = "only limb" if len(leaves) == 1 else f"longest of {len(leaves)} limbs"
+    return [(str(model.names[last]), f"the end of the {which}")]
