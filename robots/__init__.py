@@ -156,7 +156,7 @@ def load_file(
     path: str | PathLike[str],
     package_dirs: Iterable[str | PathLike[str]] = (),
     *,
-    free_flyer: bool = False,
+    free_flyer: bool | None = None,
     mimic: bool = False,
     name: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
@@ -167,7 +167,8 @@ def load_file(
 
     `package_dirs` are the folders that hold the packages of `package://` names; the file's own
     folder and those above it, ROS_PACKAGE_PATH and AMENT_PREFIX_PATH are searched too. With
-    `free_flyer` the root link floats (nq 7, nv 6).
+    `free_flyer` the root link floats (nq 7, nv 6), with False it is fixed; by default it is fixed
+    in URDF, and as the file states it in MJCF.
 
     With `mimic`, joints that mimic others (URDF `<mimic>`, MJCF `<equality><joint>`) do so exactly:
     the model's nq and nv are those of the other joints (`sphshell_pin.dynamics.mimic`). Without it
@@ -192,7 +193,7 @@ def load_file(
     MissingExtra
         A xacro file without the package xacro.
     """
-    description = read(path, package_dirs, xacro_args)
+    description = read(path, package_dirs, xacro_args, free_flyer=free_flyer)
     model = build_model(description, free_flyer=free_flyer)
     _load_poses(model, srdf)
     geometry, missing = [], []

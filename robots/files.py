@@ -95,9 +95,12 @@ def read(
     path: str | PathLike[str],
     package_dirs: Iterable[str | PathLike[str]] = (),
     xacro_args: Mapping[str, object] | None = None,
+    *,
+    free_flyer: bool | None = None,
 ) -> Description:
     """Read a URDF, xacro or MJCF file.
 
+    `free_flyer` frees the base of an MJCF or fixes it; None: as the file states it.
     Raises RobotError, with the reason in a sentence, and MissingExtra for a xacro file without the
     package xacro.
     """
@@ -118,10 +121,10 @@ def read(
             text = file.read_bytes()
     except (ValueError, OSError) as error:
         raise RobotError(f"{file}: not a URDF that can be read: {_line(error)}") from None
-    return described(text, folders)
+    return described(text, folders, free_flyer=free_flyer)
 
 
-def described(text: bytes, folders: Folders) -> Description:
+def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) -> Description:
     """Return the description that `text`, of the file of `folders`, is; see `read`."""
     file, what = folders.file, "URDF"
     try:
@@ -135,7 +138,7 @@ def described(text: bytes, folders: Folders) -> Description:
             from sphshell_pin.robots.mjcf import plain as in_plain_form
 
             what = "MJCF"
-            plain = in_plain_form(root, folders)
+            plain = in_plain_form(root, folders, floats=free_flyer)
             return Description(
                 file,
                 folders,
@@ -176,8 +179,8 @@ def _reason(suffix: str) -> str:
     return next((reason for ends, reason in _REFUSED.items() if suffix in ends), "")
 
 
-def build_model(description: Description, *, free_flyer: bool = False) -> pin.Model:
-    """Return the model, in which every joint moves freely; with `free_flyer` the root link floats.
+def build_model(description: Description, *, free_flyer: bool | None = None) -> pin.Model:
+    """Return the model, in which every joint moves freely; with `free_flyer` a URDF's root floats.
 
     Raises RobotError.
     """
@@ -187,8 +190,6 @@ def build_model(description: Description, *, free_flyer: bool = False) -> pin.Mo
             root = [pin.JointModelFreeFlyer()] if free_flyer else []
             text = ET.tostring(description.root, encoding="unicode")
             model = check_memory(pin.buildModelFromXML(text, *root))
-        elif free_flyer:
-            raise ValueError("an MJCF states which body is free: give that one a <freejoint/>")
         else:
             with _written(description.root) as path:
                 model = check_memory(pin.buildModelFromMJCF(path))
@@ -199,7 +200,7 @@ def build_model(description: Description, *, free_flyer: bool = False) -> pin.Mo
     except (ValueError, RuntimeError, OSError) as error:
         what = "MJCF" if description.is_mjcf else "URDF"
         raise RobotError(f"{file}: not a {what} that pinocchio can read: {_line(error)}") from None
-    if free_flyer:
+    if free_flyer and not description.is_mjcf:
         _check_root(model, file)
     return model
 

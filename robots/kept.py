@@ -76,7 +76,7 @@ def load_kept(
     meshes: Mapping[str, Path],
     q0: Sequence[float],
     *,
-    free_flyer: bool,
+    free_flyer: bool | None,
     mimic: bool,
     name: str,
 ) -> LoadedRobot:

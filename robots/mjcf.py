@@ -92,12 +92,12 @@ class Plain:
     sites: list[Site] = field(default_factory=list)
 
 
-def plain(root: ET.Element, folders: Folders) -> Plain:
+def plain(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> Plain:
     """Return the plain form of an MJCF; ValueError says what in it cannot be read.
 
-    What it includes is put into `root`.
+    What it includes is put into `root`, whose base `floats` or is fixed; None: as it states.
     """
-    return _Reader(root, folders).read()
+    return _Reader(root, folders, floats=floats).read()
 
 
 def _check_name(what: str, name: str, known: Collection[str]) -> None:
@@ -110,15 +110,38 @@ def _check_name(what: str, name: str, known: Collection[str]) -> None:
         )
 
 
+def _set_base(root: ET.Element, *, floats: bool) -> None:
+    """Give the only body of the world a free joint, or take it; its keys lose what was of it."""
+    bodies = root.findall("worldbody/body")
+    if len(bodies) != 1:
+        raise ValueError(f"its world has {len(bodies)} bodies: state in it which of them are free")
+    (body,) = bodies
+    free = [one for one in body if one.tag == "freejoint" or one.get("type") == "free"]
+    if not floats:
+        for joint in free:
+            body.remove(joint)
+    elif not free:
+        if body.find("joint") is not None:
+            raise ValueError(f"body '{body.get('name')}' has a joint already: it cannot float")
+        body.insert(0, ET.Element("freejoint"))
+    if floats != bool(free):
+        for key in root.iterfind("keyframe/key"):
+            qpos = key.get("qpos", "").split()
+            place = [*body.get("pos", "0 0 0").split(), "1", "0", "0", "0"]
+            key.set("qpos", " ".join(place + qpos if floats else qpos[7:]))
+
+
 class _Reader:
     """What one MJCF says, gathered body by body."""
 
-    def __init__(self, root: ET.Element, folders: Folders) -> None:
+    def __init__(self, root: ET.Element, folders: Folders, *, floats: bool | None) -> None:
         file = folders.file
         if folders.kept is None:
             include(root, file, [file.resolve()])
         elif root.find(".//include") is not None:
             raise ValueError("it includes other files")
+        if floats is not None:
+            _set_base(root, floats=floats)
         for tag in _UNKNOWN:
             if root.find(f".//{tag}") is not None:
                 raise ValueError(
@@ -255,6 +278,8 @@ class _Reader:
         summed = pin.Inertia.Zero()
         use = self.compiler.get("inertiafromgeom", "auto")
         needs = use == "true" or not any(part.tag == "inertial" for part, *_ in parts)
+        # The mass of what is fixed to the world acts on nothing, but counts in a stated sum.
+        needs = needs and (self._moves(name) or "settotalmass" in self.compiler)
         if needs and use == "false" and self.joints_of[name]:
             raise ValueError(f"body '{name}' moves, and states no <inertial>")
         low, high = numbers(self.compiler.get("inertiagrouprange", "0 5"), 2)
@@ -280,6 +305,9 @@ class _Reader:
             bound = axes @ np.diag(np.maximum(moments, least)) @ axes.T
             inertia = pin.Inertia(max(inertia.mass, least_mass), inertia.lever, bound)
         add_inertial(here, inertia)
+
+    def _moves(self, body: str) -> bool:
+        return body != "world" and (bool(self.joints_of[body]) or self._moves(self.parents[body]))
 
     def _site(self, element: ET.Element, at: pin.SE3, childclass: str, body: str) -> None:
         stated = self._with_defaults(element, childclass)
@@ -423,6 +451,10 @@ class _Reader:
             (
                 self.meshes.exact,
                 "masses of meshes that are not convex are those of their volume (inertia=exact)",
+            ),
+            (
+                self.meshes.hulls,
+                "masses of meshes that are not closed are those of their convex hulls",
             ),
             (self.meshes.left_out, "geoms of these kinds are left out"),
             (scenery, "geoms of the world are no part of the robot, add them as shells"),

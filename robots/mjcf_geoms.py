@@ -34,6 +34,7 @@ class Meshes:
         self.files: dict[str, tuple[Path, Array]] = {}
         self.colors: dict[str, str] = {}
         self.exact: list[str] = []
+        self.hulls: list[str] = []
         self.left_out: list[str] = []
         self._moved: set[str] = set()
         self._kinds: dict[str, str] = {}
@@ -82,8 +83,14 @@ class Meshes:
         kind = self._kinds[name]
         if kind == "convex":
             mesh = mesh.convex_hull
-        if kind == "shell" or not mesh.is_watertight or not mesh.volume:
-            raise ValueError(f"{why}which is not closed: state its <inertial>")
+        if kind == "shell":
+            raise ValueError(f"{why}which is a shell: state its <inertial>")
+        if not mesh.is_watertight or not mesh.volume:
+            self.hulls.append(name)
+            try:
+                mesh = mesh.convex_hull
+            except ValueError:  # a flat one
+                raise ValueError(f"{why}which has no volume: state its <inertial>") from None
         if kind == "legacy" and not mesh.is_convex:
             self.exact.append(name)
         sign = float(np.sign(mesh.volume))

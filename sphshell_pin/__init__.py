@@ -15,6 +15,7 @@ with interrupts_delayed():
     from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
 
 if TYPE_CHECKING:
+    from sphshell_pin.contact import MATERIALS as MATERIALS
     from sphshell_pin.contact import BristleFriction as BristleFriction
     from sphshell_pin.contact import BristleState as BristleState
     from sphshell_pin.contact import ContactSet as ContactSet
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 _HOME = {
+    "MATERIALS": "contact",
     "Adaptive": "dynamics",
     "BristleFriction": "contact",
     "BristleState": "contact",

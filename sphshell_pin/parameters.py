@@ -13,12 +13,18 @@ import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from sphshell_pin.checks import check_finite, check_type
 from sphshell_pin.errors import InvalidParameter
 
+if TYPE_CHECKING:
+    Named = Any  # in whose place the name of a material may be given
+else:
+    Named = float
+
 _KEY = "parameter"
+_NUMBERS = ("float", "Named")
 # A field of the object in a unit, as in "N/m^{0.exponent:g}".
 _IN_UNIT = re.compile(r"\{0\.(\w+)[^}]*\}")
 
@@ -147,7 +153,7 @@ class Ingredient:
             about, value = one.metadata.get(_KEY), getattr(self, one.name)
             if about is None or (value is None and one.default is None):
                 continue
-            if one.type in ("float", "float | None"):
+            if one.type in (*_NUMBERS, "float | None"):
                 object.__setattr__(self, one.name, about.check(one.name, value))
             elif one.type == "bool":
                 check_type(one.name, value, bool, "must be True or False")
@@ -181,7 +187,7 @@ def table(kind: type[Ingredient]) -> str:
     for one in dataclasses.fields(kind):
         if one.name in about:
             default = _shown(one.default)
-            unit = about[one.name].general_unit or ("1" if one.type == "float" else "")
+            unit = about[one.name].general_unit or ("1" if one.type in _NUMBERS else "")
             lines.append(f"| `{one.name}` | {unit} | {default} | {about[one.name].help} |")
     return "\n".join(lines) + "\n"
 

@@ -38,14 +38,19 @@ def new(
     ] = "plane",
     frame: Annotated[
         str | None,
-        typer.Option(help="Frame that carries the sphere; by default a known tip or the only end."),
+        typer.Option(
+            help="Frame that carries the sphere; by default a known tip or the end of a limb."
+        ),
     ] = None,
     radius: Annotated[
         str | None, typer.Option(metavar="LENGTH", help="Of the sphere: 0.012 \\[m] or 12mm.")
     ] = None,
     offset: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(metavar="X Y Z", help="Center of the sphere in the frame \\[m]."),
+        typer.Option(
+            metavar="X Y Z",
+            help="Center of the sphere in the frame \\[m]; by default the end of its link.",
+        ),
     ] = None,
     unit: Annotated[
         str | None, typer.Option(help="Length unit of the surface file: mm, cm, m, inch, ...")
@@ -71,8 +76,12 @@ def new(
         Literal["one", "all"],
         typer.Option(help="all: the fingertips of a hand hold the surface, as a free part."),
     ] = "one",
+    base: Annotated[
+        Literal["fixed", "floating"] | None,
+        typer.Option(help="Of the robot; by default as its file and its shape say."),
+    ] = None,
     free_flyer: Annotated[
-        bool, typer.Option("--free-flyer", help="The root link of the URDF floats.")
+        bool, typer.Option("--free-flyer", help="The same as --base floating.")
     ] = False,
     package_dir: PackageDirOption = None,
     xacro_arg: XacroArgOption = None,
@@ -109,7 +118,7 @@ def new(
                 press=press,
                 place=place,
                 tips=tips,
-                free_flyer=free_flyer,
+                base="floating" if free_flyer else base,
                 package_dirs=package_dir or (),
                 xacro_args=xacro_args_of(xacro_arg),
                 out=out,

@@ -83,10 +83,10 @@ class BristleFriction(Coefficients, kind="bristle"):
 
     @staticmethod
     def mindlin(
-        mu_static: float,
-        mu_dynamic: float | None,
-        young: float,
-        poisson: float,
+        mu_static: float | str,
+        mu_dynamic: float | str | None,
+        young: float | str | None = None,
+        poisson: float | str | None = None,
         young_2: float | None = None,
         poisson_2: float | None = None,
         *,
@@ -100,11 +100,15 @@ class BristleFriction(Coefficients, kind="bristle"):
         """Build the bristle whose stiffness follows from the bodies' materials and the contact.
 
         `young` [Pa] and `poisson` are the sphere's, `young_2` and `poisson_2` the shell's (without
-        them the same). Without `mu_dynamic` it is `mu_static`. See MindlinFriction.
+        them the same). Without `mu_dynamic` it is `mu_static`. Of two names of MATERIALS, sphere's
+        and shell's, they all follow: mindlin("rubber", "steel"). See MindlinFriction.
         """
+        mu_dynamic = mu_static if mu_dynamic is None else mu_dynamic
+        if isinstance(mu_static, str) and young is poisson is None:
+            young, poisson = mu_static, mu_dynamic
         return MindlinFriction(
             mu_static,
-            mu_static if mu_dynamic is None else mu_dynamic,
+            mu_dynamic,
             young,
             poisson,
             young_2,

@@ -9,9 +9,10 @@ from pathlib import Path
 
 from sphshell_pin import _core
 from sphshell_pin.checks import check_not_negative, check_type
+from sphshell_pin.contact.materials import find_material, friction_between
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.parameters import Ingredient, Named, parameter
 
 __all__ = ["CoulombFriction", "Friction"]
 
@@ -64,19 +65,29 @@ class Friction(Ingredient):
 
 @dataclass(frozen=True)
 class Coefficients(Friction):
-    """What the laws share that have two coefficients."""
+    """What the laws share that have two coefficients.
 
-    mu_static: float = parameter(
+    `mu_static` and `mu_dynamic` may be names of MATERIALS, of the sphere and of the shell: the
+    coefficients are theirs.
+    """
+
+    mu_static: Named = parameter(
         at_least=0, label="static friction", help="coefficient at rest or nearly so"
     )
-    mu_dynamic: float = parameter(
+    mu_dynamic: Named = parameter(
         at_least=0,
         label="dynamic friction",
         help="coefficient of fast sliding; not above `mu_static`",
     )
 
     def __post_init__(self) -> None:
-        """Raise InvalidParameter for a value outside its bounds."""
+        """Put numbers in place of names; raise InvalidParameter for a value outside its bounds."""
+        if isinstance(self.mu_static, str) and isinstance(self.mu_dynamic, str):
+            pair = find_material(self.mu_static), find_material(self.mu_dynamic)
+            for name, value in zip(
+                ("mu_static", "mu_dynamic"), friction_between(*pair), strict=True
+            ):
+                object.__setattr__(self, name, value)
         super().__post_init__()
         if self.mu_dynamic > self.mu_static:
             raise InvalidParameter(
@@ -102,10 +113,10 @@ class CoulombFriction(Coefficients, kind="coulomb"):
     Source: ADAMS/View help, contact friction force.
     """
 
-    mu_static: float = parameter(
+    mu_static: Named = parameter(
         0.3, at_least=0, label="static friction", help="coefficient at the slip speed `v_static`"
     )
-    mu_dynamic: float = parameter(
+    mu_dynamic: Named = parameter(
         0.1,
         at_least=0,
         label="dynamic friction",
@@ -159,7 +170,8 @@ class CoulombFriction(Coefficients, kind="coulomb"):
         """Return 20 times the decay of a slip below `v_static` [s]."""
         if not self.mu_static or not load > 0:
             return math.inf
-        return DECAYS_PER_PERIOD * mass * self.v_static / (1.5 * self.mu_static * load)
+        damper = 1.5 * float(self.mu_static) * load
+        return DECAYS_PER_PERIOD * mass * self.v_static / damper
 
 
 def check_friction(friction: object) -> Friction | None:

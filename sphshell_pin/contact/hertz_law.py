@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sphshell_pin import _core
 from sphshell_pin.contact.laws import HuntCrossleyLaw, ImpactLaw, dissipation_for
-from sphshell_pin.contact.materials import TwoMaterials
+from sphshell_pin.contact.materials import Material, TwoMaterials, restitution_between
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient, parameter, same_parameter
@@ -23,10 +23,12 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
 
     force = E* scale depth^1.5 with 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2; `young` [Pa] and
     `poisson` of the sphere, `young_2` and `poisson_2` of the shell (by default of the same
-    material). `scale` [m^0.5] depends on the radius of the sphere and the two principal curvatures
-    of the shell at the contact, by the elliptic integrals of Johnson, Contact Mechanics (1985),
-    4.26; on a plane it is 4/3 sqrt(radius). Where it changes along the shell there is a force along
-    the shell as well, as the elastic energy 2/5 force depth changes.
+    material); or two names of MATERIALS, HertzLaw("rubber", "steel"), which also state a
+    restitution at 1 m/s where no damping is given. `scale` [m^0.5] depends on the radius of the
+    sphere and the two principal curvatures of the shell at the contact, by the elliptic integrals
+    of Johnson, Contact Mechanics (1985), 4.26; on a plane it is 4/3 sqrt(radius). Where it changes
+    along the shell there is a force along the shell as well, as the elastic energy
+    2/5 force depth changes.
 
     Damping: by `restitution` at an impact `speed` [m/s], after Hunt and Crossley (J. Appl. Mech. 42
     (1975) 440), or by the `loss_tangent` of a viscoelastic material at a `frequency` [Hz], after
@@ -75,6 +77,12 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
         if self.restitution is not None and self.loss_tangent is not None:
             must = "must not be given with a restitution: either states the damping"
             raise InvalidParameter("loss_tangent", self.loss_tangent, must)
+
+    def _of(self, one: Material, other: Material) -> dict[str, float]:
+        stated = super()._of(one, other)
+        if self.restitution is self.speed is self.loss_tangent is self.frequency is None:
+            stated |= {"restitution": restitution_between(one, other), "speed": 1.0}
+        return stated
 
     @cached_property
     def dissipation(self) -> float:

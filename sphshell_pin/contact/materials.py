@@ -1,21 +1,94 @@
-"""The materials of sphere and shell, as the laws take them that compute a stiffness from them."""
+"""Materials to start from, and those of sphere and shell in the laws that follow from them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
 
-from sphshell_pin.parameters import parameter
+from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.parameters import Named, parameter
+
+__all__ = ["MATERIALS", "Material", "find_material", "friction_between", "restitution_between"]
+
+
+@dataclass(frozen=True)
+class Material:
+    """A material, with typical values to start from: real parts scatter widely about them.
+
+    Moduli are rounded handbook values (Ashby, Materials Selection in Mechanical Design); those of
+    the elastomers follow from their hardness, about 80 and 20 Shore A (Gent, Engineering with
+    Rubber). Friction on dry steel and restitution of a ball on a thick steel plate at about 1 m/s
+    are of the usual order and measured for no particular part.
+    """
+
+    name: str
+    young: float
+    """Young's modulus [Pa]."""
+    poisson: float
+    restitution: float
+    """Speed of rebound over speed of approach, against steel."""
+    friction: float
+    """Static coefficient against dry steel."""
+    slip: float
+    """Dynamic coefficient as a part of the static one."""
+    density: float
+    """[kg/m^3]"""
+
+
+MATERIALS: dict[str, Material] = {
+    one.name: one
+    for one in (
+        Material("steel", 2.1e11, 0.30, 0.90, 0.40, 0.75, 7850.0),
+        Material("aluminium", 7.0e10, 0.33, 0.80, 0.45, 0.75, 2700.0),
+        Material("plastic", 2.5e9, 0.38, 0.80, 0.30, 0.80, 1050.0),
+        Material("wood", 1.0e10, 0.35, 0.60, 0.40, 0.75, 700.0),
+        Material("rubber", 1.0e7, 0.49, 0.70, 0.80, 0.85, 1100.0),
+        Material("silicone", 6.0e5, 0.49, 0.60, 0.70, 0.85, 1100.0),
+    )
+}
+
+
+def find_material(name: str) -> Material:
+    """Return the material called `name`.
+
+    Raises
+    ------
+    NameNotFound
+        The table has none of that name; the text lists what it has.
+    """
+    if name not in MATERIALS:
+        raise NameNotFound("material", name, "the table", MATERIALS)
+    return MATERIALS[name]
+
+
+def restitution_between(one: Material, other: Material) -> float:
+    """Return the restitution of two materials: the more dissipative one decides."""
+    return min(one.restitution, other.restitution)
+
+
+def friction_between(one: Material, other: Material) -> tuple[float, float]:
+    """Return the static and the dynamic coefficient of two materials.
+
+    Against steel they are the table's; the softer of two others decides, as it conforms to the
+    harder one.
+    """
+    softer, harder = sorted((one, other), key=lambda m: m.young)
+    known = softer if harder.name == "steel" or softer.young < 0.1 * harder.young else None
+    static = known.friction if known else 0.5 * (softer.friction + harder.friction)
+    return static, static * (known or softer).slip
 
 
 @dataclass(frozen=True)
 class TwoMaterials:
-    """Young's modulus and Poisson's ratio of sphere and shell, and the moduli of the contact."""
+    """Young's modulus and Poisson's ratio of sphere and shell, and the moduli of the contact.
 
-    young: float = parameter(
+    `young` and `poisson` may be names of MATERIALS: those of the sphere and of the shell.
+    """
+
+    young: Named = parameter(
         above=0, unit="Pa", label="Young's modulus", help="Young's modulus of the sphere"
     )
-    poisson: float = parameter(
+    poisson: Named = parameter(
         above=-1, at_most=0.5, label="Poisson's ratio", help="Poisson's ratio of the sphere"
     )
     young_2: float | None = parameter(
@@ -32,6 +105,27 @@ class TwoMaterials:
         label="Poisson's ratio 2",
         help="Poisson's ratio of the shell; without it that of the sphere",
     )
+
+    def __post_init__(self) -> None:
+        """Put numbers in place of names; raise InvalidParameter for a value outside its bounds."""
+        if isinstance(self.young, str) and isinstance(self.poisson, str):
+            for name in ("young_2", "poisson_2"):
+                if getattr(self, name) is not None:
+                    must = "must be left out where materials are named: HertzLaw('rubber', 'steel')"
+                    raise InvalidParameter(name, getattr(self, name), must)
+            one, other = find_material(self.young), find_material(self.poisson)
+            for name, value in self._of(one, other).items():
+                object.__setattr__(self, name, value)
+        super().__post_init__()  # type: ignore[misc]  # of Ingredient
+
+    def _of(self, one: Material, other: Material) -> dict[str, float]:
+        """Return the parameters that follow from the materials."""
+        return {
+            "young": one.young,
+            "poisson": one.poisson,
+            "young_2": other.young,
+            "poisson_2": other.poisson,
+        }
 
     @property
     def _both(self) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -112,7 +112,11 @@ def check_law(law: object, shapeless: str = "") -> NormalLaw:
     `shapeless` names where nothing is known about the shape of the gap; there a law that needs it
     is refused.
     """
-    good = check_type("law", law, NormalLaw, "must be a law, for instance ImpactLaw(stiffness)")
+    must = (
+        "must be a law of this package, for instance ImpactLaw(stiffness); a force-depth curve of "
+        "your own is TableLaw(depth, force), and docs/extending.md says how to add a law"
+    )
+    good = check_type("law", law, NormalLaw, must)
     if shapeless and good.needs_shape:
         must = f"must not need the curvature of a shell {shapeless}: take law.on_plane(radius)"
         raise InvalidParameter("law", good, must)

@@ -240,6 +240,16 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
                     f"{_text(after)} m: there the nearest point of '{self.shell.name}' is on "
                     "another side: give points of the path on the surface in between"
                 )
+        away = float(
+            np.linalg.norm(self._off_target(scene, curve, curve.at(np.zeros(1))[0], 0.0, q0))
+        )
+        pull = away * self.stiffness
+        if self.normal_force and pull > self.normal_force:
+            said.append(
+                f"the controller's path begins {away:.3g} m from the tip, which its spring pulls "
+                f"there with {pull:.3g} N at once, more than normal_force = {self.normal_force:g} "
+                "N: begin the path under the tip, or start with the tip on the path"
+            )
         if len(curve.tangents):
             pieces = [
                 (curve.speed_limit(a, b, self.speed, self.acceleration), b - a)
@@ -275,25 +285,33 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
 
     def _nearest_to_target(self, scene: Scene, result: Result) -> float:
         """Return the smallest distance [m] of the moved point from the target over the rows."""
-        model, data = scene.model, scene.model.createData()
-        name, placement = self._shell_place(scene)
-        carrier, frame = find_frame(model, name), find_frame(model, self.frame)
         (curve, timing), nearest = self._motion(), np.inf
         some = slice(None, None, -(-len(result.t) // _MOST_ROWS))
         places = timing.at(result.t[some])
         targets = zip(places, curve.at(places), strict=True)
         for (place, target), q in zip(targets, result.q[some], strict=True):
-            pin.framesForwardKinematics(model, data, q)
-            at = (data.oMf[carrier] * placement).actInv(
-                data.oMf[frame].act(np.array(self.offset, dtype=float))
-            )
-            away = at - target
-            if self.normal_force:
-                k = min(int(np.searchsorted(curve.along, place)), len(curve.normals) - 1)
-                normal = curve.normals[k]
-                away = away - normal * (normal @ away)
+            away = self._off_target(scene, curve, target, place, q)
             nearest = min(nearest, float(np.linalg.norm(away)))
         return nearest
+
+    def _off_target(
+        self, scene: Scene, curve: Curve, target: Array, place: float, q: Array
+    ) -> Array:
+        """Return the moved point from a `target` at `place` [m] of the curve (3,) [m].
+
+        A controller that presses leaves out what is along the surface's normal.
+        """
+        model, data = scene.model, scene.model.createData()
+        name, placement = self._shell_place(scene)
+        pin.framesForwardKinematics(model, data, q)
+        at = (data.oMf[find_frame(model, name)] * placement).actInv(
+            data.oMf[find_frame(model, self.frame)].act(np.array(self.offset, dtype=float))
+        )
+        away: Array = at - target
+        if self.normal_force:
+            k = min(int(np.searchsorted(curve.along, place)), len(curve.normals) - 1)
+            away = away - curve.normals[k] * (curve.normals[k] @ away)
+        return away
 
     def duration(self) -> float:
         """Return the time [s] at which the target reaches the last point."""

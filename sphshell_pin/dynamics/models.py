@@ -144,15 +144,26 @@ def _check_joint_frame(model: pin.Model, name: str, joint: int) -> None:
 
 
 def unit_warning(model: pin.Model, radius: float, shell_size: float) -> str | None:
-    """Tell, in a sentence, that a shell is suspiciously large for its sphere or the robot.
+    """Tell, in a sentence, that a sphere, or the shell for it, is too large for the robot.
 
     `radius` [m] of the sphere, `shell_size` [m] the shell's box diagonal; None if all is well.
     """
+    too_large = radius_fault(model, radius)
+    if too_large:
+        return f"the sphere's radius = {radius:g} {too_large}"
     for reference, what in ((radius, "sphere's radius"), (model_reach(model), "robot's reach")):
         sentence = size_warning(shell_size, reference, what)
         if sentence:
             return sentence
     return None
+
+
+def radius_fault(model: pin.Model, radius: float) -> str | None:
+    """Tell that the `radius` [m] of a sphere is more than the robot's reach; None if it is not."""
+    reach = model_reach(model)
+    if not 0 < reach < radius:
+        return None
+    return f"[m] is more than the robot's reach, {reach:.3g} m: is it in mm?"
 
 
 def model_reach(model: pin.Model) -> float:

@@ -80,9 +80,13 @@ def named(spheres: Iterable[Sphere], name: str) -> Iterator[tuple[Sphere, str]]:
 
 
 def warn_of_size(model: pin.Model, pair: ContactPair) -> None:
-    """Warn of a shell that is suspiciously large for its sphere or the robot."""
+    """Warn of a sphere or a shell that is suspiciously large."""
     if pair.sphere is None or pair.shell is None:
         return
     suspicion = unit_warning(model, pair.sphere.radius, pair.shell.size)
     if suspicion:
-        warnings.warn(f"shell '{pair.shell.name}': {suspicion}", UnitWarning, stacklevel=3)
+        warnings.warn(
+            f"contact '{pair.name}', shell '{pair.shell.name}': {suspicion}",
+            UnitWarning,
+            stacklevel=3,
+        )

@@ -147,7 +147,7 @@ def origin(section: RobotSection) -> tuple[object, ...]:
         tuple(section.xacro_args.items()),
         section.srdf,
         section.pose,
-        section.free_flyer,
+        section.floats,
         section.mimic,
     )
 
@@ -182,7 +182,7 @@ def _load(section: RobotSection, path: Path) -> LoadedRobot:
     return load_file(
         folder / file,
         [folder / one for one in section.package_dirs],
-        free_flyer=section.free_flyer,
+        free_flyer=section.floats,
         mimic=section.mimic,
         name=Path(file).name.partition(".")[0],
         xacro_args=section.xacro_args,

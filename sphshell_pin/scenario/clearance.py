@@ -11,14 +11,11 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.dynamics.models import find_frame, held_joints
-from sphshell_pin.scenario.tips import Tip
+from sphshell_pin.scenario.tips import AT_TIP, Tip
 from sphshell_pin.shell.shell import Shell
 
 Array = npt.NDArray[np.float64]
 
-# Of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's place, as
-# meshes of fingertips stand out of the spheres that stand for them.
-_AT_TIP = 1.5
 # Contacts of the tip's own link that are looked at.
 _MOST_CONTACTS = 1000
 
@@ -106,7 +103,7 @@ class Links:
         for contact in result.getContacts():
             point = np.array(contact.pos)
             away = [float(np.linalg.norm(point - c)) / radius for c, radius in spheres]
-            if not away or min(away) > _AT_TIP:
+            if not away or min(away) > AT_TIP:
                 return point
         return None
 

@@ -45,6 +45,7 @@ urdf = {robot.urdf!o}
 file = {robot.file!o}
 package_dirs = {robot.package_dirs!o}
 xacro_args = {robot.xacro_args!o}
+base = {robot.base!o} # the root link
 free_flyer = {robot.free_flyer!o} # the root link floats
 # They do not move the tip: locked, they cost nothing.
 lock = {robot.lock!o}
@@ -195,7 +196,7 @@ def draft_text(
             sphere["offset"] = _rounded(tip.offset, digits)
         text += _fill(_CONTACT, pair=pair, sphere=sphere, shell=shell, tip=tip, plan=plan)
         materials = f"{plan.contact.material.name} on {plan.contact.against.name}"
-        friction = {"materials": materials, "v_dynamic": 10 * plan.contact.v_static}
+        friction = {"materials": materials, "v_dynamic": float(f"{10 * plan.contact.v_static:.2g}")}
         template = _COULOMB if plan.contact.bristle is None else _BRISTLE
         text += _fill(template, contact=plan.contact, **friction)
     control, mean_force = plan.control, None

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.contact.materials import Material, friction_between
 from sphshell_pin.dynamics.mimic import mimics
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, end_spheres
@@ -19,7 +20,6 @@ from sphshell_pin.scenario.clearance import Links, SelfContact
 from sphshell_pin.scenario.figures import judge
 from sphshell_pin.scenario.grasp import Grasp, Hand, grasps
 from sphshell_pin.scenario.hand_text import DURATION, GAP, HandDraft
-from sphshell_pin.scenario.materials import Material, friction_between
 from sphshell_pin.scenario.part import Part, part_file
 from sphshell_pin.scenario.plan import GRAVITY
 from sphshell_pin.scenario.run import simulate
@@ -91,7 +91,7 @@ def hold_in_hand(
     """
     model = built.assembly.model
     if floats(model):
-        raise SphshellError("a hand with a free root cannot hold a part: leave out --free-flyer")
+        raise SphshellError("a hand with a free root cannot hold a part: leave out --base")
     (shell,) = built.shells.values()
     part = Part.of(shell, materials[1])
     hand = Hand(model, tips)

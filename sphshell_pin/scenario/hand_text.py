@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.contact.materials import Material, friction_between, restitution_between
 from sphshell_pin.dynamics.joints import JointIngredients
 from sphshell_pin.scenario.bodies import joint_spans
 from sphshell_pin.scenario.grasp import Grasp, Hand
-from sphshell_pin.scenario.materials import Material, friction_between, restitution_between
 from sphshell_pin.scenario.part import Part, part_file
 from sphshell_pin.scenario.plan import bearable, hertz_stiffness
 from sphshell_pin.scenario.schema import RobotSection, ShellSection

@@ -196,7 +196,7 @@ def _robot(section: RobotSection, one: _Robot | None, kept: Kept) -> LoadedRobot
         one.file,
         places,
         one.q0,
-        free_flyer=section.free_flyer,
+        free_flyer=section.floats,
         mimic=section.mimic,
         name=called,
     )

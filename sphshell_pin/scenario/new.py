@@ -11,24 +11,25 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_positive, check_vector
-from sphshell_pin.dynamics.models import model_reach
+from sphshell_pin.contact.materials import find_material
+from sphshell_pin.dynamics.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import is_path
 from sphshell_pin.scenario.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.drafting import draft_text
 from sphshell_pin.scenario.hand import every_tip, hold_in_hand
 from sphshell_pin.scenario.knobs import check_knobs
-from sphshell_pin.scenario.materials import find_material
 from sphshell_pin.scenario.part import part_file, word_primitive
 from sphshell_pin.scenario.plan import Hold, Plan, Press
 from sphshell_pin.scenario.primitives import Ball, Box, Cylinder, HalfSpace, Primitive
 from sphshell_pin.scenario.reading import parse_scenario
 from sphshell_pin.scenario.schema import RobotSection, RunSection, Scenario, ShellSection
 from sphshell_pin.scenario.search import PLACES, Request, find_working, sphere_centers
-from sphshell_pin.scenario.tips import Tip, find_tips
+from sphshell_pin.scenario.tips import Tip, find_tips, floats
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.explain import Explanation
@@ -72,7 +73,7 @@ def new_scenario(
     press: float | None = None,
     place: str | None = None,
     tips: Literal["one", "all"] = "one",
-    free_flyer: bool = False,
+    base: Literal["fixed", "floating"] | None = None,
     package_dirs: Sequence[str | PathLike[str]] = (),
     xacro_args: Mapping[str, str] | None = None,
     out: str | PathLike[str] | None = None,
@@ -87,8 +88,10 @@ def new_scenario(
     ----------
     robot
         Name of a shipped robot, or path of a URDF, xacro (`xacro_args`: its arguments) or MJCF file
-        (`free_flyer`: the root of a URDF floats; `package_dirs`: folders above the packages of its
-        meshes).
+        (`package_dirs`: folders above the packages of its meshes).
+    base
+        "fixed" or "floating"; by default as the file states it, but a single limb on a free base is
+        an arm, which is fixed.
     surface
         A surface file, its `unit` where the format has none, or a word of WORDS.
     bodies, faces
@@ -133,24 +136,20 @@ def new_scenario(
     section = _robot_section(
         robot,
         path,
-        free_flyer=free_flyer,
+        base=base,
         package_dirs=package_dirs,
         xacro_args=xacro_args or {},
     )
     bare = _build_bare(section, path)
-    if not bare.assembly.model.nv and section.path is not None:
-        # A single body without a joint would be fixed to the world.
-        section = section.model_copy(update={"free_flyer": True})
+    shaped = None if base is not None or section.path is None else _base(bare.assembly.model)
+    if shaped is not None:
+        section = section.model_copy(update={"base": shaped})
         bare = _build_bare(section, path)
     loaded = bare.assembly.loaded[0]
-    reach = model_reach(bare.assembly.model)
-    if radius is not None and 0 < reach < radius:
-        raise InvalidParameter(
-            "radius", radius, f"[m] is more than the robot's reach, {reach:.3g} m: is it in mm?"
-        )
+    too_large = radius and radius_fault(bare.assembly.model, radius)
+    if radius and too_large:
+        raise InvalidParameter("radius", radius, too_large)
     center = None if offset is None else check_vector("offset", offset, 3, " [m]")
-    if center is not None and frame is None:
-        raise SphshellError("an offset is in a frame: state that with --frame")
     if tips == "all":
         found = every_tip(loaded, frame, radius, place)
     else:
@@ -191,7 +190,8 @@ def new_scenario(
     # What is written is what was built, and tried.
     text, built, plan = find_working(section, with_shell, found, request, draft)
     _write(path, text)
-    why = (*plan.why, _materials_note(plan))
+    of_base = () if shaped is None else (f"the base is {shaped}, by the robot's shape: or --base",)
+    why = (*of_base, *plan.why, _materials_note(plan))
     return NewScenario(path, text, built, explain_built(built), why)
 
 
@@ -242,15 +242,15 @@ def _robot_section(
     robot: str | PathLike[str],
     path: Path,
     *,
-    free_flyer: bool,
+    base: Literal["fixed", "floating"] | None,
     package_dirs: Sequence[str | PathLike[str]],
     xacro_args: Mapping[str, str],
 ) -> RobotSection:
     file = Path(robot)
     if not is_path(robot):
-        if free_flyer or package_dirs or xacro_args:
+        if base or package_dirs or xacro_args:
             raise SphshellError(
-                f"a free root, mesh folders and xacro arguments belong to a file, not to {robot}"
+                f"a base, mesh folders and xacro arguments belong to a file, not to {robot}"
             )
         return RobotSection(name=str(robot))
     place, is_urdf = _relative(file, path), file.suffix.lower() == ".urdf"
@@ -259,8 +259,19 @@ def _robot_section(
         file=None if is_urdf else place,
         package_dirs=[_relative(Path(one), path) for one in package_dirs],
         xacro_args=dict(xacro_args),
-        free_flyer=free_flyer,
+        base=base,
     )
+
+
+def _base(model: pin.Model) -> Literal["fixed", "floating"] | None:
+    """Return what the base has to be by the robot's shape; None: what its file states will do.
+
+    A single body floats, a single limb is an arm.
+    """
+    if not model.nv:
+        return "floating"
+    limbs = sum(int(parent) == 1 for parent in model.parents)
+    return "fixed" if floats(model) and limbs == 1 else None
 
 
 def _relative(file: Path, path: Path) -> str:

@@ -11,9 +11,9 @@ import numpy.typing as npt
 import pinocchio as pin
 import trimesh
 
+from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot, load_file
-from sphshell_pin.scenario.materials import Material
 from sphshell_pin.scenario.plan import GRAVITY
 from sphshell_pin.scenario.primitives import Ball, Box, Cylinder, Primitive
 from sphshell_pin.shell.shell import Shell

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.contact.materials import Material, friction_between, restitution_between
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.materials import Material, friction_between, restitution_between
 from sphshell_pin.scenario.poses import Stance
 from sphshell_pin.scenario.tips import Tip
 from sphshell_pin.scenario.touch_points import (

@@ -67,6 +67,7 @@ class RobotSection(Section):
     xacro_args: dict[str, bool | int | float | str] = {}
     srdf: str | None = None
     pose: str | None = None
+    base: Literal["fixed", "floating"] | None = None
     free_flyer: bool = False
     mimic: bool = True
     label: str | None = None
@@ -86,16 +87,23 @@ class RobotSection(Section):
                 "give either name (a shipped robot) or file (a URDF, xacro or MJCF; urdf is the "
                 "same key), not both"
             )
-        of_files = ("package_dirs", "xacro_args", "srdf", "free_flyer")
+        of_files = ("package_dirs", "xacro_args", "srdf", "base", "free_flyer")
         beside = [key for key in of_files if getattr(self, key)]
         if self.name is not None and beside:
             raise ValueError(f"{' and '.join(beside)} belong to a file; drop them beside name")
+        if self.free_flyer and self.base is not None:
+            raise ValueError('free_flyer = true is base = "floating": state base alone')
         return self
 
     @property
     def path(self) -> str | None:
         """The robot's file, or None for a shipped robot."""
         return self.file if self.file is not None else self.urdf
+
+    @property
+    def floats(self) -> bool | None:
+        """Whether the base floats; None: as the file states it."""
+        return True if self.free_flyer else None if self.base is None else self.base == "floating"
 
 
 class ShellSection(Section):

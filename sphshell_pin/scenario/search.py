@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from sphshell_pin.contact.materials import Material, find_material
 from sphshell_pin.dynamics.joints import JointIngredients
 from sphshell_pin.dynamics.models import find_frame
 from sphshell_pin.errors import SphshellError
@@ -18,7 +19,6 @@ from sphshell_pin.robots import WORKING
 from sphshell_pin.scenario.bodies import joint_spans
 from sphshell_pin.scenario.build import Built
 from sphshell_pin.scenario.clearance import Links, SelfContact
-from sphshell_pin.scenario.materials import Material, find_material
 from sphshell_pin.scenario.plan import (
     GRAVITY,
     Plan,
@@ -251,7 +251,10 @@ def _repairs(plan: Plan, fault: Fault) -> list[Plan]:
         repairs.append(replace(plan, control=loose, repair="loose"))
     stays = replace(control, path=control.path[:1], lead_in=_CALM_LEAD_IN)
     duration = _CALM_LEAD_IN + 0.5
-    return [*repairs, replace(plan, control=stays, duration=duration, repair="stays")]
+    why = plan.why
+    if len(control.path) > 1:
+        why = (*why, f"the tip presses in one place and does not slide: with a path {fault.text}")
+    return [*repairs, replace(plan, control=stays, duration=duration, repair="stays", why=why)]
 
 
 def _drop(

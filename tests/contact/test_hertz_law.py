@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -325,3 +327,31 @@ def test_ellipse_and_pressure_are_recorded(name, share) -> None:
         direction = surface.point(u, v + 1e-6) - x  # along the meridian or the axis
         axis = patch["axis_world"] @ direction / np.linalg.norm(direction)
         assert min(abs(abs(axis) - 1), abs(axis)) < 1e-3
+
+
+def test_names_of_materials_stand_for_their_values() -> None:
+    steel, rubber = sp.MATERIALS["steel"], sp.MATERIALS["rubber"]
+    numbers = (rubber.young, rubber.poisson, steel.young, steel.poisson)
+    assert sp.HertzLaw("rubber", "steel") == sp.HertzLaw(*numbers, restitution=0.7, speed=1.0)
+    damped = sp.HertzLaw("rubber", "steel", loss_tangent=0.1, frequency=10.0)
+    assert damped == sp.HertzLaw(*numbers, loss_tangent=0.1, frequency=10.0)
+    coefficients = (rubber.friction, rubber.friction * rubber.slip)
+    assert sp.CoulombFriction("rubber", "steel") == sp.CoulombFriction(*coefficients)
+    bristle = sp.BristleFriction("rubber", "steel", stiffness=1e4)
+    assert bristle == sp.BristleFriction(*coefficients, 1e4)
+    mindlin = sp.BristleFriction.mindlin("rubber", "steel")
+    assert mindlin == sp.BristleFriction.mindlin(*coefficients, *numbers)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("steel", "gum"), "no material 'gum'; the table has: steel, "),
+        (("steel", 0.3), "young = 'steel' must be a number"),
+        ((2.1e11, "rubber"), "poisson = 'rubber' must be a number"),
+        (("steel", "rubber", 1e7, 0.4), "young_2 = 10000000.0 must be left out where materials"),
+    ],
+)
+def test_names_and_numbers_do_not_mix(arguments, message) -> None:
+    with pytest.raises(sp.SphshellError, match=re.escape(message)):
+        sp.HertzLaw(*arguments)

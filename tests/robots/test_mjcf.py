@@ -199,9 +199,53 @@ def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, inside, head, words
         robots.load_file(written(tmp_path, inside, head))
 
 
-def test_a_free_body_is_stated_in_the_file():
-    with pytest.raises(robots.RobotError, match="<freejoint/>"):
+LIMB = """<mujoco><compiler angle="radian"/><worldbody>
+<body name="base" pos="0 0 0.5">{free}<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+  <body name="link" pos="0.1 0 0"><joint name="turn" axis="0 1 0"/>
+  <inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></body></worldbody>
+<keyframe><key name="home" qpos="{place} 0.3"/></keyframe></mujoco>"""
+
+
+def test_a_base_is_freed_and_fixed(tmp_path):
+    """As in a file that states it so; keys keep the joints' own numbers."""
+    free, fixed = tmp_path / "free.xml", tmp_path / "fixed.xml"
+    free.write_text(LIMB.format(free="<freejoint/>", place="0 0 0.5 1 0 0 0"))
+    fixed.write_text(LIMB.format(free="", place=""))
+    for floats, as_stated, other in ((True, free, fixed), (False, fixed, free)):
+        told = robots.load_file(as_stated, pose="home")
+        for file in (as_stated, other):
+            made = robots.load_file(file, free_flyer=floats, pose="home")
+            assert made.model.nv == told.model.nv == (7 if floats else 1)
+            np.testing.assert_allclose(made.q0, told.q0)
+            np.testing.assert_allclose(
+                made.model.jointPlacements[-1].homogeneous,
+                told.model.jointPlacements[-1].homogeneous,
+            )
+    with pytest.raises(robots.RobotError, match="has a joint already: it cannot float"):
         robots.load_file(FOLDER / "hinge.xml", free_flyer=True)
+
+
+def test_an_open_mesh_weighs_as_its_hull_and_nothing_where_nothing_moves(tmp_path):
+    """An open box: its hull is the whole one. The world's part needs no mass at all."""
+    import trimesh
+
+    box = trimesh.creation.box((0.1, 0.2, 0.3))
+    box.update_faces(np.arange(12) > 1)
+    box.export(tmp_path / "open.stl")
+    text = """<mujoco><asset><mesh name="open" file="open.stl"/></asset><worldbody>
+      <body name="base"><geom type="mesh" mesh="open"/>
+        <body name="link"><joint name="turn" axis="0 1 0"/>{geom}
+        <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></body></worldbody></mujoco>"""
+    (tmp_path / "a.xml").write_text(text.format(geom=""))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert robots.load_file(tmp_path / "a.xml").model.inertias[1].mass == 1.0
+    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    geom = '<geom type="mesh" mesh="open"/>'
+    (tmp_path / "b.xml").write_text(text.format(geom=geom).replace(inertial, ""))
+    with pytest.warns(RobotWarning, match="not closed are those of their convex hulls: 'open'"):
+        model = robots.load_file(tmp_path / "b.xml").model
+    assert model.inertias[1].mass == pytest.approx(1000 * 0.1 * 0.2 * 0.3)
 
 
 def test_meshes_of_mjcf(tmp_path):

@@ -54,6 +54,15 @@ def test_a_path_that_is_off_the_part(scenario):
         built.simulation.run(built.q0, None, 0.01, built.controller)
 
 
+def test_a_path_that_begins_beside_the_tip(scenario):
+    """Its spring pulls with the distance times the stiffness, from the first step on."""
+    control = build(scenario).scenario.controller
+    beside = [control.path[0][0] + 0.03, *control.path[0][1:]]
+    (said,) = told(scenario, {"controller.path": str([beside])})
+    assert "the controller's path begins 0.03 m from the tip" in said
+    assert f"with {0.03 * control.stiffness:.3g} N at once" in said
+
+
 def test_a_start_beyond_a_limit(scenario):
     model = build(scenario).scene.model
     name, high = model.names[1], model.upperPositionLimit[0]

@@ -8,12 +8,12 @@ import pytest
 from scipy.optimize import nnls
 
 from sphshell_pin import robots
+from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import ScenarioError, SphshellError
 from sphshell_pin.scenario import build, judge
 from sphshell_pin.scenario.balance import least_friction, nonnegative
 from sphshell_pin.scenario.grasp import Grasp, Hand
 from sphshell_pin.scenario.hand_text import GAP
-from sphshell_pin.scenario.materials import find_material
 from sphshell_pin.scenario.new import new_scenario
 from sphshell_pin.scenario.part import Part
 from sphshell_pin.scenario.primitives import Box, Cylinder

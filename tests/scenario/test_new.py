@@ -198,7 +198,8 @@ def test_the_same_question_has_the_same_answer(tmp_path):
 def test_a_single_body_of_ones_own_floats(tmp_path):
     shutil.copy(robots.URDF_FOLDER / "ball.urdf", tmp_path / "mine.urdf")
     made = new_scenario(tmp_path / "mine.urdf", "plane", out=tmp_path / "a.toml")
-    assert made.built.scenario.robot[0].free_flyer
+    assert made.built.scenario.robot[0].base == "floating"
+    assert any("the base is floating" in one for one in made.why)
     assert made.built.scene.model.nv == 6
     assert made.built.q0[2] == pytest.approx(0.012 + 2 * 0.012, rel=1e-3)
 
@@ -229,6 +230,15 @@ def test_materials_give_hertzs_law(tmp_path):
         "ball", "plane", material="rubber", against="aluminium", out=tmp_path / "b.toml"
     )
     assert turned.built.scene.pairs[0].friction == pair.friction
+
+
+def test_each_value_has_its_digits_and_each_sphere_its_reason(tmp_path):
+    made = new_scenario(arm_urdf(tmp_path), "plane", radius=0.009, out=tmp_path / "a.toml")
+    assert tomllib.loads(made.text)["contact"][0]["friction"]["v_dynamic"] == 0.027
+    assert any("on frame 'link_5': the only end of the robot" in one for one in made.why)
+    named = {"frame": "link_5", "radius": 0.009, "force": True}
+    made = new_scenario(arm_urdf(tmp_path), "plane", out=tmp_path / "a.toml", **named)
+    assert any("on frame 'link_5': as it was asked for" in one for one in made.why)
 
 
 def test_the_ball_comes_back_as_high_as_its_material_says(tmp_path):
@@ -266,8 +276,7 @@ def test_its_knobs_turn(tmp_path):
         (("ball",), {"material": "iron"}, NameNotFound, "steel, aluminium"),
         (("ball",), {"against": "iron"}, NameNotFound, "steel, aluminium"),
         (("ball",), {"place": "left"}, NameNotFound, "below, above"),
-        (("ball",), {"free_flyer": True}, SphshellError, "belong to a file, not to ball"),
-        (("turntable",), {}, SphshellError, "--radius 0.012"),
+        (("ball",), {"base": "fixed"}, SphshellError, "belong to a file, not to ball"),
         (("ball", BLADE), {"unit": "um"}, SphshellError, "less than the sphere's radius"),
         (("gear_pair",), {}, SphshellError, "one of gear_1, gear_2"),
         (("three_link_finger",), {"press": 1e4}, SphshellError, "allow a push of"),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import coal
@@ -17,7 +19,7 @@ from sphshell_pin.scenario import build, judge, shipped_scenarios
 from sphshell_pin.scenario.clearance import Links
 from sphshell_pin.scenario.new import new_scenario
 from sphshell_pin.scenario.run import simulate
-from sphshell_pin.scenario.tips import Tip
+from sphshell_pin.scenario.tips import Tip, find_tips
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"
@@ -106,8 +108,6 @@ REFUSED = [
     ("three_link_finger", "plane", {"place": "+y"}, r"cannot move along \+y in any posture"),
     (PROBE, "plane", {"press": 1e3}, r"effort limits allow a push of [\d.]+ N along"),
     (PROBE, "plane", {"press": 50.0, "material": "silicone"}, "by more than half of it"),
-    # A small sphere in the middle of the wider end of a link.
-    (PROBE, "plane", {"frame": "joint_5", "radius": 0.002}, r"link_5' (would be|is) in the part"),
 ]
 
 
@@ -188,5 +188,40 @@ def test_a_sphere_is_put_where_it_is_asked_for(tmp_path):
     (pair,) = made.built.scene.pairs
     assert pair.sphere.radius == 0.008
     np.testing.assert_allclose(pair.sphere.offset, offset)
-    with pytest.raises(SphshellError, match="--frame"):
-        new_scenario(PROBE, offset=offset, out=tmp_path / "b.toml")
+    made = new_scenario(PROBE, offset=offset, radius=0.008, out=tmp_path / "b.toml")
+    assert made.built.scene.pairs[0].sphere == pair.sphere
+
+
+def test_a_round_end_is_the_sphere_and_a_flat_one_gets_a_ball():
+    """A capsule ends in its own half ball; on a cylinder's end stands a ball, in its middle."""
+    robot = robots.load_urdf(PROBE)
+    for shape, radius in ((coal.Capsule(0.02, 0.1), 0.02), (coal.Cylinder(0.03, 0.1), None)):
+        geometry = pin.GeometryModel()
+        link = robot.model.getFrameId("link_5")
+        frame = robot.model.frames[link]
+        at = frame.placement * pin.SE3(np.eye(3), np.array([0, 0, 0.05]))
+        geometry.addGeometryObject(pin.GeometryObject("end", frame.parentJoint, link, at, shape))
+        (tip,) = find_tips(
+            replace(robot, collision_model=geometry), shipped=None, frame=None, radius=None
+        )
+        assert tip.offset[:2] == pytest.approx([0, 0], abs=1e-3)
+        if radius is not None:
+            assert tip.radius == pytest.approx(radius, rel=0.03)
+            assert tip.offset[2] == pytest.approx(0.1, abs=1e-3)
+            assert "covers the end of link 'link_5'" in tip.source
+        else:
+            assert tip.offset[2] == pytest.approx(0.1 + tip.radius, abs=1e-3)
+            assert "a ball on the end of link 'link_5'" in tip.source
+
+
+def test_a_sphere_inside_its_link_is_refused_before_any_search(tmp_path):
+    began = time.perf_counter()
+    with pytest.raises(SphshellError, match=r"inside link 'link_5', .* mm deep") as caught:
+        new_scenario(PROBE, frame="link_5", radius=0.002, out=tmp_path / "a.toml")
+    assert time.perf_counter() - began < 2.0
+    command = re.search(
+        r"--frame (\S+) --offset (\S+) (\S+) (\S+) --radius (\S+)", str(caught.value)
+    )
+    frame, *offset, radius = command.groups()
+    offset = [float(one) for one in offset]
+    new_scenario(PROBE, frame=frame, offset=offset, radius=float(radius), out=tmp_path / "a.toml")

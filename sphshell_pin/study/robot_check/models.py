@@ -57,13 +57,13 @@ def load_subject(
     """Load the robot of a name or a file without its meshes, or take a pinocchio.Model.
 
     Mimic joints are exact. Of collision geometry only the spheres are taken, which may be its
-    fingertips. `free_flyer` frees the root link of a URDF file; `package_dirs` and `xacro_args` are
+    fingertips. `free_flyer` frees the root link of a file; `package_dirs` and `xacro_args` are
     those of `robots.load_file`. Raises NameNotFound, and RobotError for a description that cannot
     be read.
     """
     if isinstance(robot, pin.Model):
         if free_flyer:
-            raise InvalidParameter("free_flyer", free_flyer, "is for URDF files: the model is made")
+            raise InvalidParameter("free_flyer", free_flyer, "is for files: the model is made")
         bare = pin.GeometryModel()
         name = robot.name or "model"
         return Subject(name, robots.LoadedRobot(name, robot, bare, bare, pin.neutral(robot)), None)
@@ -73,10 +73,10 @@ def load_subject(
     check_known([robot])
     if robots.is_path(robot):
         file = Path(robot)
-        description = robots.read(file, package_dirs, xacro_args)
+        description = robots.read(file, package_dirs, xacro_args, free_flyer=free_flyer or None)
         return _without_meshes(description, file.stem, None, free_flyer=free_flyer)
     if free_flyer:
-        raise InvalidParameter("free_flyer", robot, "must be a URDF file: named robots know it")
+        raise InvalidParameter("free_flyer", robot, "must be a file: named robots know it")
     if robot in robots.OWN:
         description = robots.read(robots.URDF_FOLDER / f"{robot}.urdf")
         return _without_meshes(description, robot, robot, free_flyer=robots.OWN[robot])
