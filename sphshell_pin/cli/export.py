@@ -110,7 +110,7 @@ def nanoseconds(text: str) -> int:
     must = "must be seconds since 1970, or a date such as 2026-11-22T21:00:00Z"
     try:
         seconds = Decimal(text)
-        if seconds.is_finite() and abs(seconds) > 10**12:  # before it is written out in digits
+        if seconds.is_finite() and seconds.adjusted() > 12:  # before it is written out in digits
             raise InvalidParameter("--start", text, must)
         return round(seconds * 10**9)
     except InvalidParameter:
