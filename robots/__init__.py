@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -16,7 +17,7 @@ import pinocchio as pin
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.mimic import shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
-from sphshell_pin.robots.description import check_size
+from sphshell_pin.robots.description import check_poses, check_size, parsed
 from sphshell_pin.robots.files import (
     Description,
     RobotError,
@@ -286,8 +287,11 @@ def _load_poses(model: pin.Model, srdf: str | PathLike[str] | None) -> None:
     if not os.path.isfile(srdf):
         raise RobotError(f"{srdf}: no such SRDF file")
     try:
-        check_size(Path(srdf).read_bytes())
-        pin.loadReferenceConfigurations(model, str(srdf), False)
+        text = Path(srdf).read_bytes()
+        check_size(text)
+        root = parsed(text)
+        check_poses(root, model)
+        pin.loadReferenceConfigurationsFromXML(model, ET.tostring(root, encoding="unicode"), False)
     except (ValueError, RuntimeError, OSError) as error:
         raise RobotError(f"{srdf}: not an SRDF that pinocchio can read: {error}") from None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from xml.parsers import expat
@@ -41,6 +42,36 @@ def parsed(text: bytes) -> ET.Element:
         return ET.fromstring(text)
     except ET.ParseError as error:
         raise ValueError(f"it is not well-formed XML: {error}") from None
+
+
+def check_poses(root: ET.Element, model: pin.Model) -> None:
+    """Raise ValueError for what pinocchio would leave out of the poses of an SRDF.
+
+    Values are written anew, as its reader takes less for a number than Python.
+    """
+    for pose in root.findall("group_state"):
+        for one in pose.findall("joint"):
+            name, value = one.get("name", ""), one.get("value", "")
+            where = f"pose '{pose.get('name')}', joint '{name}'"
+            world = name == model.names[0]  # pinocchio's reader crashes at it
+            if model.existJointName(name) and not world:
+                joint = model.joints[model.getJointId(name)]
+                count = 1 if joint.nv == 1 else joint.nq  # of a continuous joint its angle
+            elif model.existFrame(name, pin.FrameType.FIXED_JOINT) and not world:
+                continue
+            else:
+                raise ValueError(
+                    f"{where}: the robot has no such joint; correct the name or leave it out"
+                )
+            try:
+                values = [float(part) for part in value.split()]
+            except ValueError:
+                values = []
+            if len(values) != count or not all(map(math.isfinite, values)):
+                raise ValueError(
+                    f"{where}: value '{value}' must be {count} finite number{'s' * (count > 1)}"
+                )
+            one.set("value", " ".join(map(repr, values)))
 
 
 def check_size(text: bytes) -> str:

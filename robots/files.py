@@ -325,8 +325,13 @@ def _check_tree(root: ET.Element) -> None:
     links = {link.get("name") for link in root.findall("link")}
     for joint in root.findall("joint"):
         for end in ("parent", "child"):
-            element = joint.find(end)
-            link = None if element is None else element.get("link")
+            elements = joint.findall(end)
+            if len(elements) > 1:
+                # Of several, readers take different ones: what was checked would not be read.
+                raise ValueError(
+                    f"joint '{joint.get('name')}' has {len(elements)} <{end}> elements: leave one"
+                )
+            link = elements[0].get("link") if elements else None
             if link is not None and link not in links:
                 raise ValueError(
                     f"joint '{joint.get('name')}' has the {end} '{link}', but there is no such link"

@@ -17,6 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.mimic import Mimic
+from sphshell_pin.robots.description import MOST_LINKS
 from sphshell_pin.robots.mjcf_geoms import Meshes, geom_inertia, plain_geom, plain_place
 from sphshell_pin.robots.mjcf_values import (
     add_inertial,
@@ -37,6 +38,7 @@ Array = NDArray[np.float64]
 _SCALARS = ("damping", "frictionloss", "armature", "stiffness")
 # What makes bodies that this reader does not make.
 _UNKNOWN = ("composite", "flexcomp", "replicate", "attach", "deformable", "flex", "plugin")
+_MOST_JOINTS = 6  # of a body; each becomes a body in the plain form, inside that of the one before
 _COUNT = {"free": 7, "ball": 4, "slide": 1, "hinge": 1}
 
 
@@ -137,9 +139,12 @@ class _Reader:
     def __init__(self, root: ET.Element, folders: Folders, *, floats: bool | None) -> None:
         file = folders.file
         if folders.kept is None:
-            include(root, file, [file.resolve()])
+            include(root, [file.resolve()])
         elif root.find(".//include") is not None:
             raise ValueError("it includes other files")
+        links = sum(1 for _ in root.iter("body"))
+        if links > MOST_LINKS:
+            raise ValueError(f"it has {links} links; at most {MOST_LINKS} can be read")
         if floats is not None:
             _set_base(root, floats=floats)
         for tag in _UNKNOWN:
@@ -248,6 +253,10 @@ class _Reader:
         place = pose * self._pose(body.attrib)
         parts = list(self._inside(body, pin.SE3.Identity(), childclass))
         joints = [part for part in parts if part[0].tag in ("joint", "freejoint")]
+        if len(joints) > _MOST_JOINTS:
+            raise ValueError(
+                f"body '{name}' has {len(joints)} joints, MuJoCo takes at most {_MOST_JOINTS}"
+            )
         here = into
         for k, (joint, at, cls) in enumerate(joints):
             made = self._joint(joint, at, cls, name, k)

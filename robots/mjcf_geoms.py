@@ -76,8 +76,9 @@ class Meshes:
         why = f"the mass of body '{body}' would be that of mesh '{name}', "
         try:
             mesh = trimesh.load(path, force="mesh")
-        except (OSError, ValueError, NotImplementedError) as error:
-            raise ValueError(f"{why}which cannot be read ({error}): state <inertial>") from None
+        except Exception as error:  # of the readers of many formats, and of packages not there
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise ValueError(f"{why}which cannot be read ({reason}): state <inertial>") from None
         mesh.apply_scale(scale)
         mesh.merge_vertices()
         kind = self._kinds[name]

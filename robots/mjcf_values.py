@@ -11,9 +11,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.robots.description import check_size, parsed
+from sphshell_pin.robots.description import DEEPEST, check_size, parsed
 
 Array = NDArray[np.float64]
+
+MOST_FILES = 1000
+"""Files that an MJCF may include, one as often as it is named."""
+
+MOST_INCLUDED = 64e6
+"""What they may have in all [B]."""
 
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
 
@@ -73,12 +79,20 @@ def rotation(stated: Mapping[str, str], compiler: Mapping[str, str]) -> Array:
     return np.eye(3)
 
 
-def include(element: ET.Element, file: Path, open_files: list[Path]) -> None:
-    """Put the content of included files in the place of <include>."""
+def include(
+    element: ET.Element, open_files: list[Path], sizes: list[int] | None = None, deep: int = 1
+) -> None:
+    """Put the content of included files in the place of <include>; `sizes` are theirs so far [B].
+
+    The limits hold in total: of small files that include others twice, the whole doubles each time.
+    """
+    sizes = [] if sizes is None else sizes
+    if deep > DEEPEST or len(open_files) > DEEPEST:
+        raise ValueError(f"its elements or included files are nested more than {DEEPEST} deep")
     for k in range(len(element) - 1, -1, -1):
         one = element[k]
         if one.tag != "include":
-            include(one, file, open_files)
+            include(one, open_files, sizes, deep + 1)
             continue
         stated = one.get("file", "")
         places = [open_files[0].parent / stated, open_files[-1].parent / stated]
@@ -88,9 +102,15 @@ def include(element: ET.Element, file: Path, open_files: list[Path]) -> None:
         if found.resolve() in open_files:
             raise ValueError(f"it includes {stated}, which includes itself")
         text = found.read_bytes()
+        sizes.append(len(text))
+        if len(sizes) > MOST_FILES or sum(sizes) > MOST_INCLUDED:
+            raise ValueError(
+                f"it includes more than {MOST_FILES} files or {MOST_INCLUDED * 1e-6:g} MB in all, "
+                "repeats counted: write each part once"
+            )
         check_size(text)
         root = parsed(text)
-        include(root, file, [*open_files, found.resolve()])
+        include(root, [*open_files, found.resolve()], sizes, deep)
         element[k : k + 1] = list(root)
 
 

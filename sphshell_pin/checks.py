@@ -90,8 +90,10 @@ def check_each_positive(name: str, value: ArrayLike, count: int, unit: str = "")
 def as_floats(value: object) -> Array:
     """Return a copy of `value` as an array of float64.
 
-    TypeError for truth values, texts and complex numbers, which numpy would take.
+    TypeError for truth values, texts, complex numbers and masked ones, which numpy would take.
     """
+    if np.ma.is_masked(value):
+        raise TypeError("a masked array has numbers that are to be left out")
     given = np.asarray(value)
     odd = given.dtype.kind not in "iufO"
     if odd or any(one is None or isinstance(one, bool | str) for one in _objects(given)):

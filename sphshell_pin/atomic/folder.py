@@ -25,6 +25,9 @@ from sphshell_pin.atomic.exchange import exchange
 from sphshell_pin.atomic.file import sync_file, sync_folder
 from sphshell_pin.atomic.lock import holder, lock_file, sign
 
+# End the names of a sweep's files that stay where they are: SQLite finds no moved file again.
+_OPEN = (".journal", ".journal-journal")
+
 # In the folder where the new ones are made: they, and the list written once all are complete.
 _FILES, _READY = "files", "ready.json"
 
@@ -115,9 +118,10 @@ class AtomicFolder:
 
         A reader sees all old files or all new ones at any time, and every other file, unless the
         folder cannot be exchanged: a mount point, the working directory, a folder whose parent
-        cannot be written, one with subfolders, or one on a file system without the exchange of
-        names or without hard links. There the files are replaced one by one, and `last` is missing
-        meanwhile; if the process is killed then, the next `AtomicFolder` completes the change.
+        cannot be written, one with subfolders or a sweep's journal, or one on a file system without
+        the exchange of names or without hard links. There the files are replaced one by one, and
+        `last` is missing meanwhile; if the process is killed then, the next `AtomicFolder`
+        completes the change.
 
         Raises
         ------
@@ -236,6 +240,8 @@ class AtomicFolder:
             if entry.name in ours:
                 continue
             copy = target / entry.name
+            if entry.name.endswith(_OPEN):
+                raise OSError(f"{entry.path} is written by a sweep")
             if not entry.is_dir(follow_symlinks=False):
                 os.link(entry, copy, follow_symlinks=False)
             elif source == self._folder and entry.name in self._inner:

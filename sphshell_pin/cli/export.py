@@ -107,14 +107,19 @@ def nanoseconds(text: str) -> int:
 
     from sphshell_pin.errors import InvalidParameter
 
+    must = "must be seconds since 1970, or a date such as 2026-11-22T21:00:00Z"
     try:
-        return round(Decimal(text) * 10**9)
+        seconds = Decimal(text)
+        if seconds.is_finite() and seconds.adjusted() > 12:  # before it is written out in digits
+            raise InvalidParameter("--start", text, must)
+        return round(seconds * 10**9)
+    except InvalidParameter:
+        raise
     except (InvalidOperation, OverflowError, ValueError):
         pass
     try:
         time = datetime.fromisoformat(text)
     except ValueError:
-        must = "must be seconds since 1970, or a date such as 2026-11-22T21:00:00Z"
         raise InvalidParameter("--start", text, must) from None
     since = (time if time.tzinfo else time.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
     return (since // timedelta(microseconds=1)) * 1000

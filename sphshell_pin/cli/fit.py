@@ -160,8 +160,8 @@ def _bar() -> Iterator[Callable[[int, float], object]]:
 def _write(
     found: Fit, path: Path, folder: Path, changes: dict[str, str], *, picture: bool
 ) -> list[Path]:
-    from sphshell_pin.atomic import write_whole
     from sphshell_pin.errors import MissingExtra, ScenarioError
+    from sphshell_pin.export.tables import write_folder
     from sphshell_pin.scenario.knobs import check_knobs
     from sphshell_pin.scenario.reading import read_scenario
 
@@ -174,8 +174,11 @@ def _write(
             made["fit.png"] = png(found.plot())
         except MissingExtra as missing:
             typer.echo(str(missing), err=True)
-    fitted = found.write_scenario(folder / f"{path.stem}.fitted.toml", changes)
-    files = [fitted, *(write_whole(folder / name, data) for name, data in made.items())]
+    name = f"{path.stem}.fitted.toml"
+    made = {name: found.scenario_text(folder, changes).encode(), **made}
+    # Never new values beside an old report.
+    files = write_folder(folder, made, ["fit.json", name, "fit.png"])
+    fitted = folder / name
     try:
         check_knobs(read_scenario(fitted), fitted, ranges=True)
     except ScenarioError as fault:

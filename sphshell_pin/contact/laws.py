@@ -53,7 +53,7 @@ class _PowerLaw(NormalLaw):
         power = self.exponent + 1
         # Integral of du / sqrt(1 - u^power) from 0 to 1.
         half = math.sqrt(math.pi) * math.gamma(1 + 1 / power) / math.gamma(0.5 + 1 / power)
-        return 2 * depth / speed * half
+        return 2 * depth / speed * half if speed > 0.0 else math.inf
 
     @property
     def _stiffness_text(self) -> str:

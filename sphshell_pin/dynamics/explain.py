@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -163,7 +164,11 @@ def _shortest_scale(scene: Scene, pairs: tuple[PairExplanation, ...]) -> float:
 
 
 def _recommended_dt(shortest: float) -> float:
-    return 1e-3 if math.isinf(shortest) else _round_down(shortest / STEPS_PER_SCALE)
+    return (
+        1e-3
+        if math.isinf(shortest)
+        else _round_down(max(shortest / STEPS_PER_SCALE, sys.float_info.min))
+    )
 
 
 # What a model may state of its joints, as a reader calls it.

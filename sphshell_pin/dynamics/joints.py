@@ -12,7 +12,13 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_not_negative, check_positive, check_type, check_vector
+from sphshell_pin.checks import (
+    as_floats,
+    check_not_negative,
+    check_positive,
+    check_type,
+    check_vector,
+)
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.contact.normal_law import NormalLaw, check_law
 from sphshell_pin.dynamics.models import find_joint
@@ -57,8 +63,11 @@ class JointLimits:
     def __post_init__(self) -> None:
         """Raise InvalidParameter for a law that is none, and for an empty range."""
         check_law(self.law, "at a joint's stop")
-        ends = np.asarray(self.lower, dtype=float), np.asarray(self.upper, dtype=float)
-        if not np.all(ends[0] < ends[1]):
+        try:
+            right = bool(np.all(as_floats(self.lower) < as_floats(self.upper)))
+        except (TypeError, ValueError, OverflowError):
+            right = False
+        if not right:
             raise InvalidParameter(
                 "lower, upper", (self.lower, self.upper), "must be a range: lower below upper"
             )

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin import _core
 from sphshell_pin.checks import check_name
 from sphshell_pin.dynamics.mimic import group_of, mimics
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
@@ -97,7 +98,7 @@ def check_model(model: pin.Model) -> None:
     """Raise InvalidParameter for a model that Pinocchio's algorithms would not survive.
 
     That is one whose joints are not in the order parents first, whose lists differ in length, or
-    whose inertias, placements or gravity are not finite.
+    whose inertias, placements or gravity are not finite, or whose joints have indices out of range.
     """
     count = int(model.njoints)
     for name in ("names", "joints", "parents", "inertias", "jointPlacements", "nqs", "nvs"):
@@ -128,6 +129,9 @@ def check_model(model: pin.Model) -> None:
             raise InvalidParameter(
                 f"model's frame '{frame.name}'", int(frame.parentJoint), "must be on a joint of it"
             )
+    fault = _core.model_fault(model)
+    if fault:
+        raise InvalidParameter("model", type(model).__name__, f"is damaged: {fault}")
 
 
 def _check_joint_frame(model: pin.Model, name: str, joint: int) -> None:

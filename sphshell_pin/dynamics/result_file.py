@@ -12,7 +12,7 @@ import math
 import os
 import warnings
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, fields
 from functools import partial
 from os import PathLike
@@ -38,9 +38,12 @@ if TYPE_CHECKING:
 
 LARGEST_HEADER = 1 << 26  # characters; a million events need less
 
+Kind = tuple[np.dtype[np.generic], tuple[str | int, ...]]
+_Announced = tuple[np.dtype[np.generic], tuple[int, ...]]
+
 FLOAT, INT, LONG, BYTE = (np.dtype(one) for one in ("f8", "i4", "i8", "u1"))
 
-ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
+ARRAYS: dict[str, Kind] = {
     "t": (FLOAT, ("n",)),
     "q": (FLOAT, ("n", "nq")),
     "v": (FLOAT, ("n", "nv")),
@@ -65,7 +68,7 @@ ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
 }
 """By name: the numbers of an array and its shape; a size of the same name is the same in all."""
 
-SENSOR_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
+SENSOR_ARRAYS: dict[str, Kind] = {
     "sensors.sensor": (INT, ("s",)),
     "sensors.t": (FLOAT, ("s",)),
     "sensors.sampled": (FLOAT, ("s",)),
@@ -73,7 +76,7 @@ SENSOR_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
 }
 """The same of a run with sensors; other files have none of them."""
 
-PATCH_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
+PATCH_ARRAYS: dict[str, Kind] = {
     "patches.half_axes": (FLOAT, ("m", 2)),
     "patches.axis_world": (FLOAT, ("m", 3)),
     "patches.peak_pressure": (FLOAT, ("m",)),
@@ -82,7 +85,7 @@ PATCH_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
 }
 """The same of a run that recorded patches."""
 
-SENSITIVITY_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
+SENSITIVITY_ARRAYS: dict[str, Kind] = {
     "sensitivities.q": (FLOAT, ("n", "nv", "p")),
     "sensitivities.v": (FLOAT, ("n", "nv", "p")),
     "sensitivities.force_world": (FLOAT, ("m", 3, "p")),
@@ -91,7 +94,7 @@ SENSITIVITY_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]
 }
 """The same of a run that recorded its derivatives; the header names their p columns."""
 
-TORQUE_ARRAYS: dict[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]] = {
+TORQUE_ARRAYS: dict[str, Kind] = {
     "torque": (FLOAT, ("n", "nv")),
 }
 """The same of a run that recorded the controller's torques."""
@@ -103,6 +106,10 @@ _OPTIONAL = SENSOR_ARRAYS | PATCH_ARRAYS | SENSITIVITY_ARRAYS | TORQUE_ARRAYS
 _IN_FILE = {name: name for name in ARRAYS | _OPTIONAL}
 _IN_FILE["contacts.contact_id"] = "contacts.number"
 _KEPT_KINDS = (FLOAT, INT, BYTE, np.dtype(bool))
+
+
+class _Fault(ValueError):
+    """What of a file, or of results that are to become one, is not as it must be."""
 
 
 class _Part(BaseModel):
@@ -189,10 +196,20 @@ def _origin_in_file(origin: Origin, home: Path) -> dict[str, object]:
 
 def _write(path: Path, header: Mapping[str, object], arrays: Columns) -> None:
     """Write a compressed .npz file, whole or not at all; ResultError where that fails."""
-    named = {_IN_FILE.get(name, name): array for name, array in arrays.items()}
-    named["header"] = np.array(json.dumps({"format": 1, **header}))
+    try:
+        text = json.dumps({"format": 1, **header})
+        whole = {"header": np.array(text)} | {name: np.asarray(a) for name, a in arrays.items()}
+        masked = [name for name, a in arrays.items() if np.ma.isMaskedArray(a)]
+        if masked:
+            raise _Fault(f"'{masked[0]}' is a masked array: fill it first")
+        # What load refuses is not written.
+        _check_kinds({name: (a.dtype, a.shape) for name, a in whole.items()}, _wanted(arrays))
+        _checked(text, {name: whole[name] for name in arrays})
+    except (_Fault, TypeError) as fault:  # the latter: json's
+        raise ResultError(path, f"cannot write the results: {fault}") from None
     try:
         with atomic_file(path) as stream:
+            named = {_IN_FILE.get(name, name): array for name, array in whole.items()}
             np.savez_compressed(stream, allow_pickle=False, **named)
     except OSError as error:
         raise ResultError(path, f"cannot write the results: {error.strerror}") from error
@@ -257,6 +274,8 @@ def _read_file(path: str | PathLike[str], max_size: float) -> tuple[Header, Colu
             return _read(path, archive, max_size)
     except ResultError:
         raise
+    except _Fault as fault:
+        raise ResultError(path, f"is not a file that Result.save wrote: {fault}") from None
     except OSError as error:
         raise ResultError(path, f"cannot read the results: {error.strerror or error}") from error
     except Exception as error:  # whatever a damaged archive makes zipfile and numpy raise
@@ -268,29 +287,17 @@ def _read(
     path: str | PathLike[str], archive: zipfile.ZipFile, max_size: float
 ) -> tuple[Header, Columns]:
     files = {one.filename: one for one in archive.infolist()}
-    shapes: dict[str, tuple[int, ...]] = {}
-    arrays_in = ARRAYS | (SENSOR_ARRAYS if "sensors.t.npy" in files else {})
-    arrays_in |= PATCH_ARRAYS if "patches.approach.npy" in files else {}
-    arrays_in |= TORQUE_ARRAYS if "torque.npy" in files else {}
-    arrays_in |= SENSITIVITY_ARRAYS if "sensitivities.q.npy" in files else {}
+    arrays_in = _wanted({name for name, part in _IN_FILE.items() if f"{part}.npy" in files})
     parts = {"header": "header.npy"} | {name: f"{_IN_FILE[name]}.npy" for name in arrays_in}
-    for name, part in parts.items():
-        if part not in files:
-            raise _refused(path, f"it has no array '{name}'")
-        kind, shapes[name] = _announced(path, archive, files[part], name)
-        if name == "header":
-            if kind.kind != "U" or shapes[name] != () or kind.itemsize > 4 * LARGEST_HEADER:
-                raise _refused(path, f"'header' is no text but {kind} {shapes[name]}")
-        elif kind != arrays_in[name][0]:
-            raise _refused(path, f"'{name}' holds {kind}, not {arrays_in[name][0]}")
-    _check_shapes(path, shapes, arrays_in)
-    for part, file in files.items():
-        name = part.removesuffix(".npy")
-        if part.startswith(KEPT) and name != part:
-            kind, _ = _announced(path, archive, file, name)
-            if kind not in _KEPT_KINDS:
-                raise _refused(path, f"'{name}' holds {kind}")
-            parts[name] = part
+    for part in files:
+        if part.startswith(KEPT) and part.endswith(".npy"):
+            parts[part.removesuffix(".npy")] = part
+    announced = {
+        name: _announced(archive, files[part], name)
+        for name, part in parts.items()
+        if part in files
+    }
+    _check_kinds(announced, arrays_in)
     size = sum(files[part].file_size for part in parts.values())
     if size > max_size:
         raise ResultError(
@@ -299,52 +306,84 @@ def _read(
             "larger max_size to Result.load if you trust the file",
         )
     arrays = {name: _array(archive, files[part]) for name, part in parts.items()}
-    header = _header(path, str(arrays.pop("header")))
-    _check_values(path, arrays, len(header.pairs))
+    return _checked(str(arrays.pop("header")), arrays), arrays
+
+
+def _wanted(names: Collection[str]) -> Mapping[str, Kind]:
+    """Return the arrays that a file must have that has those called `names`."""
+    found = dict(ARRAYS)
+    for part, owner in (
+        (SENSOR_ARRAYS, "sensors.t"),
+        (PATCH_ARRAYS, "patches.approach"),
+        (TORQUE_ARRAYS, "torque"),
+        (SENSITIVITY_ARRAYS, "sensitivities.q"),
+    ):
+        found |= part if owner in names else {}
+    return found
+
+
+def _check_kinds(announced: Mapping[str, _Announced], wanted: Mapping[str, Kind]) -> None:
+    """Raise _Fault unless all arrays are there, of their type and shape."""
+    for name in ("header", *wanted):
+        if name not in announced:
+            raise _Fault(f"it has no array '{name}'")
+        kind, shape = announced[name]
+        if name == "header":
+            if kind.kind != "U" or shape != () or kind.itemsize > 4 * LARGEST_HEADER:
+                raise _Fault(f"'header' is no text but {kind} {shape}")
+        elif kind != wanted[name][0]:
+            raise _Fault(f"'{name}' holds {kind}, not {wanted[name][0]}")
+    _check_shapes({name: shape for name, (_, shape) in announced.items()}, wanted)
+    for name, (kind, _) in announced.items():
+        if name.startswith(KEPT) and kind not in _KEPT_KINDS:
+            raise _Fault(f"'{name}' holds {kind}")
+
+
+def _checked(text: str, arrays: Columns) -> Header:
+    """Return the header in `text`; _Fault where it or a value of the `arrays` is wrong."""
+    header = _header(text)
+    _check_values(arrays, len(header.pairs))
     if header.sensors:
-        _check_sensors(path, arrays, header.sensors)
-    _check_sensitivities(path, arrays, header.sensitivities)
-    return header, arrays
+        _check_sensors(arrays, header.sensors)
+    _check_sensitivities(arrays, header.sensitivities)
+    return header
 
 
-def _announced(
-    path: str | PathLike[str], archive: zipfile.ZipFile, file: zipfile.ZipInfo, name: str
-) -> tuple[np.dtype[np.generic], tuple[int, ...]]:
+def _announced(archive: zipfile.ZipFile, file: zipfile.ZipInfo, name: str) -> _Announced:
     """Return type and shape that an array announces; its bytes must be as many."""
     with archive.open(file) as stream, warnings.catch_warnings():
         warnings.simplefilter("error")  # numpy warns of headers that it would repair
         version = np.lib.format.read_magic(stream)
         if version != (1, 0):
-            raise _refused(path, f"'{name}' is an array of format {version}")
+            raise _Fault(f"'{name}' is an array of format {version}")
         shape, _, kind = np.lib.format.read_array_header_1_0(stream)
         if kind.hasobject:
-            raise _refused(path, f"'{name}' holds Python objects")
+            raise _Fault(f"'{name}' holds Python objects")
         if any(type(n) is not int or n < 0 for n in shape):
-            raise _refused(path, f"'{name}' has the shape {shape}")
+            raise _Fault(f"'{name}' has the shape {shape}")
         size = math.prod(shape) * kind.itemsize
         if size != file.file_size - stream.tell():
-            raise _refused(
-                path, f"'{name}' announces {size} bytes and has {file.file_size - stream.tell()}"
+            raise _Fault(
+                f"'{name}' announces {size} bytes and has {file.file_size - stream.tell()}"
             )
     return kind, shape
 
 
 def _check_shapes(
-    path: str | PathLike[str],
     shapes: dict[str, tuple[int, ...]],
-    arrays: Mapping[str, tuple[np.dtype[np.generic], tuple[str | int, ...]]],
+    arrays: Mapping[str, Kind],
 ) -> None:
     sizes: dict[str | int, tuple[int, str]] = {2: (2, ""), 3: (3, "")}
     for name, (_, wanted) in arrays.items():
         shape = shapes[name]
         called = f"({', '.join(map(str, wanted))}{',' * (len(wanted) == 1)})"
         if len(shape) != len(wanted):
-            raise _refused(path, f"'{name}' has the shape {shape}, not {called}")
+            raise _Fault(f"'{name}' has the shape {shape}, not {called}")
         for size, letter in zip(shape, wanted, strict=True):
             known, owner = sizes.setdefault(letter, (size, name))
             if size != known:
                 of = f" with {letter} = {known} as of '{owner}'" if owner else ""
-                raise _refused(path, f"'{name}' has the shape {shape}, not {called}{of}")
+                raise _Fault(f"'{name}' has the shape {shape}, not {called}{of}")
 
 
 def _array(archive: zipfile.ZipFile, file: zipfile.ZipInfo) -> NDArray[np.generic]:
@@ -355,21 +394,21 @@ def _array(archive: zipfile.ZipFile, file: zipfile.ZipInfo) -> NDArray[np.generi
     return array
 
 
-def _header(path: str | PathLike[str], text: str) -> Header:
+def _header(text: str) -> Header:
     try:
         header = Header.model_validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(["header", *map(str, first["loc"])])
-        raise _refused(path, f"{where}: {first['msg']}") from None
+        raise _Fault(f"{where}: {first['msg']}") from None
     known, joints = set(header.pairs), set(header.stats.joints)
     unknown = {name for _, name, _ in header.events} - joints | set(header.stats.pairs)
     if len(known) < len(header.pairs) or unknown - known:
-        raise _refused(path, f"header.pairs does not list each pair once: {header.pairs}")
+        raise _Fault(f"header.pairs does not list each pair once: {header.pairs}")
     return header
 
 
-def _check_values(path: str | PathLike[str], arrays: Columns, pairs: int) -> None:
+def _check_values(arrays: Columns, pairs: int) -> None:
     for name, least, most in (
         ("contacts.row", 0, len(arrays["t"]) - 1),
         ("contacts.pair", 0, pairs - 1),
@@ -379,40 +418,33 @@ def _check_values(path: str | PathLike[str], arrays: Columns, pairs: int) -> Non
         wrong = np.flatnonzero((arrays[name] < least) | (arrays[name] > most))
         if wrong.size:
             value = arrays[name][wrong[0]]
-            raise _refused(path, f"'{name}'[{wrong[0]}] is {value}, not from {least} to {most}")
+            raise _Fault(f"'{name}'[{wrong[0]}] is {value}, not from {least} to {most}")
     for name in ("t", "contacts.row"):
         # Also true of numbers that are not finite.
         falls = np.flatnonzero(~(np.diff(arrays[name]) >= 0))
         if falls.size or not np.isfinite(arrays[name]).all():
-            raise _refused(path, f"'{name}' does not rise at row {falls[0] if falls.size else 0}")
+            raise _Fault(f"'{name}' does not rise at row {falls[0] if falls.size else 0}")
 
 
-def _check_sensors(
-    path: str | PathLike[str], arrays: Columns, sensors: Mapping[str, list[str]]
-) -> None:
+def _check_sensors(arrays: Columns, sensors: Mapping[str, list[str]]) -> None:
     if "sensors.t" not in arrays:
-        raise _refused(path, "it has no array 'sensors.t'")
+        raise _Fault("it has no array 'sensors.t'")
     which = arrays["sensors.sensor"]
     if which.size and not (which.min() >= 0 and which.max() < len(sensors)):
-        raise _refused(path, f"'sensors.sensor' is not from 0 to {len(sensors) - 1}")
+        raise _Fault(f"'sensors.sensor' is not from 0 to {len(sensors) - 1}")
     widths = np.array([len(columns) for columns in sensors.values()])
     wanted = int(widths[which].sum())
     if wanted != arrays["sensors.values"].size:
         found = arrays["sensors.values"].size
-        raise _refused(path, f"'sensors.values' has {found} values, its readings {wanted}")
+        raise _Fault(f"'sensors.values' has {found} values, its readings {wanted}")
 
 
-def _check_sensitivities(path: str | PathLike[str], arrays: Columns, names: list[str]) -> None:
+def _check_sensitivities(arrays: Columns, names: list[str]) -> None:
     rows = arrays.get("sensitivities.q")
     if rows is None and names:
-        raise _refused(path, "it has no array 'sensitivities.q'")
+        raise _Fault("it has no array 'sensitivities.q'")
     columns = 0 if rows is None else rows.shape[-1]
     if columns != len(names) or len(set(names)) < len(names):
-        raise _refused(
-            path,
+        raise _Fault(
             f"header.sensitivities does not name each of {columns} columns once: {names}",
         )
-
-
-def _refused(path: str | PathLike[str], why: str) -> ResultError:
-    return ResultError(path, f"is not a file that Result.save wrote: {why}")

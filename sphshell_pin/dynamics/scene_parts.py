@@ -240,6 +240,7 @@ class SceneParts(Summarized):
 
     def pair(self, name: str) -> ContactPair:
         """Return the pair called `name`; NameNotFound lists them."""
+        check_name("name", name)
         for pair in self._pairs:
             if pair.name == name:
                 return pair

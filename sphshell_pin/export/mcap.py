@@ -124,6 +124,7 @@ def scene_of(result: Result, scene: Scene | None) -> Scene:
         from sphshell_pin.scenario.replay import Replay
 
         return Replay(result).scene
+    check_type("scene", scene, Scene, "must be a Scene")
     ran, now = (result.q.shape[1], result.v.shape[1]), (scene.model.nq, scene.model.nv)
     pairs = tuple(pair.name for pair in scene.pairs)
     if ran != now or pairs != tuple(result.pairs):
@@ -320,8 +321,11 @@ _FLOAT = "std_msgs/Float64"
 
 def _nanoseconds(t: Array, start: int) -> NDArray[np.int64]:
     """Return the time stamps of the times `t` [s]: whole nanoseconds since 1970."""
-    low, high = (start + round(float(one) * 1e9) for one in (t.min(initial=0), t.max(initial=0)))
-    if len(t) and not (low >= 0 and high < _LAST):
+    # As floats first: the nanoseconds of what is far too large are no whole number.
+    near = np.abs(t).max(initial=0.0) < _LAST * 1e-9
+    ends = (t.min(initial=0), t.max(initial=0)) if near else ()
+    stamps = [start + round(float(one) * 1e9) for one in ends]
+    if len(t) and not (near and stamps[0] >= 0 and stamps[1] < _LAST):
         raise ResultError(
             "the result",
             f"has times from {t.min():.6g} to {t.max():.6g} s, which with start = {start} ns are "

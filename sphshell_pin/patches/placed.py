@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from sphshell_pin.checks import check_type
 from sphshell_pin.errors import ResultError
 
 if TYPE_CHECKING:
@@ -83,7 +84,9 @@ def patches_on(
 
 def scene_of(result: Result, scene: Scene | None) -> Scene:
     """Return `scene`, or the one that ran; ResultError where there is none."""
+    from sphshell_pin.dynamics.scene import Scene as SceneType  # which needs this package
+
     scene = result.scene if scene is None else scene
     if scene is None:
         raise ResultError("the result", "has no scene, as it was loaded: give scene=...")
-    return scene
+    return check_type("scene", scene, SceneType, "must be a Scene")

@@ -12,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.atomic import atomic_file
-from sphshell_pin.checks import check_positive, check_vector, read_only
+from sphshell_pin.checks import check_name, check_positive, check_vector, read_only
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from sphshell_pin.patches.ellipse import load_in_polygons
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
@@ -86,6 +86,7 @@ class TaxelGrid:
 
     def __post_init__(self) -> None:
         """Check the values."""
+        check_name("pair", self.pair)
         n = np.asarray(self.shape)
         if n.shape != (2,) or n.dtype.kind not in "iu" or (n < 1).any():
             raise InvalidParameter("shape", self.shape, "must be two numbers of taxels, (n, m)")
@@ -226,6 +227,8 @@ class ShellTaxels:
 
     def __post_init__(self) -> None:
         """Check the values."""
+        check_name("pair", self.pair)
+        check_name("of", self.of)
         if self.of not in ("elements", "faces"):
             raise InvalidParameter("of", self.of, "must be 'elements' or 'faces'")
 

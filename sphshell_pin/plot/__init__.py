@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sphshell_pin.checks import check_name, check_type
 from sphshell_pin.dynamics.pair_series import PairSeries
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.plot.contact_map import QUANTITIES, plot_contact_map
@@ -62,6 +63,7 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
     Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where "map"
     has no scene.
     """
+    check_name("kind", kind)
     if kind not in KINDS:
         raise NameNotFound("kind of figure", kind, "a result", KINDS)
     if kind == "path":
@@ -83,6 +85,10 @@ def scene_of(result: Result, scene: Scene | None = None) -> Scene | None:
     None if there is none of them; ResultError if its scene cannot be built again.
     """
     scene = result.scene if scene is None else scene
+    if scene is not None:
+        from sphshell_pin.dynamics.scene import Scene as SceneType
+
+        check_type("scene", scene, SceneType, "must be a Scene")
     if scene is not None or result.origin is None:
         return scene
     from sphshell_pin.scenario.replay import Replay

@@ -235,7 +235,10 @@ class Shell(Queries):
                 raise InvalidParameter(
                     "placement", placement, "must be a pinocchio.SE3 or a scale"
                 ) from None
-        surface = self.surface().moved(scale, rotation, translation)
+        try:
+            surface = self.surface().moved(scale, rotation, translation)
+        except OverflowError:
+            raise InvalidParameter("scale", scale, "makes the shell too large") from None
         return self.from_surface(surface, **self.options)
 
     def to_file(self, path: str | os.PathLike[str], unit: str = "m") -> None:

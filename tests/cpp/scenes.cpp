@@ -229,6 +229,12 @@ void bad_input_is_refused() {
   model = balls<pinocchio::JointModelFreeFlyer>(1);
   model.inertias.pop_back();
   CHECK_THROWS(E, "model.inertias = 1 must have 2 entries", Scene{model});
+  model = balls<pinocchio::JointModelFreeFlyer>(1);
+  model.joints[1].setIndexes(1, 40, 40, 40);
+  CHECK_THROWS(E, "the indices of joint 'ball 0' are not those of its place", Scene{model});
+  model = balls<pinocchio::JointModelFreeFlyer>(1);
+  model.nq = 3;
+  CHECK_THROWS(E, "nq = 3, nv = 6 are not the sums of its joints, 7 and 6", Scene{model});
 }
 
 }  // namespace

@@ -201,7 +201,14 @@ void odd_surfaces_are_taken() {
 
 }  // namespace
 
+void a_shell_that_was_moved_stays_one() {
+  Shell first(Points{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
+  const Shell second = std::move(first);
+  CHECK(first.num_elements() == 1 && second.num_elements() == 1);
+}
+
 int main() {
+  a_shell_that_was_moved_stays_one();
   a_cube_is_touched_on_faces_edges_and_corners();
   curved_elements_follow_the_true_surface();
   threads_may_share_a_shell();

@@ -97,3 +97,28 @@ def test_a_model_that_pinocchio_would_not_survive_makes_no_scene(change) -> None
     change(model)
     with pytest.raises(InvalidParameter, match="joint"):
         sp.Scene(model)
+
+
+def _set(name: str, value: object):
+    return lambda model: setattr(model, name, value)
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda model: model.joints[1].setIndexes(1, 40, 40), "indices of joint"),
+        (lambda model: model.joints[1].setIndexes(9, 0, 0), "indices of joint"),
+        (lambda model: model.joints[1].setIndexes(1, -1, 0), "indices of joint"),
+        (lambda model: model.nqs.__setitem__(1, 3), "indices of joint"),
+        (lambda model: model.idx_vs.__setitem__(1, 40), "lists of indices"),
+        (lambda model: model.subtrees[1].append(40), "supports or subtrees"),
+        (lambda model: model.supports[1].append(40), "supports or subtrees"),
+        (_set("armature", np.zeros(1)), "armature has 1 numbers, nv is 6"),
+        (_set("lowerPositionLimit", np.zeros(1)), "lowerPositionLimit has 1 numbers, nq is 7"),
+    ],
+)
+def test_a_model_with_wrong_indices_is_refused(damage, said: str) -> None:
+    model = ball()
+    damage(model)
+    with pytest.raises(InvalidParameter, match=said):
+        sp.Scene(model)

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from sphshell_pin import (
     Simulation,
     Sphere,
 )
+from sphshell_pin.dynamics.result_parts import Event, Kept, Origin
 from sphshell_pin.errors import (
     DeepStart,
     FrameNotFound,
@@ -386,6 +388,40 @@ def test_save_and_load(tmp_path: Path) -> None:
     (tmp_path / "text.npz").write_text("not an archive")
     with pytest.raises(ResultError):
         Result.load(tmp_path / "text.npz")
+
+
+def _with(result: Result, part: str, **values: object) -> Result:
+    return replace(result, **{part: replace(getattr(result, part), **values)})
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda r: replace(r, q=r.q.astype("f4")), "'q' holds float32, not float64"),
+        (lambda r: replace(r, q=r.q[1:]), r"'q' has the shape .* with n = "),
+        (lambda r: replace(r, v=r.v[0]), r"'v' has the shape"),
+        (lambda r: replace(r, t=r.t[::-1].copy()), "'t' does not rise at row 0"),
+        (lambda r: replace(r, t=np.full_like(r.t, np.nan)), "'t' does not rise"),
+        (lambda r: replace(r, q=np.ma.masked_less(r.q, 0.0)), "'q' is a masked array"),
+        (lambda r: replace(r, pairs=("a", "a")), "header.pairs does not list each pair once"),
+        (lambda r: replace(r, events=(Event("0", r.pairs[0], "stick"),)), "header.events"),
+        (lambda r: replace(r, torque=r.v[1:]), "'torque' has the shape"),
+        (lambda r: _with(r, "contacts", row=r.contacts.row + 10**6), "'contacts.row'.* is 1000"),
+        (lambda r: _with(r, "stats", steps=0.5), "header.stats.steps"),
+        (lambda r: _with(r, "stats", wall_time=1j), "complex is not JSON"),
+        (
+            lambda r: replace(
+                r, origin=Origin("s", {}, lambda: Kept({}, {"a": np.ones(1, "c16")}))
+            ),
+            "'kept.a' holds complex128",
+        ),
+    ],
+)
+def test_what_load_would_refuse_is_not_written(tmp_path: Path, change, said: str) -> None:
+    path = tmp_path / "run.npz"
+    with pytest.raises(ResultError, match=rf"run\.npz: cannot write the results: .*{said}"):
+        change(bouncing().run(*START, 0.1)).save(path)
+    assert not path.exists()
 
 
 def test_a_file_of_version_0_1_is_read() -> None:

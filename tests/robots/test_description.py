@@ -34,6 +34,13 @@ REFUSED = {
     "nested more than 100 deep": robot("<a>" * 100_000 + "</a>" * 100_000),
     "declares an entity, 'e0'": f"<!DOCTYPE r [{ENTITIES}]>{robot('&e8;')}",
     "not well-formed XML": robot("")[:-1],
+    # urdfdom reads the first of both: a chain that the last ones hide.
+    "'j1' has 2 <parent> elements": robot(
+        "".join(
+            joint(k, k - 1).replace("</joint>", "<parent link='l0'/></joint>")
+            for k in range(1, 4900)
+        )
+    ),
     # A loop; pinocchio says that a body is missing.
     "not a URDF": robot(joint(1, 0) + joint(2, 1) + joint(3, 2).replace("'l3'", "'l1'", 2)),
 }

@@ -299,6 +299,33 @@ def test_poses_of_an_srdf():
         robots.load_file(file, srdf=FOLDER / "nix.srdf")
 
 
+@pytest.mark.parametrize(
+    ("joint", "words"),
+    [
+        ("name='f1_base' value='nan'", "'f1_base': value 'nan' must be 1 finite number"),
+        ("name='f1_base' value='1 2 3'", "'f1_base': value '1 2 3' must be 1 finite number"),
+        ("name='f1_base' value='wide'", "'f1_base': value 'wide' must be"),
+        ("name='f1_base'", "'f1_base': value '' must be"),
+        ("value='1'", "'': the robot has no such joint"),
+        ("name='f9' value='1'", "'f9': the robot has no such joint"),
+        ("name='universe' value='1'", "'universe': the robot has no such joint"),
+    ],
+)
+def test_poses_that_would_be_left_out_are_named(tmp_path, joint, words):
+    srdf = tmp_path / "p.srdf"
+    srdf.write_text(f"<robot name='h'><group_state name='p'><joint {joint}/></group_state></robot>")
+    with pytest.raises(robots.RobotError, match=rf"p\.srdf: .*pose 'p', joint.*{words}"):
+        robots.load_file(FOLDER / "hand.urdf.xacro", srdf=srdf)
+
+
+def test_values_of_poses_are_read_whole(tmp_path):
+    srdf = tmp_path / "p.srdf"
+    one = "<joint name='f1_base' value='0.1_5'/>"
+    srdf.write_text(f"<robot name='h'><group_state name='p'>{one}</group_state></robot>")
+    robot = robots.load_file(FOLDER / "hand.urdf.xacro", srdf=srdf, pose="p")
+    assert 0.15 in robot.q0
+
+
 def check_reduced(whole: pin.Model, model: pin.Model) -> None:
     """Assert that the mimic model's mass matrix and forces are G^T M G and G^T tau."""
     rng = np.random.default_rng(0)

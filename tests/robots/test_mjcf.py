@@ -192,11 +192,31 @@ def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality, word
         ("<geom size='1'/>", "", "has no <body>"),
         ("<body><joint/><geom size='a'/></body>", "", "."),
         ("<body name='b'><joint/></body>", "<compiler inertiafromgeom='false'/>", "'b' moves"),
+        (f"<body name='b'>{7 * '<joint/>'}</body>", "", "body 'b' has 7 joints"),
     ],
 )
 def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, inside, head, words):
     with pytest.raises(robots.RobotError, match=rf"not a MJCF that can be read: .*{words}"):
         robots.load_file(written(tmp_path, inside, head))
+
+
+@pytest.mark.parametrize(
+    ("part", "count", "words"),
+    [
+        ("<include file='{0}.xml'/><include file='{0}.xml'/>", 22, "more than 1000 files or 64 MB"),
+        ("<include file='{0}.xml'/>", 101, "nested more than 100 deep"),
+        ("<body>" * 30 + "<include file='{0}.xml'/>" + "</body>" * 30, 5, "more than 100 deep"),
+        ("<include file='{0}.xml'/>" * 6 + "<body/>", 4, "has 259 links; at most 50"),
+    ],
+)
+def test_files_included_count_in_total(tmp_path, monkeypatch, part, count, words):
+    monkeypatch.setattr("sphshell_pin.robots.mjcf.MOST_LINKS", 50)
+    for k in range(count):
+        text = part.format(k + 1) if k + 1 < count else "<body/>"
+        (tmp_path / f"{k}.xml").write_text(f"<mujocoinclude>{text}</mujocoinclude>")
+    path = written(tmp_path, "<include file='0.xml'/>")
+    with pytest.raises(robots.RobotError, match=words):
+        robots.load_file(path)
 
 
 LIMB = """<mujoco><compiler angle="radian"/><worldbody>

@@ -6,6 +6,7 @@ import errno
 import fcntl
 import os
 import signal
+import sqlite3
 import stat
 import time
 
@@ -34,7 +35,9 @@ def put(folder, text, last=LAST):
         for name in ("a", last):
             (desk / name).write_text(text)
         place.replace(desk, ["a", "b", last])
-    return {path.name: path.read_text() for path in folder.iterdir() if path.is_file()}
+    return {
+        path.name: path.read_text(errors="replace") for path in folder.iterdir() if path.is_file()
+    }
 
 
 def test_a_second_run_is_told_who_writes_until_that_process_is_killed(
@@ -151,6 +154,22 @@ def test_a_folder_that_must_stay_gets_its_files_one_by_one(why, tmp_path, monkey
     assert os.stat(out).st_ino == before
     assert why != "folders of others" or (out / "mine" / "notes.txt").read_text() == "mine"
     assert os.listdir(tmp_path) == ["out"]
+
+
+def test_a_folder_with_a_sweep_in_it_stays(tmp_path):
+    folder = tmp_path / "out"
+    put(folder, "old")
+    journal = sqlite3.connect(folder / "sweep.parquet.journal")
+    journal.execute("CREATE TABLE runs (run INTEGER)")
+    inode = folder.stat().st_ino
+    with journal:
+        journal.execute("INSERT INTO runs VALUES (1)")
+        assert put(folder, "new")["a"] == "new"
+    with journal:
+        journal.execute("INSERT INTO runs VALUES (2)")
+    assert folder.stat().st_ino == inode
+    assert journal.execute("SELECT count(*) FROM runs").fetchone() == (2,)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
 def test_a_link_stays_a_link(tmp_path):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +15,9 @@ pytest.importorskip("scipy")
 pytest.importorskip("matplotlib")
 
 import sphshell_pin as sp
+from sphshell_pin.atomic import folder
 from sphshell_pin.benchmarks.fitting import SCENARIO
-from sphshell_pin.cli import app
+from sphshell_pin.cli import app, fit
 from sphshell_pin.scenario import read_scenario
 from sphshell_pin.study.fit.parameters import parse_wanted
 from tests.study.test_fit import (
@@ -122,7 +125,7 @@ def test_the_command_writes_what_is_not_told_from_0(bounce, tmp_path, monkeypatc
     assert sorted(path.name for path in Path("out").iterdir()) == names
 
 
-@pytest.mark.parametrize("maker", ["to_json", "plot", "write_scenario"])
+@pytest.mark.parametrize("maker", ["to_json", "plot", "scenario_text"])
 def test_a_file_that_cannot_be_made_leaves_none(bounce, tmp_path, monkeypatch, maker):
     monkeypatch.chdir(tmp_path)
 
@@ -134,3 +137,45 @@ def test_a_file_that_cannot_be_made_leaves_none(bounce, tmp_path, monkeypatch, m
     done = CliRunner().invoke(app, ["fit", "fall.csv", str(bounce), "--param", "gravity.2"])
     assert done.exit_code == 2
     assert not Path("results").exists()
+
+
+@pytest.mark.parametrize("call", [1, 2])
+def test_values_and_report_are_of_one_fit_when_it_is_killed(tmp_path, monkeypatch, call):
+    """At each call that renames: the old files, all of them, or the new ones."""
+    source = tmp_path / "s.toml"
+    source.write_text("")
+
+    class Found:
+        value = "old"
+
+        def to_json(self):
+            return self.value
+
+        def scenario_text(self, *_):
+            return self.value
+
+    found, out = Found(), tmp_path / "out"
+    monkeypatch.setattr("sphshell_pin.scenario.knobs.check_knobs", lambda *_, **__: None)
+    monkeypatch.setattr("sphshell_pin.scenario.reading.read_scenario", lambda *_: None)
+    fit._write(found, source, out, {}, picture=False)
+    found.value = "new"
+    child = os.fork()
+    if child == 0:
+        calls = []
+
+        def killed(rename):
+            def done(*names, **options):
+                rename(*names, **options)
+                calls.append(names)
+                if len(calls) == call:
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+            return done
+
+        os.replace = killed(os.replace)
+        folder.exchange = killed(folder.exchange)
+        fit._write(found, source, out, {}, picture=False)
+        os._exit(0)
+    os.waitpid(child, 0)
+    assert {path.read_text() for path in out.iterdir()} in ({"old"}, {"new"})
+    assert {path.name for path in out.iterdir()} == {"fit.json", "s.fitted.toml"}

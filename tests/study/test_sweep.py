@@ -8,6 +8,7 @@ import os
 import signal
 import sqlite3
 import sys
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -245,6 +246,33 @@ def test_damage_anywhere_in_the_rows_is_noticed(finished):
             found = Journal(journal, plan.head, 4)
             found.close()
             assert all(repr(one) == right[i] for i, one in found.outcomes.items())
+
+
+@pytest.mark.parametrize("figures", ["[]", "{", '{"x": "1"}', "1", "[" * 100_000])
+def test_a_row_with_a_right_checksum_and_no_figures_is_done_again(finished, figures):
+    path, _, journal = finished
+    plan = plan_sweep(path, SMALL)
+    with contextlib.closing(sqlite3.connect(journal)) as file, file:
+        *row, _ = file.execute("SELECT * FROM runs WHERE rowid = 1").fetchone()
+        row[3] = figures
+        crc = zlib.crc32(repr(tuple(row)).encode())
+        file.execute("UPDATE runs SET figures = ?, crc32 = ? WHERE rowid = 1", (figures, crc))
+    found = Journal(journal, plan.head, 4)
+    found.close()
+    assert len(found.outcomes) == 3
+    assert [", row 1: is damaged" in note for note in found.notes] == [True]
+
+
+def test_a_view_in_the_place_of_a_table_is_refused(finished):
+    path, _, journal = finished
+    with contextlib.closing(sqlite3.connect(journal)) as file, file:
+        file.execute("DROP TABLE runs")
+        file.execute(
+            "CREATE VIEW runs AS WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) "
+            "SELECT k, 'done', '', '{}', 0.0, '', x'', 0 FROM n"
+        )
+    with pytest.raises(SweepError, match="is no journal of this version"):
+        Journal(journal, plan_sweep(path, SMALL).head, 4)
 
 
 def test_done_runs_are_not_done_again(folder):

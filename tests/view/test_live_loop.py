@@ -422,3 +422,29 @@ def test_the_legend_says_where_arrows_are_cut(make):
     frames(live, 1)
     live.server.clients.clear()
     assert live._state()["cut"] is True
+
+
+def test_a_queue_of_steps_gives_way_to_others(make, monkeypatch):
+    live = make()
+    advance = live.player.advance
+    monkeypatch.setattr(loop, "BUDGET", 1e-3)
+    monkeypatch.setattr(live.player, "advance", lambda *a: (time.sleep(0.005), advance(*a))[1])
+    for _ in range(100):
+        say(live, "step", seconds=1e-3)
+        say(live, "look")  # between steps of one tab, which count once
+    say(live, "speed", value=0.25)
+    begin = time.perf_counter()
+    live.frame(0.0)
+    assert time.perf_counter() - begin < 0.4
+    assert live.speed == 0.25
+    assert [text for _, text in live.told] == ["steps came faster than they run: some are left out"]
+
+
+def test_a_queue_of_events_ends_with_the_run(make, monkeypatch):
+    live = make()
+    for _ in range(9):
+        say(live, "step", seconds=1e-3)
+    done = []
+    monkeypatch.setattr(live, "_handle", lambda *_: (done.append(1), live._stop.set()))
+    live.frame(0.0)
+    assert done == [1]

@@ -7,6 +7,7 @@
 #include "bindings/callbacks.hpp"
 #include "bindings/evaluations.hpp"
 #include "bindings/records.hpp"
+#include "dynamics/model_fault.hpp"
 #include "dynamics/linearization.hpp"
 #include "dynamics/simulation.hpp"
 
@@ -203,6 +204,10 @@ void bind_dynamics(nanobind::module_& m) {
           },
           nb::arg("v"), nb::arg("limit"), nb::arg("stiffness"), nb::arg("damping"),
           nb::arg("relaxation"));
+
+  m.def(
+      "model_fault", [](nb::handle model) { return model_fault(model_of(model)); },
+      nb::arg("model"));
 
   nb::class_<Evaluations> scene(m, "Scene",
                                 nb::type_slots(slots<Evaluations, visit_evaluations>()));

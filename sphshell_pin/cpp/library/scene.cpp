@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 
+#include "dynamics/model_fault.hpp"
 #include "dynamics/scene_state.hpp"
 #include "library/checks.hpp"
 #include "library/impl.hpp"
@@ -56,6 +57,8 @@ void check_model(const Model& model) {
         !frame.placement.translation().allFinite())
       throw InvalidParameter("model's frame " + in_quotes(frame.name),
                              std::to_string(frame.parentJoint), "must be on a joint of it");
+  const std::string fault = core::model_fault(model);
+  if (!fault.empty()) throw InvalidParameter("model", "a pinocchio::Model", "is damaged: " + fault);
 }
 
 // Names may repeat (a link called as its joint): a body's frame comes first, then an operational

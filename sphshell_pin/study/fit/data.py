@@ -59,6 +59,9 @@ class Column:
         return self.quantity.name
 
 
+_LARGEST = 1e70  # of data and 1 / sigma: the squares of their quotients do not overflow
+
+
 @dataclass(frozen=True)
 class Measured:
     """The data of one experiment: times `t` (n,) [s] and columns; `notes` say what is odd."""
@@ -84,6 +87,9 @@ class _Table:
             reason = f"'{values[row]}' in column '{header}' is not a finite number"
             if header.partition(" ")[0] != TIME:
                 reason += "; put nan where nothing was measured"
+            raise self.fault(reason, int(row))
+        for row in np.flatnonzero(np.abs(values) > _LARGEST):
+            reason = f"{values[row]:g} in column '{header}' is too large to compute with"
             raise self.fault(reason, int(row))
         return values
 
@@ -205,6 +211,11 @@ def _column(
                 f"'{name}{SIGMA}' must be positive wherever '{name}' has a value", int(row)
             )
         given = deviations[rows]
+    if given is not None and not (given.min() >= 1 / _LARGEST and given.max() <= _LARGEST):
+        raise table.fault(
+            f"'{name}': standard deviations must be from {1 / _LARGEST:g} to {_LARGEST:g} "
+            f"{quantity.unit}, to compute with them".rstrip()
+        )
     return Column(quantity, rows, values[rows], given)
 
 
@@ -237,7 +248,11 @@ def _gaps(name: str, t: Array) -> tuple[str, ...]:
 def _take_columns(given: Mapping[str, ArrayLike], name: str) -> _Table:
     try:
         pairs = dict(given)
-        columns = {str(key): np.array(value, dtype=np.float64) for key, value in pairs.items()}
+        # What is masked was not measured.
+        columns = {
+            str(key): np.ma.filled(np.ma.array(value, dtype=np.float64), math.nan)
+            for key, value in pairs.items()
+        }
     except (TypeError, ValueError) as fault:
         raise DataError(
             name, f"must be a csv file, or a mapping from headers to columns of numbers ({fault})"

@@ -156,12 +156,15 @@ class Fit(Summarized):
         Raises ScenarioError where a value has no place in the file, ResultError where it cannot be
         written.
         """
+        return write_whole(path, self.scenario_text(Path(path).parent, changes).encode())
+
+    def scenario_text(self, folder: Path, changes: Mapping[str, str] | None = None) -> str:
+        """Return what `write_scenario` writes into a file in `folder`."""
         source = find_scenario(self.scenario)
         texts = {
             key: file_number(one.value) for one in self.parameters for key in one.key.split(TIE)
         }
-        text = scenario_text(source, {**(changes or {}), **texts}, Path(path).parent)
-        return write_whole(path, text.encode())
+        return scenario_text(source, {**(changes or {}), **texts}, folder)
 
     def to_json(self) -> str:
         """Return everything but the series, as JSON; null for what is infinite or nan."""

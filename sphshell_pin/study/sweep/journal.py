@@ -15,7 +15,7 @@ from pathlib import Path
 
 from sphshell_pin.atomic.lock import lock_file
 from sphshell_pin.errors import ResultError, SweepError
-from sphshell_pin.study.sweep.job import JsonObject, Outcome
+from sphshell_pin.study.sweep.job import DONE, FAILED, JsonObject, Outcome
 
 FORMAT = 4
 """Format 3 had no curves, 1 and 2 were lines of JSON; they cannot be read any more."""
@@ -109,7 +109,8 @@ class Journal:
         if self._lock < 0:
             return
         try:
-            empty = not self._file.execute("SELECT count(*) FROM runs").fetchone()[0]
+            # Not counted: a view in a damaged file may have no end.
+            empty = self._file.execute("SELECT 1 FROM runs LIMIT 1").fetchone() is None
         except (sqlite3.Error, UnicodeDecodeError):  # of a damaged file, even the error's text
             empty = False
         self._file.close()
@@ -121,8 +122,10 @@ class Journal:
 
     def _begin(self, head: str, runs: int) -> None:
         self._file.execute("PRAGMA synchronous = FULL")
-        names = {name for (name,) in self._file.execute("SELECT name FROM sqlite_master")}
-        if not names:
+        kinds = dict(self._file.execute("SELECT name, type FROM sqlite_master").fetchall())
+        if kinds and kinds != {"sweep": "table", "runs": "table"}:
+            raise ValueError("other tables, or views, which may have no end")
+        if not kinds:
             with self._file:
                 self._file.executescript(f"BEGIN; {_TABLES} COMMIT;")
         found = self._file.execute("SELECT description FROM sweep").fetchone()
@@ -132,16 +135,14 @@ class Journal:
             return
         self._compare(json.loads(found[0]), json.loads(head))
         for rowid, *row, crc in self._file.execute("SELECT rowid, * FROM runs ORDER BY rowid"):
-            if crc != _crc(tuple(row)) or not 0 <= row[0] < runs:
+            outcome = _outcome(row) if crc == _crc(tuple(row)) else None
+            if outcome is None or not 0 <= outcome.number < runs:
                 self.notes.append(
                     f"{self.path}, row {rowid}: is damaged and left out; a run that has no other "
                     "row is done again"
                 )
                 continue
-            number, status, error, figures, wall_time, worker, curves = row
-            self.outcomes[number] = Outcome(
-                number, status, error, json.loads(figures), wall_time, worker, curves
-            )
+            self.outcomes[outcome.number] = outcome
 
     def _compare(self, found: JsonObject, wanted: JsonObject) -> None:
         for key, difference in _DIFFERENCES.items():
@@ -153,6 +154,27 @@ class Journal:
 
     def _broken(self, fault: object) -> ResultError:
         return ResultError(self.path, f"cannot be written: {fault}")
+
+
+def _outcome(row: list[object]) -> Outcome | None:
+    """Return what a row states, None if that cannot be the outcome of a run."""
+    number, status, error, figures, wall_time, worker, curves = row
+    try:
+        found = json.loads(figures) if isinstance(figures, str) else None
+    except (ValueError, RecursionError):
+        return None
+    if (
+        isinstance(number, int)
+        and status in (DONE, FAILED)
+        and isinstance(error, str)
+        and isinstance(found, dict)
+        and all(isinstance(one, int | float) for one in found.values())
+        and isinstance(wall_time, float)
+        and isinstance(worker, str)
+        and isinstance(curves, bytes)
+    ):
+        return Outcome(number, status, error, found, wall_time, worker, curves)
+    return None
 
 
 def _crc(row: tuple[object, ...]) -> int:

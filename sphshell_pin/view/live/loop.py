@@ -181,7 +181,16 @@ class Live:
     def frame(self, wall: float) -> None:
         """Handle the events of browsers, go on by `wall` [s] at the speed chosen, and draw."""
         watched = self.server.watched
+        began, told = time.perf_counter(), False
         for client, event in newest(self.server.events()):
+            if self._stop.is_set():
+                return
+            if event["type"] == "step" and time.perf_counter() - began > 20 * BUDGET:
+                # Others wait for what a queue of steps takes.
+                if not told:
+                    self.server.report(client, "steps came faster than they run: some are left out")
+                told = True
+                continue
             try:
                 self._handle(client, event)
             except SphshellError as fault:

@@ -54,6 +54,9 @@ class SPHSHELL_PIN_API Shell {
   /// @throws InvalidParameter on a crease angle or side out of range
   Shell(Points vertices, const std::vector<Element>& elements, const ShellOptions& options = {});
   explicit Shell(const Surface& surface, const ShellOptions& options = {});
+  // A move is a copy, which is cheap: no shell is ever without its surface.
+  Shell(const Shell&) = default;
+  Shell& operator=(const Shell&) = default;
 
   const Points& vertices() const;
   int num_elements() const;

@@ -1,0 +1,63 @@
+"""Arguments that are far too large, of the wrong kind or masked are named in an own error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.cli.export import nanoseconds
+from sphshell_pin.errors import DataError, InvalidParameter, ResultError
+from sphshell_pin.patches import ShellTaxels
+from sphshell_pin.study.fit import Experiment
+from sphshell_pin.study.fit.data import read_experiment
+from sphshell_pin.study.fit.quantities import Quantity
+from tests.models import LAW, ball, free_q, on_plate
+
+Q = free_q([0.0, 0.0, 0.049])
+NAMES = np.array(["a", "b"])
+
+
+def test_laws_at_the_end_of_the_numbers_run_and_are_explained() -> None:
+    scene = on_plate(ball(), sp.HuntCrossleyLaw(1e308, 1e20))
+    assert "1 contact pair" in str(scene.explain(Q))
+    assert len(sp.Simulation(scene).run(Q, None, 0.001).t)
+
+
+def test_arguments_are_named(tmp_path) -> None:
+    scene = on_plate(ball(), LAW)
+    result = sp.Simulation(scene).run(Q, None, 0.001)
+    path = tmp_path / "run.mcap"
+    for said, use in {
+        "lower, upper = .* must be a range": lambda: sp.JointLimits("x", 1.0, LAW),
+        "scale = .* makes the shell too large": lambda: scene.pairs[0].shell.transformed(1e308),
+        "name = .* must be a name": lambda: scene.replace_pair(NAMES, law=LAW),
+        "kind = .* must be a name": lambda: result.plot(NAMES),
+        "pair = .* must be a name": lambda: ShellTaxels(NAMES),
+        "q = .* must hold 7 numbers": lambda: scene.contacts(np.ma.masked_equal(Q, 0.0)),
+        "--start = .* must be seconds": lambda: nanoseconds("1e999999999"),
+    }.items():
+        with pytest.raises(InvalidParameter, match=said):
+            use()
+    pytest.importorskip("mcap")
+    with pytest.raises(InvalidParameter, match="scene = 'wrong' must be a Scene"):
+        result.to_mcap(path, scene="wrong")
+    with pytest.raises(ResultError, match="are not all from 1970 to 2038"):
+        replace(result, t=np.full_like(result.t, -1e308)).to_mcap(path)
+
+
+def read(force, sigma=None):
+    """Return the data of a force at two times."""
+    known = {"f": Quantity("f", "N", lambda _, t: t)}
+    data = {"t [s]": [0.0, 1.0], "f [N]": force}
+    return read_experiment(Experiment(data), 1, known, 1.0, sigma=sigma)
+
+
+def test_data_that_cannot_be_computed_with_are_named() -> None:
+    with pytest.raises(DataError, match=r"row 1: 1e\+308 in column 'f \[N\]' is too large"):
+        read([1.0, 1e308])
+    with pytest.raises(DataError, match="'f': standard deviations must be from 1e-70 to 1e"):
+        read([1.0, 2.0], {"f": 1e-320})
+    assert read(np.ma.masked_greater([1.0, 2.0], 1.5)).columns[0].values.tolist() == [1.0]
