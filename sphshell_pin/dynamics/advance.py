@@ -30,6 +30,7 @@ from sphshell_pin.dynamics.explain import (
     weakness,
 )
 from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.dynamics.joints import moving_joints
 from sphshell_pin.dynamics.models import find_joint
 from sphshell_pin.dynamics.patches import check_record
 from sphshell_pin.dynamics.result import Result
@@ -307,7 +308,7 @@ def _runaway(core: Ended, scene: Scene) -> str:
     v = np.abs(core.v)
     v = np.where(np.isfinite(v), v, np.inf)
     worst = int(np.argmax(v))
-    for name, joint in zip(scene.model.names, scene.model.joints, strict=True):
+    for name, joint in moving_joints(scene.model):
         if joint.idx_v <= worst < joint.idx_v + joint.nv:
             return f"the speed of joint '{name}' grew to {v[worst]:.3g}"
     return "the state is no longer finite"

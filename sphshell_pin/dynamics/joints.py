@@ -271,7 +271,7 @@ class JointIngredients:
         if not (self.limits or self.friction):
             return {}
         inertia, out = joint_inertia(model), dict[str, float]()
-        names = {joint.idx_v: name for name, joint in _driven(model)}
+        names = {joint.idx_v: name for name, joint in moving_joints(model)}
         for dry in self.springs(model):
             out[names[dry.index]] = math.pi * math.sqrt(float(inertia[dry.index]) / dry.stiffness)
         for name, _, in_v, *_, law in self._stops(model):
@@ -374,8 +374,9 @@ def check_joints(joints: object, model: pin.Model, lock: Iterable[str]) -> Joint
     return kept
 
 
-def _driven(model: pin.Model) -> list[tuple[str, pin.JointModel]]:
-    joints = zip(model.names, model.joints, strict=True)
+def moving_joints(model: pin.Model) -> list[tuple[str, pin.JointModel]]:
+    """Return the joints that have velocities of their own, in the order of these velocities."""
+    joints = zip(list(model.names)[1:], list(model.joints)[1:], strict=True)  # 0 is the universe
     return [(name, joint) for name, joint in joints if joint.nv]
 
 

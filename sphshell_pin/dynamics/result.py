@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import read_only
+from sphshell_pin.dynamics.joints import moving_joints
 from sphshell_pin.dynamics.patches import Patches, patches_of
 from sphshell_pin.dynamics.result_parts import ContactLog, EnergyAudit, Event, Origin
 from sphshell_pin.dynamics.run_stats import EventKind, RunStats
@@ -311,8 +312,6 @@ def _owners(pairs: tuple[str, ...], scene: Scene) -> dict[str, tuple[str, ...]]:
         return dict.fromkeys(EVENT_KINDS, pairs)
     model = scene.model
     stops = scene.joints.stopped_joints(model)
-    velocities = tuple(
-        name for name, joint in zip(model.names, model.joints, strict=True) for _ in range(joint.nv)
-    )
+    velocities = tuple(name for name, joint in moving_joints(model) for _ in range(joint.nv))
     owners = [pairs] * 5 + [stops] * 2 + [velocities] * 4
     return dict(zip(EVENT_KINDS, owners, strict=True))

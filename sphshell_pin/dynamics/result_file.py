@@ -402,9 +402,10 @@ def _header(text: str) -> Header:
         where = ".".join(["header", *map(str, first["loc"])])
         raise _Fault(f"{where}: {first['msg']}") from None
     known, joints = set(header.pairs), set(header.stats.joints)
-    unknown = {name for _, name, _ in header.events} - joints | set(header.stats.pairs)
-    if len(known) < len(header.pairs) or unknown - known:
+    if len(known) < len(header.pairs) or not known >= set(header.stats.pairs):
         raise _Fault(f"header.pairs does not list each pair once: {header.pairs}")
+    if unknown := {name for _, name, _ in header.events} - joints - known:
+        raise _Fault(f"header.events names '{min(unknown)}', neither a pair nor a joint")
     return header
 
 

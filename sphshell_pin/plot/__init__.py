@@ -8,9 +8,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sphshell_pin.checks import check_name, check_type
+from sphshell_pin.checks import check_name
 from sphshell_pin.dynamics.pair_series import PairSeries
-from sphshell_pin.errors import NameNotFound
+from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.plot.contact_map import QUANTITIES, plot_contact_map
 from sphshell_pin.plot.contact_path import plot_contact_path
 from sphshell_pin.plot.figure import NO_CONTACT, write_figure
@@ -85,10 +85,8 @@ def scene_of(result: Result, scene: Scene | None = None) -> Scene | None:
     None if there is none of them; ResultError if its scene cannot be built again.
     """
     scene = result.scene if scene is None else scene
-    if scene is not None:
-        from sphshell_pin.dynamics.scene import Scene as SceneType
-
-        check_type("scene", scene, SceneType, "must be a Scene")
+    if scene is not None and not hasattr(scene, "pairs"):
+        raise InvalidParameter("scene", scene, "must be a Scene")
     if scene is not None or result.origin is None:
         return scene
     from sphshell_pin.scenario.replay import Replay

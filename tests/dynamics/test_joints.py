@@ -180,6 +180,19 @@ def test_torques_are_cut_at_the_effort_limit_and_the_result_says_when() -> None:
     assert residual(result) < 1e-9
 
 
+def test_events_of_limits_name_the_joint_that_met_them() -> None:
+    model = pin.buildSampleModelManipulator()
+    model.gravity.setZero()
+    for name in list(model.names)[1:]:
+        joints = JointIngredients(effort={name: 1.0}, speed={name: 0.05})
+        column = model.joints[model.getJointId(name)].idx_v
+        torque = np.where(np.arange(model.nv) == column, 1.5, 0.0)
+        run = Simulation(Scene(model, joints=joints), RungeKutta4(1e-3))
+        result = run.run(pin.neutral(model), None, 0.5, lambda *_, torque=torque: torque)
+        assert {event.kind for event in result.events} == {"effort_limit", "speed_limit"}
+        assert {event.pair for event in result.events} == {name}
+
+
 def test_efforts_may_differ_by_direction() -> None:
     scene = Scene(link(), joints=JointIngredients(effort={"hinge": (-2.0, 5.0)}))
     for asked, got in ((10.0, 5.0), (-10.0, -2.0), (1.0, 1.0)):

@@ -246,7 +246,7 @@ def test_wrong_input_is_told() -> None:
         check_robot("ball", frame="nose")
     with pytest.raises(InvalidParameter, match="radius"):
         check_robot("ball", radius=-1.0)
-    with pytest.raises(InvalidParameter, match="must be a URDF file"):
+    with pytest.raises(InvalidParameter, match="must be a file"):
         check_robot("ball", free_flyer=True)
     with pytest.raises(InvalidParameter, match="must be a name, a file or a pinocchio"):
         check_robot(3)
