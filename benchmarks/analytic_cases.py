@@ -14,7 +14,7 @@ import sphshell_pin as sp
 from sphshell_pin.benchmarks.swing import GRAVITY, MASS, RADIUS
 from sphshell_pin.benchmarks.work_precision_cases import Array, Case, decades, rectangle, steps
 from sphshell_pin.dynamics import Result
-from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.dynamics.run.integrators import Integrator
 
 
 @dataclass(frozen=True)

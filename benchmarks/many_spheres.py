@@ -10,7 +10,7 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.benchmarks.surfaces import wavy_sheet
 from sphshell_pin.benchmarks.timing import machine, one_core
-from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.dynamics.run.integrators import Integrator
 
 COUNT, RADIUS, APART = 8, 0.006, 0.012
 LAW = sp.ImpactLaw(1e5, 1.5, 10.0, 1e-4)

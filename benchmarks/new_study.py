@@ -25,11 +25,11 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, judge
-from sphshell_pin.scenario.bodies import to_se3
-from sphshell_pin.scenario.build import Built
-from sphshell_pin.scenario.new import new_scenario
-from sphshell_pin.scenario.run import simulate
-from sphshell_pin.scenario.trial import whole_posture
+from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.drafting.trial import whole_posture
+from sphshell_pin.scenario.format.bodies import to_se3
+from sphshell_pin.scenario.format.build import Built
+from sphshell_pin.scenario.running.run import simulate
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "new_study.md"

@@ -19,7 +19,7 @@ import numpy as np
 
 from sphshell_pin.benchmarks.timing import machine
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.live import Live
 from sphshell_pin.view.live.server import Server
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.scenario import build, shipped_scenarios
-from sphshell_pin.scenario.run import simulate
+from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.view import write_recording
 
 MB = 1e6

@@ -26,7 +26,7 @@ from sphshell_pin.benchmarks.work_precision_cases import (
     stick_slip,
 )
 from sphshell_pin.dynamics import Result
-from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.errors import SimulationDiverged
 
 PICTURE = Path(__file__).parent.parent / "docs" / "pictures" / "work_precision.png"

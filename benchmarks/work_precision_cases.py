@@ -15,7 +15,7 @@ import sphshell_pin as sp
 from sphshell_pin.benchmarks import swing
 from sphshell_pin.benchmarks.step import RADIUS, START, panda, tip_position
 from sphshell_pin.dynamics import Result
-from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.dynamics.run.integrators import Integrator
 
 Array = NDArray[np.float64]
 

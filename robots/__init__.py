@@ -15,7 +15,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.contact.sphere import Sphere
-from sphshell_pin.dynamics.mimic import shortened, with_mimics
+from sphshell_pin.dynamics.scene.mimic import shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
 from sphshell_pin.robots.description import check_poses, check_size, parsed
 from sphshell_pin.robots.files import (
@@ -28,7 +28,7 @@ from sphshell_pin.robots.files import (
     keep_spheres,
     read,
 )
-from sphshell_pin.robots.spheres import MeshSpheres, spheres_of_link, spheres_of_mesh
+from sphshell_pin.robots.mesh_spheres import MeshSpheres, spheres_of_link, spheres_of_mesh
 
 __all__ = [
     "OWN",
@@ -61,7 +61,7 @@ __all__ = [
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from sphshell_pin.dynamics.mimic import Mimic
+    from sphshell_pin.dynamics.scene.mimic import Mimic
 
 URDF_FOLDER = Path(__file__).parent / "urdf"
 
@@ -172,8 +172,8 @@ def load_file(
     in URDF, and as the file states it in MJCF.
 
     With `mimic`, joints that mimic others (URDF `<mimic>`, MJCF `<equality><joint>`) do so exactly:
-    the model's nq and nv are those of the other joints (`sphshell_pin.dynamics.mimic`). Without it
-    they move freely, as Pinocchio reads them.
+    the model's nq and nv are those of the other joints (`sphshell_pin.dynamics.scene.mimic`).
+    Without it they move freely, as Pinocchio reads them.
 
     `srdf` is a file with poses (its `<group_state>`). `pose` names the one that becomes `q0`; in
     MJCF it may be a `<key>`.

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.dynamics.mimic import Mimic
+from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.description import check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.dynamics.mimic import Mimic
+from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.robots.description import MOST_LINKS
 from sphshell_pin.robots.mjcf_geoms import Meshes, geom_inertia, plain_geom, plain_place
 from sphshell_pin.robots.mjcf_values import (

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.rollout import Rollout
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.run.rollout import Rollout
 
 
 # Longer lists of valid names are cut to the nearest ones, longer values in the middle.

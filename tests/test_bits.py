@@ -76,7 +76,7 @@ def laws() -> str:
 def runs() -> str:
     """Hash the motion of shipped scenarios."""
     from sphshell_pin.scenario import build
-    from sphshell_pin.scenario.run import simulate
+    from sphshell_pin.scenario.running.run import simulate
 
     columns = []
     for name in ("sphere_on_shell", "fingertip_on_blade", "ball_on_turntable"):

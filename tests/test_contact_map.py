@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.run_stats import PairFigures, RunStats
+from sphshell_pin.dynamics.result.run_stats import PairFigures, RunStats
 from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.plot import plot_contact_map, plot_result
 from sphshell_pin.plot.contact_map import element_values

@@ -173,7 +173,7 @@ LAYERS = (
 LEVEL = {folder: k for k, folders in enumerate(LAYERS) for folder in folders}
 # These offer pictures of themselves.
 PICTURES = (
-    "sphshell_pin.dynamics.result",
+    "sphshell_pin.dynamics.result.result",
     "sphshell_pin.patches.taxels",
     "sphshell_pin.patches.wear",
 )

@@ -10,12 +10,12 @@ from pydantic import TypeAdapter, ValidationError
 
 from sphshell_pin import _core
 from sphshell_pin.contact import Friction, NormalLaw
-from sphshell_pin.dynamics.controllers import Controller
-from sphshell_pin.dynamics.integrators import Integrator
-from sphshell_pin.dynamics.sensors import Sensor
+from sphshell_pin.dynamics.control.controllers import Controller
+from sphshell_pin.dynamics.run.integrators import Integrator
+from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Ingredient, parameter, parameters_of, table, table_row
-from sphshell_pin.scenario.primitives import Primitive
+from sphshell_pin.scenario.format.shape_tables import Primitive
 
 FAMILIES = {
     "law": NormalLaw,

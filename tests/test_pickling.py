@@ -13,7 +13,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import NotPicklable
 from tests import meshes, models
 

@@ -15,8 +15,8 @@ from sphshell_pin.benchmarks.peers.engine import CpuClock, Params, Trajectory
 from sphshell_pin.benchmarks.peers.press import FRAME, PressScene
 from sphshell_pin.benchmarks.peers.scenes import BallScene, Bowl, Impact, Scene
 from sphshell_pin.benchmarks.peers.shapes import Surface
-from sphshell_pin.dynamics.advance import advance, start_run
-from sphshell_pin.dynamics.sensors import SensorSet
+from sphshell_pin.dynamics.run.advance import advance, start_run
+from sphshell_pin.dynamics.sensing.sensors import SensorSet
 
 Array = NDArray[np.float64]
 # Bristles are so much stiffer than the contact: what rolls should not slip.

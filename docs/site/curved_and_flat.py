@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sphshell_pin.plot.figure import new_figure, write_figure
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.run import simulate
+from sphshell_pin.scenario.running.run import simulate
 
 PICTURE = Path(__file__).parents[1] / "pictures" / "curved_and_flat.png"
 SETTLED = 0.3  # [s], the first touch not counted

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sphshell_pin.scenario import build, run_scenario
-from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view import Live
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from sphshell_pin.adapters.evaluator import check_without_history
 from sphshell_pin.checks import check_names, check_type
 from sphshell_pin.dynamics import Scene, Simulation
-from sphshell_pin.dynamics.variations import Variations, numbers_of
+from sphshell_pin.dynamics.scene.variations import Variations, numbers_of
 from sphshell_pin.errors import MissingExtra, NameNotFound
 
 try:

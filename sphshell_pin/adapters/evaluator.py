@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sphshell_pin import _core
 from sphshell_pin.checks import check_type
 from sphshell_pin.dynamics import Scene, Simulation
-from sphshell_pin.dynamics.advance import step_of
+from sphshell_pin.dynamics.run.advance import step_of
 from sphshell_pin.errors import InvalidParameter
 
 Array = NDArray[np.float64]

@@ -11,9 +11,9 @@ import typer
 from sphshell_pin.cli.app import app, faults, progress_bar
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
-    from sphshell_pin.scenario.replay import Replay
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
+    from sphshell_pin.scenario.running.replay import Replay
 
 FORMATS = ("mcap", "csv", "parquet")
 
@@ -56,7 +56,7 @@ def export(
     """
     with faults(context):
         from sphshell_pin.errors import InvalidParameter
-        from sphshell_pin.scenario.replay import Replay
+        from sphshell_pin.scenario.running.replay import Replay
 
         if to not in FORMATS:
             must = f"must be one of {', '.join(FORMATS)}"
@@ -127,9 +127,9 @@ def nanoseconds(text: str) -> int:
 
 def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | None]:
     """Return a run and its scene; without one, say that joints have numbers instead of names."""
-    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.errors import ResultError
-    from sphshell_pin.scenario.replay import Replay
+    from sphshell_pin.scenario.running.replay import Replay
 
     try:
         replay = Replay(file_of(run), scenario)

@@ -83,7 +83,7 @@ def fit(
     Example: sphshell-pin fit drop.csv ball.toml --param contact.tip.law.stiffness
     """
     with faults(context):
-        from sphshell_pin.scenario.reading import find_scenario, read_scenario
+        from sphshell_pin.scenario.format.reading import find_scenario, read_scenario
         from sphshell_pin.study.fit import Experiment
         from sphshell_pin.study.fit import fit as fit_scenario
         from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
@@ -162,8 +162,8 @@ def _write(
 ) -> list[Path]:
     from sphshell_pin.errors import MissingExtra, ScenarioError
     from sphshell_pin.export.tables import write_folder
-    from sphshell_pin.scenario.knobs import check_knobs
-    from sphshell_pin.scenario.reading import read_scenario
+    from sphshell_pin.scenario.format.reading import read_scenario
+    from sphshell_pin.scenario.format.sliders import check_knobs
 
     # What fails in the making leaves no file behind.
     made = {"fit.json": found.to_json().encode()}

@@ -19,7 +19,7 @@ from sphshell_pin.cli.app import (
 from sphshell_pin.cli.files import BodyOption, FaceOption, faces_of
 
 if TYPE_CHECKING:
-    from sphshell_pin.scenario.new import NewScenario
+    from sphshell_pin.scenario.drafting.new import NewScenario
 
 
 @app.command()
@@ -101,7 +101,7 @@ def new(
     """
     with faults(context):
         from sphshell_pin.errors import SphshellError, UnitMissing
-        from sphshell_pin.scenario.new import new_scenario
+        from sphshell_pin.scenario.drafting.new import new_scenario
 
         try:
             made = new_scenario(

@@ -59,7 +59,7 @@ def render(
         import re
 
         from sphshell_pin.errors import InvalidParameter, SphshellError
-        from sphshell_pin.scenario.replay import Replay
+        from sphshell_pin.scenario.running.replay import Replay
         from sphshell_pin.view.film import render_film
         from sphshell_pin.view.live.opening import result_file
 

@@ -142,7 +142,7 @@ def _print_joints(report: RunReport) -> None:
 
 
 def _print_report(report: RunReport) -> None:
-    from sphshell_pin.scenario.figures import measure_energy
+    from sphshell_pin.scenario.running.figures import measure_energy
 
     console = terminal()
     stats, title = report.result.stats, report.built.scenario.title

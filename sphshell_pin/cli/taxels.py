@@ -46,7 +46,7 @@ def taxels(
 
         from sphshell_pin.errors import MissingExtra
         from sphshell_pin.patches import TaxelGrid
-        from sphshell_pin.scenario.replay import Replay
+        from sphshell_pin.scenario.running.replay import Replay
 
         height, width = map(math.radians, extent_deg)
         grid = TaxelGrid(contact, shape, axis=axis, up=up, extent=(height, width))

@@ -1,24 +1,30 @@
 """Scenes of contact pairs on a Pinocchio model, and their motion."""
 
-from sphshell_pin.dynamics import controllers, impedance, integrators, sensors
-from sphshell_pin.dynamics.controllers import *  # noqa: F403
-from sphshell_pin.dynamics.derivatives import (
+from sphshell_pin.dynamics.control import controllers, impedance
+from sphshell_pin.dynamics.control.controllers import *  # noqa: F403
+from sphshell_pin.dynamics.control.impedance import *  # noqa: F403
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.result_parts import ContactLog, EnergyAudit, Event
+from sphshell_pin.dynamics.result.run_stats import JointFigures, PairFigures, RunStats
+from sphshell_pin.dynamics.run import integrators
+from sphshell_pin.dynamics.run.integrators import *  # noqa: F403
+from sphshell_pin.dynamics.run.rollout import Rollout
+from sphshell_pin.dynamics.run.sensitivities import Sensitivities
+from sphshell_pin.dynamics.run.simulation import Simulation
+from sphshell_pin.dynamics.scene.derivatives import (
     ContactForceDerivatives,
     DynamicsDerivatives,
     StepDerivatives,
 )
-from sphshell_pin.dynamics.impedance import *  # noqa: F403
-from sphshell_pin.dynamics.integrators import *  # noqa: F403
-from sphshell_pin.dynamics.joints import JointFriction, JointIngredients, JointLimits
-from sphshell_pin.dynamics.result import Result
-from sphshell_pin.dynamics.result_parts import ContactLog, EnergyAudit, Event
-from sphshell_pin.dynamics.rollout import Rollout
-from sphshell_pin.dynamics.run_stats import JointFigures, PairFigures, RunStats
-from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts, SceneState
-from sphshell_pin.dynamics.sensitivities import Sensitivities
-from sphshell_pin.dynamics.sensor_log import Readings, SensorLog
-from sphshell_pin.dynamics.sensors import *  # noqa: F403
-from sphshell_pin.dynamics.simulation import Simulation
+from sphshell_pin.dynamics.scene.joint_components import (
+    JointFriction,
+    JointIngredients,
+    JointLimits,
+)
+from sphshell_pin.dynamics.scene.scene import ContactPair, Scene, SceneContacts, SceneState
+from sphshell_pin.dynamics.sensing import sensors
+from sphshell_pin.dynamics.sensing.sensor_log import Readings, SensorLog
+from sphshell_pin.dynamics.sensing.sensors import *  # noqa: F403
 
 __all__ = [
     "ContactForceDerivatives",

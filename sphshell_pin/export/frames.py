@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.dynamics.models import find_frame
-from sphshell_pin.dynamics.scene import ContactPair, Scene
+from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.dynamics.scene.scene import ContactPair, Scene
 
 Array = NDArray[np.float64]
 

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.checks import check_type
-from sphshell_pin.dynamics.pair_series import PairSeries
-from sphshell_pin.dynamics.result import Result
-from sphshell_pin.dynamics.scene import Scene
-from sphshell_pin.dynamics.scene_contacts import SceneContacts
-from sphshell_pin.dynamics.sensor_log import SensorLog
+from sphshell_pin.dynamics.result.pair_series import PairSeries
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.scene.scene import Scene
+from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
+from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
 from sphshell_pin.errors import MissingExtra, ResultError
 from sphshell_pin.export.cdr import Message, encode
 from sphshell_pin.export.frames import WORLD, Frames, quaternion
@@ -121,7 +121,7 @@ def scene_of(result: Result, scene: Scene | None) -> Scene:
     """
     scene = result.scene if scene is None else scene
     if scene is None:
-        from sphshell_pin.scenario.replay import Replay
+        from sphshell_pin.scenario.running.replay import Replay
 
         return Replay(result).scene
     check_type("scene", scene, Scene, "must be a Scene")

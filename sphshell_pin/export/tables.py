@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Literal
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
-from sphshell_pin.dynamics.result import Result
-from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import MissingExtra, ResultError
 from sphshell_pin.tables import Table, csv_text
 

@@ -14,9 +14,9 @@ from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on
 from sphshell_pin.patches.sampling import Grid, divide
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.pairs import ContactPair
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.pairs import ContactPair
+    from sphshell_pin.dynamics.scene.scene import Scene
 
 _STEP = 0.2  # of a stroke: between two places at which the pressure is taken, over a half axis
 

@@ -14,8 +14,8 @@ from sphshell_pin.checks import check_type
 from sphshell_pin.errors import ResultError
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
 
 Array = NDArray[np.float64]
 Longs = NDArray[np.int64]
@@ -84,7 +84,7 @@ def patches_on(
 
 def scene_of(result: Result, scene: Scene | None) -> Scene:
     """Return `scene`, or the one that ran; ResultError where there is none."""
-    from sphshell_pin.dynamics.scene import Scene as SceneType  # which needs this package
+    from sphshell_pin.dynamics.scene.scene import Scene as SceneType  # which needs this package
 
     scene = result.scene if scene is None else scene
     if scene is None:

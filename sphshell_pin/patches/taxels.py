@@ -20,9 +20,9 @@ from sphshell_pin.patches.placed import Array, Longs, PlacedPatches, patches_on,
 from sphshell_pin.summary import Summarized
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.pairs import ContactPair
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.pairs import ContactPair
+    from sphshell_pin.dynamics.scene.scene import Scene
 
 # Parallels are no straight lines in a patch: they are cut so that a chord leaves them by this
 # share of the larger half axis of the smallest of the larger patches.

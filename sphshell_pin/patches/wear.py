@@ -23,9 +23,9 @@ from sphshell_pin.summary import Fact, Summarized
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from sphshell_pin.dynamics.pairs import ContactPair
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.pairs import ContactPair
+    from sphshell_pin.dynamics.scene.scene import Scene
     from sphshell_pin.shell.shell import Shell
 
 # Samples over the smaller half axis of a patch, unless a resolution is given.

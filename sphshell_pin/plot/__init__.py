@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sphshell_pin.checks import check_name
-from sphshell_pin.dynamics.pair_series import PairSeries
+from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.plot.contact_map import QUANTITIES, plot_contact_map
 from sphshell_pin.plot.contact_path import plot_contact_path
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
 
 __all__ = [
     "KINDS",
@@ -89,7 +89,7 @@ def scene_of(result: Result, scene: Scene | None = None) -> Scene | None:
         raise InvalidParameter("scene", scene, "must be a Scene")
     if scene is not None or result.origin is None:
         return scene
-    from sphshell_pin.scenario.replay import Replay
+    from sphshell_pin.scenario.running.replay import Replay
 
     return Replay(result).scene
 

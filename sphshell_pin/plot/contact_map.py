@@ -23,8 +23,8 @@ from sphshell_pin.view.contact_path import FloatArray
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
     from sphshell_pin.patches.placed import PlacedPatches
     from sphshell_pin.shell.shell import Shell
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from mpl_toolkits.mplot3d import Axes3D
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
 
 
 MOST_NAMES = 8  # beside the paths with the largest forces

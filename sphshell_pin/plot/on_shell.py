@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from mpl_toolkits.mplot3d import Axes3D
     from numpy.typing import NDArray
 
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
     from sphshell_pin.shell.shell import Shell
 
 BARE = np.array([0.80, 0.86, 0.845, 1.0])  # an element that nothing touched

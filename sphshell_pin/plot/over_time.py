@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.dynamics.pair_series import PairSeries
+from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.plot.figure import (
     NO_CONTACT,
     count,
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.result.result import Result
 
 FORCE_COLORS = {"normal": "#d4202a", "friction": "#f08a00"}
 DEPTH_COLOR = "#2f6fde"

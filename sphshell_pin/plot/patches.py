@@ -12,8 +12,8 @@ from sphshell_pin.view.contact_path import FloatArray
 if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
 
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
     from sphshell_pin.patches.placed import PlacedPatches
     from sphshell_pin.plot.on_shell import PathGroup, Picture
 

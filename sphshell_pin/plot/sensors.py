@@ -10,7 +10,7 @@ from sphshell_pin.plot.series import thinned
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.result.result import Result
 
 NO_SENSORS = "no sensors"
 

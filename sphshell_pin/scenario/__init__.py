@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from sphshell_pin.scenario.build import Built, build, explain_built, rebuild
-from sphshell_pin.scenario.figures import Verdict, judge
-from sphshell_pin.scenario.knobs import Knob, knobs_of
-from sphshell_pin.scenario.reading import find_scenario, read_scenario, shipped_scenarios
-from sphshell_pin.scenario.run import RunReport, run_built, run_scenario
-from sphshell_pin.scenario.schema import Scenario
+from sphshell_pin.scenario.format.build import Built, build, explain_built, rebuild
+from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, shipped_scenarios
+from sphshell_pin.scenario.format.schema import Scenario
+from sphshell_pin.scenario.format.sliders import Knob, knobs_of
+from sphshell_pin.scenario.running.figures import Verdict, judge
+from sphshell_pin.scenario.running.run import RunReport, run_built, run_scenario
 
 __all__ = [
     "Built",

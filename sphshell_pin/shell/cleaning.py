@@ -18,10 +18,10 @@ from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell.cleaned import CleanedSurface
 from sphshell_pin.shell.corner_normals import Found, settle_normals, unit_normals
 from sphshell_pin.shell.health import Place, ShellHealth
-from sphshell_pin.shell.joints import settle_joints
 from sphshell_pin.shell.orientation import Borders, Oriented, as_triangles, find_borders, orient
 from sphshell_pin.shell.polygons import Polygons, examine_quads, without_area
 from sphshell_pin.shell.raw import Floats, Ints, Mask, RawSurface, raw_surface
+from sphshell_pin.shell.tangent_joints import settle_joints
 
 WELD_TOLERANCE = 1e-7
 """Vertices nearer than this share of the box diagonal are one."""

@@ -10,13 +10,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from sphshell_pin.dynamics.pair_series import PairSeries
-from sphshell_pin.dynamics.result import Result
-from sphshell_pin.dynamics.result_columns import coordinates
-from sphshell_pin.dynamics.run_stats import PairFigures
-from sphshell_pin.dynamics.scene import Scene
+from sphshell_pin.dynamics.result.pair_series import PairSeries
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.result_columns import coordinates
+from sphshell_pin.dynamics.result.run_stats import PairFigures
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError
-from sphshell_pin.scenario.figures import (
+from sphshell_pin.scenario.running.figures import (
     JOINT_FIGURES,
     PAIR_UNITS,
     SENSOR_FIGURES,

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.checks import check_points, check_positive
 from sphshell_pin.dynamics import Result, Scene
-from sphshell_pin.dynamics.models import find_frame
-from sphshell_pin.dynamics.scene import ContactPair
+from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.dynamics.scene.scene import ContactPair
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
 from sphshell_pin.testing.conservation import scene_of

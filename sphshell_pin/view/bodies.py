@@ -22,7 +22,7 @@ from sphshell_pin.view.surface import draw_faces, draw_patches, draw_shell, grea
 if TYPE_CHECKING:
     from meshcat import Visualizer
 
-    from sphshell_pin.dynamics.pairs import ContactPair, PlacedSphere
+    from sphshell_pin.dynamics.scene.pairs import ContactPair, PlacedSphere
 
 SPHERE_COLOR = 0x2F6FDE
 

@@ -10,9 +10,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.result_parts import ContactLog
-    from sphshell_pin.dynamics.scene import ContactPair, Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.result.result_parts import ContactLog
+    from sphshell_pin.dynamics.scene.scene import ContactPair, Scene
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]

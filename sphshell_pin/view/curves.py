@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.dynamics.pair_series import PairSeries
+from sphshell_pin.dynamics.result.pair_series import PairSeries
 from sphshell_pin.view.contact_path import LARGEST
 from sphshell_pin.view.meshes import pack_numbers
 from sphshell_pin.view.nodes import FloatArray, Json
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.result.result import Result
 
 MOST_PAIRS = 8
 BINS = 300  # of time: of each the extremes are kept

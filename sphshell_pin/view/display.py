@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.dynamics.models import frame_on_joint
+from sphshell_pin.dynamics.scene.models import frame_on_joint
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.arrows import ArrowKind, ArrowPool, ArrowScale, ContactColumns
 from sphshell_pin.view.bodies import (
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from meshcat import Visualizer
     from numpy.typing import ArrayLike
 
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.scene.scene import Scene
 
 TRAIL_COLOR = 0x8E1B8E
 _WIDTH = 0.05  # of links, in sizes of the robot

@@ -29,8 +29,8 @@ from sphshell_pin.view.recording import Shown, check_pace, render_recording, sou
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright
 
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
 
 Drawn = TypeVar("Drawn")
 Camera = Literal["fit", "front", "side", "top", "follow", "contact"]

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
 
 BARE = (
     "The robot is drawn by its joints, as the scene's model has no geometry: "
@@ -244,7 +244,7 @@ class Shown:
     ) -> Shown:
         """Take from the scenario of `result` what is None."""
         if scene is None and result.origin is not None:
-            from sphshell_pin.scenario.replay import Replay
+            from sphshell_pin.scenario.running.replay import Replay
 
             replay = Replay(result)
             scene, title = replay.scene, title or replay.title

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin._interrupts import interrupts_delayed
-from sphshell_pin.dynamics.models import find_frame, frame_on_joint
+from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.meshes import lit_facets
 from sphshell_pin.view.nodes import (

@@ -14,8 +14,8 @@ from sphshell_pin.view.meshes import pack_numbers
 from sphshell_pin.view.nodes import FloatArray, Json
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.result import Result
-    from sphshell_pin.dynamics.scene import Scene
+    from sphshell_pin.dynamics.result.result import Result
+    from sphshell_pin.dynamics.scene.scene import Scene
     from sphshell_pin.view.contact_path import ContactRows
 
 CLOSE = 8.0  # radii of the sphere around it that a close-up shows, at least

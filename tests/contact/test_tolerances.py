@@ -1,4 +1,4 @@
-"""What the tolerances of cpp/contact/tolerances.hpp change, and that nothing else feels them."""
+"""What the tolerances of contact/query/tolerances.hpp change; nothing else depends on them."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import CartesianImpedance, CoulombFriction, ImpactLaw, JointPD, Scene, Sphere
-from sphshell_pin.dynamics.models import find_frame
+from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
 from tests.models import ARM_Q, LAW, add_body, arm, ball, empty, free_q, on_plate, plate
 

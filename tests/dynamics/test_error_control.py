@@ -12,7 +12,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, ScenarioError
-from sphshell_pin.scenario.build import build
+from sphshell_pin.scenario.format.build import build
 from tests import meshes, models
 from tests.scenario import files
 

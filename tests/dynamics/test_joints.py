@@ -27,9 +27,9 @@ from sphshell_pin import (
     Simulation,
     Sphere,
 )
-from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import InvalidParameter, NameNotFound
-from sphshell_pin.scenario.build import build
+from sphshell_pin.scenario.format.build import build
 from tests import models
 
 MASS, LENGTH, OWN = 1.0, 0.3, 0.01

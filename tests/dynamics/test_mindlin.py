@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build
 from tests import meshes, models

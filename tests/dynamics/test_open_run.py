@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import FrameNotFound, InvalidParameter
 from tests import models
 

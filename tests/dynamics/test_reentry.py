@@ -10,7 +10,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import _core
-from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import Busy, InvalidParameter
 from tests.models import LAW, ball, free_q, on_plate
 

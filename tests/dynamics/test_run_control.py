@@ -24,7 +24,7 @@ from sphshell_pin import (
     Simulation,
     Sphere,
 )
-from sphshell_pin.dynamics.result_parts import Event, Kept, Origin
+from sphshell_pin.dynamics.result.result_parts import Event, Kept, Origin
 from sphshell_pin.errors import (
     DeepStart,
     FrameNotFound,

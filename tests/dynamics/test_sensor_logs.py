@@ -9,7 +9,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import ResultError
-from sphshell_pin.scenario.run import write_sensors
+from sphshell_pin.scenario.running.run import write_sensors
 from tests.dynamics.test_sensors import noisy, sine, slider, torque
 
 

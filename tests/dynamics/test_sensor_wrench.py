@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.dynamics.run.open_run import OpenRun
 from tests import models
 
 # A joint, its link, a sensor fixed to it, on that a flange with a tool fixed to it and a finger on

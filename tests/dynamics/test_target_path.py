@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.path import Curve, Timing, core_path
+from sphshell_pin.dynamics.control.target_path import Curve, Timing, core_path
 from sphshell_pin.errors import InvalidParameter
 from tests import meshes, models
 

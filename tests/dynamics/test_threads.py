@@ -20,7 +20,7 @@ import collections, sys, threading, time
 sys.path.insert(0, {str(ROOT)!r})
 import numpy as np
 import sphshell_pin as sp
-from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import Busy, SphshellError
 from tests.models import FRICTION, LAW, ball, free_q, on_plate
 sys.setswitchinterval(1e-6)
@@ -143,7 +143,7 @@ assert abs(run.time - 0.3) < 1e-5  # and it went on as if nothing had been
 def test_a_live_run_is_read_by_all_and_moved_by_one() -> None:
     passes("""
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.live.live_run import LiveRun
 live = LiveRun(build("ball_on_turntable"))
 body, times = live.bodies[0], []
 def look():

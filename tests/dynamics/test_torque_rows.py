@@ -8,8 +8,8 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import robots
-from sphshell_pin.dynamics.joints import JointIngredients
-from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.dynamics.run.open_run import OpenRun
+from sphshell_pin.dynamics.scene.joint_components import JointIngredients
 from sphshell_pin.errors import InvalidParameter
 
 Q0 = np.array([0.2, 0.6, 0.5])

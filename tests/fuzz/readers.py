@@ -13,7 +13,7 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.replay import Replay
+from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.study.robot_check.models import load_subject
 from sphshell_pin.study.sweep.journal import Journal
 from tests.fuzz.tables import HEAD, OUTCOMES

@@ -21,7 +21,7 @@ import numpy as np
 from sphshell_pin import robots
 from sphshell_pin.dynamics import Sensitivities
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.run import simulate
+from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study.sweep.job import Outcome
 from sphshell_pin.study.sweep.journal import Journal
 from tests.fuzz.mutate import NUMBERS, alter, odd_value

@@ -80,7 +80,7 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
     from sphshell_pin.cli import main
     from sphshell_pin.patches import TaxelGrid
     from sphshell_pin.patches.wear import wear_maps
-    from sphshell_pin.scenario.replay import Replay
+    from sphshell_pin.scenario.running.replay import Replay
 
     def command(*words: str) -> Callable[[], None]:
         def run() -> None:

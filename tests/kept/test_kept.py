@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.result_parts import Kept, Origin
+from sphshell_pin.dynamics.result.result_parts import Kept, Origin
 from sphshell_pin.errors import ResultError, RobotWarning, SphshellError
-from sphshell_pin.robots.kept import without_references
-from sphshell_pin.scenario import Built, build, kept
-from sphshell_pin.scenario.replay import Replay
-from sphshell_pin.scenario.run import origin_of, simulate
+from sphshell_pin.robots.kept_robot import without_references
+from sphshell_pin.scenario import Built, build
+from sphshell_pin.scenario.running import kept_scenario as kept
+from sphshell_pin.scenario.running.replay import Replay
+from sphshell_pin.scenario.running.run import origin_of, simulate
 from tests.kept.scenes import DATA, write
 
 CUBE = DATA / "xacro" / "finger_description" / "meshes" / "cube.stl"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.open_run import OpenRun
+from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import InvalidParameter, ResultError
 from tests.oracle.hertz import hertz_contact
 from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin import robots
-from sphshell_pin.dynamics.mimic import mimics
+from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning
 from sphshell_pin.robots import xacro_file
 

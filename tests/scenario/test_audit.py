@@ -13,7 +13,7 @@ pytest.importorskip("OCP")
 from sphshell_pin.cli import app
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, run_built
-from sphshell_pin.scenario.audit import _counts, audit_cad
+from sphshell_pin.scenario.running.cad_audit import _counts, audit_cad
 from sphshell_pin.shell.cad import CadOptions, require_kernel
 from tests.scenario.files import DROP, write
 from tests.shell import cad_shapes as shapes

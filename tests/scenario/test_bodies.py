@@ -11,8 +11,8 @@ import pytest
 from sphshell_pin import robots
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.errors import ScenarioError
-from sphshell_pin.scenario.bodies import assemble, reduce_visual, restrict
-from sphshell_pin.scenario.reading import read_scenario
+from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restrict
+from sphshell_pin.scenario.format.reading import read_scenario
 from tests.scenario.files import write
 
 TWO = """

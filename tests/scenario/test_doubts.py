@@ -14,8 +14,8 @@ import sphshell_pin as sp
 from sphshell_pin.cli import app
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SetupWarning
 from sphshell_pin.scenario import build, explain_built
-from sphshell_pin.scenario.new import new_scenario
-from sphshell_pin.scenario.run import simulate
+from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.running.run import simulate
 from tests.scenario.files import DROP, write
 
 SHORT = {"run.duration": "1e-4"}
@@ -106,7 +106,7 @@ def test_the_commands_say_so(scenario, tmp_path):
 
 
 def test_the_live_page_says_so(scenario, capsys):
-    from sphshell_pin.scenario.live import LiveRun
+    from sphshell_pin.scenario.live.live_run import LiveRun
     from sphshell_pin.view.live.opening import _warn
 
     _warn(LiveRun(build(scenario, OFF)))

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from sphshell_pin.cli import app
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.new import new_scenario
+from sphshell_pin.scenario.drafting.new import new_scenario
 from tests.scenario.files import DROP, write
 from tests.scenario.test_new import arm_urdf
 
@@ -117,7 +117,7 @@ def test_ctrl_c_while_a_library_loads_is_an_interruption(cause, monkeypatch):
             error.__context__ = None if cause is KeyboardInterrupt else ring
             raise ring from error
 
-    monkeypatch.setattr("sphshell_pin.scenario.build", load)
+    monkeypatch.setattr("sphshell_pin.scenario.format.build", load)
     code, output = told("explain", "sphere_on_shell")
     assert (code, "interrupted" in output) == (
         (130, True) if cause is KeyboardInterrupt else (2, False)

@@ -11,14 +11,14 @@ from sphshell_pin import robots
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import ScenarioError, SphshellError
 from sphshell_pin.scenario import build, judge
-from sphshell_pin.scenario.balance import least_friction, nonnegative
-from sphshell_pin.scenario.grasp import Grasp, Hand
-from sphshell_pin.scenario.hand_text import GAP
-from sphshell_pin.scenario.new import new_scenario
-from sphshell_pin.scenario.part import Part
-from sphshell_pin.scenario.primitives import Box, Cylinder
-from sphshell_pin.scenario.run import simulate
-from sphshell_pin.scenario.tips import Tip
+from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.force_balance import least_friction, nonnegative
+from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
+from sphshell_pin.scenario.drafting.hand_text import GAP
+from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.drafting.part import Part
+from sphshell_pin.scenario.format.shape_tables import Box, Cylinder
+from sphshell_pin.scenario.running.run import simulate
 
 NO_WEIGHT = np.zeros(6)
 

@@ -7,7 +7,7 @@ import pytest
 
 from sphshell_pin.errors import InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, knobs_of, rebuild, shipped_scenarios
-from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.live.live_run import LiveRun
 from tests.scenario.files import DROP, write
 
 STIFFNESS = "contact.ball-plate.law.stiffness"

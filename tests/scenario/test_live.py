@@ -8,7 +8,7 @@ import pytest
 
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.live.live_run import LiveRun
 from tests.scenario.files import DROP, write
 
 LAW = "contact.ball-plate.law"

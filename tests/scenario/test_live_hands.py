@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin.dynamics.models import apparent_mass
+from sphshell_pin.dynamics.scene.models import apparent_mass
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.live.live_run import LiveRun
 from tests import models
 from tests.scenario.arms import PD, write_arm
 from tests.scenario.files import DROP, write

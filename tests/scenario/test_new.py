@@ -24,8 +24,8 @@ from sphshell_pin.errors import (
     UnitMissing,
 )
 from sphshell_pin.scenario import build, judge, knobs_of, rebuild, shipped_scenarios
-from sphshell_pin.scenario.new import new_scenario
-from sphshell_pin.scenario.run import simulate
+from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.running.run import simulate
 from tests.shell.surfaces import surface_file
 
 SURFACES = next(iter(shipped_scenarios().values())).parent / "surfaces"
@@ -349,7 +349,7 @@ def test_a_unit_is_asked_for_as_the_command_takes_it():
 
 def test_feet_come_down_on_what_is_under_them():
     """Four feet over a plate that only one can reach: that one has the gap."""
-    from sphshell_pin.scenario.plan import _under
+    from sphshell_pin.scenario.drafting.plan import _under
 
     plate = sp.Shell.from_geometry(coal.Box(0.1, 0.1, 0.02))
     feet = np.array([[x, y, 0.3] for x in (-0.4, 0.4) for y in (-0.2, 0.2)])
@@ -366,7 +366,11 @@ def test_feet_come_down_on_what_is_under_them():
 
 def test_a_spot_avoids_edges_and_grooves():
     """On a roof the ridge is in the middle: a tip is put beside it, on one side."""
-    from sphshell_pin.scenario.touch_points import find_touch_point, touch_points, touches_once
+    from sphshell_pin.scenario.drafting.touch_points import (
+        find_touch_point,
+        touch_points,
+        touches_once,
+    )
 
     roof = [[x, y, 0.1 - abs(x)] for x in (-0.1, 0.0, 0.1) for y in (-0.2, 0.2)]
     shell = sp.Shell(roof, [[0, 2, 3, 1], [2, 4, 5, 3]])
@@ -400,7 +404,7 @@ def shell_of(geometry) -> sp.Shell:
 def test_a_surface_is_touched_in_the_middle_of_its_broad_side(
     geometry, toward, inside, point, normal
 ):
-    from sphshell_pin.scenario.touch_points import find_touch_point
+    from sphshell_pin.scenario.drafting.touch_points import find_touch_point
 
     spot = find_touch_point(shell_of(geometry), 0.01, 1e-3, toward=toward, inside=inside)
     np.testing.assert_allclose(spot.point, point, atol=1e-4)
@@ -410,7 +414,7 @@ def test_a_surface_is_touched_in_the_middle_of_its_broad_side(
 
 def test_a_sphere_has_room_in_a_groove():
     """A V of 60 degrees: the sphere rests on both sides, its center at twice the distance."""
-    from sphshell_pin.scenario.touch_points import find_touch_point
+    from sphshell_pin.scenario.drafting.touch_points import find_touch_point
 
     slope = np.tan(np.deg2rad(60))
     vertices = [[-0.1, y, 0.1 * slope] for y in (-0.1, 0.1)]
@@ -424,7 +428,7 @@ def test_a_sphere_has_room_in_a_groove():
 
 
 def test_a_way_across_stays_on_the_surface_and_ends_at_the_rim():
-    from sphshell_pin.scenario.touch_points import find_touch_point, path_on_surface
+    from sphshell_pin.scenario.drafting.touch_points import find_touch_point, path_on_surface
 
     ball = shell_of(coal.Sphere(0.1))
     spot = find_touch_point(ball, 0.01, 1e-3, toward=np.array([0.0, 0.0, 1.0]))

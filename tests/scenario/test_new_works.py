@@ -16,10 +16,10 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, judge, shipped_scenarios
-from sphshell_pin.scenario.clearance import Links
-from sphshell_pin.scenario.new import new_scenario
-from sphshell_pin.scenario.run import simulate
-from sphshell_pin.scenario.tips import Tip, find_tips
+from sphshell_pin.scenario.drafting.clearance import Links
+from sphshell_pin.scenario.drafting.fingertips import Tip, find_tips
+from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.running.run import simulate
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"

@@ -6,7 +6,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import NameNotFound, ScenarioError, SphshellError
-from sphshell_pin.scenario.reading import find_scenario, read_scenario, shipped_scenarios
+from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.view.live.opening import player_of
 from tests.scenario.files import DROP, write
 

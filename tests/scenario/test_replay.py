@@ -13,7 +13,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.errors import ResultError, SphshellError
 from sphshell_pin.scenario import build, run_built
-from sphshell_pin.scenario.replay import Replay
+from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.view.live.opening import player_of
 from tests.scenario.files import DROP, write
 

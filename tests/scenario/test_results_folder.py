@@ -15,7 +15,8 @@ import pytest
 from sphshell_pin.atomic import AtomicFolder, FolderInUse, atomic_file
 from sphshell_pin.atomic.exchange import exchange
 from sphshell_pin.errors import ResultError
-from sphshell_pin.scenario import build, run, run_built
+from sphshell_pin.scenario import build, run_built
+from sphshell_pin.scenario.running import run
 from tests.scenario.files import write
 from tests.test_cli import call
 

@@ -19,7 +19,7 @@ from sphshell_pin.errors import (
     SimulationDiverged,
 )
 from sphshell_pin.scenario import build, run_built, run_scenario
-from sphshell_pin.scenario.figures import figure_names, measure
+from sphshell_pin.scenario.running.figures import figure_names, measure
 from tests.scenario.files import DROP, write
 
 

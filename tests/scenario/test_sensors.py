@@ -10,8 +10,8 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build, rebuild, run_scenario
-from sphshell_pin.scenario.live import LiveRun
-from sphshell_pin.scenario.replay import Replay
+from sphshell_pin.scenario.live.live_run import LiveRun
+from sphshell_pin.scenario.running.replay import Replay
 from tests.scenario.files import DROP, write
 
 SENSORS = """

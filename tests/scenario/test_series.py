@@ -6,12 +6,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.live import LiveRun
-from sphshell_pin.scenario.replay import Replay
-from sphshell_pin.scenario.run import run_built
-from sphshell_pin.scenario.series import held, motion_series
+from sphshell_pin.scenario.live.live_run import LiveRun
+from sphshell_pin.scenario.running.replay import Replay
+from sphshell_pin.scenario.running.run import run_built
+from sphshell_pin.scenario.running.series import held, motion_series
 from tests.scenario.files import FINGER, write
 
 

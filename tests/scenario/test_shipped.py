@@ -6,8 +6,8 @@ import pytest
 
 from sphshell_pin.errors import MissingExtra
 from sphshell_pin.scenario import build, judge, shipped_scenarios
-from sphshell_pin.scenario.figures import check_expectations
-from sphshell_pin.scenario.run import simulate
+from sphshell_pin.scenario.running.figures import check_expectations
+from sphshell_pin.scenario.running.run import simulate
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import sphshell_pin as sp
 from sphshell_pin.cli import app
-from sphshell_pin.dynamics.result_parts import Origin
+from sphshell_pin.dynamics.result.result_parts import Origin
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.plot.compare import plot_compare
 from sphshell_pin.study.compare import Curve, Measured, compare, measured, tables_of

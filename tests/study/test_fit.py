@@ -15,7 +15,7 @@ import sphshell_pin as sp
 from sphshell_pin.benchmarks.fitting import SCENARIO, TRUTH, many_sets
 from sphshell_pin.errors import DataError, InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
-from sphshell_pin.scenario.reading import find_scenario
+from sphshell_pin.scenario.format.reading import find_scenario
 from sphshell_pin.study.fit import runs
 from sphshell_pin.study.fit.data import read_experiment
 from sphshell_pin.study.fit.parameters import free_parameters

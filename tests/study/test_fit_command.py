@@ -155,8 +155,8 @@ def test_values_and_report_are_of_one_fit_when_it_is_killed(tmp_path, monkeypatc
             return self.value
 
     found, out = Found(), tmp_path / "out"
-    monkeypatch.setattr("sphshell_pin.scenario.knobs.check_knobs", lambda *_, **__: None)
-    monkeypatch.setattr("sphshell_pin.scenario.reading.read_scenario", lambda *_: None)
+    monkeypatch.setattr("sphshell_pin.scenario.format.sliders.check_knobs", lambda *_, **__: None)
+    monkeypatch.setattr("sphshell_pin.scenario.format.reading.read_scenario", lambda *_: None)
     fit._write(found, source, out, {}, picture=False)
     found.value = "new"
     child = os.fork()

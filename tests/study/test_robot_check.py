@@ -30,8 +30,8 @@ from sphshell_pin.study.robot_check import (
 )
 from sphshell_pin.study.robot_check.models import load_subject
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
+from sphshell_pin.study.robot_check.probe_spheres import find_sphere
 from sphshell_pin.study.robot_check.setting import patch
-from sphshell_pin.study.robot_check.spheres import find_sphere
 from sphshell_pin.testing.finding import Finding
 
 ROOT = Path(__file__).parents[2]

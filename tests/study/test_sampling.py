@@ -20,7 +20,7 @@ from sphshell_pin.errors import (
     SweepError,
 )
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.run import simulate
+from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study.sweep import (
     LogNormal,
     Normal,

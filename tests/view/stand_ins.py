@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.dynamics.pairs import PlacedSphere
-from sphshell_pin.dynamics.run_stats import RunStats
+from sphshell_pin.dynamics.result.run_stats import RunStats
+from sphshell_pin.dynamics.scene.pairs import PlacedSphere
 
 CUBE_VERTICES = np.array(np.meshgrid(*3 * [(-0.5, 0.5)], indexing="ij")).reshape(3, -1).T
 CUBE_ELEMENTS = np.array(

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.live.live_run import LiveRun
 from tests.scenario.arms import write_arm
 from tests.scenario.files import DROP, write
 from tests.view.live_player import FilmPlayer

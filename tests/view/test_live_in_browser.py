@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.arrows import NORMAL_COLOR
 from sphshell_pin.view.live import Live
 from tests.view.live_player import ArmPlayer, BallPlayer, FilmPlayer

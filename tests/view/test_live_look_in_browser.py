@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.live import Live
 from tests.scenario.files import DROP, write
 

@@ -11,7 +11,7 @@ import pytest
 
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SimulationDiverged
 from sphshell_pin.scenario import build
-from sphshell_pin.scenario.live import LiveRun
+from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view import live as live_module
 from sphshell_pin.view.live import Live, loop, preview
 from sphshell_pin.view.live.loop import BUDGET, FPS
@@ -248,7 +248,7 @@ def test_the_thread_runs_until_it_is_stopped():
 def test_a_script_may_end_without_stopping_it():
     code = (
         "from sphshell_pin.scenario import build\n"
-        "from sphshell_pin.scenario.live import LiveRun\n"
+        "from sphshell_pin.scenario.live.live_run import LiveRun\n"
         "from sphshell_pin.view.live import Live\n"
         "import time\n"
         "live = Live(LiveRun(build('sphere_on_shell')), speed=10.0).start()\n"

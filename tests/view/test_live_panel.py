@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from sphshell_pin.contact import BristleFriction, CoulombFriction
-from sphshell_pin.dynamics.scene_contacts import ROW, SceneContacts
+from sphshell_pin.dynamics.scene.scene_contacts import ROW, SceneContacts
 from sphshell_pin.view.live.panel import MOST_LISTED, Panel, dump, list_contacts
 
 

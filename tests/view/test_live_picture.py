@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin.contact import CoulombFriction
-from sphshell_pin.dynamics.scene_contacts import ROW, SceneContacts
+from sphshell_pin.dynamics.scene.scene_contacts import ROW, SceneContacts
 from sphshell_pin.view.live.picture import LIVE_PARTS, Picture, PushShown
 from sphshell_pin.view.live.window import LiveWindow
 from tests.view.live_player import ArmPlayer, BallPlayer

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sphshell_pin.dynamics.patches import PATCH
+from sphshell_pin.dynamics.result.contact_patches import PATCH
 from sphshell_pin.view.nodes import new_visualizer
 from sphshell_pin.view.page import FilmWindow
 from sphshell_pin.view.patches import LEVELS, PatchPool, PatchScale

@@ -3,8 +3,8 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "contact/dual.hpp"
-#include "contact/friction.hpp"
+#include "contact/laws/dual.hpp"
+#include "contact/laws/friction.hpp"
 
 namespace nb = nanobind;
 using namespace sphshell;

@@ -7,9 +7,9 @@
 #include "bindings/callbacks.hpp"
 #include "bindings/evaluations.hpp"
 #include "bindings/records.hpp"
-#include "dynamics/model_fault.hpp"
-#include "dynamics/linearization.hpp"
-#include "dynamics/simulation.hpp"
+#include "dynamics/scene/model_fault.hpp"
+#include "dynamics/derivatives/linearization.hpp"
+#include "dynamics/run/simulation.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/pair.h>

@@ -7,11 +7,11 @@
 #include <pinocchio/spatial.hpp>
 
 #include "bindings/evaluations.hpp"
-#include "dynamics/chain.hpp"
-#include "dynamics/contact_row.hpp"
-#include "dynamics/derivatives/step_slopes.hpp"
+#include "dynamics/scene/chain.hpp"
+#include "dynamics/scene/contact_row.hpp"
+#include "dynamics/derivatives/step_derivatives.hpp"
 #include "dynamics/integrators/table.hpp"
-#include "dynamics/linearization.hpp"
+#include "dynamics/derivatives/linearization.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/string.h>

@@ -1,5 +1,5 @@
 #include "bindings/arrays.hpp"
-#include "contact/foundation.hpp"
+#include "contact/laws/foundation.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/tuple.h>

@@ -7,7 +7,7 @@
 
 #include "bindings/arrays.hpp"
 #include "bindings/gil.hpp"
-#include "shell/mending.hpp"
+#include "shell/cleaning/mending.hpp"
 
 namespace sphshell {
 namespace {

@@ -6,7 +6,7 @@
 #include "bindings/gil.hpp"
 #include "bindings/own_errors.hpp"
 #include "bindings/records.hpp"
-#include "dynamics/rollout.hpp"
+#include "dynamics/run/rollout.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/shared_ptr.h>

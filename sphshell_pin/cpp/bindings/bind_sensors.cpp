@@ -1,6 +1,6 @@
 #include "bindings/interop.hpp"
 
-#include "dynamics/sensors.hpp"
+#include "dynamics/sensing/sensors.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/vector.h>

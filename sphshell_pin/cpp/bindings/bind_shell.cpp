@@ -5,8 +5,8 @@
 #include "bindings/arrays.hpp"
 #include "bindings/gil.hpp"
 #include "bindings/own_errors.hpp"
-#include "contact/query.hpp"
-#include "shell/curved.hpp"
+#include "contact/query/query.hpp"
+#include "shell/curved/curved.hpp"
 #include "shell/in_parallel.hpp"
 #include "shell/shell.hpp"
 

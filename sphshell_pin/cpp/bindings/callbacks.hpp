@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "bindings/gil.hpp"
-#include "dynamics/controllers.hpp"
+#include "dynamics/control/controllers.hpp"
 
 namespace sphshell {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bindings/one_user.hpp"
-#include "dynamics/scene_state.hpp"
+#include "dynamics/scene/scene_state.hpp"
 
 namespace sphshell {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bindings/arrays.hpp"
-#include "dynamics/simulation.hpp"
+#include "dynamics/run/simulation.hpp"
 
 namespace sphshell {
 

@@ -4,9 +4,9 @@
 #include <memory>
 #include <mutex>
 
-#include "contact/friction.hpp"
-#include "contact/query.hpp"
-#include "shell/curved.hpp"
+#include "contact/laws/friction.hpp"
+#include "contact/query/query.hpp"
+#include "shell/curved/curved.hpp"
 #include "sphshell_pin/laws.hpp"
 #include "sphshell_pin/query.hpp"
 #include "sphshell_pin/shell.hpp"

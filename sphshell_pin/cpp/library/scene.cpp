@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <pinocchio/algorithm/joint-configuration.hpp>
 
-#include "dynamics/model_fault.hpp"
-#include "dynamics/scene_state.hpp"
+#include "dynamics/scene/model_fault.hpp"
+#include "dynamics/scene/scene_state.hpp"
 #include "library/checks.hpp"
 #include "library/impl.hpp"
 
@@ -18,7 +18,7 @@ constexpr std::size_t kMostNames = 20;  // in a message
 
 std::string in_quotes(const std::string& name) { return "'" + name + "'"; }
 
-// As check_model of sphshell_pin/dynamics/models.py.
+// As check_model of sphshell_pin/dynamics/scene/models.py.
 void check_model(const Model& model) {
   const auto count = static_cast<std::size_t>(model.njoints);
   const auto check_length = [&](const char* name, std::size_t found) {

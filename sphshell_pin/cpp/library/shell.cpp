@@ -7,7 +7,7 @@
 
 #include "library/checks.hpp"
 #include "library/impl.hpp"
-#include "shell/mending.hpp"
+#include "shell/cleaning/mending.hpp"
 
 namespace sphshell_pin {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "shell/curved.hpp"
+#include "shell/curved/curved.hpp"
 #include "shell/free_memory.hpp"
 #include "shell/in_parallel.hpp"
 #include "shell/sheets.hpp"

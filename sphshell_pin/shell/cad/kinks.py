@@ -14,8 +14,8 @@ from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideContinuity
 from sphshell_pin.shell.cad.face_surface import FaceSurface
 from sphshell_pin.shell.cad.model import CadFace, CadModel, faces_of
 from sphshell_pin.shell.cad.options import Occ
-from sphshell_pin.shell.joints import TANGENT_ANGLE
 from sphshell_pin.shell.raw import Floats
+from sphshell_pin.shell.tangent_joints import TANGENT_ANGLE
 
 ACROSS = 1e-6
 """How far on either side of a knot the normals are compared, as a share of the face's range."""

@@ -8,10 +8,15 @@ from os import PathLike
 from pathlib import Path
 
 from sphshell_pin.errors import InvalidParameter, ScenarioError
-from sphshell_pin.scenario.build import Built, build_scenario
-from sphshell_pin.scenario.knobs import check_knobs
-from sphshell_pin.scenario.reading import change_scenario, find_scenario, look_up, read_scenario
-from sphshell_pin.scenario.schema import Scenario
+from sphshell_pin.scenario.format.build import Built, build_scenario
+from sphshell_pin.scenario.format.reading import (
+    change_scenario,
+    find_scenario,
+    look_up,
+    read_scenario,
+)
+from sphshell_pin.scenario.format.schema import Scenario
+from sphshell_pin.scenario.format.sliders import check_knobs
 from sphshell_pin.study.fit.data import Experiment, Source, read_experiment
 from sphshell_pin.study.fit.parameters import Free, Wanted, free_parameters
 from sphshell_pin.study.fit.quantities import quantities_of

@@ -12,9 +12,9 @@ import numpy as np
 
 from sphshell_pin.errors import InvalidParameter, ScenarioError
 from sphshell_pin.parameters import Parameter
-from sphshell_pin.scenario.knobs import meaning
-from sphshell_pin.scenario.reading import change_scenario, look_up
-from sphshell_pin.scenario.schema import Scenario
+from sphshell_pin.scenario.format.reading import change_scenario, look_up
+from sphshell_pin.scenario.format.schema import Scenario
+from sphshell_pin.scenario.format.sliders import meaning
 
 Range = tuple[float, float]
 Wanted = Iterable[str] | Mapping[str, Range | None]

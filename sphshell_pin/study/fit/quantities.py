@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.dynamics.models import find_frame
-from sphshell_pin.dynamics.result import Result
-from sphshell_pin.scenario.build import Built
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.scenario.format.build import Built
 
 Array = NDArray[np.float64]
 

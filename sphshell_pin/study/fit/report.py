@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.atomic import write_whole
-from sphshell_pin.scenario.reading import find_scenario
+from sphshell_pin.scenario.format.reading import find_scenario
 from sphshell_pin.study.fit.parameters import TIE
 from sphshell_pin.study.fit.writing import scenario_text
 from sphshell_pin.summary import Detail, Fact, Summarized

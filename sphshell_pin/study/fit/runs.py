@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from sphshell_pin.dynamics.sensors import Sensor
+from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import (
     DataError,
     Interrupted,
@@ -20,8 +20,8 @@ from sphshell_pin.errors import (
     WeakLawWarning,
 )
 from sphshell_pin.parameters import parameters_of
-from sphshell_pin.scenario.build import Built, build_scenario
-from sphshell_pin.scenario.reading import change_scenario
+from sphshell_pin.scenario.format.build import Built, build_scenario
+from sphshell_pin.scenario.format.reading import change_scenario
 from sphshell_pin.study.fit.data import Measured
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.fit.quantities import row_step

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from sphshell_pin.errors import ScenarioError
-from sphshell_pin.scenario.reading import change_scenario, look_up, parse_scenario
-from sphshell_pin.scenario.schema import Scenario
+from sphshell_pin.scenario.format.reading import change_scenario, look_up, parse_scenario
+from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.study.sweep.job import files_of
 
 # What a value may look like: numbers and words, texts, lists without lists in them.

@@ -12,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.dynamics import Adaptive, Result, Scene, SemiImplicitEuler, Simulation
-from sphshell_pin.dynamics.integrators import Integrator
+from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.errors import SimulationDiverged, SphshellError
 from sphshell_pin.study.robot_check.setting import (
     PLATE,

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from sphshell_pin.dynamics.models import reduced_model
+from sphshell_pin.dynamics.scene.models import reduced_model
 from sphshell_pin.testing.forces import joint_names, mass_matrix
 
 Array = NDArray[np.float64]

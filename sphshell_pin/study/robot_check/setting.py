@@ -10,13 +10,18 @@ from numpy.typing import NDArray
 
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
-from sphshell_pin.dynamics.mimic import mimics, with_mimics
-from sphshell_pin.dynamics.models import find_frame
+from sphshell_pin.dynamics.scene.mimic import mimics, with_mimics
+from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.shell import Shell
 from sphshell_pin.study.robot_check.models import Subject, listed
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
-from sphshell_pin.study.robot_check.spheres import center_of, find_sphere, moved_sphere, placed_data
+from sphshell_pin.study.robot_check.probe_spheres import (
+    center_of,
+    find_sphere,
+    moved_sphere,
+    placed_data,
+)
 from sphshell_pin.testing.forces import mass_matrix, point_jacobian
 
 Array = NDArray[np.float64]

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.dynamics.pair_series import PairSeries
-from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.result.pair_series import PairSeries
+from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.scenario import Built
-from sphshell_pin.scenario.bodies import joint_spans
+from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.study.sweep.job import Outcome
 from sphshell_pin.study.sweep.table import Columns
 

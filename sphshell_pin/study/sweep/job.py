@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from sphshell_pin.errors import MissingExtra
-from sphshell_pin.scenario.schema import Scenario
+from sphshell_pin.scenario.format.schema import Scenario
 
 if TYPE_CHECKING:
     from sphshell_pin.study.sweep.curves import Curves

@@ -20,10 +20,10 @@ from sphshell_pin.scenario import (
     read_scenario,
     shipped_scenarios,
 )
-from sphshell_pin.scenario.build import build_scenario
-from sphshell_pin.scenario.figures import check_expectations, figure_units
-from sphshell_pin.scenario.knobs import meaning
-from sphshell_pin.scenario.reading import look_up
+from sphshell_pin.scenario.format.build import build_scenario
+from sphshell_pin.scenario.format.reading import look_up
+from sphshell_pin.scenario.format.sliders import meaning
+from sphshell_pin.scenario.running.figures import check_expectations, figure_units
 from sphshell_pin.study.sweep.curves import curves_of
 from sphshell_pin.study.sweep.distributions import Dist
 from sphshell_pin.study.sweep.grid import HOW, Axis, Value, Vary, axes_of, points_of, text_of

@@ -13,12 +13,12 @@ from pathlib import Path
 from sphshell_pin.dynamics import Result
 from sphshell_pin.errors import Interrupted, SphshellError, SweepError
 from sphshell_pin.scenario import Built, judge
-from sphshell_pin.scenario.build import build_scenario
-from sphshell_pin.scenario.figures import figure_names, measure
-from sphshell_pin.scenario.knobs import check_knobs
-from sphshell_pin.scenario.reading import change_scenario, find_scenario
-from sphshell_pin.scenario.run import simulate
-from sphshell_pin.scenario.schema import Scenario
+from sphshell_pin.scenario.format.build import build_scenario
+from sphshell_pin.scenario.format.reading import change_scenario, find_scenario
+from sphshell_pin.scenario.format.schema import Scenario
+from sphshell_pin.scenario.format.sliders import check_knobs
+from sphshell_pin.scenario.running.figures import figure_names, measure
+from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study.sweep.job import DONE, FAILED, Job, Outcome, Run, digest_files, versions
 
 # Figures that are no property of the motion: they differ from one time to the next.

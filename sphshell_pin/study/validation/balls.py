@@ -11,7 +11,7 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.normal_law import NormalLaw
-from sphshell_pin.dynamics.result import Result
+from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.study.validation.cases import Array
 
 GAP = 1e-3  # before the touch, over the radius

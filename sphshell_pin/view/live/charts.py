@@ -12,8 +12,8 @@ from sphshell_pin.errors import NameNotFound
 from sphshell_pin.view.nodes import FloatArray, Json
 
 if TYPE_CHECKING:
-    from sphshell_pin.scenario.player import Rows
-    from sphshell_pin.scenario.series import Series
+    from sphshell_pin.scenario.running.player import Rows
+    from sphshell_pin.scenario.running.series import Series
     from sphshell_pin.view.live.player import Player
 
 Point = list[float]
@@ -119,7 +119,7 @@ class Charts:
     """
 
     def __init__(self, player: Player) -> None:
-        from sphshell_pin.scenario.series import force_series  # loads pydantic
+        from sphshell_pin.scenario.running.series import force_series  # loads pydantic
 
         own: Sequence[Series] | None = getattr(player, "series", None)
         self.series = {

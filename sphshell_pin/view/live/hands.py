@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.dynamics.models import find_frame
+from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.view.live.events import BadMessage, Client, Event
 from sphshell_pin.view.live.picture import Picture, PushShown, frame_point
@@ -15,7 +15,7 @@ from sphshell_pin.view.live.window import LiveWindow
 from sphshell_pin.view.nodes import FloatArray, Json
 
 if TYPE_CHECKING:
-    from sphshell_pin.scenario.drag import Dragged
+    from sphshell_pin.scenario.live.drag import Dragged
     from sphshell_pin.view.live.player import Player
 
 G = 9.81

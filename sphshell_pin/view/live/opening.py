@@ -108,7 +108,7 @@ def preview(
 def _warn(player: Player) -> None:
     """Print what `explain` warns of, where a scenario is to run."""
     from sphshell_pin.scenario import explain_built
-    from sphshell_pin.scenario.live import LiveRun
+    from sphshell_pin.scenario.live.live_run import LiveRun
 
     if isinstance(player, LiveRun):
         for warning in explain_built(player.built).warnings:
@@ -122,10 +122,10 @@ def player_of(
     scenario: str | PathLike[str] | None = None,
 ) -> Player:
     """Return the player of `what`; see `preview`."""
-    from sphshell_pin.dynamics.result import Result
+    from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.scenario import Built, build
-    from sphshell_pin.scenario.live import LiveRun
-    from sphshell_pin.scenario.replay import Replay
+    from sphshell_pin.scenario.live.live_run import LiveRun
+    from sphshell_pin.scenario.running.replay import Replay
 
     if isinstance(what, str | PathLike):
         finished = result_file(what)
@@ -153,7 +153,7 @@ def result_file(what: str | PathLike[str]) -> Path | None:
 
     Raises ResultError for a folder without one.
     """
-    from sphshell_pin.scenario.reading import shipped_scenarios
+    from sphshell_pin.scenario.format.reading import shipped_scenarios
 
     path = Path(what)
     if path.suffix == ".npz":

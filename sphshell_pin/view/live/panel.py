@@ -14,8 +14,8 @@ import numpy as np
 from sphshell_pin.view.nodes import Json
 
 if TYPE_CHECKING:
-    from sphshell_pin.dynamics.scene import ContactPair, SceneContacts
-    from sphshell_pin.scenario.player import Rows
+    from sphshell_pin.dynamics.scene.scene import ContactPair, SceneContacts
+    from sphshell_pin.scenario.running.player import Rows
     from sphshell_pin.view.live.charts import Point
     from sphshell_pin.view.live.player import Player
 
@@ -100,7 +100,7 @@ def list_contacts(contacts: SceneContacts, pairs: tuple[ContactPair, ...]) -> tu
 
 def rows_now(player: Player) -> Rows:
     """Return the state of now as one row."""
-    from sphshell_pin.scenario.player import Rows
+    from sphshell_pin.scenario.running.player import Rows
 
     now: Rows | None = getattr(player, "now", None)
     if now is not None:

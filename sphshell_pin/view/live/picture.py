@@ -31,8 +31,8 @@ from sphshell_pin.view.patches import PatchRows, PatchScale
 if TYPE_CHECKING:
     from meshcat import Visualizer
 
-    from sphshell_pin.dynamics.scene import ContactPair, Scene, SceneContacts
-    from sphshell_pin.scenario.drag import Dragged
+    from sphshell_pin.dynamics.scene.scene import ContactPair, Scene, SceneContacts
+    from sphshell_pin.scenario.live.drag import Dragged
     from sphshell_pin.view.live.player import Player
 
 POOL = 16

@@ -9,11 +9,11 @@ from sphshell_pin.view.nodes import FloatArray
 if TYPE_CHECKING:
     import pinocchio as pin
 
-    from sphshell_pin.dynamics.scene import Scene, SceneContacts
-    from sphshell_pin.scenario.drag import Dragged
-    from sphshell_pin.scenario.knobs import Knob
-    from sphshell_pin.scenario.player import Rows
-    from sphshell_pin.scenario.targets import Target
+    from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
+    from sphshell_pin.scenario.format.sliders import Knob
+    from sphshell_pin.scenario.live.drag import Dragged
+    from sphshell_pin.scenario.live.joint_targets import Target
+    from sphshell_pin.scenario.running.player import Rows
     from sphshell_pin.view.patches import PatchRows
 
 

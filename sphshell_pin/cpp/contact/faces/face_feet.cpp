@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/closest_on_cell.hpp"
-#include "contact/closest_on_side.hpp"
+#include "contact/query/closest_on_cell.hpp"
+#include "contact/query/closest_on_side.hpp"
 #include "shell/faces/face_cells.hpp"
 
 namespace sphshell {

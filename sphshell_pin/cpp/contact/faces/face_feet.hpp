@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "contact/minimum.hpp"
-#include "shell/curved.hpp"
+#include "contact/query/minimum.hpp"
+#include "shell/curved/curved.hpp"
 
 namespace sphshell {
 

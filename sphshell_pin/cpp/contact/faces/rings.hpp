@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "contact/minimum.hpp"
+#include "contact/query/minimum.hpp"
 
 namespace sphshell {
 

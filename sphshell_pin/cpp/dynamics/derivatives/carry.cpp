@@ -2,7 +2,7 @@
 #include <cmath>
 #include <utility>
 
-#include "dynamics/derivatives/step_slopes.hpp"
+#include "dynamics/derivatives/step_derivatives.hpp"
 #include "dynamics/integrators/explicit.hpp"
 #include "dynamics/integrators/implicit.hpp"
 

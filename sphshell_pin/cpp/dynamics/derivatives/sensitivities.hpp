@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include "dynamics/derivatives/step_slopes.hpp"
-#include "dynamics/recording.hpp"
+#include "dynamics/derivatives/step_derivatives.hpp"
+#include "dynamics/run/recording.hpp"
 
 namespace sphshell {
 

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "dynamics/scene_data.hpp"
+#include "dynamics/scene/scene_data.hpp"
 
 namespace sphshell {
 

@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 
 #include "dynamics/integrators/stepper.hpp"
-#include "dynamics/linearization.hpp"
+#include "dynamics/derivatives/linearization.hpp"
 
 namespace sphshell {
 

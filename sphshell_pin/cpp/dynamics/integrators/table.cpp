@@ -23,7 +23,7 @@ struct Entry {
   std::unique_ptr<Stepper> (*make)(SceneData&);
 };
 
-// A new method is one line here, and the class of that name in dynamics/integrators.py.
+// A new method is one line here, and the class of that name in dynamics/run/integrators.py.
 constexpr Entry kIntegrators[] = {
     {"semi-implicit-euler", make<SemiImplicitEuler>},
     {"runge-kutta-4", make<RungeKutta4>},

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "shell/curved.hpp"
+#include "shell/curved/curved.hpp"
 
 namespace sphshell {
 namespace {

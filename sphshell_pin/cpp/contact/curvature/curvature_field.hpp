@@ -1,0 +1,80 @@
+// The curvature of the surface that curved elements were made from.
+#pragma once
+
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "contact/query/contact.hpp"
+#include "shell/curved/curved.hpp"
+#include "shell/curved/vertex_curvature.hpp"
+
+namespace sphshell {
+
+// The second derivatives of the cubic elements are off by the square of their size. The curvature
+// is fitted at the vertices instead, and carried into the elements by cubics that match its first
+// derivatives as well: it is continuous over smooth sides. It is zero in flat elements and on their
+// smooth borders. The fits also tell how far the surface lies beyond the elements.
+//
+// What was fitted is kept: one per shell and thread. Elements that were asked for before take no
+// heap.
+class CurvatureField {
+ public:
+  // A symmetric tensor: xx, yy, zz, xy, xz, yz.
+  using Tensor = Eigen::Matrix<double, 6, 1>;
+  // The curvature [1/m], positive where the surface bends away from the element's normal, and how
+  // far it lies beyond the element along that normal [m].
+  using Local = Eigen::Matrix<double, 7, 1>;
+  // The same in the first column, and its derivatives by the element's parameters u and v.
+  using Expansion = Eigen::Matrix<double, 7, 3>;
+
+  explicit CurvatureField(const Shell& shell) : shell_(&shell) {}
+  const Shell& shell() const { return *shell_; }
+
+  Expansion at(int facet, double u, double v);
+
+  static Mat3 matrix(const Tensor& t);
+  static Tensor tensor(const Mat3& m);
+
+ private:
+  // How far the surface lies beyond an element: zero at the corners, and as the fits at both ends
+  // say at four points of each side, and in the middle.
+  class Rise {
+   public:
+    double middle = 0;  // beyond what the sides give there
+
+    void set_side(int k, const double (&at)[4]);
+    // Value and derivatives by u and v.
+    Eigen::RowVector3d at(double u, double v) const;
+
+   private:
+    double even_[3][2] = {}, odd_[3][2] = {};
+  };
+  struct Cell {
+    Cubic2<Tensor> tensor;
+    Rise rise;
+  };
+  // Of the elements of one surface that are joined smoothly at a vertex.
+  struct Fan {
+    VertexCurvature fit;
+    Tensor tensor;  // that holds at the vertex, where others are joined to them
+  };
+
+  const Cell& cell(int facet);
+  const Fan& fan(int facet, int corner);
+  VertexCurvature fit_at(int corner);
+  void collect_fan(int corner, bool all, std::vector<int>& corners) const;
+  int owner_of_side(int facet, int side);
+  std::pair<Tensor, Tensor> along_side(int facet, int side);
+  double beyond(int facet, double u, double v);
+  Rise rise_of(int facet);
+
+  const Shell* shell_;
+  std::unordered_map<int, int> fan_of_, cell_of_;  // of corners (3 facet + k), of facets
+  std::vector<Fan> fans_;
+  std::vector<Cell> cells_;
+  std::vector<int> corners_, beside_;
+  std::vector<OrientedPoint> around_;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,63 @@
+// Corners and sides of curved elements, by facets: corner 3 facet + k, half-edge 3 facet + side.
+#pragma once
+
+#include <utility>
+
+#include "shell/curved/curved.hpp"
+
+namespace sphshell {
+
+// Where two sides go on into each other at their corner, that of a point next to it.
+inline Vec3 normal_of(const CubicPatch& patch, double u, double v) {
+  const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v), n = xu.cross(xv);
+  if (n.squaredNorm() > 1e-16 * xu.squaredNorm() * xv.squaredNorm()) return n.normalized();
+  const double a = u + 1e-3 * (1.0 / 3 - u), b = v + 1e-3 * (1.0 / 3 - v);
+  return patch.along_u(a, b).cross(patch.along_v(a, b)).normalized();
+}
+
+inline std::pair<double, double> corner_parameters(int k) {
+  return {k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
+}
+
+// Whether two unit normals are one: those of a smooth vertex agree to round-off.
+inline bool is_one_normal(const Vec3& a, const Vec3& b) { return a.dot(b) > 1 - 1e-10; }
+
+inline int vertex_of(const Shell& shell, int corner) {
+  return shell.triangles()[shell.triangle_of_facet(corner / 3)][corner % 3];
+}
+
+// The normal of an element at its corner.
+inline Vec3 normal_at(const Shell& shell, int corner) {
+  const auto [u, v] = corner_parameters(corner % 3);
+  const int facet = corner / 3;
+  return normal_of(shell.curved()->facets()[facet].patch(shell.facets()[facet]), u, v);
+}
+
+inline const Edge& edge_at(const Shell& shell, int facet, int side) {
+  const Topology& topology = shell.topology();
+  return topology.edges[topology.edge_of[3 * shell.triangle_of_facet(facet) + side]];
+}
+
+// The corner at a vertex of the element that a half-edge belongs to.
+inline int corner_of(const Shell& shell, int half_edge, int vertex) {
+  const int first = 3 * triangle_of(half_edge);
+  for (int corner = first; corner < first + 3; ++corner)
+    if (vertex_of(shell, corner) == vertex) return corner;
+  return -1;
+}
+
+// Calls visit(other) for the corners at the same vertex of the elements beside a corner's.
+template <class Visit>
+void for_each_beside(const Shell& shell, int corner, Visit&& visit) {
+  const Topology& topology = shell.topology();
+  const int vertex = vertex_of(shell, corner);
+  for (int side : {corner % 3, previous_corner(corner % 3)}) {
+    const Edge& edge = edge_at(shell, corner / 3, side);
+    for (int n = 0; n < edge.count; ++n) {
+      const int h = shell.facet_half_edge(topology.incidence[edge.begin + n]);
+      if (triangle_of(h) != corner / 3) visit(corner_of(shell, h, vertex), edge);
+    }
+  }
+}
+
+}  // namespace sphshell

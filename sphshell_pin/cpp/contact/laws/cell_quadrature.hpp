@@ -1,0 +1,330 @@
+// Integrals over the part of a curved element inside a ball.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "contact/query/closest_on_cell.hpp"
+#include "contact/laws/gauss.hpp"
+#include "shell/curved/curved.hpp"
+
+namespace sphshell {
+
+// The square of the distance along a cubic side, less that of the ball's radius: degree 6, by its
+// Bernstein coefficients.
+struct Sextic {
+  double f[7];
+
+  Sextic() = default;
+  Sextic(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, double radius2)
+      : f{a.dot(a),
+          a.dot(b),
+          (2 * a.dot(c) + 3 * b.dot(b)) / 5,
+          (a.dot(d) + 9 * b.dot(c)) / 10,
+          (2 * b.dot(d) + 3 * c.dot(c)) / 5,
+          c.dot(d),
+          d.dot(d)} {
+    for (double& value : f) value -= radius2;
+  }
+
+  void halve(Sextic& low, Sextic& high) const;  // by de Casteljau
+  double root() const;
+  // Appends its roots between the ends in their order; at most 6.
+  void roots(double begin, double end, int depth, double* out, int& count) const;
+};
+
+// Green's formula in the plane of the parameters: with H(w) the integral of s g(o + s (w - o)) over
+// s from 0 to 1, that of g over a region is the one of H(w) (w - o) x dw round it, for any pole o.
+// The region is the part of a triangle inside the ball, where rho^2 is convex: round it go pieces
+// of the triangle's sides, between roots of a polynomial, and arcs of rho = R, each over a chord.
+// All that g is evaluated at is inside the triangle. Parts that are large against their distance
+// from the center, and those in which the walk fails, are divided.
+class CellQuadrature {
+ public:
+  using Vec2 = Eigen::Vector2d;
+
+  // The patch is relative to the ball's center; least_order: of Gauss's rules.
+  CellQuadrature(const CubicPatch& patch, const FacetAxes& axes, double radius, int least_order)
+      : patch_(patch),
+        axes_(axes),
+        radius_(radius),
+        radius2_(radius * radius),
+        least_order_(least_order) {}
+
+  // visit(x, area vector by parameters, weight) for all quadrature points.
+  template <class Visit>
+  void run(Visit&& visit) {
+    part({Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)}, 0, visit);
+  }
+
+ private:
+  struct Part {
+    Vec2 corner[3];
+  };
+  // A piece of the boundary: a straight one, or an arc over the chord from a to b.
+  struct Piece {
+    Vec2 a, b;
+    bool is_arc;
+  };
+  static constexpr int kMostPieces = 64, kMostLevels = 12;
+
+  template <class Visit>
+  void part(const Part& w, int level, Visit& visit);
+  template <class Visit>
+  void divide(const Part& w, int level, Visit& visit);
+  template <class Visit>
+  void whole(const Part& w, int order, Visit& visit);
+  template <class Visit>
+  void at(const Vec2& w, double weight, Visit& visit) {
+    const Vec3 x = patch_.point(w.x(), w.y());
+    visit(x, patch_.along_u(w.x(), w.y()).cross(patch_.along_v(w.x(), w.y())), weight);
+  }
+  template <class Visit>
+  void sector(const Vec2& pole, const Vec2& w, const Vec2& dw, double weight, const GaussRule& rule,
+              Visit& visit) {
+    const Vec2 from = w - pole;
+    weight *= from.x() * dw.y() - from.y() * dw.x();
+    if (weight == 0) return;
+    for (int i = 0; i < rule.size; ++i)
+      at(pole + rule.nodes[i] * from, weight * rule.nodes[i] * rule.weights[i], visit);
+  }
+
+  // Of rho^2 - R^2 over the parameters: half its gradient in right-angled axes, and itself.
+  Vec2 gradient(const Vec2& w, double* value = nullptr) const {
+    const Vec3 x = patch_.point(w.x(), w.y());
+    double gu = x.dot(patch_.along_u(w.x(), w.y())), gv = x.dot(patch_.along_v(w.x(), w.y()));
+    axes_.first(gu, gv);
+    if (value) *value = x.squaredNorm() - radius2_;
+    return {gu, gv};
+  }
+  Vec2 to_plane(const Vec2& d) const {
+    return {axes_.a * d.x() + axes_.b * d.y(), axes_.c * d.y()};
+  }
+  Vec2 to_parameters(const Vec2& d) const {
+    const double v = d.y() / axes_.c;
+    return {(d.x() - axes_.b * v) / axes_.a, v};
+  }
+
+  bool add_arc(const Vec2& a, const Vec2& b, const Part& w, int depth);
+  bool add_loop(const Part& w, bool& found);
+  bool root_towards(const Vec2& from, const Vec2& direction, const Part& w, Vec2& out) const;
+  struct ArcPoint {
+    Vec2 w, dw;
+  };
+  // Points of an arc at the share t of its chord.
+  class Arc;
+
+  CubicPatch patch_;
+  const FacetAxes& axes_;
+  double radius_, radius2_;
+  int least_order_;
+  Piece pieces_[kMostPieces];
+  int count_ = 0;
+};
+
+// An arc of rho = R as a graph over its chord.
+class CellQuadrature::Arc {
+ public:
+  Arc(const CellQuadrature& cell, const Vec2& a, const Vec2& b)
+      : cell_(cell), a_(a), chord_(b - a) {
+    const Vec2 chord = cell.to_plane(chord_);
+    length_ = chord.norm();
+    if (!(length_ > 0)) return;
+    chord_plane_ = chord;
+    out_ = Vec2(chord.y(), -chord.x()) / length_;
+    out_parameters_ = cell.to_parameters(out_);
+    const Vec2 ga = cell.gradient(a), gb = cell.gradient(b);
+    lean_ = std::min(ga.dot(out_) / ga.norm(), gb.dot(out_) / gb.norm());
+    rise_a_ = -ga.dot(chord) / ga.dot(out_), rise_b_ = -gb.dot(chord) / gb.dot(out_);
+  }
+
+  // Cosine of the larger angle between the chord's normal and the gradient at an end.
+  double lean() const { return length_ > 0 ? lean_ : -1; }
+  const Vec2& out() const { return out_parameters_; }
+
+  ArcPoint at(double t) const {
+    double s = t * (1 - t) * ((1 - t) * rise_a_ - t * rise_b_);
+    Vec2 w, g;
+    for (int i = 0; i < 12; ++i) {
+      w = a_ + t * chord_ + s * out_parameters_;
+      double value;
+      g = cell_.gradient(w, &value);
+      const double step = value / (2 * g.dot(out_));
+      if (!(std::abs(step) < length_)) break;
+      s -= step;
+      if (std::abs(step) < 1e-7 * length_) break;
+    }
+    w = a_ + t * chord_ + s * out_parameters_;
+    const double slope = -g.dot(chord_plane_) / g.dot(out_);
+    return {w, chord_ + slope * out_parameters_};
+  }
+
+ private:
+  const CellQuadrature& cell_;
+  Vec2 a_, chord_, chord_plane_, out_, out_parameters_;
+  double length_ = 0, lean_ = -1, rise_a_ = 0, rise_b_ = 0;
+};
+
+template <class Visit>
+void CellQuadrature::divide(const Part& w, int level, Visit& visit) {
+  const Vec2 half[3] = {(w.corner[0] + w.corner[1]) / 2, (w.corner[1] + w.corner[2]) / 2,
+                        (w.corner[2] + w.corner[0]) / 2};
+  part({half[0], half[1], half[2]}, level + 1, visit);
+  part({w.corner[0], half[0], half[2]}, level + 1, visit);
+  part({half[0], w.corner[1], half[1]}, level + 1, visit);
+  part({half[2], half[1], w.corner[2]}, level + 1, visit);
+}
+
+// Stroud's rule of degree 5, Dunavant's of degree 8 (Int. J. Numer. Methods Eng. 21 (1985) 1129),
+// or a product of Gauss's.
+template <class Visit>
+void CellQuadrature::whole(const Part& w, int order, Visit& visit) {
+  struct Orbit {
+    double weight, a, b, c;
+  };
+  static constexpr Orbit kSeven[] = {
+      {0.225, 1. / 3, 1. / 3, 1. / 3},
+      {0.132394152788506181, 0.059715871789769820, 0.470142064105115090, 0.470142064105115090},
+      {0.125939180544827153, 0.797426985353087322, 0.101286507323456339, 0.101286507323456339}};
+  static constexpr Orbit kSixteen[] = {
+      {0.144315607677787168, 1. / 3, 1. / 3, 1. / 3},
+      {0.095091634267284625, 0.081414823414553688, 0.459292588292723156, 0.459292588292723156},
+      {0.103217370534718250, 0.658861384496479963, 0.170569307751760018, 0.170569307751760018},
+      {0.032458497623198080, 0.898905543365937904, 0.050547228317031048, 0.050547228317031048},
+      {0.027230314174434994, 0.008394777409957605, 0.728492392955404281, 0.263112829634638113}};
+  const Vec2 e1 = w.corner[1] - w.corner[0], e2 = w.corner[2] - w.corner[0];
+  const double twice = e1.x() * e2.y() - e1.y() * e2.x();
+  if (order > 4) {
+    const GaussRule rule = gauss_rule(order);
+    for (int i = 0; i < rule.size; ++i)
+      sector(w.corner[0], w.corner[1] + rule.nodes[i] * (e2 - e1), e2 - e1, rule.weights[i], rule,
+             visit);
+    return;
+  }
+  const auto put = [&](double weight, double b1, double b2) {
+    at(w.corner[0] + b1 * e1 + b2 * e2, weight * twice / 2, visit);
+  };
+  const Orbit* orbit = order < 4 ? kSeven : kSixteen;
+  const int count = order < 4 ? 3 : 5;
+  put(orbit[0].weight, 1. / 3, 1. / 3);
+  for (int i = 1; i < count; ++i) {
+    const Orbit& o = orbit[i];
+    put(o.weight, o.a, o.b), put(o.weight, o.b, o.c), put(o.weight, o.c, o.a);
+    if (o.b != o.c) put(o.weight, o.b, o.a), put(o.weight, o.c, o.b), put(o.weight, o.a, o.c);
+  }
+}
+
+template <class Visit>
+void CellQuadrature::part(const Part& w, int level, Visit& visit) {
+  // Its control points: of the three sides, each from its corner on, and the middle one.
+  Vec3 net[3][4], middle;
+  if (level == 0) {
+    const CubicPatch& c = patch_;
+    net[0][0] = c.c00;
+    net[0][1] = c.c00 + c.c10 / 3;
+    net[0][2] = c.c00 + (2 * c.c10 + c.c20) / 3;
+    net[1][0] = c.c00 + c.c10 + c.c20 + c.c30;
+    net[1][1] = c.c00 + (2 * c.c10 + c.c01 + c.c20 + c.c11 + c.c21) / 3;
+    net[1][2] = c.c00 + (c.c10 + 2 * c.c01 + c.c02 + c.c11 + c.c12) / 3;
+    net[2][0] = c.c00 + c.c01 + c.c02 + c.c03;
+    net[2][1] = c.c00 + (2 * c.c01 + c.c02) / 3;
+    net[2][2] = c.c00 + c.c01 / 3;
+    middle = c.c00 + (c.c10 + c.c01) / 3 + c.c11 / 6;
+  } else {
+    for (int k = 0; k < 3; ++k) {
+      const Vec2 &p = w.corner[k], &q = w.corner[next_corner(k)];
+      net[k][0] = patch_.polar(p, p, p);
+      net[k][1] = patch_.polar(p, p, q);
+      net[k][2] = patch_.polar(p, q, q);
+    }
+    middle = patch_.polar(w.corner[0], w.corner[1], w.corner[2]);
+  }
+  for (int k = 0; k < 3; ++k) net[k][3] = net[next_corner(k)][0];
+  const Vec3 towards = (net[0][0] + net[1][0] + net[2][0]).normalized();
+  double low = middle.dot(towards), high2 = middle.squaredNorm(), size2 = 0;
+  for (int k = 0; k < 3; ++k) {
+    for (int i = 0; i < 3; ++i) {
+      low = std::min(low, net[k][i].dot(towards));
+      high2 = std::max(high2, net[k][i].squaredNorm());
+    }
+    size2 = std::max(size2, (net[k][3] - net[k][0]).squaredNorm());
+  }
+  if (low >= radius_) return;
+  // Where p is analytic decides on the order.
+  double size = std::sqrt(size2);
+  if (low > 0) size = std::min(size, 2 * std::sqrt(radius2_ - low * low));
+  if (size > low && level < kMostLevels) return divide(w, level, visit);
+  const double ratio = size / std::max(low, 1e-3 * size);
+  const int order = std::max(least_order_, ratio < 0.1    ? 3
+                                           : ratio < 0.25 ? 4
+                                           : ratio < 0.5  ? 5
+                                           : ratio < 0.8  ? 6
+                                                          : 7);
+  if (high2 <= radius2_) return whole(w, order, visit);
+
+  count_ = 0;
+  int corners_inside = 0;
+  bool any = false, fails = false, has_exit = false, has_entry = false;
+  Vec2 exit, first_entry;
+  for (int k = 0; k < 3; ++k) {
+    const Vec2 &p = w.corner[k], &q = w.corner[next_corner(k)];
+    const Sextic along(net[k][0], net[k][1], net[k][2], net[k][3], radius2_);
+    double t[8];
+    int count = 0;
+    along.roots(0, 1, 0, t, count);
+    bool inside = along.f[0] < 0;
+    corners_inside += inside;
+    any = any || inside || count > 0;
+    double from = 0;
+    for (int i = 0; i <= count; ++i) {
+      const double to = i < count ? t[i] : 1;
+      if (inside) pieces_[count_++] = {p + from * (q - p), p + to * (q - p), false};
+      if (i == count) break;
+      const Vec2 place = p + to * (q - p);
+      if (inside) {
+        exit = place, has_exit = true;
+      } else if (has_exit) {
+        fails = fails || !add_arc(exit, place, w, 0);
+        has_exit = false;
+      } else {
+        first_entry = place, has_entry = true;
+      }
+      inside = !inside, from = to;
+    }
+  }
+  if (has_exit != has_entry) fails = true;
+  if (has_exit && has_entry) fails = fails || !add_arc(exit, first_entry, w, 0);
+  const bool looped = !any;
+  if (looped) fails = !add_loop(w, any);
+  // Its sides are inside; its middle may not be.
+  if (corners_inside == 3 && count_ == 3 && level < 2) fails = true;
+  if (fails && level < kMostLevels) return divide(w, level, visit);
+  if (!any) return;
+
+  // Pieces in line with the pole contribute nothing: a corner inside the ball, else a crossing.
+  Vec2 pole = pieces_[0].a;
+  for (int k = 0; k < 3; ++k)
+    if (net[k][0].squaredNorm() < radius2_) pole = w.corner[k];
+  if (corners_inside == 0 && looped) pole = (pieces_[0].a + pieces_[count_ / 2].a) / 2;
+  const GaussRule rule = gauss_rule(order);
+  const GaussRule along_arc = gauss_rule(std::max(order, 5));
+  for (int i = 0; i < count_; ++i) {
+    const Piece& piece = pieces_[i];
+    if (!piece.is_arc) {
+      const Vec2 d = piece.b - piece.a, from = piece.a - pole;
+      if (std::abs(from.x() * d.y() - from.y() * d.x()) <= 1e-15) continue;
+      for (int j = 0; j < rule.size; ++j)
+        sector(pole, piece.a + rule.nodes[j] * d, d, rule.weights[j], rule, visit);
+      continue;
+    }
+    const Arc arc(*this, piece.a, piece.b);
+    if (arc.lean() <= 0) continue;
+    for (int j = 0; j < along_arc.size; ++j) {
+      const ArcPoint on = arc.at(along_arc.nodes[j]);
+      sector(pole, on.w, on.dw, along_arc.weights[j], rule, visit);
+    }
+  }
+}
+
+}  // namespace sphshell

@@ -1,0 +1,285 @@
+// Normal force of one contact, from depth and gap rate. Templated, so that automatic
+// differentiation gives the slopes of what the simulation runs.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+#include <Eigen/Core>
+
+#include "contact/laws/kinds.hpp"
+
+namespace sphshell {
+
+using Vec3 = Eigen::Vector3d;
+template <class S>
+using Vector3 = Eigen::Matrix<S, 3, 1>;
+
+// STEP of ADAMS: a cubic from h0 at x0 to h1 at x1, constant outside.
+template <class S>
+S step(const S& x, double x0, double h0, double x1, double h1) {
+  if (x <= x0) return S(h0);
+  if (x >= x1) return S(h1);
+  const S u = (x - x0) / (x1 - x0);
+  return h0 + (h1 - h0) * u * u * (3 - 2 * u);
+}
+
+template <class S>
+S power(const S& x, double exponent) {
+  using std::pow, std::sqrt;
+  if (exponent == 1) return x;
+  if (exponent == 1.5) return x * sqrt(x);
+  if (exponent == 2) return x * x;
+  return pow(x, exponent);
+}
+
+template <class S>
+struct NormalForce {
+  S total;    // >= 0 [N]
+  S elastic;  // its part that derives from the potential [N]
+};
+
+template <class S>
+NormalForce<S> push(const S& total, const S& elastic) {
+  return {total < 0 ? S(0) : total, elastic};
+}
+
+// The laws. Each has its name, its parameters, and
+// - force: at depth > 0 [m] and gap_rate = n . v_rel [m/s], negative while closing;
+// - energy: the potential of the elastic part [J];
+// - needs_rate: whether the force depends on gap_rate.
+// Hertz's law also gets the scale of the gap, see Hertz [m^0.5].
+
+// max(0, k depth^e - STEP(depth, 0, 0, d, c) gap_rate)
+struct ImpactLaw {
+  static constexpr const char* kind = "impact";
+  double stiffness, exponent, damping, full_damping_depth;  // [N/m^e], 1, [N s/m], [m]
+
+  explicit ImpactLaw(const Numbers& p)
+      : stiffness(p.at(0)), exponent(p.at(1)), damping(p.at(2)), full_damping_depth(p.at(3)) {}
+
+  bool needs_rate() const { return damping > 0; }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+    const S elastic = stiffness * power(depth, exponent);
+    if (!needs_rate()) return {elastic, elastic};
+    return push(S(elastic - step(depth, 0, 0, full_damping_depth, damping) * gap_rate), elastic);
+  }
+
+  double energy(double depth) const {
+    return stiffness * power(depth, exponent) * depth / (exponent + 1);
+  }
+};
+
+// max(0, k depth^e (1 - b gap_rate))
+struct HuntCrossleyLaw {
+  static constexpr const char* kind = "hunt-crossley";
+  double stiffness, exponent, dissipation;  // [N/m^e], 1, [s/m]
+
+  explicit HuntCrossleyLaw(const Numbers& p)
+      : stiffness(p.at(0)), exponent(p.at(1)), dissipation(p.at(2)) {}
+
+  bool needs_rate() const { return dissipation > 0; }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+    const S elastic = stiffness * power(depth, exponent);
+    if (!needs_rate()) return {elastic, elastic};
+    return push(S(elastic - elastic * dissipation * gap_rate), elastic);
+  }
+
+  double energy(double depth) const {
+    return stiffness * power(depth, exponent) * depth / (exponent + 1);
+  }
+};
+
+// Hertz's force between a sphere and whatever it touches, E* scale depth^1.5, with the damping of
+// Hunt and Crossley (1 - b gap_rate), or that of a viscoelastic material that relaxes in a time
+// tau, 1.5 tau E* scale depth^0.5 gap_rate (Kuwabara and Kono, Jpn. J. Appl. Phys. 26 (1987) 1230).
+struct HertzLaw {
+  static constexpr const char* kind = "hertz";
+  double modulus, dissipation, relaxation;  // E* [Pa], b [s/m], tau [s]
+  double fixed_scale;                       // whatever it touches; 0: that of the gap [m^0.5]
+
+  explicit HertzLaw(const Numbers& p)
+      : modulus(p.at(0)), dissipation(p.at(1)), relaxation(p.at(2)), fixed_scale(p.at(3)) {}
+
+  bool needs_rate() const { return dissipation > 0 || relaxation > 0; }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate, const S& scale) const {
+    using std::sqrt;
+    const S used = fixed_scale > 0 ? S(fixed_scale) : scale;
+    const S root = modulus * used * sqrt(depth), elastic = root * depth;
+    if (!needs_rate()) return {elastic, elastic};
+    return push(S(elastic - (elastic * dissipation + 1.5 * relaxation * root) * gap_rate), elastic);
+  }
+
+  double energy(double depth, double scale) const {
+    const double used = fixed_scale > 0 ? fixed_scale : scale;
+    return 0.4 * modulus * used * depth * depth * std::sqrt(depth);
+  }
+};
+
+// Elastic, from rows of depth and force, the first of them zero: the monotone cubic Hermite
+// interpolant of Fritsch and Carlson (SIAM J. Numer. Anal. 17 (1980) 238), with three-point slopes
+// limited as by de Boor and Swartz; beyond the last row it goes on with the last slope.
+struct TableLaw {
+  static constexpr const char* kind = "table";
+
+  // Of the depth x beyond the start of a piece: force c[0] + c[1] x + c[2] x^2 + c[3] x^3 [N], and
+  // energy [J] stored down to its start.
+  struct Piece {
+    double c[4], energy;
+  };
+  std::vector<double> starts;  // of the pieces [m]
+  std::vector<Piece> pieces;
+  // Where to search: the piece in which each of many equal intervals of depth starts.
+  std::vector<std::uint32_t> cells;
+  double cells_per_depth = 0;  // [1/m]
+
+  // All depths, then all forces.
+  explicit TableLaw(const Numbers& p) : starts(p.begin(), p.begin() + p.size() / 2) {
+    if (starts.size() < 2) throw std::invalid_argument("a table of a law needs 2 rows");
+    const std::vector<double> forces(p.begin() + starts.size(), p.end());
+    const std::size_t last = starts.size() - 1;
+    std::vector<double> h, secants, slopes(last + 1);
+    for (std::size_t i = 0; i < last; ++i) {
+      h.push_back(starts[i + 1] - starts[i]);
+      secants.push_back((forces[i + 1] - forces[i]) / h[i]);
+    }
+    for (std::size_t i = 1; i < last; ++i)
+      slopes[i] = std::min((h[i - 1] * secants[i] + h[i] * secants[i - 1]) / (h[i - 1] + h[i]),
+                           3 * std::min(secants[i - 1], secants[i]));
+    // At the ends the slope of the parabola through three rows; the last one stays positive.
+    const auto end = [&](std::size_t at, std::size_t next, double least) {
+      const double slope = secants[at] + h[at] * (secants[at] - secants[next]) / (h[at] + h[next]);
+      return std::clamp(slope, least * secants[at], 3 * secants[at]);
+    };
+    slopes[0] = last > 1 ? end(0, 1, 0) : secants[0];
+    slopes[last] = last > 1 ? end(last - 1, last - 2, 0.1) : secants[0];
+    double energy = 0;
+    for (std::size_t i = 0; i < last; ++i) {
+      const double bend = slopes[i] + slopes[i + 1] - 2 * secants[i];
+      pieces.push_back(
+          {{forces[i], slopes[i], (secants[i] - slopes[i] - bend) / h[i], bend / (h[i] * h[i])},
+           energy});
+      energy = energy_at(pieces.back(), h[i]);
+    }
+    pieces.push_back({{forces[last], slopes[last], 0, 0}, energy});
+    const std::size_t count = 4 * last;
+    std::vector<std::uint32_t> found;
+    for (std::size_t k = 0; k <= count; ++k) found.push_back(piece_at(starts[last] * k / count));
+    found.push_back(last);
+    cells = std::move(found);
+    cells_per_depth = count / starts[last];
+  }
+
+  bool needs_rate() const { return false; }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S&) const {
+    const std::size_t i = piece_at(depth);
+    const auto& c = pieces[i].c;
+    const S x = depth - starts[i];
+    const S elastic = ((c[3] * x + c[2]) * x + c[1]) * x + c[0];
+    return {elastic, elastic};
+  }
+
+  double energy(double depth) const {
+    const std::size_t i = piece_at(depth);
+    return energy_at(pieces[i], depth - starts[i]);
+  }
+
+  template <class S>
+  std::size_t piece_at(const S& depth) const {
+    auto first = starts.begin() + 1, end = starts.end();
+    if constexpr (std::is_same_v<S, double>) {
+      // Rounding may choose the neighboring piece at its end, where both agree.
+      if (!cells.empty() && depth < starts.back()) {
+        const std::size_t k = depth * cells_per_depth;
+        end = first + cells[k + 1];
+        first += cells[k];
+      }
+    }
+    const auto deeper = [](const S& x, double start) { return x < start; };
+    return std::upper_bound(first, end, depth, deeper) - starts.begin() - 1;
+  }
+
+  static double energy_at(const Piece& p, double x) {
+    return p.energy + (((p.c[3] / 4 * x + p.c[2] / 3) * x + p.c[1] / 2) * x + p.c[0]) * x;
+  }
+};
+
+// The elastic foundation of contact/laws/foundation.hpp; with a radius that of a ball on a plane,
+// where the depth is all that counts.
+struct FoundationLaw {
+  static constexpr const char* kind = "foundation";
+  double modulus, thickness, dissipation, radius;  // [Pa], [m], [s/m], [m]
+
+  explicit FoundationLaw(const Numbers& p)
+      : modulus(p.at(0)), thickness(p.at(1)), dissipation(p.at(2)), radius(p.at(3)) {}
+
+  bool needs_rate() const { return dissipation > 0; }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+    const S elastic = modulus / thickness * M_PI * depth * depth * (radius - depth / 3);
+    if (!needs_rate()) return {elastic, elastic};
+    return push(S(elastic - elastic * dissipation * gap_rate), elastic);
+  }
+
+  double energy(double depth) const {
+    return modulus / thickness * M_PI * depth * depth * depth * (radius / 3 - depth / 12);
+  }
+};
+
+// One of the laws.
+struct NormalLaw {
+  std::variant<ImpactLaw, HuntCrossleyLaw, HertzLaw, TableLaw, FoundationLaw> law =
+      ImpactLaw({0, 1, 0, 1});
+
+  bool needs_rate() const {
+    return std::visit([](const auto& one) { return one.needs_rate(); }, law);
+  }
+  // Of a force that follows the shape of the gap, else null.
+  const HertzLaw* hertz() const {
+    const HertzLaw* one = std::get_if<HertzLaw>(&law);
+    return one && one->fixed_scale == 0 ? one : nullptr;
+  }
+  // Of a force that is an integral over the overlap, else null.
+  const FoundationLaw* foundation() const {
+    const FoundationLaw* one = std::get_if<FoundationLaw>(&law);
+    return one && one->radius == 0 ? one : nullptr;
+  }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate, const S& scale = S(0)) const {
+    return std::visit(
+        [&](const auto& one) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(one)>, HertzLaw>)
+            return one.force(depth, gap_rate, scale);
+          else
+            return one.force(depth, gap_rate);
+        },
+        law);
+  }
+
+  double energy(double depth, double scale = 0) const {
+    return std::visit(
+        [&](const auto& one) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(one)>, HertzLaw>)
+            return one.energy(depth, scale);
+          else
+            return one.energy(depth);
+        },
+        law);
+  }
+};
+
+}  // namespace sphshell

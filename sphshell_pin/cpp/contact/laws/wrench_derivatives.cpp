@@ -1,0 +1,240 @@
+#include "contact/laws/wrench_derivatives.hpp"
+
+#include <algorithm>
+
+#include "contact/laws/dual.hpp"
+
+namespace sphshell {
+namespace {
+
+// The law's outputs and their derivatives in axes that turn with the normal.
+struct LawSlopes {
+  struct By {
+    Vec3 depth, spin, scale;
+    Mat3 relative, stretch, rolling, outer[kMostRings - 1];
+  };
+  Vec3 force, moment, rate;  // force and moment on the sphere but for the weight
+  By force_by, moment_by, rate_by;
+  Vec3 outer[kMostRings - 1];  // rates of the rings behind the first
+  By outer_by[kMostRings - 1];
+};
+
+// Seeds: depth, relative velocity and, of 8, spin and stretch, of 9, the scale as well, last; of
+// 12, rolling, and of more the rings behind the first. The normal needs none, as a law does not
+// change with the axes it is written in.
+constexpr int kSpin = 4, kStretch = 5, kRolling = 8, kOuter = 11;
+constexpr int rings_of(int seeds) { return seeds > kOuter ? (seeds - kOuter) / 3 + 1 : 1; }
+constexpr bool has_scale(int seeds) { return seeds > kRolling; }
+
+template <int N>
+void read(const Vector3<Dual<N>>& x, Vec3& value, LawSlopes::By& by) {
+  for (int i = 0; i < 3; ++i) {
+    value[i] = x[i].value;
+    by.depth[i] = x[i].slope[0];
+    by.relative.row(i) = x[i].slope.template segment<3>(1);
+    if constexpr (N > kSpin) {
+      by.spin[i] = x[i].slope[kSpin];
+      by.stretch.row(i) = x[i].slope.template segment<3>(kStretch);
+    }
+    if constexpr (N > kOuter) {
+      by.rolling.row(i) = x[i].slope.template segment<3>(kRolling);
+      for (int k = 1; k < rings_of(N); ++k)
+        by.outer[k - 1].row(i) = x[i].slope.template segment<3>(kOuter + 3 * (k - 1));
+    }
+    by.scale[i] = has_scale(N) ? x[i].slope[N - 1] : 0;
+  }
+  if constexpr (N <= kSpin) by.spin.setZero(), by.stretch.setZero();
+}
+
+template <int N>
+void differentiate(const NormalLaw& law, const FrictionLaw& friction, const ContactSite& site,
+                   double relaxation, const ContactKinematics<double>& at, LawSlopes& out) {
+  using S = Dual<N>;
+  ContactKinematics<S> m;
+  m.depth = S::seed(at.depth, 0);
+  for (int i = 0; i < 3; ++i) {
+    m.normal[i] = at.normal[i];
+    m.relative[i] = S::seed(at.relative[i], 1 + i);
+    if constexpr (N > kSpin) m.bristle[i] = S::seed(at.bristle[i], kStretch + i);
+    if constexpr (N > kOuter) m.rolling[i] = S::seed(at.rolling[i], kRolling + i);
+  }
+  if constexpr (has_scale(N)) m.scale = S::seed(at.scale, N - 1);
+  if constexpr (N > kSpin) m.spin = S::seed(at.spin, kSpin);
+  constexpr int most = rings_of(N) - 1;
+  const int outer = std::min(most, friction.rings() - 1);
+  Vector3<S> states[most + 1], rates[most + 1];
+  if constexpr (most > 0) {
+    for (int k = 0; k < outer; ++k)
+      for (int i = 0; i < 3; ++i) states[k][i] = S::seed(site.outer[k][i], kOuter + 3 * k + i);
+    m.outer = states;
+    m.outer_rate = rates;
+  }
+  const ContactForce<S> f = contact_force(law, friction, site.disc_radius, relaxation, m);
+  read<N>(f.normal * m.normal + f.friction, out.force, out.force_by);
+  Vector3<S> moment = f.torsion * m.normal;
+  if constexpr (N > kOuter) moment += f.rolling;
+  read<N>(moment, out.moment, out.moment_by);
+  read<N>(f.bristle_rate, out.rate, out.rate_by);
+  for (int k = 0; k < outer; ++k) read<N>(rates[k], out.outer[k], out.outer_by[k]);
+}
+
+// The rate of a stretch's turning with the normal, added to its slopes; see
+// SceneData::rate_of_turning.
+void add_turning(const ContactSite& site, const Vec3& stretch, const Mat3& normal_by_place,
+                 const Eigen::RowVector3d& weight_by_place, Mat3& rate_by_place,
+                 Matrix36& rate_by_twist, Mat3& rate_by_stretch) {
+  const Contact& contact = site.contact;
+  const Vec3 spin = site.twist.tail<3>();
+  const Mat3 normal_rate_by_velocity = contact.dn_dc / contact.weight;
+  const Vec3 normal_rate =
+      normal_rate_by_velocity * (site.twist.head<3>() + spin.cross(site.place));
+  const Mat3 n = cross_matrix(contact.normal), by_velocity = n * normal_rate_by_velocity;
+  const Vec3 turning = contact.normal.cross(normal_rate);
+  const Mat3 by_place = by_velocity * cross_matrix(spin) -
+                        cross_matrix(normal_rate) * normal_by_place -
+                        turning * weight_by_place / contact.weight;
+  const Mat3 against_stretch = -cross_matrix(stretch);
+  rate_by_place += against_stretch * by_place;
+  rate_by_twist.leftCols<3>() += against_stretch * by_velocity;
+  rate_by_twist.rightCols<3>() -= against_stretch * by_velocity * cross_matrix(site.place);
+  rate_by_stretch += cross_matrix(turning);
+}
+
+}  // namespace
+
+void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double relaxation,
+                    const ContactSite& site, ContactSlopes& out) {
+  const Contact& contact = site.contact;
+  const Vec3 &n = contact.normal, &point = contact.point, spin = site.twist.tail<3>();
+  const double weight = contact.weight;
+
+  // How the contact follows its place.
+  Mat3 normal_by = Mat3::Zero(), point_by = Mat3::Zero();
+  Eigen::RowVector3d depth_by = -n.transpose(), weight_by = Eigen::RowVector3d::Zero();
+  if (site.follows) {
+    weight_by = n.transpose() * contact.dn_dc;
+    normal_by = (contact.dn_dc - n * weight_by) / weight;
+    depth_by *= std::abs(weight);
+    point_by = Mat3::Identity() + n * depth_by - (site.radius - contact.depth) * normal_by;
+    if (site.point_by) point_by = *site.point_by;
+    if (site.shape) depth_by -= site.shape->tilt.transpose();
+  }
+  out.depth_by_place = depth_by;
+  out.normal_by_place = normal_by;
+
+  ContactKinematics<double> m;
+  m.depth = site.shape ? site.shape->depth : contact.depth;
+  m.normal = n;
+  m.relative = site.twist.head<3>() + spin.cross(point);
+  m.spin = n.dot(spin);
+  m.bristle = site.stretch;
+  LawSlopes at;
+  const bool rolls = friction.rolls();
+  const Mat3 across = Mat3::Identity() - n * n.transpose();
+  const int outer = friction.rings() - 1;
+  if (rolls) m.rolling = across * spin;
+  Eigen::RowVector3d scale_by = Eigen::RowVector3d::Zero();
+  if (site.shape) {
+    m.scale = site.shape->scale;
+    scale_by = site.shape->gradient.transpose();
+  }
+  if (outer > 3)
+    differentiate<kOuter + 3 * (kMostRings - 1) + 1>(law, friction, site, relaxation, m, at);
+  else if (outer > 0)
+    differentiate<kOuter + 9 + 1>(law, friction, site, relaxation, m, at);
+  else if (rolls)
+    differentiate<kOuter + 1>(law, friction, site, relaxation, m, at);
+  else if (site.shape)
+    differentiate<kRolling + 1>(law, friction, site, relaxation, m, at);
+  else if (friction.has_state())
+    differentiate<kRolling>(law, friction, site, relaxation, m, at);
+  else
+    differentiate<kSpin>(law, friction, site, relaxation, m, at);
+
+  // The turning of the normal is a rotation of all vectors of the law, and what is left of their
+  // change goes through its slopes.
+  const Mat3 turned_by = cross_matrix(n) * normal_by;
+  const Mat3 relative_by = cross_matrix(spin) * point_by + cross_matrix(m.relative) * turned_by;
+  const Mat3 stretch_by = cross_matrix(m.bristle) * turned_by;
+  const Eigen::RowVector3d spin_by = spin.transpose() * normal_by;
+  const auto by_place = [&](const Vec3& value, const LawSlopes::By& by) -> Mat3 {
+    Mat3 all = by.depth * depth_by + by.relative * relative_by + by.spin * spin_by +
+               by.stretch * stretch_by + by.scale * scale_by - cross_matrix(value) * turned_by;
+    if (rolls) all += by.rolling * across * cross_matrix(spin) * turned_by;
+    for (int k = 0; k < outer; ++k) all += by.outer[k] * cross_matrix(site.outer[k]) * turned_by;
+    return all;
+  };
+  const Mat3 arm = cross_matrix(point);
+  const auto by_twist = [&](const LawSlopes::By& by) -> Matrix36 {
+    Matrix36 all;
+    all << by.relative, by.spin * n.transpose() - by.relative * arm;
+    if (rolls) all.rightCols<3>() += by.rolling * across;
+    return all;
+  };
+
+  const Vec3 force = weight * at.force;
+  const Mat3 force_by_place = at.force * weight_by + weight * by_place(at.force, at.force_by);
+  const Matrix36 force_by_twist = weight * by_twist(at.force_by);
+  out.wrench << force, point.cross(force) + weight * at.moment;
+  out.by_place.topRows<3>() = force_by_place;
+  out.by_place.bottomRows<3>() = arm * force_by_place - cross_matrix(force) * point_by +
+                                 at.moment * weight_by + weight * by_place(at.moment, at.moment_by);
+  out.by_depth.head<3>() = weight * at.force_by.depth;
+  out.by_depth.tail<3>() = weight * (arm * at.force_by.depth + at.moment_by.depth);
+  out.by_twist.topRows<3>() = force_by_twist;
+  out.by_twist.bottomRows<3>() = arm * force_by_twist + weight * by_twist(at.moment_by);
+  if (site.shape && law.hertz()) {
+    // Of the force at the sphere's center, see SceneData::compute_force.
+    const HertzLaw& hertz = *law.hertz();
+    const ContactShape& shape = *site.shape;
+    const double energy = hertz.energy(m.depth, 1);
+    const NormalForce<Dual<1>> unit =
+        hertz.force(Dual<1>::seed(m.depth, 0), Dual<1>(0), Dual<1>(1));
+    const double push = unit.elastic.value, push_by = unit.elastic.slope[0];
+    const Vec3 climb = weight * (shape.scale * push * shape.tilt - energy * shape.gradient);
+    const Mat3 by =
+        weight * (push * shape.tilt * scale_by + shape.scale * push_by * shape.tilt * depth_by +
+                  shape.scale * push * shape.tilt_by - push * shape.gradient * depth_by -
+                  energy * shape.second);
+    out.wrench.head<3>() += climb;
+    out.wrench.tail<3>() += site.place.cross(climb);
+    out.by_place.topRows<3>() += by;
+    out.by_place.bottomRows<3>() += cross_matrix(site.place) * by - cross_matrix(climb);
+    const Vec3 by_depth = weight * (shape.scale * push_by * shape.tilt - push * shape.gradient);
+    out.by_depth.head<3>() += by_depth;
+    out.by_depth.tail<3>() += site.place.cross(by_depth);
+  }
+  if (!friction.has_state()) return;
+  const auto by_stretch = [&](const Mat3& force, const Mat3& moment) -> Matrix63 {
+    Matrix63 all;
+    all.topRows<3>() = weight * force;
+    all.bottomRows<3>() = weight * (arm * force + moment);
+    return all;
+  };
+  out.by_stretch = by_stretch(at.force_by.stretch, at.moment_by.stretch);
+  out.rate = at.rate;
+  out.rate_by_depth = at.rate_by.depth;
+  out.rate_by_place = by_place(at.rate, at.rate_by);
+  out.rate_by_twist = by_twist(at.rate_by);
+  out.rate_by_stretch = at.rate_by.stretch;
+  if (site.follows)
+    add_turning(site, site.stretch, normal_by, weight_by, out.rate_by_place, out.rate_by_twist,
+                out.rate_by_stretch);
+  for (int k = 0; k < outer; ++k) {
+    ContactSlopes::Ring& ring = out.outer[k];
+    const LawSlopes::By& by = at.outer_by[k];
+    ring.by_stretch = by_stretch(at.force_by.outer[k], at.moment_by.outer[k]);
+    ring.rate = at.outer[k];
+    ring.rate_by_depth = by.depth;
+    ring.rate_by_place = by_place(at.outer[k], by);
+    ring.rate_by_twist = by_twist(by);
+    ring.first_by_stretch = at.rate_by.outer[k];
+    ring.rate_by_first = by.stretch;
+    for (int i = 0; i < outer; ++i) ring.rate_by_outer[i] = by.outer[i];
+    if (site.follows)
+      add_turning(site, site.outer[k], normal_by, weight_by, ring.rate_by_place, ring.rate_by_twist,
+                  ring.rate_by_outer[k]);
+  }
+}
+
+}  // namespace sphshell

@@ -1,0 +1,67 @@
+// How the wrench of one contact, and the rate of its bristle, change with the relative motion.
+#pragma once
+
+#include "contact/laws/friction.hpp"
+#include "contact/laws/hertz.hpp"
+#include "contact/query/query.hpp"
+
+namespace sphshell {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;  // a twist or a wrench, linear part first
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Matrix63 = Eigen::Matrix<double, 6, 3>;
+using Matrix36 = Eigen::Matrix<double, 3, 6>;
+
+inline Mat3 cross_matrix(const Vec3& x) {
+  Mat3 out;
+  out << 0, -x[2], x[1], x[2], 0, -x[0], -x[1], x[0], 0;
+  return out;
+}
+
+// A contact and the motion of the sphere's body against the shell; all in the shell's frame, twists
+// and wrenches about its origin.
+struct ContactSite {
+  Contact contact;
+  // What the contact follows: the sphere's center. Of a contact source, which does not say how its
+  // contacts follow, the contact point, and the contact itself stays where it is.
+  Vec3 place;
+  bool follows;
+  double radius;       // of the sphere [m]
+  double disc_radius;  // that the laws take: see Pair::disc_radius [m]
+  Vector6 twist;
+  Vec3 stretch;                         // of the bristle [m]
+  Vec3 outer[kMostRings - 1];           // of its rings behind the first
+  const ContactShape* shape = nullptr;  // of Hertz's law
+  // By its place, of a contact point that is no point of the sphere's normal.
+  const Mat3* point_by = nullptr;
+};
+
+struct ContactSlopes {
+  Eigen::RowVector3d depth_by_place;
+  Mat3 normal_by_place;
+  Vector6 wrench;     // on the sphere's body
+  Matrix63 by_place;  // of the wrench
+  Matrix6 by_twist;
+  Vector6 by_depth;  // where the contact stays where it is
+  Matrix63 by_stretch;
+  Vec3 rate, rate_by_depth;  // of the bristle; without its turning with the normal
+  Mat3 rate_by_place;
+  Matrix36 rate_by_twist;
+  Mat3 rate_by_stretch;
+  // The same of the rings of a bristle behind the first.
+  struct Ring {
+    Vec3 rate, rate_by_depth;
+    Matrix63 by_stretch;
+    Mat3 rate_by_place;
+    Matrix36 rate_by_twist;
+    Mat3 first_by_stretch;  // of the first ring's rate
+    Mat3 rate_by_first, rate_by_outer[kMostRings - 1];
+  } outer[kMostRings - 1];
+};
+
+// Exact, but that the contact's turn is held where the bristle turns with the normal: what that
+// leaves out is of the order of the stretch times the square of the curvature.
+void contact_slopes(const NormalLaw& law, const FrictionLaw& friction, double relaxation,
+                    const ContactSite& site, ContactSlopes& out);
+
+}  // namespace sphshell

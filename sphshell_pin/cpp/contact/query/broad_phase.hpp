@@ -1,0 +1,35 @@
+// Which facets a sphere may touch.
+#pragma once
+
+#include <vector>
+
+#include "contact/query/contact.hpp"
+#include "shell/curved/cell_bounds.hpp"
+#include "shell/shell.hpp"
+
+namespace sphshell {
+
+class BroadPhase {
+ public:
+  explicit BroadPhase(bool follow);
+
+  // Facets in the order of the tree: `overlapping` those whose box meets the sphere, widened by
+  // `bulge`, `candidates` those of them that may hold a minimum of the distance. Memory of their
+  // `cells`, if given, is on its way as well.
+  void find(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
+            const Sphere& sphere, const CellBounds* cells = nullptr);
+
+  std::vector<int> overlapping, candidates;
+
+ private:
+  void keep_in_cone(const Shell& shell, const LargeArray<NormalCone>& cones, double bulge,
+                    const Sphere& sphere, double margin, const CellBounds* cells);
+
+  bool follow_;
+  // The lists hold while the center is within margin_ of anchor_; -1: they hold nothing.
+  const Shell* followed_ = nullptr;
+  double followed_radius_ = 0, margin_ = -1;
+  Vec3 anchor_ = Vec3::Zero(), last_ = Vec3::Zero();
+};
+
+}  // namespace sphshell

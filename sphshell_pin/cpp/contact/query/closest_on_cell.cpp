@@ -1,0 +1,259 @@
+#include "contact/query/closest_on_cell.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "contact/query/closest_on_side.hpp"
+#include "contact/query/tolerances.hpp"
+
+namespace sphshell {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+
+// |x(u, v) - c|^2 / 2 at a point of a patch: half the square of the distance, with its first
+// derivatives and the second ones, those of a plane first.
+struct Expansion {
+  Vec3 from;  // x - c
+  double gu, gv, fuu, fuv, fvv;
+  double huu, huv, hvv;
+
+  Expansion(const CubicPatch& patch, double u, double v, const Vec3& c)
+      : from(patch.point(u, v) - c) {
+    const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v);
+    gu = from.dot(xu), gv = from.dot(xv);
+    fuu = xu.dot(xu), fuv = xu.dot(xv), fvv = xv.dot(xv);
+    huu = fuu + from.dot(patch.along_uu(u, v));
+    huv = fuv + from.dot(patch.along_uv(u, v));
+    hvv = fvv + from.dot(patch.along_vv(u, v));
+  }
+
+  bool convex() const { return huu > 0 && huu * hvv - huv * huv > 1e-9 * fuu * fvv; }
+
+  // Newton's step. Where the distance is not convex, its first-order part is: it leads downhill
+  // all the same.
+  Vec2 step() const {
+    const bool second = convex();
+    const double a = second ? huu : fuu, b = second ? huv : fuv, c = second ? hvv : fvv;
+    const double determinant = a * c - b * b;
+    return {-(c * gu - b * gv) / determinant, -(a * gv - b * gu) / determinant};
+  }
+};
+
+double outside(double u, double v) { return std::max({-u, -v, u + v - 1}); }
+
+// A lower bound of |x|^2 over a part of a patch: the least of its 28 coefficients in Bernstein's
+// form, of degree 6.
+double least2_of(const CubicPatch& patch, const Vec2 (&corner)[3]) {
+  static constexpr double kWeight3[4][4] = {{1, 3, 3, 1}, {3, 6, 3, 0}, {3, 3, 0, 0}, {1}};
+  static constexpr double kFactorial[7] = {1, 1, 2, 6, 24, 120, 720};
+  Vec3 net[4][4];
+  double sum[7][7] = {};
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; i + j < 4; ++j) {
+      const auto pick = [&](int n) { return corner[n < i ? 1 : n < i + j ? 2 : 0]; };
+      net[i][j] = kWeight3[i][j] * patch.polar(pick(0), pick(1), pick(2));
+    }
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; i + j < 4; ++j)
+      for (int k = 0; k < 4; ++k)
+        for (int l = 0; k + l < 4; ++l) sum[i + k][j + l] += net[i][j].dot(net[k][l]);
+  double least = sum[0][0];
+  for (int i = 0; i < 7; ++i)
+    for (int j = 0; i + j < 7; ++j)
+      least = std::min(
+          least, sum[i][j] * kFactorial[i] * kFactorial[j] * kFactorial[6 - i - j] / kFactorial[6]);
+  return least;
+}
+
+// Round-off of squares of distances, as a share.
+constexpr double kSame = 4e-15;
+
+class CellSearch {
+ public:
+  CellSearch(const Facet& facet, const CurvedFacet& curved, const CellBounds& bounds, const Vec3& x,
+             double radius, Nearest& out)
+      : axes_(facet), patch_(curved.patch(facet)), radius_(radius), out_(out) {
+    const Vec3 from = x - facet.corner[0];
+    const double height = facet.normal.dot(from), side = axes_.a + std::abs(axes_.b) + axes_.c;
+    whole_ = bounds.curvature(height, (from - height * facet.normal).norm() + side);
+    // From here on x is the origin, for the sake of round-off.
+    patch_.c00 -= x;
+    least_ = radius * radius;
+    steepest_ = 1 + double(bounds.stretch) + double(bounds.slope);
+    bend_ = std::hypot(std::max(std::abs(bounds.low), std::abs(bounds.high)), bounds.sway);
+    Vec3 uuu = 6 * patch_.c30, uuv = 2 * patch_.c21, uvv = 2 * patch_.c12, vvv = 6 * patch_.c03;
+    twist_ = third(uuu, uuv, uvv, vvv);
+    static constexpr double kCorner[3][2] = {{0, 0}, {1, 0}, {0, 1}};
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 point = facet.corner[k] - x;
+      if (point.squaredNorm() >= least_) continue;
+      least_ = point.squaredNorm();
+      out_ = {Feature::Vertex, k, 0.0, {kCorner[k][0], kCorner[k][1], point}};
+    }
+    whole2_ = least2_of(patch_, kWhole);
+    level_ = nothing_below(whole2_);
+    for (int k = 0; k < 3 && !level_; ++k) {
+      CubicCurve side = curved.side(facet, k);
+      side.c0 -= x;
+      const double t = nearest_on_side(side, Vec3::Zero());
+      const Vec3 point = side.point(t);
+      if (point.squaredNorm() >= least_) continue;
+      least_ = point.squaredNorm();
+      const auto [u, v] = on_side(k, t);
+      out_ = {Feature::Edge, k, t, {u, v, point}};
+    }
+  }
+
+  bool run() {
+    if (!level_) look_into(kWhole, 0);
+    return least_ < radius_ * radius_;
+  }
+
+ private:
+  // Bound on the size of the third derivatives, over the facet.
+  double third(const Vec3& uuu, const Vec3& uuv, const Vec3& uvv, const Vec3& vvv) const {
+    // d/dx = d/du / a; d/dy = (d/dv - (b / a) d/du) / c.
+    const double p = axes_.b / axes_.a, a = axes_.a, c = axes_.c;
+    const Vec3 yuu = (uuv - p * uuu) / c, yuv = (uvv - p * uuv) / c, yvv = (vvv - p * uvv) / c;
+    const Vec3 xyy = (yuv - p * yuu) / (a * c), yyy = (yvv - 2 * p * yuv + p * p * yuu) / (c * c);
+    return std::sqrt((uuu / (a * a * a)).squaredNorm() + 3 * (yuu / (a * a)).squaredNorm() +
+                     3 * xyy.squaredNorm() + yyy.squaredNorm());
+  }
+
+  void look_into(const Vec2 (&corner)[3], int halvings) {
+    const Vec2 middle = (corner[0] + corner[1] + corner[2]) / 3;
+    Expansion here(patch_, middle.x(), middle.y(), Vec3::Zero());
+    axes_.first(here.gu, here.gv);
+    axes_.second(here.huu, here.huv, here.hvv);
+    double reach = 0;
+    for (const Vec2& p : corner) {
+      const Vec2 d = p - middle;
+      reach = std::max(reach, std::hypot(axes_.a * d.x() + axes_.b * d.y(), axes_.c * d.y()));
+    }
+    const double distance2 = here.from.squaredNorm(), distance = std::sqrt(distance2);
+    const Eigenvalues bend(here.huu, here.huv, here.hvv);
+    // The second derivative is x' . x' + x . x'': how much it may differ within reach.
+    const double differs = (3 * steepest_ * bend_ + distance * twist_) * reach +
+                           (bend_ * bend_ + steepest_ * twist_) * reach * reach;
+    const double low = std::max(bend.low - differs, whole_.low);
+    const double high = std::min(bend.high + differs, whole_.high);
+    const double slope = std::hypot(here.gu, here.gv);
+    if (slope > std::max(high, -low) * reach) return;  // falls all over it
+    const double bound = distance2 - 2 * slope * reach + std::min(low, 0.0) * reach * reach;
+    if (bound >= least_ * (1 - kSame)) return;
+    if (low > 0 || halvings == kMostHalvings) return descend(middle);
+    if (halvings == 0) descend(middle);  // what it finds spares parts
+    if (nothing_below(halvings == 0 ? whole2_ : least2_of(patch_, corner))) return;
+    const Vec2 half[3] = {(corner[0] + corner[1]) / 2, (corner[1] + corner[2]) / 2,
+                          (corner[2] + corner[0]) / 2};
+    // The part in the middle first: what it finds spares the others.
+    look_into({half[0], half[1], half[2]}, halvings + 1);
+    look_into({corner[0], half[0], half[2]}, halvings + 1);
+    look_into({half[0], corner[1], half[1]}, halvings + 1);
+    look_into({half[2], half[1], corner[2]}, halvings + 1);
+  }
+
+  // What a part may hold beyond what is known cannot be felt.
+  bool nothing_below(double bound2) const {
+    const double distance = std::sqrt(least_), depth = std::max(0.0, radius_ - distance);
+    return bound2 >= least_ - 2 * kLevel * distance * depth;
+  }
+
+  // Downhill at every step, and never leaving the cell.
+  void descend(const Vec2& start) {
+    double u = start.x(), v = start.y(), now = patch_.point(u, v).squaredNorm();
+    for (int i = 0; i < 3 * kMostIterations; ++i) {
+      const Vec2 step = Expansion(patch_, u, v, Vec3::Zero()).step();
+      double share = 1;
+      for (; share > 1e-6; share /= 2) {
+        const double a = u + share * step.x(), b = v + share * step.y();
+        if (outside(a, b) > kOverlap) continue;
+        const double there = patch_.point(a, b).squaredNorm();
+        if (there > now * (1 + kSame / 10)) continue;
+        u = a, v = b, now = std::min(now, there);
+        break;
+      }
+      if (share <= 1e-6 || step.cwiseAbs().maxCoeff() < 1e-4) break;
+    }
+    // The last steps change the distance by less than round-off.
+    CellPoint found{u, v, patch_.point(u, v)}, exact;
+    if (find_minimum(patch_, Vec3::Zero(), {u, v}, exact) &&
+        exact.point.squaredNorm() < now * (1 + 1e-12))
+      found = exact;
+    const double distance2 = found.point.squaredNorm();
+    if (distance2 >= least_ * (1 - kSame)) return;
+    least_ = distance2;
+    out_ = {Feature::Face, 0, 0.0, found};
+  }
+
+  const Vec2 kWhole[3] = {{0, 0}, {1, 0}, {0, 1}};
+  const FacetAxes axes_;
+  CubicPatch patch_;
+  Eigenvalues whole_{0, 0, 0};      // bounds on the second derivative of |x|^2 / 2
+  double radius_, least_;           // least: square of the distance of out_
+  double steepest_, bend_, twist_;  // bounds on the derivatives of x, over the facet
+  double whole2_;                   // least2_of the whole cell
+  bool level_;                      // all of it is as near as its nearest corner
+  Nearest& out_;
+};
+
+}  // namespace
+
+std::pair<double, double> on_side(int k, double t) {
+  return k == 0 ? std::pair(t, 0.0) : k == 1 ? std::pair(1 - t, t) : std::pair(0.0, 1 - t);
+}
+
+std::pair<double, double> closest_on_facet(const Facet& facet, const Vec3& x) {
+  const Vec3 e1 = facet.corner[1] - facet.corner[0], e2 = facet.corner[2] - facet.corner[0];
+  const Vec3 d = x - facet.corner[0];
+  const double a = e1.dot(e1), b = e1.dot(e2), c = e2.dot(e2), p = d.dot(e1), q = d.dot(e2);
+  const double area2 = a * c - b * b;
+  const double u = std::clamp((c * p - b * q) / area2, 0.0, 1.0);
+  return {u, std::clamp((a * q - b * p) / area2, 0.0, 1.0 - u)};
+}
+
+bool find_minimum(const CubicPatch& patch, const Vec3& x, std::pair<double, double> start,
+                  CellPoint& out) {
+  auto [u, v] = start;
+  for (int i = 0; i < kMostIterations; ++i) {
+    const Expansion here(patch, u, v, x);
+    Vec2 step = here.step();
+    const double length = step.cwiseAbs().maxCoeff();
+    if (length > 0.5) step *= 0.5 / length;
+    u += step.x(), v += step.y();
+    if (outside(u, v) > 1) return false;
+    if (length >= kLastStep || !here.convex()) continue;
+    if (outside(u, v) > kOverlap) return false;
+    out = {u, v, patch.point(u, v)};
+    return true;
+  }
+  return false;
+}
+
+bool find_nearest(const Facet& facet, const CurvedFacet& curved, const CellBounds& bounds,
+                  const Vec3& x, double radius, Nearest& out) {
+  if (!CellSearch(facet, curved, bounds, x, radius, out).run()) return false;
+  out.at.point += x;
+  return true;
+}
+
+Mat3 dx_dc_of(const CubicPatch& patch, double u, double v, const Vec3& x) {
+  const Expansion here(patch, u, v, x);
+  Eigen::Matrix<double, 3, 2> along;
+  along << patch.along_u(u, v), patch.along_v(u, v);
+  Eigen::Matrix2d second;
+  second << here.huu, here.huv, here.huv, here.hvv;
+  if (second.determinant() == 0) return Mat3::Zero();
+  return along * second.inverse() * along.transpose();
+}
+
+Mat3 dx_dc_of(const CubicCurve& side, double t, const Vec3& x) {
+  const Vec3 along = side.tangent(t);
+  const double second = along.squaredNorm() + (side.point(t) - x).dot(side.second(t));
+  if (second == 0) return Mat3::Zero();
+  return along * along.transpose() / second;
+}
+
+}  // namespace sphshell

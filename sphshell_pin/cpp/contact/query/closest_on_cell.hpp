@@ -1,0 +1,47 @@
+// The point of a curved element, a cell, nearest to a point, and how it follows that point.
+#pragma once
+
+#include <utility>
+
+#include "contact/query/contact.hpp"
+#include "shell/curved/curved.hpp"
+
+namespace sphshell {
+
+// A point of a cell by its parameters.
+struct CellPoint {
+  double u, v;
+  Vec3 point;
+};
+
+// The closest point of a cell: within it, on a side or in a corner.
+struct Nearest {
+  Feature feature;
+  int index;  // of the side or corner
+  double t;   // along the side
+  CellPoint at;
+};
+
+// The parameters u, v at t on side k.
+std::pair<double, double> on_side(int k, double t);
+
+// The closest point on the flat facet, moved into it, as parameters.
+std::pair<double, double> closest_on_facet(const Facet& facet, const Vec3& x);
+
+// The minimum of the distance from x that Newton's method finds from `start`. False where it lies
+// outside the cell, or where there is none.
+bool find_minimum(const CubicPatch& patch, const Vec3& x, std::pair<double, double> start,
+                  CellPoint& out);
+
+// The closest point of a cell whatever its shape: least on its sides, for certain, and within it,
+// where it is divided until the distance is convex on a part, or no point of a part can be closest.
+// False where none is nearer than `radius`.
+bool find_nearest(const Facet& facet, const CurvedFacet& curved, const CellBounds& bounds,
+                  const Vec3& x, double radius, Nearest& out);
+
+// How the closest point follows x (3, 3): the second derivatives of the distance decide. Zero
+// where they do not.
+Mat3 dx_dc_of(const CubicPatch& patch, double u, double v, const Vec3& x);
+Mat3 dx_dc_of(const CubicCurve& side, double t, const Vec3& x);
+
+}  // namespace sphshell

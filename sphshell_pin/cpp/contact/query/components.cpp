@@ -1,0 +1,317 @@
+#include "contact/query/components.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+#include "contact/query/closest_on_cell.hpp"
+#include "contact/query/closest_on_side.hpp"
+#include "contact/faces/face_feet.hpp"
+#include "shell/curved/curved.hpp"
+
+namespace sphshell {
+namespace {
+
+Minimum on_side(const Shell& shell, int f, int k, double t, const Sphere& sphere, bool want_dn_dc) {
+  const Facet& facet = shell.facets()[f];
+  const bool vertex = t == 0 || t == 1;
+  const int corner = t == 1 ? next_corner(k) : k;
+  SideFoot foot{t, facet.corner[corner], Vec3::Zero()};
+  if (!vertex) foot = nearest_on_side(shell, f, k, sphere.center);
+  Contact contact = contact_at(foot.point, facet.normal, sphere, facet.element,
+                               vertex ? Feature::Vertex : Feature::Edge);
+  if (want_dn_dc)
+    contact.dn_dc =
+        dn_dc_of(contact, sphere.radius,
+                 vertex ? Mat3(Mat3::Zero()) : dx_dc_of(shell, f, k, foot, sphere.center));
+  return {contact, f, vertex ? corner : k, false};
+}
+
+}  // namespace
+
+void FacetTable::clear() {
+  count_ = 0;
+  if (++round_ == 0) slots_.clear(), round_ = 1;
+}
+
+FacetTable::Slot& FacetTable::slot(int facet) {
+  const std::size_t mask = slots_.size() - 1;
+  std::size_t i = static_cast<std::uint32_t>(facet) * 2654435761u & mask;
+  while (slots_[i].round == round_ && slots_[i].facet != facet) i = (i + 1) & mask;
+  return slots_[i];
+}
+
+int FacetTable::number(int facet, bool& added) {
+  if (slots_.size() < 4 * (static_cast<std::size_t>(count_) + 1)) {
+    std::vector<Slot> old(std::max<std::size_t>(1024, 4 * slots_.size()), Slot{0, 0, 0});
+    old.swap(slots_);
+    for (const Slot& s : old)
+      if (s.round == round_) slot(s.facet) = s;
+  }
+  Slot& at = slot(facet);
+  added = at.round != round_;
+  if (added) at = {facet, count_++, round_};
+  return at.number;
+}
+
+int FacetTable::find(int facet) {
+  const Slot& at = slot(facet);
+  return at.round == round_ ? at.number : kNone;
+}
+
+void Components::merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+                       std::vector<Minimum>& minima) {
+  std::sort(minima.begin(), minima.end(), [](const Minimum& x, const Minimum& y) {
+    const Contact &a = x.contact, &b = y.contact;
+    return a.depth != b.depth       ? a.depth > b.depth
+           : a.feature != b.feature ? a.feature < b.feature
+           : a.element != b.element ? a.element < b.element
+                                    : x.facet < y.facet;
+  });
+  // Of what was found on one cell the deepest is its closest point.
+  cells_.clear();
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < minima.size(); ++i) {
+    bool added = false;
+    cells_.number(minima[i].facet, added);
+    if (added) minima[kept++] = minima[i];
+  }
+  minima.erase(minima.begin() + kept, minima.end());
+  if (minima.size() < 2) return;
+  tree_.clear();
+  reset_components(minima.size());
+  if (components_.size() < minima.size()) components_.resize(minima.size());
+  for (std::size_t i = 0; i < minima.size(); ++i)
+    components_[i].cells = 1, components_[i].open.clear();
+  connect_equal_points(sphere, minima);
+  for (int i = 0; i < static_cast<int>(minima.size()); ++i)
+    add_candidates(shell, sphere, minima[i].facet, i, i);
+  grow_components(shell, sphere, minima.size());
+  find_saddles(shell, sphere, want_dn_dc, minima);
+}
+
+int Components::root(int cell) {
+  while (parent_[cell] != cell) cell = parent_[cell] = parent_[parent_[cell]];
+  return cell;
+}
+
+bool Components::belongs_to(int facet, int component) {
+  const int cell = cells_.find(facet);
+  return cell != FacetTable::kNone && root(cell) == component;
+}
+
+void Components::reset_components(std::size_t minima) {
+  parent_.resize(std::size_t(cells_.size()));
+  std::iota(parent_.begin(), parent_.end(), 0);
+  deepest_.assign(parent_.size(), -1);
+  std::iota(deepest_.begin(), deepest_.begin() + minima, 0);
+}
+
+// Sheets that lie on each other are one where they have one closest point.
+void Components::connect_equal_points(const Sphere& sphere, const std::vector<Minimum>& minima) {
+  const double same = kSamePlace * sphere.radius;
+  const auto point = [&](int i) -> const Vec3& { return minima[i].contact.point; };
+  by_x_.resize(minima.size());
+  std::iota(by_x_.begin(), by_x_.end(), 0);
+  std::sort(by_x_.begin(), by_x_.end(), [&](int i, int j) { return point(i).x() < point(j).x(); });
+  for (std::size_t a = 0; a < by_x_.size(); ++a)
+    for (std::size_t b = a + 1; b < by_x_.size(); ++b) {
+      if (point(by_x_[b]).x() - point(by_x_[a]).x() > same) break;
+      if ((point(by_x_[a]) - point(by_x_[b])).squaredNorm() > same * same) continue;
+      const auto [deeper, other] = std::minmax(by_x_[a], by_x_[b]);
+      const int facet = minima[other].facet;
+      components_[deeper].open.push_back({minima[other].contact.depth,
+                                          SaddleCandidate::Kind::CommonPoint, deeper, facet, facet,
+                                          0, 0, other});
+    }
+}
+
+bool Components::lower(const SaddleCandidate& a, const SaddleCandidate& b) {
+  return a.depth != b.depth   ? a.depth < b.depth
+         : a.facet != b.facet ? a.facet > b.facet
+                              : a.side > b.side;
+}
+
+void Components::add_candidates(const Shell& shell, const Sphere& sphere, int f, int cell,
+                                int component) {
+  const Facet& facet = shell.facets()[f];
+  const CellBounds& bounds = shell.curved()->cells()[f];
+  const double reach = sphere.radius + bounds.bulge;
+  std::vector<SaddleCandidate>& open = components_[component].open;
+  const Topology& topology = shell.topology();
+  for (int k = 0; k < 3 && !topology.pinches.empty(); ++k) {
+    const Pinch* pinch = topology.pinch_at(shell.triangles()[shell.triangle_of_facet(f)][k]);
+    const double depth = sphere.radius - (facet.corner[k] - sphere.center).norm();
+    if (pinch == nullptr || depth <= 0) continue;
+    const int name = shell.facet_half_edge(pinch->fans[0][0]);
+    for (const std::vector<int>& fan : pinch->fans) {
+      const int to = triangle_of(shell.facet_half_edge(fan[0]));
+      if (belongs_to(to, component)) continue;
+      open.push_back(
+          {depth, SaddleCandidate::Kind::Side, cell, to, triangle_of(name), side_of(name), 0, 0});
+      std::push_heap(open.begin(), open.end(), lower);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    const int beyond = bounds.beyond[k];
+    if (beyond == kBoundary || (beyond >= 0 && belongs_to(triangle_of(beyond), component)))
+      continue;
+    const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
+    const double t =
+        std::clamp((sphere.center - facet.corner[k]).dot(d) / d.squaredNorm(), 0.0, 1.0);
+    const double distance = (facet.corner[k] + t * d - sphere.center).norm();
+    if (distance >= reach) continue;
+    // A side is seen from the first of its triangles, so that a point has one name.
+    const auto add_candidate = [&](int h, int name) {
+      open.push_back({reach - distance, SaddleCandidate::Kind::Bound, cell, triangle_of(h),
+                      triangle_of(name), side_of(name), 0, 0});
+      std::push_heap(open.begin(), open.end(), lower);
+    };
+    const int here = 3 * f + k;
+    if (beyond >= 0) {
+      const bool first = shell.triangle_of_facet(f) < shell.triangle_of_facet(triangle_of(beyond));
+      add_candidate(beyond, first ? here : beyond);
+      continue;
+    }
+    const int h = 3 * shell.triangle_of_facet(f) + k;
+    const Edge& edge = topology.edges[topology.edge_of[h]];
+    const int name = shell.facet_half_edge(topology.incidence[edge.begin]);
+    for (int i = edge.begin; i < edge.begin + edge.count; ++i)
+      if (topology.incidence[i] != h)
+        add_candidate(shell.facet_half_edge(topology.incidence[i]), name);
+  }
+}
+
+// The highest candidate that leads out of a component belongs to some largest spanning forest
+// (Prim). The smaller components go first, and all in turn: what remains when one component is
+// left, or those that are left lead nowhere inside the sphere, is not looked at.
+void Components::grow_components(const Shell& shell, const Sphere& sphere, std::size_t minima) {
+  active_.resize(minima);
+  std::iota(active_.begin(), active_.end(), 0);
+  for (int size = 16; active_.size() > 1; size *= 2) {
+    for (std::size_t i = 0; i < active_.size(); ++i) {
+      int component = active_[i];
+      if (root(component) != component) continue;
+      while (component >= 0 && components_[component].cells < size)
+        component = expand(shell, sphere, component);
+    }
+    active_.erase(
+        std::remove_if(active_.begin(), active_.end(),
+                       [&](int p) { return root(p) != p || components_[p].open.empty(); }),
+        active_.end());
+  }
+}
+
+// Takes one more candidate into account; returns the component then, -1 once it leads nowhere.
+// Bounds are made exact where they come up first.
+int Components::expand(const Shell& shell, const Sphere& sphere, int component) {
+  std::vector<SaddleCandidate>& open = components_[component].open;
+  if (open.empty()) return -1;
+  std::pop_heap(open.begin(), open.end(), lower);
+  SaddleCandidate candidate = open.back();
+  open.pop_back();
+  if (candidate.depth <= 0) {
+    open.clear();
+    return -1;
+  }
+  if (belongs_to(candidate.to, component)) return component;
+  if (candidate.kind == SaddleCandidate::Kind::Bound) {
+    const SideFoot foot = nearest_on_side(shell, candidate.facet, candidate.side, sphere.center);
+    candidate.t = foot.t;
+    candidate.depth = sphere.radius - (foot.point - sphere.center).norm();
+    candidate.kind = SaddleCandidate::Kind::Side;
+    open.push_back(candidate);
+    std::push_heap(open.begin(), open.end(), lower);
+    return component;
+  }
+  bool added = false;
+  const int facet = candidate.to;
+  candidate.to = cells_.number(facet, added);
+  if (added) {
+    parent_.push_back(component);
+    ++components_[component].cells;
+    tree_.push_back(candidate);
+    add_candidates(shell, sphere, facet, candidate.to, component);
+    return component;
+  }
+  const int other = root(candidate.to);
+  if (other == component) return component;
+  tree_.push_back(candidate);
+  const int kept =
+      components_[component].open.size() < components_[other].open.size() ? other : component;
+  const int gone = kept == component ? other : component;
+  for (const SaddleCandidate& more : components_[gone].open) {
+    components_[kept].open.push_back(more);
+    std::push_heap(components_[kept].open.begin(), components_[kept].open.end(), lower);
+  }
+  components_[kept].cells += components_[gone].cells;
+  components_[gone].open.clear();
+  parent_[gone] = kept;
+  return kept;
+}
+
+// The shallower of two minima ends at the saddle that merges their components (Kruskal).
+void Components::find_saddles(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+                              std::vector<Minimum>& minima) {
+  std::sort(tree_.begin(), tree_.end(),
+            [](const SaddleCandidate& a, const SaddleCandidate& b) { return lower(b, a); });
+  reset_components(minima.size());
+  absorbed_.assign(minima.size(), 0);
+  leader_.resize(minima.size());
+  std::iota(leader_.begin(), leader_.end(), 0);
+  for (const SaddleCandidate& candidate : tree_) {
+    const int a = root(candidate.from), b = root(candidate.to);
+    const int i = deepest_[a], j = deepest_[b];
+    parent_[b] = a;
+    deepest_[a] = i < 0 ? j : j < 0 ? i : std::min(i, j);
+    if (i < 0 || j < 0) continue;
+    const int deeper = std::min(i, j), shallower = std::max(i, j);
+    // Between two parts of a ring there is none: its corners are on the circle to that gap.
+    const bool one_ring = minima[deeper].off_axis < 1 && minima[shallower].off_axis < 1;
+    const double least = one_ring ? shell.curved()->gap() : kNoSaddle * sphere.radius;
+    if (candidate.depth >= minima[shallower].contact.depth - least) {
+      absorbed_[shallower] = 1;
+      continue;
+    }
+    Minimum saddle =
+        candidate.kind == SaddleCandidate::Kind::Side
+            ? on_side(shell, candidate.facet, candidate.side, candidate.t, sphere, want_dn_dc)
+            : minima[candidate.minimum];
+    saddle.contact.weight = -1;
+    saddle.contact.dn_dc *= -1;
+    saddle.contact.group = -1;
+    group_if_nearly_one(minima, deeper, shallower, shell.curved()->facets()[candidate.facet].flat,
+                        saddle.contact);
+    minima.push_back(saddle);
+    absorbed_.push_back(0);
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < minima.size(); ++i) {
+    if (absorbed_[i]) continue;
+    int& group = minima[i].contact.group;
+    if (group >= 0) group = leader_of(group);
+    minima[kept++] = minima[i];
+  }
+  minima.erase(minima.begin() + kept, minima.end());
+}
+
+// Minima of nearly one depth and normal, the saddle between them as well, are shown as one contact.
+void Components::group_if_nearly_one(std::vector<Minimum>& minima, int deeper, int shallower,
+                                     bool flat, Contact& saddle) {
+  const double share = flat ? kShallowFlat : kShallow;
+  const auto near = [&](const Contact& c) {
+    return c.depth - saddle.depth < share * saddle.depth &&
+           (c.normal - saddle.normal).squaredNorm() < kAlike * kAlike;
+  };
+  Contact &a = minima[deeper].contact, &b = minima[shallower].contact;
+  if (!near(a) || !near(b)) return;
+  a.group = saddle.group = deeper;
+  b.group = shallower;
+  leader_[leader_of(shallower)] = leader_of(deeper);
+}
+
+int Components::leader_of(int minimum) {
+  while (leader_[minimum] != minimum) minimum = leader_[minimum] = leader_[leader_[minimum]];
+  return minimum;
+}
+
+}  // namespace sphshell

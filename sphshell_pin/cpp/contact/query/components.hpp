@@ -1,0 +1,89 @@
+// Components of the surface inside the sphere: each counts once.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "contact/query/minimum.hpp"
+
+namespace sphshell {
+
+// From a facet to a small number; keeps its memory.
+class FacetTable {
+ public:
+  void clear();
+  // The number of a facet, a new one where it had none: then `added` is set.
+  int number(int facet, bool& added);
+  // The number of a facet, or kNone.
+  int find(int facet);
+  int size() const { return count_; }
+
+  static constexpr int kNone = -1;
+
+ private:
+  struct Slot {
+    int facet, number;
+    std::uint32_t round;
+  };
+  Slot& slot(int facet);
+  std::vector<Slot> slots_;
+  std::uint32_t round_ = 0;
+  int count_ = 0;
+};
+
+// The theorem of fixed cells (docs/contact.md, "Components and saddles"): with a_i the depth at the
+// closest point of cell i and p_ij that at the closest point of a side that cells i and j share,
+//
+//   V = sum_i U(a_i) - largest total of U(p_ij) over a spanning forest of the shared sides
+//
+// cannot jump. A cell whose closest point is on a shared side adds as much as that side takes: only
+// the others are minima, and the sides where their components merge are saddles.
+class Components {
+ public:
+  // Leaves one minimum a cell, deepest first, and adds the saddles, of weight -1.
+  void merge(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+             std::vector<Minimum>& minima);
+
+ private:
+  // Where two cells meet: over a side, at its closest point, first only bounded from above; or at
+  // the closest point of both.
+  struct SaddleCandidate {
+    enum class Kind { Bound, Side, CommonPoint };
+    double depth;
+    Kind kind;
+    int from, to;  // cells; `to` is a facet until the candidate is used
+    int facet, side;
+    double t;     // along the side
+    int minimum;  // of a common point
+  };
+
+  // The cells found so far from one minimum, and the candidates on its border, as a heap.
+  struct Component {
+    int cells;
+    std::vector<SaddleCandidate> open;
+  };
+
+  static bool lower(const SaddleCandidate& a, const SaddleCandidate& b);
+  int root(int cell);
+  bool belongs_to(int facet, int component);
+  void reset_components(std::size_t minima);
+  void add_candidates(const Shell& shell, const Sphere& sphere, int facet, int cell, int component);
+  void connect_equal_points(const Sphere& sphere, const std::vector<Minimum>& minima);
+  void grow_components(const Shell& shell, const Sphere& sphere, std::size_t minima);
+  int expand(const Shell& shell, const Sphere& sphere, int component);
+  void find_saddles(const Shell& shell, const Sphere& sphere, bool want_dn_dc,
+                    std::vector<Minimum>& minima);
+  void group_if_nearly_one(std::vector<Minimum>& minima, int deeper, int shallower, bool flat,
+                           Contact& saddle);
+  int leader_of(int minimum);
+
+  FacetTable cells_;                   // the first of them hold the minima, in their order
+  std::vector<int> parent_, deepest_;  // per cell; deepest_: minimum of its component, or -1
+  std::vector<Component> components_;  // beside the minima, and as many more as were ever needed
+  std::vector<int> by_x_, active_;
+  std::vector<SaddleCandidate> tree_;
+  std::vector<char> absorbed_;  // beside the minima and saddles
+  std::vector<int> leader_;     // beside the minima: towards the one that it is grouped with
+};
+
+}  // namespace sphshell

@@ -1,0 +1,219 @@
+#include "contact/query/curved_query.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/query/closest_on_cell.hpp"
+#include "contact/query/closest_on_side.hpp"
+#include "contact/faces/rings.hpp"
+#include "contact/query/regions.hpp"
+
+namespace sphshell {
+
+void CurvedQuery::find(const Shell& shell, const Sphere& sphere, BroadPhase& broad, bool want_dn_dc,
+                       std::vector<Minimum>& minima) {
+  const CurvedShell& surface = *shell.curved();
+  // Where nothing is bent there is no need to look.
+  const CellBounds* cells = surface.bulge() > 0 ? surface.cells().data() : nullptr;
+  const CellBounds flat{};
+  broad.find(shell, surface.cones(), surface.bulge(), sphere, cells);
+  outlooks_.clear(), borders_.clear();
+  const LargeArray<FaceCell>& faces = surface.face_cells();
+  if (!faces.empty()) feet_.clear(surface);
+  for (int f : broad.candidates) {
+    if (!faces.empty() && faces[f].closed) {
+      feet_.add(shell, f, sphere, want_dn_dc, minima);
+      borders_.push_back(f);
+      continue;
+    }
+    const Outlook outlook(f, shell.facets()[f], surface.cones()[f], cells ? cells[f] : flat,
+                          sphere);
+    if (outlook.empty()) continue;
+    for (int line = 0; line < int(sizeof(CurvedFacet)); line += 64)
+      prefetch(reinterpret_cast<const char*>(&surface.facets()[f]) + line);
+    outlooks_.push_back(outlook);
+  }
+  const Task task{shell, sphere, want_dn_dc, minima};
+  for (const Outlook& outlook : outlooks_) {
+    const Owned& owned = surface.facets()[outlook.facet].owned;
+    if (outlook.within) {
+      if (surface.facets()[outlook.facet].flat)
+        add_flat(task, outlook);
+      else
+        add_bent(task, outlook);
+    }
+    for (int k = 0; k < 3; ++k) {
+      if (outlook.side[k] && owned.twin[k] != kNotOwned) add_edge(task, outlook.facet, k);
+      if (outlook.corner[k] && owned.vertex[k] >= 0) add_vertex(task, outlook.facet, k);
+    }
+  }
+  for (const int f : borders_) add_border(task, f);
+  if (!faces.empty() && !minima.empty()) find_rings(shell, sphere, broad.candidates, minima);
+  if (minima.size() > 1) components_.merge(shell, sphere, want_dn_dc, minima);
+}
+
+CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
+                              const CellBounds& bounds, const Sphere& sphere)
+    : facet(f),
+      height(at.normal.dot(sphere.center - at.corner[0])),
+      within(false),
+      side{false, false, false},
+      corner{false, false, false},
+      convex(false) {
+  const double bulge = bounds.bulge;
+  // The center stands over a minimum along a normal that leans at most by the opening, so its
+  // projection falls within `lean` of the feature that holds the minimum.
+  const double lean =
+      cone.tan_opening >= kAnyOpening
+          ? std::numeric_limits<double>::infinity()
+          : bulge + sphere.tolerance + (std::abs(height) + bulge) * cone.tan_opening;
+  Vec3 edge[3];
+  double length2[3], across[3];  // across: of the center, from side k inward, times its length
+  bool near_side[3];
+  for (int k = 0; k < 3; ++k) {
+    edge[k] = at.corner[next_corner(k)] - at.corner[k];
+    across[k] = at.normal.dot(edge[k].cross(sphere.center - at.corner[k]));
+    length2[k] = edge[k].squaredNorm();
+    const bool far = across[k] * across[k] > lean * lean * length2[k];
+    if (far && across[k] < 0) return;
+    near_side[k] = !far || across[k] < 0;
+  }
+  // Half the square of the distance falls towards `descent` in the middle, and elsewhere by what
+  // differs from it no more than its second derivative makes of the way there.
+  const Vec3 middle = (at.corner[0] + at.corner[1] + at.corner[2]) / 3;
+  const Vec3 aside = sphere.center - middle - height * at.normal;
+  const Vec3 offset(bounds.offset[0], bounds.offset[1], bounds.offset[2]);
+  const double raised = offset.dot(at.normal), size = aside.norm(), reach = cone.reach;
+  const Vec3 descent = aside - (offset - raised * at.normal) +
+                       (height - raised) * Vec3(bounds.lean[0], bounds.lean[1], bounds.lean[2]);
+  const Eigenvalues bend = bounds.curvature(height, size + reach);
+  convex = bend.low > kConvex;
+  // Half a unit in the last place of the numbers in single precision.
+  constexpr double kSingle = 1e-7;
+  const double differs = std::max(bend.high, -bend.low) * reach + bounds.stretch * (size + bulge) +
+                         kSingle * (std::abs(height) + bulge) + sphere.tolerance;
+  within = descent.squaredNorm() <= differs * differs;
+  bool forward[3], backward[3];  // along side k the distance may not fall; nor back along it
+  for (int k = 0; k < 3; ++k) {
+    const double limit2 = differs * differs * length2[k];
+    const double along = descent.dot(edge[k]), inward = at.normal.dot(edge[k].cross(descent));
+    const bool steep = along * along > limit2;
+    forward[k] = !steep || along < 0, backward[k] = !steep || along > 0;
+    side[k] = near_side[k] && !steep && (inward < 0 || inward * inward <= limit2);
+  }
+  for (int k = 0; k < 3; ++k)
+    corner[k] =
+        near_side[k] && near_side[previous_corner(k)] && forward[k] && backward[previous_corner(k)];
+}
+
+// Where the distance is convex all over the cell, Newton's method finds what is within it, and the
+// facets that own its sides and corners what is there. Else its closest point is found for
+// certain, and counts on a side too: what others find beside it is no deeper, and what it would
+// count too much is absorbed by the link over that side, which is as deep.
+void CurvedQuery::add_bent(const Task& task, const Outlook& outlook) {
+  const auto& [shell, sphere, want_dn_dc, minima] = task;
+  const int f = outlook.facet;
+  const Facet& facet = shell.facets()[f];
+  const CurvedFacet& curved = shell.curved()->facets()[f];
+  const CubicPatch patch = curved.patch(facet);
+  Nearest found{Feature::Face, 0, 0.0, {}};
+  if (outlook.convex) {
+    if (!find_minimum(patch, sphere.center, closest_on_facet(facet, sphere.center), found.at))
+      return;
+  } else if (!find_nearest(facet, curved, shell.curved()->cells()[f], sphere.center, sphere.radius,
+                           found)) {
+    return;
+  }
+  const auto& [u, v, point] = found.at;
+  if (!sphere.reaches(point)) return;
+  const Vec3 outward = patch.along_u(u, v).cross(patch.along_v(u, v)).normalized();
+  Contact contact = contact_at(point, outward, sphere, facet.element, found.feature);
+  if (want_dn_dc) {
+    Mat3 dx_dc = Mat3::Zero();
+    if (found.feature == Feature::Face) dx_dc = dx_dc_of(patch, u, v, sphere.center);
+    if (found.feature == Feature::Edge)
+      dx_dc = dx_dc_of(curved.side(facet, found.index), found.t, sphere.center);
+    contact.dn_dc = dn_dc_of(contact, sphere.radius, dx_dc);
+  }
+  minima.push_back({contact, f, found.index, (sphere.center - point).dot(outward) < 0});
+}
+
+void CurvedQuery::add_flat(const Task& task, const Outlook& outlook) {
+  const auto& [shell, sphere, want_dn_dc, minima] = task;
+  const Facet& facet = shell.facets()[outlook.facet];
+  const double height = outlook.height;
+  if (std::abs(height) >= sphere.radius) return;
+  for (int k = 0; k < 3; ++k)
+    if (test_side(facet, k, sphere.center, sphere.tolerance * sphere.tolerance).beyond) return;
+  minima.push_back(
+      {{sphere.center - height * facet.normal, height < 0 ? Vec3(-facet.normal) : facet.normal,
+        sphere.radius - std::abs(height), facet.element, Feature::Face},
+       outlook.facet,
+       0,
+       height < 0});
+}
+
+// Within a face there is nothing to look for but its own closest point: beside it the sides and
+// corners of its border.
+void CurvedQuery::add_border(const Task& task, int f) {
+  const auto& [shell, sphere, want_dn_dc, minima] = task;
+  const Facet& facet = shell.facets()[f];
+  const Owned& owned = shell.curved()->facets()[f].owned;
+  const FaceCell& cell = shell.curved()->face_cells()[f];
+  for (int k = 0; k < 3; ++k) {
+    if (owned.vertex[k] >= 0) add_vertex(task, f, k);
+    if (owned.twin[k] == kNotOwned) continue;
+    const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k],
+               c = sphere.center - facet.corner[k];
+    const double t = std::clamp(c.dot(d) / d.squaredNorm(), 0.0, 1.0);
+    const double reach = sphere.radius + double(cell.bulge[k]);
+    if ((c - t * d).squaredNorm() < reach * reach) add_edge(task, f, k);
+  }
+}
+
+// The closest point of a side between its ends, if the distance falls into none of the elements
+// that meet there.
+void CurvedQuery::add_edge(const Task& task, int f, int k) {
+  const auto& [shell, sphere, want_dn_dc, minima] = task;
+  const Facet& facet = shell.facets()[f];
+  const SideFoot foot = nearest_on_side(shell, f, k, sphere.center);
+  if (foot.t <= 0 || foot.t >= 1) return;
+  const Vec3 &point = foot.point, along = foot.tangent.normalized();
+  if (!sphere.reaches(point)) return;
+  const auto rises = [&, &shell = shell, &sphere = sphere](int h) {
+    const bool same = shell.facets()[triangle_of(h)].corner[side_of(h)] == facet.corner[k];
+    const Vec3 in = inward(shell, h, same ? foot.t : 1 - foot.t, point, along);
+    return (sphere.center - point).dot(in) <= sphere.tolerance + shell.curved()->gap();
+  };
+  const int code = shell.curved()->facets()[f].owned.twin[k];
+  if (!rises(3 * f + k) || (code >= 0 && !rises(code))) return;
+  if (code <= kManifold) {
+    const std::vector<int>& all = shell.half_edges_of(kManifold - code);
+    if (!std::all_of(all.begin(), all.end(), rises)) return;
+  }
+  Contact contact = contact_at(point, facet.normal, sphere, facet.element, Feature::Edge);
+  if (want_dn_dc)
+    contact.dn_dc = dn_dc_of(contact, sphere.radius, dx_dc_of(shell, f, k, foot, sphere.center));
+  minima.push_back({contact, f, k, false});
+}
+
+// A corner, if the distance falls along none of its edges: then it falls in no direction between
+// two of them either, as their angle is below 180 degrees.
+void CurvedQuery::add_vertex(const Task& task, int f, int k) {
+  const auto& [shell, sphere, want_dn_dc, minima] = task;
+  const Facet& facet = shell.facets()[f];
+  if (!sphere.reaches(facet.corner[k])) return;
+  const Topology& topology = shell.topology();
+  const Tangents& tangents = shell.curved()->tangents();
+  const int vertex = shell.curved()->facets()[f].owned.vertex[k];
+  const Vec3 from = sphere.center - facet.corner[k];
+  const double tolerance = sphere.tolerance + shell.curved()->gap();
+  for (int i = topology.neighbor_begin[vertex]; i < topology.neighbor_begin[vertex + 1]; ++i)
+    if (from.dot(tangents[i]) > tolerance * tangents[i].norm()) return;
+  Contact contact =
+      contact_at(facet.corner[k], facet.normal, sphere, facet.element, Feature::Vertex);
+  if (want_dn_dc) contact.dn_dc = dn_dc_of(contact, sphere.radius, Mat3::Zero());
+  minima.push_back({contact, f, k, false});
+}
+
+}  // namespace sphshell

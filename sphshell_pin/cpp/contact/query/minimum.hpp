@@ -1,0 +1,47 @@
+// Minima of the distance as the queries find them, before a shell's side is looked at.
+#pragma once
+
+#include <cmath>
+
+#include "contact/query/contact.hpp"
+#include "contact/query/tolerances.hpp"
+#include "shell/shell.hpp"
+
+namespace sphshell {
+
+struct Minimum {
+  Contact contact;
+  int facet;    // that holds it
+  int index;    // its side or corner, of an edge or a vertex
+  bool behind;  // of a face: the center is on its inner side
+  // Of a ring: its axis, unit, and how far off it the center is, below 1 (see ring_of()).
+  Vec3 axis = Vec3::Zero();
+  double off_axis = 1;
+};
+
+inline Vec3 direction(const Vec3& point, const Vec3& center, const Vec3& if_equal) {
+  const Vec3 d = center - point;
+  const double length = d.norm();
+  return length > 0 ? Vec3(d / length) : if_equal;
+}
+
+// The contact at a point of the shell; `outward`: there, where the center is as good as at it.
+inline Contact contact_at(const Vec3& point, const Vec3& outward, const Sphere& sphere, int element,
+                          Feature feature) {
+  const Vec3 from = sphere.center - point;
+  const double distance = from.norm();
+  const Vec3 normal = distance > kAtSurface * sphere.radius ? Vec3(from / distance)
+                      : from.dot(outward) < 0               ? Vec3(-outward)
+                                                            : outward;
+  return {point, normal, sphere.radius - distance, element, feature};
+}
+
+// How the normal changes with the center, where the contact point follows it by dx_dc (3, 3).
+inline Mat3 dn_dc_of(const Contact& contact, double radius, const Mat3& dx_dc) {
+  const double distance = radius - contact.depth;
+  if (!(distance > 0)) return Mat3::Zero();
+  const Vec3& n = contact.normal;
+  return (Mat3::Identity() - n * n.transpose() - dx_dc) / distance;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,216 @@
+#include "contact/query/query.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/query/curved_query.hpp"
+#include "contact/faces/rings.hpp"
+#include "contact/query/flat_query.hpp"
+#include "shell/triangle.hpp"
+
+namespace sphshell {
+namespace {
+
+// The pseudo-normal of the feature that a contact is on: it separates outside from inside.
+struct FeatureNormal {
+  Vec3 outward;
+  bool rim;  // on the border of an open sheet: no inside there
+};
+
+FeatureNormal feature_normal(const Shell& shell, const Minimum& at) {
+  const Topology& topology = shell.topology();
+  const int t = shell.triangle_of_facet(at.facet);
+  if (at.contact.feature == Feature::Vertex) {
+    const int vertex = shell.triangles()[t][at.index];
+    return {topology.vertex_normal[vertex], bool(topology.vertex_on_rim[vertex])};
+  }
+  if (at.contact.feature == Feature::Edge) {
+    const Edge& edge = topology.edges[topology.edge_of[3 * t + at.index]];
+    return {topology.edge_normal(edge), edge.on_rim()};
+  }
+  return {at.behind ? Vec3(-at.contact.normal) : at.contact.normal, false};
+}
+
+// side = outside | inside: the nearest contact tells on which side the center is. On the right side
+// count the contacts whose feature faces the center; on the wrong side the sphere is pushed back
+// out through the nearest point.
+void keep_one_side(const Shell& shell, const Sphere& sphere, std::vector<Minimum>& minima) {
+  const double sign = shell.side() == Side::Outside ? 1.0 : -1.0;
+  const auto faces_center = [&](const Minimum& at) {
+    if (at.contact.feature == Feature::Face) return at.behind == (sign < 0);
+    const FeatureNormal n = feature_normal(shell, at);
+    return n.rim || sign * n.outward.dot(sphere.center - at.contact.point) >= 0;
+  };
+  const auto nearest = std::max_element(
+      minima.begin(), minima.end(),
+      [](const Minimum& a, const Minimum& b) { return a.contact.depth < b.contact.depth; });
+  if (!faces_center(*nearest)) {
+    Minimum out = *nearest;
+    out.contact.normal = -out.contact.normal;
+    out.contact.dn_dc = -out.contact.dn_dc;
+    out.contact.depth = 2 * sphere.radius - out.contact.depth;
+    out.contact.group = -1;
+    minima.assign(1, out);
+    return;
+  }
+  minima.erase(std::remove_if(minima.begin(), minima.end(),
+                              [&](const Minimum& at) { return !faces_center(at); }),
+               minima.end());
+  for (Minimum& at : minima)
+    if (at.contact.depth == sphere.radius)
+      at.contact.normal = sign * feature_normal(shell, at).outward.normalized();
+}
+
+// The paper's sum: every element within reach counts, at its closest point.
+void find_elements(const Shell& shell, const Sphere& sphere, BroadPhase& broad,
+                   std::vector<Contact>& contacts) {
+  const Vec3& center = sphere.center;
+  const Topology& topology = shell.topology();
+  const std::vector<int>& element = shell.element();
+  const auto closest = [&](int t) {
+    const Vec3 corner[3] = {shell.vertices()[shell.triangles()[t][0]],
+                            shell.vertices()[shell.triangles()[t][1]],
+                            shell.vertices()[shell.triangles()[t][2]]};
+    return closest_on_triangle(center, corner, topology.face_normal[t]);
+  };
+  const int last = static_cast<int>(element.size()) - 1;
+  const auto is_nearest_of_element = [&](int t, double d2) {
+    // Of the two triangles of a quad the nearer one counts.
+    for (int u : {t - 1, t + 1}) {
+      if (u < 0 || u > last || element[u] != element[t]) continue;
+      const double other2 = (center - closest(u).point).squaredNorm();
+      if (other2 < d2 || (other2 == d2 && u < t)) return false;
+    }
+    return true;
+  };
+  broad.find(shell, shell.cones(), 0, sphere);
+  for (int f : broad.overlapping) {
+    const int t = shell.triangle_of_facet(f);
+    const ClosestPoint at = closest(t);
+    const double d2 = (center - at.point).squaredNorm();
+    if (!sphere.reaches(at.point) || !is_nearest_of_element(t, d2)) continue;
+    Feature feature = at.feature >= 4   ? Feature::Vertex
+                      : at.feature >= 1 ? Feature::Edge
+                                        : Feature::Face;
+    if (feature == Feature::Edge && topology.edges[topology.edge_of[3 * t + at.feature - 1]].inner)
+      feature = Feature::Face;
+    const Vec3& normal = topology.face_normal[t];
+    const double height = normal.dot(center - at.point);
+    if (shell.side() == Side::Outside && height < 0) continue;
+    if (shell.side() == Side::Inside && height > 0) continue;
+    contacts.push_back({at.point, direction(at.point, center, normal),
+                        sphere.radius - std::sqrt(d2), element[t], feature});
+  }
+  std::sort(contacts.begin(), contacts.end(),
+            [](const Contact& a, const Contact& b) { return a.element < b.element; });
+}
+
+}  // namespace
+
+struct Query::Parts {
+  explicit Parts(bool follow) : follow(follow), broad(follow) { minima.reserve(64); }
+
+  bool follow, want_dn_dc = false;
+  BroadPhase broad;
+  FlatQuery flat;
+  CurvedQuery curved;
+  std::vector<Minimum> minima;
+};
+
+Query::Query(bool follow) : parts_(std::make_unique<Parts>(follow)) { contacts.reserve(64); }
+
+Query::Query(const Query& other) : Query(other.parts_->follow) {
+  parts_->want_dn_dc = other.parts_->want_dn_dc;
+  contacts = other.contacts;
+}
+
+Query& Query::operator=(const Query& other) {
+  Query copy(other);
+  parts_.swap(copy.parts_);
+  contacts.swap(copy.contacts);
+  return *this;
+}
+
+Query::~Query() = default;
+
+void Query::want_dn_dc() { parts_->want_dn_dc = true; }
+
+const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& center, double radius,
+                                        Method method) {
+  contacts.clear();
+  const Sphere sphere{center, radius, kRoundOff * (shell.size() + radius)};
+  if (method == Method::Elements) {
+    find_elements(shell, sphere, parts_->broad, contacts);
+    return contacts;
+  }
+  std::vector<Minimum>& minima = parts_->minima;
+  minima.clear();
+  if (method == Method::Smooth)
+    parts_->curved.find(shell, sphere, parts_->broad, parts_->want_dn_dc, minima);
+  else
+    parts_->flat.find(shell, sphere, parts_->broad, parts_->want_dn_dc, minima);
+  if (minima.empty()) return contacts;
+  if (shell.side() != Side::Both) keep_one_side(shell, sphere, minima);
+  for (const Minimum& minimum : minima) {
+    Contact& contact = contacts.emplace_back(minimum.contact);
+    contact.rim = contact.feature != Feature::Face && feature_normal(shell, minimum).rim;
+    if (minimum.off_axis < 1) contact = ring_of(minimum, sphere);
+    contact.facet = minimum.facet, contact.index = minimum.index;
+  }
+  // Deepest first, saddles last: the order must not depend on the numbering of the elements.
+  if (contacts.size() > 1)
+    std::sort(contacts.begin(), contacts.end(), [](const Contact& a, const Contact& b) {
+      return a.weight != b.weight ? a.weight > b.weight
+             : a.depth != b.depth ? a.depth > b.depth
+                                  : a.element < b.element;
+    });
+  return contacts;
+}
+
+bool leads(const std::vector<Contact>& contacts, std::size_t i) {
+  if (contacts[i].group < 0) return true;
+  for (std::size_t j = 0; j < i; ++j)
+    if (contacts[j].group == contacts[i].group) return false;
+  return true;
+}
+
+Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3& center,
+                 double radius) {
+  Contact whole = contacts[i];
+  if (whole.group < 0) return whole;
+  whole.normal.setZero(), whole.dn_dc.setZero();
+  whole.depth = 0;
+  for (const Contact& c : contacts) {
+    if (c.group != whole.group) continue;
+    whole.depth += c.weight * c.depth;
+    whole.normal += c.weight * c.normal;
+    whole.dn_dc += c.dn_dc;
+  }
+  whole.normal.normalize();
+  // As one contact its weight is 1, wherever the sphere is.
+  whole.dn_dc -= (whole.normal * (whole.normal.transpose() * whole.dn_dc)).eval();
+  whole.point = center - (radius - whole.depth) * whole.normal;
+  return whole;
+}
+
+void merge_groups(const std::vector<Contact>& contacts, const Vec3& center, double radius,
+                  std::vector<Contact>& shown) {
+  shown.clear();
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    if (leads(contacts, i)) shown.push_back(whole_of(contacts, i, center, radius));
+}
+
+SurfacePoint on_curved(const Shell& shell, const Vec3& point, SurfacePoint at, Query& query) {
+  const double reach = std::abs(at.distance) + 1.01 * shell.curved()->bulge();
+  const auto& found = query.find(shell, point, reach + 1e-9 * shell.size(), Method::Smooth);
+  if (found.empty()) return at;
+  const Vec3 from = point - found.front().point;
+  const bool behind = found.front().normal.dot(at.normal) < 0;
+  at.normal = behind ? Vec3(-found.front().normal) : found.front().normal;
+  at.point = found.front().point;
+  at.distance = from.dot(at.normal) < 0 ? -from.norm() : from.norm();
+  at.element = found.front().element;
+  return at;
+}
+
+}  // namespace sphshell

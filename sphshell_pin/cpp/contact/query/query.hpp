@@ -1,0 +1,52 @@
+// Where a sphere touches a shell.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "contact/query/contact.hpp"
+#include "shell/shell.hpp"
+
+namespace sphshell {
+
+// Scratch of one query; keep one per thread and pair, and queries use no heap once it has grown.
+// With `follow`, the facets near a sphere are kept while it moves little from call to call (same
+// shell and radius); the contacts are the same to the bit. A copy starts with new scratch.
+class Query {
+ public:
+  explicit Query(bool follow = false);
+  Query(const Query& other);
+  Query& operator=(const Query& other);
+  ~Query();
+
+  // The contacts of the sphere (center in the shell's frame [m]); valid until the next call.
+  // Minima come deepest first, then saddles.
+  const std::vector<Contact>& find(const Shell& shell, const Vec3& center, double radius,
+                                   Method method);
+
+  // Also find dn_dc; not for the method "elements".
+  void want_dn_dc();
+
+  std::vector<Contact> contacts;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+// Whether contact i leads those that are shown as one with it.
+bool leads(const std::vector<Contact>& contacts, std::size_t i);
+
+// The contact that i leads: those of its group as one, with their resultant.
+Contact whole_of(const std::vector<Contact>& contacts, std::size_t i, const Vec3& center,
+                 double radius);
+
+// The contacts as shown: those of one group as one, with their resultant.
+void merge_groups(const std::vector<Contact>& contacts, const Vec3& center, double radius,
+                  std::vector<Contact>& shown);
+
+// The place of the curved surface beside that of the flat one, `at`: the deepest contact of a
+// sphere that reaches it.
+SurfacePoint on_curved(const Shell& shell, const Vec3& point, SurfacePoint at, Query& query);
+
+}  // namespace sphshell

@@ -1,0 +1,106 @@
+#include "contact/query/tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace sphshell {
+namespace {
+
+// The center can pass a sheet within a step only from deeper than this share of the radius: a step
+// moves it by a quarter of the radius at most.
+constexpr double kDeep = 0.5;
+
+// Longer lists, which only a contact source gives, go on by their order: all pairs would be too
+// many.
+constexpr std::size_t kLongest = 1000;
+
+}  // namespace
+
+ContactTracker::ContactTracker() {
+  for (auto* list : {&places_, &next_}) list->reserve(64);
+  pairings_.reserve(256);
+  at_.reserve(64);
+}
+
+double ContactTracker::disc(const Contact& contact, double radius) {
+  if (radius == 0) return std::numeric_limits<double>::infinity();
+  const double distance = radius - contact.depth;
+  return std::sqrt(std::max(0.0, radius * radius - distance * distance));
+}
+
+const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, const Vec3& center,
+                                              double radius) {
+  at_.assign(contacts.size(), -1);
+  pushed_through_ = false;
+  // On a concave surface a contact moves farther than the center.
+  const double moved = 4 * (center - center_).norm();
+  pairings_.clear();
+  const bool by_order = radius == 0 && std::max(places_.size(), contacts.size()) > kLongest;
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    places_[i].taken = false;
+    if (by_order) {
+      if (i < contacts.size()) pairings_.push_back({0, static_cast<int>(i), static_cast<int>(i)});
+      continue;
+    }
+    for (std::size_t j = 0; j < contacts.size(); ++j) {
+      const Contact& c = contacts[j];
+      if (places_[i].saddle != (c.weight < 0)) continue;
+      const double apart = (places_[i].point - c.point).norm();
+      if (apart < std::max({places_[i].reach, disc(c, radius), moved}))
+        pairings_.push_back({apart, static_cast<int>(i), static_cast<int>(j)});
+    }
+  }
+  // Nearest first, each once.
+  std::sort(pairings_.begin(), pairings_.end(), [](const Pairing& a, const Pairing& b) {
+    return a.apart != b.apart ? a.apart < b.apart
+           : a.from != b.from ? a.from < b.from
+                              : a.to < b.to;
+  });
+  for (const Pairing& pairing : pairings_) {
+    Place& place = places_[pairing.from];
+    if (place.taken || at_[pairing.to] >= 0) continue;
+    place.taken = true;
+    at_[pairing.to] = pairing.from;
+    // What a stage met on its way says nothing of the side.
+    if (pairing.from < static_cast<int>(known_)) keep_side(contacts[pairing.to], place, radius);
+  }
+  for (std::size_t j = 0; j < contacts.size(); ++j) {
+    if (at_[j] >= 0) continue;
+    const Contact& c = contacts[j];
+    at_[j] = static_cast<int>(places_.size());
+    places_.push_back(
+        {c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, c.rim, c.feature, count_++});
+  }
+  return at_;
+}
+
+void ContactTracker::keep_side(Contact& c, const Place& place, double radius) {
+  if (radius == 0 || place.depth < kDeep * radius || c.normal.dot(place.normal) >= 0) return;
+  // Round a border the normal may turn by any angle in a step, and comes to no other side; nor does
+  // it round the edge of a thin body.
+  const bool on_faces = c.feature == Feature::Face && place.feature == Feature::Face;
+  if (c.rim || place.rim || (place.depth <= radius && !on_faces)) return;
+  c.normal = -c.normal;
+  c.depth = 2 * radius - c.depth;
+  c.dn_dc = -c.dn_dc;
+  pushed_through_ = true;
+}
+
+void ContactTracker::accept(const std::vector<Contact>& contacts, const Vec3& center,
+                            double radius) {
+  next_.clear();
+  deep_ = false;
+  for (std::size_t j = 0; j < contacts.size(); ++j) {
+    const Contact& c = contacts[j];
+    next_.push_back({c.point, c.normal, c.depth, disc(c, radius), c.weight < 0, c.rim, c.feature,
+                     places_[at_[j]].number});
+    deep_ = deep_ || (radius > 0 && c.depth > kDeep * radius);
+  }
+  places_.swap(next_);
+  known_ = places_.size();
+  next_number_ = count_;
+  center_ = center;
+}
+
+}  // namespace sphshell

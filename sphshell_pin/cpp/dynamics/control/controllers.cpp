@@ -1,0 +1,153 @@
+#include "dynamics/control/controllers.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <pinocchio/spatial.hpp>
+#include <utility>
+
+namespace sphshell {
+namespace {
+
+constexpr double kMobility = 1e-9;  // of the largest: directions in which a frame cannot move
+
+}  // namespace
+
+GravityCompensation::GravityCompensation(VectorX actuated) : actuated_(std::move(actuated)) {}
+
+void GravityCompensation::torque(SceneData& scene, double, const VectorX& q, const VectorX&,
+                                 VectorX& tau) {
+  tau = scene.body().gravity(q).cwiseProduct(actuated_);
+}
+
+JointPd::JointPd(VectorX kp, VectorX kd, VectorX q_ref, bool gravity, VectorX actuated)
+    : kp_(std::move(kp)),
+      kd_(std::move(kd)),
+      q_ref_(std::move(q_ref)),
+      actuated_(std::move(actuated)),
+      error_(VectorX::Zero(kd_.size())),
+      gravity_(gravity) {}
+
+void JointPd::torque(SceneData& scene, double, const VectorX& q, const VectorX& v, VectorX& tau) {
+  scene.body().difference(q, q_ref_, error_);
+  tau = kp_.cwiseProduct(error_) - kd_.cwiseProduct(v);
+  if (gravity_) tau += scene.body().gravity(q);
+  tau.array() *= actuated_.array();
+}
+
+CartesianImpedance::CartesianImpedance(ImpedanceSettings settings, int num_joints)
+    : s_(std::move(settings)),
+      path_(std::move(s_.path)),
+      opposed_(static_cast<std::size_t>(num_joints), pinocchio::Force::Zero()),
+      error_(VectorX::Zero(s_.actuated.size())) {}
+
+void CartesianImpedance::prepare(SceneData& scene) {
+  scene.need_velocity_of(s_.joint);
+  scene.need_velocity_of(s_.path_joint);
+  started_ = false;
+}
+
+void CartesianImpedance::torque(SceneData& scene, double t, const VectorX& q, const VectorX& v,
+                                VectorX& tau) {
+  Multibody& body = scene.body();
+  const SE3& joint = body.world_from_joint(s_.joint);
+  const SE3 pose = joint * s_.frame;
+  const pinocchio::Motion twist = s_.frame.actInv(body.velocity(s_.joint));
+  const Vec3 velocity = pose.rotation() * twist.linear(), spin = pose.rotation() * twist.angular();
+  if (!started_) hold_ = pose.rotation(), started_ = true;
+
+  const TargetPath::Target on_path = path_.at(t - late_);
+  SE3 path = s_.path_placement;
+  if (s_.path_joint != 0) path = body.world_from_joint(s_.path_joint) * s_.path_placement;
+  const Vec3 target = path.act(on_path.point);
+  Vec3 target_velocity = path.rotation() * on_path.velocity;
+  Vec3 normal = path.rotation() * on_path.normal;
+  if (s_.path_joint != 0) target_velocity += body.velocity_at(s_.path_joint, target);
+
+  Vec3 offset = target - pose.translation();
+  if (s_.normal_force != 0) {
+    normal.normalize();
+    offset -= offset.dot(normal) * normal;
+  }
+  Vec3 force = s_.stiffness * offset + s_.damping * (target_velocity - velocity);
+  if (s_.normal_force != 0) force -= s_.normal_force * normal;
+  Vec3 moment = -s_.rotational_damping * spin;
+  if (s_.rotational_stiffness != 0)
+    moment += s_.rotational_stiffness *
+              pinocchio::log3(Eigen::Matrix3d(hold_ * pose.rotation().transpose()));
+
+  aside_.setZero(v.size());
+  if (s_.posture_stiffness.size() > 0) {
+    body.difference(q, s_.q_ref, error_);
+    aside_ = s_.posture_stiffness.cwiseProduct(error_);
+  }
+  if (s_.joint_damping.size() > 0) aside_ -= s_.joint_damping.cwiseProduct(v);
+  if (s_.decoupled) {
+    const pinocchio::Force more = wrench_of_motion(body, q, v, on_path, path);
+    force += pose.rotation() * more.linear();
+    moment += pose.rotation() * more.angular();
+  }
+
+  // One recursion gives the bias torques and J^T F: inverse dynamics at rest against -F.
+  pinocchio::Force& opposed = opposed_[s_.joint];
+  const Vec3 local = joint.rotation().transpose() * force;
+  opposed.linear() = -local;
+  opposed.angular() =
+      -(joint.rotation().transpose() * moment) - s_.frame.translation().cross(local);
+  tau = (body.bias(q, v, opposed_) + aside_).cwiseProduct(s_.actuated);
+}
+
+// In the frame: Lambda (a_d - Jdot v - J M^-1 tau), with tau what acts aside of F. Of a carrier
+// that moves, a_d has what its velocity determines. Where the frame has no mobility, as in a
+// singular posture, there is no wrench.
+pinocchio::Force CartesianImpedance::wrench_of_motion(Multibody& body, const VectorX& q,
+                                                      const VectorX& v,
+                                                      const TargetPath::Target& target,
+                                                      const SE3& path) {
+  pinocchio::Force& opposed = opposed_[s_.joint];
+  opposed.setZero();
+  body.bias(q, v, opposed_);
+  Vec3 wanted = path.rotation() * target.acceleration;
+  if (s_.path_joint != 0) {
+    const SE3& carrier = body.world_from_joint(s_.path_joint);
+    const pinocchio::Motion &w = body.velocity(s_.path_joint), drift = body.drift(s_.path_joint);
+    const Vec3 r = carrier.actInv(path.act(target.point));
+    const Vec3 along = s_.path_placement.rotation() * target.velocity;
+    wanted +=
+        carrier.rotation() * (drift.linear() + drift.angular().cross(r) +
+                              w.angular().cross(w.linear() + w.angular().cross(r) + 2 * along));
+  }
+  const pinocchio::Motion twist = s_.frame.actInv(body.velocity(s_.joint));
+  const pinocchio::Motion drift = s_.frame.actInv(body.drift(s_.joint));
+  const SE3 pose = body.world_from_joint(s_.joint) * s_.frame;
+  body.task(q, s_.joint, s_.frame, jacobian_, mobility_);
+  Eigen::Matrix<double, 6, 1> error;
+  error << pose.rotation().transpose() * wanted - drift.linear() -
+               twist.angular().cross(twist.linear()),
+      -drift.angular();
+  error -= mobility_.transpose() * aside_;
+  // Without a hold of the orientation that is left to the spring of the posture.
+  const int rows = s_.rotational_stiffness != 0 || s_.rotational_damping != 0 ? 6 : 3;
+  const MatrixX mobility = (jacobian_ * mobility_).topLeftCorner(rows, rows);
+  const Eigen::SelfAdjointEigenSolver<MatrixX> by_axis(mobility);
+  const double least = kMobility * by_axis.eigenvalues()[rows - 1];
+  Eigen::Matrix<double, 6, 1> wrench = Eigen::Matrix<double, 6, 1>::Zero();
+  for (int k = 0; k < rows; ++k) {
+    const auto axis = by_axis.eigenvectors().col(k);
+    if (by_axis.eigenvalues()[k] > least)
+      wrench.head(rows) += axis * (axis.dot(error.head(rows)) / by_axis.eigenvalues()[k]);
+  }
+  return pinocchio::Force(wrench);
+}
+
+// The orientation held stays, and the target stays where it is on the path.
+void CartesianImpedance::take_over(const Controller& before, double t) {
+  const auto* other = dynamic_cast<const CartesianImpedance*>(&before);
+  if (!other || !path_.same_curve(other->path_)) return;
+  hold_ = other->hold_;
+  started_ = other->started_;
+  const double place = other->path_.place_at(t - other->late_);
+  // Where it still waits it sets out at once if its time has come, from the start of the path.
+  late_ = place > 0 ? t - path_.time_of(place) : std::max(other->late_, t - path_.begin());
+}
+
+}  // namespace sphshell

@@ -1,0 +1,39 @@
+// A force from outside, as joint torques.
+#pragma once
+
+#include "dynamics/scene/multibody.hpp"
+
+namespace sphshell {
+
+// What acts at a point x of a body: a force [N], and a spring and a damper from there to an anchor
+// [N/m], [N s/m], all in the world: force + stiffness (anchor - x) - damping x'.
+struct PointForce {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero(), anchor = Eigen::Vector3d::Zero();
+  double stiffness = 0, damping = 0;
+
+  bool is_zero() const { return force.isZero(0) && stiffness == 0 && damping == 0; }
+};
+
+class Push {
+ public:
+  // A force at a point of the joint's frame; a zero one ends the push. `frame`: the number of the
+  // one to whose body the point belongs.
+  void set(int joint, const Eigen::Vector3d& point, const PointForce& force, int frame);
+  bool active() const { return !force_.is_zero(); }
+  int joint() const { return joint_; }
+  int frame() const { return frame_; }
+  // In the joint's frame, about its origin; the body's placements and velocities are those of the
+  // state.
+  pinocchio::Force on_joint(const Multibody& body) const;
+  // tau with J^T times the force added; the body's placements are those of (q, v).
+  const VectorX& added(Multibody& body, const VectorX& q, const VectorX& v, const VectorX& tau);
+
+ private:
+  int joint_ = 0, frame_ = 0;
+  Eigen::Vector3d point_ = Eigen::Vector3d::Zero();
+  PointForce force_;
+  Forces opposed_;
+  VectorX sum_;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,72 @@
+#include "dynamics/control/target_path.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace sphshell {
+
+TargetPath::Place TargetPath::in_phase(std::size_t phase, double t) const {
+  if (phase + 1 == s_.times.size()) return {s_.places[phase], 0.0, 0.0};
+  const double x = t - s_.times[phase], v = s_.speeds[phase];
+  const double a = s_.accelerations[phase], j = s_.jerks[phase];
+  if (t < s_.times[phase]) return {s_.places[phase], 0.0, 0.0};
+  return {s_.places[phase] + x * (v + x * (a / 2 + x * j / 6)), v + x * (a + x * j / 2), a + x * j};
+}
+
+TargetPath::Target TargetPath::at(double t) {
+  // Time may also step back: the inner stages of a step.
+  while (phase_ + 1 < s_.times.size() && t >= s_.times[phase_ + 1]) ++phase_;
+  while (phase_ > 0 && t < s_.times[phase_]) --phase_;
+  const auto [place, speed, rate] = in_phase(phase_, t);
+  const std::vector<double>& along = s_.along;
+  while (piece_ + 2 < along.size() && place >= along[piece_ + 1]) ++piece_;
+  while (piece_ > 0 && place < along[piece_]) --piece_;
+  const std::size_t i = piece_, j = std::min(i + 1, along.size() - 1);
+  const double length = along[j] - along[i];
+  const double u = length > 0 ? std::clamp((place - along[i]) / length, 0.0, 1.0) : 0.0;
+  const Vec3 chord = s_.points[j] - s_.points[i];
+  Target target;
+  target.normal = s_.normals[i] + u * (s_.normals[j] - s_.normals[i]);
+  if (length <= 0) {
+    target.point = s_.points[i];
+    target.velocity.setZero();
+    target.acceleration.setZero();
+  } else if (s_.tangents.empty()) {
+    target.point = s_.points[i] + u * chord;
+    target.velocity = speed * (chord / length);
+    target.acceleration = rate * (chord / length);
+  } else {
+    // The chord's line, plus what the tangents at both ends add to it.
+    const Vec3 from = length * s_.tangents[i] - chord, to = length * s_.tangents[j] - chord;
+    const double w = 1 - u;
+    target.point = s_.points[i] + u * (chord + w * (w * from - u * to));
+    const Vec3 tangent = (chord + w * (w - 2 * u) * from + u * (u - 2 * w) * to) / length;
+    const Vec3 bend = ((2 * u - 4 * w) * from + (4 * u - 2 * w) * to) / (length * length);
+    target.velocity = speed * tangent;
+    target.acceleration = rate * tangent + speed * speed * bend;
+  }
+  return target;
+}
+
+double TargetPath::next_kink(double t) const {
+  const auto next = std::upper_bound(s_.kinks.begin(), s_.kinks.end(), t);
+  return next == s_.kinks.end() ? std::numeric_limits<double>::infinity() : *next;
+}
+
+double TargetPath::place_at(double t) const {
+  const auto next = std::upper_bound(s_.times.begin() + 1, s_.times.end(), t);
+  return in_phase(static_cast<std::size_t>(next - s_.times.begin()) - 1, t).place;
+}
+
+double TargetPath::time_of(double place) const {
+  const auto next = std::lower_bound(s_.places.begin(), s_.places.end(), place);
+  if (next == s_.places.begin() || next == s_.places.end()) return s_.times.back();
+  const auto phase = static_cast<std::size_t>(next - s_.places.begin()) - 1;
+  // The place grows over a phase: halve it until the doubles between are used up.
+  double from = s_.times[phase], to = s_.times[phase + 1];
+  for (double middle = (from + to) / 2; from < middle && middle < to; middle = (from + to) / 2)
+    (in_phase(phase, middle).place < place ? from : to) = middle;
+  return to;
+}
+
+}  // namespace sphshell

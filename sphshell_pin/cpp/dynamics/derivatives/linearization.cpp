@@ -1,0 +1,191 @@
+#include "dynamics/derivatives/linearization.hpp"
+
+#include <pinocchio/spatial.hpp>
+
+namespace sphshell {
+namespace {
+
+// The displacement of a place that goes with a displacement of its body.
+Matrix36 displacement_at(const Vec3& place) {
+  Matrix36 out;
+  out << Mat3::Identity(), -pinocchio::skew(place);
+  return out;
+}
+
+}  // namespace
+
+Linearization::Linearization(SceneData& scene) : scene_(scene) {
+  scene.want_dn_dc();
+  scene.body().want_derivatives();
+  const pinocchio::Model& model = scene.body().model();
+  for (const Pair& pair : scene.pairs()) chains_.emplace_back(model, pair.joint_j, pair.joint_i);
+  force_.setZero(model.nv);
+  column_.setZero(model.nv);
+  inverse_mass_.setZero(model.nv, model.nv);
+  is_loaded_.assign(static_cast<std::size_t>(model.nv), 0);
+  loaded_.reserve(is_loaded_.size());
+}
+
+void Linearization::forces(const VectorX& q, const VectorX& v, MatrixX& by_q, MatrixX& by_v) {
+  force_.setZero(v.size());
+  add_contacts(q, v, nullptr);
+  by_q = by_q_;
+  by_v = by_v_;
+}
+
+void Linearization::rates(const VectorX& q, const VectorX& v, const VectorX& z, const VectorX& tau,
+                          MatrixX& jacobian) {
+  Multibody& body = scene_.body();
+  const Eigen::Index nv = v.size();
+  jacobian.setZero(nv + z.size(), 2 * nv + z.size());
+  auto by_q = jacobian.topLeftCorner(nv, nv), by_v = jacobian.block(0, nv, nv, nv);
+  force_ = tau;
+  const bool joints_act = scene_.joints().act(), any = scene_.touching() || joints_act;
+  by_parameters_.setZero(nv + z.size(), static_cast<Eigen::Index>(parameters_.size()));
+  if (any) add_contacts(q, v, &jacobian);
+  if (joints_act) add_joints(q, v, z, jacobian);
+  // These forces are torques like others: their derivatives pass through the inertia.
+  body.acceleration_derivatives(q, v, force_, by_q, by_v, inverse_mass_);
+  if (!any) return;
+  for (int m : loaded_)
+    for (int k : loaded_) {
+      by_q.col(m) += by_q_(k, m) * inverse_mass_.col(k);
+      by_v.col(m) += by_v_(k, m) * inverse_mass_.col(k);
+    }
+  if (!parameters_.empty())
+    by_parameters_.topRows(nv) = (inverse_mass_ * by_parameters_.topRows(nv)).eval();
+  // What was written as generalized forces by z.
+  const auto pass_through_inertia = [&](Eigen::Index z) {
+    auto column = jacobian.col(2 * nv + z).head(nv);
+    column_.setZero();
+    for (int k : loaded_) column_ += column[k] * inverse_mass_.col(k);
+    column = column_;
+  };
+  for (const ActiveContact& active : scene_.active())
+    for (int i = 0; i < 3 * rings_of(active); ++i) pass_through_inertia(3 * active.slot + i);
+  for (Eigen::Index i = scene_.joint_bristles(); i < z.size(); ++i) pass_through_inertia(i);
+}
+
+// Adds stops, damping and dry friction of joints, as add_contacts() does with contacts.
+void Linearization::add_joints(const VectorX& q, const VectorX& v, const VectorX& z,
+                               MatrixX& jacobian) {
+  const JointForces& joints = scene_.joints();
+  const Eigen::Index nv = v.size(), first = scene_.joint_bristles();
+  force_ += joints.torque();
+  joints.slopes(q, v, z.tail(joints.size()), scene_.least_relaxation(), joint_slopes_);
+  for (const JointForces::Slope& slope : joint_slopes_) {
+    by_q_(slope.v, slope.v) += slope.by_q;
+    by_v_(slope.v, slope.v) += slope.by_v;
+    if (!is_loaded_[slope.v]) loaded_.push_back(slope.v);
+    is_loaded_[slope.v] = 1;
+    if (slope.spring < 0) continue;
+    const Eigen::Index row = first + slope.spring;
+    jacobian(slope.v, 2 * nv + row) += slope.by_z;
+    jacobian(nv + row, nv + slope.v) = slope.rate_by_v;
+    jacobian(nv + row, 2 * nv + row) = slope.rate_by_z;
+  }
+}
+
+// Fills by_q_ and by_v_, adds to force_, and where there is a jacobian writes what bristles have in
+// it, of the acceleration as generalized forces.
+void Linearization::add_contacts(const VectorX& q, const VectorX& v, MatrixX* jacobian) {
+  const Eigen::Index nv = v.size();
+  by_q_.setZero(nv, nv);
+  by_v_.setZero(nv, nv);
+  for (int k : loaded_) is_loaded_[k] = 0;
+  loaded_.clear();
+  if (!scene_.touching()) return;
+  scene_.body().place_axes(q);
+  const std::vector<ActiveContact>& active = scene_.active();
+  for (std::size_t first = 0, next; first < active.size(); first = next) {
+    const int p = active[first].pair;
+    Chain& chain = chains_[p];
+    chain.place(scene_.body(), scene_.states()[p].world_from_j, v);
+    Sum sum{Vector6::Zero(), Matrix6::Zero(), Matrix6::Zero()};
+    for (next = first; next < active.size() && active[next].pair == p; ++next) {
+      const ContactSite site = site_of(active[next], chain.twist());
+      find_slopes(active[next], site);
+      sum.wrench += slopes_.wrench;
+      sum.by_displacement += slopes_.by_place * displacement_at(site.place);
+      sum.by_twist += slopes_.by_twist;
+      if (jacobian && active[next].slot >= 0) add_bristle(active[next], site, chain, *jacobian);
+      if (jacobian) add_parameters(active[next], site, chain);
+    }
+    chain.add_force(sum.wrench, force_, by_q_);
+    for (int m = 0; m < chain.size(); ++m) {
+      const Vector6 by_v = sum.by_twist * chain.axes().col(m);
+      const Vector6 by_q =
+          sum.by_displacement * chain.axes().col(m) + sum.by_twist * chain.twist_by_q().col(m);
+      const int column = chain.velocity(m);
+      for (int k = 0; k < chain.size(); ++k) {
+        by_q_(chain.velocity(k), column) += chain.axes().col(k).dot(by_q);
+        by_v_(chain.velocity(k), column) += chain.axes().col(k).dot(by_v);
+      }
+      if (!is_loaded_[column]) loaded_.push_back(column);
+      is_loaded_[column] = 1;
+    }
+  }
+}
+
+void Linearization::find_slopes(const ActiveContact& active, const ContactSite& site) {
+  const Pair& pair = scene_.pairs()[active.pair];
+  if (active.row >= 0)
+    scene_.foundation(active).slopes(pair, active.row, scene_.relaxation(pair), site,
+                                     active.force.normal, slopes_);
+  else
+    contact_slopes(pair.law, pair.friction, scene_.relaxation(pair), site, slopes_);
+}
+
+void Linearization::add_bristle(const ActiveContact& active, const ContactSite& site,
+                                const Chain& chain, MatrixX& jacobian) {
+  const Eigen::Index nv = force_.size(), z = 3 * active.slot;
+  const Matrix36 by_displacement = slopes_.rate_by_place * displacement_at(site.place);
+  auto rate = jacobian.middleRows<3>(nv + z);
+  for (int m = 0; m < chain.size(); ++m) {
+    const int k = chain.velocity(m);
+    const auto axis = chain.axes().col(m);
+    // Joints that mimic another have its velocity.
+    rate.col(k) += by_displacement * axis + slopes_.rate_by_twist * chain.twist_by_q().col(m);
+    rate.col(nv + k) += slopes_.rate_by_twist * axis;
+    jacobian.block<1, 3>(k, 2 * nv + z) += axis.transpose() * slopes_.by_stretch;
+  }
+  rate.middleCols<3>(2 * nv + z) = slopes_.rate_by_stretch;
+  const int outer = rings_of(active) - 1;
+  for (int r = 0; r < outer; ++r) {
+    const ContactSlopes::Ring& ring = slopes_.outer[r];
+    const Eigen::Index own = 2 * nv + z + 3 * (r + 1);
+    const Matrix36 by_displacement = ring.rate_by_place * displacement_at(site.place);
+    auto ring_rate = jacobian.middleRows<3>(nv + z + 3 * (r + 1));
+    for (int m = 0; m < chain.size(); ++m) {
+      const int k = chain.velocity(m);
+      const auto axis = chain.axes().col(m);
+      ring_rate.col(k) += by_displacement * axis + ring.rate_by_twist * chain.twist_by_q().col(m);
+      ring_rate.col(nv + k) += ring.rate_by_twist * axis;
+      jacobian.block<1, 3>(k, own) += axis.transpose() * ring.by_stretch;
+    }
+    rate.middleCols<3>(own) = ring.first_by_stretch;
+    ring_rate.middleCols<3>(2 * nv + z) = ring.rate_by_first;
+    for (int i = 0; i < outer; ++i)
+      ring_rate.middleCols<3>(2 * nv + z + 3 * (i + 1)) = ring.rate_by_outer[i];
+  }
+}
+
+int Linearization::rings_of(const ActiveContact& active) const {
+  return active.slot < 0 ? 0 : scene_.pairs()[active.pair].friction.rings();
+}
+
+ContactSite Linearization::site_of(const ActiveContact& active, const Vector6& twist) const {
+  const Pair& pair = scene_.pairs()[active.pair];
+  const PairState& state = scene_.states()[active.pair];
+  const auto& turn = state.world_from_j.rotation();
+  ContactSite site{
+      active.contact, state.center, !pair.source, pair.radius,         scene_.disc_radius(active),
+      twist,          Vec3::Zero(), {},           scene_.shape(active)};
+  if (pair.source) site.place = site.contact.point;
+  if (active.slot >= 0) site.stretch = turn.transpose() * active.kinematics.bristle;
+  for (int i = 1; i < rings_of(active); ++i)
+    site.outer[i - 1] = scene_.stretches().segment<3>(3 * (active.slot + i));
+  return site;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,198 @@
+// How contacts answer parameters of their pair.
+#include <algorithm>
+
+#include "dynamics/derivatives/linearization.hpp"
+
+namespace sphshell {
+namespace {
+
+// The motion that a twist gives to a place.
+Vec3 motion_of(const Vector6& twist, const Vec3& place) {
+  return twist.head<3>() + twist.tail<3>().cross(place);
+}
+
+// The wrench of a foundation's row, about the origin of the shell's frame.
+Vector6 foundation_wrench(const FoundationPair& foundation, const Pair& pair, int row,
+                          const ContactSite& site, double relaxation, ContactSlopes& scratch) {
+  const Vec3 spin = site.twist.tail<3>(), velocity = site.twist.head<3>() + spin.cross(site.place);
+  const FoundationForce found = foundation.force(pair, row, velocity, spin);
+  const double normal = std::max(0.0, site.contact.normal.dot(found.normal));
+  foundation.slopes(pair, row, relaxation, site, normal, scratch);
+  return scratch.wrench;
+}
+
+}  // namespace
+
+Eigen::RowVector3d Linearization::plain_depth_by_place(const ContactSite& site) const {
+  Eigen::RowVector3d out = slopes_.depth_by_place;
+  if (site.shape) out += site.shape->tilt.transpose();
+  return out;
+}
+
+Linearization::Answer Linearization::answer_of(const Parameter& parameter,
+                                               const ActiveContact& active,
+                                               const ContactSite& site) {
+  using Kind = Parameter::Kind;
+  Answer out;
+  const int rings = rings_of(active);
+  const auto ring_of = [&](int i) { return i == 0 ? nullptr : &slopes_.outer[i - 1]; };
+  for (int i = 0; i < rings; ++i) out.rates[i].setZero();
+  if (parameter.kind == Kind::Offset || parameter.kind == Kind::Placement) {
+    const Pair& pair = scene_.pairs()[active.pair];
+    const SE3& world_from_j = scene_.states()[active.pair].world_from_j;
+    Vec3 moved;  // the place, against the shell
+    Vector6 twist = Vector6::Zero();
+    if (parameter.kind == Kind::Offset) {
+      const auto from_i = scene_.body().world_from(pair.joint_i, pair.placement_i).rotation();
+      moved = world_from_j.rotation().transpose() * from_i.col(parameter.axis);
+    } else {
+      out.moved[parameter.axis] = 1;
+      moved = -motion_of(out.moved, site.place);
+      twist = -pinocchio::Motion(out.moved).cross(pinocchio::Motion(site.twist)).toVector();
+    }
+    out.wrench = slopes_.by_place * moved + slopes_.by_twist * twist;
+    out.depth = slopes_.depth_by_place * moved;
+    out.plain_depth = plain_depth_by_place(site) * moved;
+    out.normal = slopes_.normal_by_place * moved;
+    for (int i = 0; i < rings; ++i)
+      out.rates[i] =
+          ring_of(i) ? Vec3(ring_of(i)->rate_by_place * moved + ring_of(i)->rate_by_twist * twist)
+                     : Vec3(slopes_.rate_by_place * moved + slopes_.rate_by_twist * twist);
+    return out;
+  }
+  if (parameter.kind != Kind::Field) {
+    out.plain_depth = 1;
+    out.depth = site.shape ? 1 + site.shape->tilt.dot(site.contact.normal) : 1;
+    if (active.row < 0) out.wrench = out.depth * slopes_.by_depth;
+    for (int i = 0; i < rings && active.row < 0; ++i)
+      out.rates[i] = out.depth * (ring_of(i) ? ring_of(i)->rate_by_depth : slopes_.rate_by_depth);
+  }
+  add_differences(parameter, active, site, out);
+  return out;
+}
+
+// What follows from a parameter at a contact whose depth is held; of a foundation, all of it.
+void Linearization::add_differences(const Parameter& parameter, const ActiveContact& active,
+                                    const ContactSite& site, Answer& answer) {
+  using Kind = Parameter::Kind;
+  const int rings = rings_of(active);
+  for (const double sign : {1.0, -1.0}) {
+    const Pair& pair = sign > 0 ? parameter.more : parameter.less;
+    const double share = sign / (2 * parameter.step), relaxation = scene_.relaxation(pair);
+    ContactSite other = site;
+    if (active.row >= 0) {
+      FoundationPair foundation;
+      std::vector<Contact> contacts;
+      foundation.find(pair, site.place, true, contacts);
+      const std::size_t row = static_cast<std::size_t>(active.row);
+      if (row >= contacts.size()) continue;
+      other.contact = contacts[row];
+      other.radius = pair.radius;
+      other.disc_radius = pair.disc_radius();
+      answer.wrench +=
+          share * foundation_wrench(foundation, pair, active.row, other, relaxation, other_slopes_);
+    } else {
+      ContactShape shape;
+      other.disc_radius = pair.disc_radius();
+      if (site.shape) {
+        shape = scene_.shape_of(active.pair, pair, site.contact);
+        shape.depth = site.shape->depth;
+        other.shape = &shape;
+        other.disc_radius = shape.disc_radius();
+      }
+      if (parameter.kind == Kind::Ball) other.contact.point = pair.ball * site.contact.normal;
+      contact_slopes(pair.law, pair.friction, relaxation, other, other_slopes_);
+      answer.wrench += share * other_slopes_.wrench;
+    }
+    for (int i = 0; i < rings; ++i)
+      answer.rates[i] += share * (i == 0 ? other_slopes_.rate : other_slopes_.outer[i - 1].rate);
+  }
+}
+
+// As generalized forces, and rates of bristles.
+void Linearization::add_parameters(const ActiveContact& active, const ContactSite& site,
+                                   const Chain& chain) {
+  const Eigen::Index nv = force_.size(), z = nv + 3 * active.slot;
+  for (std::size_t c = 0; c < parameters_.size(); ++c) {
+    if (parameters_[c].pair != active.pair) continue;
+    const Answer answer = answer_of(parameters_[c], active, site);
+    for (int m = 0; m < chain.size(); ++m) {
+      const auto axis = chain.axes().col(m);
+      const Vector6 axis_moved =
+          -pinocchio::Motion(answer.moved).cross(pinocchio::Motion(axis)).toVector();
+      by_parameters_(chain.velocity(m), c) +=
+          axis.dot(answer.wrench) + axis_moved.dot(slopes_.wrench);
+    }
+    for (int i = 0; i < rings_of(active); ++i)
+      by_parameters_.block<3, 1>(z + 3 * i, c) += answer.rates[i];
+  }
+}
+
+void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactForceSlopes& out) {
+  const Eigen::Index nv = v.size(), nz = scene_.bristle_size(), first = 2 * nv + nz;
+  std::vector<int> row_of;
+  const int rows = scene_.rows_of_contacts(row_of);
+  const Eigen::Index columns = first + static_cast<Eigen::Index>(parameters_.size());
+  out.force_world.setZero(3 * rows, columns);
+  out.normal_force.setZero(rows, columns);
+  out.depth.setZero(rows, columns);
+  out.plain_depth.setZero(rows, columns);
+  if (rows == 0) return;
+  Multibody& body = scene_.body();
+  body.place_axes(q);
+  const std::vector<ActiveContact>& all = scene_.active();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const ActiveContact& active = all[i];
+    const Pair& pair = scene_.pairs()[active.pair];
+    const SE3& world_from_j = scene_.states()[active.pair].world_from_j;
+    const auto& turn = world_from_j.rotation();
+    Chain& chain = chains_[active.pair];
+    if (i == 0 || all[i - 1].pair != active.pair) chain.place(body, world_from_j, v);
+    const ContactSite site = site_of(active, chain.twist());
+    find_slopes(active, site);
+    const Vec3 normal = site.contact.normal, force = slopes_.wrench.head<3>();
+    const double weight = site.contact.weight;
+    auto world = out.force_world.middleRows<3>(3 * row_of[i]);
+    auto along = out.normal_force.row(row_of[i]);
+    auto depth = out.depth.row(row_of[i]), plain = out.plain_depth.row(row_of[i]);
+    // One column, from changes in the shell's frame.
+    const auto add = [&](Eigen::Index column, const Vec3& force_by, const Vec3& normal_by,
+                         double depth_by, double plain_by) {
+      world.col(column) += turn * force_by;
+      along[column] += force_by.dot(normal) + force.dot(normal_by);
+      depth[column] += weight * depth_by;
+      plain[column] += weight * plain_by;
+    };
+    for (int m = 0; m < chain.size(); ++m) {
+      const Vector6 axis = chain.axes().col(m), rate = chain.twist_by_q().col(m);
+      const Vec3 moved = motion_of(axis, site.place);
+      const Vec3 by_q =
+          slopes_.by_place.topRows<3>() * moved + slopes_.by_twist.topRows<3>() * rate;
+      add(chain.velocity(m), by_q, slopes_.normal_by_place * moved, slopes_.depth_by_place * moved,
+          plain_depth_by_place(site) * moved);
+      add(nv + chain.velocity(m), slopes_.by_twist.topRows<3>() * axis, Vec3::Zero(), 0, 0);
+    }
+    // The shell's frame turns with its body.
+    const Vec3 force_world = turn * force;
+    for (std::size_t j : body.model().supports[pair.joint_j]) {
+      for (int k = 0; j > 0 && k < body.model().nvExtendeds[j]; ++k) {
+        const Vec3 axis = body.axes().col(body.model().idx_vExtendeds[j] + k).tail<3>();
+        world.col(body.model().idx_vs[j] + k) += axis.cross(force_world);
+      }
+    }
+    for (int r = 0; r < rings_of(active); ++r)
+      for (int k = 0; k < 3; ++k) {
+        const Matrix63& by = r == 0 ? slopes_.by_stretch : slopes_.outer[r - 1].by_stretch;
+        add(2 * nv + 3 * (active.slot + r) + k, by.topRows<3>().col(k), Vec3::Zero(), 0, 0);
+      }
+    for (std::size_t c = 0; c < parameters_.size(); ++c) {
+      if (parameters_[c].pair != active.pair) continue;
+      const Answer answer = answer_of(parameters_[c], active, site);
+      const Eigen::Index column = first + static_cast<Eigen::Index>(c);
+      add(column, answer.wrench.head<3>(), answer.normal, answer.depth, answer.plain_depth);
+      world.col(column) += turn * answer.moved.tail<3>().cross(force);
+    }
+  }
+}
+
+}  // namespace sphshell

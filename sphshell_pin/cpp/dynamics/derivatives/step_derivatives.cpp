@@ -1,0 +1,283 @@
+#include "dynamics/derivatives/step_derivatives.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "dynamics/integrators/stepper.hpp"
+
+namespace sphshell {
+namespace {
+
+// Of central differences of torques, relative to the larger of 1 and the number.
+constexpr double kTorqueDifference = 1e-7;
+// Changes over a step and over its halves agree to this share of the largest, in contact and out of
+// it, or are taken as they are after so many halvings.
+constexpr double kAgreed = 1e-6, kAgreedFree = 1e-9;
+constexpr int kMostHalvings = 16;
+// Smaller changes of positions [m or rad] and velocities, of stretches [m], count as these, where a
+// parameter changes by all of itself.
+constexpr double kLeast = 1e-6, kLeastStretch = 1e-9;
+// A step ends just behind its event, where the slopes may jump: those before it count.
+constexpr double kLastNode = 1 - 1e-5;
+
+}  // namespace
+
+StepSlopes::StepSlopes(SceneData& scene, std::vector<Parameter> parameters)
+    : scene_(scene), linearization_(scene) {
+  linearization_.set_parameters(std::move(parameters));
+}
+
+void StepSlopes::carry(Chart& chart, const Stepper& stepper, double h, const MatrixX& torque,
+                       Tangent& tangent) {
+  const Tangent from = tangent;
+  origin_ = &from, torque_ = &torque;
+  stepper.carry(*this, chart, h, tangent);
+  origin_ = nullptr, torque_ = nullptr;
+}
+
+StepSlopes::Coordinates StepSlopes::at_origin() const {
+  return {MatrixX::Zero(origin_->q.rows(), origin_->q.cols()), origin_->v, origin_->z};
+}
+
+void StepSlopes::finish(Chart& chart, const VectorX& y, const Coordinates& by, Tangent& out) {
+  chart_slopes_.begin(chart, y);
+  chart_slopes_.place(origin_->q, by.u, by.w, out.q, out.v);
+  out.z = by.z;
+}
+
+// At state_, which is evaluated.
+void StepSlopes::linearize(Chart& chart, double t) {
+  Torques& torques = chart.torques();
+  follows_ = torques.follow_state();
+  if (follows_) {
+    const TorqueAt at = [&](double time, const VectorX& q, const VectorX& v) -> const VectorX& {
+      return torques.torque(time, q, v);
+    };
+    torque_slopes(at, t, state_.q, state_.v, state_.z);
+  }
+  scene_.evaluate(state_.q, state_.v, state_.z);
+  tau_ = torques.torque(t, state_.q, state_.v);
+  linearization_.rates(state_.q, state_.v, state_.z, tau_, jacobian_);
+  if (follows_)
+    jacobian_.topRows(tau_.size()).noalias() += linearization_.inverse_mass() * torque_slopes_;
+}
+
+void StepSlopes::torque_slopes(const TorqueAt& torque, double t, const VectorX& q, const VectorX& v,
+                               const VectorX& z) {
+  const Eigen::Index nv = v.size();
+  torque_slopes_.setZero(nv, 2 * nv + z.size());
+  q_ = q, v_ = v, z_ = z;
+  u_.setZero(nv);
+  scene_.evaluate(q, v, z, true);
+  const VectorX rates = scene_.bristle_rates(), here = torque(t, q, v);
+  const std::size_t contacts = scene_.active().size();
+  // Torques may jump where a contact begins or ends: they are differenced on this side of it.
+  const auto difference = [&](Eigen::Index column, double step, const auto& move) {
+    VectorX sum = VectorX::Zero(nv);
+    double span = 0;
+    for (const double sign : {1.0, -1.0}) {
+      move(sign * step);
+      scene_.evaluate(q_, v_, z_, true);
+      if (scene_.active().size() != contacts) continue;
+      sum += sign * (torque(t, q_, v_) - here);
+      span += step;
+    }
+    move(0);
+    if (span > 0) torque_slopes_.col(column) = sum / span;
+  };
+  for (Eigen::Index k = 0; k < nv; ++k) {
+    difference(k, kTorqueDifference, [&](double step) {
+      u_[k] = step;
+      scene_.body().integrate(q, u_, q_);
+      u_[k] = 0;
+    });
+    q_ = q;
+    difference(nv + k, kTorqueDifference * std::max(1.0, std::abs(v[k])),
+               [&](double step) { v_[k] = v[k] + step; });
+  }
+  // Slots without a contact change nothing; stretches are short.
+  for (Eigen::Index k = 0; k < z.size(); ++k)
+    if (rates[k] != 0)
+      difference(2 * nv + k, 1e-3 * kTorqueDifference, [&](double step) { z_[k] = z[k] + step; });
+  // What a controller makes of forces that the parameters change at a held state.
+  const std::vector<Parameter>& parameters = linearization_.parameters();
+  torque_by_parameters_.setZero(nv, static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t c = 0; c < parameters.size(); ++c) {
+    const Parameter& one = parameters[c];
+    VectorX sum = VectorX::Zero(nv);
+    double span = 0;
+    for (const double sign : {1.0, -1.0}) {
+      const auto [pair, step] = one.changed(scene_.pairs()[one.pair], sign, kTorqueDifference);
+      const Pair kept = scene_.exchange(one.pair, pair);
+      scene_.evaluate(q, v, z, true);
+      if (scene_.active().size() == contacts) {
+        sum += sign * (torque(t, q, v) - here);
+        span += step;
+      }
+      scene_.exchange(one.pair, kept);
+    }
+    if (span > 0) torque_by_parameters_.col(c) = sum / span;
+  }
+  scene_.evaluate(q, v, z, true);
+  if (torque(t, q, v) != here) remembers_ = true;
+}
+
+MatrixX StepSlopes::held(const Tangent& at) const {
+  const Eigen::Index nv = at.q.rows();
+  MatrixX out = torque_slopes_.leftCols(nv) * at.q + torque_slopes_.middleCols(nv, nv) * at.v;
+  out.noalias() += torque_slopes_.rightCols(at.z.rows()) * at.z;
+  out.leftCols(torque_by_parameters_.cols()) += torque_by_parameters_;
+  return out;
+}
+
+// Of (v', z').
+MatrixX StepSlopes::by_parameters() const {
+  MatrixX out = linearization_.by_parameters();
+  if (follows_)
+    out.topRows(tau_.size()).noalias() += linearization_.inverse_mass() * torque_by_parameters_;
+  return out;
+}
+
+void StepSlopes::rates(Chart& chart, double t, const VectorX& y, const Coordinates& by,
+                       Coordinates& out) {
+  const Eigen::Index nv = chart.nv(), nz = chart.nz();
+  chart.finish(t, y, state_);
+  scene_.evaluate(state_.q, state_.v, state_.z);
+  linearize(chart, t);
+  chart_slopes_.begin(chart, y);
+  chart_slopes_.place(origin_->q, by.u, by.w, q_by_, v_by_);
+  out.w.noalias() = jacobian_.topLeftCorner(nv, nv) * q_by_;
+  out.w.noalias() += jacobian_.block(0, nv, nv, nv) * v_by_;
+  out.w.noalias() += jacobian_.topRightCorner(nv, nz) * by.z;
+  out.w.noalias() += linearization_.inverse_mass() * *torque_;
+  out.z.noalias() = jacobian_.bottomLeftCorner(nz, nv) * q_by_;
+  out.z.noalias() += jacobian_.block(nv, nv, nz, nv) * v_by_;
+  out.z.noalias() += jacobian_.bottomRightCorner(nz, nz) * by.z;
+  const MatrixX own = by_parameters();
+  out.w.leftCols(own.cols()) += own.topRows(nv);
+  out.z.leftCols(own.cols()) += own.bottomRows(nz);
+  scene_.evaluate(state_.q, state_.v, state_.z);
+  y_ = scene_.acceleration(state_.q, state_.v, tau_);
+  chart_slopes_.rates(y_, state_.v, by.u, by.w, v_by_, out.u, out.w);
+}
+
+const MatrixX& StepSlopes::bristle_rates(Chart& chart, const VectorX& v, const MatrixX& v_by) {
+  const State& from = chart.origin();
+  const Eigen::Index nv = chart.nv(), nz = chart.nz();
+  scene_.evaluate(from.q, v, from.z);
+  linearization_.rates(from.q, v, from.z, tau_, jacobian_);
+  rates_.noalias() = jacobian_.bottomLeftCorner(nz, nv) * origin_->q;
+  rates_.noalias() += jacobian_.block(nv, nv, nz, nv) * v_by;
+  rates_.noalias() += jacobian_.bottomRightCorner(nz, nz) * origin_->z;
+  const MatrixX& by = linearization_.by_parameters();
+  rates_.leftCols(by.cols()) += by.bottomRows(nz);
+  return rates_;
+}
+
+void StepSlopes::along(Chart& chart, const Stepper& stepper, double h, double share,
+                       const MatrixX& torque, const Tangent& from, Tangent& out) {
+  origin_ = &from, torque_ = &torque;
+  along(chart, stepper, h, share, out);
+  origin_ = nullptr, torque_ = nullptr;
+}
+
+void StepSlopes::along(Chart& chart, const Stepper& stepper, double h, double share, Tangent& out) {
+  const Path path{chart, stepper, h};
+  const Eigen::Index nv = chart.nv(), nz = chart.nz();
+  MatrixX changes(2 * nv + nz, origin_->q.cols());
+  changes << origin_->q, origin_->v, origin_->z;
+  const std::vector<Parameter>& parameters = linearization_.parameters();
+  scales_.setOnes(changes.cols());
+  for (std::size_t c = 0; c < parameters.size(); ++c) scales_[c] = parameters[c].scale;
+  follow(path, 0, share, 0, changes);
+  out.q = changes.topRows(nv);
+  out.v = changes.middleRows(nv, nv);
+  out.z = changes.bottomRows(nz);
+}
+
+// Halves are taken until they agree: in free flight a body may turn far in a step; where friction
+// begins to slip, or a law is clamped, the derivatives of the rates jump within one.
+void StepSlopes::follow(const Path& path, double from, double to, int depth, MatrixX& changes) {
+  MatrixX once = changes;
+  const bool touching = radau(path, from, to, once);
+  if (depth >= kMostHalvings) {
+    changes = once;
+    return;
+  }
+  const double middle = 0.5 * (from + to);
+  MatrixX twice = changes;
+  radau(path, from, middle, twice);
+  radau(path, middle, to, twice);
+  const Eigen::Index nv = path.chart.nv(), nz = path.chart.nz();
+  const MatrixX error = (once - twice) * scales_.asDiagonal(), all = twice * scales_.asDiagonal();
+  const auto off = [&](Eigen::Index first, Eigen::Index count, double least) {
+    if (count == 0) return 0.0;
+    const double size = all.middleRows(first, count).cwiseAbs().maxCoeff();
+    return error.middleRows(first, count).cwiseAbs().maxCoeff() / std::max(size, least);
+  };
+  if (std::max({off(0, nv, kLeast), off(nv, nv, kLeast), off(2 * nv, nz, kLeastStretch)}) >
+      (touching ? kAgreed : kAgreedFree)) {
+    follow(path, from, middle, depth + 1, changes);
+    follow(path, middle, to, depth + 1, changes);
+  } else {
+    changes = twice;
+  }
+}
+
+bool StepSlopes::radau(const Path& path, double from, double to, MatrixX& changes) {
+  constexpr int kStages = 3;
+  static const double kRoot = std::sqrt(6.0);
+  static const double kNode[kStages] = {(4 - kRoot) / 10, (4 + kRoot) / 10, 1};
+  static const double kA[kStages][kStages] = {
+      {(88 - 7 * kRoot) / 360, (296 - 169 * kRoot) / 1800, (-2 + 3 * kRoot) / 225},
+      {(296 + 169 * kRoot) / 1800, (88 + 7 * kRoot) / 360, (-2 - 3 * kRoot) / 225},
+      {(16 - kRoot) / 36, (16 + kRoot) / 36, 1.0 / 9}};
+  Chart& chart = path.chart;
+  const Eigen::Index nv = chart.nv(), nz = chart.nz(), n = 2 * nv + nz, m = changes.cols();
+  const double span = (to - from) * path.h;
+  MatrixX slope[kStages], force[kStages];
+  // Bristles that no contact has change nothing.
+  std::vector<char> lives(static_cast<std::size_t>(n), 0);
+  std::fill_n(lives.begin(), 2 * nv, 1);
+  bool touching = false;
+  for (int i = 0; i < kStages; ++i) {
+    const double at = std::min(from + (to - from) * kNode[i], kLastNode),
+                 t = chart.origin().t + at * path.h;
+    path.stepper.interpolate(at, y_);
+    chart.finish(t, y_, state_);
+    scene_.evaluate(state_.q, state_.v, state_.z);
+    touching = touching || scene_.touching() || scene_.joints().act();
+    linearize(chart, t);
+    slope[i].setZero(n, n);
+    slope[i].block(0, nv, nv, nv).setIdentity();
+    slope[i].bottomRows(nv + nz) = jacobian_;
+    add_turning(scene_.body(), state_.v, slope[i]);
+    force[i].setZero(n, m);
+    force[i].middleRows(nv, nv).noalias() = linearization_.inverse_mass() * *torque_;
+    const MatrixX own = by_parameters();
+    force[i].bottomLeftCorner(nv + nz, own.cols()) += own;
+    for (Eigen::Index k = 2 * nv; k < n; ++k)
+      if (!slope[i].row(k).isZero(0) || !slope[i].col(k).isZero(0)) lives[k] = 1;
+  }
+  std::vector<Eigen::Index> live;
+  for (Eigen::Index k = 0; k < n; ++k)
+    if (lives[k]) live.push_back(k);
+  const Eigen::Index size = static_cast<Eigen::Index>(live.size());
+  MatrixX part = changes(live, Eigen::all);
+  MatrixX system = MatrixX::Identity(kStages * size, kStages * size), right(kStages * size, m);
+  for (int i = 0; i < kStages; ++i) {
+    const MatrixX a = slope[i](live, live);
+    for (int j = 0; j < kStages; ++j)
+      system.block(i * size, j * size, size, size) -= span * kA[i][j] * a;
+    right.middleRows(i * size, size) = a * part + force[i](live, Eigen::all);
+  }
+  const MatrixX rates = system.partialPivLu().solve(right);
+  for (int j = 0; j < kStages; ++j)
+    part += span * kA[kStages - 1][j] * rates.middleRows(j * size, size);
+  for (Eigen::Index k = 0; k < size; ++k) changes.row(live[k]) = part.row(k);
+  return touching;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,233 @@
+#include "dynamics/run/recording.hpp"
+
+#include <algorithm>
+#include <boost/math/tools/minima.hpp>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+#include "dynamics/scene/patch.hpp"
+
+namespace sphshell {
+namespace {
+
+// A step holds a peak that counts only where one of its ends comes this near to the largest so far;
+// what raises that by less than this share of it does not count.
+constexpr double kNearPeak = 0.5, kSamePeak = 1e-10;
+// Where within a step its rate is seen beside an end, as a share of it.
+constexpr double kBeside = 1e-4;
+// Of the share at which a peak is, and looks until it is found: the value is off by the square.
+constexpr int kPeakBits = 16;
+constexpr std::uintmax_t kMostPeakLooks = 50;
+
+}  // namespace
+
+Recorder::Recorder(const SceneData& scene, double start, double end, double record_dt, bool patches)
+    : start_(start),
+      end_(end),
+      record_dt_(record_dt),
+      summaries_(scene.pairs().size() + scene.joints().stops().size()),
+      status_(summaries_.size()),
+      touches_(summaries_.size()) {
+  const JointEffects* joints = scene.joints().effects();
+  if (joints) limits_.resize(std::max(joints->most_effort.size(), joints->speed.size()));
+  limit_status_.resize(limits_.size());
+  if (patches) record_.patches.emplace();
+}
+
+void Recorder::record_patches(bool on) {
+  if (on == record_.patches.has_value()) return;
+  record_.patches.reset();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  if (on) record_.patches.emplace(record_.contacts.size(), unknown_patch(nan));
+}
+
+void Recorder::record_torques(TorquesAt torques, Eigen::Index nv) {
+  torques_ = std::move(torques);
+  if (!record_.torques)  // rows that are there already have none
+    record_.torques.emplace(record_.t.size() * static_cast<std::size_t>(nv),
+                            std::numeric_limits<double>::quiet_NaN());
+}
+
+Record Recorder::take() {
+  Record next;
+  if (record_.patches) next.patches.emplace();
+  if (record_.torques) next.torques.emplace();
+  return std::exchange(record_, std::move(next));
+}
+
+Record Recorder::snapshot(SceneData& scene, const State& state) {
+  Record recorded = take();
+  const long rows = std::exchange(rows_, 0);
+  RowFollower* follower = std::exchange(follower_, nullptr);
+  add_row(scene, state);
+  rows_ = rows, follower_ = follower;
+  return std::exchange(record_, std::move(recorded));
+}
+
+void Recorder::add_rows(SceneData& scene, const Chart& chart, const Stepper& stepper,
+                        const State& from, const State& to) {
+  if (record_dt_ > 0) {
+    // The end is a row, and none stands a round-off before it.
+    const double last = end_ - 1e-9 * record_dt_;
+    bool moved = false;
+    for (; due() < to.t && due() < last; ++next_row_) {
+      const double share = (due() - from.t) / (to.t - from.t);
+      stepper.interpolate(share, y_);
+      chart.finish(due(), y_, between_);
+      scene.evaluate(between_.q, between_.v, between_.z, true);
+      add_row(scene, between_, share);
+      moved = true;
+    }
+    if (moved) {
+      scene.restart();
+      scene.evaluate(to.q, to.v, to.z);
+    }
+    if (to.t < (due() < last ? due() : end_)) return;
+    ++next_row_;
+  }
+  scene.evaluate(to.q, to.v, to.z, true);
+  add_row(scene, to);
+}
+
+void Recorder::add_row(SceneData& scene, const State& state, double share) {
+  scene.log(state.q, state.v, record_.contacts, record_.patches ? &*record_.patches : nullptr);
+  record_.contact_row.resize(record_.contacts.size(), double(rows_));
+  record_.t.push_back(state.t);
+  record_.q.insert(record_.q.end(), state.q.begin(), state.q.end());
+  record_.v.insert(record_.v.end(), state.v.begin(), state.v.end());
+  const Powers& powers = scene.powers();
+  const double kinetic = scene.body().kinetic_energy(state.q, state.v);
+  const double potential = scene.body().potential_energy(state.q);
+  const Ledger& ledger = state.ledger;
+  for (double e : {kinetic, potential, powers.elastic + powers.bristles, ledger.damping,
+                   ledger.friction - powers.bristles, ledger.control})
+    record_.energy.push_back(e);
+  if (record_.torques) {
+    const VectorX& torques = torques_(state);
+    record_.torques->insert(record_.torques->end(), torques.begin(), torques.end());
+  }
+  if (follower_) follower_->add_row(state, share);
+  ++rows_;
+}
+
+// Begin and end of touch; `begin` is the kind of the first, that of the end follows it.
+void Recorder::add_touch(std::size_t k, const Touch& now, double t, double h, int number,
+                         Event::Kind begin) {
+  PairSummary& summary = summaries_[k];
+  PairStatus& status = status_[k];
+  const Touch before = std::exchange(status.touch, now);
+  if (before.touching) summary.contact_time += h;
+  summary.impulse += 0.5 * h * (before.normal_force + now.normal_force);
+  if (now.touching != before.touching) {
+    const int kind = static_cast<int>(begin) + (now.touching ? 0 : 1);
+    record_.events.push_back({t, number, static_cast<Event::Kind>(kind)});
+    status.deep = false;
+    if (now.touching) ++summary.touches;
+  }
+  raise_peaks(summary, now, t);
+}
+
+void Recorder::raise_peaks(PairSummary& summary, const Touch& now, double t) {
+  if (!now.touching) return;
+  if (now.normal_force > summary.peak_force)
+    summary.peak_force = now.normal_force, summary.peak_force_time = t;
+  if (now.depth > summary.max_depth) summary.max_depth = now.depth, summary.max_depth_time = t;
+}
+
+Recorder::Touch Recorder::touch_of(const SceneData& scene, std::size_t k) const {
+  const std::size_t pairs = scene.pairs().size();
+  if (k < pairs) {
+    const PairState& now = scene.states()[k];
+    return {now.count > 0, now.normal_force, now.depth};
+  }
+  const StopState& now = scene.joints().stops()[k - pairs];
+  return {now.touching, now.force, now.depth};
+}
+
+void Recorder::add_peaks(SceneData& scene, const Chart& chart, const Stepper& stepper,
+                         const State& from, const State& to) {
+  bool moved = false;
+  const auto look = [&](double share, std::size_t k) {
+    moved = true;
+    stepper.interpolate(share, y_);
+    chart.finish(from.t + share * (to.t - from.t), y_, between_);
+    scene.evaluate(between_.q, between_.v, between_.z);
+    return touch_of(scene, k);
+  };
+  for (std::size_t k = 0; k < summaries_.size(); ++k) touches_[k] = touch_of(scene, k);
+  for (std::size_t k = 0; k < summaries_.size(); ++k) {
+    PairSummary& summary = summaries_[k];
+    const Touch &first = status_[k].touch, &last = touches_[k];
+    if (!first.touching && !last.touching) continue;
+    for (const auto& [of, most] : {std::pair(&Touch::normal_force, &PairSummary::peak_force),
+                                   std::pair(&Touch::depth, &PairSummary::max_depth)}) {
+      // Towards its higher end a rate that has changed its sign falls.
+      const bool rises = last.*of > first.*of;
+      const double higher = rises ? last.*of : first.*of;
+      if (!(higher > 0) || higher < kNearPeak * summary.*most) continue;
+      const double rate = (look(rises ? 1 - kBeside : kBeside, k).*of - higher) / kBeside;
+      // Where the peak is concave it stays below its tangent.
+      if (!(rate > 0 && higher + rate > (1 + kSamePeak) * summary.*most)) continue;
+      std::uintmax_t looks = kMostPeakLooks;
+      const double at =
+          boost::math::tools::brent_find_minima([&](double share) { return -(look(share, k).*of); },
+                                                0.0, 1.0, kPeakBits, looks)
+              .first;
+      raise_peaks(summary, look(at, k), between_.t);
+    }
+  }
+  if (!moved) return;
+  scene.restart();
+  scene.evaluate(to.q, to.v, to.z);
+}
+
+void Recorder::add_step(const SceneData& scene, double t, double h) {
+  const std::size_t pairs = scene.pairs().size();
+  for (std::size_t k = 0; k < pairs; ++k) {
+    const PairState& now = scene.states()[k];
+    const int number = static_cast<int>(k);
+    const auto add_event = [&](Event::Kind kind) { record_.events.push_back({t, number, kind}); };
+    PairStatus& status = status_[k];
+    add_touch(k, touch_of(scene, k), t, h, number, Event::Kind::Touch);
+    const bool beyond = now.conformity > kMostConformal || now.half_axis > kLargestEllipse;
+    if (beyond && !status.beyond_hertz) add_event(Event::Kind::BeyondHertz);
+    status.beyond_hertz = beyond;
+    const double radius = scene.pairs()[k].least_radius();
+    const bool through = now.pushed_through || (radius > 0 && now.depth > radius);
+    if (through && !status.through) add_event(Event::Kind::Through);
+    status.through = through;
+    if (now.count > 0 && radius > 0 && now.depth > 0.5 * radius && !status.deep) {
+      status.deep = true;
+      add_event(Event::Kind::Deep);
+    }
+  }
+  for (std::size_t k = pairs; k < summaries_.size(); ++k)
+    add_touch(k, touch_of(scene, k), t, h, static_cast<int>(k - pairs), Event::Kind::Stop);
+}
+
+void Recorder::add_limits(const SceneData& scene, const VectorX& v, const std::vector<char>& cut,
+                          double t, double h) {
+  for (std::size_t i = 0; i < limits_.size(); ++i) {
+    const JointEffects& joints = *scene.joints().effects();
+    LimitSummary& summary = limits_[i];
+    LimitStatus& status = limit_status_[i];
+    const int number = static_cast<int>(i);
+    const auto change = [&](bool& was, bool is, double& first, Event::Kind begin) {
+      if (was == is) return;
+      was = is;
+      if (is && first < 0) first = t;
+      const int kind = static_cast<int>(begin) + (is ? 0 : 1);
+      record_.events.push_back({t, number, static_cast<Event::Kind>(kind)});
+    };
+    if (cut[i]) summary.cut_time += h;
+    change(status.cut, cut[i], summary.first_cut, Event::Kind::EffortLimit);
+    const double speed = std::abs(v[number]);
+    summary.peak_speed = std::max(summary.peak_speed, speed);
+    const bool too_fast = joints.speed.size() > 0 && speed > joints.speed[number];
+    change(status.too_fast, too_fast, summary.first_too_fast, Event::Kind::SpeedLimit);
+  }
+}
+
+}  // namespace sphshell

@@ -1,0 +1,339 @@
+#include "dynamics/run/simulation.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+namespace sphshell {
+namespace {
+
+constexpr int kMostFineSteps = 1000000;
+// A start deeper than this share of the radius is refused.
+constexpr double kDeepStart = 0.5;
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+bool is_closed(const Shell& shell) {
+  const std::vector<Edge>& edges = shell.topology().edges;
+  return std::none_of(edges.begin(), edges.end(), [](const Edge& edge) { return edge.count == 1; });
+}
+
+State state_at(double t, VectorX q, VectorX v, int bristle_size) {
+  return {t, std::move(q), std::move(v), VectorX::Zero(bristle_size), {}};
+}
+
+// Torques that sensors ask for leave no trace in the figures of the effort limits.
+class KeptCuts {
+ public:
+  explicit KeptCuts(std::vector<char>& cuts) : cuts_(cuts), kept_(cuts) {}
+  ~KeptCuts() { cuts_ = std::move(kept_); }
+
+ private:
+  std::vector<char>& cuts_;
+  std::vector<char> kept_;
+};
+
+}  // namespace
+
+Simulation::Simulation(const pinocchio::Model& model, std::vector<Pair> pairs,
+                       JointForces::Effects joints, RunSettings settings,
+                       std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
+                       std::vector<Sensor> sensors)
+    : settings_(std::move(settings)),
+      scene_(model, std::move(pairs), std::move(joints)),
+      controller_(std::move(controller)),
+      stepping_(
+          scene_, *this, settings_,
+          state_at(settings_.start_time, std::move(q0), std::move(v0), scene_.bristle_size())),
+      recorder_(scene_, settings_.start_time, end(), settings_.record_dt, settings_.patches),
+      tau_(VectorX::Zero(model.nv)),
+      cut_(static_cast<std::size_t>(model.nv), 0),
+      next_control_(settings_.start_time) {
+  if (!sensors.empty())
+    sensors_ = std::make_unique<Sensors>(std::move(sensors), model, settings_.start_time);
+  if (settings_.torques) record_torques();
+  if (controller_) controller_->prepare(scene_);
+  if (controller_ && sensors_) controller_->read(sensors_->readings());
+  if (settings_.dt > 0) {
+    // The last step is shortened to end at the duration; a hair's breadth is not a step.
+    const double ratio = settings_.duration / settings_.dt;
+    grid_steps_ = std::lround(std::ceil(ratio - 1e-9 - 4e-16 * ratio));
+  }
+}
+
+void Simulation::differentiate(SensitivitySettings settings) {
+  if (!settings.any()) return;
+  sensitivities_ = std::make_unique<Sensitivities>(scene_, std::move(settings));
+  recorder_.set_follower(sensitivities_.get());
+}
+
+std::optional<DeepStart> Simulation::deep_start() {
+  if (!started_) start();
+  for (std::size_t k = 0; k < scene_.pairs().size(); ++k) {
+    const Pair& pair = scene_.pairs()[k];
+    if (pair.source) continue;
+    double depth = scene_.states()[k].depth;
+    if (pair.shell && pair.shell->side() != Side::Both && depth == 0) {
+      const double distance = pair.shell->closest_point(scene_.states()[k].center).distance;
+      const double outside = pair.shell->side() == Side::Outside ? distance : -distance;
+      if (outside < 0 && is_closed(*pair.shell)) depth = pair.radius - outside;
+    }
+    if (depth > kDeepStart * pair.least_radius()) return DeepStart{static_cast<int>(k), depth};
+  }
+  return {};
+}
+
+Simulation::Status Simulation::advance(double wall_seconds, double until,
+                                       const std::atomic<bool>* stop) {
+  until_ = until;
+  if (finished_) return Status::Finished;
+  const auto start_of_call = std::chrono::steady_clock::now();
+  Status status = Status::Running;
+  if (!started_) start();
+  if (sensors_ && !sensors_->begun()) begin_sensors();
+  int pause = 15;
+  for (int checked = 0; status == Status::Running && time() < until; ++checked) {
+    if ((checked & pause) == pause) {
+      const double elapsed = seconds_since(start_of_call);
+      if (elapsed > wall_seconds || (stop && *stop)) break;
+      if (elapsed > 1e-3 * (checked + 1)) pause = 0;  // slow steps: look at the clock at each
+    }
+    status = at_end() ? Status::Finished : step();
+  }
+  finished_ = status != Status::Running;
+  wall_time_ += seconds_since(start_of_call);
+  return status;
+}
+
+void Simulation::start() {
+  started_ = true;
+  stepping_.restart();
+  recorder_.add_step(scene_, time(), 0);
+  recorder_.add_limits(scene_, v(), cut_, time(), 0);
+  recorder_.add_row(scene_, stepping_.state());
+}
+
+// The first sample needs the first torque, for which a controller may read the sensors.
+void Simulation::begin_sensors() {
+  sensors_->hold_still(scene_, stepping_.state(), push_);
+  hold_torques();
+  sensors_->begin(scene_, *this, stepping_.state(), push_);
+}
+
+Record Simulation::take() {
+  Record out = recorder_.take();
+  if (sensors_) out.sensors = sensors_->take();
+  return out;
+}
+
+double Simulation::end_of_step() const {
+  if (settings_.dt > 0)
+    return grid_ + 1 >= grid_steps_ ? end()
+                                    : settings_.start_time + double(grid_ + 1) * settings_.dt;
+  double out = std::min(end(), until_);
+  if (controller_ && settings_.control_dt > 0) out = std::min(out, next_control_);
+  if (controller_) out = std::min(out, controller_->next_kink(time()));
+  return out;
+}
+
+Simulation::Status Simulation::step() {
+  if (fine_steps_ == 0) hold_torques();
+  if (sensors_) sensors_->begin_step(scene_, *this, stepping_.state(), push_);
+  const double end = end_of_step();
+  Status status = Status::Running;
+  if (settings_.dt == 0) {
+    if (!make_controlled(end)) status = Status::Stuck;
+  } else {
+    kink_ = kInfinity;
+    if (!stepping_.fine() && stepping_.make_fixed(end)) {
+      if (sensitivities_) differentiate_step();
+      accept();
+    } else
+      status = replace_fixed_step(end);
+    if (status == Status::Running && time() < end) return is_finite() ? status : Status::Diverged;
+    fine_steps_ = 0;
+    // Back to fixed steps when they would do.
+    if (stepping_.fine() && stepping_.proposal() > 0.5 * settings_.dt) stepping_.set_fine(false);
+    ++grid_;
+    ++steps_;
+    const long every =
+        settings_.record_dt > 0 ? std::max(1L, std::lround(settings_.record_dt / settings_.dt)) : 1;
+    if (status == Status::Running && (grid_ % every == 0 || at_end()))
+      recorder_.add_row(scene_, stepping_.state());
+  }
+  return is_finite() ? status : Status::Diverged;
+}
+
+// One step of those that replace a fixed one: there may be very many, and the caller wants to look
+// at the clock.
+Simulation::Status Simulation::replace_fixed_step(double end) {
+  stepping_.set_fine(true);
+  return fine_steps_++ < kMostFineSteps && make_controlled(end) ? Status::Running : Status::Stuck;
+}
+
+// False where no step is short enough.
+bool Simulation::make_controlled(double end) {
+  if (controller_) kink_ = controller_->next_kink(time());
+  switch (stepping_.make_controlled(end)) {
+    case Stepping::Made::Stuck:
+      return false;
+    case Stepping::Made::Nothing:
+      return true;
+    case Stepping::Made::Step:
+      break;
+  }
+  if (sensitivities_) differentiate_step();
+  if (settings_.dt == 0) {
+    if (sensors_) {
+      const KeptCuts kept(cut_);
+      sensors_->add_dense(scene_, *this, stepping_.chart(), stepping_.stepper(), stepping_.state(),
+                          stepping_.next(), push_);
+    }
+    recorder_.add_rows(scene_, stepping_.chart(), stepping_.stepper(), stepping_.state(),
+                       stepping_.next());
+    ++steps_;
+  }
+  recorder_.add_peaks(scene_, stepping_.chart(), stepping_.stepper(), stepping_.state(),
+                      stepping_.next());
+  accept();
+  return true;
+}
+
+void Simulation::differentiate_step() {
+  const KeptCuts kept(cut_);
+  sensitivities_->step(stepping_.chart(), stepping_.stepper(), stepping_.state(), stepping_.next());
+}
+
+void Simulation::accept() {
+  const double before = time();
+  if (sensors_ && settings_.dt > 0) {
+    const KeptCuts kept(cut_);
+    sensors_->add_fixed(scene_, *this, stepping_.state(), stepping_.next(), settings_.dt, push_);
+  }
+  if (sensitivities_) {
+    const KeptCuts kept(cut_);
+    const bool controlled = settings_.dt == 0 || stepping_.fine();
+    sensitivities_->accept(stepping_.next(), controlled && stepping_.at_event());
+  }
+  stepping_.accept();
+  recorder_.add_step(scene_, time(), time() - before);
+  recorder_.add_limits(scene_, v(), cut_, time(), time() - before);
+}
+
+// Not-a-number fails every comparison.
+bool Simulation::is_finite() const { return v().squaredNorm() < 1e24 && q().squaredNorm() < 1e24; }
+
+// Torques that are held over control_dt change at the start of a step, never inside one.
+void Simulation::hold_torques() {
+  if (!controller_ || settings_.control_dt == 0) return;
+  // The grid of fixed steps need not hold the control times to the last bit.
+  const double round_off = std::numeric_limits<double>::epsilon() * std::abs(time());
+  const double hair = settings_.dt > 0 ? std::max(1e-6 * settings_.dt, 4 * round_off) : 0;
+  if (time() + hair < next_control_) return;
+  while (next_control_ <= time() + hair)
+    next_control_ = settings_.start_time + double(++controls_) * settings_.control_dt;
+  // First at the state itself: a controller may begin there.
+  command(time(), q(), v());
+  if (sensitivities_) {
+    const KeptCuts kept(cut_);
+    const VectorX asked = tau_;
+    sensitivities_->hold(
+        [this](double t, const VectorX& q, const VectorX& v) -> const VectorX& {
+          command(t, q, v);
+          return tau_;
+        },
+        stepping_.state());
+    tau_ = asked;
+  }
+  if (sensors_) sensors_->jump();
+}
+
+void Simulation::record_torques() {
+  recorder_.record_torques(
+      [this](const State& at) -> const VectorX& { return recorded_torques(at); }, tau_.size());
+}
+
+// The first row stands before the first torque that is held.
+const VectorX& Simulation::recorded_torques(const State& state) {
+  const bool held = settings_.control_dt > 0;
+  if (controller_ && !held) {
+    const KeptCuts kept(cut_);
+    command(std::min(state.t, std::nextafter(kink_, -kInfinity)), state.q, state.v);
+  } else if (controller_ && controls_ == 0) {
+    tau_.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return tau_;
+}
+
+// What the controller asks for, cut to what the motors give.
+void Simulation::command(double t, const VectorX& q, const VectorX& v) {
+  controller_->torque(scene_, t, q, v, tau_);
+  const JointEffects* joints = scene_.joints().effects();
+  if (!joints || joints->most_effort.size() == 0) return;
+  for (Eigen::Index i = 0; i < tau_.size(); ++i) {
+    const double asked = tau_[i];
+    tau_[i] = std::clamp(asked, joints->least_effort[i], joints->most_effort[i]);
+    cut_[i] = tau_[i] != asked;
+  }
+}
+
+const VectorX& Simulation::torque(double t, const VectorX& q, const VectorX& v) {
+  // The stages at the end of a step that ends at a kink belong to what comes before it.
+  if (t >= kink_) t = std::nextafter(kink_, -kInfinity);
+  if (controller_ && settings_.control_dt == 0) command(t, q, v);
+  return push_.active() ? push_.added(scene_.body(), q, v, tau_) : tau_;
+}
+
+bool Simulation::follow_state() const {
+  return push_.active() || (controller_ && settings_.control_dt == 0);
+}
+
+bool Simulation::follow_time() const {
+  return controller_ && settings_.control_dt == 0 && controller_->follows_time();
+}
+
+Record Simulation::snapshot() {
+  if (!started_) start();
+  return recorder_.snapshot(scene_, stepping_.state());
+}
+
+void Simulation::push(int joint, const Vec3& point, const PointForce& force, int frame) {
+  scene_.need_velocity_of(joint);
+  // The next step begins with what was evaluated here, maybe without this joint.
+  scene_.body().kinematics(q(), v());
+  push_.set(joint, point, force, frame);
+  if (sensors_) sensors_->jump();
+}
+
+void Simulation::take_over(const Simulation& before) {
+  if (!controller_ || !before.controller_) return;
+  controller_->take_over(*before.controller_, time());
+  next_control_ = time();
+}
+
+void Simulation::change(std::vector<Pair> pairs, JointForces::Effects joints,
+                        std::shared_ptr<Controller> controller) {
+  if (!started_) start();
+  State& state = stepping_.state();
+  scene_.restart();
+  scene_.evaluate(state.q, state.v, state.z, true);
+  const double before = scene_.powers().elastic;
+  scene_.change(std::move(pairs), std::move(joints));
+  if (controller && controller != controller_) {
+    controller->prepare(scene_);
+    if (sensors_) controller->read(sensors_->readings());
+    if (controller_) controller->take_over(*controller_, state.t);
+    controller_ = std::move(controller);
+    next_control_ = state.t;
+  }
+  stepping_.restart();
+  // A change of stiffness adds the change of stored energy.
+  state.ledger.control += scene_.powers().elastic - before;
+  recorder_.add_step(scene_, state.t, 0);
+  if (sensors_) sensors_->jump();
+}
+
+}  // namespace sphshell

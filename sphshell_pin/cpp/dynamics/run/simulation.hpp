@@ -1,0 +1,159 @@
+// One run: the loop over the steps, the controller's torques, and changes on the way.
+#pragma once
+
+#include <atomic>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "dynamics/control/controllers.hpp"
+#include "dynamics/derivatives/sensitivities.hpp"
+#include "dynamics/control/push.hpp"
+#include "dynamics/run/recording.hpp"
+#include "dynamics/sensing/sensors.hpp"
+#include "dynamics/run/stepping.hpp"
+
+namespace sphshell {
+
+struct RunSettings : StepSettings {
+  double duration = 0, start_time = 0;  // [s]
+  double control_dt = 0;  // hold the torques this long [s]; 0: evaluate at every stage
+  double record_dt = 0;   // between recorded rows [s]; 0: every step
+  bool patches = false;   // record those of contacts
+  bool torques = false;   // record those of the controller
+};
+
+// A sphere that starts too deep in a shell for its contacts to be trusted.
+struct DeepStart {
+  int pair;
+  double depth;  // [m]
+};
+
+// What the steps of a run cost.
+struct Counts {
+  long steps = 0;          // accepted
+  long rejected = 0;       // made, but their error or a sphere's motion was too large
+  long event_steps = 0;    // made to end at an event, but they missed it
+  long evaluations = 0;    // of the dynamics, in all of these
+  long event_queries = 0;  // of the contacts alone, to locate events on the dense output
+};
+
+// What a run uses and others may share, such as a user's routine.
+struct Lent {
+  std::vector<Pair> pairs;
+  std::shared_ptr<Controller> controller;
+};
+
+class Simulation : private Torques {
+ public:
+  enum class Status : int { Running = 0, Finished = 1, Diverged = 2, Stuck = 3 };
+
+  Simulation(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
+             RunSettings settings, std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
+             std::vector<Sensor> sensors = {});
+
+  // Before the start: what is recorded changes with these by so much. The controller is then asked
+  // at other states, too.
+  void differentiate(SensitivitySettings settings);
+  SensitivityRecord take_sensitivities() {
+    return sensitivities_ ? sensitivities_->take() : SensitivityRecord();
+  }
+
+  // Whether the controller, asked twice at a state, has given two answers.
+  bool controller_remembers() const { return sensitivities_ && sensitivities_->torques_remember(); }
+
+  // The first pair whose sphere is deeper than half its radius (of two spheres, the smaller) at the
+  // start, or inside a closed one-sided shell on the wrong side, however far.
+  std::optional<DeepStart> deep_start();
+  // Runs for about `wall_seconds` of wall-clock time, to the first step that ends at the time
+  // `until` or later, or until `stop` is set.
+  Status advance(double wall_seconds, double until = std::numeric_limits<double>::infinity(),
+                 const std::atomic<bool>* stop = nullptr);
+  // Hands over what was recorded since the last call.
+  Record take();
+  // The current state as the only row of a record; what was recorded stays.
+  Record snapshot();
+
+  // From now on rows have the controller's torques, cut to their limits. A controller whose torques
+  // are not held is asked for them at each row.
+  void record_torques();
+
+  // From now on the same pairs have other laws, friction (of the same kind) and radii, stops and
+  // dry friction of joints have other values, and the controller is another, unless null. The
+  // energy this brings counts as the controller's work.
+  void change(std::vector<Pair> pairs, JointForces::Effects joints,
+              std::shared_ptr<Controller> controller);
+  // Go on where the controller of `before` is, which is at the same time.
+  void take_over(const Simulation& before);
+  // From now on a force acts at a point of the joint's frame; zero ends it. Its work counts as the
+  // controller's. `frame`: the number of the one to whose body the point belongs.
+  void push(int joint, const Vec3& point, const PointForce& force, int frame);
+  // Whether the rows from now on have the patches of their contacts.
+  void record_patches(bool on) { recorder_.record_patches(on); }
+
+  // Hands over what a caller may share; the run is at its end.
+  Lent give_back() { return {scene_.give_back(), std::move(controller_)}; }
+
+  double progress() const {
+    return settings_.duration > 0 ? (time() - settings_.start_time) / settings_.duration : 1.0;
+  }
+  double time() const { return stepping_.state().t; }
+  const VectorX& q() const { return stepping_.state().q; }
+  const VectorX& v() const { return stepping_.state().v; }
+  Counts counts() const {
+    return {steps_, stepping_.rejected(), stepping_.event_steps(), stepping_.evaluations(),
+            stepping_.event_queries()};
+  }
+  double last_step() const { return stepping_.proposal(); }  // [s]
+  double wall_time() const { return wall_time_; }            // spent in advance() [s]
+  // Of the pairs, then of the joints' stops.
+  const std::vector<PairSummary>& summaries() const { return recorder_.summaries(); }
+  // Of the velocities (nv), where effort or speed has a limit; else none.
+  const std::vector<LimitSummary>& limits() const { return recorder_.limits(); }
+  const pinocchio::Model& model() const { return scene_.body().model(); }
+  const std::vector<Pair>& pairs() const { return scene_.pairs(); }
+  const Controller* controller() const { return controller_.get(); }
+
+ private:
+  const VectorX& torque(double t, const VectorX& q, const VectorX& v) override;
+  bool follow_state() const override;
+  bool follow_time() const override;
+
+  void start();
+  void begin_sensors();
+  Status step();
+  Status replace_fixed_step(double end);
+  bool make_controlled(double end);
+  void differentiate_step();
+  void accept();
+  void hold_torques();
+  const VectorX& recorded_torques(const State& state);
+  void command(double t, const VectorX& q, const VectorX& v);
+  double end_of_step() const;
+  bool is_finite() const;
+  double end() const { return settings_.start_time + settings_.duration; }
+  bool at_end() const { return time() >= end(); }
+
+  RunSettings settings_;
+  SceneData scene_;
+  std::shared_ptr<Controller> controller_;
+  Stepping stepping_;
+  Recorder recorder_;
+  Push push_;
+  std::unique_ptr<Sensors> sensors_;              // null where there are none
+  std::unique_ptr<Sensitivities> sensitivities_;  // null unless asked for
+  VectorX tau_;
+  std::vector<char> cut_;  // torques that were cut to their limit, when last computed
+  long grid_ = 0, grid_steps_ = 0,
+       steps_ = 0;      // of the fixed step: which it is, how many there are
+  int fine_steps_ = 0;  // made of the fixed step under way
+  double wall_time_ = 0;
+  double until_ = std::numeric_limits<double>::infinity();  // where advance() stops [s]
+  double next_control_;                                     // when held torques change next [s]
+  long controls_ = 0;
+  double kink_ = std::numeric_limits<double>::infinity();  // of the torques, next in time [s]
+  bool started_ = false, finished_ = false;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,51 @@
+#include "dynamics/scene/clusters.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "shell/curved/curved.hpp"
+
+namespace sphshell {
+namespace {
+
+bool stand_alike(const Pair& a, const Pair& b) {
+  return !a.group.empty() && a.group == b.group && a.shell && a.shell == b.shell &&
+         a.method == b.method && a.joint_i == b.joint_i && a.joint_j == b.joint_j &&
+         a.placement_j == b.placement_j;
+}
+
+}  // namespace
+
+bool Cluster::is_far(const Pair& pair, const Vec3& center_in_shell) const {
+  const CurvedShell* curved = pair.shell->curved();
+  const double bulge = curved != nullptr ? curved->bulge() : 0;
+  return !pair.shell->bvh().may_meet(center_in_shell, radius + bulge);
+}
+
+Vec3 Cluster::center_in_shell(const Multibody& body, const Pair& pair,
+                              const SE3& world_from_j) const {
+  return world_from_j.actInv(pair.joint_i == 0 ? center
+                                               : body.world_from_joint(pair.joint_i).act(center));
+}
+
+std::vector<Cluster> clusters_of(const std::vector<Pair>& pairs) {
+  std::vector<Cluster> out;
+  for (std::size_t k = 1; k < pairs.size(); ++k) {
+    if (!stand_alike(pairs[k - 1], pairs[k])) continue;
+    if (out.empty() || out.back().last != k - 1) out.push_back({k - 1, k, Vec3::Zero(), 0});
+    out.back().last = k;
+  }
+  for (Cluster& cluster : out) {
+    Eigen::AlignedBox3d box;
+    for (std::size_t k = cluster.first; k <= cluster.last; ++k)
+      box.extend(pairs[k].placement_i.translation());
+    cluster.center = box.center();
+    for (std::size_t k = cluster.first; k <= cluster.last; ++k) {
+      const double away = (pairs[k].placement_i.translation() - cluster.center).norm();
+      cluster.radius = std::max(cluster.radius, away + pairs[k].radius);
+    }
+  }
+  return out;
+}
+
+}  // namespace sphshell

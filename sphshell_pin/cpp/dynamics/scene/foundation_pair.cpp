@@ -1,0 +1,270 @@
+#include "dynamics/scene/foundation_pair.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "contact/laws/dual.hpp"
+#include "dynamics/scene/patch.hpp"
+#include "dynamics/scene/scene_data.hpp"
+
+namespace sphshell {
+namespace {
+
+// What velocity makes of a pressure p along n: p (share n - drag slip), share = 1 - b gap_rate.
+struct Pressed {
+  double gap_rate, share, drag;
+  Vec3 slip;
+
+  Pressed(const FoundationLaw& law, const CoulombFriction* friction, const Vec3& n, const Vec3& v)
+      : gap_rate(n.dot(v)),
+        share(std::max(0.0, 1 - law.dissipation * gap_rate)),
+        drag(0),
+        slip(v - gap_rate * n) {
+    if (friction) drag = share * friction->over_speed(slip.squaredNorm());
+  }
+};
+
+const CoulombFriction* sliding_friction(const Pair& pair) {
+  return std::get_if<CoulombFriction>(&pair.friction.law);
+}
+
+// The derivative of the pressure at a point this far from the sphere's center by that center.
+Vec3 pressure_by_center(const Vec3& from, double radius) {
+  const double rho = from.norm();
+  return (radius * radius / (rho * rho) + 1) / (2 * rho) * from;
+}
+
+}  // namespace
+
+void FoundationPair::find(const Pair& pair, const Vec3& center, bool slopes,
+                          std::vector<Contact>& contacts) {
+  contacts.clear();
+  center_ = center;
+  const bool points =
+      pair.law.needs_rate() || sliding_friction(pair) || (slopes && pair.friction.has_state());
+  if (pair.ball > 0)
+    foundation_.find_on_ball(pair.ball, center, pair.radius, points);
+  else
+    foundation_.find(*pair.shell, pair.method, center, pair.radius, slopes, points);
+  for (const FoundationRow& row : foundation_.rows()) {
+    const Vec3 n = row.normal();
+    Contact& contact =
+        contacts.emplace_back(Contact{row.center, n, row.depth, row.element, Feature::Face});
+    const double length = row.sum.force.norm();
+    if (slopes && length > 0)
+      contact.dn_dc = (row.sum.slope - n * (n.transpose() * row.sum.slope)) / length;
+    // It has no sides: the foundation knows where it pushes.
+    contact.rim = true;
+  }
+}
+
+FoundationForce FoundationPair::force(const Pair& pair, std::size_t i, const Vec3& velocity,
+                                      const Vec3& spin) const {
+  const FoundationLaw& law = *pair.law.foundation();
+  const double kappa = law.modulus / law.thickness;
+  FoundationForce out;
+  out.elastic = out.normal = kappa * foundation_.rows()[i].sum.force;
+  out.friction.setZero(), out.moment.setZero();
+  const CoulombFriction* friction = sliding_friction(pair);
+  for (const FoundationPoint& point : foundation_.points()) {
+    if (point.row != static_cast<int>(i) || point.area == 0) continue;
+    const Vec3 arm = point.point - center_, v = velocity + spin.cross(arm);
+    const Pressed pressed(law, friction, point.normal, v);
+    const double push = kappa * point.pressure * point.area;
+    const Vec3 damped = push * (pressed.share - 1) * point.normal;
+    const Vec3 drag = -push * pressed.drag * pressed.slip;
+    out.normal += damped;
+    out.friction += drag;
+    out.moment += arm.cross(damped + drag);
+    out.damping -= push * (pressed.share - 1) * pressed.gap_rate;
+    out.sliding -= drag.dot(pressed.slip);
+  }
+  return out;
+}
+
+double FoundationPair::energy(const Pair& pair, std::size_t i) const {
+  const FoundationLaw& law = *pair.law.foundation();
+  return law.modulus / law.thickness * foundation_.rows()[i].sum.energy;
+}
+
+// An ellipse has half axes of 2 sqrt(moment / area).
+PatchRow FoundationPair::patch(const Pair& pair, std::size_t i, const Mat3& rotation,
+                               double force) const {
+  Foundation found;
+  if (pair.ball > 0)
+    found.find_on_ball(pair.ball, center_, pair.radius, true);
+  else
+    found.find(*pair.shell, pair.method, center_, pair.radius, false, true);
+  const int number = static_cast<int>(i);
+  const FoundationRow& row = found.rows()[i];
+  double area = 0, peak = 0;
+  Vec3 middle = Vec3::Zero(), push = Vec3::Zero();
+  for (const FoundationPoint& one : found.points()) {
+    if (one.row != number) continue;
+    area += one.area, middle += one.area * one.point, push += one.force;
+    peak = std::max(peak, one.pressure);
+  }
+  if (!(area > 0)) return unknown_patch(row.depth);
+  middle /= area;
+  const Vec3 normal = row.normal(), east = normal.unitOrthogonal(), north = normal.cross(east);
+  Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
+  for (const FoundationPoint& one : found.points()) {
+    if (one.row != number) continue;
+    const Eigen::Vector2d away(east.dot(one.point - middle), north.dot(one.point - middle));
+    moments += one.area * away * away.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solved(moments / area);
+  const Eigen::Vector2d half = 2 * solved.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Eigen::Vector2d longer = solved.eigenvectors().col(1);
+  const Vec3 axis = rotation * (longer[0] * east + longer[1] * north);
+  // Damping is shared out as the elastic pressure is.
+  PatchRow out{{half[1], half[0]}, {}, peak * force / push.norm(), force / area, row.depth};
+  std::copy_n(axis.data(), 3, out.axis);
+  return out;
+}
+
+// The quadrature points stay where they are on the shell: there the pressure follows the center,
+// and the border of the overlap adds nothing, as it bears no pressure.
+void FoundationPair::slopes(const Pair& pair, std::size_t i, double relaxation,
+                            const ContactSite& site, double normal_force,
+                            ContactSlopes& out) const {
+  const FoundationLaw& law = *pair.law.foundation();
+  const double kappa = law.modulus / law.thickness;
+  const FoundationRow& row = foundation_.rows()[i];
+  const Vec3 force = kappa * row.sum.force;
+  const Mat3 slope = kappa * row.sum.slope;
+  out.wrench << force, center_.cross(force);
+  out.by_place << slope, cross_matrix(center_) * slope - cross_matrix(force);
+  out.by_twist.setZero();
+  out.depth_by_place = -site.contact.normal.transpose();
+  out.normal_by_place = site.contact.dn_dc;
+  const CoulombFriction* friction = sliding_friction(pair);
+  for (const FoundationPoint& point : foundation_.points()) {
+    if (point.row != static_cast<int>(i) || point.area == 0) continue;
+    const Vec3 &x = point.point, &n = point.normal;
+    const Vec3 v = site.twist.head<3>() + site.twist.tail<3>().cross(x);
+    const Pressed pressed(law, friction, n, v);
+    // Of a pressure of one: the force, and its derivative by the velocity.
+    const double area = kappa * point.area;
+    const Vec3 unit = area * ((pressed.share - 1) * n - pressed.drag * pressed.slip);
+    Mat3 by_velocity = Mat3::Zero();
+    if (pressed.share > 0) {
+      by_velocity -= law.dissipation * n * n.transpose();
+      if (friction) {
+        const Dual<1> over = friction->over_speed(Dual<1>::seed(pressed.slip.squaredNorm(), 0));
+        const Mat3 flat = Mat3::Identity() - n * n.transpose();
+        by_velocity += law.dissipation * over.value * pressed.slip * n.transpose() -
+                       pressed.share * (over.value * flat + 2 * over.slope[0] * pressed.slip *
+                                                                pressed.slip.transpose());
+      }
+    }
+    by_velocity *= area * point.pressure;
+    const Vec3 pressure_by = pressure_by_center(x - center_, pair.radius);
+    const Mat3 arm = cross_matrix(x), by_place = unit * pressure_by.transpose();
+    out.wrench.head<3>() += point.pressure * unit;
+    out.wrench.tail<3>() += point.pressure * x.cross(unit);
+    out.by_place.topRows<3>() += by_place;
+    out.by_place.bottomRows<3>() += arm * by_place;
+    out.by_twist.topLeftCorner<3, 3>() += by_velocity;
+    out.by_twist.topRightCorner<3, 3>() -= by_velocity * arm;
+    out.by_twist.bottomLeftCorner<3, 3>() += arm * by_velocity;
+    out.by_twist.bottomRightCorner<3, 3>() -= arm * by_velocity * arm;
+  }
+  if (pair.friction.has_state()) add_bristle(pair, i, relaxation, site, normal_force, out);
+}
+
+// Of the center of pressure, by the sphere's center.
+Mat3 FoundationPair::center_slopes(std::size_t i, double radius) const {
+  double all = 0;
+  Vec3 first = Vec3::Zero(), all_by = Vec3::Zero();
+  Mat3 first_by = Mat3::Zero();
+  for (const FoundationPoint& point : foundation_.points()) {
+    if (point.row != static_cast<int>(i)) continue;
+    const Vec3 from = point.point - center_, by = point.area * pressure_by_center(from, radius);
+    const double share = point.area * point.pressure;
+    all += share, first += share * from;
+    all_by += by, first_by += from * by.transpose();
+  }
+  if (!(all > 0)) return Mat3::Identity();
+  return (first_by - first / all * all_by.transpose()) / all;
+}
+
+// The bristle's part of the wrench, and its rates. It follows from a contact whose normal force
+// depends on nothing, less what that does without friction; the normal force's own derivatives,
+// which are those of the pressure, pass through that of the friction by it.
+void FoundationPair::add_bristle(const Pair& pair, std::size_t i, double relaxation,
+                                 const ContactSite& site, double normal_force,
+                                 ContactSlopes& out) const {
+  const Vec3& n = site.contact.normal;
+  const double size = std::max(normal_force, 1e-300), depth = site.contact.depth;
+  // Of the pressure's force along the normal.
+  const Vec3 push = out.wrench.head<3>();
+  const Eigen::RowVector3d by_place =
+      n.transpose() * out.by_place.topRows<3>() + push.transpose() * site.contact.dn_dc;
+  const Eigen::Matrix<double, 1, 6> by_twist = n.transpose() * out.by_twist.topRows<3>();
+  ContactSite at = site;
+  at.disc_radius = 2 * pair.disc_radius();
+  const Mat3 point_by = center_slopes(i, pair.radius);
+  at.point_by = &point_by;
+  NormalLaw held, steep;  // the same force here, constant, and in proportion to the depth
+  held.law = ImpactLaw({size, 0, 0, 1});
+  steep.law = ImpactLaw({size / depth, 1, 0, 1});
+  ContactSlopes all, without, more;
+  contact_slopes(held, pair.friction, relaxation, at, all);
+  contact_slopes(held, FrictionLaw(), relaxation, at, without);
+  contact_slopes(steep, pair.friction, relaxation, at, more);
+  Vector6 normal_by_depth;
+  normal_by_depth << n, site.contact.point.cross(n);
+  const Vector6 by_force = (more.by_depth - all.by_depth) * (depth / size) - normal_by_depth;
+  out.wrench += all.wrench - without.wrench;
+  out.by_place += all.by_place - without.by_place + by_force * by_place;
+  out.by_twist += all.by_twist - without.by_twist + by_force * by_twist;
+  out.by_stretch = all.by_stretch;
+  out.rate = all.rate;
+  const Vec3 rate_by_force = (more.rate_by_depth - all.rate_by_depth) * (depth / size);
+  out.rate_by_place = all.rate_by_place + rate_by_force * by_place;
+  out.rate_by_twist = all.rate_by_twist + rate_by_force * by_twist;
+  out.rate_by_stretch = all.rate_by_stretch;
+  for (int k = 0; k + 1 < pair.friction.rings(); ++k) {
+    ContactSlopes::Ring& ring = out.outer[k] = all.outer[k];
+    const Vec3 by = (more.outer[k].rate_by_depth - ring.rate_by_depth) * (depth / size);
+    ring.rate_by_place += by * by_place;
+    ring.rate_by_twist += by * by_twist;
+  }
+}
+
+// The force of a row of a foundation, in place of that of its depth.
+void SceneData::add_foundation(ActiveContact& active, const ContactKinematics<double>& m) {
+  const Pair& pair = pairs_[active.pair];
+  const PairState& state = states_[active.pair];
+  const auto& turn = state.world_from_j.rotation();
+  const Vec3 center = state.world_from_j.act(state.center);
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
+  if (pair.needs_velocity()) {
+    velocity = turn.transpose() * relative_velocity(pair, center);
+    spin = turn.transpose() *
+           (body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
+  }
+  const FoundationForce found = foundations_[active.pair].force(pair, active.row, velocity, spin);
+  ContactForce<double>& f = active.force;
+  f.elastic = found.elastic.norm();
+  f.normal = std::max(0.0, active.contact.normal.dot(found.normal));
+  const Vec3 whole = turn * (found.normal + found.friction);
+  f.friction = whole - f.normal * m.normal;
+  active.moment = turn * found.moment + (center - active.point).cross(whole);
+  active.damping = found.damping, active.sliding = found.sliding;
+  if (!pair.friction.has_state()) return;
+  // One bristle at the center of pressure, on a disc as large as that of a plane.
+  ContactForce<double> bristle;
+  bristle.normal = f.normal, bristle.slip = f.slip;
+  std::visit(
+      [&](const auto& one) { one.add(bristle, m, 2 * pair.disc_radius(), relaxation(pair)); },
+      pair.friction.law);
+  active.sliding = friction_power(bristle, m);
+  bristle.elastic = f.elastic;
+  bristle.friction += f.friction;
+  f = bristle;
+}
+
+}  // namespace sphshell

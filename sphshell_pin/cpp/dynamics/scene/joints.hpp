@@ -1,0 +1,90 @@
+// What acts in the joints besides motors and gravity: stops at the ends of their range, viscous
+// damping, dry friction; and the limits of their motors and speeds.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "contact/laws/laws.hpp"
+#include "dynamics/scene/multibody.hpp"
+#include "dynamics/scene/powers.hpp"
+
+namespace sphshell {
+
+// One end of the range of a coordinate whose rate is a velocity. Its law gives the generalized
+// force [N m or N] that pushes back at a depth [rad or m] beyond the end.
+struct JointStop {
+  int q, v;     // indices of the coordinate and of the velocity
+  double end;   // [rad or m]
+  double sign;  // 1: the upper end, -1: the lower one
+  NormalLaw law;
+
+  double depth(const VectorX& at) const { return sign * (at[q] - end); }
+};
+
+// Dry friction of one velocity: the elastic, perfectly plastic spring of BristleFriction in one
+// dimension, with a constant limit.
+struct DryFriction {
+  int v;
+  double limit, stiffness, damping;  // [N m], [N m/rad], [N m s/rad], or [N], [N/m], [N s/m]
+  double relaxation;                 // time in which the spring gives way beyond its limit [s]
+
+  double clamped(double x) const { return std::clamp(x, -limit, limit); }
+};
+
+struct JointEffects {
+  std::vector<JointStop> stops;
+  std::vector<DryFriction> friction;
+  VectorX damping;                           // (nv) [N m s/rad or N s/m], or empty
+  VectorX least_effort, most_effort, speed;  // (nv), infinite where there is no limit, or empty
+};
+
+struct StopState {
+  double depth = 0, force = 0;
+  bool touching = false;
+  bool clamped = false;  // in touch, and the law's clamp holds it at no force
+};
+
+// The effects at one state. Without any, nothing is computed.
+class JointForces {
+ public:
+  using Effects = std::shared_ptr<const JointEffects>;
+
+  JointForces(Effects effects, int nv);
+
+  // Whether anything acts, or may act.
+  bool act() const { return act_; }
+  const JointEffects* effects() const { return effects_.get(); }
+  // Of the same stops and friction, with other values.
+  void change(Effects effects) { effects_ = std::move(effects); }
+  // Number of stretches of springs: the last part of the scene's z.
+  int size() const { return static_cast<int>(rates_.size()); }
+
+  // z: the stretches [rad or m]; they give way no faster than `relaxation` [s].
+  void evaluate(const VectorX& q, const VectorX& v, const VectorRef& z, double relaxation);
+  // Of the last evaluate(): the torques (nv), what they do, rates of the stretches.
+  const VectorX& torque() const { return torque_; }
+  const Powers& powers() const { return powers_; }
+  const VectorX& rates() const { return rates_; }
+  const std::vector<StopState>& stops() const { return stops_; }
+  // tau with the torques of the last evaluate().
+  const VectorX& added(const VectorX& tau);
+
+  // How torque and rate of one velocity answer the state; `spring`: which friction, or -1.
+  struct Slope {
+    int v, spring;
+    double by_q, by_v, by_z, rate_by_v, rate_by_z;
+  };
+  void slopes(const VectorX& q, const VectorX& v, const VectorRef& z, double relaxation,
+              std::vector<Slope>& out) const;
+
+ private:
+  Effects effects_;
+  bool act_;
+  VectorX torque_, rates_, sum_;
+  Powers powers_;
+  std::vector<StopState> stops_;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,297 @@
+#include "dynamics/scene/multibody.hpp"
+
+#include <algorithm>
+#include <pinocchio/algorithm/aba-derivatives.hpp>
+#include <pinocchio/algorithm/aba.hpp>
+#include <pinocchio/algorithm/crba.hpp>
+#include <pinocchio/algorithm/energy.hpp>
+#include <pinocchio/algorithm/jacobian.hpp>
+#include <pinocchio/algorithm/joint-configuration.hpp>
+#include <pinocchio/algorithm/kinematics.hpp>
+#include <pinocchio/algorithm/rnea-derivatives.hpp>
+#include <pinocchio/algorithm/rnea.hpp>
+#include <string>
+
+namespace sphshell {
+namespace {
+
+constexpr double kDifference = 1e-5;  // step of central differences in q [m or rad]
+
+void find_curved(const pinocchio::JointModel& joint, std::vector<CurvedSegment>& out) {
+  if (const auto* whole = boost::get<pinocchio::JointModelComposite>(&joint)) {
+    for (const auto& part : whole->joints) find_curved(part, out);
+    return;
+  }
+  const std::string kind = joint.shortname();
+  using Group = CurvedSegment::Group;
+  const auto add = [&](Group group) { out.push_back({group, joint.idx_v(), joint.idx_q()}); };
+  if (kind == "JointModelFreeFlyer") add(Group::Rigid);
+  if (kind == "JointModelSpherical") add(Group::Rotation);
+  if (kind == "JointModelPlanar") add(Group::Planar);
+}
+
+// True where each subtree's joints have consecutive numbers, as Pinocchio's derivatives need them.
+bool depth_first(const pinocchio::Model& model) {
+  for (int j = 1; j < model.njoints; ++j)
+    if (model.subtrees[j].back() - j + 1 != model.subtrees[j].size()) return false;
+  return true;
+}
+
+}  // namespace
+
+Multibody::Multibody(const pinocchio::Model& model)
+    : model_(model),
+      data_(model_),
+      zero_(VectorX::Zero(model_.nv)),
+      mimics_(!model_.mimicking_joints.empty()) {
+  for (int j = 1; j < model_.njoints; ++j) find_curved(model_.joints[j], curved_);
+}
+
+Multibody::Multibody(const Multibody& other) = default;
+
+Multibody::~Multibody() = default;
+
+void Multibody::need(int joint) {
+  for (; joint > 0; joint = static_cast<int>(model_.parents[joint])) {
+    const auto at = std::lower_bound(needed_.begin(), needed_.end(), joint);
+    if (at != needed_.end() && *at == joint) return;
+    needed_.insert(at, joint);
+  }
+}
+
+void Multibody::kinematics(const VectorX& q) {
+  using Step =
+      pinocchio::impl::ForwardKinematicZeroStep<double, 0, pinocchio::JointCollectionDefaultTpl,
+                                                VectorX>;
+  for (int j : needed_)
+    Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q));
+}
+
+void Multibody::kinematics(const VectorX& q, const VectorX& v) {
+  using Step =
+      pinocchio::impl::ForwardKinematicFirstStep<double, 0, pinocchio::JointCollectionDefaultTpl,
+                                                 VectorX, VectorX>;
+  for (int j : needed_)
+    Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, v));
+}
+
+// In reduced coordinates: with G the velocities of all joints per independent one, G^T M G, and
+// G^T of the bias forces, which is what Pinocchio's CRBA and RNEA return.
+const VectorX& Multibody::solve(const VectorX& tau, const VectorX& bias) {
+  mass_.compute(data_.M);
+  solution_ = tau - bias;
+  mass_.solveInPlace(solution_);
+  return solution_;
+}
+
+const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
+  if (mimics_) {
+    pinocchio::crba(model_, data_, q, pinocchio::Convention::WORLD);
+    return solve(tau, pinocchio::rnea(model_, data_, q, v, zero_));
+  }
+  return pinocchio::aba(model_, data_, VectorRef(q), VectorRef(v), VectorRef(tau));
+}
+
+const VectorX& Multibody::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau,
+                                       const Forces& external) {
+  if (mimics_) {
+    pinocchio::crba(model_, data_, q, pinocchio::Convention::WORLD);
+    return solve(tau, pinocchio::rnea(model_, data_, q, v, zero_, external));
+  }
+  return pinocchio::aba(model_, data_, VectorRef(q), VectorRef(v), VectorRef(tau), external);
+}
+
+void Multibody::acceleration_derivatives(const VectorX& q, const VectorX& v, const VectorX& tau,
+                                         Eigen::Ref<MatrixX> by_q, Eigen::Ref<MatrixX> by_v,
+                                         Eigen::Ref<MatrixX> by_tau) {
+  if (!differences_) {
+    if (!unlocked_) {
+      pinocchio::computeABADerivatives(model_, data_, q, v, tau, by_q, by_v, by_tau);
+      return;
+    }
+    // With G the ratios, tau = G^T id(q_all, G v, G a): differentiated at a held torque.
+    const VectorX a = acceleration(q, v, tau);
+    place_unlocked(q);
+    auto& [model, data, ratios, id_by_q, id_by_v, id_by_a, q_all] = *unlocked_;
+    pinocchio::computeRNEADerivatives(model, data, q_all, VectorX(ratios * v), VectorX(ratios * a),
+                                      id_by_q, id_by_v, id_by_a);
+    by_tau.setIdentity();
+    mass_.solveInPlace(by_tau);
+    by_q.noalias() = -by_tau * (ratios.transpose() * id_by_q * ratios);
+    by_v.noalias() = -by_tau * (ratios.transpose() * id_by_v * ratios);
+    return;
+  }
+  by_q.setZero();
+  by_v.setZero();
+  by_tau.setZero();
+  for (int m = 0; m < model_.nv; ++m)
+    for (const double sign : {1.0, -1.0}) {
+      step_.setZero();
+      step_[m] = sign * kDifference;
+      integrate(q, step_, moved_);
+      by_q.col(m) += sign / (2 * kDifference) * acceleration(moved_, v, tau);
+      // The acceleration is quadratic in v and linear in tau: any step is exact.
+      step_ = v;
+      step_[m] += sign;
+      by_v.col(m) += sign / 2 * acceleration(q, step_, tau);
+      step_ = tau;
+      step_[m] += sign;
+      by_tau.col(m) += sign / 2 * acceleration(q, v, step_);
+    }
+}
+
+void Multibody::want_derivatives() {
+  turning_.clear();
+  step_.setLinSpaced(model_.nv, 0.2, 0.7);  // anywhere but at a special place
+  moved_ = pinocchio::neutral(model_);
+  const VectorX q = pinocchio::integrate(model_, moved_, step_);
+  for (int j = 1; j < model_.njoints; ++j) {
+    const int nv = model_.nvs[j];
+    if (nv == 0) continue;  // its axis is that of a joint with one
+    TurningAxes axes{j, Matrix6X::Zero(6, nv * nv)};
+    turn_axes(q, axes);
+    if (axes.by_q.cwiseAbs().maxCoeff() > 1e-6) turning_.push_back(axes);
+  }
+  differences_ = !turning_.empty() || !depth_first(model_);
+  if (mimics_ && !differences_) unlock();
+}
+
+void Multibody::unlock() {
+  pinocchio::Model all;
+  all.gravity = model_.gravity;
+  for (int j = 1; j < model_.njoints; ++j) {
+    const auto* mimic = boost::get<pinocchio::JointModelMimic>(&model_.joints[j]);
+    all.addJoint(model_.parents[j], mimic ? mimic->jmodel() : model_.joints[j],
+                 model_.jointPlacements[j], model_.names[j]);
+    all.inertias[j] = model_.inertias[j];
+  }
+  MatrixX ratios = MatrixX::Zero(all.nv, model_.nv);
+  for (int j = 1; j < model_.njoints; ++j) {
+    const auto* mimic = boost::get<pinocchio::JointModelMimic>(&model_.joints[j]);
+    for (int i = 0; i < all.nvs[j]; ++i)
+      ratios(all.idx_vs[j] + i, model_.joints[j].idx_v() + i) = mimic ? mimic->scaling() : 1;
+  }
+  const MatrixX zero = MatrixX::Zero(all.nv, all.nv);
+  unlocked_.emplace(
+      Unlocked{all, pinocchio::Data(all), ratios, zero, zero, zero, pinocchio::neutral(all)});
+}
+
+void Multibody::place_unlocked(const VectorX& q) {
+  const pinocchio::Model& all = unlocked_->model;
+  for (int j = 1; j < model_.njoints; ++j) {
+    const auto from = q.segment(model_.joints[j].idx_q(), all.nqs[j]);
+    auto to = unlocked_->q.segment(all.idx_qs[j], all.nqs[j]);
+    if (const auto* mimic = boost::get<pinocchio::JointModelMimic>(&model_.joints[j]))
+      pinocchio::configVectorAffineTransform(mimic->jmodel(), from, mimic->scaling(),
+                                             mimic->offset(), to);
+    else
+      to = from;
+  }
+}
+
+void Multibody::turn_axes(const VectorX& q, TurningAxes& axes) {
+  const int nv = model_.nvs[axes.joint], first = model_.idx_vs[axes.joint];
+  axes.by_q.setZero();
+  for (int m = 0; m < nv; ++m)
+    for (const double sign : {1.0, -1.0}) {
+      step_.setZero();
+      step_[first + m] = sign * kDifference;
+      integrate(q, step_, moved_);
+      auto& data = data_.joints[axes.joint];
+      model_.joints[axes.joint].calc(data, moved_);
+      axes.by_q.middleCols(nv * m, nv) += sign / (2 * kDifference) * data.S().matrix();
+    }
+}
+
+void Multibody::place_axes(const VectorX& q) {
+  for (TurningAxes& axes : turning_)
+    if (std::binary_search(needed_.begin(), needed_.end(), axes.joint)) turn_axes(q, axes);
+  using Step =
+      pinocchio::impl::JointJacobiansForwardStep<double, 0, pinocchio::JointCollectionDefaultTpl,
+                                                 VectorX, Matrix6X>;
+  for (int j : needed_)
+    Step::run(model_.joints[j], data_.joints[j], Step::ArgsType(model_, data_, q, data_.J));
+}
+
+const VectorX& Multibody::gravity(const VectorX& q) {
+  return pinocchio::computeGeneralizedGravity(model_, data_, q);
+}
+
+const VectorX& Multibody::bias(const VectorX& q, const VectorX& v, const Forces& external) {
+  return pinocchio::rnea(model_, data_, q, v, zero_, external);
+}
+
+pinocchio::Motion Multibody::drift(int joint) const {
+  if (joint == 0) return pinocchio::Motion::Zero();
+  return data_.a_gf[joint] + data_.oMi[joint].actInv(model_.gravity);
+}
+
+void Multibody::task(const VectorX& q, int joint, const pinocchio::SE3& frame, Matrix6X& jacobian,
+                     MatrixX& mobility) {
+  using pinocchio::Convention;
+  pinocchio::crba(model_, data_, q, mimics_ ? Convention::WORLD : Convention::LOCAL);
+  mass_.compute(data_.M);
+  jacobian.setZero(6, model_.nv);
+  pinocchio::computeJointJacobian(model_, data_, q, joint, jacobian);
+  jacobian = frame.toActionMatrixInverse() * jacobian;
+  mobility = jacobian.transpose();
+  mass_.solveInPlace(mobility);
+}
+
+void Multibody::transmit(const VectorX& q, const VectorX& v, const VectorX& acceleration,
+                         const Forces& external) {
+  pinocchio::rnea(model_, data_, q, v, acceleration, external);
+}
+
+void Multibody::integrate(const VectorX& q, const VectorX& step, VectorX& out) const {
+  pinocchio::integrate(model_, q, step, out);
+}
+
+void Multibody::difference(const VectorX& q0, const VectorX& q1, VectorX& out) const {
+  pinocchio::difference(model_, q0, q1, out);
+}
+
+void Multibody::sizes(const VectorX& q, VectorX& out) const {
+  out.setOnes(model_.nv);
+  for (int j = 1; j < model_.njoints; ++j) {
+    const auto& joint = model_.joints[j];
+    if (joint.nq() == joint.nv())
+      out.segment(joint.idx_v(), joint.nv()) = q.segment(joint.idx_q(), joint.nq()).cwiseAbs();
+  }
+  for (const CurvedSegment& s : curved_) {
+    if (s.group == CurvedSegment::Group::Rigid)
+      out.segment<3>(s.index_v).setConstant(q.segment<3>(s.index_q).norm());
+    if (s.group == CurvedSegment::Group::Planar)
+      out.segment<2>(s.index_v).setConstant(q.segment<2>(s.index_q).norm());
+  }
+}
+
+void Multibody::speeds(const VectorRef& v, VectorX& out) const {
+  out = v.cwiseAbs();
+  const auto together = [&](int i, int n) {
+    out.segment(i, n).setConstant(v.segment(i, n).norm());
+  };
+  for (const CurvedSegment& s : curved_) {
+    together(s.index_v, s.group == CurvedSegment::Group::Planar ? 2 : 3);
+    if (s.group == CurvedSegment::Group::Rigid) together(s.index_v + 3, 3);
+  }
+}
+
+double Multibody::kinetic_energy(const VectorX& q, const VectorX& v) {
+  if (!mimics_) return pinocchio::computeKineticEnergy(model_, data_, q, v);
+  pinocchio::crba(model_, data_, q, pinocchio::Convention::WORLD);
+  return 0.5 * v.dot(data_.M.selfadjointView<Eigen::Upper>() * v);
+}
+
+double Multibody::potential_energy(const VectorX& q) {
+  if (!mimics_) return pinocchio::computePotentialEnergy(model_, data_, q);
+  pinocchio::forwardKinematics(model_, data_, q);
+  double sum = 0;
+  for (int j = 1; j < model_.njoints; ++j) {
+    const auto& inertia = model_.inertias[j];
+    sum -= inertia.mass() * model_.gravity.linear().dot(data_.oMi[j].act(inertia.lever()));
+  }
+  return sum;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,404 @@
+#include "dynamics/scene/scene_data.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "contact/query/ball.hpp"
+
+namespace sphshell {
+
+SceneData::SceneData(const pinocchio::Model& model, std::vector<Pair> pairs,
+                     JointForces::Effects joints)
+    : body_(model),
+      joints_(std::move(joints), model.nv),
+      pairs_(std::move(pairs)),
+      clusters_(clusters_of(pairs_)),
+      queries_(pairs_.size(), Query(true)),
+      shapes_(pairs_.size()),
+      trackers_(pairs_.size()),
+      states_(pairs_.size()),
+      excursions_(pairs_.size()),
+      external_(static_cast<std::size_t>(model.njoints), pinocchio::Force::Zero()),
+      bristles_(group_numbers(pairs_)) {
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    const Pair& pair = pairs_[k];
+    needs_velocity_ = needs_velocity_ || pair.needs_velocity();
+    if (pair.law.foundation()) foundations_.resize(pairs_.size());
+    if (pair.friction.has_state()) {
+      bristles_.add(k, pair.friction.rings());
+      several_rings_ = several_rings_ || pair.friction.rings() > 1;
+      if (pair.has_dn_dc()) queries_[k].want_dn_dc();
+    }
+    for (int j : {pair.joint_i, pair.joint_j}) {
+      body_.need(j);
+      if (j > 0 && std::find(loaded_.begin(), loaded_.end(), j) == loaded_.end())
+        loaded_.push_back(j);
+    }
+  }
+  bristle_rates_.setZero(bristle_size());
+  active_.reserve(64);
+}
+
+void SceneData::change(std::vector<Pair> pairs, JointForces::Effects joints) {
+  pairs_ = std::move(pairs);
+  clusters_ = clusters_of(pairs_);
+  joints_.change(std::move(joints));
+  for (const Pair& pair : pairs_) needs_velocity_ = needs_velocity_ || pair.needs_velocity();
+}
+
+void SceneData::need_velocity_of(int joint) {
+  body_.need(joint);
+  needs_velocity_ = true;
+}
+
+void SceneData::restart() {
+  for (ContactTracker& tracker : trackers_) tracker.restart();
+  bristles_.restart();
+  for (Excursion& excursion : excursions_) excursion.moved = 0, excursion.touched = false;
+}
+
+void SceneData::want_dn_dc() {
+  wants_second_ = true;
+  for (std::size_t k = 0; k < pairs_.size(); ++k)
+    if (pairs_[k].has_dn_dc()) queries_[k].want_dn_dc();
+}
+
+void SceneData::evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool identify) {
+  active_.clear();
+  if (needs_velocity_)
+    body_.kinematics(q, v);
+  else if (!pairs_.empty())
+    body_.kinematics(q);
+  auto cluster = clusters_.begin();
+  bool far = false;  // whether the cluster of the pair is
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    const Pair& pair = pairs_[k];
+    PairState& state = states_[k];
+    state = PairState();
+    if (cluster != clusters_.end() && k > cluster->last) ++cluster, far = false;
+    const bool clustered = cluster != clusters_.end() && k >= cluster->first;
+    if (clustered && k > cluster->first) {
+      state.world_from_j = states_[k - 1].world_from_j;
+    } else {
+      state.world_from_j = body_.world_from(pair.joint_j, pair.placement_j);
+      if (clustered)
+        far = cluster->is_far(pair, cluster->center_in_shell(body_, pair, state.world_from_j));
+    }
+    std::vector<Contact>& contacts = find_contacts(k, far);
+    Excursion& excursion = excursions_[k];
+    excursion.moved = std::max(excursion.moved, (state.center - excursion.from).norm());
+    excursion.touched = excursion.touched || !contacts.empty();
+    ContactTracker& tracker = trackers_[k];
+    if (!contacts.empty() && (identify || tracker.deep() || pair.friction.has_state())) {
+      const std::vector<int>& at = tracker.match(contacts, state.center, pair.radius);
+      for (std::size_t i = 0; i < contacts.size(); ++i)
+        add_contact(k, contacts[i], bristles_.slot(k, at[i]), tracker.places()[at[i]].number);
+      state.pushed_through = tracker.pushed_through();
+    } else {
+      for (std::size_t i = 0; i < contacts.size(); ++i)
+        add_contact(k, contacts[i], -1, static_cast<int>(i));
+    }
+  }
+  evaluate_joints(q, v, z);
+  compute_forces(z);
+}
+
+void SceneData::evaluate_joints(const VectorX& q, const VectorX& v, const VectorX& z) {
+  if (joints_.act()) joints_.evaluate(q, v, z.tail(joints_.size()), relaxation_);
+}
+
+void SceneData::revisit(const VectorX& q, const VectorX& v, const VectorX& z) {
+  if (active_.empty() && !joints_.act()) return;
+  if (needs_velocity_) body_.kinematics(q, v);
+  evaluate_joints(q, v, z);
+  compute_forces(z);
+}
+
+void SceneData::accept(VectorX& z) {
+  bristles_.begin();
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    const Pair& pair = pairs_[k];
+    std::vector<Contact>& contacts = queries_[k].contacts;
+    const Vec3& center = states_[k].center;
+    excursions_[k].from = center;
+    ContactTracker& tracker = trackers_[k];
+    if (contacts.empty() && tracker.places().empty()) {
+      tracker.move_to(center);
+      bristles_.assign_none(k);
+      continue;
+    }
+    const std::vector<int>& at = tracker.match(contacts, center, pair.radius);
+    if (pair.friction.has_state())
+      bristles_.assign(k, contacts, at, tracker, z, pair.friction.torsional(), pair.has_dn_dc());
+    else
+      bristles_.assign_none(k);
+    tracker.accept(contacts, center, pair.radius);
+    for (std::size_t i = 0; i < contacts.size(); ++i)
+      active_[next++].contact_id = tracker.places()[i].number;
+  }
+  if (!bristles_.any()) return;
+  end_bristles(bristles_, z);
+  // From now on, the place of a contact is its place in the list.
+  for (std::size_t i = 0, place = 0; i < active_.size(); ++i) {
+    place = i > 0 && active_[i].pair == active_[i - 1].pair ? place + 1 : 0;
+    active_[i].slot = bristles_.slot(active_[i].pair, static_cast<int>(place));
+  }
+  compute_forces(z);
+}
+
+void SceneData::reorder_bristles(VectorX& z) {
+  if (!bristles_.any()) return;
+  Bristles bristles = bristles_;
+  bristles.begin();
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    const Pair& pair = pairs_[k];
+    std::vector<Contact>& contacts = queries_[k].contacts;
+    if (!pair.friction.has_state() || (contacts.empty() && trackers_[k].places().empty())) {
+      bristles.assign_none(k);
+      continue;
+    }
+    const std::vector<int>& at = trackers_[k].match(contacts, states_[k].center, pair.radius);
+    bristles.assign(k, contacts, at, trackers_[k], z, pair.friction.torsional(), pair.has_dn_dc());
+  }
+  end_bristles(bristles, z);
+}
+
+// Stretches of joints stay behind those of contacts.
+void SceneData::end_bristles(Bristles& bristles, VectorX& z) const {
+  const VectorX joints = z.tail(joints_.size());
+  bristles.end(z);
+  z.conservativeResize(bristles.size() + joints.size());
+  z.tail(joints.size()) = joints;
+}
+
+std::vector<Contact>& SceneData::find_contacts(std::size_t k, bool far) {
+  const Pair& pair = pairs_[k];
+  PairState& state = states_[k];
+  Query& query = queries_[k];
+  if (pair.source) {
+    query.contacts.clear();
+    pair.source(body_.world_from(pair.joint_i, pair.placement_i), state.world_from_j,
+                query.contacts);
+    // In the frame of body j, as those of a shell.
+    for (Contact& contact : query.contacts) {
+      contact.point = state.world_from_j.actInv(contact.point);
+      contact.normal = state.world_from_j.rotation().transpose() * contact.normal;
+    }
+    state.center.setZero();
+    return query.contacts;
+  }
+  const Vec3& center = pair.placement_i.translation();
+  state.center = state.world_from_j.actInv(
+      pair.joint_i == 0 ? center : body_.world_from_joint(pair.joint_i).act(center));
+  if (far) {
+    query.contacts.clear();
+    return query.contacts;
+  }
+  if (pair.law.foundation()) {
+    const bool slopes = wants_second_ || pair.friction.has_state();
+    foundations_[k].find(pair, state.center, slopes, query.contacts);
+    return query.contacts;
+  }
+  if (pair.ball > 0)
+    find_on_ball(pair.ball, state.center, pair.radius, query.contacts);
+  else
+    query.find(*pair.shell, state.center, pair.radius, pair.method);
+  if (pair.needs_shape()) find_shapes(k);
+  // Friction belongs to a place, and its spring should not be split and merged at every border
+  // between elements: contacts that are nearly one are one. The elastic energy is that of their
+  // depths' sum, off by the square of the depths' difference, 1e-4 at most.
+  if (pair.friction.active() && query.contacts.size() > 1) {
+    merge_groups(query.contacts, state.center, pair.radius, merged_);
+    if (pair.needs_shape()) {
+      merge_shapes(query.contacts, shapes_[k], merged_shapes_);
+      shapes_[k].swap(merged_shapes_);
+    }
+    query.contacts.swap(merged_);
+  }
+  return query.contacts;
+}
+
+// The shapes of the gaps at a pair's contacts.
+void SceneData::find_shapes(std::size_t k) {
+  shapes_[k].clear();
+  for (const Contact& contact : queries_[k].contacts)
+    shapes_[k].push_back(shape_of(k, pairs_[k], contact));
+}
+
+ContactShape SceneData::shape_of(std::size_t k, const Pair& pair, const Contact& contact) {
+  if (pair.ball > 0 || pair.method != Method::Smooth) {
+    const double curvature = 1 / pair.radius + (pair.ball > 0 ? 1 / pair.ball : 0);
+    ContactShape out = shape_of_gap(curvature * Mat3::Identity(), contact.normal, pair.radius);
+    out.depth = contact.depth;
+    return out;
+  }
+  const auto at = std::find_if(curvatures_.begin(), curvatures_.end(),
+                               [&](const Curvature& one) { return one.is_of(*pair.shell); });
+  Curvature& curvature = at == curvatures_.end() ? curvatures_.emplace_back(*pair.shell) : *at;
+  return curvature.shape(contact, states_[k].center, pair.radius, wants_second_);
+}
+
+void SceneData::add_contact(std::size_t k, const Contact& contact, int slot, int contact_id) {
+  ActiveContact& active = active_.emplace_back();
+  active.pair = static_cast<int>(k);
+  active.slot = slot;
+  active.contact_id = contact_id;
+  active.contact = contact;
+  if (pairs_[k].law.foundation())
+    active.row = static_cast<int>(&contact - queries_[k].contacts.data());
+  if (pairs_[k].needs_shape())
+    active.shape = static_cast<int>(&contact - queries_[k].contacts.data());
+}
+
+void SceneData::compute_forces(const VectorX& z) {
+  powers_ = joints_.powers();
+  bristle_rates_.setZero(bristle_size());
+  bristle_rates_.tail(joints_.size()) = joints_.rates();
+  touching_ = !active_.empty();
+  if (!touching_) return;
+  if (several_rings_) stretches_ = z;
+  for (int j : loaded_) external_[j].setZero();
+  for (PairState& state : states_) state.clear_sums();
+  for (ActiveContact& active : active_) {
+    compute_kinematics(active, z);
+    compute_force(active, z);
+    add_force(active);
+  }
+}
+
+void SceneData::compute_kinematics(ActiveContact& active, const VectorX& z) {
+  const Pair& pair = pairs_[active.pair];
+  const SE3& world_from_j = states_[active.pair].world_from_j;
+  ContactKinematics<double>& m = active.kinematics;
+  active.point = world_from_j.act(active.contact.point);
+  m.depth = active.contact.depth;
+  m.normal = world_from_j.rotation() * active.contact.normal;
+  m.relative.setZero();
+  if (pair.needs_velocity()) m.relative = relative_velocity(pair, active.point);
+  if (pair.friction.torsional())
+    m.spin =
+        m.normal.dot(body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j));
+  if (const ContactShape* gap = shape(active)) m.scale = gap->scale, m.depth = gap->depth;
+  if (pair.friction.rolls()) {
+    const Vec3 spin = body_.angular_velocity(pair.joint_i) - body_.angular_velocity(pair.joint_j);
+    m.rolling = spin - spin.dot(m.normal) * m.normal;
+  }
+  if (active.slot >= 0) m.bristle = world_from_j.rotation() * z.segment<3>(3 * active.slot);
+}
+
+void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
+  const Pair& pair = pairs_[active.pair];
+  const auto& rotation = states_[active.pair].world_from_j.rotation();
+  const int at = 3 * active.slot, rings = active.slot >= 0 ? pair.friction.rings() : 1;
+  Vec3 outer[kMostRings - 1], outer_rate[kMostRings - 1];
+  ContactKinematics<double>& m = active.kinematics;
+  if (rings > 1) {
+    for (int i = 1; i < rings; ++i) outer[i - 1] = rotation * z.segment<3>(at + 3 * i);
+    m.outer = outer;
+    m.outer_rate = outer_rate;
+  }
+  active.force = contact_force(pair.law, pair.friction, disc_radius(active), relaxation(pair), m);
+  if (active.row >= 0) add_foundation(active, m);
+  m.outer = nullptr, m.outer_rate = nullptr;  // not beyond this evaluation
+  // The energy also changes with the shape, as the sphere moves along the shell. It depends on the
+  // sphere's center alone: that is where the force acts.
+  if (const HertzLaw* hertz = pair.law.hertz(); hertz && active.shape >= 0) {
+    const ContactShape& gap = *shape(active);
+    active.climb =
+        rotation * (active.force.elastic * gap.tilt - hertz->energy(gap.depth, 1) * gap.gradient);
+  }
+  if (active.slot < 0) return;
+  bristle_rates_.segment<3>(at) =
+      rotation.transpose() * active.force.bristle_rate + rate_of_turning(active, z.segment<3>(at));
+  for (int i = 1; i < rings; ++i)
+    bristle_rates_.segment<3>(at + 3 * i) = rotation.transpose() * outer_rate[i - 1] +
+                                            rate_of_turning(active, z.segment<3>(at + 3 * i));
+}
+
+// How fast a stretch turns with the normal, in the shell's frame.
+Vec3 SceneData::rate_of_turning(const ActiveContact& active, const Vec3& stretch) const {
+  const Pair& pair = pairs_[active.pair];
+  if (!pair.has_dn_dc()) return Vec3::Zero();
+  const PairState& state = states_[active.pair];
+  const Vec3 center_rate = state.world_from_j.rotation().transpose() *
+                           relative_velocity(pair, state.world_from_j.act(state.center));
+  const Contact& contact = active.contact;
+  const Vec3 normal_rate = contact.dn_dc * center_rate / contact.weight;
+  return contact.normal.cross(normal_rate).cross(stretch);
+}
+
+ContactWrench SceneData::wrench(const ActiveContact& active) const {
+  const ContactForce<double>& f = active.force;
+  const Vec3& normal = active.kinematics.normal;
+  const double weight = active.contact.weight;
+  ContactWrench out{active.point, weight * (f.normal * normal + f.friction),
+                    weight * f.torsion * normal + weight * f.rolling + active.moment};
+  if (active.shape >= 0) {
+    const PairState& state = states_[active.pair];
+    out.force += weight * active.climb;
+    out.moment +=
+        weight * (state.world_from_j.act(state.center) - active.point).cross(active.climb);
+  }
+  return out;
+}
+
+// Adds a contact to the forces on the joints and to the sums of its pair.
+void SceneData::add_force(const ActiveContact& active) {
+  const Pair& pair = pairs_[active.pair];
+  const ContactForce<double>& f = active.force;
+  const ContactKinematics<double>& m = active.kinematics;
+  const double weight = active.contact.weight;
+  const ContactWrench on_i = wrench(active);
+  apply(pair.joint_i, active.point, on_i.force, on_i.moment);
+  apply(pair.joint_j, active.point, -on_i.force, -on_i.moment);
+  PairState& state = states_[active.pair];
+  if (weight > 0) ++state.count;
+  if (active.row < 0) {
+    state.pieces += weight > 0 ? 1 : -1;
+    if (f.normal == 0) ++state.clamped;
+  } else {
+    // The force of a foundation is smooth where a patch comes or goes: no event.
+    state.pieces = 1;
+  }
+  state.depth = std::max(state.depth, m.depth);
+  state.normal_force += weight * f.normal;
+  // The weight of several as one is the length of the sum of their normals.
+  const double share = weight > 0 ? 1 : weight;
+  if (active.row >= 0) {
+    powers_.damping += active.damping;
+    powers_.friction += active.sliding;
+    powers_.elastic += foundations_[active.pair].energy(pair, active.row);
+  } else {
+    powers_.damping += weight * damping_power(f, m);
+    powers_.friction += weight * friction_power(f, m);
+    powers_.elastic += share * pair.law.energy(m.depth, m.scale);
+  }
+  if (active.slot >= 0) powers_.bristles += 0.5 * share * f.stiffness * f.stretch2;
+  if (const ContactShape* gap = shape(active)) {
+    state.conformity = std::max(state.conformity, gap->conformity);
+    state.half_axis = std::max(state.half_axis, gap->half_axes(m.depth)[0] / pair.radius);
+  }
+}
+
+void SceneData::apply(int joint, const Vec3& point_world, const Vec3& force_world,
+                      const Vec3& moment_world) {
+  if (joint == 0) return;  // the world does not move
+  const SE3& pose = body_.world_from_joint(joint);
+  const Vec3 force = pose.rotation().transpose() * force_world;
+  external_[joint].linear() += force;
+  external_[joint].angular() +=
+      pose.actInv(point_world).cross(force) + pose.rotation().transpose() * moment_world;
+}
+
+Vec3 SceneData::relative_velocity(const Pair& pair, const Vec3& point_world) const {
+  return body_.velocity_at(pair.joint_i, point_world) -
+         body_.velocity_at(pair.joint_j, point_world);
+}
+
+const VectorX& SceneData::acceleration(const VectorX& q, const VectorX& v, const VectorX& tau) {
+  const VectorX& all = joints_.act() ? joints_.added(tau) : tau;
+  return touching_ ? body_.acceleration(q, v, all, external_) : body_.acceleration(q, v, all);
+}
+
+}  // namespace sphshell

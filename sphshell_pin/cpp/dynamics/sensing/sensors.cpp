@@ -1,0 +1,309 @@
+#include "dynamics/sensing/sensors.hpp"
+
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <type_traits>
+#include <utility>
+
+namespace sphshell {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+// Pieces of a filter's period. A sine at the cutoff is then followed to 1e-4 of its amplitude.
+constexpr double kPieces = 8;
+
+// Steele, Lea, Flood, OOPSLA 2014: one step of SplitMix64.
+std::uint64_t mix(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15u;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+// Weights of a signal s0 + b u + c u^2, u from 0 to 1, in a filter after z = h / time constant.
+struct Weights {
+  double constant, linear, square;
+};
+
+Weights weights(double z) {
+  const double w0 = -std::expm1(-z);
+  if (z > 0.03) {
+    const double w1 = 1 - w0 / z;
+    return {w0, w1, 1 - 2 * w1 / z};
+  }
+  double w1 = 0, w2 = 0, term = -1;  // (-z)^k / (k + 1)!
+  for (int k = 1; k < 8; ++k) {
+    term *= -z / (k + 1);
+    w1 += term;
+    w2 += 2 * term / (k + 2);
+  }
+  return {w0, w1, w2};
+}
+
+bool has(const std::vector<int>& sorted, int one) {
+  return std::binary_search(sorted.begin(), sorted.end(), one);
+}
+
+}  // namespace
+
+// The sum of 256 fair bits, whose steps two uniform numbers fill. It calls nothing of the system's
+// mathematical library, whose last digits differ between machines.
+double normal_noise(std::uint64_t seed, std::uint64_t sample, std::uint64_t value) {
+  const std::uint64_t key = mix(mix(mix(seed) ^ sample) ^ value);
+  double sum = -128;
+  for (std::uint64_t i = 0; i < 4; ++i)
+    sum += static_cast<double>(std::bitset<64>(mix(key ^ mix(i))).count());
+  const std::uint64_t rest = mix(key ^ mix(4));
+  sum +=
+      static_cast<double>(rest >> 32) * 0x1p-32 - static_cast<double>(rest & 0xffffffffu) * 0x1p-32;
+  // The variance is 256 / 4 + 2 / 12.
+  constexpr double kDeviation = 8.010409893800427;
+  return sum / kDeviation;
+}
+
+Sensors::Sensors(std::vector<Sensor> sensors, const pinocchio::Model& model, double start)
+    : start_(start), external_(model.joints.size(), pinocchio::Force::Zero()) {
+  int size = 0;
+  for (Sensor& sensor : sensors) {
+    shortest_ = std::min(shortest_, 1 / sensor.rate);
+    if (sensor.cutoff > 0) {
+      filtered_ = true;
+      piece_ = std::min(piece_, 1 / (kPieces * sensor.cutoff));
+    }
+    dynamic_ = dynamic_ || !std::holds_alternative<ContactSwitch>(sensor.kind);
+    channels_.push_back({std::move(sensor), size, 0, false, {}});
+    size += channels_.back().sensor.size();
+  }
+  for (auto* values : {&measured_, &before_, &middle_, &after_, &smooth_, &readings_})
+    values->resize(static_cast<std::size_t>(size));
+}
+
+void Sensors::hold_still(SceneData& scene, const State& state, const Push& push) {
+  acceleration_.setZero(state.v.size());
+  read_all(scene, state, push);
+  smooth_ = measured_;
+  for (Channel& channel : channels_)
+    for (int i = 0; i < channel.sensor.size(); ++i)
+      readings_[channel.at + i] = value(channel, i, false);
+}
+
+void Sensors::begin(SceneData& scene, Torques& torques, const State& state, const Push& push) {
+  begun_ = true;
+  measure(scene, torques, state, push);
+  smooth_ = before_ = measured_;
+  known_ = true;
+  jumped_ = false;
+  sample(state.t);
+  deliver(state.t);
+}
+
+void Sensors::begin_step(SceneData& scene, Torques& torques, const State& state, const Push& push) {
+  if (!std::exchange(jumped_, false) || !known_) return;
+  measure(scene, torques, state, push);
+  before_ = measured_;
+}
+
+void Sensors::add_fixed(SceneData& scene, Torques& torques, const State& from, const State& to,
+                        double dt, const Push& push) {
+  const double next = next_due(), margin = hair(to.t);
+  const bool used = filtered_ || next <= to.t + margin;
+  // The next step begins where this one ends.
+  const bool needed = used || next < to.t + dt - margin;
+  if (needed) {
+    measure(scene, torques, to, push);
+    if (used) {
+      const double h = to.t - from.t;
+      const std::vector<double> start = known_ ? before_ : measured_, end = measured_;
+      march(from.t, to.t, [&](double t, std::vector<double>& out) {
+        const double share = (t - from.t) / h;
+        for (std::size_t i = 0; i < out.size(); ++i)
+          out[i] = share < 1 ? start[i] + share * (end[i] - start[i]) : end[i];
+      });
+    }
+    before_ = measured_;
+  }
+  known_ = needed;
+  deliver(to.t);
+}
+
+void Sensors::add_dense(SceneData& scene, Torques& torques, const Chart& chart,
+                        const Stepper& stepper, const State& from, const State& to,
+                        const Push& push) {
+  if (filtered_ || next_due() <= to.t + hair(to.t)) {
+    scene.restart();
+    march(from.t, to.t, [&](double t, std::vector<double>& out) {
+      const State* state = &to;
+      if (t < to.t) {
+        stepper.interpolate((t - from.t) / (to.t - from.t), y_);
+        chart.finish(t, y_, between_);
+        state = &between_;
+      }
+      scene.evaluate(state->q, state->v, state->z);
+      measure(scene, torques, *state, push);
+      out = measured_;
+    });
+    scene.restart();
+    scene.evaluate(to.q, to.v, to.z);
+  }
+  known_ = filtered_;
+  deliver(to.t);
+}
+
+// Takes the samples that are due and moves the filters on; `signal` gives the signals at a time.
+template <class Signal>
+void Sensors::march(double from, double to, const Signal& signal) {
+  const double margin = hair(to);
+  for (double t = from; t < to;) {
+    double next = next_due();
+    if (filtered_) next = std::min({next, t + piece_, to});
+    if (next > to + margin) return;
+    if (next > to - margin) next = to;
+    if (filtered_) signal(0.5 * (t + next), middle_);
+    signal(next, after_);
+    if (filtered_)
+      filter(next - t);
+    else
+      smooth_ = after_;
+    before_ = after_;
+    t = next;
+    sample(t);
+  }
+}
+
+void Sensors::filter(double h) {
+  for (const Channel& channel : channels_) {
+    const double cutoff = channel.sensor.cutoff;
+    const std::size_t begin = channel.at, end = begin + channel.sensor.size();
+    if (cutoff == 0) {
+      std::copy(after_.begin() + begin, after_.begin() + end, smooth_.begin() + begin);
+      continue;
+    }
+    const Weights w = weights(2 * kPi * cutoff * h);
+    for (std::size_t i = begin; i < end; ++i) {
+      const double s0 = before_[i], b = 4 * middle_[i] - 3 * s0 - after_[i];
+      const double c = 2 * (s0 + after_[i] - 2 * middle_[i]);
+      smooth_[i] += w.constant * (s0 - smooth_[i]) + w.linear * b + w.square * c;
+    }
+  }
+}
+
+void Sensors::sample(double t) {
+  const double limit = t + hair(t);
+  for (Channel& channel : channels_)
+    for (; due(channel) <= limit; ++channel.sample) {
+      const double when = due(channel);
+      Reading reading{when + channel.sensor.delay, when, {}};
+      for (int i = 0; i < channel.sensor.size(); ++i)
+        reading.values.push_back(value(channel, i, true));
+      channel.under_way.push_back(std::move(reading));
+    }
+}
+
+// Of a sample: with noise, and within the range. A switch keeps its position.
+double Sensors::value(Channel& channel, int i, bool noisy) const {
+  const Sensor& sensor = channel.sensor;
+  const double signal = smooth_[channel.at + i];
+  if (const auto* contact = std::get_if<ContactSwitch>(&sensor.kind)) {
+    channel.on = channel.on ? signal >= contact->release : signal > contact->threshold;
+    return channel.on ? 1 : 0;
+  }
+  double noise = 0;
+  if (noisy && sensor.noise[i] > 0)
+    noise = sensor.noise[i] * normal_noise(sensor.seed, static_cast<std::uint64_t>(channel.sample),
+                                           static_cast<std::uint64_t>(i));
+  return std::clamp(signal + noise, -sensor.range[i], sensor.range[i]);
+}
+
+void Sensors::deliver(double t) {
+  const double limit = t + hair(t);
+  for (std::size_t k = 0; k < channels_.size(); ++k) {
+    std::deque<Reading>& under_way = channels_[k].under_way;
+    for (; !under_way.empty() && under_way.front().arrival <= limit; under_way.pop_front()) {
+      const Reading& reading = under_way.front();
+      std::copy(reading.values.begin(), reading.values.end(), readings_.begin() + channels_[k].at);
+      rows_.sensor.push_back(static_cast<int>(k));
+      rows_.t.push_back(reading.arrival);
+      rows_.sampled.push_back(reading.sampled);
+      rows_.values.insert(rows_.values.end(), reading.values.begin(), reading.values.end());
+    }
+  }
+}
+
+SensorRows Sensors::take() { return std::exchange(rows_, {}); }
+
+double Sensors::next_due() const {
+  double out = kInfinity;
+  for (const Channel& channel : channels_) out = std::min(out, due(channel));
+  return out;
+}
+
+// Times closer than this are the same: the grids of steps and of samples need not agree to the last
+// bit.
+double Sensors::hair(double t) const {
+  return std::max(1e-9 * shortest_, 4 * std::numeric_limits<double>::epsilon() * std::abs(t));
+}
+
+void Sensors::measure(SceneData& scene, Torques& torques, const State& state, const Push& push) {
+  if (dynamic_) {
+    const VectorX& tau = torques.torque(state.t, state.q, state.v);
+    acceleration_ = scene.acceleration(state.q, state.v, tau);
+  }
+  read_all(scene, state, push);
+}
+
+// With the acceleration as it is.
+void Sensors::read_all(SceneData& scene, const State& state, const Push& push) {
+  if (dynamic_) {
+    if (scene.touching())
+      external_ = scene.external();
+    else
+      std::fill(external_.begin(), external_.end(), pinocchio::Force::Zero());
+    if (push.active()) external_[push.joint()] += push.on_joint(scene.body());
+    scene.body().transmit(state.q, state.v, acceleration_, external_);
+  }
+  for (const Channel& channel : channels_)
+    std::visit([&](const auto& kind) { read(kind, scene, push, &measured_[channel.at]); },
+               channel.sensor.kind);
+}
+
+void Sensors::read(const ForceTorque& sensor, SceneData& scene, const Push& push,
+                   double* out) const {
+  const Multibody& body = scene.body();
+  const int joint = sensor.joint;
+  const pinocchio::Motion& v = body.transmitted_velocity(joint);
+  // Newton and Euler for what moves with this joint; its acceleration holds gravity's.
+  pinocchio::Force sum =
+      sensor.inertia * body.transmitted_acceleration(joint) + sensor.inertia.vxiv(v);
+  for (int child : sensor.children) sum += body.transmitted_to_parent(child);
+  const SE3& pose = joint == 0 ? SE3::Identity() : body.world_from_joint(joint);
+  const auto take_off = [&](const ContactWrench& wrench, double sign) {
+    const Vec3 force = sign * (pose.rotation().transpose() * wrench.force);
+    sum.linear() -= force;
+    sum.angular() -= pose.actInv(wrench.point).cross(force) +
+                     sign * (pose.rotation().transpose() * wrench.moment);
+  };
+  if (scene.touching())
+    for (const ActiveContact& active : scene.active()) {
+      if (has(sensor.pairs_i, active.pair)) take_off(scene.wrench(active), 1);
+      if (has(sensor.pairs_j, active.pair)) take_off(scene.wrench(active), -1);
+    }
+  if (push.active() && has(sensor.frames, push.frame())) sum -= push.on_joint(body);
+  const pinocchio::Force seen = sensor.frame.actInv(sum);
+  Eigen::Map<Vec3>{out} = seen.linear();
+  Eigen::Map<Vec3>{out + 3} = seen.angular();
+}
+
+void Sensors::read(const JointTorque& sensor, SceneData& scene, const Push&, double* out) const {
+  const Multibody& body = scene.body();
+  const int k = sensor.index;
+  *out = body.transmitted()[k] - body.model().armature[k] * acceleration_[k];
+}
+
+void Sensors::read(const ContactSwitch& sensor, SceneData& scene, const Push&, double* out) const {
+  double sum = 0;
+  for (int pair : sensor.pairs) sum += scene.states()[pair].normal_force;
+  *out = sum;
+}
+
+}  // namespace sphshell

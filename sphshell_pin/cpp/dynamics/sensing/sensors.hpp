@@ -1,0 +1,126 @@
+// What a robot's computer knows of a run: sampled, filtered, noisy, limited and delayed readings.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <variant>
+#include <vector>
+
+#include "dynamics/integrators/stepper.hpp"
+#include "dynamics/control/push.hpp"
+#include "dynamics/run/recording.hpp"
+
+namespace sphshell {
+
+// The wrench that the parts before a frame exert on those beyond it: in the frame, about its
+// origin.
+struct ForceTorque {
+  int joint = 0;                              // that carries the frame
+  SE3 frame = SE3::Identity();                // in that joint
+  pinocchio::Inertia inertia;                 // of what is beyond it on this joint, in that joint
+  std::vector<int> children;                  // joints that are beyond it, and hang on this joint
+  std::vector<int> pairs_i, pairs_j, frames;  // whose body i or j, and which, are beyond it on it
+  int size() const { return 6; }
+};
+
+// The generalized force that a joint transmits, without what its own rotor takes.
+struct JointTorque {
+  int index = 0;  // of its velocity
+  int size() const { return 1; }
+};
+
+// 1 once the sum of normal forces is above the threshold, 0 once it is below `release` [N].
+struct ContactSwitch {
+  std::vector<int> pairs;
+  double threshold = 0, release = 0;
+  int size() const { return 1; }
+};
+
+struct Sensor {
+  std::variant<ForceTorque, JointTorque, ContactSwitch> kind;
+  double rate = 1000, delay = 0;     // [Hz], [s]
+  double cutoff = 0;                 // of the low-pass filter before the sampling [Hz]; 0: none
+  std::vector<double> range, noise;  // of each value: largest, and standard deviation of a sample
+  std::uint64_t seed = 0;
+
+  int size() const {
+    return std::visit([](const auto& one) { return one.size(); }, kind);
+  }
+};
+
+// A normal random number that depends on the three alone: the same bits on every machine.
+double normal_noise(std::uint64_t seed, std::uint64_t sample, std::uint64_t value);
+
+// The sensors of one run. A step is never shortened for them: they look at its dense output or,
+// where its length is fixed, between the signals at its ends.
+class Sensors {
+ public:
+  // Samples are due at start + k / rate [s].
+  Sensors(std::vector<Sensor> sensors, const pinocchio::Model& model, double start);
+
+  // What controllers read before the first sample: the scene's last state without acceleration.
+  void hold_still(SceneData& scene, const State& state, const Push& push);
+  // The first sample, where the run begins; filters begin settled.
+  void begin(SceneData& scene, Torques& torques, const State& state, const Push& push);
+  bool begun() const { return begun_; }
+  // Torques, forces or laws have changed where the next step begins.
+  void jump() { jumped_ = true; }
+  // A step begins at a state, at which the scene was last evaluated.
+  void begin_step(SceneData& scene, Torques& torques, const State& state, const Push& push);
+  // A step of the fixed length `dt` or a part of it; the scene was last evaluated at its end.
+  void add_fixed(SceneData& scene, Torques& torques, const State& from, const State& to, double dt,
+                 const Push& push);
+  // The last step of `stepper`. Leaves the forces evaluated at its end.
+  void add_dense(SceneData& scene, Torques& torques, const Chart& chart, const Stepper& stepper,
+                 const State& from, const State& to, const Push& push);
+
+  // The latest of all sensors, one after the other.
+  const std::vector<double>& readings() const { return readings_; }
+  // Hands over what has arrived since the last call.
+  SensorRows take();
+
+ private:
+  struct Reading {
+    double arrival, sampled;
+    std::vector<double> values;
+  };
+  struct Channel {
+    Sensor sensor;
+    int at;           // of its first value among those of all sensors
+    long sample = 0;  // next
+    bool on = false;  // of a switch
+    std::deque<Reading> under_way;
+  };
+
+  void measure(SceneData& scene, Torques& torques, const State& state, const Push& push);
+  void read_all(SceneData& scene, const State& state, const Push& push);
+  void read(const ForceTorque& sensor, SceneData& scene, const Push& push, double* out) const;
+  void read(const JointTorque& sensor, SceneData& scene, const Push& push, double* out) const;
+  void read(const ContactSwitch& sensor, SceneData& scene, const Push& push, double* out) const;
+  template <class Signal>
+  void march(double from, double to, const Signal& signal);
+  void filter(double h);
+  void sample(double t);
+  double value(Channel& channel, int i, bool noisy) const;
+  void deliver(double t);
+  double due(const Channel& channel) const {
+    return start_ + double(channel.sample) / channel.sensor.rate;
+  }
+  double next_due() const;
+  double hair(double t) const;
+
+  std::vector<Channel> channels_;
+  double start_, shortest_ = kInfinity;  // period of sampling [s]
+  double piece_ = kInfinity;             // filters are integrated over pieces no longer [s]
+  bool filtered_ = false, dynamic_ = false;
+  bool begun_ = false, jumped_ = false, known_ = false;
+  // The signals of all sensors: measured last, and at the begin, in the middle and at the end of a
+  // piece; behind the filters.
+  std::vector<double> measured_, before_, middle_, after_, smooth_, readings_;
+  SensorRows rows_;
+  Forces external_;
+  VectorX acceleration_, y_;
+  State between_;
+};
+
+}  // namespace sphshell

@@ -1,0 +1,356 @@
+// Ear clipping of polygons in space, by shape rather than by order.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "shell/cleaning/mending.hpp"
+#include "shell/point_tree.hpp"
+
+namespace sphshell {
+namespace {
+
+using Vec2 = PointTree<2>::Point;
+
+double cross(const Vec2& a, const Vec2& b, const Vec2& c) {
+  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+double squared(const Vec2& a, const Vec2& b) {
+  return (b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]);
+}
+
+// 2 area / longest edge^2, signed: the measure by which elements count as without area.
+double shape(const Vec2& a, const Vec2& b, const Vec2& c) {
+  const double longest = std::max({squared(a, b), squared(b, c), squared(c, a)});
+  return longest > 0.0 ? cross(a, b, c) / longest : 0.0;
+}
+
+constexpr double kFlat = 2e-12;  // 2 area / longest edge^2 of a triangle without area
+constexpr double kTie = 1e-9;    // shapes nearer than this count as equal; place decides
+constexpr double kLast = 1e-6;   // factor on the shape of ears that would leave a sliver behind
+
+// Up to so many corners plain loops do. Beyond, a k-d tree finds what lies in an ear and a
+// tournament the best ear; only among ears that tie at one place may another one be chosen.
+constexpr int kFew = 512;
+
+// The largest of n values that change one at a time, in O(log n).
+class Tournament {
+ public:
+  void reset(int n) {
+    for (leaves_ = 1; leaves_ < static_cast<std::size_t>(n);) leaves_ *= 2;
+    value_.assign(2 * leaves_, kOut);
+  }
+
+  void set(int i, double value) { put(i, std::max(kLeast, value)); }  // NaN counts as kLeast
+  void drop(int i) { put(i, kOut); }
+
+  // The first of those within `margin` of the largest.
+  int first(double margin) const {
+    const double least = value_[1] - margin;
+    std::size_t node = 1;
+    while (node < leaves_) node = 2 * node + (value_[2 * node] >= least ? 0 : 1);
+    return static_cast<int>(node - leaves_);
+  }
+
+ private:
+  static constexpr double kLeast = -1.5, kOut = -2.0;  // below every shape and kBlocked
+
+  void put(int i, double value) {
+    std::size_t node = leaves_ + static_cast<std::size_t>(i);
+    value_[node] = value;
+    while (node /= 2) value_[node] = std::max(value_[2 * node], value_[2 * node + 1]);
+  }
+
+  std::size_t leaves_ = 1;
+  std::vector<double> value_;
+};
+
+class Clipper {
+ public:
+  Clipper(const PolygonView& polygons, const double* points, double tolerance)
+      : polygons_(polygons), points_(points), tolerance_(tolerance) {}
+
+  // Appends the triangles of one polygon; false if no proper ear was left at some point.
+  bool clip(std::size_t polygon, EarClips& out) {
+    project(polygon);
+    const auto n = static_cast<int>(flat_.size());
+    prepare(n);
+    for (int i = 0; i < n; ++i) evaluate_ear(i);
+    bool proper = true;
+    int start = 0;
+    for (int left = n; left > 3; --left) {
+      int best = best_ear(start);
+      if (score_[best] <= kFlat) {
+        proper = false;
+        best = bluntest(start);
+      }
+      emit(polygon, best, out);
+      start = previous_[best];
+      remove(best);
+    }
+    proper = proper && shape(flat_[previous_[start]], flat_[start], flat_[next_[start]]) > kFlat;
+    emit(polygon, start, out);
+    return proper;
+  }
+
+ private:
+  static constexpr double kBlocked = -1.0;
+
+  void prepare(int n) {
+    next_.resize(n);
+    previous_.resize(n);
+    score_.resize(n);
+    rank_.resize(n);
+    order_.resize(n);
+    first_copy_.resize(n);
+    copies_.assign(n, 0);
+    blocker_.assign(n, -1);
+    if (waiting_.size() < flat_.size()) waiting_.resize(n);
+    for (int i = 0; i < n; ++i) {
+      next_[i] = (i + 1) % n;
+      previous_[i] = (i + n - 1) % n;
+      waiting_[i].clear();
+    }
+    std::iota(order_.begin(), order_.end(), 0);
+    std::sort(order_.begin(), order_.end(),
+              [&](int i, int j) { return vertex(i) != vertex(j) ? vertex(i) < vertex(j) : i < j; });
+    for (int k = 0; k < n; ++k) {
+      const int i = order_[k];
+      first_copy_[i] = k > 0 && vertex(order_[k - 1]) == vertex(i) ? first_copy_[order_[k - 1]] : i;
+      ++copies_[first_copy_[i]];
+    }
+    many_ = n > kFew;
+    if (!many_) return;
+    plant();
+    std::sort(order_.begin(), order_.end(), [&](int i, int j) {
+      const double *a = point(first_ + i), *b = point(first_ + j);
+      if (std::equal(a, a + 3, b)) return i < j;
+      return std::lexicographical_compare(a, a + 3, b, b + 3);
+    });
+    for (int k = 0; k < n; ++k) rank_[order_[k]] = k;
+    ears_.reset(n);
+    shapes_.reset(n);
+  }
+
+  // Puts the vertices that are left into the tree.
+  void plant() {
+    std::vector<std::int32_t> left;
+    for (std::size_t i = 0; i < flat_.size(); ++i) {
+      if (copies_[i] > 0) left.push_back(static_cast<std::int32_t>(i));
+    }
+    planted_ = left_ = left.size();
+    tree_ = PointTree<2>(flat_.front().data(), std::move(left));
+  }
+
+  // Finds the score of corner i, after its neighbors changed or what blocked it is gone.
+  void evaluate_ear(int i) {
+    score_[i] = ear_shape(i);
+    if (blocker_[i] >= 0) waiting_[blocker_[i]].push_back(i);
+    if (!many_) return;
+    ears_.set(rank_[i], score_[i]);
+    shapes_.set(rank_[i], shape(flat_[previous_[i]], flat_[i], flat_[next_[i]]));
+  }
+
+  void remove(int i) {
+    const int before = previous_[i], after = next_[i], copy = first_copy_[i];
+    next_[before] = after;
+    previous_[after] = before;
+    blocker_[i] = -1;
+    if (many_) {
+      ears_.drop(rank_[i]);
+      shapes_.drop(rank_[i]);
+    }
+    const bool gone = --copies_[copy] == 0;
+    if (gone && many_ && 2 * --left_ < planted_) plant();
+    evaluate_ear(before);
+    evaluate_ear(after);
+    if (!gone) return;
+    // An ear that was blocked by this vertex may be free now; all others stay as they are.
+    for (const int k : waiting_[copy]) {
+      if (blocker_[k] == copy) evaluate_ear(k);
+    }
+  }
+
+  int best_ear(int start) const {
+    if (many_) return order_[ears_.first(kTie)];
+    int best = start;
+    for (int i = next_[start]; i != start; i = next_[i]) {
+      if (better(i, best)) best = i;
+    }
+    return best;
+  }
+
+  // Newell's normal gives the plane; in it the polygon runs counter-clockwise.
+  void project(std::size_t polygon) {
+    first_ = polygons_.offsets[polygon];
+    const std::int64_t last = polygons_.offsets[polygon + 1];
+    std::array<double, 3> normal{}, along{};
+    const double* origin = point(first_);
+    double longest = 0.0;
+    for (std::int64_t s = first_; s < last; ++s) {
+      const double* a = point(s);
+      const double* b = point(polygons_.next(polygon, s));
+      std::array<double, 3> p{}, q{}, edge{};
+      for (int k = 0; k < 3; ++k) {
+        p[k] = a[k] - origin[k];
+        q[k] = b[k] - origin[k];
+        edge[k] = q[k] - p[k];
+      }
+      for (int k = 0; k < 3; ++k) {
+        normal[k] += p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3];
+      }
+      const double length = std::hypot(edge[0], edge[1], edge[2]);
+      if (length > longest) {
+        longest = length;
+        along = edge;
+      }
+    }
+    double size = std::hypot(normal[0], normal[1], normal[2]);
+    for (double& x : normal) x /= size > 0.0 ? size : 1.0;
+    double lean = 0.0;
+    for (int k = 0; k < 3; ++k) lean += normal[k] * along[k];
+    for (int k = 0; k < 3; ++k) along[k] -= lean * normal[k];
+    size = std::hypot(along[0], along[1], along[2]);
+    for (double& x : along) x /= size > 0.0 ? size : 1.0;
+    flat_.clear();
+    for (std::int64_t s = first_; s < last; ++s) {
+      const double* a = point(s);
+      Vec2 uv{};
+      for (int k = 0; k < 3; ++k) {
+        const double d = a[k] - origin[k];
+        uv[0] += d * along[k];
+        uv[1] += d * (normal[(k + 1) % 3] * along[(k + 2) % 3] -
+                      normal[(k + 2) % 3] * along[(k + 1) % 3]);
+      }
+      flat_.push_back(uv);
+    }
+  }
+
+  // Shape of the ear at corner i, or kBlocked if it is flat, reflex or not empty; then blocker_
+  // tells a vertex in it. A corner that lies beyond the diagonal by less than the tolerance (as
+  // inserted ones do) would be left with a sliver: such ears come last.
+  double ear_shape(int i) {
+    const int h = previous_[i], j = next_[i];
+    const Vec2 &a = flat_[h], &b = flat_[i], &c = flat_[j];
+    blocker_[i] = -1;
+    const double quality = shape(a, b, c);
+    if (quality <= kFlat) return kBlocked;
+    const double slack = 1e-14 * std::max({squared(a, b), squared(b, c), squared(c, a)});
+    const double base = squared(c, a), reach = tolerance_ * std::sqrt(base);
+    bool sliver = false;
+    const auto blocks = [&](int k) {
+      // The two banks of a bridge to a hole share their vertices: those do not block.
+      if (vertex(k) == vertex(h) || vertex(k) == vertex(i) || vertex(k) == vertex(j)) return false;
+      const Vec2& p = flat_[k];
+      if (cross(a, b, p) >= -slack && cross(b, c, p) >= -slack && cross(c, a, p) >= -slack) {
+        blocker_[i] = first_copy_[k];
+        return true;
+      }
+      const double beyond = -cross(c, a, p);
+      const double along = (p[0] - a[0]) * (c[0] - a[0]) + (p[1] - a[1]) * (c[1] - a[1]);
+      sliver = sliver || (beyond >= 0.0 && beyond <= reach && along > 0.0 && along < base);
+      return false;
+    };
+    if (many_) {
+      // A point within the slack is at most 0.5 % of an edge outside: shape > kFlat = 200 * 1e-14.
+      const double grow = 0.02 * std::sqrt(slack / 1e-14) + 2.0 * reach;
+      const Vec2 low{std::min({a[0], b[0], c[0]}) - grow, std::min({a[1], b[1], c[1]}) - grow};
+      const Vec2 high{std::max({a[0], b[0], c[0]}) + grow, std::max({a[1], b[1], c[1]}) + grow};
+      // Rounding is monotone: the computed product of no point in the box is beyond its extremes.
+      const auto extreme = [](const Vec2& from, const Vec2& to, const PointTree<2>::Box& box,
+                              bool most) {
+        return cross(from, to,
+                     {(to[1] > from[1]) == most ? box.low[0] : box.high[0],
+                      (to[0] > from[0]) == most ? box.high[1] : box.low[1]});
+      };
+      const auto meets = [&](const PointTree<2>::Box& box) {
+        if (box.low[0] > high[0] || box.low[1] > high[1] || box.high[0] < low[0] ||
+            box.high[1] < low[1]) {
+          return false;
+        }
+        const double across = extreme(c, a, box, true);
+        if (!sliver && across >= -reach && extreme(c, a, box, false) <= 0.0) return true;
+        return across >= -slack && extreme(a, b, box, true) >= -slack &&
+               extreme(b, c, box, true) >= -slack;
+      };
+      tree_.search(
+          meets, [&](int k) { return copies_[k] > 0 && blocks(k); }, static_cast<std::uint32_t>(i));
+    } else {
+      for (int k = next_[j]; k != h && !blocks(k); k = next_[k]) {
+      }
+    }
+    if (blocker_[i] >= 0) return kBlocked;
+    return sliver ? kLast * quality : quality;
+  }
+
+  bool better(int i, int than) const {
+    if (score_[i] > score_[than] + kTie) return true;
+    if (score_[i] < score_[than] - kTie) return false;
+    const double* a = point(first_ + i);
+    const double* b = point(first_ + than);
+    return std::lexicographical_compare(a, a + 3, b, b + 3);
+  }
+
+  // Where nothing is an ear (the outline crosses itself): the corner with the best shape.
+  int bluntest(int start) const {
+    if (many_) return order_[shapes_.first(0.0)];
+    int best = start;
+    double most = -2.0;
+    int i = start;
+    do {
+      const double quality = shape(flat_[previous_[i]], flat_[i], flat_[next_[i]]);
+      if (quality > most) {
+        most = quality;
+        best = i;
+      }
+      i = next_[i];
+    } while (i != start);
+    return best;
+  }
+
+  void emit(std::size_t polygon, int i, EarClips& out) const {
+    // Cyclic order starting at the first-listed corner of the three.
+    std::array<int, 3> ear{previous_[i], i, next_[i]};
+    std::rotate(ear.begin(), std::min_element(ear.begin(), ear.end()), ear.end());
+    for (const int k : ear) out.triangle_slots.push_back(first_ + k);
+    out.triangle_polygon.push_back(static_cast<std::int32_t>(polygon));
+  }
+
+  const double* point(std::int64_t slot) const {
+    return points_ + 3 * static_cast<std::size_t>(polygons_.corners[slot]);
+  }
+  std::int32_t vertex(int i) const { return polygons_.corners[first_ + i]; }
+
+  const PolygonView& polygons_;
+  const double* points_;
+  double tolerance_;
+  std::int64_t first_ = 0;
+  std::vector<Vec2> flat_;
+  std::vector<int> next_, previous_;
+  std::vector<double> score_;
+  std::vector<int> first_copy_;  // of each corner: the first one that is the same vertex
+  std::vector<int> copies_;      // of each first copy: how many corners of its vertex are left
+  std::vector<int> blocker_;     // of each blocked ear: the first copy of a vertex in it, else -1
+  std::vector<std::vector<int>>
+      waiting_;                         // of each first copy: ears that it blocks or once blocked
+  bool many_ = false;                   // corners; what follows is used only then
+  PointTree<2> tree_;                   // of the first copies
+  std::size_t planted_ = 0, left_ = 0;  // points when the tree was built, and now
+  std::vector<int> order_, rank_;       // corners by x, y, z of their points
+  Tournament ears_, shapes_;            // by rank: scores, and shapes as they stand
+};
+
+}  // namespace
+
+EarClips clip_ears(const PolygonView& polygons, const double* points, double tolerance) {
+  EarClips out;
+  out.tangled.assign(polygons.count, 0);
+  Clipper clipper(polygons, points, tolerance);
+  for (std::size_t p = 0; p < polygons.count; ++p) {
+    if (!clipper.clip(p, out)) out.tangled[p] = 1;
+  }
+  return out;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,302 @@
+#include "shell/cleaning/mending.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "shell/disjoint_sets.hpp"
+#include "shell/half_edges.hpp"
+#include "shell/large_array.hpp"
+#include "shell/topology.hpp"
+
+namespace sphshell {
+namespace {
+
+std::uint64_t mix(std::uint64_t key) {
+  key ^= key >> 33;
+  key *= 0xff51afd7ed558ccdULL;
+  key ^= key >> 33;
+  key *= 0xc4ceb9fe1a85ec53ULL;
+  return key ^ (key >> 33);
+}
+
+// Open-addressing table from a key to the head of a chain of points.
+class CellTable {
+ public:
+  explicit CellTable(std::size_t expected) {
+    std::size_t size = 16;
+    while (size < 2 * expected) size *= 2;
+    keys_.assign(size, kFree);
+    heads_.assign(size, -1);
+    mask_ = size - 1;
+  }
+
+  std::int32_t find(std::uint64_t key) const {
+    for (std::size_t at = mix(key) & mask_;; at = (at + 1) & mask_) {
+      if (keys_[at] == key) return heads_[at];
+      if (keys_[at] == kFree) return -1;
+    }
+  }
+
+  // Makes `value` the head of the chain and returns the head before it.
+  std::int32_t push(std::uint64_t key, std::int32_t value) {
+    for (std::size_t at = mix(key) & mask_;; at = (at + 1) & mask_) {
+      if (keys_[at] == kFree) keys_[at] = key;
+      if (keys_[at] == key) return std::exchange(heads_[at], value);
+    }
+  }
+
+ private:
+  static constexpr std::uint64_t kFree = ~std::uint64_t{0};
+  std::vector<std::uint64_t> keys_;
+  std::vector<std::int32_t> heads_;
+  std::size_t mask_ = 0;
+};
+
+std::array<Vec3, 3> corners_of(const double* points, const std::int32_t* vertices) {
+  std::array<Vec3, 3> out;
+  for (int k = 0; k < 3; ++k)
+    out[k] = Eigen::Map<const Vec3>(points + 3 * static_cast<std::size_t>(vertices[k]));
+  return out;
+}
+
+// A cell this many tolerances wide: few points share a cell, and few lie near a cell's border.
+constexpr double kCellInTolerances = 64.0;
+
+}  // namespace
+
+Weld weld(const double* points, std::size_t count, double tolerance) {
+  Weld out;
+  DisjointSets groups(count);
+  std::array<double, 3> low{};
+  low.fill(std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < 3 * count; ++i) low[i % 3] = std::min(low[i % 3], points[i]);
+  const double cell = kCellInTolerances * tolerance;
+  // 21 bits per axis hold the at most 1e7 / 64 cells of a box of 1e7 tolerances.
+  const auto index = [&](double x, int axis) {
+    return static_cast<std::uint64_t>(std::max(0.0, std::floor((x - low[axis]) / cell)));
+  };
+  CellTable table(count);
+  std::vector<std::int32_t> chain(count, -1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* p = points + 3 * i;
+    std::array<std::uint64_t, 3> from{}, to{};
+    for (int axis = 0; axis < 3; ++axis) {
+      from[axis] = index(p[axis] - tolerance, axis);
+      to[axis] = index(p[axis] + tolerance, axis);
+    }
+    bool same_place = false;
+    for (std::uint64_t x = from[0]; x <= to[0]; ++x) {
+      for (std::uint64_t y = from[1]; y <= to[1]; ++y) {
+        for (std::uint64_t z = from[2]; z <= to[2]; ++z) {
+          for (std::int32_t j = table.find((x << 42) | (y << 21) | z); j >= 0; j = chain[j]) {
+            const double* other = points + 3 * static_cast<std::size_t>(j);
+            const double dx = p[0] - other[0], dy = p[1] - other[1], dz = p[2] - other[2];
+            const double squared = dx * dx + dy * dy + dz * dz;
+            if (squared > tolerance * tolerance) continue;
+            groups.merge(static_cast<std::int32_t>(i), j);
+            same_place = same_place || squared == 0.0;
+          }
+        }
+      }
+    }
+    if (same_place) continue;  // an equal point is in the table already: keep chains short
+    const std::uint64_t key = (index(p[0], 0) << 42) | (index(p[1], 1) << 21) | index(p[2], 2);
+    chain[i] = table.push(key, static_cast<std::int32_t>(i));
+  }
+  out.representative.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t first = groups.find(static_cast<std::int32_t>(i));
+    out.representative[i] = first;
+    const double* a = points + 3 * i;
+    const double* b = points + 3 * static_cast<std::size_t>(first);
+    const double distance = std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+    out.largest_distance = std::max(out.largest_distance, distance);
+  }
+  return out;
+}
+
+EdgeTable edge_table(const PolygonView& polygons, std::size_t vertex_count) {
+  const auto slots = static_cast<std::size_t>(polygons.offsets[polygons.count]);
+  // The corner after each slot's own: slots are asked for in order, their polygons found as we go.
+  LargeArray<std::int32_t> following(slots);
+  for (std::size_t p = 0; p < polygons.count; ++p)
+    for (std::int64_t s = polygons.offsets[p]; s < polygons.offsets[p + 1]; ++s)
+      following[s] = polygons.corners[polygons.next(p, s)];
+  EdgeTable out;
+  out.slot_edge.assign(slots, -1);
+  out.ends.reserve(slots + 16);
+  out.users.reserve(slots / 2 + 8);
+  for_each_edge(
+      slots, vertex_count,
+      [&](std::size_t s) { return std::pair(polygons.corners[s], following[s]); },
+      [&](int low, int high, const std::uint64_t* first, const std::uint64_t* last) {
+        for (auto* word = first; word != last; ++word)
+          out.slot_edge[static_cast<std::uint32_t>(*word)] =
+              static_cast<std::int32_t>(out.users.size());
+        out.ends.push_back(low);
+        out.ends.push_back(high);
+        out.users.push_back(static_cast<std::int32_t>(last - first));
+      });
+  return out;
+}
+
+Duplicates duplicate_polygons(const PolygonView& polygons, const std::int32_t* slot_edge,
+                              const std::int32_t* users, std::size_t edge_count) {
+  Duplicates out;
+  out.first.resize(polygons.count);
+  std::iota(out.first.begin(), out.first.end(), 0);
+  out.opposite.assign(polygons.count, 0);
+  // Equal cycles have the same edges: only polygons are compared that agree about which of theirs
+  // fewest polygons use. They are chained, each to the one before.
+  LargeArray<std::int32_t> latest(edge_count, -1), before(polygons.count, -1);
+  for (std::size_t p = 0; p < polygons.count; ++p) {
+    const std::int64_t from = polygons.offsets[p], n = polygons.offsets[p + 1] - from;
+    std::int32_t edge = -1;
+    for (std::int64_t s = from; s < from + n; ++s) {
+      const std::int32_t e = slot_edge[s];
+      if (e >= 0 && (edge < 0 || std::pair(users[e], e) < std::pair(users[edge], edge))) edge = e;
+    }
+    if (edge < 0 || users[edge] < 2) continue;
+    // Canonical cycle: from the lowest corner towards its lower neighbor.
+    const auto canonical = [&](std::size_t q, bool& back) {
+      const std::int32_t* c = polygons.corners + polygons.offsets[q];
+      const std::int64_t lowest = std::min_element(c, c + n) - c;
+      back = c[(lowest + n - 1) % n] < c[(lowest + 1) % n];
+      return [=](std::int64_t k) { return c[(lowest + (back ? n - k : k)) % n]; };
+    };
+    bool back = false;
+    const auto own = canonical(p, back);
+    std::int32_t q = latest[edge];
+    for (; q >= 0; q = before[q]) {
+      if (polygons.offsets[q + 1] - polygons.offsets[q] != n) continue;
+      bool other_back = false, equal = true;
+      const auto other = canonical(static_cast<std::size_t>(q), other_back);
+      for (std::int64_t k = 0; equal && k < n; ++k) equal = own(k) == other(k);
+      if (!equal) continue;
+      out.first[p] = q;
+      out.opposite[p] = back != other_back;
+      break;
+    }
+    if (q < 0) before[p] = std::exchange(latest[edge], static_cast<std::int32_t>(p));
+  }
+  return out;
+}
+
+std::vector<std::uint8_t> repeated_corners(const PolygonView& polygons) {
+  std::vector<std::uint8_t> out;
+  for (const std::int64_t back : {1, 2}) {
+    for (std::size_t p = 0; p < polygons.count; ++p) {
+      const std::int64_t from = polygons.offsets[p], n = polygons.offsets[p + 1] - from;
+      for (std::int64_t k = 0; k < n; ++k) {
+        const std::int32_t* c = polygons.corners + from;
+        // A corner that the next one repeats; or the tip between two that are one vertex.
+        const bool repeated =
+            back == 1 ? c[k] == c[(k + 1) % n] : c[(k + n - 1) % n] == c[(k + 1) % n];
+        if (!repeated) continue;
+        if (out.empty()) out.assign(static_cast<std::size_t>(polygons.offsets[polygons.count]), 0);
+        out[from + k] = 1;
+      }
+    }
+    if (!out.empty()) break;
+  }
+  return out;
+}
+
+std::vector<double> triangle_shapes(const PolygonView& polygons, const double* points) {
+  std::vector<double> out(polygons.count, -1.0);
+  for (std::size_t p = 0; p < polygons.count; ++p) {
+    const std::int64_t from = polygons.offsets[p];
+    if (polygons.offsets[p + 1] - from != 3) continue;
+    const auto [a, b, c] = corners_of(points, polygons.corners + from);
+    const double area = (b - a).cross(c - a).norm();
+    const double longest =
+        std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
+    out[p] = area / (longest > 0.0 ? longest : 1.0);
+  }
+  return out;
+}
+
+ComponentSums component_sums(const double* points, const std::int32_t* triangles,
+                             const std::int32_t* triangle_polygon, std::size_t triangle_count,
+                             const std::int32_t* component, const std::uint8_t* flip,
+                             std::size_t component_count, const double* center) {
+  ComponentSums out;
+  out.volume.assign(component_count, 0.0);
+  out.area = out.turned_area = out.volume;
+  out.largest.assign(component_count, 0);
+  std::vector<double> most(component_count, -1.0);
+  const Vec3 middle(center[0], center[1], center[2]);
+  for (std::size_t t = 0; t < triangle_count; ++t) {
+    const std::size_t p = triangle_polygon == nullptr ? t : triangle_polygon[t];
+    const auto [a, b, c] = corners_of(points, triangles + 3 * t);
+    const Vec3 vector_area = 0.5 * (b - a).cross(c - a);
+    const double area = vector_area.norm(), share = (a - middle).dot(vector_area) / 3.0;
+    const std::int32_t owner = component[p];
+    out.volume[owner] += flip[p] ? -share : share;
+    out.area[owner] += area;
+    out.turned_area[owner] += flip[p] ? area : -area;
+    if (area >= most[owner]) most[owner] = area, out.largest[owner] = static_cast<std::int32_t>(t);
+  }
+  return out;
+}
+
+Orientation flood_fill(const PolygonView& polygons, const std::int32_t* slot_edge,
+                       const std::int32_t* users, std::size_t edge_count) {
+  struct User {
+    std::int32_t slot, polygon;
+  };
+  constexpr User kNone{-1, -1};
+  LargeArray<User> pair(2 * edge_count, kNone);
+  for (std::size_t p = 0; p < polygons.count; ++p) {
+    for (std::int64_t s = polygons.offsets[p]; s < polygons.offsets[p + 1]; ++s) {
+      const std::int32_t edge = slot_edge[s];
+      if (edge < 0 || users[edge] != 2) continue;
+      pair[2 * edge + (pair[2 * edge].slot < 0 ? 0 : 1)] = {static_cast<std::int32_t>(s),
+                                                            static_cast<std::int32_t>(p)};
+    }
+  }
+  Orientation out;
+  out.component.assign(polygons.count, -1);
+  out.flip.assign(polygons.count, 0);
+  std::vector<std::int32_t> queue;
+  for (std::size_t seed = 0; seed < polygons.count; ++seed) {
+    if (out.component[seed] >= 0) continue;
+    const auto label = static_cast<std::int32_t>(out.one_sided.size());
+    out.one_sided.push_back(0);
+    out.component[seed] = label;
+    queue.assign(1, static_cast<std::int32_t>(seed));
+    for (std::size_t head = 0; head < queue.size(); ++head) {
+      const std::int32_t p = queue[head];
+      for (std::int64_t s = polygons.offsets[p]; s < polygons.offsets[p + 1]; ++s) {
+        const std::int32_t edge = slot_edge[s];
+        if (edge < 0 || users[edge] != 2) continue;
+        const User& twin = pair[2 * edge + (pair[2 * edge].slot == s ? 1 : 0)];
+        const std::int32_t q = twin.polygon;
+        if (q == p) continue;  // a seam of a polygon with itself tells nothing
+        const bool same_way = polygons.corners[s] == polygons.corners[twin.slot];
+        const std::uint8_t wanted = out.flip[p] ^ static_cast<std::uint8_t>(same_way);
+        if (out.component[q] < 0) {
+          out.component[q] = label;
+          out.flip[q] = wanted;
+          queue.push_back(q);
+        } else if (out.flip[q] != wanted) {
+          out.one_sided[label] = 1;
+        }
+      }
+    }
+  }
+  return out;
+}
+
+std::vector<std::int32_t> connected_components(std::size_t nodes, const std::int32_t* pairs,
+                                               std::size_t pair_count) {
+  DisjointSets sets(nodes);
+  for (std::size_t k = 0; k < pair_count; ++k) sets.merge(pairs[2 * k], pairs[2 * k + 1]);
+  return sets.labels();
+}
+
+}  // namespace sphshell

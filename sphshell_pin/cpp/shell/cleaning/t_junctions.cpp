@@ -1,0 +1,87 @@
+// Vertices that lie on the open edges of other polygons, found with a k-d tree.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "shell/cleaning/mending.hpp"
+#include "shell/point_tree.hpp"
+
+namespace sphshell {
+namespace {
+
+// Slab test of the segment against the box grown by the tolerance: never misses a point.
+bool meets(const PointTree<3>::Box& box, const double* a, const double* b, double tolerance) {
+  double enter = 0.0, leave = 1.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = box.low[axis] - tolerance, high = box.high[axis] + tolerance;
+    const double d = b[axis] - a[axis];
+    if (d == 0.0) {
+      if (a[axis] < low || a[axis] > high) return false;
+      continue;
+    }
+    const double one = (low - a[axis]) / d, two = (high - a[axis]) / d;
+    enter = std::max(enter, std::min(one, two));
+    leave = std::min(leave, std::max(one, two));
+    // A little slack: the quotients carry rounding.
+    if (enter > leave + 1e-9) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Insertions find_t_junctions(const PolygonView& polygons, const double* points,
+                            const std::vector<std::int64_t>& open_slots,
+                            const std::vector<std::int32_t>& open_polygons,
+                            const std::vector<std::int32_t>& candidates, double tolerance,
+                            std::size_t most) {
+  Insertions out;
+  const PointTree<3> tree(points, candidates);
+  struct Hit {
+    double parameter;
+    std::int32_t vertex;
+  };
+  std::vector<Hit> hits;
+  // Per vertex the last polygon that has it as a corner.
+  std::vector<std::int32_t> owner(candidates.empty() ? 0 : candidates.back() + 1, -1);
+  for (std::size_t k = 0; k < open_slots.size() && out.slot.size() <= most; ++k) {
+    const auto polygon = static_cast<std::size_t>(open_polygons[k]);
+    const std::int64_t from = polygons.offsets[polygon], to = polygons.offsets[polygon + 1];
+    const std::int64_t slot = open_slots[k];
+    if (k == 0 || open_polygons[k] != open_polygons[k - 1]) {
+      for (std::int64_t s = from; s < to; ++s) {
+        const auto corner = static_cast<std::size_t>(polygons.corners[s]);
+        if (corner < owner.size()) owner[corner] = open_polygons[k];
+      }
+    }
+    const double* a = points + 3 * static_cast<std::size_t>(polygons.corners[slot]);
+    const double* b =
+        points + 3 * static_cast<std::size_t>(polygons.corners[polygons.next(polygon, slot)]);
+    const std::array<double, 3> d{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    hits.clear();
+    const auto near = [&](const PointTree<3>::Box& box) { return meets(box, a, b, tolerance); };
+    tree.search(near, [&](std::int32_t vertex) {
+      if (owner[static_cast<std::size_t>(vertex)] == open_polygons[k]) return false;
+      const double* p = points + 3 * static_cast<std::size_t>(vertex);
+      const std::array<double, 3> e{p[0] - a[0], p[1] - a[1], p[2] - a[2]};
+      const double t = (e[0] * d[0] + e[1] * d[1] + e[2] * d[2]) / squared;
+      if (t > 0.0 && t < 1.0 &&
+          std::hypot(e[0] - t * d[0], e[1] - t * d[1], e[2] - t * d[2]) <= tolerance) {
+        hits.push_back({t, vertex});
+      }
+      return out.slot.size() + hits.size() > most;
+    });
+    std::sort(hits.begin(), hits.end(), [](const Hit& x, const Hit& y) {
+      return x.parameter != y.parameter ? x.parameter < y.parameter : x.vertex < y.vertex;
+    });
+    for (const Hit& hit : hits) {
+      out.slot.push_back(slot);
+      out.vertex.push_back(hit.vertex);
+      out.parameter.push_back(hit.parameter);
+    }
+  }
+  return out;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,100 @@
+// Inside of creases.cpp and crease_evidence.cpp: what is known of every edge while creases are
+// sought.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <utility>
+#include <vector>
+
+#include "shell/curved/creases.hpp"
+#include "shell/curved/fans.hpp"
+
+namespace sphshell {
+
+// Coordinates are known to this share of the box at best: single precision.
+constexpr double kRounded = 1.2e-7;
+
+// The surface at one side of an element, estimated from that element alone.
+struct SideEstimate {
+  float turn;       // from its plane to the side [rad], > 0 convex
+  float curvature;  // across the side [1/m]
+  float height;     // of the opposite corner over the side [m]
+  bool known;       // there are elements beyond the opposite corner
+};
+
+// An edge. Single precision: there is one for every edge of the surface at a time.
+struct Joint {
+  Eigen::Vector3f direction;
+  int half_edge[2];  // none where < 0: an edge that is no joint of two elements wound alike
+  float angle;       // [rad], > 0 convex
+  bool exists() const { return half_edge[0] >= 0; }
+};
+
+// The side of a joint that bends more, of those that are known.
+inline int curved_side(const std::array<SideEstimate, 2>& estimates) {
+  const auto& [a, b] = estimates;
+  return a.known && (!b.known || std::abs(a.curvature) >= std::abs(b.curvature)) ? 0 : 1;
+}
+
+class CreaseSearch {
+ public:
+  CreaseSearch(const Shell& shell, std::vector<Vec3> normals, bool given, const Faces& faces)
+      : shell_(shell), given_(given), faces_(faces), original_(std::move(normals)) {
+    list_joints();
+    start();
+  }
+
+  CornerNormals divide();
+
+ private:
+  const std::vector<Vec3>& points() const { return shell_.vertices(); }
+  int vertex(int corner) const { return shell_.triangles()[corner / 3][corner % 3]; }
+  bool is_known(int corner) const { return faces_.of_triangle(corner / 3) >= 0; }
+  // Whether the faces at both sides of a joint are known.
+  bool is_settled(std::size_t e) const {
+    return is_known(joints_[e].half_edge[0]) && is_known(joints_[e].half_edge[1]);
+  }
+  // The corner opposite a half-edge.
+  static int opposite(int h) { return Fans::before(h); }
+
+  void list_joints();
+  void start();
+  Fans fans() const;
+  void normals_of(const Fans& fans);
+  SideEstimate estimate_side(const Fans& fans, int h) const;
+  bool reaches_beyond(const Fans& fans, int h) const;
+  void classify_joints();
+  void weigh_runs();
+  float count_along(int vertex, const Eigen::Vector3f& direction,
+                    const std::vector<char>& joints) const;
+  bool add_creases();
+  template <class May>
+  void extend_lines(std::vector<int> ends, May&& may);
+  void separate_straight_walls();
+  void lean_as_other_ends(const Fans& fans);
+
+  template <class Visit>
+  void at_vertex(int vertex, Visit&& visit) const {
+    const Topology& topology = shell_.topology();
+    for (int i = topology.neighbor_begin[vertex]; i < topology.neighbor_begin[vertex + 1]; ++i)
+      visit(edge_at_[i]);
+  }
+
+  const Shell& shell_;
+  bool given_;
+  const Faces& faces_;
+  std::vector<Vec3> original_, normals_;
+  std::vector<int> original_count_;  // per corner: of its fan before it was divided
+  std::vector<char> divided_;        // per corner
+  std::vector<char> independent_;    // per corner, of given normals
+  std::vector<Joint> joints_;        // per edge
+  std::vector<int> edge_at_;         // beside Topology::neighbors
+  std::vector<char> crease_;         // per edge, as all that follows
+  std::vector<char> explained_, alike_, core_, smooth_;
+  std::vector<float> off_, evidence_;
+  std::vector<std::array<float, 2>> run_;  // evidence beyond either side
+  std::vector<std::array<SideEstimate, 2>> estimates_;
+};
+
+}  // namespace sphshell

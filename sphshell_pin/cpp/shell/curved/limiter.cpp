@@ -1,0 +1,139 @@
+#include "shell/curved/limiter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace sphshell {
+namespace {
+
+// A facet holds no turn beyond a side if it is so many times higher than the one beside it.
+constexpr double kMuchHigher = 5;
+// A side may leave its chord by so many times the sagitta of the turns around: regular triangles
+// need 2, irregular ones up to 8.
+constexpr double kMostSagittas = 8;
+// And by so many times what this share of all sides, by length, account for: a mesher makes its
+// errors alike. A surface that fits the vertices around is better evidence, but not along a needle,
+// so many times longer than high, of which it sees the ends alone.
+constexpr double kMostUsual = 2, kMost = 0.75, kNeedle = 10;
+
+}  // namespace
+
+Dominance::Dominance(const Shell& shell, const CoplanarRegions& regions)
+    : shell_(shell), regions_(regions), uneven_(shell.topology().edges.size(), 0) {
+  const Topology& topology = shell.topology();
+  for (std::size_t e = 0; e < uneven_.size(); ++e) {
+    const Edge& edge = topology.edges[e];
+    if (edge.count != 2 || edge.kind != EdgeClass::Smooth) continue;
+    const double a = regions.height(topology.incidence[edge.begin]),
+                 b = regions.height(topology.incidence[edge.begin + 1]);
+    uneven_[e] = a > kMuchHigher * b || b > kMuchHigher * a;
+  }
+}
+
+bool Dominance::normal(const int* begin, const int* end, Vec3& normal, double& ratio) const {
+  const Topology& topology = shell_.topology();
+  if (std::none_of(begin, end, [&](int c) {
+        return uneven_[topology.edge_of[c]] || uneven_[topology.edge_of[Fans::before(c)]];
+      }))
+    return false;
+  // One coplanar region of the fan: how high it stands over what it dominates; what dominates it.
+  struct Member {
+    int region;
+    double height, under;
+  };
+  struct Pair {
+    int here, there;
+    double height;
+  };
+  std::vector<Member> members;
+  std::vector<Pair> sides;
+  const auto member = [&](int region) -> Member& {
+    for (Member& m : members)
+      if (m.region == region) return m;
+    members.push_back({region, 0, 0});
+    return members.back();
+  };
+  bool any = false;
+  ratio = 0;
+  for (const int* c = begin; c != end; ++c)
+    for (const int h : {*c, Fans::before(*c)}) {
+      const Edge& edge = topology.edges[topology.edge_of[h]];
+      if (edge.count != 2) continue;
+      const int g = topology.other_half_edge(edge, h);
+      const int here = regions_.of(triangle_of(h)), there = regions_.of(triangle_of(g));
+      if (here == there || std::none_of(begin, end, [&](int d) { return d / 3 == g / 3; }))
+        continue;
+      const double up = regions_.height(h), down = regions_.height(g);
+      ratio = std::max(ratio, up / down);
+      if (up > kMuchHigher * down)
+        any = true, member(here).height = std::max(member(here).height, up);
+      if (down > kMuchHigher * up) member(here).under = std::max(member(here).under, down);
+      sides.push_back({here, there, down});
+    }
+  if (!any) return false;
+  // What lies beside a dominated facet, and is as low, is dominated with it.
+  for (bool more = true; more;) {
+    more = false;
+    for (const Pair& side : sides) {
+      const double under = member(side.here).under;
+      if (!(under > kMuchHigher * side.height) || member(side.there).under >= under) continue;
+      member(side.there).under = under;
+      more = true;
+    }
+  }
+  double highest = 0;
+  for (const Member& m : members)
+    if (m.under == 0) highest = std::max(highest, m.height);
+  if (!(highest > 0)) return false;
+  Vec3 sum = Vec3::Zero();
+  for (const int* c = begin; c != end; ++c) {
+    const Member& m = member(regions_.of(*c / 3));
+    if (m.under == 0 && kMuchHigher * m.height >= highest)
+      sum += max_weight(shell_, *c) * regions_.normal(m.region);
+  }
+  if (sum.isZero(0)) return false;
+  normal = sum.normalized();
+  return true;
+}
+
+void SagittaWitness::add(const Shell& shell, const Edge& edge) {
+  const Topology& topology = shell.topology();
+  const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+  const int a = regions_.of(triangle_of(h)), b = regions_.of(triangle_of(g));
+  if (a == b) return;
+  const double turn = std::abs(topology.angle(shell.vertices(), shell.triangles(), edge));
+  const auto s = static_cast<float>(turn * std::min(regions_.height(h), regions_.height(g)) / 8);
+  sagitta_[a] = std::max(sagitta_[a], s);
+  sagitta_[b] = std::max(sagitta_[b], s);
+  const std::vector<Vec3>& p = shell.vertices();
+  sides_.push_back({s, static_cast<float>((p[edge.last_vertex] - p[edge.first_vertex]).norm())});
+}
+
+void SagittaWitness::find_usual() {
+  std::sort(sides_.begin(), sides_.end());
+  double length = 0, below = 0;
+  for (const auto& side : sides_) length += side.second;
+  for (const auto& [sagitta, own] : sides_) {
+    if (below > kMost * length) break;
+    below += own;
+    usual_ = sagitta;
+  }
+  std::vector<std::pair<float, float>>().swap(sides_);
+}
+
+double SagittaWitness::most(const Shell& shell, const Edge& edge, bool smooth, bool fitted) const {
+  double least = std::numeric_limits<double>::infinity(), lowest = least, most = 0;
+  for (int i = edge.begin; i < edge.begin + edge.count; ++i) {
+    const double s = sagitta_[regions_.of(triangle_of(shell.topology().incidence[i]))];
+    least = std::min(least, s), most = std::max(most, s);
+    lowest = std::min(lowest, regions_.height(shell.topology().incidence[i]));
+  }
+  const double local = kMostSagittas * (smooth ? least : most);
+  const double length =
+      (shell.vertices()[edge.last_vertex] - shell.vertices()[edge.first_vertex]).norm();
+  return fitted && length <= kNeedle * lowest ? local : std::min(local, kMostUsual * usual_);
+}
+
+}  // namespace sphshell

@@ -1,0 +1,284 @@
+#include "shell/curved/vertex_normals.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "shell/curved/creases.hpp"
+#include "shell/curved/fans.hpp"
+#include "shell/in_parallel.hpp"
+#include "shell/curved/limiter.hpp"
+
+namespace sphshell {
+namespace {
+
+// A fit leaves at most this share of the squared heights: what curves more unevenly is noise, or
+// the end of a fillet.
+constexpr double kMostUneven = 0.1;
+// Smallest pivot of the scaled normal equations: below, the points do not tell the terms apart.
+constexpr double kLeastPivot = 1e-6;
+// A tilt of the frame that settles it [rad].
+constexpr double kSettledTilt = 1e-7;
+// Normals agree within this angle [rad] and share of the spread of the normals around.
+constexpr double kSmallTurn = 0.005, kLikely = 0.25;
+// Where a facet is much higher than its neighbors the surface may be smooth all the same, if it was
+// sampled unevenly: up to this ratio of heights, if two fits leave little and agree within a share
+// of the spread.
+constexpr double kMostUnevenHeights = 10, kLittle = 0.02, kSurelyAlike = 0.1;
+// A given normal contradicts a face that is off by more than this.
+constexpr double kContradiction = 0.01;
+// Corners take the normal of a face in their fan within this angle [rad] of their own facet's.
+constexpr double kTakesOver = 0.44;
+
+// True where the surface falls away from a fan's vertex along straight lines, as from the tip of a
+// cone: seen from the vertices around it does not bend that much.
+bool is_cone_apex(const Shell& shell, const std::vector<Vec3>& normals, const int* begin,
+                  const int* end) {
+  double uneven = 0, bent = 0;
+  for (const int* c = begin; c != end; ++c) {
+    const int t = *c / 3, k = *c % 3;
+    const Triangle& triangle = shell.triangles()[t];
+    for (int far : {next_corner(k), previous_corner(k)}) {
+      const Vec3 edge = shell.vertices()[triangle[far]] - shell.vertices()[triangle[k]];
+      const double here = -normals[*c].dot(edge), there = normals[3 * t + far].dot(edge);
+      uneven += std::abs(here - there) / edge.norm();
+      bent += (std::abs(here) + std::abs(there)) / edge.norm();
+    }
+  }
+  return uneven > 0.5 * bent;
+}
+
+// The normal at `origin` of the surface through it that fits the points around best. Heights over
+// the tangent plane are those of circular arcs whose curvature is a quadratic form of the
+// direction, z = a x + b y + (A x^2 + 2 B x y + C y^2) (x^2 + y^2 + z^2) / (2 (x^2 + y^2)), so that
+// spheres are exact; with 9 terms the cubics too. False where the points do not determine it, or do
+// not fit.
+template <int Terms>
+bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& normal,
+                double most_uneven = kMostUneven) {
+  using Row = Eigen::Matrix<double, Terms, 1>;
+  using Square = Eigen::Matrix<double, Terms, Terms>;
+  if (points.size() < Terms + 3) return false;
+  double size2 = 0;
+  for (const Vec3& p : points) size2 += (p - origin).squaredNorm();
+  const double scale = std::sqrt(double(points.size()) / size2);
+  Vec3 n = normal;
+  // The frame turns with the normal: a few rounds settle both.
+  for (int round = 0; round < 3; ++round) {
+    const Vec3 east = n.unitOrthogonal(), north = n.cross(east);
+    Square square = Square::Zero();
+    Row along = Row::Zero();
+    double heights2 = 0;
+    for (const Vec3& p : points) {
+      const Vec3 d = scale * (p - origin);
+      const double x = d.dot(east), y = d.dot(north), z = d.dot(n);
+      const double flat2 = x * x + y * y, full2 = d.squaredNorm();
+      if (flat2 < 0.1 * full2) return false;
+      const double arc = full2 / flat2, weight = 1 / full2;
+      Row row;
+      row.template head<5>() << x, y, arc * x * x, arc * x * y, arc * y * y;
+      if constexpr (Terms == 9)
+        row.template tail<4>() << x * x * x, x * x * y, x * y * y, y * y * y;
+      square.noalias() += weight * row * row.transpose();
+      along += weight * z * row;
+      heights2 += weight * z * z;
+    }
+    // Columns scaled alike, so that the pivots tell how nearly dependent they are.
+    const Row size = square.diagonal().cwiseSqrt();
+    if (!(size.minCoeff() > 0)) return false;
+    const Eigen::LDLT<Square> solver(size.cwiseInverse().asDiagonal() * square *
+                                     size.cwiseInverse().asDiagonal());
+    if (!(solver.vectorD().cwiseAbs().minCoeff() > kLeastPivot)) return false;
+    const Row fit = solver.solve(along.cwiseQuotient(size)).cwiseQuotient(size);
+    if (round > 0 && heights2 - fit.dot(along) > most_uneven * heights2) return false;
+    n = (n - fit[0] * east - fit[1] * north).normalized();
+    // What a further round would turn it by is smaller than this by as much as it is small.
+    if (round > 0 && fit.template head<2>().squaredNorm() < kSettledTilt * kSettledTilt) break;
+  }
+  normal = n;
+  return true;
+}
+
+}  // namespace
+
+double max_weight(const Shell& shell, int corner) {
+  const Triangle& t = shell.triangles()[corner / 3];
+  const int k = corner % 3;
+  const std::vector<Vec3>& p = shell.vertices();
+  const Vec3 a = p[t[next_corner(k)]] - p[t[k]], b = p[t[previous_corner(k)]] - p[t[k]];
+  return a.cross(b).norm() / (a.squaredNorm() * b.squaredNorm());
+}
+
+Vec3 max_normal(const Shell& shell, const int* begin, const int* end) {
+  Vec3 sum = Vec3::Zero();
+  for (const int* c = begin; c != end; ++c)
+    sum += max_weight(shell, *c) * shell.topology().face_normal[*c / 3];
+  return sum.normalized();
+}
+
+EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& regions,
+                                  const Faces& faces) {
+  const Topology& topology = shell.topology();
+  const int corners = 3 * static_cast<int>(shell.triangles().size());
+  std::vector<Vec3> out(static_cast<std::size_t>(corners));
+  std::vector<Trust> trust(out.size(), Trust::Averaged);
+  const auto known = [&](int c) { return faces.of_triangle(c / 3) >= 0; };
+  for (int c = 0; c < corners; ++c)
+    if (known(c)) out[c] = faces.normal(shell, c / 3, c % 3), trust[c] = Trust::Own;
+  // Faces with normals of their own meet at a crease, whatever the angle.
+  const Fans fans(shell, [&](const Edge& edge) {
+    if (!edge.inner && edge.kind != EdgeClass::Smooth) return false;
+    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    return !known(h) || !known(g) ||
+           (out[h] - out[Fans::after(g)]).norm() + (out[Fans::after(h)] - out[g]).norm() <
+               kSameNormal;
+  });
+  const int count = fans.size();
+  const auto set = [&](int fan, const Vec3& normal, Trust how) {
+    for (const int* c = fans.begin(fan); c != fans.end(fan); ++c)
+      if (!known(*c)) out[*c] = normal, trust[*c] = how;
+  };
+  // Largest angle [rad] from a fan's normal to those of its triangles and of the fans beside it.
+  std::vector<Vec3> plain;
+  const auto spread = [&](int fan, bool beside) {
+    double cosine = 1;
+    for (const int* c = fans.begin(fan); c != fans.end(fan); ++c) {
+      cosine = std::min(cosine, plain[*c].dot(topology.face_normal[*c / 3]));
+      for (int k = 0; beside && k < 3; ++k)
+        cosine = std::min(cosine, plain[*c].dot(plain[*c / 3 * 3 + k]));
+    }
+    return std::acos(std::clamp(cosine, -1.0, 1.0));
+  };
+  for (int fan = 0; fan < count; ++fan)
+    if (fans.begin(fan) != fans.end(fan))
+      set(fan, max_normal(shell, fans.begin(fan), fans.end(fan)), Trust::Averaged);
+  plain = out;
+  std::vector<int> around;
+  std::vector<Vec3> points;
+  const std::vector<char> none(out.size(), 0);
+  const auto gather = [&](int fan, const std::vector<char>& sharp, std::vector<int>& vertices,
+                          std::vector<Vec3>& at) {
+    fans.vertices_around(fan, sharp, vertices);
+    at.clear();
+    for (int v : vertices) at.push_back(shell.vertices()[v]);
+    return shell.vertices()[fans.vertex(*fans.begin(fan))];
+  };
+  const auto fits_surely = [&](int fan) {
+    const Vec3 origin = gather(fan, none, around, points);
+    Vec3 quadratic = plain[*fans.begin(fan)], cubic = quadratic;
+    return fit_normal<5>(origin, points, quadratic, kLittle) &&
+           fit_normal<9>(origin, points, cubic, kLittle) &&
+           quadratic.cross(cubic).norm() <= kSurelyAlike * spread(fan, false);
+  };
+  // Takes the normals of the faces in a fan over: the one that a facet has too, else their mean.
+  const auto take_over = [&](int fan) {
+    Vec3 sum = Vec3::Zero();
+    const int *begin = fans.begin(fan), *end = fans.end(fan);
+    for (const int* c = begin; c != end; ++c)
+      if (known(*c)) sum += out[*c];
+    if (sum.isZero(0)) return false;
+    sum.normalize();
+    for (const int* c = begin; c != end; ++c) {
+      if (known(*c)) continue;
+      const Vec3& own = topology.face_normal[*c / 3];
+      const bool alike = std::any_of(begin, end, [&](int d) {
+        return known(d) && (out[d] - own).squaredNorm() < kSameNormal * kSameNormal;
+      });
+      out[*c] = !alike && sum.dot(own) > std::cos(kTakesOver) ? sum : own;
+      trust[*c] = Trust::Limited;
+    }
+    return true;
+  };
+  // What is flat or sharp (its triangles spread more than creases may) keeps its triangles' own. No
+  // fit looks past what is sharp, a face, or limited.
+  const Dominance dominance(shell, regions);
+  std::vector<char> settled(out.size(), 0), sharp(out.size(), 0);
+  for (int fan = 0; fan < count; ++fan) {
+    const int *begin = fans.begin(fan), *end = fans.end(fan);
+    if (begin == end) continue;
+    if (take_over(fan)) {
+      settled[fan] = sharp[fan] = 1;
+      continue;
+    }
+    const double angle = spread(fan, false), limit = shell.crease_angle();
+    sharp[fan] = angle > limit || (angle > limit / 2 && is_cone_apex(shell, plain, begin, end));
+    settled[fan] = sharp[fan] || std::all_of(begin, end, [&](int c) {
+                     return topology.planar_face[c / 3] == topology.planar_face[*begin / 3];
+                   });
+    Vec3 normal;
+    double ratio;
+    if (settled[fan]) {
+      for (const int* c = begin; c != end; ++c)
+        out[*c] = topology.face_normal[*c / 3], trust[*c] = Trust::Facet;
+    } else if (dominance.normal(begin, end, normal, ratio) &&
+               (ratio > kMostUnevenHeights || !fits_surely(fan))) {
+      set(fan, normal, Trust::Limited);
+      settled[fan] = sharp[fan] = 1;
+    }
+  }
+  plain = out;
+  const auto fit = [&](int fan, std::vector<int>& near, std::vector<Vec3>& at) {
+    const Vec3 origin = gather(fan, sharp, near, at);
+    const Vec3 own = plain[*fans.begin(fan)];
+    Vec3 quadratic = own, cubic = own;
+    const bool fits = fit_normal<5>(origin, at, quadratic);
+    const bool fits_better = fit_normal<9>(origin, at, cubic);
+    const auto agree = [](const Vec3& a, const Vec3& b, double angle) {
+      return a.cross(b).norm() <= kSmallTurn + angle;
+    };
+    // Two fits that agree are right. One alone has to stay close to the triangles; seen from one
+    // side only, a normal may lie somewhat beyond them.
+    const bool open = topology.vertex_sharp[fans.vertex(*fans.begin(fan))];
+    if (fits && fits_better ? agree(quadratic, cubic, kLikely * spread(fan, true))
+                            : fits_better && agree(cubic, own, kLikely * spread(fan, false)))
+      set(fan, cubic, Trust::Fitted);
+    else if (fits && !fits_better &&
+             agree(quadratic, own, open ? 1.1 * spread(fan, true) : kLikely * spread(fan, false)))
+      set(fan, quadratic, Trust::Fitted);
+  };
+  in_parallel(static_cast<std::size_t>(count), kAllCores, kGrain,
+              [&](std::size_t begin, std::size_t end) {
+                std::vector<int> near;
+                std::vector<Vec3> at;
+                for (std::size_t fan = begin; fan < end; ++fan)
+                  if (fans.begin(fan) != fans.end(fan) && !settled[fan])
+                    fit(static_cast<int>(fan), near, at);
+              });
+  return {std::move(out), std::move(trust), false};
+}
+
+bool estimated_elsewhere(const Shell& shell, const std::vector<Vec3>& given) {
+  const Topology& topology = shell.topology();
+  const auto alike = [&](int i, int j) { return (given[i] - given[j]).norm() <= kSameNormal; };
+  const Fans fans(shell, [&](const Edge& edge) {
+    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    return alike(h, Fans::after(g)) && alike(Fans::after(h), g);
+  });
+  // Means over edges beyond the crease angle, as on a coarse ball, are better than none.
+  int within = 0, beyond = 0;
+  for (const Edge& edge : topology.edges) {
+    const double turn = std::abs(topology.angle(shell.vertices(), shell.triangles(), edge));
+    within += turn > kSameNormal && edge.kind == EdgeClass::Smooth;
+    beyond += turn < kSurelySharp && edge.kind == EdgeClass::Crease;
+  }
+  return beyond <= within && are_means(shell, fans, given);
+}
+
+EstimatedNormals settle_given_normals(const Shell& shell, const std::vector<Vec3>& given,
+                                      Faces& faces) {
+  std::vector<char> contradicted(faces.shapes.size(), 0);
+  const int corners = static_cast<int>(given.size());
+  for (int c = 0; c < corners; ++c) {
+    const int face = faces.of_triangle(c / 3);
+    if (face >= 0 && (faces.normal(shell, c / 3, c % 3) - given[c]).norm() > kContradiction)
+      contradicted[face] = 1;
+  }
+  faces.give_up(contradicted);
+  EstimatedNormals out{given, std::vector<Trust>(given.size(), Trust::Own), true};
+  for (int c = 0; c < corners; ++c)
+    if (faces.of_triangle(c / 3) >= 0) out.normals[c] = faces.normal(shell, c / 3, c % 3);
+  return out;
+}
+
+}  // namespace sphshell

@@ -1,0 +1,1 @@
+"""Controllers: joint torques from the state, and the paths that they follow."""

@@ -1,0 +1,1 @@
+"""Runs: integrators, single runs, open runs, rollouts and their sensitivities."""

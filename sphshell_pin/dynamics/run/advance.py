@@ -1,0 +1,314 @@
+"""Starts compiled runs and makes results of what they recorded: for run, open run and rollout."""
+
+from __future__ import annotations
+
+import math
+import signal
+import threading
+import warnings
+from collections.abc import Callable, Collection
+from types import FrameType
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sphshell_pin import _core
+from sphshell_pin.checks import (
+    check_finite,
+    check_moved_mass,
+    check_not_negative,
+    check_positive,
+)
+from sphshell_pin.dynamics.control.callables import reads_sensors
+from sphshell_pin.dynamics.control.controllers import Callback, Controller, wrap_callable
+from sphshell_pin.dynamics.result.contact_patches import check_record
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.run_stats import JointFigures, PairFigures, RunStats
+from sphshell_pin.dynamics.run.integrators import Integrator
+from sphshell_pin.dynamics.scene.explain import (
+    DEFAULT_SPEED,
+    coarseness,
+    explain_pairs,
+    relaxation_time,
+    weakness,
+)
+from sphshell_pin.dynamics.scene.joint_components import moving_joints
+from sphshell_pin.dynamics.scene.models import find_joint
+from sphshell_pin.dynamics.scene.scene import Scene
+from sphshell_pin.dynamics.sensing.sensors import SensorSet
+from sphshell_pin.errors import DeepStart, InvalidParameter, SetupWarning, WeakLawWarning
+
+Array = NDArray[np.float64]
+AnyController = Controller | Callback | None
+# A compiled run, or what a rollout keeps of one.
+Ended: TypeAlias = "_core.Simulation | _core.Outcome"
+
+_DIVERGED, _STUCK = 2, 3
+# Python looks up this often [s] while compiled code runs: progress, Ctrl-C.
+GLANCE = 0.05
+_MOST_STEPS = 2.0**31 - 1
+# The compiled loop gives up beyond this position [m or rad].
+_FARTHEST = 1e12
+
+
+def start_run(
+    scene: Scene,
+    integrator: Integrator,
+    q0: ArrayLike,
+    v0: ArrayLike | None,
+    duration: float,
+    controller: AnyController,
+    control_dt: float | None,
+    *,
+    record_dt: float | None,
+    t0: float,
+    sensors: SensorSet,
+    record: Collection[str] = (),
+    warn: bool = True,
+    prepare: Callable[[_core.Simulation], None] | None = None,
+) -> _core.Simulation:
+    """Check the arguments of Simulation.run and return the compiled run at its start.
+
+    `prepare` is called with it before its first row is recorded. With `warn`, a law that cannot
+    stop its sphere causes a WeakLawWarning, and a controller whose parameters are probably a
+    mistake, or steps that are longer than recommended, a SetupWarning.
+    """
+    q, v = scene.check_state(q0, v0)
+    duration = check_not_negative("duration", duration, "s")
+    core_controller, hold = bind_controller(scene, integrator, controller, control_dt, q, sensors)
+    if warn and isinstance(controller, Controller):
+        for doubt in controller.doubts(scene, q):
+            warnings.warn(doubt, SetupWarning, stacklevel=3)
+    settings = run_settings(
+        scene, integrator, duration, hold, record_dt=record_dt, record=record, t0=t0
+    )
+    pairs = core_pairs(scene, q, v, warn=warn, limited_dt=integrator.limited_dt)
+    joints = scene.joints.to_core(scene.model)
+    core = _core.Simulation(
+        scene.model, pairs, joints, core_controller, q, v, settings, sensors.core
+    )
+    if prepare is not None:
+        prepare(core)
+    deep = core.deep_start()
+    if deep is not None:
+        raise deep_start(scene, *deep)
+    return core
+
+
+def run_settings(
+    scene: Scene,
+    integrator: Integrator,
+    duration: float,
+    hold: float,
+    *,
+    record_dt: float | None,
+    record: Collection[str] = (),
+    t0: float,
+) -> _core.RunSettings:
+    """Check and collect the settings of a compiled run; torques are held for `hold` [s]."""
+    dt = step_of(integrator)
+    t0 = check_finite("t0", t0)
+    if np.spacing(abs(t0) + duration) > 1e-3 * (dt or 1e-6):
+        raise InvalidParameter(
+            "t0, duration",
+            (t0, duration),
+            f"must be small enough to count steps of {dt or 1e-6!r} s",
+        )
+    check_moved_mass(scene.model)
+    recorded = check_record(record)
+    every = 0.0
+    if record_dt is not None:
+        every = min(check_positive("record_dt", record_dt, "s"), _MOST_STEPS * (dt or 1.0))
+    return _core.RunSettings(
+        integrator=integrator.kind,
+        dt=dt,
+        rtol=float(getattr(integrator, "rtol", 0.0)),
+        atol=float(getattr(integrator, "atol", 0.0)),
+        duration=duration,
+        start_time=t0,
+        control_dt=hold,
+        record_dt=every,
+        patches="patch" in recorded,
+        torques="torque" in recorded,
+    )
+
+
+def step_of(integrator: Integrator) -> float:
+    """Return the fixed step [s], or 0 where the error decides."""
+    return float(getattr(integrator, "dt", 0.0))
+
+
+def bind_controller(
+    scene: Scene,
+    integrator: Integrator,
+    controller: AnyController,
+    control_dt: float | None,
+    q0: Array,
+    sensors: SensorSet,
+) -> tuple[_core.Controller | None, float]:
+    """Return the C++ controller, started at q0 (nq,), and how long its torques are held [s]."""
+    dt = step_of(integrator)
+    if control_dt is not None and check_positive("control_dt", control_dt, "s") < dt:
+        raise InvalidParameter("control_dt", control_dt, f"must not be below dt = {dt!r} s")
+    if controller is None:
+        return None, 0.0
+    if isinstance(controller, type):
+        raise InvalidParameter(
+            "controller", controller, "is a class, not a controller: did you forget ()?"
+        )
+    if isinstance(controller, Controller):
+        return controller.to_core(scene, q0), control_dt or 0.0
+    if callable(controller):
+        if not reads_sensors(controller):
+            return wrap_callable(controller, scene.model), control_dt or dt
+        if control_dt is None and dt == 0:
+            raise InvalidParameter(
+                "control_dt",
+                None,
+                "must be given for a controller that reads sensors with an integrator of variable "
+                "step: how long its torques are held [s]",
+            )
+        return wrap_callable(controller, scene.model, sensors.readings), control_dt or dt
+    raise InvalidParameter(
+        "controller", controller, "must be None, a controller or tau(t, q, v, contacts)"
+    )
+
+
+def core_pairs(
+    scene: Scene, q0: Array, v0: Array, *, warn: bool, limited_dt: float | None = None
+) -> list[_core.Pair]:
+    """Build the C++ pairs for a run from q0 (nq,), v0 (nv,).
+
+    `warn` as of `start_run`; `limited_dt` [s] is that of the run's integrator.
+    """
+    pairs = [pair.to_core() for pair in scene.pairs]
+    # Only bristles need to know how fast an impact is.
+    has_state = any(pair.friction is not None and pair.friction.has_state for pair in scene.pairs)
+    if not warn and not has_state:
+        return pairs
+    figures = explain_pairs(scene, q0, v0) if pairs else ()
+    for pair, core, figure in zip(scene.pairs, pairs, figures, strict=True):
+        core.relaxation = relaxation_time(pair, figure)
+        weak = weakness(pair, figure)
+        # A sphere at rest in touch has no speed to judge by.
+        if warn and weak is not None and figure.approach_speed != DEFAULT_SPEED:
+            warnings.warn(weak, WeakLawWarning, stacklevel=4)
+    coarse = coarseness(scene, figures, limited_dt) if warn else None
+    if coarse is not None:
+        warnings.warn(coarse, SetupWarning, stacklevel=4)
+    return pairs
+
+
+def deep_start(scene: Scene, pair: int, depth: float) -> DeepStart:
+    """Return the error of a sphere that starts too deep [m] in the shell of its pair."""
+    return DeepStart(scene.pairs[pair].name, depth, scene.pairs[pair].least_radius)
+
+
+def advance(
+    core: _core.Simulation,
+    until: float = math.inf,
+    wall: float = math.inf,
+    glance: Callable[[], None] | None = None,
+) -> int:
+    """Advance a run to the time `until` or the end, for `wall` [s] of computing at most.
+
+    `glance` is called several times a second. Returns the status of the compiled run: 0 while it
+    can go on.
+    """
+    began = core.wall_time
+    while True:
+        status = core.advance(min(GLANCE, wall - (core.wall_time - began)), until)
+        if glance is not None:
+            glance()
+        if status or core.time >= until or core.wall_time - began >= wall:
+            return status
+
+
+def result_of(
+    scene: Scene,
+    integrator: Integrator,
+    core: Ended,
+    record: dict[str, NDArray[np.generic]],
+    sensors: SensorSet,
+) -> Result:
+    """Make the result of a compiled run, or of what is left of one, and its record."""
+    names = tuple(pair.name for pair in scene.pairs)
+    summaries = core.summaries
+    counts, wall_time = core.counts, core.wall_time
+    simulated = core.time - float(record["t"][0] if len(record["t"]) else core.time)
+    figures = map(PairFigures.from_core, summaries[: len(names)])
+    stats = RunStats(
+        **counts,
+        wall_time=wall_time,
+        real_time_factor=simulated / wall_time if wall_time > 0 else math.inf,
+        duration=simulated,
+        dt=step_of(integrator) or (simulated / counts["steps"] if counts["steps"] else 0.0),
+        integrator=type(integrator).__name__,
+        pairs=dict(zip(names, figures, strict=True)),
+        joints=joint_figures(scene, summaries[len(names) :], core.limits),
+    )
+    return Result.from_blocks([record], names, stats, scene, sensors)
+
+
+def joint_figures(
+    scene: Scene, stops: list[dict[str, float]], limits: list[dict[str, float]]
+) -> dict[str, JointFigures]:
+    """Return the figures of the joints that have stops or limits, from what the core adds up."""
+    model, joints = scene.model, scene.joints
+    found: dict[str, JointFigures] = {}
+    for name, sums in zip(joints.stopped_joints(model), stops, strict=True):
+        found[name] = found.get(name, JointFigures()).with_stop(sums)
+    if limits:
+        for name in dict.fromkeys((*joints.effort, *joints.speed)):
+            joint = find_joint(model, name)
+            for sums in limits[joint.idx_v : joint.idx_v + joint.nv]:
+                found[name] = found.get(name, JointFigures()).with_limit(sums)
+    return found
+
+
+class CtrlC:
+    """Notes Ctrl-C during a run, which does not interrupt a user's callback then.
+
+    A second one interrupts it. Outside the main thread signals cannot be caught.
+    """
+
+    def __init__(self) -> None:
+        self.pressed = False
+        self._replaced = False
+
+    def __enter__(self) -> CtrlC:
+        if threading.current_thread() is threading.main_thread():
+            self._replaced = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+            if self._replaced:
+                signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._replaced:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        if self.pressed:
+            signal.default_int_handler(number, frame)
+        self.pressed = True
+
+
+def why_ended(status: int, core: Ended, scene: Scene) -> str | None:
+    """Say why the compiled run cannot go on after `status`; None where it can, or has finished."""
+    if status == _STUCK:
+        return f"the error stays too large however short the step (tried {core.last_step:.1e} s)"
+    return _runaway(core, scene) if status == _DIVERGED else None
+
+
+def _runaway(core: Ended, scene: Scene) -> str:
+    """Say which joint ran away first."""
+    if not np.abs(core.q).max(initial=0.0) < _FARTHEST:
+        return "a joint's position grew beyond all bounds"
+    v = np.abs(core.v)
+    v = np.where(np.isfinite(v), v, np.inf)
+    worst = int(np.argmax(v))
+    for name, joint in moving_joints(scene.model):
+        if joint.idx_v <= worst < joint.idx_v + joint.nv:
+            return f"the speed of joint '{name}' grew to {v[worst]:.3g}"
+    return "the state is no longer finite"

@@ -1,0 +1,228 @@
+"""What is left of many runs of one scene."""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, NoReturn, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin import _core
+from sphshell_pin.checks import read_only
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.run_stats import PairFigures
+from sphshell_pin.dynamics.run.advance import deep_start, result_of, why_ended
+from sphshell_pin.dynamics.run.integrators import Integrator
+from sphshell_pin.dynamics.scene.scene import Scene
+from sphshell_pin.dynamics.scene.variations import Variations
+from sphshell_pin.dynamics.sensing.varied_sensors import VariedSensors
+from sphshell_pin.errors import (
+    Interrupted,
+    MissingExtra,
+    NotPicklable,
+    RunFailed,
+    SimulationDiverged,
+    SphshellError,
+    WeakLawWarning,
+)
+from sphshell_pin.summary import Detail, Fact, Summarized, names
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+_STOPPED = 0
+# What the interpreter tells before the exception itself.
+_TRACEBACK = re.compile(r'Traceback .*\n(  File ".*", line \d+, in .*\n)*')
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was to be run: `numbers` are those of the compiled runs, None of those not begun."""
+
+    starts: list[tuple[Array, Array]]
+    numbers: list[int | None]
+    variations: Variations
+    failures: dict[int, SphshellError]
+    t0: float
+
+
+class Rollout(Summarized, Sequence[Result]):
+    """Runs that Simulation.rollout made: n of them, in the order of their starts.
+
+    [i] gives the Result of run i, with the rows that were recorded, and a slice a list of them; a
+    run that could not begin raises its failure.
+
+    Attributes
+    ----------
+    t (n,) : when each run ended [s]
+    q (n, nq), v (n, nv) : its state there
+    steps (n,) : how many it took
+    residual (n,) : energy that appeared from nowhere from its first row to its last [J]
+    figures : of each pair over all steps, (n,) each: "PAIR.peak_force", "PAIR.mean_force" [N],
+        "PAIR.impulse" [N s], "PAIR.max_depth" [m], "PAIR.contact_time", "PAIR.peak_force_time",
+        "PAIR.max_depth_time" [s], "PAIR.touches"; nan in runs that could not begin
+    failures : why runs ended before their time, by their numbers; {} where all is well
+    varied : what was varied, by name: the values of all runs
+    threads : how many worked
+    wall_time : of the whole rollout [s]
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        integrator: Integrator,
+        core: _core.Rollout,
+        plan: Plan,
+        threads: int,
+        wall_time: float,
+        sensors: VariedSensors,
+    ) -> None:
+        self._integrator, self._core, self._plan = integrator, core, plan
+        self._sensors = sensors.base
+        self.threads, self.wall_time = threads, wall_time
+        self.varied = {**plan.variations.columns, **sensors.columns}
+        self.failures = dict(plan.failures)
+        count = len(plan.starts)
+        self.t = np.full(count, plan.t0)
+        self.q = np.array([q for q, _ in plan.starts]).reshape(count, scene.model.nq)
+        self.v = np.array([v for _, v in plan.starts]).reshape(count, scene.model.nv)
+        self.steps = np.zeros(count, dtype=np.int64)
+        self.residual = np.full(count, math.nan)
+        self.figures: dict[str, Array] = {}
+        through: list[tuple[int, str]] = []
+        for run, number in enumerate(plan.numbers):
+            if number is None:
+                continue
+            outcome = core.outcome(number)
+            why_not = self._why_not_begun(run, outcome)
+            if why_not is not None:
+                plan.numbers[run] = None
+                plan.failures[run] = self.failures[run] = why_not
+                continue
+            self.t[run], self.steps[run] = outcome.time, outcome.counts["steps"]
+            self.q[run], self.v[run] = outcome.q, outcome.v
+            self.residual[run] = outcome.residual
+            # Behind the pairs are the stops of joints.
+            for pair, summary in zip(scene.pairs, outcome.summaries, strict=False):
+                for name, value in asdict(PairFigures.from_core(summary)).items():
+                    column = self.figures.setdefault(
+                        f"{pair.name}.{name}", np.full(count, math.nan)
+                    )
+                    column[run] = value
+            through += [(run, scene.pairs[k].name) for k in outcome.through]
+            why = self._why_failed(run, outcome)
+            if why is not None:
+                self.failures[run] = why
+        self.failures = dict(sorted(self.failures.items()))
+        for array in (self.t, self.q, self.v, self.steps, self.residual, *self.figures.values()):
+            read_only(array)
+        if through:
+            run, name = through[0]
+            runs = len({run for run, _ in through})
+            warnings.warn(
+                f"in {runs} of {count} runs, the first of them run {run}, a sphere's centre was "
+                f"pushed through the shell: the law of contact '{name}' is too weak for the speed",
+                WeakLawWarning,
+                stacklevel=4,
+            )
+
+    def __len__(self) -> int:
+        """Return the number of runs."""
+        return len(self._plan.numbers)
+
+    @overload
+    def __getitem__(self, index: int) -> Result: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Result]: ...
+    def __getitem__(self, index: int | slice) -> Result | list[Result]:
+        """Return the result of a run, or of a slice of the runs."""
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        run = range(len(self))[index]
+        number = self._plan.numbers[run]
+        if number is None:
+            raise self._plan.failures[run].with_traceback(None)
+        return self._result(run, self._core.outcome(number))
+
+    def _facts(self) -> list[Fact]:
+        ended = float(self.t.max()) if len(self) else math.nan
+        return [
+            Fact("runs", len(self)),
+            Fact("failed", len(self.failures)),
+            Fact("until", ended, "s"),
+            Fact("varied", names(self.varied)),
+            Fact("steps", int(self.steps.sum()), brief=False),
+            Fact("threads", self.threads, brief=False),
+            Fact("wall time", self.wall_time, "s", brief=False),
+        ]
+
+    def _rows(self) -> Detail | None:
+        rows: list[tuple[object, ...]] = []
+        for name, values in self.figures.items():
+            known = values[np.isfinite(values)]
+            if len(known):
+                rows.append((name, known.min(), float(np.median(known)), known.max()))
+        return Detail(("figure [SI units]", "least", "median", "largest"), rows, len(rows))
+
+    def __iter__(self) -> Iterator[Result]:
+        """Go through the results of all runs."""
+        return (self[run] for run in range(len(self)))
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be pickled: the runs are with the compiled core."""
+        raise NotPicklable(
+            "a Rollout cannot be pickled or copied: keep its to_dataframe(), or save a run with "
+            "rollout[i].save(path)"
+        )
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a pandas DataFrame with a row for each run: what was varied, and its figures.
+
+        What was varied and is no number is left out. Raises MissingExtra without pandas.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise MissingExtra("pandas", "tables", "Rollout.to_dataframe") from None
+        columns: dict[str, object] = {"run": np.arange(len(self))}
+        for name, values in self.varied.items():
+            array = np.asarray(values)
+            if array.dtype.kind in "fi" and array.ndim < 3:  # poses are matrices
+                parts = array.T if array.ndim == 2 else [array]
+                suffixes = [f".{i}" for i in range(len(parts))] if array.ndim == 2 else [""]
+                columns |= {f"{name}{s}": part for s, part in zip(suffixes, parts, strict=True)}
+        columns |= {"t": self.t, "steps": self.steps, "residual": self.residual, **self.figures}
+        columns["failure"] = [str(self.failures.get(run, "")) for run in range(len(self))]
+        return pandas.DataFrame(columns)
+
+    def _result(self, run: int, outcome: _core.Outcome) -> Result:
+        number = self._plan.numbers[run]
+        assert number is not None
+        scene = self._plan.variations.scene(run)
+        record = self._core.record(number)
+        return result_of(scene, self._integrator, outcome, record, self._sensors)
+
+    def _why_not_begun(self, run: int, outcome: _core.Outcome) -> SphshellError | None:
+        if outcome.deep_start is not None:
+            return deep_start(self._plan.variations.scene(run), *outcome.deep_start)
+        if not len(outcome.q):  # memory was short before the start
+            return SphshellError(f"the run could not begin: {outcome.fault}")
+        return None
+
+    def _why_failed(self, run: int, outcome: _core.Outcome) -> SphshellError | None:
+        if outcome.fault:
+            why = " ".join(_TRACEBACK.sub("", outcome.fault, count=1).split()).rstrip(":")
+            return RunFailed(outcome.time, why, self._result(run, outcome))
+        reason = why_ended(outcome.status, outcome, self._plan.variations.scene(run))
+        if reason is not None:
+            return SimulationDiverged(outcome.time, reason, self._result(run, outcome))
+        if outcome.status == _STOPPED:
+            return Interrupted(outcome.time, self._result(run, outcome))
+        return None

@@ -1,0 +1,238 @@
+"""Runs a scene, once or many times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from numpy.typing import ArrayLike
+
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.run.advance import (
+    AnyController,
+    CtrlC,
+    advance,
+    result_of,
+    start_run,
+    step_of,
+    why_ended,
+)
+from sphshell_pin.dynamics.run.integrators import Adaptive, Integrator
+from sphshell_pin.dynamics.run.many_runs import roll_out
+from sphshell_pin.dynamics.run.rollout import Rollout
+from sphshell_pin.dynamics.run.sensitivities import Asked
+from sphshell_pin.dynamics.scene.derivatives import StepDerivatives, step_derivatives
+from sphshell_pin.dynamics.scene.scene import Scene
+from sphshell_pin.dynamics.scene.scene_state import SceneState
+from sphshell_pin.dynamics.sensing.sensors import Sensor, SensorSet, check_sensors
+from sphshell_pin.errors import Interrupted, InvalidParameter, SimulationDiverged
+from sphshell_pin.summary import Fact, Summarized
+
+
+class Simulation(Summarized):
+    """Moves `scene` in time with `integrator`, Adaptive() unless given.
+
+    `sensors` are read on the way: for the results, and for controller callables.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        integrator: Integrator | None = None,
+        sensors: Iterable[Sensor] = (),
+    ) -> None:
+        if not isinstance(scene, Scene):
+            raise InvalidParameter("scene", type(scene).__name__, "must be a sphshell_pin.Scene")
+        integrator = Adaptive() if integrator is None else integrator
+        if not isinstance(integrator, Integrator):
+            raise InvalidParameter(
+                "integrator",
+                integrator,
+                "must be Adaptive(rtol), Implicit(rtol), SemiImplicitEuler(dt), RungeKutta4(dt) or "
+                "LinearlyImplicitEuler(dt)",
+            )
+        self.scene = scene
+        self.integrator = integrator
+        self.sensors = check_sensors(sensors)
+
+    def _facts(self) -> list[Fact]:
+        return [
+            Fact("integrator", repr(self.integrator)),
+            *self.scene._facts(),
+            Fact("sensors", len(self.sensors), brief=bool(self.sensors)),
+        ]
+
+    def run(
+        self,
+        q0: ArrayLike,
+        v0: ArrayLike | None = None,
+        duration: float = 1.0,
+        controller: AnyController = None,
+        control_dt: float | None = None,
+        *,
+        record_dt: float | None = None,
+        record: Collection[str] = (),
+        sensitivities: Collection[str] = (),
+        progress: Callable[[float], object] | None = None,
+        t0: float = 0.0,
+    ) -> Result:
+        """Run from q0 (nq,), v0 (nv,) for `duration` [s] and return the Result.
+
+        `controller`: None, a controller of this package, or a callable
+        tau(t, q, v, contacts) -> (nv,). Torques are held for `control_dt` [s]; by default a
+        callable is asked once a fixed step, a controller of this package at every stage of it.
+        Adaptive and Implicit ask at every stage, and Implicit 2 nv + 2 times more a step, at states
+        nearby: a callable with a memory needs control_dt. So does one with a fifth argument
+        `sensors`: it gets the latest reading of each sensor by name. Rows are recorded every
+        `record_dt` [s] (default: every step); `progress` is called a few times a second with the
+        share done. The same input gives the same bits. With `record=("patch",)` the patch of each
+        recorded contact is kept, too: `Result.patches`; with "torque" the controller's torques, cut
+        to their limits: `Result.torque`. A controller that is not held is asked at each row then.
+
+        `sensitivities` names what the rows are differentiated by: parameters as in
+        `Scene.dynamics_derivatives`, "q0" and "v0" (nv columns each); `Result.sensitivities` then
+        has the derivatives of q, v, forces and depths. Of fixed steps they are those of the steps
+        that are made, of the other integrators those of the motion; stretches of bristles begin
+        with their touch. A controller is then asked at states nearby as well, so that one with a
+        memory, or that reads sensors, cannot be taken.
+
+        A law that cannot stop its sphere earns a WeakLawWarning; a path off its shell, and steps of
+        SemiImplicitEuler that are longer than `Scene.explain` recommends, a SetupWarning.
+
+        Raises InvalidParameter for wrong sizes and values, DeepStart for a sphere that starts
+        deep inside, SimulationDiverged and (on Ctrl-C) Interrupted, both with `.result`.
+        """
+        sensors = SensorSet(self.sensors, self.scene)
+        asked = None
+        if not isinstance(sensitivities, tuple) or sensitivities:
+            asked = Asked(self.scene, sensitivities, controller)
+        core = start_run(
+            self.scene,
+            self.integrator,
+            q0,
+            v0,
+            duration,
+            controller,
+            control_dt,
+            record_dt=record_dt,
+            record=record,
+            t0=t0,
+            sensors=sensors,
+            prepare=None if asked is None else asked.begin,
+        )
+        ctrl_c = CtrlC()
+
+        def glance() -> None:
+            if progress is not None:
+                progress(core.progress)
+            if asked:
+                asked.check(core)
+            if ctrl_c.pressed and core.progress < 1:
+                raise KeyboardInterrupt
+
+        def so_far() -> Result:
+            result = result_of(self.scene, self.integrator, core, core.take(), sensors)
+            return replace(result, sensitivity_rows=asked.rows(core)) if asked else result
+
+        try:
+            with ctrl_c:
+                status = advance(core, glance=glance)
+        except KeyboardInterrupt:
+            raise Interrupted(core.time, so_far()) from None
+        result = so_far()
+        reason = why_ended(status, core, self.scene)
+        if reason is not None:
+            raise SimulationDiverged(core.time, reason, result)
+        return result
+
+    def step_derivatives(
+        self,
+        q: ArrayLike,
+        v: ArrayLike | None = None,
+        tau: ArrayLike | None = None,
+        *,
+        parameters: Collection[str] = (),
+        state: SceneState | None = None,
+    ) -> StepDerivatives:
+        """Return where one fixed step from q (nq,), v (nv,) leads, and its derivatives.
+
+        The torques tau (nv,) are held over the step (zero unless given). `parameters` and `state`
+        as in `Scene.dynamics_derivatives`. They are the derivatives of what the step computes, not
+        of the motion that it approximates.
+
+        Raises InvalidParameter for an integrator whose steps have no fixed length.
+        """
+        dt = step_of(self.integrator)
+        if dt == 0:
+            raise InvalidParameter(
+                "integrator",
+                self.integrator,
+                "has no fixed step to differentiate: take SemiImplicitEuler(dt), RungeKutta4(dt) "
+                "or LinearlyImplicitEuler(dt)",
+            )
+        at = self.scene.place(q, v, tau, parameters, state)
+        return step_derivatives(self.integrator.kind, dt, at)
+
+    def rollout(
+        self,
+        q0s: ArrayLike,
+        v0s: ArrayLike | None = None,
+        duration: float = 1.0,
+        threads: int | None = None,
+        *,
+        controller: AnyController | Sequence[AnyController] = None,
+        control_dt: float | None = None,
+        vary: Mapping[str, object] | None = None,
+        record_dt: float | None = None,
+        record: Collection[str] = (),
+        progress: Callable[[float], object] | None = None,
+        t0: float = 0.0,
+    ) -> Rollout:
+        """Make many runs at once, over threads; each has the bits that `run` gives it.
+
+        Parameters
+        ----------
+        q0s : (n, nq), or (nq,) for all runs
+        v0s : (n, nv), or (nv,) for all runs; at rest unless given
+        duration, controller, control_dt, t0 : as of `run`; `controller` may be a list of n. A
+            callable is asked for all runs in turn, and holds up the other threads meanwhile
+        threads : how many, no more than runs; all processors unless given
+        vary : parameters that differ from run to run: names to n values each. Names are
+            "PAIR.law" and "PAIR.friction" (n laws, n frictions or None), "PAIR.law.FIELD" and
+            "PAIR.friction.FIELD" (n numbers; the fields of the law or friction that the pair has),
+            "PAIR.sphere.radius" (n) [m], "PAIR.sphere.offset" (n, 3) [m], the same of
+            "PAIR.other_sphere", "PAIR.placement" of
+            the shell in its frame (n pinocchio.SE3), "sensors.NAME.FIELD" (n numbers), such as the
+            seed of a sensor's noise
+        record_dt : between recorded rows [s]; unless given only start and end are recorded
+        record : as of `run`
+        progress : called a few times a second with the share of the runs that are done
+
+        Returns
+        -------
+        Rollout : its length is n, [i] gives the Result of run i. A run that fails is noted in
+            `failures`, and the others go on
+
+        Raises
+        ------
+        InvalidParameter, NameNotFound
+            For wrong sizes, names and values, before anything runs.
+        RolloutInterrupted
+            On Ctrl-C, with the `rollout` so far.
+        """
+        return roll_out(
+            self.scene,
+            self.integrator,
+            q0s,
+            v0s,
+            duration,
+            threads,
+            controller=controller,
+            control_dt=control_dt,
+            vary=vary,
+            record_dt=record_dt,
+            record=record,
+            progress=progress,
+            t0=t0,
+            sensors=SensorSet(self.sensors, self.scene),
+        )

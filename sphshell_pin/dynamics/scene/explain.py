@@ -1,0 +1,438 @@
+"""What a scene models, on which time scales, and what to expect of it before it runs."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin.checks import check_moved_mass
+from sphshell_pin.contact.laws import HuntCrossleyLaw
+from sphshell_pin.dynamics.scene.joint_components import WHICH, JointIngredients
+from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
+from sphshell_pin.dynamics.scene.sources import checked_source
+
+if TYPE_CHECKING:
+    from sphshell_pin.dynamics.scene.pairs import ContactPair
+    from sphshell_pin.dynamics.scene.scene import Scene
+
+Array = NDArray[np.float64]
+
+# Speed of approach where neither v nor a fall gives one [m/s].
+DEFAULT_SPEED = 0.1
+# Stands for the law of stops that are only listed.
+_ANY_LAW = HuntCrossleyLaw(1.0, 1.0)
+# Steps in the shortest time scale: enough for a few percent with fixed steps.
+STEPS_PER_SCALE = 30
+# Of the bristles' relaxation time [s].
+LONGEST_RELAXATION = 2e-5
+
+
+@dataclass(frozen=True)
+class PairExplanation:
+    """Time scales and depths of one pair; nan where the pair cannot move along the normal.
+
+    `gap` [m] at q (negative in overlap; nan for a source that finds nothing at q);
+    `effective_mass` [kg] along the normal; `approach_speed` [m/s] the figures below are for;
+    `contact_time` [s] of an undamped impact at that speed, `impact_depth` [m] its largest depth;
+    `resting_depth` [m] under the effective mass's own weight; `depth_limit_speed` [m/s] at which
+    the depth would reach the radius; `shortest_time` [s] of all time scales, damping and friction
+    included; `group` names the pairs that were stated together.
+    """
+
+    name: str
+    modelled: tuple[str, ...]
+    gap: float
+    effective_mass: float
+    approach_speed: float
+    contact_time: float
+    impact_depth: float
+    resting_depth: float
+    depth_limit_speed: float
+    shortest_time: float
+    group: str = ""
+
+
+@dataclass(frozen=True, repr=False)
+class Explanation:
+    """The answer of Scene.explain; str() gives it as text."""
+
+    modelled: tuple[str, ...]
+    not_modelled: tuple[str, ...]
+    pairs: tuple[PairExplanation, ...]
+    recommended_dt: float
+    warnings: tuple[str, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def __str__(self) -> str:
+        """Return the explanation as text."""
+        lines = ["Modeled:", *(f"  {line}" for line in self.modelled)]
+        lines += ["Not modeled:", *(f"  {line}" for line in self.not_modelled)]
+        for pair, others in _shown(self.pairs):
+            alike = f", the nearest of {others + 1} of '{pair.group}'" if others else ""
+            lines += [f"Contact '{pair.name}'{alike}:", *(f"  {line}" for line in pair.modelled)]
+            for label, value, unit in (
+                ("gap at q", pair.gap * 1e3, "mm"),
+                ("effective mass along the normal", pair.effective_mass, "kg"),
+                ("speed of approach", pair.approach_speed, "m/s"),
+                ("contact time at that speed", pair.contact_time * 1e3, "ms"),
+                ("depth at that speed", pair.impact_depth * 1e3, "mm"),
+                ("resting depth under its own weight", pair.resting_depth * 1e3, "mm"),
+                ("speed at which the depth reaches the radius", pair.depth_limit_speed, "m/s"),
+            ):
+                if math.isfinite(value):
+                    lines.append(f"  {label}: {value:.4g} {unit}")
+        lines.append(f"Recommended dt of a fixed step: {self.recommended_dt:.3g} s")
+        lines += [f"Warning: {w}" for w in self.warnings]
+        return "\n".join(lines)
+
+
+def _shown(pairs: tuple[PairExplanation, ...]) -> Iterator[tuple[PairExplanation, int]]:
+    """Yield the pairs as they are shown, of a group the nearest, with the number of its others."""
+    for group, several in itertools.groupby(pairs, lambda pair: pair.group):
+        members = list(several)
+        if group:
+            nearest = min(members, key=lambda pair: (math.isnan(pair.gap), pair.gap))
+            yield nearest, len(members) - 1
+        else:
+            yield from ((pair, 0) for pair in members)
+
+
+def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explanation:
+    """Work out the explanation of `scene` at q (nq,), v (nv,), for a step of `dt` [s]."""
+    model = scene.model
+    check_moved_mass(model)
+    gravity = float(np.linalg.norm(model.gravity.linear))
+    pairs = tuple(map(_with_curvature, scene.pairs, explain_pairs(scene, q, v)))
+    warnings = beyond_limits(model, q)
+    # Of the pairs that were stated together the first speaks for those with the same warning.
+    seen: dict[tuple[str, str], list[str]] = {}
+    for pair, figures in zip(scene.pairs, pairs, strict=True):
+        for warning in _warnings_of(scene, pair, figures):
+            kind = (
+                re.sub(r"[-+\d.]+", "", warning.replace(pair.name, "")) if pair.group else warning
+            )
+            seen.setdefault((pair.group, kind), []).append(warning)
+    for (group, _), alike in seen.items():
+        more = (
+            f" (and {_count(len(alike) - 1, 'other')} of '{group}')" if group and alike[1:] else ""
+        )
+        warnings.append(f"{alike[0]}{more}")
+    coarse = coarseness(scene, pairs, dt)
+    if coarse is not None:
+        warnings.append(coarse)
+    free = sum(1 for j in model.joints[1:] if j.nv)
+    modelled = [
+        f"{_count(free, 'joint')} with {_count(model.nv, 'degree')} of freedom",
+        f"gravity {gravity:.4g} m/s^2" if gravity else "no gravity",
+        _count(len(pairs), "contact pair"),
+    ]
+    modelled += _joints_modelled(scene)
+    absent = ["contact between other pairs of bodies", *_joints_stated(scene)]
+    if scene.lock:
+        absent.append(f"motion of the locked joints {', '.join(scene.lock)}")
+    recommended = _recommended_dt(_shortest_scale(scene, pairs))
+    return Explanation(tuple(modelled), tuple(absent), pairs, recommended, tuple(warnings))
+
+
+def coarseness(scene: Scene, pairs: tuple[PairExplanation, ...], dt: float | None) -> str | None:
+    """Say so where steps of `dt` [s] are longer than recommended; `pairs` are those of `scene`."""
+    shortest = _shortest_scale(scene, pairs)
+    recommended = _recommended_dt(shortest)
+    if dt is None or dt <= 1.0001 * recommended or math.isinf(shortest):
+        return None
+    return (
+        f"dt = {dt:.3g} s is larger than the recommended {recommended:.3g} s: the shortest "
+        f"time scale {shortest:.3g} s would get {shortest / dt:.2g} steps"
+    )
+
+
+def _shortest_scale(scene: Scene, pairs: tuple[PairExplanation, ...]) -> float:
+    """Return the shortest time scale [s] of pairs and joints, inf where there is none."""
+    scales = [pair.shortest_time for pair in pairs if math.isfinite(pair.shortest_time)]
+    return min([*scales, *scene.joints.time_scales(scene.model).values()], default=math.inf)
+
+
+def _recommended_dt(shortest: float) -> float:
+    return (
+        1e-3
+        if math.isinf(shortest)
+        else _round_down(max(shortest / STEPS_PER_SCALE, sys.float_info.min))
+    )
+
+
+# What a model may state of its joints, as a reader calls it.
+_JOINT_KINDS = {
+    "limits": "position limits",
+    "damping": "damping",
+    "friction": "dry friction",
+    "armature": "armature",
+    "effort": "effort limits",
+    "speed": "speed limits",
+}
+
+
+def _joints_modelled(scene: Scene) -> list[str]:
+    out = []
+    for kind in scene.joints.kinds():
+        names = list(getattr(scene.joints, kind))
+        only = " (reported where they are exceeded)" if kind == "speed" else ""
+        out.append(f"{_JOINT_KINDS[kind]} of {_names(names)}{only}")
+    model = scene.model
+    mimics = [str(model.names[j]) for j in model.mimicking_joints]
+    if mimics:
+        out.append(f"joints that mimic others, exactly: {_names(mimics)}")
+    return out
+
+
+def _joints_stated(scene: Scene) -> list[str]:
+    """List what the model states of its joints and the scene leaves out."""
+    # In ABA the model's armature acts anyhow.
+    kinds = [one for one in WHICH if one != "armature"]
+    stated = JointIngredients.from_model(scene.model, kinds, _ANY_LAW)
+    out = []
+    for kind in stated.kinds():
+        modelled = getattr(scene.joints, kind)
+        left_out = [name for name in getattr(stated, kind) if name not in modelled]
+        if left_out:
+            out.append(f"{_JOINT_KINDS[kind]} that the robot's file states, of {_names(left_out)}")
+    return out
+
+
+def _names(names: list[str]) -> str:
+    shown = ", ".join(f"'{name}'" for name in names[:4])
+    return shown if len(names) <= 4 else f"{shown}, ... ({len(names)} joints)"
+
+
+def explain_pairs(scene: Scene, q: Array, v: Array) -> tuple[PairExplanation, ...]:
+    """Work out the explanation of each pair of `scene` at q (nq,), v (nv,)."""
+    data, mass_matrix = _mass_at(scene, q, v)
+    gravity = float(np.linalg.norm(scene.model.gravity.linear))
+    return tuple(_explain_pair(scene, pair, data, mass_matrix, v, gravity) for pair in scene.pairs)
+
+
+def _with_curvature(pair: ContactPair, figures: PairExplanation) -> PairExplanation:
+    """Say how far the curved elements of a pair, if it has any, stand off the flat ones."""
+    if pair.shell is None or pair.method != "smooth":
+        return figures
+    said = [f"{label}: {text}" for label, text in pair.shell.curvature_report().rows()]
+    return replace(figures, modelled=(*figures.modelled, *said))
+
+
+def relaxation_time(pair: ContactPair, figures: PairExplanation) -> float:
+    """Return the time [s] in which the bristles of a pair relax beyond their limit.
+
+    A fiftieth of the shortest impact that the pair's law can stop (its depth would reach the
+    radius): friction then follows a slip that turns round within an impact.
+    """
+    limit = figures.depth_limit_speed
+    if not pair.spheres or not math.isfinite(limit):
+        return LONGEST_RELAXATION
+    shortest = pair.plane_law.contact_time(pair.least_radius, limit)
+    return min(0.02 * shortest, LONGEST_RELAXATION)
+
+
+def weakness(pair: ContactPair, figures: PairExplanation) -> str | None:
+    """Say so where the law of a pair cannot stop the sphere."""
+    if not figures.impact_depth >= pair.least_radius:
+        return None
+    return (
+        f"contact '{pair.name}': at {figures.approach_speed:.3g} m/s the depth would reach the "
+        "radius: the law cannot stop the sphere, make it stiffer"
+    )
+
+
+def _mass_at(scene: Scene, q: Array, v: Array) -> tuple[pin.Data, Array]:
+    """Return the data with placements and Jacobians, and the mass matrix (nv, nv)."""
+    model = scene.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, q, v)
+    pin.computeJointJacobians(model, data, q)
+    pin.crba(model, data, q)
+    return data, np.triu(data.M) + np.triu(data.M, 1).T
+
+
+@dataclass(frozen=True)
+class _Touch:
+    """Where a pair touches, or would: in the world."""
+
+    gap: float
+    point: Array
+    normal: Array
+
+
+def _touch_of(pair: ContactPair, data: pin.Data) -> _Touch | None:
+    pose_i = data.oMi[pair.joint_i] * pair.placement_i
+    pose_j = data.oMi[pair.joint_j] * pair.placement_j
+    if pair.find is not None:
+        points, normals, depths = checked_source(pair.find, pair.name)(pose_i, pose_j)
+        if not len(depths):
+            return None
+        deepest = int(np.argmax(depths))
+        return _Touch(-float(depths[deepest]), points[deepest], normals[deepest])
+    center = pose_i.translation
+    if pair.other_sphere is not None and pair.sphere is not None:
+        away = center - pose_j.translation
+        length = float(np.linalg.norm(away))
+        normal = away / length if length > 0 else np.array([0.0, 0.0, 1.0])
+        point = pose_j.translation + pair.other_sphere.radius * normal
+        return _Touch(length - pair.other_sphere.radius - pair.sphere.radius, point, normal)
+    if pair.sphere is None or pair.shell is None:
+        return None
+    at = pair.shell.closest_points(pose_j.actInv(center)[None], method=pair.method)
+    distance = float(at.distances[0])
+    signed = {"both": abs(distance), "outside": distance, "inside": -distance}[pair.shell.side]
+    point = pose_j.act(at.points[0])
+    away = center - point
+    length = float(np.linalg.norm(away))
+    normal = away / length if length > 0 else pose_j.rotation @ at.normals[0]
+    return _Touch(signed - pair.sphere.radius, point, normal)
+
+
+def _explain_pair(
+    scene: Scene, pair: ContactPair, data: pin.Data, mass_matrix: Array, v: Array, gravity: float
+) -> PairExplanation:
+    gap = mass = slip_mass = speed = math.nan
+    touch = _touch_of(pair, data)
+    if touch is not None:
+        gap = touch.gap
+        jacobian = _point_jacobian(scene, data, pair.joint_i, touch.point) - _point_jacobian(
+            scene, data, pair.joint_j, touch.point
+        )
+        mobility = jacobian @ np.linalg.solve(mass_matrix, jacobian.T) if v.size else np.eye(3) * 0
+        mass = _mass(float(touch.normal @ mobility @ touch.normal))
+        tangent = np.eye(3) - np.outer(touch.normal, touch.normal)
+        slip_mass = _mass(float(np.linalg.eigvalsh(tangent @ mobility @ tangent).max()))
+        fall = math.sqrt(2 * gravity * max(gap, 0.0))
+        speed = max(abs(float(touch.normal @ jacobian @ v)), fall) or DEFAULT_SPEED
+    law = pair.plane_law
+    weight = mass * gravity
+    load = depth = contact_time = resting_depth = limit = math.nan
+    times = []
+    if math.isfinite(mass):
+        load = max(weight, law.normal_force(-gap))
+        depth = law.depth_of(0.5 * mass * speed**2)
+        contact_time = law.contact_time(depth, speed)
+        resting_depth = law.depth_at(weight)
+        times.append(law.shortest_time(mass, speed, load))
+        if pair.spheres:
+            limit = math.sqrt(2 * law.energy(pair.least_radius) / mass)
+    if pair.friction is not None and math.isfinite(slip_mass):
+        times.append(pair.friction.slip_time(slip_mass, load, _disc(pair, max(depth, -gap))))
+    return PairExplanation(
+        name=pair.name,
+        modelled=_ingredients(pair),
+        gap=gap,
+        effective_mass=mass,
+        approach_speed=speed,
+        contact_time=contact_time,
+        impact_depth=depth,
+        resting_depth=resting_depth,
+        depth_limit_speed=limit,
+        shortest_time=min(times, default=math.inf),
+        group=pair.group,
+    )
+
+
+def _disc(pair: ContactPair, depth: float) -> float:
+    """Return the radius [m] of the disc of contact at this depth, nan of a source."""
+    curvature = sum(1 / one.radius for one in pair.spheres)
+    return math.sqrt(depth / curvature) if curvature and depth > 0 else math.nan
+
+
+def _mass(mobility: float) -> float:
+    return 1 / mobility if mobility > 1e-12 else math.nan
+
+
+def _point_jacobian(scene: Scene, data: pin.Data, joint: int, point: Array) -> Array:
+    """Jacobian (3, nv) of the velocity of the world point `point` as fixed to `joint`."""
+    if joint == 0:
+        return np.zeros((3, scene.model.nv))
+    jacobian = pin.getJointJacobian(scene.model, data, joint, pin.WORLD).reshape(6, -1)
+    moved: Array = jacobian[:3] - pin.skew(point) @ jacobian[3:]
+    return moved
+
+
+def _ingredients(pair: ContactPair) -> tuple[str, ...]:
+    lines = []
+    if pair.sphere is not None and pair.shell is not None:
+        shell = pair.shell
+        lines.append(
+            f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}' against "
+            f"shell '{shell.name}' on frame '{pair.frame_j}'"
+        )
+        moving = "moves with its frame" if pair.joint_j else "does not move: no wrench on its side"
+        lines.append(
+            f"{len(shell.elements)} elements, box diagonal {shell.size * 1e3:.4g} mm, "
+            f"side '{shell.side}', method '{pair.method}'; the shell {moving}"
+        )
+    elif pair.sphere is not None and pair.other_sphere is not None:
+        lines.append(
+            f"sphere of radius {pair.sphere.radius * 1e3:.4g} mm on frame '{pair.frame_i}' against "
+            f"sphere of radius {pair.other_sphere.radius * 1e3:.4g} mm on frame '{pair.frame_j}'"
+        )
+    else:
+        lines.append(
+            f"contact points of the user's own routine between frames '{pair.frame_i}' and "
+            f"'{pair.frame_j}'"
+        )
+    lines.append(f"normal force: {pair.law.text}")
+    lines.append(
+        "no friction: no tangential force is computed"
+        if pair.friction is None
+        else f"friction: {pair.friction.text}"
+    )
+    return tuple(lines)
+
+
+def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> list[str]:
+    out: list[str] = []
+    where = f"contact '{pair.name}'"
+    if not pair.spheres:
+        return out
+    radius, shell = pair.least_radius, pair.shell
+    if shell is not None:
+        sentence = unit_warning(scene.model, radius, shell.size)
+        if sentence:
+            out.append(f"{where}: {sentence}")
+        out += [f"{where}: shell '{shell.name}': {problem}" for problem in shell.health.problems]
+    weak = weakness(pair, figures)
+    if weak is not None:
+        out.append(weak)
+    elif figures.resting_depth > 0.1 * radius:
+        out.append(
+            f"{where}: at rest the depth is {figures.resting_depth / radius:.0%} of the radius: "
+            "the law is soft for this mass"
+        )
+    if figures.gap < -0.5 * radius:
+        out.append(f"{where}: starts at depth {-figures.gap * 1e3:.4g} mm, deep inside")
+    if not math.isfinite(figures.effective_mass):
+        out.append(f"{where}: neither body can move along the normal at this q")
+    if shell is not None and shell.side != "both" and not shell.is_closed:
+        out.append(
+            f"{where}: shell '{shell.name}' is open and one-sided: a sphere that goes round its "
+            "rim is thrown out on the other side and gains energy"
+        )
+    if pair.method == "elements":
+        out.append(f"{where}: method 'elements' counts a place of touch once per touched element")
+    return out
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def _round_down(x: float) -> float:
+    """Round to the next lower 1, 2 or 5 times a power of ten."""
+    scale = 10.0 ** math.floor(math.log10(x))
+    return max(f for f in (1, 2, 5) if f * scale <= x * (1 + 1e-12)) * scale

@@ -1,0 +1,169 @@
+"""Two bodies that may touch, as constant descriptions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from sphshell_pin import _core
+from sphshell_pin.contact import Friction, Method, MindlinFriction, NormalLaw, Sphere
+from sphshell_pin.contact.normal_law import check_law
+from sphshell_pin.deprecation import renamed
+from sphshell_pin.dynamics.scene.sources import Find, checked_source
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.shell import Shell
+from sphshell_pin.summary import Fact, Summarized
+
+
+class PlacedSphere(NamedTuple):
+    """A sphere of `radius` [m] whose center is the origin of `placement` in a joint."""
+
+    joint: int
+    placement: pin.SE3
+    radius: float
+
+
+@dataclass(frozen=True, repr=False)
+class ContactPair(Summarized):
+    """One pair of bodies that may touch; body i carries the sphere, body j the shell.
+
+    `frame_i`, `frame_j` name their frames, `joint_i`, `joint_j` the joints, `pose_i`, `pose_j` the
+    frames' placements in the joints. The shell is at `placement` in frame_j; a pair of two spheres
+    has `other_sphere`, on body j, instead of it, and a pair of a contact source has `find` instead
+    of `sphere` and `shell`. `group` names the entry of which there are several pairs.
+    """
+
+    name: str
+    frame_i: str
+    frame_j: str
+    joint_i: int
+    joint_j: int
+    pose_i: pin.SE3
+    pose_j: pin.SE3
+    placement: pin.SE3
+    law: NormalLaw
+    friction: Friction | None
+    method: str = "facets"
+    sphere: Sphere | None = None
+    shell: Shell | None = None
+    find: Find | None = None
+    other_sphere: Sphere | None = None
+    group: str = ""
+
+    frame = renamed("frame", "frame_j")
+    sphere_placement = renamed("sphere_placement", "placement_i")
+    shell_placement = renamed("shell_placement", "placement_j")
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for what needs a sphere or a shell where there is none."""
+        if self.find is None:
+            return
+        check_law(self.law, "at the points of a contact source")
+        if isinstance(self.friction, MindlinFriction):
+            must = "needs a sphere, and a contact source has none: take a BristleFriction"
+            raise InvalidParameter("friction", self.friction.kind, must)
+
+    @property
+    def _title(self) -> str:
+        return f"ContactPair '{self.name}'"
+
+    def _facts(self) -> list[Fact]:
+        labels = ("sphere", "with", "normal law", "friction")
+        return [
+            Fact(label, text, brief=label in labels[:2])
+            for label, text in zip(labels, self.shown[1:], strict=True)
+        ]
+
+    @property
+    def plane_law(self) -> NormalLaw:
+        """The law, and of one that follows the curvature of the shell that of a plane shell."""
+        if not self.law.needs_shape:
+            return self.law
+        return self.law.on_plane(1 / sum(1 / one.radius for one in self.spheres))
+
+    @property
+    def kind(self) -> str:
+        """Return "sphere-shell", "sphere-sphere" or "source"."""
+        if self.find is not None:
+            return "source"
+        return "sphere-shell" if self.other_sphere is None else "sphere-sphere"
+
+    @property
+    def spheres(self) -> tuple[PlacedSphere, ...]:
+        """The spheres of this pair: one, two, or none of a source."""
+        out = []
+        if self.sphere is not None:
+            out.append(PlacedSphere(self.joint_i, self.placement_i, self.sphere.radius))
+        if self.other_sphere is not None:
+            out.append(PlacedSphere(self.joint_j, self.placement_j, self.other_sphere.radius))
+        return tuple(out)
+
+    @property
+    def least_radius(self) -> float:
+        """The radius of the smallest of `spheres` [m], nan without any."""
+        return min((one.radius for one in self.spheres), default=math.nan)
+
+    @cached_property
+    def placement_i(self) -> pin.SE3:
+        """The sphere's center in joint_i; of a source, frame_i."""
+        return self.pose_i if self.sphere is None else _center(self.pose_i, self.sphere)
+
+    @cached_property
+    def placement_j(self) -> pin.SE3:
+        """The shell, or the other sphere's center, in joint_j; of a source, frame_j."""
+        if self.other_sphere is not None:
+            return _center(self.pose_j, self.other_sphere)
+        return self.pose_j * self.placement
+
+    @property
+    def shown(self) -> tuple[str, str, str, str, str]:
+        """Name, sphere, what it touches, law and friction, each in a few words."""
+        spheres = [
+            f"radius {one.radius * 1e3:g} mm at '{one.frame}'"
+            for one in (self.sphere, self.other_sphere)
+            if one is not None
+        ]
+        first = spheres[0] if self.sphere is not None else f"contact source at '{self.frame_i}'"
+        if self.shell is not None:
+            other = f"'{self.shell.name}' at '{self.frame_j}', {self.method}"
+        else:
+            other = spheres[1] if len(spheres) > 1 else f"'{self.frame_j}'"
+        return (
+            self.name,
+            first,
+            other,
+            self.law.text,
+            ("none" if self.friction is None else self.friction.text),
+        )
+
+    def to_core(self) -> _core.Pair:
+        """Build the C++ binding of this pair."""
+        source = None
+        if self.find is not None:
+            has_state = self.friction is not None and self.friction.has_state
+            source = checked_source(self.find, self.name, has_state)
+        core = _core.Pair(
+            name=self.name,
+            joint_i=self.joint_i,
+            placement_i=self.placement_i.homogeneous,
+            joint_j=self.joint_j,
+            placement_j=self.placement_j.homogeneous,
+            radius=0.0 if self.sphere is None else self.sphere.radius,
+            ball=0.0 if self.other_sphere is None else self.other_sphere.radius,
+            shell=None if self.shell is None else self.shell.core_for(self.method),
+            source=source,
+            method=int(Method.from_name(self.method)),
+            law=self.law.core,
+            friction=None if self.friction is None else self.friction.core,
+        )
+        core.group = self.group
+        return core
+
+
+def _center(frame: pin.SE3, sphere: Sphere) -> pin.SE3:
+    return frame * pin.SE3(np.eye(3), np.array(sphere.offset))

@@ -1,0 +1,351 @@
+"""What a scene is made of: a Pinocchio model and its contact pairs."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from copy import copy
+from dataclasses import replace
+from typing import Self, TypedDict, Unpack
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from sphshell_pin import _core
+from sphshell_pin.checks import (
+    check_configuration,
+    check_name,
+    check_names,
+    check_vector,
+)
+from sphshell_pin.contact import Friction, ImpactLaw, Method, NormalLaw, Sphere
+from sphshell_pin.contact.friction import check_friction
+from sphshell_pin.contact.normal_law import check_law
+from sphshell_pin.dynamics.scene.joint_components import JointIngredients, check_joints
+from sphshell_pin.dynamics.scene.models import (
+    check_model,
+    find_frame,
+    reduced_model,
+)
+from sphshell_pin.dynamics.scene.pairs import ContactPair
+from sphshell_pin.dynamics.scene.sources import Find
+from sphshell_pin.dynamics.scene.sphere_arguments import (
+    Parts,
+    default_group,
+    named,
+    parts_of,
+    warn_of_size,
+)
+from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
+from sphshell_pin.shell import Shell
+from sphshell_pin.summary import Detail, Fact, Summarized, names
+
+Array = NDArray[np.float64]
+
+
+class _Settings(TypedDict, total=False):
+    law: NormalLaw
+    friction: Friction | None
+    method: str
+
+
+class SceneParts(Summarized):
+    """What a Scene is made of."""
+
+    def __init__(
+        self,
+        model: pin.Model,
+        lock: Iterable[str] = (),
+        q_lock: ArrayLike | None = None,
+        joints: JointIngredients | None = None,
+    ) -> None:
+        if not isinstance(model, pin.Model):
+            raise InvalidParameter("model", type(model).__name__, "must be a pinocchio.Model")
+        check_model(model)
+        self.lock = check_names("lock", lock)
+        if q_lock is None:
+            q = pin.neutral(model)
+        elif self.lock:
+            q = check_configuration("q_lock", model, q_lock)
+        else:
+            raise InvalidParameter(
+                "q_lock", q_lock, "must come with lock, the joints to hold there"
+            )
+        self._model = reduced_model(model, self.lock, q) if self.lock else pin.Model(model)
+        # What a locked joint holds, its frames do not say any more.
+        self._whole = (pin.Model(model), q) if self.lock else (self._model, q)
+        # Of joints that are held nothing is left to model.
+        held = () if joints is None else tuple(n for n in model.names if n not in self._model.names)
+        self._joints = check_joints(joints, self._model, held)
+        self._model = self._joints.with_armature(self._model)
+        # What users get, made when they first ask; `_model` is never handed out.
+        self._shown: pin.Model | None = None
+        self._pairs: tuple[ContactPair, ...] = ()
+        self._core: _core.Scene | None = None
+
+    def _facts(self) -> list[Fact]:
+        model = self._model
+        pairs = [pair.name for pair in self._pairs]
+        return [
+            Fact("model", model.name or "without a name"),
+            Fact("joints", model.njoints - 1),
+            Fact("degrees of freedom", model.nv, one="degree of freedom"),
+            Fact("contact pairs", len(pairs), brief=False),
+            Fact("contact", names(pairs)),
+        ]
+
+    def _rows(self) -> Detail:
+        headings = ("contact", "sphere", "with", "normal law", "friction")
+        rows = [pair.shown for pair in self._pairs]
+        return Detail(headings, rows, len(rows))
+
+    def __getstate__(self) -> dict[str, object]:
+        """Everything but the C++ binding, which is made again: what pickle and copy take."""
+        return {**self.__dict__, "_core": None}
+
+    @property
+    def model(self) -> pin.Model:
+        """The scene's own model, without the locked joints.
+
+        It is to be read: once it is changed, this and all that computes with the scene raises
+        InvalidParameter. Make a new scene of a changed model.
+        """
+        if self._shown is None:
+            self._shown = pin.Model(self._model)
+        self._check_unchanged()
+        return self._shown
+
+    @property
+    def whole(self) -> tuple[pin.Model, Array]:
+        """The model with the locked joints, and a configuration that has them where they are."""
+        return self._whole
+
+    @property
+    def neutral(self) -> Array:
+        """The model's neutral configuration (nq,)."""
+        return np.asarray(pin.neutral(self._model))
+
+    @property
+    def pairs(self) -> tuple[ContactPair, ...]:
+        """The contact pairs, in the order in which they were added."""
+        return self._pairs
+
+    @property
+    def joints(self) -> JointIngredients:
+        """What is modelled in the joints, without the locked ones."""
+        return self._joints
+
+    def add_contact(
+        self,
+        sphere: Sphere,
+        shell: Shell | Sphere,
+        frame: str = "universe",
+        placement: pin.SE3 | None = None,
+        law: NormalLaw | None = None,
+        friction: Friction | None = None,
+        method: str | None = None,
+        name: str | None = None,
+    ) -> ContactPair:
+        """Let `sphere` touch `shell`, which is placed at `placement` in `frame`.
+
+        In place of the shell there may be another Sphere, which is a solid ball in a frame of its
+        own: `frame`, `placement` and `method` are then not to be given. Contact is symmetric, but
+        that forces act at the point of this other sphere that is closest to the first one's center.
+
+        Without `friction` the contact has none; `method` is "smooth" (default), "facets" or
+        "elements". Returns the pair. Warns with UnitWarning of a shell a thousand times larger than
+        the sphere or the robot, and with FutureWarning where no `law` is stated: it is then ADAMS's
+        default, ImpactLaw.from_adams().
+        """
+        frame_j, parts = parts_of(sphere, shell, frame, placement, method)
+        default = f"{sphere.frame}-{parts['shell'].name if 'shell' in parts else frame_j}"
+        ends = (sphere.frame, "frame"), (frame_j, "frame")
+        pair = self._add(name, default, *ends, law=law, friction=friction, **parts)
+        warn_of_size(self._model, pair)
+        return pair
+
+    def add_contacts(
+        self,
+        spheres: Iterable[Sphere],
+        shell: Shell | Sphere,
+        frame: str = "universe",
+        placement: pin.SE3 | None = None,
+        *,
+        law: NormalLaw,
+        friction: Friction | None = None,
+        method: str | None = None,
+        name: str | None = None,
+    ) -> tuple[ContactPair, ...]:
+        """Let each of `spheres` touch `shell`: all contacts of a hand, a foot or a robot at once.
+
+        The other arguments are those of `add_contact`, and hold for all. Returns the pairs, called
+        "name/frame", with several spheres in one frame "name/frame-0" and so on; `name` is that of
+        the shell by default. They share what they can: while they are all far from the shell, one
+        distance keeps them from passing through it, and contacts with bristles that begin in one
+        step share the room for them (more than 16 at once begin with the next step).
+        """
+        known = self._pairs
+        group = default_group(shell) if name is None else name
+        try:
+            for sphere, called in named(spheres, group):
+                frame_j, parts = parts_of(sphere, shell, frame, placement, method)
+                ends = (sphere.frame, "frame"), (frame_j, "frame")
+                parts["group"] = group
+                self._add(called, called, *ends, law=law, friction=friction, **parts)
+        except SphshellError:
+            self._pairs = known
+            raise
+        made = self._pairs[len(known) :]
+        warn_of_size(self._model, min(made, key=lambda pair: pair.least_radius))
+        return made
+
+    def add_contact_source(
+        self,
+        find: Find,
+        frame_i: str,
+        frame_j: str,
+        law: NormalLaw | None = None,
+        friction: Friction | None = None,
+        name: str | None = None,
+    ) -> ContactPair:
+        """Let the user's own routine say where two bodies touch (gears, cams, ...).
+
+        find(pose_i, pose_j), with the world placements (pinocchio.SE3) of both frames, returns
+        points_world (k, 3) [m], normals_world (k, 3) (unit, from j to i), depths (k,) [m]; entries
+        with depth <= 0 are no contacts. It is called in every evaluation of the forces. A scene
+        that is to be pickled (multiprocessing) needs a function of a module here, no lambda.
+        """
+        if not callable(find):
+            raise InvalidParameter("find", find, "must be callable: find(pose_i, pose_j)")
+        return self._add(
+            name,
+            f"{frame_i}-{frame_j}",
+            (frame_i, "frame_i"),
+            (frame_j, "frame_j"),
+            placement=pin.SE3.Identity(),
+            law=law,
+            friction=friction,
+            find=find,
+        )
+
+    def check_state(self, q: ArrayLike, v: ArrayLike | None = None) -> tuple[Array, Array]:
+        """Return copies of q (nq,) and v (nv,).
+
+        InvalidParameter for other sizes, no numbers, or a joint whose quaternion or (cos, sin) pair
+        is not of unit length.
+        """
+        self._check_unchanged()
+        model = self._model
+        what = f": this model has nq = {model.nq}, nv = {model.nv}"
+        if self.lock:
+            what += f" after locking {', '.join(self.lock)}"
+        q = check_configuration("q", model, q, what)
+        v = np.zeros(model.nv) if v is None else check_vector("v", v, model.nv, what)
+        return q, v
+
+    def pair(self, name: str) -> ContactPair:
+        """Return the pair called `name`; NameNotFound lists them."""
+        check_name("name", name)
+        for pair in self._pairs:
+            if pair.name == name:
+                return pair
+        raise NameNotFound("contact", name, "the scene", [p.name for p in self._pairs])
+
+    def replace_pair(self, name: str, **changes: Unpack[_Settings]) -> None:
+        """Change the law, friction or method of the pair called `name`."""
+        known = tuple(_Settings.__annotations__)
+        unknown = set(changes) - set(known)
+        if unknown:
+            raise NameNotFound("setting", unknown.pop(), "a pair", known)
+        if "law" in changes:
+            check_law(changes["law"])
+        check_friction(changes.get("friction"))
+        if "method" in changes:
+            Method.from_name(changes["method"])
+        old = self.pair(name)
+        self._pairs = tuple(replace(p, **changes) if p is old else p for p in self._pairs)
+        self._core = None
+
+    @property
+    def core(self) -> _core.Scene:
+        """The C++ binding, built when first needed."""
+        if self._core is None:
+            joints = self._joints.to_core(self._model)
+            self._core = _core.Scene(self._model, [p.to_core() for p in self._pairs], joints)
+        return self._core
+
+    def _check_unchanged(self) -> None:
+        """Raise InvalidParameter if somebody has changed the model that they got of this scene."""
+        # Some hold numbers that are not equal to themselves (nan); of them no change is noticed.
+        if self._shown is None or self._shown == self._model or self._model != self._model:
+            return
+        raise InvalidParameter(
+            "scene.model",
+            self._shown,
+            "must stay as it is, as the scene has been checked and compiled with it: change the "
+            "model first, and make a new Scene of it",
+            "was changed, but",
+        )
+
+    def _add(
+        self,
+        name: str | None,
+        default: str,
+        i: tuple[str, str],
+        j: tuple[str, str],
+        *,
+        law: NormalLaw | None,
+        friction: Friction | None,
+        **parts: Unpack[Parts],
+    ) -> ContactPair:
+        """Add a pair of the frames `i` and `j`, each with the name of its argument."""
+        if law is None:
+            law = ImpactLaw.from_adams()
+            warnings.warn(
+                "a contact without a law gets ADAMS's default, which is deprecated: state it, "
+                "law=ImpactLaw.from_adams() for the same",
+                FutureWarning,
+                stacklevel=3,
+            )
+        check_law(law)
+        check_friction(friction)
+        (joint_i, pose_i), (joint_j, pose_j) = (self.frame_in_joint(*frame) for frame in (i, j))
+        pair = ContactPair(
+            name=self._pair_name(name, default),
+            frame_i=i[0],
+            frame_j=j[0],
+            joint_i=joint_i,
+            joint_j=joint_j,
+            pose_i=pose_i,
+            pose_j=pose_j,
+            law=law,
+            friction=friction,
+            **parts,
+        )
+        self._pairs = (*self._pairs, pair)
+        self._core = None
+        return pair
+
+    def _pair_name(self, name: str | None, default: str) -> str:
+        taken = {p.name for p in self._pairs}
+        if name is not None:
+            check_name("name", name)
+            if name in taken:
+                raise InvalidParameter("name", name, "is taken by another contact of this scene")
+            return name
+        wanted, k = default, 2
+        while wanted in taken:
+            wanted, k = f"{default}-{k}", k + 1
+        return wanted
+
+    def with_pairs(self, pairs: tuple[ContactPair, ...]) -> Self:
+        """Return a scene of the same model, which both share, with other `pairs`."""
+        other = copy(self)
+        other._shown, other._pairs, other._core = self.model, pairs, None
+        return other
+
+    def frame_in_joint(self, name: str, called: str = "frame") -> tuple[int, pin.SE3]:
+        """Return the joint of the frame `name`, and where the frame is in it."""
+        frame = self._model.frames[find_frame(self._model, name, called)]
+        return int(frame.parentJoint), pin.SE3(frame.placement)

@@ -1,0 +1,92 @@
+"""Arguments of Scene.add_contact and add_contacts: spheres, and what they touch."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import TypedDict
+
+import pinocchio as pin
+
+from sphshell_pin.checks import check_name, check_placement, check_type
+from sphshell_pin.contact import Method, Sphere
+from sphshell_pin.dynamics.scene.models import unit_warning
+from sphshell_pin.dynamics.scene.pairs import ContactPair
+from sphshell_pin.dynamics.scene.sources import Find
+from sphshell_pin.errors import InvalidParameter, UnitWarning
+from sphshell_pin.shell import Shell
+
+
+class Parts(TypedDict, total=False):
+    """Fields of a ContactPair in which kinds of pairs differ."""
+
+    placement: pin.SE3
+    method: str
+    sphere: Sphere
+    shell: Shell
+    find: Find
+    other_sphere: Sphere
+    group: str
+
+
+def parts_of(
+    sphere: Sphere, shell: Shell | Sphere, frame: str, placement: pin.SE3 | None, method: str | None
+) -> tuple[str, Parts]:
+    """Check the arguments of Scene.add_contact; return frame_j and the fields of the pair."""
+    check_type("sphere", sphere, Sphere, "must be a Sphere(radius, frame)")
+    if isinstance(shell, Sphere):
+        why = "must not be given where shell is a Sphere"
+        if frame != "universe":
+            raise InvalidParameter("frame", frame, f"{why}: that names its own frame")
+        if placement is not None:
+            raise InvalidParameter("placement", placement, f"{why}: that has its own offset")
+        if method is not None:
+            raise InvalidParameter("method", method, f"{why}: their contact has a closed form")
+        return shell.frame, {
+            "placement": pin.SE3.Identity(),
+            "sphere": sphere,
+            "other_sphere": shell,
+        }
+    check_type("shell", shell, Shell, "must be a Shell (of a file: Shell.from_file) or a Sphere")
+    method = "smooth" if method is None else method
+    Method.from_name(method)
+    placement = check_placement("placement", placement)
+    return frame, {"placement": placement, "method": method, "sphere": sphere, "shell": shell}
+
+
+def default_group(shell: Shell | Sphere) -> str:
+    """Return what the contacts of several spheres with `shell` are called."""
+    return shell.frame if isinstance(shell, Sphere) else shell.name
+
+
+def named(spheres: Iterable[Sphere], name: str) -> Iterator[tuple[Sphere, str]]:
+    """Yield each of `spheres`, which are one at least, with the name of its pair."""
+    check_name("name", name)
+    wanted = "must be spheres, one at least: Sphere(radius, frame)"
+    if isinstance(spheres, Sphere) or not isinstance(spheres, Iterable):
+        raise InvalidParameter("spheres", spheres, wanted)
+    every = list(spheres)
+    for k, one in enumerate(every):
+        check_type(f"spheres[{k}]", one, Sphere, "must be a Sphere(radius, frame)")
+    if not every:
+        raise InvalidParameter("spheres", every, wanted)
+    counts = Counter(one.frame for one in every)
+    seen: Counter[str] = Counter()
+    for one in every:
+        called = f"{name}/{one.frame}"
+        yield one, called if counts[one.frame] == 1 else f"{called}-{seen[one.frame]}"
+        seen[one.frame] += 1
+
+
+def warn_of_size(model: pin.Model, pair: ContactPair) -> None:
+    """Warn of a sphere or a shell that is suspiciously large."""
+    if pair.sphere is None or pair.shell is None:
+        return
+    suspicion = unit_warning(model, pair.sphere.radius, pair.shell.size)
+    if suspicion:
+        warnings.warn(
+            f"contact '{pair.name}', shell '{pair.shell.name}': {suspicion}",
+            UnitWarning,
+            stacklevel=3,
+        )

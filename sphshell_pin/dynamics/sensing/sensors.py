@@ -1,0 +1,315 @@
+"""Sensors: what a robot's computer knows of its forces, sampled, filtered, noisy and late."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from sphshell_pin import _core
+from sphshell_pin.checks import check_name, check_type
+from sphshell_pin.dynamics.scene.joint_components import joint_slides
+from sphshell_pin.dynamics.scene.models import find_frame, find_joint
+from sphshell_pin.dynamics.scene.scene import Scene
+from sphshell_pin.dynamics.scene.scene_contacts import Columns
+from sphshell_pin.dynamics.sensing.sensor_log import Readings, SensorLog, split_logs
+from sphshell_pin.dynamics.sensing.subtree_inertia import beyond, frames_beyond
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.parameters import Ingredient, parameter
+
+__all__ = ["ContactSwitch", "ForceTorqueSensor", "JointTorqueSensor"]
+
+_FASTEST = 1e6  # [Hz]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor(Ingredient):
+    """Base of the sensors of a simulation.
+
+    The reading k is taken at the start of the run plus k / `rate` and arrives `delay` later.
+    """
+
+    name: str = parameter(help="of the sensor in results and for controllers")
+    rate: float = parameter(
+        1000.0, above=0, at_most=_FASTEST, unit="Hz", help="readings in a second"
+    )
+    delay: float = parameter(
+        0.0, at_least=0, unit="s", help="from taking a reading to its arrival at the controller"
+    )
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for a value of a wrong type or outside its bounds."""
+        super().__post_init__()
+        check_name("name", self.name)
+
+    def columns(self, scene: Scene) -> tuple[str, ...]:
+        """Return the names of the values of a reading, with their units."""
+        raise NotImplementedError
+
+    def to_core(self, scene: Scene) -> _core.Sensor:
+        """Build the C++ binding for `scene`.
+
+        Raises FrameNotFound, NameNotFound and InvalidParameter for what the scene does not have.
+        """
+        core = self._measured(scene)
+        core.rate, core.delay = self.rate, self.delay
+        return core
+
+    def _measured(self, scene: Scene) -> _core.Sensor:
+        raise NotImplementedError
+
+    def reading(self, values: NDArray[np.float64]) -> NDArray[np.float64] | float | bool:
+        """Return a reading as a controller gets it."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Analog(Sensor):
+    """A signal, filtered before it is sampled, with noise and a range."""
+
+    cutoff: float | None = parameter(
+        None,
+        above=0,
+        at_most=_FASTEST,
+        unit="Hz",
+        help="of the first-order low-pass filter before the sampling; none by default",
+    )
+    seed: int = parameter(0, help="of the noise; other names have other noise")
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter for a value of a wrong type or outside its bounds."""
+        super().__post_init__()
+        check_type("seed", self.seed, int, "must be a whole number")
+
+    def _set(self, core: _core.Sensor, ranges: list[float | None], noise: list[float]) -> None:
+        core.cutoff = self.cutoff or 0.0
+        core.range = [math.inf if one is None else one for one in ranges]
+        core.noise = noise
+        digest = hashlib.sha256(f"{self.seed} {self.name}".encode()).digest()
+        core.seed = int.from_bytes(digest[:8], "little")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceTorqueSensor(_Analog, kind="force-torque"):
+    """The wrench that the parts before `frame` exert on those beyond it.
+
+    It is stated in the frame, about its origin. Beyond the frame of a link is the link with all
+    that is attached to it, beyond that of a joint the joint's link; their weight, their inertia and
+    their contacts are included. A tool at rest that nothing touches reads its weight, upwards; a
+    tip pressed on a surface reads the opposite of what the surface exerts on it, less the tool's
+    weight.
+    """
+
+    frame: str = parameter(help="the link or joint beyond which it measures")
+    force_range: float | None = parameter(
+        None, above=0, unit="N", help="largest force along each axis"
+    )
+    torque_range: float | None = parameter(
+        None, above=0, unit="N m", help="largest torque about each axis"
+    )
+    force_noise: float = parameter(
+        0.0, at_least=0, unit="N", help="standard deviation of each force reading"
+    )
+    torque_noise: float = parameter(
+        0.0, at_least=0, unit="N m", help="standard deviation of each torque reading"
+    )
+
+    def columns(self, scene: Scene) -> tuple[str, ...]:
+        """Return the names of the values of a reading, with their units."""
+        parts = (("force", "N"), ("torque", "N m"))
+        return tuple(f"{part}_{axis} [{unit}]" for part, unit in parts for axis in "xyz")
+
+    def _measured(self, scene: Scene) -> _core.Sensor:
+        check_name("frame", self.frame)
+        part = beyond(scene, self.frame)
+        pairs_i, pairs_j = (
+            [
+                k
+                for k, pair in enumerate(scene.pairs)
+                if find_frame(scene.model, getattr(pair, side)) in part.frames
+            ]
+            for side in ("frame_i", "frame_j")
+        )
+        if not (part.inertia.mass > 0 or part.children or pairs_i or pairs_j):
+            raise InvalidParameter(
+                "frame",
+                self.frame,
+                "has nothing beyond it: no mass, no joint and no contact, so that it would always "
+                "read zero",
+            )
+        core = _core.Sensor.force_torque(
+            joint=part.joint,
+            frame=part.placement.homogeneous,
+            inertia=part.inertia.toDynamicParameters(),
+            children=list(part.children),
+            pairs_i=pairs_i,
+            pairs_j=pairs_j,
+            frames=sorted(part.frames),
+        )
+        self._set(
+            core,
+            3 * [self.force_range] + 3 * [self.torque_range],
+            3 * [self.force_noise] + 3 * [self.torque_noise],
+        )
+        return core
+
+    def reading(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the force [N] and the torque [N m] (6,)."""
+        return values
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointTorqueSensor(_Analog, kind="joint-torque"):
+    """The torque that a joint transmits to the link that it moves, positive along its velocity.
+
+    It is the controller's torque with what stops, friction and damping of the joint add, less what
+    the rotor's inertia (the model's armature) takes. A sliding joint has a force [N]. Where other
+    joints follow this one, what they transmit counts as seen from it.
+    """
+
+    joint: str = parameter(help="a joint with one degree of freedom")
+    range: float | None = parameter(None, above=0, unit="N m", help="largest torque")
+    noise: float = parameter(0.0, at_least=0, unit="N m", help="standard deviation of each reading")
+
+    def columns(self, scene: Scene) -> tuple[str, ...]:
+        """Return the names of the values of a reading, with their units."""
+        slides = joint_slides(find_joint(scene.model, self.joint))
+        return ("force [N]" if slides else "torque [N m]",)
+
+    def _measured(self, scene: Scene) -> _core.Sensor:
+        check_name("joint", self.joint)
+        joint = find_joint(scene.model, self.joint)
+        if joint.nv != 1:
+            raise InvalidParameter(
+                "joint",
+                self.joint,
+                f"must have one degree of freedom, this has {joint.nv}"
+                + (": it follows another joint, measure that one" if joint.nv == 0 else ""),
+            )
+        core = _core.Sensor.joint_torque(index=joint.idx_v)
+        self._set(core, [self.range], [self.noise])
+        return core
+
+    def reading(self, values: NDArray[np.float64]) -> float:
+        """Return the torque [N m], or force [N]."""
+        return float(values[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactSwitch(Sensor, kind="contact-switch"):
+    """Whether the normal forces of a contact, or of all on a link, sum to more than a threshold.
+
+    It closes above `threshold` and opens below `release`, by default the same.
+    """
+
+    contact: str | None = parameter(None, help="name of the contact")
+    frame: str | None = parameter(None, help="or the link whose contacts it feels")
+    threshold: float = parameter(at_least=0, unit="N", help="closes above this force")
+    release: float | None = parameter(None, at_least=0, unit="N", help="opens below this force")
+
+    def __post_init__(self) -> None:
+        """Raise InvalidParameter unless there is one of contact and frame, and release fits."""
+        super().__post_init__()
+        if (self.contact is None) == (self.frame is None):
+            raise InvalidParameter(
+                "contact, frame",
+                (self.contact, self.frame),
+                "must be one of the two: the name of a contact, or a link",
+            )
+        if self.release is not None and self.release > self.threshold:
+            raise InvalidParameter(
+                "release", self.release, f"must not be above threshold = {self.threshold:g} [N]"
+            )
+
+    def columns(self, scene: Scene) -> tuple[str, ...]:
+        """Return the names of the values of a reading, with their units."""
+        return ("closed",)
+
+    def _measured(self, scene: Scene) -> _core.Sensor:
+        if self.contact is not None:
+            # A name may be that of several pairs that were stated together.
+            names = [{pair.name, pair.group} for pair in scene.pairs]
+            pairs = [k for k, known in enumerate(names) if self.contact in known]
+            if not pairs:
+                scene.pair(self.contact)
+        else:
+            assert self.frame is not None
+            check_name("frame", self.frame)
+            frames = self._frames(scene, self.frame)
+            pairs = [
+                k
+                for k, pair in enumerate(scene.pairs)
+                if {find_frame(scene.model, f) for f in (pair.frame_i, pair.frame_j)} & frames
+            ]
+            if not pairs:
+                raise InvalidParameter(
+                    "frame", self.frame, "has no contact on it or on what is fixed to it"
+                )
+        release = self.threshold if self.release is None else self.release
+        return _core.Sensor.contact_switch(pairs=pairs, threshold=self.threshold, release=release)
+
+    @staticmethod
+    def _frames(scene: Scene, name: str) -> frozenset[int]:
+        if scene.model.frames[find_frame(scene.model, name)].type == pin.FrameType.OP_FRAME:
+            return frozenset(frames_beyond(scene.model, name))
+        return beyond(scene, name).frames
+
+    def reading(self, values: NDArray[np.float64]) -> bool:
+        """Return whether it is closed."""
+        return bool(values[0])
+
+
+class SensorSet:
+    """The sensors of a simulation, bound to the scene of a run.
+
+    Raises what `Sensor.to_core` raises; the text names the sensor.
+    """
+
+    def __init__(self, sensors: tuple[Sensor, ...], scene: Scene) -> None:
+        self.sensors = sensors
+        self.core = [sensor.to_core(scene) for sensor in sensors]
+        self._columns = [sensor.columns(scene) for sensor in sensors]
+        self._widths = np.array([len(one) for one in self._columns], dtype=int)
+        self._spans = [
+            slice(end - width, end)
+            for end, width in zip(np.cumsum(self._widths), self._widths, strict=True)
+        ]
+
+    def readings(self, memory: bytes | bytearray) -> Readings:
+        """Return the latest readings by name from the core's memory of them."""
+        values = np.frombuffer(memory)
+        return Readings(
+            (one.name, one.reading(values[span]))
+            for one, span in zip(self.sensors, self._spans, strict=True)
+        )
+
+    def logs(self, record: Columns) -> dict[str, SensorLog]:
+        """Return what the core has recorded of each sensor."""
+        names = [one.name for one in self.sensors]
+        parts = [record[f"sensor{part}"] for part in ("", "_t", "_sampled", "_values")]
+        return split_logs(dict(zip(names, self._columns, strict=True)), *parts)
+
+
+def check_sensors(sensors: Iterable[object]) -> tuple[Sensor, ...]:
+    """Return the sensors as a tuple; raise InvalidParameter for others and for equal names."""
+    if isinstance(sensors, Sensor):
+        raise InvalidParameter("sensors", sensors, "must be a list of sensors: write [...]")
+    try:
+        given = list(sensors)
+    except TypeError:
+        raise InvalidParameter("sensors", sensors, "must be a list of sensors") from None
+    found: dict[str, Sensor] = {}
+    for k, one in enumerate(given):
+        if not isinstance(one, Sensor):
+            raise InvalidParameter(
+                f"sensors[{k}]", one, "must be a sensor, as ForceTorqueSensor(name, frame)"
+            )
+        if one.name in found:
+            raise InvalidParameter(f"sensors[{k}].name", one.name, "is taken by another sensor")
+        found[one.name] = one
+    return tuple(found.values())

@@ -1,0 +1,1 @@
+"""Drafting of new scenarios: fingertips, postures, places to touch, grasps, and the text."""

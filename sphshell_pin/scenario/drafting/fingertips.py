@@ -1,0 +1,164 @@
+"""Where a robot carries its sphere: known fingertips and feet, or the end of its only limb."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips
+from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry
+
+Array = npt.NDArray[np.float64]
+
+# Of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's place, as
+# meshes of fingertips stand out of the spheres that stand for them.
+AT_TIP = 1.5
+_ASKED = "as it was asked for"
+# Words in the names of frames that mark the end of a limb, in the order of trust.
+_END_WORDS = ("tcp", "tip", "tool", "ee_link", "eef", "end_effector", "foot", "feet")
+
+
+@dataclass(frozen=True)
+class Tip:
+    """A sphere on a robot: `radius` [m], center `offset` (3,) [m] in `frame`; how it is known."""
+
+    frame: str
+    radius: float
+    offset: Array
+    source: str
+
+
+def find_tips(
+    robot: LoadedRobot,
+    *,
+    shipped: str | None,
+    frame: str | None,
+    radius: float | None,
+    offset: Array | None = None,
+) -> list[Tip]:
+    """Return the spheres of `robot` to put on a surface.
+
+    One for a robot with a fixed base, all feet of one that floats. `shipped` is the name of a
+    shipped robot; `frame`, `radius` [m] and `offset` (3,) [m] in the frame are what the user gave.
+
+    Raises
+    ------
+    FrameNotFound
+        The robot has no such frame.
+    SphshellError
+        Which frame cannot be found out, or the sphere is inside its own link.
+    """
+    known = _known(robot, shipped)
+    if frame is not None:
+        find_frame(robot.model, frame)
+        known = [one for one in known if one.frame == frame]
+    elif not floats(robot.model):
+        known = known[:1]
+    if known and offset is not None:
+        known = [replace(known[0], offset=offset, source=_ASKED)]
+    if not known:
+        names = _ends(robot.model) if frame is None else [(frame, _ASKED)]
+        known = [_at_end(robot, *one, radius, offset, asked=frame is not None) for one in names]
+    found = [_sized(one, radius) for one in known]
+    # The sphere of a shipped robot is where it belongs, whatever size is asked for.
+    for one in found if shipped is None or offset is not None else ():
+        _check_outside(robot, one)
+    return found
+
+
+def _at_end(
+    robot: LoadedRobot,
+    frame: str,
+    source: str,
+    radius: float | None,
+    offset: Array | None,
+    *,
+    asked: bool,
+) -> Tip:
+    """Return a sphere at the end of the link of `frame`.
+
+    At the frame itself where that is before the link, or `asked` for with a radius.
+    """
+    link = LinkGeometry(robot, frame)
+    end = link.end(radius)
+    if offset is not None:
+        return Tip(frame, end.radius, offset, _ASKED)
+    before = -math.inf < link.depth(np.zeros(3)) < -0.5 * end.radius
+    if before or (asked and radius):
+        return Tip(frame, end.radius, np.zeros(3), source)
+    return Tip(frame, end.radius, end.offset, f"{source}; {end.source}")
+
+
+def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
+    """Raise SphshellError for a sphere that is inside its own link, where it touches nothing."""
+    if int(robot.model.frames[find_frame(robot.model, tip.frame)].parentJoint) == 0:
+        return
+    link = LinkGeometry(robot, tip.frame)
+    depth = link.depth(tip.offset)
+    if depth > AT_TIP * tip.radius:
+        end = link.end()
+        x, y, z = (float(f"{one:.4f}") + 0.0 for one in end.offset)
+        raise SphshellError(
+            f"the sphere of radius {1e3 * tip.radius:.3g} mm on frame '{tip.frame}' is inside link "
+            f"'{link.link}', its center {1e3 * depth:.3g} mm deep: it can touch nothing; a ball at "
+            f"the end of this link: --frame {tip.frame} --offset {x:g} {y:g} {z:g} --radius "
+            f"{end.radius:g}"
+        )
+
+
+def floats(model: pin.Model) -> bool:
+    """Whether the root of the robot is free to move in space."""
+    return bool(model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer")
+
+
+def _known(robot: LoadedRobot, shipped: str | None) -> list[Tip]:
+    if shipped in TIPS:
+        spheres, source = fingertips(shipped), "a fingertip this package knows of"
+    else:
+        spheres, source = end_spheres(robot), "the sphere of its collision geometry"
+    model = robot.model
+    return [
+        Tip(one.frame, one.radius, np.array(one.offset), source)
+        for one in spheres
+        if int(model.frames[find_frame(model, one.frame)].parentJoint) > 0
+    ]
+
+
+def _sized(tip: Tip, radius: float | None) -> Tip:
+    if radius is not None:
+        # A center that stands one radius before the frame goes on touching it.
+        touching = tip.radius and abs(np.linalg.norm(tip.offset) - tip.radius) < 1e-9
+        offset = tip.offset * (radius / tip.radius) if touching else tip.offset
+        return Tip(tip.frame, radius, offset, tip.source)
+    return tip
+
+
+def _ends(model: pin.Model) -> list[tuple[str, str]]:
+    """Return the frames at the ends of the limbs that may be meant, and why."""
+    leaves = set(range(1, model.njoints)) - {int(one) for one in model.parents}
+    carriers = {int(one.parentFrame) for one in model.frames}
+    names = [
+        one.name
+        for i, one in enumerate(model.frames)
+        if int(one.parentJoint) in leaves and i not in carriers
+    ]
+    if len(names) == 1:
+        return [(names[0], "the only end of the robot")]
+    for word in _END_WORDS:
+        found = [name for name in names if word in name.lower()]
+        if len(found) == 1 or (found and floats(model)):
+            return [(name, f"an end of the robot called '{word}'") for name in found]
+    last = max(sorted(leaves), key=lambda j: len(model.supports[j]))
+    if floats(model) or len(model.supports[last]) <= 2:
+        raise SphshellError(
+            "the robot has several ends: state which frame carries the sphere with --frame, for "
+            f"instance one of {', '.join(names[:8]) or ', '.join(f.name for f in model.frames)}"
+        )
+    which = "only limb" if len(leaves) == 1 else f"longest of {len(leaves)} limbs"
+    return [(str(model.names[last]), f"the end of the {which}")]

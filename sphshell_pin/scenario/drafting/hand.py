@@ -1,0 +1,216 @@
+"""A new scenario in which a hand holds a free part between all its fingertips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.contact.materials import Material, friction_between
+from sphshell_pin.dynamics.scene.mimic import mimics
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.robots import LoadedRobot, end_spheres
+from sphshell_pin.scenario.drafting.clearance import Links, SelfContact
+from sphshell_pin.scenario.drafting.fingertips import Tip, floats
+from sphshell_pin.scenario.drafting.force_balance import least_friction
+from sphshell_pin.scenario.drafting.grasp import Grasp, Hand, grasps
+from sphshell_pin.scenario.drafting.hand_text import DURATION, GAP, HandDraft
+from sphshell_pin.scenario.drafting.part import Part, part_file
+from sphshell_pin.scenario.drafting.plan import GRAVITY
+from sphshell_pin.scenario.drafting.pose_search import stated_kinds
+from sphshell_pin.scenario.format.bodies import joint_spans
+from sphshell_pin.scenario.format.build import Built
+from sphshell_pin.scenario.format.schema import RobotSection, ShellSection
+from sphshell_pin.scenario.running.figures import judge
+from sphshell_pin.scenario.running.run import simulate
+from sphshell_pin.shell.shell import Shell
+
+Array = npt.NDArray[np.float64]
+
+# Weights that friction could carry under the forces by default.
+_SAFETY = 3.0
+# Grasps that are run; the part of a run after which the hand holds, and how far the part may move
+# from then on, in radii.
+_MOST_RUNS, _SETTLED, _MOVED = 6, 0.4, 0.2
+
+
+@dataclass(frozen=True)
+class Held:
+    """A scenario that works: its text, the part's URDF, and why it is as it is."""
+
+    text: str
+    urdf: str
+    built: Built
+    why: tuple[str, ...]
+
+
+def every_tip(
+    robot: LoadedRobot, frame: str | None, radius: float | None, place: str | None
+) -> list[Tip]:
+    """Return all fingertips of `robot`.
+
+    SphshellError for fewer than two, and for options that belong to a single one.
+    """
+    for option, value in (("--frame", frame), ("--radius", radius), ("--place", place)):
+        if value is not None:
+            raise SphshellError(f"{option} belongs to a single tip: leave it out with --tips all")
+    spheres = end_spheres(robot)
+    if len(spheres) < 2:
+        raise SphshellError(
+            "--tips all needs two fingertips or more, spheres in the collision geometry of links "
+            f"that carry no further joint; this robot has {len(spheres)}"
+        )
+    return [
+        Tip(one.frame, one.radius, np.array(one.offset), "the sphere of its collision geometry")
+        for one in spheres
+    ]
+
+
+def hold_in_hand(
+    section: RobotSection,
+    shell_section: ShellSection,
+    built: Built,
+    tips: Sequence[Tip],
+    materials: tuple[Material, Material],
+    press: float | None,
+    name: str,
+    make: Callable[[str, Built], Built],
+) -> Held:
+    """Return a scenario `name` in which the `tips` of a robot hold the surface of `built`.
+
+    `materials` are those of tips and part, `press` [N] the largest normal force of a tip;
+    `make(text, reuse)` builds a text. Each draft is run; the first that holds the part is taken.
+
+    Raises
+    ------
+    SphshellError
+        None does; the text says why, and what to change.
+    """
+    model = built.assembly.model
+    if floats(model):
+        raise SphshellError("a hand with a free root cannot hold a part: leave out --base")
+    (shell,) = built.shells.values()
+    part = Part.of(shell, materials[1])
+    hand = Hand(model, tips)
+    mu, _ = friction_between(*materials)
+    total = _SAFETY * part.mass * GRAVITY / mu if press is None else 2.0 * press
+    hand_geometry = built.assembly.loaded[0].collision_model
+    rules = mimics(model)
+    moving = {model.names[j] for j in hand.joints}
+    lock = tuple(name for name in list(model.names)[1:] if name not in rules and name not in moving)
+    links = Links(model, hand_geometry, shell, tips, lock)
+    touching = SelfContact(model, hand_geometry, built.assembly.q0)
+    blocked: list[str] = []
+
+    def free_of_part(q: Array, placement: pin.SE3) -> bool:
+        found = links.within(q, placement, whole=True)
+        if found is not None:
+            blocked.append(found.link)
+        return found is None
+
+    found = grasps(
+        hand,
+        built.assembly.q0,
+        shell,
+        part.weight,
+        total,
+        mu,
+        GAP,
+        lambda q: not touching.found(q),
+        free_of_part,
+    )
+    if not found:
+        raise _no_grasp(shell, len(tips), blocked)
+    reuse = _with_part(built, section, part, name)
+    kinds = stated_kinds(model, lock)
+    fault = ""
+    for one in found[:_MOST_RUNS]:
+        grasp = _pressed(one, part, press, mu)
+        draft = HandDraft(section, shell_section, shell, hand, grasp, part, materials, lock, name)
+        fault = draft.fault()
+        if fault:
+            continue
+        for joints in draft.choices(kinds):
+            text = draft.text(joints)
+            made = make(text, reuse)
+            fault = _try(made, draft, links)
+            if not fault:
+                return Held(text, part.urdf(), made, draft.why(kinds, joints))
+    raise SphshellError(
+        f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {fault}; a lighter "
+        "--against, another --press, or a smaller part"
+    )
+
+
+def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> SphshellError:
+    sizes = " x ".join(f"{1e3 * one:.3g}" for one in shell.box[1] - shell.box[0])
+    if blocked:
+        link = max(set(blocked), key=blocked.count)
+        return SphshellError(
+            f"link '{link}' would be in the part, or another one, wherever all {count} fingertips "
+            f"touch it and could hold it: take a part of another size than {sizes} mm"
+        )
+    return SphshellError(
+        f"the {count} fingertips cannot hold a part of {sizes} mm: nowhere that was tried do all "
+        "touch it with forces inside their friction cones; take a part of another size, or its "
+        "--unit"
+    )
+
+
+def _with_part(built: Built, section: RobotSection, part: Part, name: str) -> Built:
+    """Return `built` with the part as a second robot, so that neither is read from files."""
+    loaded = (built.assembly.loaded[0], part.loaded())
+    scenario = built.scenario.model_copy(update={"robot": [section, _part_section(name)]})
+    return replace(built, scenario=scenario, assembly=replace(built.assembly, loaded=loaded))
+
+
+def _part_section(name: str) -> RobotSection:
+    return RobotSection(urdf=part_file(name), free_flyer=True, label="part")
+
+
+def _pressed(grasp: Grasp, part: Part, press: float | None, mu: float) -> Grasp:
+    """Return the grasp with forces of which the largest normal one is `press` [N]."""
+    if press is None:
+        return grasp
+    total = 2.0 * press
+    for _ in range(4):
+        wrench = part.weight(grasp.placement)
+        found = least_friction(grasp.points, grasp.normals, wrench, total, mu)
+        if found is None:
+            break
+        grasp = replace(grasp, friction=found[0], forces=found[1])
+        total *= press / grasp.normal_forces().max()
+    return grasp
+
+
+def _try(built: Built, draft: HandDraft, links: Links) -> str:
+    """Run a draft; return what fails, or an empty text."""
+    result, stopped = simulate(built)
+    if stopped is not None:
+        return f"the run stops: {stopped}"
+    for name, pair in result.stats.pairs.items():
+        if pair.contact_time < 0.9 * DURATION:
+            return f"'{name}' loses the part"
+    model = built.scene.model
+    span, _ = joint_spans(model, "part/root_joint")
+    held = result.q[result.t >= _SETTLED * DURATION]
+    moved = float(np.linalg.norm(held[:, span][:, :3] - held[0, span][:3], axis=1).max())
+    if moved > _MOVED * float(draft.hand.radii.min()):
+        return f"the part moves by {1e3 * moved:.2g} mm in the hand"
+    q = draft.grasp.q.copy()
+    for row in result.q[:: max(1, len(result.q) // 60)]:
+        for j in draft.hand.joints:
+            name = draft.hand.model.names[j]
+            to_q, _ = joint_spans(draft.hand.model, name)
+            from_q, _ = joint_spans(model, f"hand/{name}")
+            q[to_q] = row[from_q]
+        found = links.within(q, pin.XYZQUATToSE3(row[span]))
+        if found is not None:
+            return f"link '{found.link}' is in the part"
+    for one in judge(built, result):
+        if not one.met:
+            return f"{one.figure} is {one.measured:.3g}, not {one.expected}"
+    return ""

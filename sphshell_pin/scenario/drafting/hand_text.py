@@ -1,0 +1,261 @@
+"""The text of a scenario in which a hand holds a part, and the values in it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.contact.materials import Material, friction_between, restitution_between
+from sphshell_pin.dynamics.scene.joint_components import JointIngredients
+from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
+from sphshell_pin.scenario.drafting.part import Part, part_file
+from sphshell_pin.scenario.drafting.plan import bearable, hertz_stiffness
+from sphshell_pin.scenario.format.bodies import joint_spans
+from sphshell_pin.scenario.format.schema import RobotSection, ShellSection
+from sphshell_pin.shell.shell import Shell
+
+Array = npt.NDArray[np.float64]
+
+GAP = 1e-4
+"""Of each fingertip at the start [m]."""
+
+DURATION, HELD = 1.5, 0.05
+"""Of the run [s], and how well the largest force is held in it."""
+
+# How far the joints' springs are drawn by the largest torque [rad].
+_DRAWN = 0.1
+_NO_LIMIT = 1e9
+# What may keep fingers from pressing as their motors do.
+_BRAKES = ("friction", "damping")
+
+
+@dataclass(frozen=True)
+class HandDraft:
+    """A grasp that becomes a scenario `name`."""
+
+    section: RobotSection
+    shell: ShellSection
+    surface: Shell
+    hand: Hand
+    grasp: Grasp
+    part: Part
+    materials: tuple[Material, Material]
+    lock: tuple[str, ...]
+    name: str
+
+    @property
+    def press(self) -> float:
+        """Largest normal force [N]."""
+        return float(self.grasp.normal_forces().max())
+
+    @property
+    def strongest(self) -> int:
+        """The tip that presses hardest."""
+        return int(np.argmax(self.grasp.normal_forces()))
+
+    def fault(self) -> str:
+        """Say what is wrong before anything is run."""
+        model, torques = self.hand.model, self.hand.torques(self.grasp)
+        weight = pin.computeGeneralizedGravity(model, model.createData(), self.grasp.q)
+        limits = np.array(model.upperEffortLimit)
+        stated = (limits > 0) & (limits < _NO_LIMIT)
+        over = np.flatnonzero(stated & (np.abs(torques + weight) > limits))
+        if len(over):
+            k = int(over[0])
+            return f"the effort limit of {limits[k]:g} N m allows no press of {self.press:.3g} N"
+        radius = float(self.hand.radii.min())
+        if self.press > bearable(radius, *self.materials) * 7.5**1.5:
+            return (
+                f"{self.press:.3g} N would press a {self.materials[0].name} sphere of radius "
+                f"{1e3 * radius:.3g} mm in by more than half of it"
+            )
+        return ""
+
+    def gains(self) -> tuple[float, float]:
+        """Return stiffness [N m/rad] and damping [N m s/rad] of the joints."""
+        model = self.hand.model
+        torque = float(np.abs(self.hand.torques(self.grasp)).max())
+        kp = _round(torque / _DRAWN)
+        inertia = np.diag(pin.crba(model, model.createData(), self.grasp.q))
+        moved = [model.joints[j].idx_v for j in self.hand.joints]
+        return kp, _round(1.4 * math.sqrt(kp * float(np.median(inertia[moved]))))
+
+    def pressed_in(self) -> Array:
+        """Return the configuration (nq,) in which the tips are as deep in the part as pressed."""
+        radii = self.hand.radii
+        stiffness = [hertz_stiffness(float(radius), *self.materials) for radius in radii]
+        depths = (self.grasp.normal_forces() / stiffness) ** (2 / 3)
+        found = self.hand.close_on(self.grasp.q, self.surface, self.grasp.placement, -depths)
+        return self.grasp.q if found is None else found[0]
+
+    def choices(self, kinds: list[str]) -> list[list[str]]:
+        """Return what may act in the joints: what the file states, then without what brakes."""
+        free = [kind for kind in kinds if kind not in _BRAKES]
+        pushes = float(np.abs(self.hand.torques(self.grasp)).max())
+        dry = JointIngredients.from_model(self.hand.model, ["friction"]).friction.values()
+        stuck = any(one.torque > pushes for one in dry)
+        return [free] if stuck or free == kinds else [kinds, free]
+
+    def text(self, joints: list[str]) -> str:
+        """Return the scenario's text, with `joints` of what the robot's file states."""
+        model, grasp, hand = self.hand.model, self.grasp, self.hand
+        kp, kd = self.gains()
+        drawn = pin.integrate(model, self.pressed_in(), hand.torques(grasp) / kp)
+        one, other = self.materials
+        static, dynamic = friction_between(one, other)
+        radius, load = float(hand.radii.min()), self.press
+        slope = 1.5 * hertz_stiffness(radius, one, other) ** (2 / 3) * load ** (1 / 3)
+        damping = 0.2 * math.sqrt(slope * self.part.mass / len(hand.tips))
+        place = grasp.placement
+        root = [*place.translation.tolist(), *pin.Quaternion(place.rotation).coeffs().tolist()]
+        stated = self.section.model_dump(exclude_defaults=True)
+        keys = ("name", "urdf", "file", "package_dirs", "xacro_args")
+        source = "\n".join(f"{key} = {_toml(stated[key])}" for key in keys if key in stated)
+        if self.lock:
+            source += f"\nlock = {_toml(list(self.lock))} # they move no fingertip"
+        surface = self.shell.model_dump(exclude_defaults=True, exclude={"frame", "placement"})
+        spheres = "\n".join(
+            f"  {{ frame = {_toml('hand/' + tip.frame)}, radius = {tip.radius!r}, "
+            f"offset = {_toml(tip.offset.tolist())} }},"
+            for tip in hand.tips
+        )
+        strongest = f"tips/hand/{hand.tips[self.strongest].frame}"
+        return f"""\
+# {len(hand.tips)} fingertips hold {self.shell.name}.
+#
+#   sphshell-pin run {self.name}.toml
+#   sphshell-pin view {self.name}.toml
+#
+# Units are SI (m, kg, s, N, rad) unless a key says otherwise.
+
+title = {_toml(f"{len(hand.tips)} fingertips hold {self.shell.name}")}
+
+[[robot]]
+{source}
+label = "hand"
+joints = {_toml(joints)}
+
+# All fingertips are {1e3 * GAP:g} mm away from the part.
+[robot.start]
+{_joints(model, grasp.q, hand.joints, "")}
+
+# {self.part.mass:.3g} kg, {other.name} all through: {other.density:g} kg/m^3.
+[[robot]]
+urdf = {_toml(part_file(self.name))}
+free_flyer = true
+label = "part"
+
+[robot.start]
+# x y z [m] and the quaternion x y z w
+root_joint = {_toml([round(x, 9) for x in root])}
+
+[[shell]]
+{chr(10).join(f"{key} = {_toml(value)}" for key, value in surface.items())}
+frame = "part/part"
+
+# Hertz: {one.name} balls on {other.name}; friction that sticks.
+[[contact]]
+name = "tips"
+spheres = [
+{spheres}
+]
+shell = {_toml(self.shell.name)}
+
+[contact.law]
+type = "hertz"
+radius = {radius!r}
+young_1 = {_toml(one.young)}
+poisson_1 = {one.poisson}
+young_2 = {_toml(other.young)}
+poisson_2 = {other.poisson}
+restitution = {restitution_between(one, other)}
+speed = 0.1
+
+[contact.friction]
+type = "bristle"
+mu_static = {round(static, 3)}
+mu_dynamic = {round(dynamic, 3)}
+stiffness = {_toml(_round(slope))} # [N/m] as stiff as the law under the load
+damping = {_toml(_round(damping))} # [N s/m] a tenth of critical
+torsional = true # a fingertip is soft
+
+[controller]
+type = "joint-pd"
+kp = {_toml(kp)} # [N m/rad]
+kd = {_toml(kd)} # [N m s/rad]
+
+# Where the springs would take the fingers if the part were not there: {self.press:.3g} N at most.
+[controller.q_ref]
+{_joints(model, drawn, hand.joints, "hand/")}
+
+[run]
+duration = {DURATION}
+integrator = "implicit"
+rtol = 1e-5
+record_dt = 5e-3
+
+[[knob]]
+key = "controller.kp"
+
+[[knob]]
+key = "contact.tips.friction.mu_static"
+min = {round(dynamic, 3)}
+max = 1.5
+
+[[knob]]
+key = "gravity.2"
+min = -20.0
+max = 0.0
+
+# What the run is checked against.
+[expect]
+{_toml(f"pairs.{strongest}.mean_force")} = {{ value = {_round(self.press, 3)}, rtol = {HELD} }}
+{_toml(f"pairs.{strongest}.touches")} = {{ min = 1 }}
+"energy.relative_residual" = {{ max = 1e-3 }}
+"""
+
+    def why(self, kinds: list[str], joints: list[str]) -> tuple[str, ...]:
+        """Return one sentence for each choice that was made."""
+        left_out = [kind for kind in kinds if kind not in joints]
+        note = f"of what the file states of the joints, without {' and '.join(left_out)}: with "
+        notes = (note + "that the fingers would not press as they should",) if left_out else ()
+        one, other = self.materials
+        frames = ", ".join(f"'{tip.frame}'" for tip in self.hand.tips)
+        used = self.grasp.friction / friction_between(one, other)[0]
+        return (
+            f"{len(self.hand.tips)} fingertips, the spheres of the collision geometry: {frames}",
+            f"the part is {other.name} all through and weighs {self.part.mass:.3g} kg",
+            f"the fingertips press with {self.press:.3g} N at most; its weight and their forces "
+            f"use {100 * used:.0f} % of the friction",
+            f"law and friction of {one.name} on {other.name}, typical values: --law and --against "
+            "name others",
+            *notes,
+        )
+
+
+def _joints(model: pin.Model, q: Array, joints: Sequence[int], prefix: str) -> str:
+    lines = []
+    for j in joints:
+        span, _ = joint_spans(model, model.names[j])
+        values = [round(float(x), 6) for x in q[span]]
+        stated = values[0] if len(values) == 1 else values
+        lines.append(f"{_toml(prefix + model.names[j])} = {_toml(stated)}")
+    return "\n".join(lines)
+
+
+def _round(x: float, digits: int = 2) -> float:
+    return float(f"{x:.{digits}g}")
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)

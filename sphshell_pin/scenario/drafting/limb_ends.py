@@ -1,0 +1,153 @@
+"""Where a limb ends, by the geometry of its last link: the sphere to put there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+from scipy.spatial import ConvexHull, QhullError
+
+from sphshell_pin.dynamics.scene.models import find_frame, model_reach
+from sphshell_pin.robots import LoadedRobot
+from sphshell_pin.shell.shell import Shell
+
+Array = npt.NDArray[np.float64]
+
+# How far a ball that covers an end may stand out before it, as a part of its radius: else the end
+# is flat, and gets a ball of this part of that radius. Without geometry: as a part of the reach.
+_STANDS_OUT, _BALL, _OF_REACH = 0.25, 1 / 3, 0.01
+# Steps of the search for the ball that covers an end, and of that for the smallest ball.
+_DEPTHS, _STEPS = 40, 300
+# Of what is at the axis of a joint: its distance from it, as a part of the link's size.
+_AT_AXIS = 0.2
+
+
+@dataclass(frozen=True)
+class End:
+    """A sphere at the end of a link: center (3,) [m] in the frame asked for, radius [m]."""
+
+    offset: Array
+    radius: float
+    source: str
+
+
+class LinkGeometry:
+    """The corners of the geometry that moves with a frame of a robot, in that frame.
+
+    Those of its collision geometry; where it has none, of its visual one.
+    """
+
+    def __init__(self, robot: LoadedRobot, frame: str) -> None:
+        model = robot.model
+        self._robot, self._model = robot, model
+        self._frame = model.frames[find_frame(model, frame)]
+        self._joint = int(self._frame.parentJoint)
+        bodies = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
+        carried = [name for name in bodies if self._carries(name)]
+        self.link = carried[0] if carried else frame
+        self.corners = _moved(self._frame.placement.inverse(), self._corners(self._joint))
+
+    def depth(self, center: Array) -> float:
+        """Return how far `center` (3,) [m] is inside the convex hull [m]; negative outside."""
+        try:
+            hull = ConvexHull(self.corners)
+        except (QhullError, ValueError):  # flat, or nothing
+            return -math.inf
+        return float(-(hull.equations[:, :3] @ center + hull.equations[:, 3]).max())
+
+    def end(self, radius: float | None = None) -> End:
+        """Return a ball at the end, of `radius` [m] if that is given.
+
+        It is the smallest one that covers the end as deep as it is large, if the end is round: a
+        fingertip's own sphere. On a flat end it is a smaller ball in the middle of it.
+        """
+        if not len(self.corners):
+            ball = radius or _rounded(_OF_REACH * model_reach(self._model))
+            return End(np.zeros(3), ball, "a ball on its origin, as its link has no geometry")
+        ahead = self._ahead()
+        along = self.corners @ ahead
+        depth = along.max() - along
+        size = float(np.linalg.norm(np.ptp(self.corners, axis=0)))
+        for reach in size * np.geomspace(0.02, 1.0, _DEPTHS):
+            center, covers = _smallest_ball(self.corners[depth <= reach])
+            if covers <= reach:
+                break
+        before = float(along.max() - center @ ahead)
+        if radius is None and covers - before < _STANDS_OUT * covers:
+            return End(center, _rounded(covers), f"it covers the end of link '{self.link}'")
+        ball = _rounded(_BALL * covers) if radius is None else radius
+        front = center + (before + ball) * ahead
+        return End(front, ball, f"a ball on the end of link '{self.link}'")
+
+    def _carries(self, link: str) -> bool:
+        """Whether `link` moves with the frame, and has geometry."""
+        k = find_frame(self._model, link)
+        return int(self._model.frames[k].parentJoint) == self._joint and any(
+            int(one.parentFrame) == k
+            for geometry in (self._robot.collision_model, self._robot.visual_model)
+            for one in geometry.geometryObjects
+        )
+
+    def _ahead(self) -> Array:
+        """Return the unit vector (3,) towards the end, in the frame.
+
+        Away from the joint's axis; along it where the link is about it, away from the link before.
+        """
+        model, place = self._model, self._frame.placement.inverse()
+        here = _middle(self.corners)
+        joint = model.joints[self._joint]
+        before = self._corners(int(model.parents[self._joint]))
+        behind = place.act(model.jointPlacements[self._joint].actInv(_middle(before)))
+        origin, away = place.translation, here - behind
+        if joint.nv == 1:
+            motion = np.ravel(joint.createData().S)
+            axis = place.rotation @ (motion[:3] + motion[3:])
+            aside = (here - origin) - axis * (axis @ (here - origin))
+            if joint.shortname().startswith("JointModelP"):
+                aside = np.zeros(3)
+            size = float(np.linalg.norm(np.ptp(self.corners, axis=0)))
+            near = np.linalg.norm(aside) < _AT_AXIS * size
+            away = axis * np.sign(axis @ away or 1.0) if near else aside
+        ahead: Array = away / max(float(np.linalg.norm(away)), 1e-12)
+        return ahead
+
+    def _corners(self, joint: int) -> Array:
+        """Return the corners (k, 3) [m] of the geometry of a joint, in the joint's frame."""
+        for geometry in (self._robot.collision_model, self._robot.visual_model):
+            found = [
+                _moved(one.placement, np.asarray(Shell.from_geometry(one).vertices))
+                for one in geometry.geometryObjects
+                if int(one.parentJoint) == joint
+            ]
+            if found:
+                return np.concatenate(found)
+        return np.zeros((0, 3))
+
+
+def _rounded(x: float) -> float:
+    return float(f"{x:.2g}")
+
+
+def _moved(place: pin.SE3, points: Array) -> Array:
+    moved: Array = points @ place.rotation.T + place.translation
+    return moved
+
+
+def _middle(points: Array) -> Array:
+    middle: Array = 0.5 * (points.min(axis=0) + points.max(axis=0)) if len(points) else np.zeros(3)
+    return middle
+
+
+def _smallest_ball(points: Array) -> tuple[Array, float]:
+    """Return center (3,) and radius of nearly the smallest ball around `points` (k, 3).
+
+    Each step goes towards the farthest point (Badoiu and Clarkson, SODA 2003).
+    """
+    center = _middle(points)
+    for k in range(_STEPS):
+        farthest = points[int(np.argmax(((points - center) ** 2).sum(axis=1)))]
+        center = center + (farthest - center) / (k + 2)
+    return center, float(np.linalg.norm(points - center, axis=1).max())

@@ -1,0 +1,93 @@
+"""A free part in the fingertips of a hand: its mass, its URDF, and words for such parts."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+import trimesh
+
+from sphshell_pin.contact.materials import Material
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.robots import LoadedRobot, load_file
+from sphshell_pin.scenario.drafting.plan import GRAVITY
+from sphshell_pin.scenario.format.shape_tables import Ball, Box, Cylinder, Primitive
+from sphshell_pin.shell.shell import Shell
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Part:
+    """The free body that carries the surface."""
+
+    mass: float
+    center: Array
+    """Of its mass (3,) [m], in the frame of the surface."""
+    inertia: Array
+    """About that (3, 3) [kg m^2]."""
+
+    @classmethod
+    def of(cls, shell: Shell, material: Material) -> Part:
+        """Return the part that is of `material` all through; SphshellError if it is open."""
+        if not shell.is_closed:
+            raise SphshellError(
+                f"the surface '{shell.name}' is open, so it has no weight: --tips all holds a "
+                "closed part"
+            )
+        mesh = trimesh.Trimesh(shell.vertices, shell.triangles, process=False)
+        mesh.density = material.density
+        return cls(float(mesh.mass), np.array(mesh.center_mass), np.array(mesh.moment_inertia))
+
+    def urdf(self) -> str:
+        """Return its description: the link `part`."""
+        x, y, z = self.center
+        i = self.inertia
+        return f"""<?xml version="1.0"?>
+<robot name="part">
+  <link name="part">
+    <inertial>
+      <origin xyz="{x:.9g} {y:.9g} {z:.9g}"/>
+      <mass value="{self.mass:.9g}"/>
+      <inertia ixx="{i[0, 0]:.9g}" iyy="{i[1, 1]:.9g}" izz="{i[2, 2]:.9g}"
+               ixy="{i[0, 1]:.9g}" ixz="{i[0, 2]:.9g}" iyz="{i[1, 2]:.9g}"/>
+    </inertial>
+  </link>
+</robot>
+"""
+
+    def loaded(self) -> LoadedRobot:
+        """Return it as a robot with a free root."""
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "part.urdf"
+            file.write_text(self.urdf())
+            return load_file(file, free_flyer=True, mimic=True, name="part")
+
+    def weight(self, placement: pin.SE3) -> Array:
+        """Return its weight at `placement` (6,): force [N], torque about the world's origin."""
+        force = np.array([0.0, 0.0, -GRAVITY * self.mass])
+        return np.concatenate([force, np.cross(placement.act(self.center), force)])
+
+
+def word_primitive(word: str, radius: float) -> Primitive:
+    """Return what a word stands for between fingertips of `radius` [m]; SphshellError if nothing.
+
+    It is five radii wide.
+    """
+    sizes: dict[str, Primitive] = {
+        "sphere": Ball(2.5 * radius),
+        "cylinder": Cylinder(radius=2.5 * radius, length=10 * radius),
+        "box": Box([5 * radius, 5 * radius, 10 * radius]),
+    }
+    if word not in sizes:
+        raise SphshellError(f"a hand cannot hold a {word}: --tips all takes {', '.join(sizes)}")
+    return sizes[word]
+
+
+def part_file(name: str) -> str:
+    """Return the name of the part's URDF, beside the scenario `name`."""
+    return f"{name}_part.urdf"

@@ -1,0 +1,430 @@
+"""What a new scenario consists of, chosen: the values that its text states and explains."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.contact.materials import Material, friction_between, restitution_between
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.scenario.drafting.fingertips import Tip
+from sphshell_pin.scenario.drafting.poses import Stance
+from sphshell_pin.scenario.drafting.touch_points import (
+    come_down,
+    find_touch_point,
+    path_on_surface,
+    touch_points,
+    touches_once,
+)
+from sphshell_pin.shell import Shell
+
+Array = npt.NDArray[np.float64]
+
+GRAVITY = 9.81
+UP = np.array([0.0, 0.0, 1.0])
+
+# Of a tip at the start, as a part of its radius; of a body that falls, and of feet.
+TIP_GAP, FALL_GAP, FOOT_GAP = 0.02, 2.0, 0.1
+# How far from the middle a body falls, as a part of the surface's box.
+FALL_BESIDE = 0.1
+# How far friction and force may turn a tip that is to keep its orientation [rad].
+TIP_TURN = 0.02
+# Largest normal force by default [N], and in weights of the tip's effective mass.
+MOST_FORCE, MOST_WEIGHTS = 5.0, 2.0
+# The path across a surface: radii long at most, radii a second.
+PATH_RADII, PATH_RATE = 10.0, 3.0
+LEAD_IN = 0.5
+# Of the target's speed and acceleration, each [s].
+RAMP = 0.25
+# Turns of the part about the approach, tried in this order [rad], and how many places are kept
+# where the sphere touches no single face.
+_YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
+_MOST_UNEVEN = 1
+# Places and turns at which links are held against the part.
+_MOST_TRIED = 250
+# How fast a moved tip returns to its path [rad/s], and how far friction may delay it, in
+# radii.
+TIP_RATE, TIP_LAG = 20.0, 0.2
+# Sag of a standing robot's joints under its weight [rad].
+SAG = 0.05
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Law and friction of a tip, as the scenario states them."""
+
+    material: Material
+    against: Material
+    restitution: float
+    speed: float
+    """At which the restitution holds: of the first touch [m/s]."""
+    mu_static: float
+    mu_dynamic: float
+    v_static: float
+    """Slip speed [m/s] at which friction is full."""
+    bristle: tuple[float, float] | None = None
+    """Stiffness [N/m] and damping [N s/m] of bristles, for what has to stand."""
+
+
+@dataclass(frozen=True)
+class Press:
+    """A tip that is moved along a path and pressed on the surface."""
+
+    force: float
+    path: Array
+    """Points (k, 3) in the shell's frame [m]."""
+    speed: float
+    lead_in: float
+    stiffness: float
+    damping: float
+    rotational_stiffness: float
+    rotational_damping: float
+    even: bool
+    """Whether the sphere touches one face along the whole path: all of `force` acts there."""
+    posture_stiffness: tuple[float, ...]
+    joint_damping: tuple[float, ...]
+
+    @property
+    def spline(self) -> bool:
+        """Whether the path bends."""
+        return len(self.path) > 2
+
+    @property
+    def acceleration(self) -> float | None:
+        """Limit of the target's acceleration [m/s2], where it moves."""
+        return _round(self.speed / RAMP) if len(self.path) > 1 else None
+
+    @property
+    def jerk(self) -> float | None:
+        """Limit of the target's jerk [m/s3], where it moves."""
+        return _round(self.speed / RAMP**2) if len(self.path) > 1 else None
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Joints held in the posture of the start."""
+
+    kp: float
+    kd: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A scenario before it is text."""
+
+    tips: tuple[Tip, ...]
+    contact: Contact
+    control: Press | Hold | None
+    duration: float
+    gap: float
+    placement: pin.SE3
+    """Of the shell in the world."""
+    root: Array | None
+    """Where the free root starts: x y z and quaternion x y z w."""
+    why: tuple[str, ...] = field(default=())
+    """One sentence for each choice that was made for the user."""
+    left_out: tuple[str, ...] = ()
+    """Of what the robot's file states of its joints."""
+    repair: str = ""
+    """What was changed of a draft that failed; "" of the first draft."""
+
+
+def press_plans(
+    shell: Shell,
+    tip: Tip,
+    stance: Stance,
+    materials: tuple[Material, Material],
+    press: float | None,
+    blocked: Callable[[pin.SE3], bool],
+    *,
+    toward: Array | None = None,
+    inside: bool = False,
+) -> Iterator[Plan]:
+    """Yield plans in which a tip of a robot with a fixed base presses and slides.
+
+    `press` [N] is the normal force asked for; `toward` (3,) the side of the surface to touch, with
+    `inside` from its middle; `blocked` says whether links of the robot are in the part at a
+    placement. One plan for each place on the part and turn of it where they are not; first those
+    where the sphere touches one face along the whole path, in each the nearest to the center first.
+
+    Raises
+    ------
+    SphshellError
+        The joints cannot push as hard as `press`.
+    """
+    force = _force(stance, tip, materials, press)
+    gap = _gap(tip.radius, force, materials)
+    uneven: list[Plan] = []
+    tried = 0
+    for touch in touch_points(shell, tip.radius, gap, toward=toward, inside=inside):
+        on_face = touches_once(shell, touch, touch.point[None], tip.radius, 2 * gap)
+        if tried >= _MOST_TRIED:
+            break
+        if not on_face and len(uneven) >= _MOST_UNEVEN:
+            continue
+        facing = _turn(touch.normal, -stance.approach)
+        for angle in _YAWS:
+            turned = pin.AngleAxis(angle, stance.approach).toRotationMatrix() @ facing
+            placement = pin.SE3(turned, stance.center - turned @ touch.center)
+            tried += 1
+            if blocked(placement):
+                continue
+            path = touch.point[None]
+            if on_face and stance.slide is not None and stance.inertia:
+                length = min(PATH_RADII * tip.radius, 0.8 * stance.room)
+                path = path_on_surface(
+                    shell, touch, turned.T @ stance.slide, length, 0.5 * tip.radius
+                )
+            even = on_face and touches_once(shell, touch, path, tip.radius, 2 * gap)
+            if on_face and not even:
+                path, even = touch.point[None], True
+            plan = _press_plan(tip, stance, materials, press, force, gap, placement, path, even)
+            if even:
+                yield plan
+            else:
+                uneven.append(plan)
+            break
+    yield from uneven
+
+
+def _force(
+    stance: Stance, tip: Tip, materials: tuple[Material, Material], press: float | None
+) -> float:
+    """Return the normal force [N]; SphshellError where the joints cannot push as hard."""
+    if press is None:
+        force = _suitable_force(stance, tip.radius, materials)
+        if force <= 0:
+            raise SphshellError(
+                "the joints' effort limits do not carry the robot's own weight in this posture: "
+                "correct them in its file"
+            )
+        return _round(force)
+    if press > stance.force:
+        raise SphshellError(
+            f"the joints' effort limits allow a push of {_round(stance.force, 3):g} N along "
+            f"{_axis(stance.approach)}, not {press:g} N"
+        )
+    deepest = hertz_stiffness(tip.radius, *materials) * (0.5 * tip.radius) ** 1.5
+    if press > deepest:
+        raise SphshellError(
+            f"{press:g} N would press a {materials[0].name} sphere of radius {_mm(tip.radius)} in "
+            "by more than half of it: a smaller --press, a larger --radius, or a harder --law"
+        )
+    return press
+
+
+def _gap(radius: float, force: float, materials: tuple[Material, Material]) -> float:
+    """Return the gap at the start [m] from which the first touch peaks at four times `force` [N].
+
+    Fallen through g, Hertz's sphere stops at 4^(2/3) times the depth d under `force` at rest, where
+    2/5 k (4^(2/3) d)^(5/2) = force (g + 4^(2/3) d): g = 1.51 d.
+    """
+    rest = float((force / hertz_stiffness(radius, *materials)) ** (2 / 3))
+    return min(TIP_GAP * radius, 1.5 * rest)
+
+
+def _press_plan(
+    tip: Tip,
+    stance: Stance,
+    materials: tuple[Material, Material],
+    press: float | None,
+    force: float,
+    gap: float,
+    placement: pin.SE3,
+    path: Array,
+    even: bool,
+) -> Plan:
+    rate = _round(PATH_RATE * tip.radius)
+    contact = _contact(materials, math.sqrt(2 * force * gap / stance.mass), 0.1 * rate)
+    softest = contact.mu_static * force / (TIP_LAG * tip.radius)
+    stiffness = max(stance.slide_mass * TIP_RATE**2, softest)
+    mass = math.sqrt(stance.mass * stance.slide_mass)
+    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    turning = 0.0
+    if stance.inertia:
+        moment = contact.mu_static * force * tip.radius
+        turning = max(stance.inertia * TIP_RATE**2, moment / TIP_TURN)
+    spare = stance.model.nv > (6 if turning else 3)
+    # The posture's pull may take a fiftieth of the normal force at the end of the path.
+    pull = min(0.02 * force / (stance.mass * max(length, tip.radius)), 100.0) if spare else 0.0
+    control = Press(
+        force=force,
+        path=path,
+        even=even,
+        speed=rate,
+        lead_in=LEAD_IN,
+        stiffness=_round(stiffness),
+        damping=_round(1.4 * math.sqrt(stiffness * mass)),
+        rotational_stiffness=_round(turning),
+        rotational_damping=_round(1.4 * math.sqrt(turning * stance.inertia)),
+        posture_stiffness=tuple(_round(pull * one) for one in stance.joint_inertia),
+        joint_damping=tuple(_round(0.7 * math.sqrt(pull) * one) for one in stance.joint_inertia),
+    )
+    why = [f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}"]
+    why.append(
+        f"the surface is {_mm(gap)} in front of the sphere, which presses along "
+        f"{_axis(stance.approach)}"
+    )
+    if stance.bent:
+        why.append("the joints were bent to a posture in which the tip can move and press")
+    if stance.lock:
+        why.append(f"{_count(len(stance.lock), 'joint')} that do not move the tip are locked")
+    if press is None:
+        why.append(
+            f"normal force {force:g} N, for an effective mass of {stance.mass:.3g} kg at the tip"
+        )
+    if not even:
+        why.append(
+            "the sphere touches edges or several sides at once, wherever it was tried: the force "
+            "on the surface is the resultant of several"
+        )
+    if len(path) < 2:
+        reason = "it has no room" if stance.inertia else "its joints cannot keep it from rolling"
+        why.append(f"the tip presses in one place and does not slide: {reason}")
+    ramps = 2 * RAMP if len(path) > 1 else 0.0
+    duration = math.ceil(10 * (LEAD_IN + length / rate + ramps + 0.5)) / 10
+    return Plan((tip,), contact, control, duration, gap, placement, None, tuple(why))
+
+
+def plan_fall(
+    shell: Shell,
+    tip: Tip,
+    center: Array,
+    root: Array,
+    materials: tuple[Material, Material],
+    *,
+    inside: bool = False,
+) -> Plan:
+    """Plan a scenario in which a free body falls on the surface, which is placed as in its file.
+
+    `center` (3,) [m] is the sphere's in the world when the root is at `root` (7,).
+    """
+    gap = FALL_GAP * tip.radius
+    # Beside the middle: a ball in a bowl rolls then.
+    beside = FALL_BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
+    touch = find_touch_point(shell, tip.radius, gap, toward=UP, inside=inside, beside=beside)
+    start = root.copy()
+    start[:3] += touch.center - center
+    speed = math.sqrt(2 * GRAVITY * gap)
+    why = (
+        f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}",
+        f"it falls {_mm(gap)} beside the middle of the surface, at {speed:.2g} m/s",
+    )
+    contact = _contact(materials, speed, 0.005)
+    return Plan((tip,), contact, None, 1.0, gap, pin.SE3.Identity(), start, why)
+
+
+def plan_stand(
+    shell: Shell,
+    tips: tuple[Tip, ...],
+    centers: Array,
+    mass: float,
+    joint_inertia: Array,
+    leg: float,
+    materials: tuple[Material, Material],
+) -> Plan:
+    """Plan a scenario in which a floating robot of `mass` [kg] stands on spheres.
+
+    `centers` (k, 3) [m] are those of the `tips` in the world, `joint_inertia` [kg m^2] the
+    diagonal of the mass matrix of its motors, `leg` [m] the distance of its root from the tips.
+    """
+    gap = FOOT_GAP * min(tip.radius for tip in tips)
+    place = _under(shell, centers, np.array([tip.radius for tip in tips]), gap)
+    load = mass * GRAVITY / len(tips)
+    kp = load * 0.5 * leg / SAG
+    # A leg turns the body above it as much as itself.
+    inertia = float(np.median(joint_inertia)) + mass / len(tips) * (0.5 * leg) ** 2
+    base = _contact(materials, math.sqrt(2 * GRAVITY * gap), 0.005)
+    radius = tips[0].radius
+    slope = 1.5 * hertz_stiffness(radius, *materials) ** (2 / 3) * load ** (1 / 3)
+    bristle = (_round(slope), _round(0.2 * math.sqrt(slope * mass / len(tips))))
+    contact = replace(base, bristle=bristle)
+    why = [
+        f"the sphere of radius {_mm(tip.radius)} on frame '{tip.frame}': {tip.source}"
+        for tip in tips
+    ]
+    why.append(f"the robot floats, {_mm(gap)} above the surface, and its joints hold the posture")
+    if len(tips) < 3:
+        why.append("it will fall over: nothing but its sphere touches")
+    why.append("friction sticks, so that it can stand")
+    control = Hold(_round(kp), _round(1.4 * math.sqrt(kp * inertia)))
+    return Plan(tips, contact, control, 2.0, gap, place, None, tuple(why))
+
+
+def hertz_stiffness(radius: float, one: Material, other: Material) -> float:
+    """Return Hertz's stiffness [N/m^1.5] of a sphere of `radius` [m] on a plane."""
+    softness = (1 - one.poisson**2) / one.young + (1 - other.poisson**2) / other.young
+    return 4 / 3 * math.sqrt(radius) / softness
+
+
+def bearable(radius: float, one: Material, other: Material) -> float:
+    """Return the load [N] that presses a sphere of `radius` [m] in by a fifteenth of it."""
+    return float(hertz_stiffness(radius, one, other) * (radius / 15) ** 1.5)
+
+
+def _contact(materials: tuple[Material, Material], speed: float, slip: float) -> Contact:
+    static, dynamic = friction_between(*materials)
+    return Contact(
+        materials[0],
+        materials[1],
+        restitution_between(*materials),
+        _round(speed),
+        round(static, 3),
+        round(dynamic, 3),
+        _round(slip),
+    )
+
+
+def _suitable_force(stance: Stance, radius: float, materials: tuple[Material, Material]) -> float:
+    weights = MOST_WEIGHTS * stance.mass * GRAVITY
+    return min(MOST_FORCE, 0.1 * stance.force, weights, bearable(radius, *materials))
+
+
+def _under(shell: Shell, centers: Array, radii: Array, gap: float) -> pin.SE3:
+    """Return the placement of the shell so that the nearest of the spheres has the `gap` [m] to it.
+
+    Its center is under the center of the spheres; if none of them would then land on it, under the
+    first one.
+    """
+    touch = find_touch_point(shell, float(radii[0]), gap, toward=UP)
+    for anchor in (centers.mean(axis=0), centers[0]):
+        aside = anchor - touch.point
+        heights = []
+        for center, radius in zip(centers, radii, strict=True):
+            above = center - aside
+            above[2] = shell.box[1, 2] + 2 * (radius + gap)
+            down = come_down(shell, above, -UP, float(radius), gap).center[2]
+            if down > shell.box[0, 2] - radius:
+                heights.append(center[2] - down)
+        if heights:
+            return pin.SE3(np.eye(3), np.array([aside[0], aside[1], min(heights)]))
+    raise SphshellError("no sphere lands on the surface: it is too small")
+
+
+def _turn(source: Array, target: Array) -> Array:
+    rotation: Array = pin.Quaternion.FromTwoVectors(source, target).toRotationMatrix()
+    return rotation
+
+
+def _round(x: float, digits: int = 2) -> float:
+    return float(f"{x:.{digits}g}")
+
+
+def _mm(x: float) -> str:
+    return f"{x * 1e3:.3g} mm"
+
+
+def _axis(direction: Array) -> str:
+    k = int(np.argmax(np.abs(direction)))
+    if abs(direction[k]) > 0.999:
+        return f"{'-' if direction[k] < 0 else '+'}{'xyz'[k]}"
+    return f"[{', '.join(f'{one:.2f}' for one in direction)}]"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"

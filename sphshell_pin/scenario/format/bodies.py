@@ -1,0 +1,248 @@
+"""The robots of a scenario, put together into one pinocchio model with its start state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.checks import off_unit_length
+from sphshell_pin.dynamics.scene.mimic import check_follows, count_of_all, mimics, shortened
+from sphshell_pin.dynamics.scene.models import (
+    find_frame,
+    find_joint,
+    reduced_geometry,
+    set_joint,
+)
+from sphshell_pin.errors import MissingExtra, ScenarioError, SphshellError
+from sphshell_pin.robots import LoadedRobot, load, load_file
+from sphshell_pin.scenario.format.reading import item_key
+from sphshell_pin.scenario.format.schema import Placement, RobotSection, Scenario
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """All robots as one model, before any joint is locked."""
+
+    model: pin.Model
+    """Names carry `label/` as soon as there are several robots."""
+    visual_model: pin.GeometryModel
+    q0: Array
+    """Start configuration (nq,)."""
+    v0: Array
+    """Start velocity (nv,)."""
+    lock: tuple[str, ...]
+    """Joints to lock at their place in q0."""
+    loaded: tuple[LoadedRobot, ...] = ()
+    """The robots as they were loaded, one for each table."""
+    prefixes: tuple[str, ...] = ()
+    """What stands before the names of each robot."""
+
+
+@contextmanager
+def blamed_on(path: Path, key: str) -> Iterator[None]:
+    """Name the scenario's file and `key` in any fault of the package that happens inside.
+
+    So it does of numbers that are too large or too small to compute with.
+    """
+    try:
+        yield
+    except (ScenarioError, MissingExtra):
+        raise
+    except SphshellError as error:
+        raise ScenarioError(path, key, str(error)) from error
+    except ArithmeticError as error:
+        why = f"has a number too large or too small to compute with ({error})"
+        raise ScenarioError(path, key, why) from error
+
+
+def to_se3(placement: Placement) -> pin.SE3:
+    """Return the SE3 of a placement table."""
+    return pin.SE3(pin.rpy.rpyToMatrix(*np.deg2rad(placement.rpy_deg)), np.array(placement.xyz))
+
+
+def assemble(
+    scenario: Scenario, path: Path, loaded: Mapping[tuple[object, ...], LoadedRobot] | None = None
+) -> Assembly:
+    """Load all robots of `scenario` and append them into one model under its gravity.
+
+    `loaded` are robots at hand, by the `origin` of their table.
+
+    Raises
+    ------
+    ScenarioError
+        A robot cannot be loaded, two share a label, or a start value does not fit its joint.
+    MissingExtra
+        A robot comes from a package that is not installed.
+    """
+    several = len(scenario.robot) > 1
+    base, visual = pin.Model(), pin.GeometryModel()
+    starts: list[tuple[str, Array, Array, Array]] = []
+    lock: list[str] = []
+    labels: set[str] = set()
+    taken: list[LoadedRobot] = []
+    prefixes: list[str] = []
+    for i, section in enumerate(scenario.robot):
+        key = item_key("robot", scenario.robot, i)
+        with blamed_on(path, key):
+            robot = (loaded or {}).get(origin(section)) or _load(section, path)
+        taken.append(robot)
+        model, geometry = robot.model.copy(), robot.visual_model.copy()
+        q, v = _start(model, robot.q0, section, path, key)
+        for j, joint in enumerate(section.lock):
+            with blamed_on(path, f"{key}.lock[{j}]"):
+                joint_spans(model, joint)
+        prefix = ""
+        if several:
+            prefix = _prefix(section, robot)
+            if prefix in labels:
+                raise ScenarioError(
+                    path, f"{key}.label", "two robots share this label", prefix.rstrip("/")
+                )
+            labels.add(prefix)
+            _rename(model, geometry, prefix)
+        prefixes.append(prefix)
+        lock += [prefix + joint for joint in section.lock]
+        for name in list(model.names)[1:]:
+            in_q, in_v = joint_spans(model, name)
+            starts.append((name, q[in_q], v[in_v], np.array(model.armature[in_v])))
+        stand = to_se3(section.placement)
+        with blamed_on(path, f"{key}.frame"):
+            carrier = find_frame(base, section.frame)
+        if not several and stand.isIdentity():
+            base, visual = model, geometry
+        else:
+            try:
+                base, visual = pin.appendModel(base, model, visual, geometry, carrier, stand)
+            except ValueError as error:
+                why = f"robots whose joints and links share names cannot be combined: {error}"
+                raise ScenarioError(path, key, why) from None
+    base.gravity.linear = np.array(scenario.gravity)
+    q0, v0, armature = pin.neutral(base), np.zeros(base.nv), np.zeros(base.nv)
+    for name, q_joint, v_joint, inertia in starts:
+        in_q, in_v = joint_spans(base, name)
+        q0[in_q], v0[in_v], armature[in_v] = q_joint, v_joint, inertia
+    if armature.any():
+        base.armature = armature  # which pinocchio.appendModel (4.1) drops
+    return Assembly(base, visual, q0, v0, tuple(lock), tuple(taken), tuple(prefixes))
+
+
+def _prefix(section: RobotSection, robot: LoadedRobot) -> str:
+    return f"{section.label or robot.name}/"
+
+
+def origin(section: RobotSection) -> tuple[object, ...]:
+    """Return what tells robots of one scenario's folder apart before they start and are placed."""
+    return (
+        section.name,
+        section.path,
+        tuple(section.package_dirs),
+        tuple(section.xacro_args.items()),
+        section.srdf,
+        section.pose,
+        section.floats,
+        section.mimic,
+    )
+
+
+def reduce_visual(assembly: Assembly) -> pin.GeometryModel:
+    """Return the visual geometry for the model with `assembly.lock` locked."""
+    if not assembly.lock:
+        return assembly.visual_model
+    return reduced_geometry(assembly.model, assembly.visual_model, assembly.lock, assembly.q0)[1]
+
+
+def restrict(model: pin.Model, reduced: pin.Model, q: Array, v: Array) -> tuple[Array, Array]:
+    """Return the state (q, v) of `model` for the joints that `reduced` still has."""
+    q_reduced, v_reduced = pin.neutral(reduced), np.zeros(reduced.nv)
+    for name in list(reduced.names)[1:]:
+        to_q, to_v = joint_spans(reduced, name)
+        from_q, from_v = joint_spans(model, name)
+        q_reduced[to_q], v_reduced[to_v] = q[from_q], v[from_v]
+    return q_reduced, v_reduced
+
+
+def joint_spans(model: pin.Model, name: str) -> tuple[slice, slice]:
+    """Return the places of a joint's numbers in q and in v; NameNotFound lists the joints."""
+    joint = find_joint(model, name)
+    return slice(joint.idx_q, joint.idx_q + joint.nq), slice(joint.idx_v, joint.idx_v + joint.nv)
+
+
+def _load(section: RobotSection, path: Path) -> LoadedRobot:
+    if section.name is not None:
+        return load(section.name, mimic=section.mimic, pose=section.pose)
+    folder, file = path.parent, section.path or ""
+    return load_file(
+        folder / file,
+        [folder / one for one in section.package_dirs],
+        free_flyer=section.floats,
+        mimic=section.mimic,
+        name=Path(file).name.partition(".")[0],
+        xacro_args=section.xacro_args,
+        srdf=None if section.srdf is None else folder / section.srdf,
+        pose=section.pose,
+    )
+
+
+def _start(
+    model: pin.Model, q_default: Array, section: RobotSection, path: Path, key: str
+) -> tuple[Array, Array]:
+    q, v = np.array(q_default, dtype=float), np.zeros(model.nv)
+    if section.q is not None:
+        every = count_of_all(model)
+        if len(section.q) not in (model.nq, every):
+            count = f"{model.nq} coordinates"
+            if every != model.nq:
+                count += f" ({every} with those of mimic joints)"
+            raise ScenarioError(path, f"{key}.q", f"the robot has {count}, not {len(section.q)}")
+        q = np.array(section.q)
+        if len(q) != model.nq:
+            with blamed_on(path, f"{key}.q"):
+                q = shortened(model, q, check=True)
+    rules = mimics(model)
+    for name, value in section.start.items():
+        with blamed_on(path, f'{key}.start."{name}"'):
+            set_joint(model, q, name, value)
+    for name in (one for one in section.start if one in rules):
+        # What it mimics may be stated too, or another joint that mimics the same.
+        rule, value = rules[name], section.start[name]
+        joint = find_joint(model, rule.of)
+        if joint.nq == 1:
+            with blamed_on(path, f'{key}.start."{name}"'):
+                stated = value[0] if isinstance(value, list) else value
+                check_follows(rule, stated, q[joint.idx_q])
+    for name, value in section.speed.items():
+        where = f'{key}.speed."{name}"'
+        with blamed_on(path, where):
+            _, span = joint_spans(model, name)
+        if name in rules:
+            raise ScenarioError(
+                path, where, f"the joint mimics '{rules[name].of}': state the speed of that one"
+            )
+        values = np.atleast_1d(np.array(value, dtype=float))
+        count = span.stop - span.start
+        if len(values) != count:
+            raise ScenarioError(path, where, f"the joint takes {count} numbers", value)
+        v[span] = values
+    unit = pin.normalize(model, q)
+    # Rounded quaternions and cosines are set right; a wrong one (not of unit length) is a mistake.
+    if not np.allclose(unit, q, rtol=0, atol=1e-2) or not pin.isNormalized(model, unit, 1e-3):
+        where = f"{key}.start" if section.start or section.q is None else f"{key}.q"
+        raise ScenarioError(path, where, str(off_unit_length(model, q)))
+    return unit, v
+
+
+def _rename(model: pin.Model, geometry: pin.GeometryModel, prefix: str) -> None:
+    for j in range(1, model.njoints):
+        model.names[j] = prefix + model.names[j]
+    for f in range(1, model.nframes):
+        model.frames[f].name = prefix + model.frames[f].name
+    for one in geometry.geometryObjects:
+        one.name = prefix + one.name

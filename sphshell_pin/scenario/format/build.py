@@ -1,0 +1,381 @@
+"""From a scenario file to what runs: the scene, its start state, its controller, its simulation."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+import sphshell_pin as sp
+from sphshell_pin.dynamics.control.callables import check_callable
+from sphshell_pin.dynamics.control.controllers import (
+    Callback,
+    Controller,
+    PythonFunction,
+    ShellPlace,
+)
+from sphshell_pin.dynamics.scene.explain import Explanation
+from sphshell_pin.dynamics.sensing.sensors import Sensor, check_sensors
+from sphshell_pin.errors import (
+    InvalidParameter,
+    NameNotFound,
+    ScenarioError,
+    SphshellError,
+    UnitWarning,
+)
+from sphshell_pin.parameters import Ingredient, parameters_of
+from sphshell_pin.robots import LoadedRobot
+from sphshell_pin.scenario.format import schema
+from sphshell_pin.scenario.format.bodies import (
+    Assembly,
+    assemble,
+    blamed_on,
+    origin,
+    reduce_visual,
+    restrict,
+    to_se3,
+)
+from sphshell_pin.scenario.format.functions import load_function
+from sphshell_pin.scenario.format.joint_tables import joint_ingredients
+from sphshell_pin.scenario.format.reading import (
+    change_scenario,
+    find_scenario,
+    item_key,
+    read_scenario,
+)
+from sphshell_pin.scenario.format.sliders import check_knobs
+from sphshell_pin.scenario.format.sphere_tables import spheres_of, to_sphere
+from sphshell_pin.summary import Fact, Summarized
+
+Array = npt.NDArray[np.float64]
+# A user's own; what it takes depends on where the scenario names it.
+Function = Callable[..., Any]
+
+
+@dataclass(frozen=True, repr=False)
+class Built(Summarized):
+    """A scenario ready to run."""
+
+    name: str
+    path: Path
+    scenario: schema.Scenario
+    scene: sp.Scene
+    q0: Array
+    v0: Array
+    controller: Controller | Callback | None
+    simulation: sp.Simulation
+    visual_model: pin.GeometryModel
+    """Geometry of the scene's model."""
+    assembly: Assembly
+    """The robots as one model; the same object as before where a rebuild could keep it."""
+    shells: Mapping[str, sp.Shell]
+    """The surfaces by name; the same objects as before where a rebuild could keep them."""
+    functions: Mapping[str, Function]
+    """The user's own functions by "file.py:function", loaded once."""
+    figures: Mapping[str, Callable[[sp.Result, sp.Scene], float]]
+    """The scenario's own figures: functions of (result, scene)."""
+
+    @property
+    def _title(self) -> str:
+        return f"Built '{self.name}'"
+
+    def _facts(self) -> list[Fact]:
+        return [
+            Fact("title", self.scenario.title),
+            Fact("duration", self.scenario.run.duration, "s"),
+            Fact("file", self.path, brief=False),
+            *(fact for fact in self.simulation._facts() if fact.label != "title"),
+        ]
+
+
+def build(
+    name: str | PathLike[str],
+    changes: Mapping[str, str] | None = None,
+    *,
+    reuse: Built | None = None,
+) -> Built:
+    """Build the scenario called `name` (shipped, or a path), with `changes` by dotted key.
+
+    Robots, shells and functions of `reuse`, built of the same file before, are taken over where
+    their tables are the same.
+
+    Raises
+    ------
+    ScenarioError
+        The file, a key, or a value is wrong; the text names them and what would be valid.
+    NameNotFound
+        No such scenario.
+    MissingExtra
+        The scenario needs an optional package that is not installed.
+    """
+    path = find_scenario(name)
+    scenario = read_scenario(path, changes)
+    check_knobs(scenario, path, ranges=not changes)
+    return build_scenario(
+        scenario, path, reuse if reuse is not None and reuse.path == path else None
+    )
+
+
+def rebuild(built: Built, changes: Mapping[str, str]) -> Built:
+    """Build the scenario of `built` with more values changed; its file is not read again.
+
+    What the changes leave alone is the same object as before: `shells`, `assembly`,
+    `visual_model`, `functions`. `built` stays as it is.
+
+    Raises
+    ------
+    ScenarioError
+        A key or a value is wrong; the text names it and what would be valid.
+    """
+    scenario = change_scenario(built.scenario, changes, built.path)
+    check_knobs(scenario, built.path, ranges=False)
+    return build_scenario(scenario, built.path, built)
+
+
+def build_scenario(
+    scenario: schema.Scenario,
+    path: Path,
+    reuse: Built | None = None,
+    *,
+    function: Callable[[str, Path, str], Function] = load_function,
+    robots: Mapping[tuple[object, ...], LoadedRobot] | None = None,
+    surfaces: Mapping[str, sp.Shell] | None = None,
+) -> Built:
+    """Build a scenario that is already read; `path` is its file, which others stand beside.
+
+    Robots, shells and functions of `reuse` are taken over where their tables are the same.
+    `function(where, path, key)` gives what "file.py:function" names: `load_function` runs the file,
+    `functions.unloaded` does not. `robots` at hand, by the `origin` of their table, and `surfaces`,
+    by name, are not read from files.
+    """
+    assembly = _assemble(scenario, path, reuse, robots)
+    functions = {} if reuse is None else dict(reuse.functions)
+
+    def load(where: str, key: str) -> Function:
+        if where not in functions:
+            functions[where] = function(where, path, key)
+        return functions[where]
+
+    with blamed_on(path, "robot"):
+        q_lock = assembly.q0 if assembly.lock else None
+        joints = joint_ingredients(scenario, assembly, path)
+        scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock, joints=joints)
+    shells = {
+        section.name: (
+            (surfaces or {}).get(section.name)
+            or _kept_shell(section, reuse)
+            or _build_shell(section, path, item_key("shell", scenario.shell, i)),
+            section,
+        )
+        for i, section in enumerate(scenario.shell)
+    }
+    if len(shells) < len(scenario.shell):
+        raise ScenarioError(path, "shell", "two shells share a name")
+    for i, contact in enumerate(scenario.contact):
+        key = item_key("contact", scenario.contact, i)
+        _add_contact(scene, contact, shells, assembly, path, key)
+    for i, source in enumerate(scenario.source):
+        key = item_key("source", scenario.source, i)
+        find = load(source.find, f"{key}.find")
+        with blamed_on(path, key):
+            scene.add_contact_source(
+                find,
+                source.frame_i,
+                source.frame_j,
+                source.law.made(path.parent),
+                source.friction.made(path.parent),
+                name=source.name,
+            )
+    q0, v0 = restrict(assembly.model, scene.model, assembly.q0, assembly.v0)
+    controller = _build_controller(scenario.controller, scene, q0, shells, path, load)
+    sensors = _build_sensors(scenario.sensor, scene, path)
+    with blamed_on(path, "run"):
+        simulation = sp.Simulation(scene, scenario.run.made(), sensors)
+    figures = {
+        figure: load(where, f"figures.{figure}") for figure, where in scenario.figures.items()
+    }
+    if reuse is not None and assembly.visual_model is reuse.assembly.visual_model:
+        visual = reuse.visual_model
+    else:
+        visual = reduce_visual(assembly)
+    return Built(
+        path.stem,
+        path,
+        scenario,
+        scene,
+        q0,
+        v0,
+        controller,
+        simulation,
+        visual,
+        assembly,
+        {name: shell for name, (shell, _) in shells.items()},
+        functions,
+        figures,
+    )
+
+
+def _assemble(
+    scenario: schema.Scenario,
+    path: Path,
+    reuse: Built | None,
+    robots: Mapping[tuple[object, ...], LoadedRobot] | None,
+) -> Assembly:
+    if reuse is None:
+        return assemble(scenario, path, robots)
+    if reuse.scenario.robot != scenario.robot:
+        loaded = zip(map(origin, reuse.scenario.robot), reuse.assembly.loaded, strict=True)
+        return assemble(scenario, path, dict(loaded))
+    if reuse.scenario.gravity == scenario.gravity:
+        return reuse.assembly
+    model = reuse.assembly.model.copy()
+    model.gravity.linear = np.array(scenario.gravity)
+    return replace(reuse.assembly, model=model)
+
+
+def _kept_shell(section: schema.ShellSection, reuse: Built | None) -> sp.Shell | None:
+    """Return the shell of the same table in `reuse`; where it stands is no part of a shell."""
+    if reuse is None:
+        return None
+    for old in reuse.scenario.shell:
+        stands = {"frame": section.frame, "placement": section.placement}
+        if old.model_copy(update=stands) == section:
+            return reuse.shells[old.name]
+    return None
+
+
+def explain_built(built: Built) -> Explanation:
+    """Return Scene.explain's answer for the start: what is modelled, time scales, warnings."""
+    said = built.scene.explain(built.q0, built.v0, built.simulation.integrator.limited_dt)
+    if not isinstance(built.controller, Controller):
+        return said
+    doubts = built.controller.doubts(built.scene, built.q0)
+    return replace(said, warnings=(*said.warnings, *doubts))
+
+
+def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
+    crease_angle = float(np.deg2rad(section.crease_angle_deg))
+    with blamed_on(path, key):
+        if section.primitive is not None:
+            shell = section.primitive.shell(
+                chord_error=section.chord_error,
+                segments=section.segments,
+                side=section.side,
+                crease_angle=crease_angle,
+                name=section.name,
+            )
+        else:
+            file = path.parent / str(section.file)
+            if not os.path.isfile(file):
+                raise SphshellError(f"no such surface file: {file}")
+            shell = sp.Shell.from_file(
+                file,
+                unit=section.unit,
+                scale=section.scale,
+                chord_error=section.chord_error,
+                bodies=section.bodies,
+                faces=section.faces,
+                time_limit=section.time_limit,
+                memory_limit=section.memory_limit,
+                side=section.side,
+                crease_angle=crease_angle,
+                name=section.name,
+            )
+        return shell if section.magnify == 1.0 else shell.transformed(scale=section.magnify)
+
+
+def _add_contact(
+    scene: sp.Scene,
+    contact: schema.ContactSection,
+    shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
+    assembly: Assembly,
+    path: Path,
+    key: str,
+) -> None:
+    shell: sp.Shell | sp.Sphere
+    if contact.other_sphere is not None:
+        shell, frame, placement = to_sphere(contact.other_sphere), "universe", None
+        carrier = shell.frame
+    else:
+        with blamed_on(path, f"{key}.shell"):
+            name = contact.shell or ""
+            if name not in shells:
+                raise NameNotFound("shell", name, "the scenario", shells)
+        shell, section = shells[name]
+        frame, placement = section.frame, to_se3(section.placement)
+        carrier = frame
+    with blamed_on(path, f"{key}.spheres"):
+        several = spheres_of(contact, assembly, carrier)
+    with blamed_on(path, key), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
+        law, friction = contact.law.made(path.parent), contact.friction.made(path.parent)
+        if contact.sphere is not None:
+            sphere = to_sphere(contact.sphere)
+            scene.add_contact(
+                sphere, shell, frame, placement, law, friction, contact.method, contact.name
+            )
+        else:
+            scene.add_contacts(
+                several,
+                shell,
+                frame,
+                placement,
+                law=law,
+                friction=friction,
+                method=contact.method,
+                name=contact.name,
+            )
+
+
+def _build_sensors(stated: Sequence[Ingredient], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
+    for i, one in enumerate(stated):
+        with blamed_on(path, item_key("sensor", stated, i)):
+            assert isinstance(one, Sensor)
+            # A wrong frame or joint is reported now, not when the run starts.
+            one.to_core(scene)
+    with blamed_on(path, "sensor"):
+        return check_sensors(stated)
+
+
+def _build_controller(
+    stated: Ingredient,
+    scene: sp.Scene,
+    q0: Array,
+    shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
+    path: Path,
+    load: Callable[[str, str], Function],
+) -> Controller | Function | None:
+    def find_shell(name: str) -> ShellPlace:
+        with blamed_on(path, "controller.shell"):
+            if name not in shells:
+                raise NameNotFound("shell", name, "the scenario", shells)
+        shell, section = shells[name]
+        return shell, section.frame, to_se3(section.placement)
+
+    with blamed_on(path, "controller"):
+        if isinstance(stated, PythonFunction):
+            function = load(stated.function, "controller.function")
+            check_callable(function)
+            return function
+        controller: Controller | None = stated.made(path.parent)
+        if controller is None:
+            return None
+        controller = controller.in_scenario(find_shell)
+        try:
+            # A wrong frame, joint or size is reported now, not when the run starts.
+            controller.to_core(scene, q0)
+        except InvalidParameter as error:
+            name = error.name.partition(".")[0].partition("[")[0]
+            known = name in parameters_of(stated)
+            raise ScenarioError(
+                path, f"controller.{name}" if known else "controller", str(error)
+            ) from None
+        return controller

@@ -1,0 +1,113 @@
+"""Primitive shapes that a scenario states by their sizes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypedDict, Unpack
+
+import coal
+import numpy as np
+
+from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.scenario.format.typed_tables import Lengths3
+from sphshell_pin.shell import Shell
+
+
+class ShellOptions(TypedDict):
+    """What a shell of a primitive takes besides its sizes."""
+
+    chord_error: float | None
+    segments: int | None
+    side: str
+    crease_angle: float
+    name: str
+
+
+class Primitive(Ingredient):
+    """Base of the shapes that a scenario states by their sizes; centered, axes along z."""
+
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        return Shell.from_geometry(self.geometry(), **options)
+
+    def geometry(self) -> coal.ShapeBase:
+        """Return it as Coal has it."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Box(Primitive, kind="box"):
+    """A box."""
+
+    size: Lengths3 = parameter(unit="m", help="edge lengths along x, y, z")
+
+    def geometry(self) -> coal.Box:
+        """Return it as Coal has it."""
+        return coal.Box(*self.size)
+
+
+@dataclass(frozen=True)
+class Ball(Primitive, kind="sphere"):
+    """A ball."""
+
+    radius: float = parameter(above=0, unit="m", help="radius")
+
+    def geometry(self) -> coal.Sphere:
+        """Return it as Coal has it."""
+        return coal.Sphere(self.radius)
+
+
+@dataclass(frozen=True)
+class _Round(Primitive):
+    radius: float = parameter(above=0, unit="m", help="radius")
+    length: float = parameter(above=0, unit="m", help="length along z, of a capsule without caps")
+
+
+@dataclass(frozen=True)
+class Cylinder(_Round, kind="cylinder"):
+    """A cylinder."""
+
+    def geometry(self) -> coal.Cylinder:
+        """Return it as Coal has it."""
+        return coal.Cylinder(self.radius, self.length)
+
+
+@dataclass(frozen=True)
+class Capsule(_Round, kind="capsule"):
+    """A capsule."""
+
+    def geometry(self) -> coal.Capsule:
+        """Return it as Coal has it."""
+        return coal.Capsule(self.radius, self.length)
+
+
+@dataclass(frozen=True)
+class Cone(_Round, kind="cone"):
+    """A cone."""
+
+    def geometry(self) -> coal.Cone:
+        """Return it as Coal has it."""
+        return coal.Cone(self.radius, self.length)
+
+
+@dataclass(frozen=True)
+class Ellipsoid(Primitive, kind="ellipsoid"):
+    """An ellipsoid."""
+
+    radii: Lengths3 = parameter(unit="m", help="half axes along x, y, z")
+
+    def geometry(self) -> coal.Ellipsoid:
+        """Return it as Coal has it."""
+        return coal.Ellipsoid(*self.radii)
+
+
+@dataclass(frozen=True)
+class HalfSpace(Primitive, kind="half-space"):
+    """A square in the plane z = 0, facing +z."""
+
+    extent: float = parameter(10.0, above=0, unit="m", help="edge length")
+
+    def shell(self, **options: Unpack[ShellOptions]) -> Shell:
+        """Return its surface."""
+        plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        return Shell.from_geometry(plane, extent=self.extent, **options)

@@ -1,0 +1,219 @@
+"""Knobs: what of a scenario is turned while it is looked at: numbers, and words of a choice."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, get_args, get_origin
+
+from pydantic import BaseModel
+
+from sphshell_pin.errors import ScenarioError
+from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
+from sphshell_pin.scenario.format.reading import Found, look_up
+from sphshell_pin.scenario.format.schema import KnobSection, Scenario
+
+if TYPE_CHECKING:
+    from sphshell_pin.scenario.format.build import Built
+
+# A knob without a range goes from a tenth of its value to ten times as much.
+DECADE = 10.0
+
+# Keys whose new value holds from the start only: a run in progress keeps its state and its time.
+_FROM_THE_START = ("robot", "shell", "run")
+
+
+@dataclass(frozen=True)
+class Knob:
+    """A number of a scenario with the range to turn it in, or a word with its choices."""
+
+    key: str
+    """Dotted key, as --set takes it."""
+    label: str
+    unit: str
+    """Unit of `value`, `low`, `high`; "" for a pure number."""
+    low: float
+    high: float
+    log: bool
+    """Whether equal turns multiply (else they add)."""
+    value: float | str
+    restart: bool
+    """Whether a new value holds only from the next start: start states, placements, times."""
+    choices: tuple[str, ...] = ()
+    """The words that the value may be; none where it is a number."""
+
+
+def knobs_of(built: Built) -> tuple[Knob, ...]:
+    """Return the knobs of a built scenario, in the file's order, with the values they stand at.
+
+    A range is widened where the value, changed by --set, lies outside.
+    """
+    return tuple(_knob(one, built.scenario, built.path) for one in built.scenario.knob)
+
+
+def check_knobs(scenario: Scenario, path: Path, *, ranges: bool) -> None:
+    """Check the knobs of the `scenario` read from `path`; with `ranges` their values lie inside.
+
+    Raises
+    ------
+    ScenarioError
+        A key that the scenario has not or that is not a number, one given twice, or a range that
+        cannot be.
+    """
+    seen: set[str] = set()
+    for i, section in enumerate(scenario.knob):
+        where = f"knob[{i}]"
+        found = look_up(scenario, section.key, path)
+        if found.key in seen:
+            raise ScenarioError(path, f"{where}.key", "is a knob already", section.key)
+        seen.add(found.key)
+        if _choices(scenario, found):
+            _check_choice(section, found, path, where)
+            continue
+        value = float(_found(section, scenario, path).value)
+        low, high, log = _range(section, value, meaning(scenario, found))
+        if low is None or high is None:
+            if not ranges:
+                continue  # its author saw a range, which this value has left
+            raise ScenarioError(
+                path, where, f"needs min and max, as '{section.key}' is not positive", value
+            )
+        if not low < high:
+            raise ScenarioError(path, where, f"min {low:g} must be less than max {high:g}")
+        if log and low <= 0:
+            raise ScenarioError(path, where, "min must be positive with log = true", low)
+        if ranges and not low <= value <= high:
+            raise ScenarioError(
+                path,
+                where,
+                f"'{section.key}' = {value:g} lies outside its range {low:g} to {high:g}: change "
+                "the knob's min and max",
+            )
+
+
+def _found(section: KnobSection, scenario: Scenario, path: Path) -> Found:
+    found = look_up(scenario, section.key, path)
+    if isinstance(found.value, bool) or not isinstance(found.value, int | float):
+        shown = None if isinstance(found.value, dict | list) else found.value
+        raise ScenarioError(path, section.key, "is not a number, so it cannot be a knob", shown)
+    return found
+
+
+def _range(
+    section: KnobSection, value: float, about: Parameter
+) -> tuple[float | None, float | None, bool]:
+    low, high = section.min, section.max
+    if value > 0:
+        low = value / DECADE if low is None else low
+        if high is None:
+            high = value * DECADE if about.at_most is None else min(value * DECADE, about.at_most)
+    log = section.log if section.log is not None else about.log
+    if log is None:
+        # A range that was given spans what one wants to see, in plain steps unless it is wide.
+        log = low is not None and high is not None and low > 0 and high >= DECADE * low
+    return low, high, log
+
+
+def _choices(scenario: Scenario, found: Found) -> tuple[str, ...]:
+    """Return the words that the value at a key may be, where its table lists them; else none."""
+    owner: object = scenario
+    for part in found.parts[:-1]:
+        owner = _child(owner, part)
+    info = type(owner).model_fields.get(found.parts[-1]) if isinstance(owner, BaseModel) else None
+    if info is None:
+        return ()
+    parts = (info.annotation, *get_args(info.annotation))
+    words = [word for part in parts if get_origin(part) is Literal for word in get_args(part)]
+    return tuple(word for word in words if isinstance(word, str))
+
+
+def _check_choice(section: KnobSection, found: Found, path: Path, where: str) -> None:
+    if found.value is None:
+        raise ScenarioError(path, section.key, "is not set: give it a value to make it a knob")
+    for name in ("min", "max", "log", "unit"):
+        if getattr(section, name) is not None:
+            given = getattr(section, name)
+            raise ScenarioError(path, f"{where}.{name}", "is for numbers, not for words", given)
+
+
+def _knob(section: KnobSection, scenario: Scenario, path: Path) -> Knob:
+    at = look_up(scenario, section.key, path)
+    choices = _choices(scenario, at)
+    if choices:
+        label = meaning(scenario, at).label if section.label is None else section.label
+        restart = at.parts[0] in _FROM_THE_START
+        return Knob(section.key, label, "", 0.0, 0.0, False, str(at.value), restart, choices)
+    found = _found(section, scenario, path)
+    value, about = float(found.value), meaning(scenario, found)
+    low, high, log = _range(section, value, about)
+    # A missing end, and a value that is not positive any more.
+    if low is None:
+        low = DECADE * value
+    if high is None:
+        high = value / DECADE if value < 0.0 else 1.0
+    low, high = min(low, value), max(high, value)
+    return Knob(
+        key=section.key,
+        label=about.label if section.label is None else section.label,
+        unit=about.unit if section.unit is None else section.unit,
+        low=low,
+        high=high,
+        log=log and low > 0,
+        value=value,
+        restart=found.parts[0] in _FROM_THE_START,
+    )
+
+
+def meaning(scenario: Scenario, found: Found) -> Parameter:
+    """Return what the description of its table says of a number of `scenario`.
+
+    The label says whose it is, the unit is that of the table's other values.
+    """
+    owner: object = scenario
+    prefix: list[str] = []
+    for i, part in enumerate(found.parts):
+        about = _description(owner, part)
+        if about is not None:
+            inner = found.parts[i + 1 :]
+            label = about.label or part.replace("_", " ")
+            unit = owner.unit_of(part) if isinstance(owner, Ingredient) else about.unit
+            return replace(about, label=_named(prefix, _inside(label, inner), scenario), unit=unit)
+        prefix.append(part)
+        owner = _child(owner, part)
+    *tables, last = found.parts
+    return Parameter(label=f"{'.'.join(tables[1:])} {last.replace('_', ' ')}".strip())
+
+
+def _description(owner: object, name: str) -> Parameter | None:
+    if isinstance(owner, BaseModel):
+        info = type(owner).model_fields.get(name)
+        return next((m for m in info.metadata if isinstance(m, Parameter)), None) if info else None
+    return parameters_of(owner).get(name)
+
+
+def _child(owner: object, part: str) -> object:
+    if isinstance(owner, list):
+        names = [getattr(one, "label", None) or getattr(one, "name", None) for one in owner]
+        at = names.index(part) if part in names else int(part) if part.isdecimal() else None
+        return None if at is None else owner[at]
+    return owner.get(part) if isinstance(owner, Mapping) else getattr(owner, part, None)
+
+
+def _inside(label: str, inner: list[str]) -> str:
+    """Return the label of a part of a vector or table."""
+    if not inner:
+        return label
+    (part,) = inner
+    if label == "rpy deg":
+        return ("roll", "pitch", "yaw")[int(part)]
+    axis = "xyz"[int(part)] if part in ("0", "1", "2") else f"of {part}"
+    return axis if label == "xyz" else f"{label} {axis}"
+
+
+def _named(tables: list[str], label: str, scenario: Scenario) -> str:
+    """Return `label` with the name of the item that it belongs to."""
+    if tables and tables[0] in ("contact", "source"):
+        several = len(scenario.contact) + len(scenario.source) > 1
+        return f"{tables[1]}: {label}" if several else label
+    return f"{tables[1]} {label}" if len(tables) > 1 else label

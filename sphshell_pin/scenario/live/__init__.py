@@ -1,0 +1,1 @@
+"""Live scenarios: parameters, targets and bodies that change while a run goes on."""

@@ -1,0 +1,103 @@
+"""The joint targets of a controller, as a page moves them while the run goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from sphshell_pin.dynamics.control.controllers import Controller
+from sphshell_pin.dynamics.run.advance import AnyController
+from sphshell_pin.dynamics.scene.joint_components import joint_slides
+from sphshell_pin.dynamics.scene.mimic import mimics
+from sphshell_pin.dynamics.scene.models import model_reach, set_joint
+from sphshell_pin.errors import InvalidParameter, NameNotFound
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a controller wants a joint of one coordinate."""
+
+    joint: str
+    rotates: bool
+    """Whether the numbers are angles [rad]; else lengths [m]."""
+    low: float
+    high: float
+    limited: bool
+    """Whether `low` and `high` are the limits of the joint, else a range to move it in."""
+    value: float
+
+
+def targets_of(controller: AnyController, model: pin.Model, start: Array) -> tuple[Target, ...]:
+    """Return the targets of the joints that `controller` pulls to its `q_ref`.
+
+    `start` (nq,) is the start of the run, which is the target where `q_ref` states none. Joints of
+    several coordinates, and those that mimic others, have none.
+    """
+    if not isinstance(controller, Controller) or controller.posture_gain is None:
+        return ()
+    pulled = controller.gain(controller.posture_gain, model) * controller.actuated(model)
+    posture = controller.posture(model, start)
+    follows = mimics(model)
+    return tuple(
+        _target(model, joint, posture)
+        for joint in list(model.joints)[1:]
+        if joint.nv == 1
+        and joint.nq <= 2
+        and pulled[joint.idx_v] > 0
+        # A mimic joint has the coordinate of another one.
+        and model.names[joint.id] not in follows
+    )
+
+
+def aimed(
+    controller: AnyController, model: pin.Model, start: Array, aims: Mapping[str, float]
+) -> AnyController:
+    """Return `controller` with the targets `aims` [rad or m] by joint, and those it had."""
+    if not isinstance(controller, Controller) or controller.posture_gain is None:
+        return controller
+    posture = controller.posture(model, start)
+    for joint, value in aims.items():
+        set_joint(model, posture, joint, value)
+    changes: dict[str, Any] = {"q_ref": posture}
+    return replace(controller, **changes)
+
+
+def check_aim(targets: tuple[Target, ...], joint: str, value: float) -> None:
+    """Raise NameNotFound or InvalidParameter unless `joint` may be sent to `value` [rad or m]."""
+    found = next((one for one in targets if one.joint == joint), None)
+    if found is None:
+        raise NameNotFound("joint with a target", joint, "this run", [o.joint for o in targets])
+    if found.limited and not found.low <= value <= found.high:
+        unit = "rad" if found.rotates else "m"
+        raise InvalidParameter(
+            f"target of '{joint}'",
+            value,
+            f"must be within the limits of the joint, {found.low:.6g} to {found.high:.6g} {unit}",
+        )
+
+
+def _target(model: pin.Model, joint: pin.JointModel, posture: Array) -> Target:
+    if joint.nq == 2:  # cosine and sine
+        value = float(np.arctan2(posture[joint.idx_q + 1], posture[joint.idx_q]))
+    else:
+        value = float(posture[joint.idx_q])
+    rotates = not joint_slides(joint)
+    low, high = -np.inf, np.inf
+    if joint.nq == 1:
+        low = float(model.lowerPositionLimit[joint.idx_q])
+        high = float(model.upperPositionLimit[joint.idx_q])
+    # A model that states none has infinite ones, very large ones, or the same for both.
+    room = 4.0 * np.pi if rotates else 4.0 * model_reach(model)
+    limited = low < high and low > -room and high < room
+    if not limited:
+        half = np.pi if rotates else model_reach(model)
+        low, high = -half, half
+    name = model.names[joint.id]
+    return Target(name, rotates, min(low, value), max(high, value), limited, value)

@@ -1,0 +1,1 @@
+"""Running scenarios: results folders, figures beside the expected ones, replays."""

@@ -1,0 +1,232 @@
+"""What is kept of a scenario with its results: its robots, surfaces and tables, as they were used.
+
+So a finished run can be shown on any machine, and no file is read but that of the results. What is
+kept may have been changed by whoever gives it away: indices are checked, nothing is executed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from sphshell_pin.atomic import atomic_file
+from sphshell_pin.dynamics.result.result_parts import Kept
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.parameters import Ingredient
+from sphshell_pin.robots import LoadedRobot
+from sphshell_pin.robots.kept_robot import ALONE, load_kept, meshes_of, text_of, without_references
+from sphshell_pin.scenario.format.bodies import origin
+from sphshell_pin.scenario.format.schema import RobotSection, Scenario
+from sphshell_pin.shell.kept_shell import arrays_of, shell_of
+from sphshell_pin.shell.shell import Shell
+
+MOST_FILES = 256e6
+"""Meshes and tables of a run that are kept [bytes]; of what is beyond it, only the hash."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+
+class _Robot(_Part):
+    """A robot of a file; `meshes` are the SHA-256 of its meshes, "" of one that was missing."""
+
+    file: str
+    text: str
+    q0: list[float]
+    meshes: dict[str, str]
+
+
+class _Surface(_Part):
+    side: str
+    crease_angle: float
+    rounding: float
+    finds_faces: bool
+    face_names: list[str]
+
+
+class _Contents(_Part):
+    """`robots` as the scenario has them, None of a shipped one; `tables` of laws as `meshes`."""
+
+    robots: list[_Robot | None]
+    surfaces: dict[str, _Surface]
+    tables: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Restored:
+    """A scenario whose files are at hand: what `build_scenario` takes."""
+
+    scenario: Scenario
+    robots: Mapping[tuple[object, ...], LoadedRobot]
+    surfaces: Mapping[str, Shell]
+
+
+def keep(
+    scenario: Scenario, folder: Path, robots: Sequence[LoadedRobot], shells: Mapping[str, Shell]
+) -> Kept:
+    """Return what is kept of a scenario in `folder`, built with `robots` and `shells`.
+
+    Robots and surfaces that need no file are built again from the settings. A mesh is kept if it
+    needs no other file, up to MOST_FILES in total.
+    """
+    arrays: dict[str, NDArray[np.generic]] = {}
+    room = MOST_FILES
+
+    def kept(path: Path | None, alone: bool = True) -> str:
+        nonlocal room
+        try:
+            content = b"" if path is None else path.read_bytes()
+        except OSError:  # gone since the scenario was built
+            return ""
+        digest = hashlib.sha256(content).hexdigest()
+        if content and alone and _file(digest) not in arrays and len(content) <= room:
+            room -= len(content)
+            arrays[_file(digest)] = np.frombuffer(content, np.uint8)
+        return digest if content else ""
+
+    held: list[_Robot | None] = []
+    for section, robot in zip(scenario.robot, robots, strict=True):
+        description = robot.description if section.path is not None else None
+        if description is None:
+            held.append(None)
+            continue
+        meshes = {
+            name: kept(path, name.lower().endswith(ALONE))
+            for name, path in meshes_of(description).items()
+        }
+        file = str(description.file.absolute() if description.is_mjcf else section.path)
+        text, q0 = text_of(description), robot.q0.tolist()
+        held.append(_Robot(file=file, text=text, q0=q0, meshes=meshes))
+    surfaces = {}
+    for one in scenario.shell:
+        if one.file is not None:
+            shell = shells[one.name]
+            arrays |= {f"shell.{one.name}.{k}": array for k, array in arrays_of(shell).items()}
+            surfaces[one.name] = _Surface(
+                side=shell.side,
+                crease_angle=shell.crease_angle,
+                rounding=shell.rounding,
+                finds_faces=shell.finds_faces,
+                face_names=list(shell.face_names),
+            )
+    laws = [law for one in scenario.contact for law in (one.law, one.friction)]
+    laws += [law for other in scenario.source for law in (other.law, other.friction)]
+    tables = {name: kept(folder / name) for law in laws for name in law.files}
+    contents = _Contents(robots=held, surfaces=surfaces, tables=tables)
+    return Kept(contents.model_dump(mode="json"), arrays)
+
+
+def restore(scenario: Scenario, kept: Kept) -> Restored:
+    """Return `scenario` with what is kept of it.
+
+    Raises
+    ------
+    SphshellError
+        Something of it is not kept, or not as `keep` gives it.
+    """
+    try:
+        contents = _Contents.model_validate(kept.contents)
+    except ValidationError as error:
+        where = ".".join(map(str, error.errors(include_url=False)[0]["loc"]))
+        raise SphshellError(f"what is kept of its scene has a wrong part, '{where}'") from None
+    if len(contents.robots) != len(scenario.robot):
+        raise SphshellError(f"it has {len(contents.robots)} robots, not {len(scenario.robot)}")
+    robots = {
+        origin(section): _robot(section, one, kept)
+        for section, one in zip(scenario.robot, contents.robots, strict=True)
+        if section.path is not None
+    }
+    surfaces = {}
+    for one in scenario.shell:
+        if one.file is None:
+            continue
+        if one.name not in contents.surfaces:
+            raise SphshellError(f"it does not hold the surface '{one.name}'")
+        about = dict(contents.surfaces[one.name])
+        about["face_names"] = tuple(about["face_names"])
+        begin = f"shell.{one.name}."
+        arrays = {k.removeprefix(begin): v for k, v in kept.arrays.items() if k.startswith(begin)}
+        surfaces[one.name] = shell_of(arrays, name=one.name, **about)
+    tables = {name: _place(kept, digest, ".csv") for name, digest in contents.tables.items()}
+
+    def at_hand(law: Ingredient, friction: Ingredient) -> dict[str, Ingredient]:
+        return {"law": _at_hand(law, tables), "friction": _at_hand(friction, tables)}
+
+    sections = {
+        "contact": [c.model_copy(update=at_hand(c.law, c.friction)) for c in scenario.contact],
+        "source": [c.model_copy(update=at_hand(c.law, c.friction)) for c in scenario.source],
+    }
+    return Restored(scenario.model_copy(update=sections), robots, surfaces)
+
+
+def _at_hand(stated: Ingredient, places: Mapping[str, Path | None]) -> Ingredient:
+    """Return a law that names files at hand."""
+    changed = {}
+    for one in fields(stated):
+        name = getattr(stated, one.name)
+        if isinstance(name, str) and name in stated.files:
+            if places.get(name) is None:
+                raise SphshellError(f"it does not hold the file '{name}' of a law")
+            changed[one.name] = str(places[name])
+    return replace(stated, **changed) if changed else stated
+
+
+def _robot(section: RobotSection, one: _Robot | None, kept: Kept) -> LoadedRobot:
+    if one is None:
+        raise SphshellError(f"it does not hold the robot '{section.path}'")
+    places = {}
+    for name, digest in one.meshes.items():
+        suffix = Path(name).suffix.lower()
+        place = _place(kept, digest, suffix) if suffix in ALONE else None
+        if place is not None:
+            places[name] = place
+    called = Path(section.path or "").name.partition(".")[0]
+    return load_kept(
+        one.text,
+        one.file,
+        places,
+        one.q0,
+        free_flyer=section.floats,
+        mimic=section.mimic,
+        name=called,
+    )
+
+
+def _file(digest: str) -> str:
+    return f"file.{digest}"
+
+
+def _place(kept: Kept, digest: str, suffix: str) -> Path | None:
+    """Return a file with what is kept under `digest`, None if nothing is."""
+    array = kept.arrays.get(_file(digest))
+    if array is None or array.dtype != np.uint8:
+        return None
+    content = without_references(suffix, array.tobytes())
+    if content is None:
+        return None
+    # Named by what it holds: files of all results of a process stand in one folder.
+    place = _folder() / (hashlib.sha256(content).hexdigest() + suffix)
+    if not place.exists():
+        with atomic_file(place) as stream:
+            stream.write(content)
+    return place
+
+
+@cache
+def _holder(process: int) -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="sphshell-pin-")
+
+
+def _folder() -> Path:
+    """Return a folder that stays until this process ends, as meshes are read when drawn."""
+    return Path(_holder(os.getpid()).name)

@@ -1,0 +1,357 @@
+"""Run a scenario without a screen and write its results folder."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from sphshell_pin.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.dynamics.control.controllers import Controller
+from sphshell_pin.dynamics.result.result import Result
+from sphshell_pin.dynamics.result.result_parts import Origin
+from sphshell_pin.errors import (
+    Interrupted,
+    MissingExtra,
+    ResultError,
+    SetupWarning,
+    SimulationDiverged,
+    SphshellError,
+    WeakLawWarning,
+)
+from sphshell_pin.scenario.format.build import Built, build
+from sphshell_pin.scenario.format.reading import shipped_scenarios
+from sphshell_pin.scenario.running.cad_audit import CadAudit, check_audit
+from sphshell_pin.scenario.running.cad_audit import audit_cad as compare_with_cad
+from sphshell_pin.scenario.running.figures import Verdict, check_expectations, judge, measure_energy
+from sphshell_pin.scenario.running.kept_scenario import keep
+from sphshell_pin.tables import csv_text
+
+RECORDING = "recording.html"
+SUMMARY = "summary.json"
+STOPPED = "stopped"
+"""Subfolder for what a run computed that stopped early, beside an earlier one's results."""
+
+# What a run writes: a later one replaces all of it, so that no folder mixes two runs.
+RESULTS = (
+    "run.npz",
+    "contacts.csv",
+    "sensors.csv",
+    SUMMARY,
+    "force_and_depth.png",
+    "energy.png",
+    "contact_path.png",
+    "contact_map.png",
+    "wear.npz",
+    "wear.png",
+    "sensors.png",
+    RECORDING,
+)
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """What a run left behind."""
+
+    built: Built
+    result: Result
+    """What was computed until then when `stopped` is set."""
+    folder: Path
+    files: tuple[Path, ...]
+    notes: tuple[str, ...]
+    """What could not be written, and why; one sentence each."""
+    verdicts: tuple[Verdict, ...]
+    stopped: SphshellError | None
+    """Why the run ended early: Interrupted or SimulationDiverged."""
+    audit: CadAudit | None = None
+    """Differences of the contacts from those on the exact CAD faces, if that was asked for."""
+    doubts: tuple[str, ...] = ()
+    """What in the run shows that the scenario is probably a mistake; one sentence each."""
+
+
+def run_scenario(
+    name: str | PathLike[str],
+    out: str | PathLike[str] | None = None,
+    *,
+    changes: Mapping[str, str] | None = None,
+    recording: bool = True,
+    audit_cad: bool = False,
+    progress: Callable[[float], object] | None = None,
+) -> RunReport:
+    """Build and run the scenario called `name` (shipped, or a path) and write its results folder.
+
+    `out` is the folder, results/<name> by default; `changes` are values by dotted key. An
+    interrupted or diverged run is written like any other, and `stopped` says so; where the folder
+    has the results of a complete run, it is written to the subfolder `stopped`. Files take the
+    place of an earlier run's all at once, when all are on disk (see `sphshell_pin.atomic`). With
+    `audit_cad` each contact with a CAD surface is compared with that on the exact faces (see
+    `scenario.audit`).
+
+    Raises
+    ------
+    ScenarioError, NameNotFound, MissingExtra
+        The scenario cannot be built.
+    ResultError
+        The folder cannot be written, or another run is writing it; raised before the run starts.
+    SphshellError
+        There is no CAD surface to audit.
+    KeyboardInterrupt
+        On Ctrl-C while the results are written; its text says so if they are there.
+    """
+    built = build(name, changes)
+    return run_built(built, out, recording=recording, audit_cad=audit_cad, progress=progress)
+
+
+def run_built(
+    built: Built,
+    out: str | PathLike[str] | None = None,
+    *,
+    recording: bool = True,
+    audit_cad: bool = False,
+    progress: Callable[[float], object] | None = None,
+) -> RunReport:
+    """Run a scenario that is already built; see `run_scenario`."""
+    check_expectations(built)
+    if audit_cad:
+        check_audit(built)
+    folder = Path("results") / built.name if out is None else Path(out)
+    with contextlib.ExitStack() as held:
+        place = held.enter_context(_results_folder(folder))
+        result, stopped = simulate(built, progress)
+        verdicts, fault = _judge(built, result) if stopped is None else ((), None)
+        notes: list[str] = []
+        if stopped is not None and _holds_complete(folder):
+            notes.append(f"the complete results of an earlier run stay in {folder}")
+            folder = folder / STOPPED
+            place = held.enter_context(_results_folder(folder))
+        audit = compare_with_cad(built, result) if audit_cad else None
+        try:
+            desk = place.desk()
+            result.save(desk / "run.npz", home=folder)
+            write_contacts(desk / "contacts.csv", result, audit)
+            if result.sensors:
+                write_sensors(desk / "sensors.csv", result)
+            interrupted = _draw(built, result, desk, notes, recording=recording)
+            _write_summary(desk, built, result, verdicts, stopped, audit)
+            files = tuple(folder / name for name in RESULTS if (desk / name).exists())
+            if folder / RECORDING not in files and (folder / RECORDING).exists():
+                notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
+            place.replace(desk, RESULTS)
+        except OSError as error:
+            raise _not_written(folder, error) from None
+    if fault is not None:
+        raise fault
+    if interrupted:
+        raise KeyboardInterrupt(f"the results are in {folder}, but not all pictures of them")
+    doubts = _beyond_hertz(result)
+    if stopped is None and isinstance(built.controller, Controller):
+        doubts = (*doubts, *built.controller.doubts_after(result))
+    return RunReport(built, result, folder, files, tuple(notes), verdicts, stopped, audit, doubts)
+
+
+def _beyond_hertz(result: Result) -> tuple[str, ...]:
+    """Say of each contact when the theory of its law first ended."""
+    first = {e.pair: e.t for e in reversed(result.events) if e.kind == "beyond_hertz"}
+    return tuple(
+        f"contact '{pair}': from t = {t:.4g} s Hertz's theory does not hold: the ellipse of "
+        "contact is more than half as long as the sphere, or a socket fits the sphere closely; "
+        "make the bodies stiffer, or take a FoundationLaw"
+        for pair, t in first.items()
+    )
+
+
+def _judge(built: Built, result: Result) -> tuple[tuple[Verdict, ...], Exception | None]:
+    """Return the verdicts; or the fault of a figure of the user's, raised when all is written."""
+    try:
+        return tuple(judge(built, result)), None
+    except Exception as fault:
+        return (), fault
+
+
+def simulate(
+    built: Built, progress: Callable[[float], object] | None = None
+) -> tuple[Result, SphshellError | None]:
+    """Run without writing; return the result, and why it ended early (None: it did not)."""
+    run = built.scenario.run
+    try:
+        with warnings.catch_warnings():
+            for kind in (WeakLawWarning, SetupWarning):  # explain_built and doubts report them
+                warnings.simplefilter("ignore", kind)
+            result = built.simulation.run(
+                built.q0,
+                built.v0,
+                run.duration,
+                built.controller,
+                run.control_dt,
+                record_dt=run.record_dt,
+                record=run.record,
+                progress=progress,
+            )
+    except (Interrupted, SimulationDiverged) as error:
+        error.result = replace(error.result, origin=origin_of(built))
+        return error.result, error
+    return replace(result, origin=origin_of(built)), None
+
+
+def origin_of(built: Built) -> Origin:
+    """Return the origin that a Result of this scenario records."""
+    shipped = shipped_scenarios().get(built.name)
+    scenario = built.name if shipped == built.path else str(built.path.absolute())
+    settings = built.scenario.model_dump(mode="json")
+    plain = {key: _plain(value) for key, value in settings.items()}
+    folder = built.path.absolute().parent
+    return Origin(
+        scenario,
+        plain,
+        partial(keep, built.scenario, folder, built.assembly.loaded, dict(built.shells)),
+    )
+
+
+@contextlib.contextmanager
+def _results_folder(folder: Path) -> Iterator[AtomicFolder]:
+    """Hold the results folder; ResultError where it cannot be made, or another run has it."""
+    with contextlib.ExitStack() as held:
+        try:
+            place = held.enter_context(AtomicFolder(folder, last=SUMMARY, inner=[STOPPED]))
+        except FolderInUse as busy:
+            raise ResultError(
+                folder, f"{busy}: wait until it ends, or give another folder with --out"
+            ) from None
+        except OSError as error:
+            raise ResultError(
+                folder,
+                f"the results folder cannot be written: {error.strerror}; give another with --out",
+            ) from None
+        yield place
+
+
+def _not_written(folder: Path, error: OSError) -> ResultError:
+    cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
+    return ResultError(folder, f"the results cannot be written: {cause.strerror or cause}")
+
+
+def _holds_complete(folder: Path) -> bool:
+    """Whether `folder` has results that a run which stopped early must not replace."""
+    try:
+        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+        return bool(summary["complete"])
+    except (OSError, ValueError, KeyError, TypeError):
+        # Somebody's results without a summary count as complete.
+        return any((folder / name).exists() for name in RESULTS)
+
+
+def _draw(built: Built, result: Result, desk: Path, notes: list[str], *, recording: bool) -> bool:
+    """Write the pictures; note which of them cannot be made, as the numbers matter more.
+
+    Returns whether Ctrl-C ended it. Raises ResultError for one that cannot be written.
+    """
+    scenario = built.scenario
+
+    def write_recording() -> None:
+        speed, title = scenario.run.recording_speed, scenario.title
+        view = result.view(built.scene, built.visual_model, speed=speed, title=title)
+        view.save(desk / RECORDING)
+
+    def write_wear() -> None:
+        if scenario.run.wear is not None:
+            from sphshell_pin.patches.wear import save_wear, wear_maps
+
+            save_wear(wear_maps(result, scenario.run.wear, built.scene), desk)
+
+    writers: dict[str, Callable[[], object]] = {
+        "figures": lambda: result.save_figures(desk, built.scene),
+        "wear": write_wear,
+        RECORDING: write_recording,
+    }
+    for what, write in writers.items():
+        if what == RECORDING and not recording:
+            continue
+        try:
+            write()
+        except KeyboardInterrupt:
+            return True
+        except MissingExtra as error:
+            notes.append(str(error))
+        except Exception as error:
+            if isinstance(error, ResultError) and isinstance(error.__cause__, OSError):
+                raise
+            named = "" if isinstance(error, ResultError) else f"{type(error).__name__}: "
+            notes.append(f"{what} could not be made: {named}{error}".removesuffix(": "))
+    return False
+
+
+def write_contacts(
+    path: str | PathLike[str], result: Result, audit: CadAudit | None = None
+) -> None:
+    """Write the contact log of `result` as comma-separated values, one row for each contact."""
+    columns = result.contact_columns() | ({} if audit is None else audit.columns())
+    Path(path).write_text(csv_text(columns), encoding="utf-8", newline="")
+
+
+def write_sensors(path: str | PathLike[str], result: Result) -> None:
+    """Write the readings of the sensors as comma-separated values, one row for each time."""
+    Path(path).write_text(csv_text(result.sensor_columns()), encoding="utf-8", newline="")
+
+
+def _write_summary(
+    desk: Path,
+    built: Built,
+    result: Result,
+    verdicts: Iterable[Verdict],
+    stopped: SphshellError | None,
+    audit: CadAudit | None,
+) -> None:
+    import coal
+    import pinocchio as pin
+
+    import sphshell_pin
+
+    summary = {
+        "scenario": built.name,
+        "title": built.scenario.title,
+        "complete": stopped is None,
+        "stopped": None if stopped is None else str(stopped),
+        "stats": asdict(result.stats),
+        "energy": measure_energy(result),
+        "expected": [
+            {"figure": v.figure, "expected": v.expected, "measured": v.measured, "met": v.met}
+            for v in verdicts
+        ],
+        **({} if audit is None else {"cad_audit": audit.figures()}),
+        "versions": {
+            "sphshell_pin": sphshell_pin.__version__,
+            "pinocchio": pin.__version__,
+            "coal": coal.__version__,
+            "numpy": np.__version__,
+        },
+        "files": {name: _digest(desk / name) for name in RESULTS if (desk / name).exists()},
+        "settings": origin_of(built).settings,
+    }
+    text = json.dumps(_plain(summary), indent=2, allow_nan=False)
+    (desk / SUMMARY).write_text(text + "\n", encoding="utf-8")
+
+
+def _digest(path: Path) -> str:
+    with open(path, "rb") as file:
+        return f"sha256:{hashlib.file_digest(file, 'sha256').hexdigest()}"
+
+
+def _plain(value: object) -> object:
+    """Return `value` made of what JSON knows; it has no infinity: null stands for it."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value if value is None or isinstance(value, str | int | float) else str(value)

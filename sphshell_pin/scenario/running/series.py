@@ -1,0 +1,172 @@
+"""What a chart can show of a run: curves of forces, depths, joints, sensors and energy.
+
+A curve is described once, by a Series: its names, its unit, and how its values follow from what a
+player records. Nothing is computed for a curve that nobody looks at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sphshell_pin.dynamics.result.result_columns import coordinates
+from sphshell_pin.scenario.running.player import Rows
+
+if TYPE_CHECKING:
+    import pinocchio as pin
+
+    from sphshell_pin.dynamics.sensing.sensor_log import SensorLog
+
+Array = NDArray[np.float64]
+
+# Units of charts, as people read them: the factor from SI units, and the name.
+_SHOWN = {
+    "rad": (180.0 / np.pi, "deg"),
+    "rad/s": (180.0 / np.pi, "deg/s"),
+    "m": (1e3, "mm"),
+    "m/s": (1e3, "mm/s"),
+}
+_TORQUES = {"rad/s": "N m", "m/s": "N"}
+
+
+@dataclass(frozen=True)
+class Series:
+    """A curve that a chart can show.
+
+    `key` names it among all; `quantity` is what it is one of and `name` which one, `unit` that of
+    its values. `of` gives the values (n,) from the block `source` (n, k) of Rows. `color` is
+    "normal" or "friction" where the picture has a color for it; `from_zero` whether the axis of a
+    chart begins at zero.
+    """
+
+    key: str
+    quantity: str
+    name: str
+    unit: str
+    source: str
+    of: Callable[[Array], Array]
+    color: str = ""
+    from_zero: bool = False
+
+    def values(self, rows: Rows) -> Array:
+        """Return the values (n,) of `rows`, nan where they were not recorded."""
+        block = rows.block(self.source)
+        return np.full(len(rows), np.nan) if block is None else self.of(block)
+
+
+def force_series(pairs: Sequence[str]) -> tuple[Series, ...]:
+    """Return the curves of normal and friction forces [N] and depths [mm] of the pairs so named.
+
+    Of several pairs there are also those of their sum, and of the deepest.
+    """
+    kinds = {"normal": "normal_force", "friction": "friction_force"}
+    several = len(pairs) > 1
+    found = [
+        Series(
+            kind,
+            "Force",
+            f"{kind}, all pairs" if several else kind,
+            "N",
+            source,
+            lambda block: block.sum(axis=1),
+            color=kind,
+            from_zero=True,
+        )
+        for kind, source in kinds.items()
+    ]
+    if several:
+        found += [
+            Series(
+                f"{kind}.{pair}",
+                "Force",
+                f"{kind}, {pair}",
+                "N",
+                source,
+                _column(k),
+                from_zero=True,
+            )
+            for k, pair in enumerate(pairs)
+            for kind, source in kinds.items()
+        ]
+    return (
+        *found,
+        *(
+            Series(f"depth.{pair}", "Depth", pair, "mm", "depth", _column(k, 1e3), from_zero=True)
+            for k, pair in enumerate(pairs)
+        ),
+    )
+
+
+def motion_series(model: pin.Model, *, torque: bool) -> tuple[Series, ...]:
+    """Return the curves of joint positions and velocities, and of the controller's torques.
+
+    Angles are in degrees, lengths in mm; of a joint that turns without end the angle from -180 to
+    180 degrees.
+    """
+    in_q, in_v = (list(map(_split, names)) for names in coordinates(model))
+    endless = {joint.idx_q for joint in model.joints if (joint.nq, joint.nv) == (2, 1)}
+    found = []
+    for k, (column, si) in enumerate(in_q):
+        if k - 1 in endless or not column:
+            continue
+        name = column.removesuffix(".0") if k in endless else column
+        factor, unit = _SHOWN["rad"] if k in endless else _SHOWN.get(si, (1.0, si))
+        read = _angle(k, factor) if k in endless else _column(k, factor)
+        found.append(Series(f"q.{name}", "Joint position", name, unit, "q", read))
+    for k, (name, si) in enumerate(in_v):
+        factor, unit = _SHOWN.get(si, (1.0, si))
+        found.append(Series(f"v.{name}", "Joint velocity", name, unit, "v", _column(k, factor)))
+    for k, (name, si) in enumerate(in_v if torque else ()):
+        unit, read = _TORQUES.get(si, si), _column(k)
+        found.append(Series(f"torque.{name}", "Controller torque", name, unit, "torque", read))
+    return tuple(one for one in found if one.name)
+
+
+def sensor_series(columns: Mapping[str, Sequence[str]]) -> tuple[Series, ...]:
+    """Return the curves of the sensors whose columns, with their units, these are."""
+    found = []
+    for sensor, names in columns.items():
+        for k, (name, unit) in enumerate(map(_unit, names)):
+            source = f"sensor.{sensor}"
+            found.append(
+                Series(f"{source}.{name}", f"Sensor {sensor}", name, unit, source, _column(k))
+            )
+    return tuple(found)
+
+
+RESIDUAL = Series("residual", "Energy residual", "residual", "J", "residual", lambda b: b[:, 0])
+"""The curve of the energy residual."""
+
+
+def held(log: SensorLog, t: Array, before: Array | None) -> Array:
+    """Return the last reading (n, k) that had arrived at each time `t` (n,) [s].
+
+    `before` (k,) is the one from before the log; without it times before its first reading get nan.
+    """
+    first = np.full(len(log.columns), np.nan) if before is None else before
+    values: Array = np.vstack((first, log.values))[np.searchsorted(log.t, t, side="right")]
+    return values
+
+
+def _column(k: int, factor: float = 1.0) -> Callable[[Array], Array]:
+    return lambda block: factor * block[:, k]
+
+
+def _angle(k: int, factor: float) -> Callable[[Array], Array]:
+    return lambda block: factor * np.arctan2(block[:, k + 1], block[:, k])
+
+
+def _split(column: str) -> tuple[str, str]:
+    """Return name and unit of a column of `coordinates`, "q.NAME [UNIT]"."""
+    name, unit = _unit(column)
+    return name[2:], unit
+
+
+def _unit(column: str) -> tuple[str, str]:
+    name, _, unit = column.partition(" [")
+    unit = unit.removesuffix("]")
+    return name, "" if unit == "1" else unit
