@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 _Doubles = NDArray[np.float64]
 _Ints = NDArray[np.int32]
@@ -178,30 +178,37 @@ class Parameter:
 
 class _Evaluations:
     def __init__(
-        self, model: pin.Model, pairs: Sequence[Pair], joints: JointEffects | None = None
+        self,
+        model: pin.Model,
+        shown: pin.Model,
+        pairs: Sequence[Pair],
+        joints: JointEffects | None,
+        convert: Callable[[object, object, object], tuple[_Doubles, _Doubles, _Doubles]],
     ) -> None: ...
-    def joint_forces(self, q: _Doubles, v: _Doubles) -> _Doubles: ...
-    def external_forces(self, q: _Doubles, v: _Doubles) -> pin.StdVec_Force: ...
-    def contacts(self, q: _Doubles, v: _Doubles) -> NDArray[np.uint8]: ...
-    def contact_derivatives(self, q: _Doubles, v: _Doubles) -> tuple[_Doubles, _Doubles]: ...
+    def joint_forces(self, q: ArrayLike, v: ArrayLike | None) -> _Doubles: ...
+    def external_forces(self, q: ArrayLike, v: ArrayLike | None) -> pin.StdVec_Force: ...
+    def contacts(self, q: ArrayLike, v: ArrayLike | None) -> NDArray[np.uint8]: ...
+    def contact_derivatives(
+        self, q: ArrayLike, v: ArrayLike | None
+    ) -> tuple[_Doubles, _Doubles]: ...
     def dynamics_derivatives(
         self,
-        q: _Doubles,
-        v: _Doubles,
-        tau: _Doubles,
+        q: ArrayLike,
+        v: ArrayLike | None,
+        tau: ArrayLike | None,
         parameters: Sequence[Parameter],
         repeat: int = 1,
     ) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles, _Doubles]: ...
     def contact_force_derivatives(
-        self, q: _Doubles, v: _Doubles, parameters: Sequence[Parameter]
+        self, q: ArrayLike, v: ArrayLike | None, parameters: Sequence[Parameter]
     ) -> tuple[NDArray[np.uint8], _Doubles, _Doubles, _Doubles]: ...
     def step_derivatives(
         self,
         integrator: str,
         dt: float,
-        q: _Doubles,
-        v: _Doubles,
-        tau: _Doubles,
+        q: ArrayLike,
+        v: ArrayLike | None,
+        tau: ArrayLike | None,
         parameters: Sequence[Parameter],
     ) -> tuple[_Doubles, _Doubles, _Doubles, _Doubles, _Doubles]: ...
 
@@ -209,7 +216,7 @@ def model_fault(model: pin.Model) -> str: ...
 
 class SceneState(_Evaluations):
     def copy(self) -> SceneState: ...
-    def advance(self, q: _Doubles, v: _Doubles, dt: float) -> None: ...
+    def advance(self, q: ArrayLike, v: ArrayLike, dt: float) -> None: ...
 
 class Scene(_Evaluations):
     @property

@@ -23,12 +23,17 @@ using IntTriples = nb::ndarray<const int, nb::shape<-1, 3>, nb::c_contig, nb::de
 using Ints = nb::ndarray<const int, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 using Bytes = nb::ndarray<const std::uint8_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 
-// Moves a vector's memory into an array of the given shape.
-template <class T>
-Array<T> to_array(std::vector<T> values, std::initializer_list<std::size_t> shape) {
+// Moves a vector's memory into an array of the given shape; one of const elements is read-only.
+template <class Element, class T>
+Array<Element> array_of(std::vector<T> values, std::initializer_list<std::size_t> shape) {
   auto* kept = new std::vector<T>(std::move(values));
   nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-  return Array<T>(kept->data(), shape, owner);
+  return Array<Element>(kept->data(), shape, owner);
+}
+
+template <class T>
+Array<T> to_array(std::vector<T> values, std::initializer_list<std::size_t> shape) {
+  return array_of<T>(std::move(values), shape);
 }
 
 template <class T>
@@ -43,10 +48,22 @@ inline Array<double> to_array(const Eigen::VectorXd& x) {
   return to_array(std::vector<double>(x.begin(), x.end()));
 }
 
-inline Array<double> to_array(const Eigen::MatrixXd& x) {
-  const auto by_rows = x.reshaped<Eigen::RowMajor>();
-  return to_array(std::vector<double>(by_rows.begin(), by_rows.end()),
-                  {std::size_t(x.rows()), std::size_t(x.cols())});
+template <class Element = double>
+Array<Element> by_rows(const Eigen::MatrixXd& x) {
+  const auto rows = x.reshaped<Eigen::RowMajor>();
+  return array_of<Element>(std::vector<double>(rows.begin(), rows.end()),
+                           {std::size_t(x.rows()), std::size_t(x.cols())});
+}
+
+inline Array<double> to_array(const Eigen::MatrixXd& x) { return by_rows(x); }
+
+// What users may only read.
+inline Array<const double> read_only_array(const Eigen::VectorXd& x) {
+  return array_of<const double>(std::vector<double>(x.begin(), x.end()), {std::size_t(x.size())});
+}
+
+inline Array<const double> read_only_array(const Eigen::MatrixXd& x) {
+  return by_rows<const double>(x);
 }
 
 inline void append(std::vector<double>& out, const Eigen::Vector3d& x) {

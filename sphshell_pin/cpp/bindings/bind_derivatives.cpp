@@ -43,81 +43,94 @@ void bind(nb::class_<T>& bound) {
   bound
       .def(
           "dynamics_derivatives",
-          [](T& self, const VectorX& q, const VectorX& v, const VectorX& tau,
+          [](T& self, nb::handle given_q, nb::handle given_v, nb::handle given_tau,
              const std::vector<const Parameter*>& parameters, int repeat) {
-            return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
-              check_count("tau", tau.size(), v.size());
+            const auto [q, v, tau] = self.arguments(given_q, given_v, given_tau);
+            return self.at(
+                q, v, [&, &q = q, &v = v, &tau = tau](SceneData& scene, auto&& evaluate) {
+                  Linearization& linearization = evaluate.linearization();
+                  linearization.set_parameters(copies(parameters));
+                  const VectorX z = self.bristles(scene);
+                  MatrixX jacobian;
+                  VectorX acceleration;
+                  for (int i = 0; i < repeat; ++i) {
+                    evaluate();
+                    acceleration = scene.acceleration(q, v, tau);
+                    linearization.rates(q, v, z, tau, jacobian);
+                  }
+                  linearization.set_parameters({});
+                  const Eigen::Index nv = v.size();
+                  return nb::make_tuple(
+                      read_only_array(acceleration),
+                      read_only_array(MatrixX(jacobian.topLeftCorner(nv, nv))),
+                      read_only_array(MatrixX(jacobian.block(0, nv, nv, nv))),
+                      read_only_array(MatrixX(linearization.inverse_mass())),
+                      read_only_array(MatrixX(linearization.by_parameters().topRows(nv))));
+                });
+          },
+          nb::arg("q"), nb::arg("v").none(), nb::arg("tau").none(), nb::arg("parameters"),
+          nb::arg("repeat") = 1)
+      .def(
+          "contact_force_derivatives",
+          [](T& self, nb::handle given_q, nb::handle given_v,
+             const std::vector<const Parameter*>& parameters) {
+            const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
+            return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
               Linearization& linearization = evaluate.linearization();
               linearization.set_parameters(copies(parameters));
-              const VectorX z = self.bristles(scene);
-              MatrixX jacobian;
-              VectorX acceleration;
-              for (int i = 0; i < repeat; ++i) {
-                evaluate();
-                acceleration = scene.acceleration(q, v, tau);
-                linearization.rates(q, v, z, tau, jacobian);
-              }
+              evaluate();
+              ContactForceSlopes out;
+              linearization.contact_forces(q, v, out);
               linearization.set_parameters({});
-              const Eigen::Index nv = v.size();
-              return nb::make_tuple(to_array(acceleration),
-                                    to_array(MatrixX(jacobian.topLeftCorner(nv, nv))),
-                                    to_array(MatrixX(jacobian.block(0, nv, nv, nv))),
-                                    to_array(MatrixX(linearization.inverse_mass())),
-                                    to_array(MatrixX(linearization.by_parameters().topRows(nv))));
+              std::vector<ContactRow> rows;
+              scene.log(q, v, rows);
+              return nb::make_tuple(
+                  to_bytes(std::move(rows)), read_only_array(MatrixX(out.force_world)),
+                  read_only_array(MatrixX(out.normal_force)), read_only_array(MatrixX(out.depth)));
             });
           },
-          nb::arg("q"), nb::arg("v"), nb::arg("tau"), nb::arg("parameters"), nb::arg("repeat") = 1)
-      .def("contact_force_derivatives",
-           [](T& self, const VectorX& q, const VectorX& v,
-              const std::vector<const Parameter*>& parameters) {
-             return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
-               Linearization& linearization = evaluate.linearization();
-               linearization.set_parameters(copies(parameters));
-               evaluate();
-               ContactForceSlopes out;
-               linearization.contact_forces(q, v, out);
-               linearization.set_parameters({});
-               std::vector<ContactRow> rows;
-               scene.log(q, v, rows);
-               return nb::make_tuple(to_bytes(std::move(rows)), to_array(MatrixX(out.force_world)),
-                                     to_array(MatrixX(out.normal_force)),
-                                     to_array(MatrixX(out.depth)));
-             });
-           })
-      .def("step_derivatives", [](T& self, const std::string& integrator, double dt,
-                                  const VectorX& q, const VectorX& v, const VectorX& tau,
-                                  const std::vector<const Parameter*>& parameters) {
-        return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
-          check_count("tau", tau.size(), v.size());
-          const std::unique_ptr<Stepper> stepper = make_stepper(integrator, scene);
-          const Relaxed relaxed(scene, stepper->is_implicit() ? 0 : dt);
-          StepSlopes slopes(scene, copies(parameters));
-          HeldTorques torques(tau);
-          Chart chart(scene, torques);
-          evaluate();
-          const State start{0, q, v, self.bristles(scene), {}};
-          State end;
-          chart.begin(start);
-          scene.evaluate(q, v, start.z, true);
-          stepper->begin(chart);
-          stepper->step(chart, dt, end);
-          const Eigen::Index nv = v.size(), first = static_cast<Eigen::Index>(parameters.size()),
-                             all = first + 3 * nv;
-          Tangent tangent{MatrixX::Zero(nv, all), MatrixX::Zero(nv, all),
-                          MatrixX::Zero(start.z.size(), all)};
-          MatrixX torque = MatrixX::Zero(nv, all);
-          tangent.q.middleCols(first, nv).setIdentity();
-          tangent.v.middleCols(first + nv, nv).setIdentity();
-          torque.rightCols(nv).setIdentity();
-          slopes.carry(chart, *stepper, dt, torque, tangent);
-          scene.restart();
-          MatrixX by(2 * nv, all);
-          by << tangent.q, tangent.v;
-          return nb::make_tuple(
-              to_array(end.q), to_array(end.v), to_array(MatrixX(by.middleCols(first, 2 * nv))),
-              to_array(MatrixX(by.rightCols(nv))), to_array(MatrixX(by.leftCols(first))));
-        });
-      });
+          nb::arg("q"), nb::arg("v").none(), nb::arg("parameters"))
+      .def(
+          "step_derivatives",
+          [](T& self, const std::string& integrator, double dt, nb::handle given_q,
+             nb::handle given_v, nb::handle given_tau,
+             const std::vector<const Parameter*>& parameters) {
+            const auto [q, v, tau] = self.arguments(given_q, given_v, given_tau);
+            return self.at(
+                q, v, [&, &q = q, &v = v, &tau = tau](SceneData& scene, auto&& evaluate) {
+                  const std::unique_ptr<Stepper> stepper = make_stepper(integrator, scene);
+                  const Relaxed relaxed(scene, stepper->is_implicit() ? 0 : dt);
+                  StepSlopes slopes(scene, copies(parameters));
+                  HeldTorques torques(tau);
+                  Chart chart(scene, torques);
+                  evaluate();
+                  const State start{0, q, v, self.bristles(scene), {}};
+                  State end;
+                  chart.begin(start);
+                  scene.evaluate(q, v, start.z, true);
+                  stepper->begin(chart);
+                  stepper->step(chart, dt, end);
+                  const Eigen::Index nv = v.size(),
+                                     first = static_cast<Eigen::Index>(parameters.size()),
+                                     all = first + 3 * nv;
+                  Tangent tangent{MatrixX::Zero(nv, all), MatrixX::Zero(nv, all),
+                                  MatrixX::Zero(start.z.size(), all)};
+                  MatrixX torque = MatrixX::Zero(nv, all);
+                  tangent.q.middleCols(first, nv).setIdentity();
+                  tangent.v.middleCols(first + nv, nv).setIdentity();
+                  torque.rightCols(nv).setIdentity();
+                  slopes.carry(chart, *stepper, dt, torque, tangent);
+                  scene.restart();
+                  MatrixX by(2 * nv, all);
+                  by << tangent.q, tangent.v;
+                  return nb::make_tuple(read_only_array(end.q), read_only_array(end.v),
+                                        read_only_array(MatrixX(by.middleCols(first, 2 * nv))),
+                                        read_only_array(MatrixX(by.rightCols(nv))),
+                                        read_only_array(MatrixX(by.leftCols(first))));
+                });
+          },
+          nb::arg("integrator"), nb::arg("dt"), nb::arg("q"), nb::arg("v").none(),
+          nb::arg("tau").none(), nb::arg("parameters"));
 }
 
 }  // namespace

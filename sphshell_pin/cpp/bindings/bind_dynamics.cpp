@@ -121,41 +121,54 @@ PyType_Slot* slots() {
 template <class T>
 void bind_evaluations(nb::class_<T>& bound) {
   bound
-      .def("external_forces",
-           [](T& self, const VectorX& q, const VectorX& v) {
-             return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
-               evaluate();
-               const Forces none(scene.touching() ? 0 : scene.external().size(),
-                                 pinocchio::Force::Zero());
-               return to_python(scene.touching() ? scene.external() : none);
-             });
-           })
-      .def("joint_forces",
-           [](T& self, const VectorX& q, const VectorX& v) {
-             return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
-               evaluate();
-               const JointForces& joints = scene.joints();
-               return to_array(joints.act() ? joints.torque() : VectorX(VectorX::Zero(v.size())));
-             });
-           })
-      .def("contacts",
-           [](T& self, const VectorX& q, const VectorX& v) {
-             return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
-               std::vector<ContactRow> rows;
-               evaluate();
-               scene.log(q, v, rows);
-               return to_bytes(std::move(rows));
-             });
-           })
-      .def("contact_derivatives", [](T& self, const VectorX& q, const VectorX& v) {
-        return self.at(q, v, [&](SceneData&, auto&& evaluate) {
-          Linearization& linearization = evaluate.linearization();
-          evaluate();
-          MatrixX by_q, by_v;
-          linearization.forces(q, v, by_q, by_v);
-          return std::pair(to_array(by_q), to_array(by_v));
-        });
-      });
+      .def(
+          "external_forces",
+          [](T& self, nb::handle given_q, nb::handle given_v) {
+            const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
+            return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
+              evaluate();
+              const Forces none(scene.touching() ? 0 : scene.external().size(),
+                                pinocchio::Force::Zero());
+              return to_python(scene.touching() ? scene.external() : none);
+            });
+          },
+          nb::arg("q"), nb::arg("v").none() = nb::none())
+      .def(
+          "joint_forces",
+          [](T& self, nb::handle given_q, nb::handle given_v) {
+            const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
+            return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
+              evaluate();
+              const JointForces& joints = scene.joints();
+              return to_array(joints.act() ? joints.torque() : VectorX(VectorX::Zero(v.size())));
+            });
+          },
+          nb::arg("q"), nb::arg("v").none() = nb::none())
+      .def(
+          "contacts",
+          [](T& self, nb::handle given_q, nb::handle given_v) {
+            const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
+            return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
+              std::vector<ContactRow> rows;
+              evaluate();
+              scene.log(q, v, rows);
+              return to_bytes(std::move(rows));
+            });
+          },
+          nb::arg("q"), nb::arg("v").none() = nb::none())
+      .def(
+          "contact_derivatives",
+          [](T& self, nb::handle given_q, nb::handle given_v) {
+            const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
+            return self.at(q, v, [&, &q = q, &v = v](SceneData&, auto&& evaluate) {
+              Linearization& linearization = evaluate.linearization();
+              evaluate();
+              MatrixX by_q, by_v;
+              linearization.forces(q, v, by_q, by_v);
+              return std::pair(to_array(by_q), to_array(by_v));
+            });
+          },
+          nb::arg("q"), nb::arg("v").none() = nb::none());
 }
 
 }  // namespace
@@ -215,11 +228,14 @@ void bind_dynamics(nanobind::module_& m) {
   scene
       .def(
           "__init__",
-          [](Evaluations* self, nb::handle model, const std::vector<const Pair*>& pairs,
-             std::shared_ptr<JointEffects> joints) {
-            new (self) Evaluations(model_of(model), copies(pairs), std::move(joints));
+          [](Evaluations* self, nb::object model, nb::object shown,
+             const std::vector<const Pair*>& pairs, std::shared_ptr<JointEffects> joints,
+             nb::object convert) {
+            new (self) Evaluations(model_of(model), copies(pairs), std::move(joints),
+                                   {model, std::move(shown), std::move(convert)});
           },
-          nb::arg("model"), nb::arg("pairs"), nb::arg("joints") = nb::none())
+          nb::arg("model"), nb::arg("shown"), nb::arg("pairs"), nb::arg("joints").none(),
+          nb::arg("convert"))
       .def_prop_ro("bristle_size", &Evaluations::bristle_size)
       .def("rates",
            [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
@@ -256,13 +272,22 @@ void bind_dynamics(nanobind::module_& m) {
   state
       .def(
           "__init__",
-          [](OwnState* self, nb::handle model, const std::vector<const Pair*>& pairs,
-             std::shared_ptr<JointEffects> joints) {
-            new (self) OwnState(model_of(model), copies(pairs), std::move(joints));
+          [](OwnState* self, nb::object model, nb::object shown,
+             const std::vector<const Pair*>& pairs, std::shared_ptr<JointEffects> joints,
+             nb::object convert) {
+            new (self) OwnState(model_of(model), copies(pairs), std::move(joints),
+                                {model, std::move(shown), std::move(convert)});
           },
-          nb::arg("model"), nb::arg("pairs"), nb::arg("joints") = nb::none())
+          nb::arg("model"), nb::arg("shown"), nb::arg("pairs"), nb::arg("joints").none(),
+          nb::arg("convert"))
       .def("copy", [](const OwnState& self) { return new OwnState(self); })
-      .def("advance", &OwnState::advance, nb::arg("q"), nb::arg("v"), nb::arg("dt"));
+      .def(
+          "advance",
+          [](OwnState& self, nb::handle q, nb::handle v, double dt) {
+            const StateArgument given = self.arguments(q, v, nb::none());
+            self.advance(given.q, given.v, dt);
+          },
+          nb::arg("q"), nb::arg("v").none(), nb::arg("dt"));
   bind_derivatives(m, scene, state);
 
   nb::class_<Controller>(m, "Controller");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bindings/one_user.hpp"
+#include "bindings/state_arguments.hpp"
 #include "dynamics/scene/scene_state.hpp"
 
 namespace sphshell {
@@ -27,11 +28,14 @@ struct Evaluate {
 // itself, may begin another. The interpreter's lock guards the fields.
 class Evaluations {
  public:
-  Evaluations(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints)
-      : first_(model, std::move(pairs), std::move(joints)) {}
+  Evaluations(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
+              StateArguments arguments)
+      : arguments(std::move(arguments)), first_(model, std::move(pairs), std::move(joints)) {}
 
   Evaluations(const Evaluations&) = delete;
   Evaluations& operator=(const Evaluations&) = delete;
+
+  const StateArguments arguments;
 
   // work(scene, evaluate) at a state whose sizes are checked.
   template <class Work>
@@ -77,11 +81,13 @@ class Evaluations {
 // A SceneState for one user at a time.
 struct OwnState {
   OneUser user{"SceneState"};
+  const StateArguments arguments;
   SceneState state;
 
-  OwnState(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints)
-      : state(model, std::move(pairs), std::move(joints)) {}
-  OwnState(const OwnState& other) : state(other.state) {}
+  OwnState(const pinocchio::Model& model, std::vector<Pair> pairs, JointForces::Effects joints,
+           StateArguments arguments)
+      : arguments(std::move(arguments)), state(model, std::move(pairs), std::move(joints)) {}
+  OwnState(const OwnState& other) : arguments(other.arguments), state(other.state) {}
 
   // As Evaluations::at, with what the state remembers.
   template <class Work>
@@ -93,7 +99,6 @@ struct OwnState {
   VectorX bristles(const SceneData&) const { return state.bristles(); }
   void advance(const VectorX& q, const VectorX& v, double dt) {
     const Use use(user, "advance");
-    check_state(state.scene(), q, v);
     state.advance(q, v, dt);
   }
 };

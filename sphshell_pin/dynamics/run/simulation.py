@@ -21,7 +21,7 @@ from sphshell_pin.dynamics.run.integrators import Adaptive, Integrator
 from sphshell_pin.dynamics.run.many_runs import roll_out
 from sphshell_pin.dynamics.run.rollout import Rollout
 from sphshell_pin.dynamics.run.sensitivities import Asked
-from sphshell_pin.dynamics.scene.derivatives import StepDerivatives, step_derivatives
+from sphshell_pin.dynamics.scene.derivatives import StepDerivatives
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.scene_state import SceneState
 from sphshell_pin.dynamics.sensing.sensors import Sensor, SensorSet, check_sensors
@@ -170,8 +170,7 @@ class Simulation(Summarized):
                 "has no fixed step to differentiate: take SemiImplicitEuler(dt), RungeKutta4(dt) "
                 "or LinearlyImplicitEuler(dt)",
             )
-        at = self.scene.place(q, v, tau, parameters, state)
-        return step_derivatives(self.integrator.kind, dt, at)
+        return self.scene.step_derivatives(self.integrator.kind, dt, q, v, tau, parameters, state)
 
     def rollout(
         self,

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.scene.explain import explain_pairs, relaxation_time
-from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
+from sphshell_pin.dynamics.scene.scene_contacts import Rows, SceneContacts
 from sphshell_pin.dynamics.scene.variations import Variations, numbers_of
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.summary import Summarized
@@ -86,6 +85,33 @@ class ContactForceDerivatives(Summarized):
     normal_by_parameters: Array
     depth_by_parameters: Array
     parameters: tuple[str, ...]
+
+    @classmethod
+    def from_core(
+        cls,
+        rows: Rows,
+        force: Array,
+        normal: Array,
+        depth: Array,
+        nv: int,
+        columns: tuple[str, ...],
+    ) -> ContactForceDerivatives:
+        """Build from the core's matrices: by q, v, bristles and parameters, side by side."""
+        contacts = SceneContacts.from_rows(rows)
+        force = force.reshape(-1, 3, normal.shape[1])
+        first = normal.shape[1] - len(columns)
+        return cls(
+            contacts=contacts,
+            by_q=force[..., :nv],
+            by_v=force[..., nv : 2 * nv],
+            normal_by_q=normal[:, :nv],
+            normal_by_v=normal[:, nv : 2 * nv],
+            depth_by_q=depth[:, :nv],
+            by_parameters=force[..., first:],
+            normal_by_parameters=normal[:, first:],
+            depth_by_parameters=depth[:, first:],
+            parameters=columns,
+        )
 
 
 def parameter_columns(scene: Scene, names: object, others: tuple[str, ...] = ()) -> tuple[str, ...]:
@@ -192,54 +218,3 @@ def _core_pair(
         figures = explain_pairs(scene.with_pairs(pairs), *start)
         core.relaxation = relaxation_time(pairs[at], figures[at])
     return core
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where derivatives are asked for, checked: a state, torques and columns of parameters."""
-
-    core: _core.Scene | _core.SceneState
-    q: Array
-    v: Array
-    tau: Array
-    columns: tuple[str, ...]
-    parameters: list[_core.Parameter]
-
-
-def dynamics_derivatives(at: Place) -> DynamicsDerivatives:
-    """See Scene.dynamics_derivatives."""
-    parts = at.core.dynamics_derivatives(at.q, at.v, at.tau, at.parameters)
-    for part in parts:
-        read_only(part)
-    return DynamicsDerivatives(*parts, parameters=at.columns)
-
-
-def step_derivatives(integrator: str, dt: float, at: Place) -> StepDerivatives:
-    """See Simulation.step_derivatives; `integrator` is its name."""
-    parts = at.core.step_derivatives(integrator, dt, at.q, at.v, at.tau, at.parameters)
-    for part in parts:
-        read_only(part)
-    return StepDerivatives(*parts, parameters=at.columns)
-
-
-def contact_force_derivatives(at: Place) -> ContactForceDerivatives:
-    """See Scene.contact_force_derivatives."""
-    rows, force, normal, depth = at.core.contact_force_derivatives(at.q, at.v, at.parameters)
-    contacts = SceneContacts.from_rows(rows)
-    nv, p = len(at.v), len(at.columns)
-    force = read_only(force.reshape(len(contacts.depth), 3, normal.shape[1]))
-    normal, depth = read_only(normal), read_only(depth)
-    # What there is between v and the parameters are bristles.
-    first = force.shape[-1] - p
-    return ContactForceDerivatives(
-        contacts=contacts,
-        by_q=force[..., :nv],
-        by_v=force[..., nv : 2 * nv],
-        normal_by_q=normal[:, :nv],
-        normal_by_v=normal[:, nv : 2 * nv],
-        depth_by_q=depth[:, :nv],
-        by_parameters=force[..., first:],
-        normal_by_parameters=normal[:, first:],
-        depth_by_parameters=depth[:, first:],
-        parameters=at.columns,
-    )

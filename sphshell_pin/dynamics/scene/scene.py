@@ -9,15 +9,13 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin import _core
-from sphshell_pin.checks import check_positive, check_type, check_vector
+from sphshell_pin.checks import check_positive, check_type
 from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.scene.derivatives import (
     ContactForceDerivatives,
     DynamicsDerivatives,
-    Place,
-    contact_force_derivatives,
+    StepDerivatives,
     core_parameters,
-    dynamics_derivatives,
     parameter_columns,
 )
 from sphshell_pin.dynamics.scene.explain import Explanation, explain_scene
@@ -77,7 +75,7 @@ class Scene(SceneParts):
         (default: at rest). Bristles have the stretch that `state` holds, without one they are
         unstretched: friction then creeps as if it had no spring.
         """
-        return self._at(state).external_forces(*self.check_state(q, v))
+        return self._at(state).external_forces(q, v)
 
     def joint_forces(
         self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
@@ -87,7 +85,7 @@ class Scene(SceneParts):
         They are to be added to those of the motors: pin.aba(model, data, q, v, tau + these, fext).
         `state` as in `external_forces`: without one, springs of dry friction are unstretched.
         """
-        return np.asarray(self._at(state).joint_forces(*self.check_state(q, v)))
+        return self._at(state).joint_forces(q, v)
 
     def contact_derivatives(
         self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
@@ -105,7 +103,7 @@ class Scene(SceneParts):
         stay where they are in frame j, and their depth changes by the motion of body i at the
         point along the normal. `state` as in `external_forces`; its bristles are held.
         """
-        return self._at(state).contact_derivatives(*self.check_state(q, v))
+        return self._at(state).contact_derivatives(q, v)
 
     def contact_force_derivatives(
         self,
@@ -120,7 +118,9 @@ class Scene(SceneParts):
         `parameters` and `state` as in `dynamics_derivatives`; what is approximate is said in
         `contact_derivatives`.
         """
-        return contact_force_derivatives(self.place(q, v, None, parameters, state))
+        columns, core = self.core_parameters(parameters, state)
+        found = self._at(state).contact_force_derivatives(q, v, core)
+        return ContactForceDerivatives.from_core(*found, self._model.nv, columns)
 
     def dynamics_derivatives(
         self,
@@ -148,25 +148,36 @@ class Scene(SceneParts):
         Raises NameNotFound for a parameter that the scene does not have, InvalidParameter for
         wrong sizes.
         """
-        return dynamics_derivatives(self.place(q, v, tau, parameters, state))
+        columns, core = self.core_parameters(parameters, state)
+        found = self._at(state).dynamics_derivatives(q, v, tau, core)
+        return DynamicsDerivatives(*found, columns)
 
-    def place(
+    def step_derivatives(
         self,
+        integrator: str,
+        dt: float,
         q: ArrayLike,
         v: ArrayLike | None,
         tau: ArrayLike | None,
         parameters: Collection[str],
         state: SceneState | None,
-    ) -> Place:
-        """Check the arguments of `dynamics_derivatives`, and return them as the core takes them."""
-        core = self._at(state)
-        q, v = self.check_state(q, v)
-        nv = self._model.nv
-        torques = np.zeros(nv) if tau is None else check_vector("tau", tau, nv, " [N m or N]")
-        some = not isinstance(parameters, tuple) or parameters
-        columns = parameter_columns(self, parameters) if some else ()
-        start = None if state is None else state.start
-        return Place(core, q, v, torques, columns, core_parameters(self, columns, start))
+    ) -> StepDerivatives:
+        """Return the derivatives of a step `dt` [s] of the integrator of that kind.
+
+        See Simulation.step_derivatives.
+        """
+        columns, core = self.core_parameters(parameters, state)
+        found = self._at(state).step_derivatives(integrator, dt, q, v, tau, core)
+        return StepDerivatives(*found, columns)
+
+    def core_parameters(
+        self, parameters: Collection[str], state: SceneState | None = None
+    ) -> tuple[tuple[str, ...], list[_core.Parameter]]:
+        """Return the columns of the `parameters`, and each as the core takes it."""
+        if isinstance(parameters, tuple) and not parameters:
+            return (), []
+        columns = parameter_columns(self, parameters)
+        return columns, core_parameters(self, columns, None if state is None else state.start)
 
     def contacts(
         self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
@@ -175,7 +186,7 @@ class Scene(SceneParts):
 
         `state` as in `external_forces`; contacts then have its ids.
         """
-        return SceneContacts.from_rows(self._at(state).contacts(*self.check_state(q, v)))
+        return SceneContacts.from_rows(self._at(state).contacts(q, v))
 
     def _at(self, state: SceneState | None) -> _core.Scene | _core.SceneState:
         if state is None:

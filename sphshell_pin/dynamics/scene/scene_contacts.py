@@ -86,8 +86,18 @@ class SceneContacts(Summarized):
 
     @classmethod
     def from_rows(cls, rows: Rows) -> SceneContacts:
-        """Build from the memory of the core's rows."""
-        return cls(**columns(rows))
+        """Build from the memory of the core's rows; a column is made when it is first read."""
+        contacts = object.__new__(cls)
+        contacts.__dict__["_table"] = rows
+        return contacts
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        """Return a column that has not been read yet."""
+        if "_table" not in self.__dict__ or name not in (ROW.names or ()):
+            raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
+        column = read_only(np.frombuffer(self.__dict__["_table"], ROW)[name])
+        self.__dict__[name] = column
+        return column
 
 
 def columns(rows: Rows) -> Columns:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import Self, TypedDict, Unpack
 
 import numpy as np
@@ -42,6 +43,16 @@ from sphshell_pin.shell import Shell
 from sphshell_pin.summary import Detail, Fact, Summarized, names
 
 Array = NDArray[np.float64]
+
+
+class CoreParts(TypedDict):
+    """What the core makes a scene of."""
+
+    model: pin.Model
+    shown: pin.Model
+    pairs: list[_core.Pair]
+    joints: _core.JointEffects | None
+    convert: Callable[[object, object, object], tuple[Array, Array, Array]]
 
 
 class _Settings(TypedDict, total=False):
@@ -236,13 +247,7 @@ class SceneParts(Summarized):
         is not of unit length.
         """
         self._check_unchanged()
-        model = self._model
-        what = f": this model has nq = {model.nq}, nv = {model.nv}"
-        if self.lock:
-            what += f" after locking {', '.join(self.lock)}"
-        q = check_configuration("q", model, q, what)
-        v = np.zeros(model.nv) if v is None else check_vector("v", v, model.nv, what)
-        return q, v
+        return checked_state(self._model, self.lock, q, v)[:2]
 
     def pair(self, name: str) -> ContactPair:
         """Return the pair called `name`; NameNotFound lists them."""
@@ -271,22 +276,28 @@ class SceneParts(Summarized):
     def core(self) -> _core.Scene:
         """The C++ binding, built when first needed."""
         if self._core is None:
-            joints = self._joints.to_core(self._model)
-            self._core = _core.Scene(self._model, [p.to_core() for p in self._pairs], joints)
+            self._core = _core.Scene(**self.core_parts([p.to_core() for p in self._pairs]))
         return self._core
+
+    def core_parts(self, pairs: list[_core.Pair]) -> CoreParts:
+        """Return what the core makes a scene or its state of, with `pairs`."""
+        shown = self.model
+        return {
+            "model": self._model,
+            "shown": shown,
+            "pairs": pairs,
+            "joints": self._joints.to_core(self._model),
+            "convert": partial(_converted, self._model, shown, self.lock),
+        }
+
+    def shares_model(self, other: SceneParts) -> bool:
+        """Whether both scenes have one model, as those that `with_pairs` makes."""
+        return self._model is other._model
 
     def _check_unchanged(self) -> None:
         """Raise InvalidParameter if somebody has changed the model that they got of this scene."""
-        # Some hold numbers that are not equal to themselves (nan); of them no change is noticed.
-        if self._shown is None or self._shown == self._model or self._model != self._model:
-            return
-        raise InvalidParameter(
-            "scene.model",
-            self._shown,
-            "must stay as it is, as the scene has been checked and compiled with it: change the "
-            "model first, and make a new Scene of it",
-            "was changed, but",
-        )
+        if self._shown is not None:
+            _check_unchanged(self._model, self._shown)
 
     def _add(
         self,
@@ -349,3 +360,40 @@ class SceneParts(Summarized):
         """Return the joint of the frame `name`, and where the frame is in it."""
         frame = self._model.frames[find_frame(self._model, name, called)]
         return int(frame.parentJoint), pin.SE3(frame.placement)
+
+
+def checked_state(
+    model: pin.Model, lock: tuple[str, ...], q: object, v: object = None, tau: object = None
+) -> tuple[Array, Array, Array]:
+    """Return copies of q (nq,), v (nv,) and tau (nv,), zeros for None; InvalidParameter if wrong.
+
+    `lock` are the joints that were locked, which the sizes do not count.
+    """
+    what = f": this model has nq = {model.nq}, nv = {model.nv}"
+    if lock:
+        what += f" after locking {', '.join(lock)}"
+    q = check_configuration("q", model, q, what)
+    v = np.zeros(model.nv) if v is None else check_vector("v", v, model.nv, what)
+    tau = np.zeros(model.nv) if tau is None else check_vector("tau", tau, model.nv, " [N m or N]")
+    return q, v, tau
+
+
+def _converted(
+    model: pin.Model, shown: pin.Model, lock: tuple[str, ...], q: object, v: object, tau: object
+) -> tuple[Array, Array, Array]:
+    """Return what the core does not read by itself, as arrays, or raise what is wrong with it."""
+    _check_unchanged(model, shown)
+    return checked_state(model, lock, q, v, tau)
+
+
+def _check_unchanged(model: pin.Model, shown: pin.Model) -> None:
+    # Some hold numbers that are not equal to themselves (nan); of them no change is noticed.
+    if shown == model or model != model:  # noqa: PLR0124
+        return
+    raise InvalidParameter(
+        "scene.model",
+        shown,
+        "must stay as it is, as the scene has been checked and compiled with it: change the "
+        "model first, and make a new Scene of it",
+        "was changed, but",
+    )

@@ -48,7 +48,7 @@ class SceneState(Summarized):
             figures = explain_pairs(scene, *self.start)
             for pair, core, figure in zip(scene.pairs, cores, figures, strict=True):
                 core.relaxation = relaxation_time(pair, figure)
-        self._core = _core.SceneState(scene.model, cores, scene.joints.to_core(scene.model))
+        self._core = _core.SceneState(**scene.core_parts(cores))
         if q is not None:
             self._core.advance(*self.start, 0.0)
 
@@ -62,7 +62,7 @@ class SceneState(Summarized):
         of order 1; contacts that began within the step are unstretched.
         """
         core = self.core_of(self._scene)
-        core.advance(*self._scene.check_state(q, v), check_not_negative("dt", dt, "s"))
+        core.advance(q, v, check_not_negative("dt", dt, "s"))
 
     def copy(self) -> SceneState:
         """Return an independent state with the same memory."""
@@ -88,7 +88,7 @@ class SceneState(Summarized):
 
     def core_of(self, scene: Scene) -> _core.SceneState:
         """Return the C++ binding; InvalidParameter unless `scene` is the one it was made of."""
-        if scene.model is not self._scene.model or scene.pairs is not self._pairs:
+        if scene.pairs is not self._pairs or not scene.shares_model(self._scene):
             raise InvalidParameter(
                 "state",
                 self,
