@@ -59,7 +59,7 @@ def findings(rows: list[list[str]]) -> str:
     """Return findings as a table: what, figure, quartiles, aim; a missed aim says so."""
     lines = [["what", "figure", "quartiles", "aim"], ["---"] * 4]
     for what, figure, quartiles, aim, verdict in rows:
-        missed = " (missed)" if verdict == "missed" else ""
+        missed = " (this aim is missed)" if verdict == "missed" else ""
         lines.append([what.replace("|", "\\|"), figure, quartiles, aim + missed])
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
