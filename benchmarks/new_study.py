@@ -227,7 +227,7 @@ def sections(cases: Sequence[Case]) -> list[Measured]:
     counts = [[text, str(count)] for text, count in reasons.most_common()]
     return [
         Measured(text=text, table=rows),
-        Measured("Refused", table=[["because", "cases"], *counts]),
+        Measured("New scenarios refused", table=[["because", "cases"], *counts]),
     ]
 
 
