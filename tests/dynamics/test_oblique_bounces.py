@@ -45,7 +45,7 @@ def test_oblique_bounce_against_the_theory(degrees: float) -> None:
 
 
 def test_what_micro_slip_adds() -> None:
-    """The figures of docs/laws.md: v_t' / v_t of Kharaz's ball, against Maw et al.'s theory."""
+    """v_t' / v_t of Kharaz's ball, against Maw et al.'s theory."""
     degrees = np.array([2.0, 5, 10, 15, 20, 25, 30])
     psi = KAPPA * np.tan(np.radians(degrees)) / MU
     ratios = [
