@@ -1,6 +1,6 @@
 """What a command measured, as data of the documentation site: docs/measured/NAME.json.
 
-The site shows it where a page says `<!-- measured: NAME -->`.
+The site shows it where a page has the line `[data](measured/NAME.json)`.
 """
 
 from __future__ import annotations

@@ -184,6 +184,7 @@ def test_no_page_is_an_orphan():
                 linked.add((page.parent / link.partition("#")[0]).resolve())
     start = ROOT / "docs" / "index.md"  # of the site
     assert {page for page in PAGES if ROOT / "docs" in page.parents} - {start} <= linked
+    assert set((ROOT / "docs" / "measured").iterdir()) <= linked
     shown = ROOT / "docs" / "pictures"
     measured = json.loads((ROOT / "docs/measured/validation.json").read_text(encoding="utf-8"))
     for section in measured["sections"]:

@@ -81,6 +81,25 @@ def test_it_builds_without_a_warning(built):
     assert "WARNING" not in done.stderr
 
 
+def test_data_and_parameters_are_shown_in_place_of_their_marks(built):
+    site, _ = built
+    texts = {one.name: one.read_text(encoding="utf-8") for one in site.glob("*.html")}
+    for name, text in texts.items():
+        assert not re.search(r'<p><a href="measured/[^>]*>\w+</a></p>|<!-- \w+: \w+ -->', text), (
+            name
+        )
+    for name, words in (
+        ("hard_cases", ("2 I depth / v", "Tip of 3 or 100 facets")),
+        ("speed", ("coal::collide", "Ball bounces five times")),
+        ("robots", ("three_link_finger", "4 of 5")),
+        ("laws", ("parameter of <code>MindlinFriction</code>", "full_damping_depth")),
+        ("scenarios", ("half-space", "cartesian-impedance", "release")),
+        ("commands", ("--chord-error", "check-robot")),
+    ):
+        for word in words:
+            assert word in texts[f"{name}.html"], (name, word)
+
+
 def test_every_page_is_there_and_in_the_menu(built, pages):
     site, _ = built
     written = {page.relative_to(ROOT / "docs") for page in (ROOT / "docs").rglob("*.md")}

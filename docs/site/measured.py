@@ -1,7 +1,7 @@
-"""A hook of MkDocs: a page shows the data of docs/measured/, which the commands there wrote.
+"""A hook of MkDocs: a page shows the data of docs/measured/ in place of a link to them.
 
-`<!-- measured: NAME -->` stands for all sections of NAME.json (see benchmarks/measured.py), and
-`<!-- report: NAME -->` for one block of report.json (see benchmarks/quote.py).
+A line `[data](measured/NAME.json)` becomes all sections of that file (see benchmarks/measured.py),
+and `[NAME](measured/report.json)` one block of a report (see benchmarks/quote.py).
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from typing import Any
 from sphshell_pin.benchmarks import quote
 
 DATA = Path(__file__).parents[1] / "measured"
-MARK = re.compile(r"^<!-- (measured|report): (\w+) -->$", re.MULTILINE)
+LINK = re.compile(r"^\[(\w+)\]\(measured/(\w+)\.json\)$", re.MULTILINE)
 PLAIN = str.maketrans({mark: f"\\{mark}" for mark in "\\|*_<"})
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Replace the marks of a page; a name that is not there is an error of the build."""
-    return MARK.sub(lambda found: shown(found[1], found[2]), markdown)
+    """Replace such lines of a page; a name that is not there is an error of the build."""
+    return LINK.sub(lambda found: shown(found[1], found[2]), markdown)
 
 
-def shown(kind: str, name: str) -> str:
-    """Return what stands for a mark, as Markdown."""
-    if kind == "report":
-        return quote.blocks_of(quote.read(DATA / "report.json"))[name]
+def shown(block: str, name: str) -> str:
+    """Return a file's content, or of a report one block, as Markdown."""
+    if name == "report":
+        return quote.blocks_of(quote.read(DATA / "report.json"))[block]
     data = json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
     head = f"*Measured by `{data['command']}`; [all data](measured/{name}.json).*"
     sections = of_robots(data) if name == "robots" else data["sections"]

@@ -23,9 +23,11 @@ def sections(ran: list[tuple[Case, Outcome]]) -> list[Measured]:
         for one, found in ran
         for k, f in enumerate(found.findings)
     ]
+    within = [row[-1] for row in rows].count("within")
+    text = f"{within} of {len(rows)} figures are within their bounds."
     names = ["case", "figure", "error", "bound", "verdict"]
     missing = Measured("Not found", notes=NOT_FOUND)
-    return [Measured(table=[names, *rows]), *(section(*one) for one in ran), missing]
+    return [Measured(text=text, table=[names, *rows]), *(section(*one) for one in ran), missing]
 
 
 def judged(finding: Finding) -> tuple[str, str]:

@@ -66,10 +66,12 @@ def row(verdict: Verdict) -> tuple[str, ...]:
 
 def sections(results: list[tuple[Case, list[Verdict]]]) -> list[measured.Measured]:
     """Return what the site shows: a section for each module."""
-    parts = []
+    found = [verdict for _, verdicts in results for verdict in verdicts]
+    wrong = sum(not verdict.ok for verdict in found)
+    parts = [measured.Measured(text=f"{len(found)} verdicts, {wrong} of them out of bounds.")]
     for module, group in itertools.groupby(results, key=lambda result: result[0].module):
         heading, _, text = (importlib.import_module(module).__doc__ or "").strip().partition(".")
-        rows = [row(verdict) for _, found in group for verdict in found]
+        rows = [row(verdict) for _, verdicts in group for verdict in verdicts]
         parts.append(measured.Measured(heading, text.strip(), table=[COLUMNS, *rows]))
     return parts
 
