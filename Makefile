@@ -79,10 +79,10 @@ bench: $(VENV)/.bench ## print what contact costs, as ratios
 report: $(VENV)/.bench ## measure speed against error: a page in results/report
 	$(BIN)/sphshell-pin report --out $(OUT)/report
 
-robots: $(VENV)/.test ## check every robot and write docs/robots.md
-	$(BIN)/sphshell-pin check-robot --all --write docs/robots.md
+robots: $(VENV)/.test ## check every robot, for docs/robots.md
+	$(BIN)/sphshell-pin check-robot --all --json docs/measured/robots.json
 
-hard-cases: $(VENV)/.test ## run every hard case and write docs/hard_cases.md
+hard-cases: $(VENV)/.test ## run every hard case, for docs/hard_cases.md
 	$(BIN)/python -m tests.hard_cases --write
 
 work-precision: $(VENV)/.test ## error against computing time of the integrators, with a figure

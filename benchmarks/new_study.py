@@ -23,6 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.benchmarks.measured import Measured, write
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build, judge
 from sphshell_pin.scenario.drafting.new import new_scenario
@@ -32,7 +33,6 @@ from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.running.run import simulate
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "new_study.md"
 DATA = ROOT / "tests" / "data" / "corpus"
 PROBE = ROOT / "tests" / "data" / "robots" / "arm_with_probe.urdf"
 
@@ -57,28 +57,6 @@ ROBOTS: dict[str, tuple[str, dict[str, object]]] = {
 }
 """What `new` is asked: the robot, and the options that it cannot do without."""
 
-INTRODUCTION = """\
-# New scenarios tested
-
-`sphshell-pin new` was asked for a scenario of each of {robots} robots with each of {parts} parts
-at 5 places (`--place below`, `above`, `+x`, `-x`, `+y`; a robot that floats has none). Each
-scenario that it wrote was read again, run, and judged by its own expectations: it touches, the
-force is within 5 %, the energy adds up. No link was in the part: tried with Coal at 300 rows of
-its run, and in another way with the corners of the links' meshes and the signed distance of closed
-parts. `make new-study FOLDER=...` repeats it with the parts of a folder; `python -m
-benchmarks.new_study FOLDER` takes some robots with `--robots`, and writes this page with `--write`.
-A cell says how many places got a scenario that works.
-
-The parts are CAD files of other projects, from 3 mm to 41 m; one of 3.5 mm is smaller than each
-sphere.
-"""
-NOTES = """
-Looked at one by one: `three_link_finger` moves in the plane of x and z, so `+y` is refused. The
-legs of `a1` and `solo12` need a ground for four feet; the refused parts are under one or two of
-them, or stand up between them. The palm, or other fingers, of the Allegro hand are beside the
-finger that touches, and would be in a part that is wider than it. Where its force is not held,
-the sphere touches an edge of the part, at which a path has no single normal.
-"""
 PLACES = ("below", "above", "+x", "-x", "+y")
 SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep", ".stl", ".obj", ".shl", ".ply", ".off")
 UNITS = {".stl": "mm", ".obj": "mm", ".brep": "mm", ".ply": "mm", ".off": "mm"}
@@ -204,7 +182,7 @@ def main() -> int:
     parser.add_argument("folder", type=Path, nargs="?", default=DATA)
     parser.add_argument("--robots", nargs="*", default=list(ROBOTS), choices=list(ROBOTS))
     parser.add_argument("--files", nargs="*", help="names without a suffix; default: the first 8")
-    parser.add_argument("--write", action="store_true", help=f"write {PAGE.name}")
+    parser.add_argument("--write", action="store_true", help="write docs/measured/new_study.json")
     parser.add_argument("--processes", type=int, default=2)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -220,38 +198,37 @@ def main() -> int:
                 said = f"refused: {case.refused}" if case.refused else case.failed or "works"
                 where = f"{case.robot}  {case.part}  {case.place}  {case.seconds:.1f} s"
                 print(f"{where}  {said}", flush=True)
-    text = report(cases)
-    print(text)
+    found = sections(cases)
+    print(found[0].text, *(" | ".join(row) for one in found for row in one.table), sep="\n")
     if asked.write:
-        PAGE.write_text(text, encoding="utf-8")
+        print(f"wrote {write('new_study', 'python -m benchmarks.new_study FOLDER --write', found)}")
     return 1 if any(case.failed for case in cases) else 0
 
 
-def report(cases: Sequence[Case]) -> str:
-    """Return the page of the documentation."""
+def sections(cases: Sequence[Case]) -> list[Measured]:
+    """Return what the site shows: the places that work by robot and part, and why others do not."""
     robots = list(dict.fromkeys(case.robot for case in cases))
     parts = list(dict.fromkeys(case.part for case in cases))
     written = [case for case in cases if not case.refused]
     works = sum(not case.failed for case in written)
-    lines = [
-        INTRODUCTION.format(robots=len(robots), parts=len(parts)),
+    text = (
         f"{len(cases)} cases: {len(written)} written, of which {works} work in their own run; "
-        f"{len(cases) - len(written)} refused.",
-        "",
-        f"| robot | {' | '.join(parts)} |",
-        "|---" * (len(parts) + 1) + "|",
-    ]
+        f"{len(cases) - len(written)} refused."
+    )
+    rows = [["robot", *parts]]
     for robot in robots:
         cells = []
         for part in parts:
             here = [case for case in cases if (case.robot, case.part) == (robot, part)]
             works = sum(not case.refused and not case.failed for case in here)
             cells.append(f"{works} of {len(here)}")
-        lines.append(f"| {robot} | {' | '.join(cells)} |")
+        rows.append([robot, *cells])
     reasons = Counter(reason(case.refused) for case in cases if case.refused)
-    lines += ["", "| refused because | cases |", "|---|---|"]
-    lines += [f"| {text} | {count} |" for text, count in reasons.most_common()]
-    return "\n".join(lines) + "\n" + NOTES
+    counts = [[text, str(count)] for text, count in reasons.most_common()]
+    return [
+        Measured(text=text, table=rows),
+        Measured("New scenarios refused", table=[["because", "cases"], *counts]),
+    ]
 
 
 def reason(text: str) -> str:

@@ -1,9 +1,9 @@
-"""Quote a report in README.md and docs/: the figures there come from measured data, never by hand.
+"""Quote a report in README.md: the figures there come from measured data, never by hand.
 
 python -m benchmarks.quote results/report
 
-Copies report.json to docs/measured/ and replaces what stands between `<!-- measured: NAME -->` and
-`<!-- end measured -->` on the pages.
+Copies report.json to docs/measured/, which the documentation site shows, and replaces
+what stands between `<!-- measured: NAME -->` and `<!-- end measured -->` on the README.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 from sphshell_pin.atomic import atomic_file
 
 ROOT = Path(__file__).parent.parent
-PAGES = ("README.md", "docs/speed.md", "docs/why_not.md")
+PAGE = "README.md"
 DATA = "docs/measured/report.json"
 BLOCK = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end measured -->)", re.DOTALL)
 
@@ -59,7 +59,7 @@ def findings(rows: list[list[str]]) -> str:
     """Return findings as a table: what, figure, quartiles, aim; a missed aim says so."""
     lines = [["what", "figure", "quartiles", "aim"], ["---"] * 4]
     for what, figure, quartiles, aim, verdict in rows:
-        missed = " (missed)" if verdict == "missed" else ""
+        missed = " (this aim is missed)" if verdict == "missed" else ""
         lines.append([what.replace("|", "\\|"), figure, quartiles, aim + missed])
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
@@ -105,8 +105,7 @@ def main() -> int:
     try:
         data = read(options.report / "report.json")
         texts = {DATA: json.dumps(data, indent=1, ensure_ascii=False) + "\n"}
-        for name in PAGES:
-            texts[name] = quoted((ROOT / name).read_text(encoding="utf-8"), blocks_of(data))
+        texts[PAGE] = quoted((ROOT / PAGE).read_text(encoding="utf-8"), blocks_of(data))
         for name, text in texts.items():
             with atomic_file(ROOT / name) as file:
                 file.write(text.encode())

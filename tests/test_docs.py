@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import json
 import re
 import shlex
 import sys
@@ -163,14 +163,6 @@ def test_the_commands_of_a_page_exist_with_their_options(page):
         parser.parse_args(arguments)  # raises for an option that is not there
 
 
-def test_the_page_of_commands_is_that_of_the_help():
-    spec = importlib.util.spec_from_file_location("commands", ROOT / "docs/site/commands.py")
-    commands = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(commands)
-    written = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
-    assert written == commands.page(), "write it anew: python docs/site/commands.py"
-
-
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_the_links_of_a_page_lead_somewhere(page):
     text = INLINE_CODE.sub("", FENCE.sub("", page.read_text(encoding="utf-8")))
@@ -192,6 +184,11 @@ def test_no_page_is_an_orphan():
                 linked.add((page.parent / link.partition("#")[0]).resolve())
     start = ROOT / "docs" / "index.md"  # of the site
     assert {page for page in PAGES if ROOT / "docs" in page.parents} - {start} <= linked
-    pictures = {path for path in (ROOT / "docs" / "pictures").rglob("*") if path.is_file()}
+    assert set((ROOT / "docs" / "measured").iterdir()) <= linked
+    shown = ROOT / "docs" / "pictures"
+    measured = json.loads((ROOT / "docs/measured/validation.json").read_text(encoding="utf-8"))
+    for section in measured["sections"]:
+        linked |= {shown / file for file, _ in section.get("pictures", ())}
+    pictures = {path for path in shown.rglob("*") if path.is_file()}
     assert pictures <= linked
     assert all(picture.stat().st_size < 400_000 for picture in pictures)

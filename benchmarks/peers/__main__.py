@@ -9,9 +9,10 @@ import argparse
 from pathlib import Path
 
 from sphshell_pin.atomic import atomic_file
+from sphshell_pin.benchmarks.measured import write
 from sphshell_pin.benchmarks.peers.measuring import measure
 from sphshell_pin.benchmarks.peers.scenes import SCENES
-from sphshell_pin.benchmarks.peers.tables import PAGE, TITLES, machine_line, page
+from sphshell_pin.benchmarks.peers.tables import TITLES, machine_line, sections
 from sphshell_pin.benchmarks.peers.workers import ENGINES
 from sphshell_pin.benchmarks.timing import one_core
 from sphshell_pin.study.report.peers import assemble
@@ -26,7 +27,7 @@ def main() -> None:
     parser.add_argument("--scene", action="append", choices=SCENES, help="only these")
     parser.add_argument("--quick", action="store_true", help="fewer settings, swings and rounds")
     parser.add_argument("--out", type=Path, help="folder for the tables, as .csv")
-    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
+    parser.add_argument("--write", action="store_true", help="write docs/measured/peers.json")
     arguments = parser.parse_args()
     one_core()
     print(machine_line())
@@ -46,9 +47,8 @@ def main() -> None:
                 file.write(table.csv().encode())
         print(f"wrote {len(tables)} tables to {arguments.out}")
     if arguments.write:
-        with atomic_file(PAGE) as file:
-            file.write(page(rows, ratios, arguments.quick).encode())
-        print(f"wrote docs/{PAGE.name}")
+        command = f"python -m benchmarks.peers{' --quick' * arguments.quick} --write"
+        print(f"wrote {write('peers', command, sections(rows, ratios))}")
 
 
 if __name__ == "__main__":

@@ -1,45 +1,30 @@
-"""Writes docs/commands.md from the help of the command line: `python docs/site/commands.py`."""
+"""A hook of MkDocs: commands.md shows the help of the command line."""
 
 from __future__ import annotations
 
 import inspect
 import re
-from pathlib import Path
 from typing import Any
 
 import typer
 
 from sphshell_pin.cli import app
 
-PAGE = Path(__file__).parents[1] / "commands.md"
-HEAD = """\
-# Command line
 
-Every command has `--help`; `--debug` before the command shows the traceback of an error.
-
-| exit code | meaning |
-|---|---|
-| 0 | fine |
-| 1 | an expected figure was missed, or a part of what was asked for failed |
-| 2 | an error, reported in one sentence |
-| 130 | interrupted; what was computed until then is kept |
-
-This page is written by `python docs/site/commands.py`, from the help texts.
-"""
-
-
-def page() -> str:
-    """Return the whole page."""
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """Put a section for each command below the head of commands.md."""
+    if page.file.src_uri != "commands.md":
+        return markdown
     group: Any = typer.main.get_command(app)
-    return "\n".join([HEAD, *(_section(name, one) for name, one in group.commands.items())])
+    return "\n".join([markdown, *(_section(name, one) for name, one in group.commands.items())])
 
 
 def _section(name: str, command: Any) -> str:
     text = inspect.cleandoc(command.callback.__doc__)
     paragraphs = [" ".join(one.split()) for one in text.split("\n\n")]
     examples = [one for one in paragraphs if one.startswith("Example: ")]
-    told = [one for one in paragraphs if one not in examples]
-    lines = [f"## {name}", "", "\n\n".join(told), ""]
+    texts = [one for one in paragraphs if one not in examples]
+    lines = [f"## {name}", "", "\n\n".join(texts), ""]
     for one in examples:
         lines += ["```sh", one.removeprefix("Example: "), "```", ""]
     rows = [_row(one) for one in command.params]
@@ -61,8 +46,3 @@ def _row(parameter: Any) -> str:
     meaning = re.sub(r"\\(?=\[)", "", parameter.help or "")
     meaning = meaning if meaning.endswith("...") else meaning.removesuffix(".")
     return f"| {', '.join(f'`{one}`' for one in names)} | {meaning} | {shown} |"
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
-    print(PAGE)

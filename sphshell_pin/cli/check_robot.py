@@ -108,10 +108,11 @@ def check_robot_(
             left = len(names) - len(reports)
             typer.echo(f"interrupted: {left} of {len(names)} robots were not checked", err=True)
             raise typer.Exit(INTERRUPTED)
+        command = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
         if json is not None:
-            write_whole(json, study.as_json(reports, seed, sizes).encode())
+            text = study.as_json(reports, f"{command} --json {json}", seed, sizes)
+            write_whole(json, text.encode())
         if write is not None:
-            command = "sphshell-pin check-robot " + ("--all" if every else " ".join(names))
             page = study.as_markdown(reports, f"{command} --write {write}")
             write_whole(write, page.encode())
         verdicts = [one.verdict for one in reports]

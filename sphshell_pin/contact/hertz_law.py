@@ -35,7 +35,7 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
     Kuwabara and Kono (Jpn. J. Appl. Phys. 26 (1987) 1230): 1.5 tau E* scale depth^0.5 times the
     closing speed, tau = loss_tangent / (2 pi frequency). By default none.
 
-    `radius` [m]: of a sphere on a plane, whatever it touches; see on_plane.
+    `radius` [m]: gives the constant stiffness of a sphere on a plane; see on_plane.
     """
 
     restitution: float | None = parameter(
@@ -58,8 +58,8 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
         None,
         above=0,
         unit="m",
-        help="of a sphere on a plane, whatever it touches; without it the stiffness follows the "
-        "curvature of what it touches",
+        help="radius of the sphere, for the constant stiffness of a sphere on a plane; without it "
+        "the stiffness follows the curvature of the surface at the contact",
     )
 
     def __post_init__(self) -> None:
@@ -104,7 +104,7 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
         return self.radius is None
 
     def on_plane(self, radius: float) -> NormalLaw:
-        """Return the law of a sphere of `radius` [m] on a plane, whatever it touches.
+        """Return the law with the constant stiffness of a sphere of `radius` [m] on a plane.
 
         It is an ImpactLaw, a HuntCrossleyLaw with a restitution, and a HertzLaw with a loss
         tangent.

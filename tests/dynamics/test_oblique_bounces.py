@@ -45,7 +45,7 @@ def test_oblique_bounce_against_the_theory(degrees: float) -> None:
 
 
 def test_what_micro_slip_adds() -> None:
-    """The figures of docs/laws.md: v_t' / v_t of Kharaz's ball, against Maw et al.'s theory."""
+    """v_t' / v_t of Kharaz's ball, against Maw et al.'s theory."""
     degrees = np.array([2.0, 5, 10, 15, 20, 25, 30])
     psi = KAPPA * np.tan(np.radians(degrees)) / MU
     ratios = [
@@ -71,7 +71,7 @@ def test_rings_against_the_theory(rings: int) -> None:
 
 
 def test_rings_converge_to_micro_slip() -> None:
-    """The figures of docs/laws.md: rms of v_t' / v_t against Maw et al.'s theory."""
+    """The rms of v_t' / v_t against Maw et al.'s theory."""
     psi = KAPPA * np.tan(np.radians([2.0, 5, 10, 15, 20, 25, 30, 40, 60, 80])) / MU
     exact = oblique.micro_slip(psi, KAPPA, steps=20_000)
     errors = [

@@ -1,4 +1,4 @@
-"""Run the hard cases, print their table, and write docs/hard_cases.md.
+"""Run the hard cases, print their table, and write docs/measured/hard_cases.json.
 
 python -m tests.hard_cases [--quick] [--only WORD] [--write]
 """
@@ -10,8 +10,8 @@ import importlib
 import itertools
 import sys
 import time
-from pathlib import Path
 
+from sphshell_pin.benchmarks import measured
 from tests.hard_cases.verdict import CASES, Case, Verdict, failed
 
 # In the order of the page. A module's docstring is the text above its table.
@@ -27,15 +27,7 @@ MODULES = (
     "starts",
     "repeats",
 )
-PAGE = Path(__file__).parents[2] / "docs" / "hard_cases.md"
-INTRODUCTION = """\
-# Hard cases
-
-Every run below is compared with a closed form, or with a bound that physics sets. `error` is the
-relative difference, or where the law says zero the figure itself. The quick cases run with the
-tests. `python -m tests.hard_cases --write` ran all of them and wrote this page; `--quick` leaves
-out the slow ones, and `--only WORD` runs those whose name or module has the word.
-"""
+NAME = "hard_cases"
 COLUMNS = ("case", "what is tried", "law", "expected", "measured", "error", "bound", "verdict")
 
 
@@ -72,25 +64,16 @@ def row(verdict: Verdict) -> tuple[str, ...]:
     )
 
 
-def line(cells: tuple[str, ...]) -> str:
-    """Return a row of a Markdown table; nothing in it is markup."""
-    plain = str.maketrans({mark: f"\\{mark}" for mark in "\\|*_`<"})
-    return f"| {' | '.join(cell.translate(plain) for cell in cells)} |"
-
-
-def table(verdicts: list[Verdict]) -> str:
-    rule = "|".join(["", *(["---"] * len(COLUMNS)), ""])
-    return "\n".join([line(COLUMNS), rule, *(line(row(verdict)) for verdict in verdicts)])
-
-
-def page(results: list[tuple[Case, list[Verdict]]]) -> str:
-    """Return docs/hard_cases.md: a section for each module."""
-    parts = [INTRODUCTION]
+def sections(results: list[tuple[Case, list[Verdict]]]) -> list[measured.Measured]:
+    """Return what the site shows: a section for each module."""
+    found = [verdict for _, verdicts in results for verdict in verdicts]
+    wrong = sum(not verdict.ok for verdict in found)
+    parts = [measured.Measured(text=f"{len(found)} verdicts, {wrong} of them out of bounds.")]
     for module, group in itertools.groupby(results, key=lambda result: result[0].module):
         heading, _, text = (importlib.import_module(module).__doc__ or "").strip().partition(".")
-        verdicts = [verdict for _, found in group for verdict in found]
-        parts += [part for part in (f"## {heading}", text.strip(), table(verdicts)) if part]
-    return "\n\n".join(part.strip() for part in parts) + "\n"
+        rows = [row(verdict) for _, verdicts in group for verdict in verdicts]
+        parts.append(measured.Measured(heading, text.strip(), table=[COLUMNS, *rows]))
+    return parts
 
 
 def main() -> int:
@@ -100,7 +83,7 @@ def main() -> int:
     )
     parser.add_argument("--quick", action="store_true", help="leave out the slow cases")
     parser.add_argument("--only", metavar="WORD", help="cases whose name or module has the word")
-    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
+    parser.add_argument("--write", action="store_true", help=f"write docs/measured/{NAME}.json")
     options = parser.parse_args()
     if options.write and (options.quick or options.only):
         parser.error("--write needs all cases: leave out --quick and --only")
@@ -119,8 +102,8 @@ def main() -> int:
             print(f"  {name:34.34s} {tried:52.52s} {figures}", flush=True)
         results.append((known, verdicts))
     if options.write:
-        PAGE.write_text(page(results), encoding="utf-8")
-        print(f"wrote {PAGE}")
+        command = "python -m tests.hard_cases --write"
+        print(f"wrote {measured.write(NAME, command, sections(results))}")
     wrong = sum(not verdict.ok for _, verdicts in results for verdict in verdicts)
     print(f"{sum(len(verdicts) for _, verdicts in results)} verdicts, {wrong} of them fail")
     return 1 if wrong else 0

@@ -1,6 +1,6 @@
 """Generate parts, write them as files, and compare what is read with their exact CAD faces.
 
-python -m tests.parts [--count 300] [--seed 1] [--only 123 peg] [--show] [--write PAGE]
+python -m tests.parts [--count 300] [--seed 1] [--only 123 peg] [--show] [--write]
 python -m tests.parts --files FOLDER
 """
 
@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 
+from sphshell_pin.benchmarks.measured import Measured, write
 from tests.parts import tables
 from tests.parts.cad_mesh import KINDS
 from tests.parts.earlier import against
@@ -26,24 +27,6 @@ from tests.parts.judge import METHODS, Part, Verdict, distance_errors, loaded, r
 from tests.parts.real import press_on_files
 from tests.parts.running import Outcome, run
 from tests.parts.solids import FAMILIES, family_of, random_solid
-
-INTRODUCTION = """\
-# What mesh files of parts cost
-
-Most CAD programs export meshes without normals. Here are {count} random parts of {families}
-families, made with OpenCASCADE, meshed with deflections of 1e-4 to 1e-2 of their size, written to
-files in several ways, and compared with their exact CAD faces. OpenCASCADE failed on {skipped} of
-them, which were skipped.
-
-- **worse than flat**: parts whose largest error of the closest distance with the curved elements
-  exceeds 1.5 times that with the flat ones by more than 1e-4 of the size.
-- **mean error over flat's**: geometric mean over the parts.
-- **planes off**: parts with a force on a planar face whose error exceeds 1.5 times that of the
-  flat elements by more than 1 %; **force on them**: smallest and largest, over the exact ones.
-- **spoiled**: files whose flat elements are off by more than 2 % of the size; they are left out.
-
-`{command}` wrote this page.
-"""
 
 
 def main() -> int:
@@ -66,7 +49,9 @@ def main() -> int:
         if options.keep and not outcome.skipped:
             keep(outcome.number, options.seed, options.keep)
     verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
-    print("\n\n".join(sections(verdicts)))
+    found = sections(verdicts)
+    for one in found:
+        print(f"## {one.title}\n\n{tables.table(one.table)}\n")
     failed = Counter(f"{family_of(one.number)}: {one.skipped}" for one in outcomes if one.skipped)
     print(f"\n{len(outcomes)} parts, {failed.total()} skipped {dict(failed)}")
     print(f"{time.perf_counter() - begin:.0f} s")
@@ -76,14 +61,12 @@ def main() -> int:
         rows = [asdict(verdict) for verdict in verdicts]
         options.json.write_text(json.dumps(rows, default=np.ndarray.tolist), encoding="utf-8")
     if options.write:
-        text = INTRODUCTION.format(
-            count=len(outcomes),
-            families=len(FAMILIES),
-            skipped=failed.total(),
-            command=f"python -m tests.parts --count {options.count} --seed {options.seed} --write",
+        command = f"python -m tests.parts --count {options.count} --seed {options.seed} --write"
+        text = (
+            f"{len(outcomes)} parts of {len(FAMILIES)} families; OpenCASCADE failed on "
+            f"{failed.total()}, which were skipped."
         )
-        options.write.write_text("\n\n".join([text.strip(), *sections(verdicts)]) + "\n", "utf-8")
-        print(f"wrote {options.write}")
+        print(f"wrote {write('mesh_parts', command, [Measured(text=text), *found])}")
     return 1 if any(outcome.refused for outcome in outcomes) else 0
 
 
@@ -99,7 +82,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--keep", type=Path, help="folder for the STEP files of the parts")
     parser.add_argument("--json", type=Path, help="all figures, to a file")
     parser.add_argument("--against", type=Path, help="figures of an earlier run to compare with")
-    parser.add_argument("--write", type=Path, help="the tables as a page, to a file")
+    parser.add_argument("--write", action="store_true", help="write docs/measured/mesh_parts.json")
     parser.add_argument("--files", type=Path, help="a folder of files to press on, instead")
     options = parser.parse_args()
     unknown = {*options.without} - {*KINDS_OF_FILE}
@@ -129,17 +112,19 @@ def report(outcome: Outcome) -> None:
         print(f"{outcome.number:4d} {family_of(outcome.number)} skipped: {outcome.skipped}")
 
 
-def sections(verdicts: list[Verdict]) -> list[str]:
-    """Return headings and tables."""
+def sections(verdicts: list[Verdict]) -> list[Measured]:
+    """Return what the site shows."""
     first = next((kind for kind in KINDS_OF_FILE if any(v.file == kind for v in verdicts)), "")
     own = [verdict for verdict in verdicts if verdict.file == first]
-    found = ["## Kinds of files", tables.by_file(verdicts)]
-    found += [f"## Families: {first}", tables.by_family(own)]
+    found = [
+        Measured("Kinds of files", table=tables.by_file(verdicts)),
+        Measured(f"Families: {first}", table=tables.by_family(own)),
+    ]
     for name, group in tables.groups(verdicts, "file"):
         faces = tables.by_face(group)
         if faces and (name == first or any(v.recognized is not None for v in group)):
-            found += [f"## Triangles by their CAD face: {name}", faces]
-    return [*found, "## The worst", tables.worst(verdicts)]
+            found.append(Measured(f"Triangles by their CAD face: {name}", table=faces))
+    return [*found, Measured("The worst", table=tables.worst(verdicts))]
 
 
 def show(part: Part, kinds: tuple[str, ...]) -> None:

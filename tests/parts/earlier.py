@@ -45,7 +45,7 @@ def against(path: Path, verdicts: Iterable[Verdict]) -> str:
                 " ".join(map(str, grown)) or "-",
             ]
         )
-    return table(COLUMNS, rows)
+    return table([COLUMNS, *rows])
 
 
 def _worse(row: dict[str, Any]) -> bool:

@@ -1,8 +1,8 @@
-"""The verdicts as tables of Markdown."""
+"""The verdicts as tables: rows of texts, the headings first."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -37,19 +37,23 @@ FACE_COLUMNS = (
 )
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [columns, ["---"] * len(columns), *rows]
+Rows = list[Sequence[str]]
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows as Markdown."""
+    lines = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def by_file(verdicts: list[Verdict]) -> str:
+def by_file(verdicts: list[Verdict]) -> Rows:
     """One row for each kind of file."""
-    return table(FILE_COLUMNS, [[name, *summary(own)] for name, own in groups(verdicts, "file")])
+    return [FILE_COLUMNS, *([name, *summary(own)] for name, own in groups(verdicts, "file"))]
 
 
-def by_family(verdicts: list[Verdict]) -> str:
+def by_family(verdicts: list[Verdict]) -> Rows:
     columns = ("family", *FILE_COLUMNS[1:])
-    return table(columns, [[name, *summary(own)] for name, own in groups(verdicts, "family")])
+    return [columns, *([name, *summary(own)] for name, own in groups(verdicts, "family"))]
 
 
 def groups(verdicts: list[Verdict], key: str) -> list[tuple[str, list[Verdict]]]:
@@ -99,14 +103,14 @@ def largest_ratio(verdict: Verdict) -> float:
     return verdict.largest["smooth"] / max(verdict.largest["facets"], MARGIN)
 
 
-def by_face(verdicts: list[Verdict]) -> str:
+def by_face(verdicts: list[Verdict]) -> Rows:
     """One row for each kind of CAD face; the last columns need faces that were found."""
     found = [v.found for v in verdicts if v.found is not None and not v.spoiled]
     looked = any(verdict.recognized is not None for verdict in verdicts)
     if not found:
-        return ""
+        return []
     whole = sum(found[1:], start=found[0])
-    return table(FACE_COLUMNS, [[kind, *_faces(whole, k, looked)] for k, kind in enumerate(KINDS)])
+    return [FACE_COLUMNS, *([kind, *_faces(whole, k, looked)] for k, kind in enumerate(KINDS))]
 
 
 def _faces(found: Found, k: int, looked: bool) -> list[str]:
@@ -122,14 +126,14 @@ def _faces(found: Found, k: int, looked: bool) -> list[str]:
     return [*cells, share(taken, count), *(share(int(part[k]), taken) for part in parts), pieces]
 
 
-def worst(verdicts: list[Verdict], count: int = 25) -> str:
+def worst(verdicts: list[Verdict], count: int = 25) -> Rows:
     """Show the worst file of the worst parts, and the numbers to repeat them."""
     worse = sorted((v for v in verdicts if v.worse and not v.spoiled), key=largest_ratio)
     rows = sorted({v.number: v for v in worse}.values(), key=largest_ratio, reverse=True)[:count]
     columns = ("number", "family", "file", "triangles", "largest error", "flat", "force", "health")
-    return table(
+    return [
         columns,
-        [
+        *(
             [
                 str(v.number),
                 v.family,
@@ -141,8 +145,8 @@ def worst(verdicts: list[Verdict], count: int = 25) -> str:
                 "ok" if v.ok else "not ok",
             ]
             for v in rows
-        ],
-    )
+        ),
+    ]
 
 
 def line(verdict: Verdict) -> str:

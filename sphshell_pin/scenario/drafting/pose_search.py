@@ -100,8 +100,8 @@ class _Tried:
         """Leave one more kind of what the file states of the joints out, for this `fault`."""
         self.without = (*self.without, kind)
         self.note = (
-            f"what the file states of the joints' {' and '.join(self.without)} is left out: with "
-            f"it {fault.text}"
+            f"the {' and '.join(self.without)} that the robot's file states for its joints is not "
+            f"modeled, because with it {fault.text}"
         )
 
 

@@ -99,7 +99,10 @@ def findings_of(rows: list[Row]) -> list[Finding]:
     """Return the figures that have aims."""
     lines = [of(rows, name, SMOOTH) for name in CURVED]
     estimated = [of(rows, name, ESTIMATED) for name in CURVED]
-    error = f"force error at h / r = {AT}, exact normals: the worst mean of bowl, dome, torus"
+    error = (
+        f"force error, mean: elements of {AT} sphere radii (h / r = {AT}), exact normals; "
+        "worst of bowl, dome, torus"
+    )
     lowest = "order of the force error in h, exact normals: lowest of bowl, dome, torus"
     flat = "force error on a flat plate, any refinement, side force included"
     return [

@@ -126,8 +126,8 @@ def remarks(reports: Sequence[RobotReport]) -> list[str]:
     return [f"{', '.join(names)}: {sentence}." for sentence, names in of.items()]
 
 
-def as_json(reports: Sequence[RobotReport], seed: int, sizes: Sizes) -> str:
-    """Return all figures as JSON; what is no finite number is null."""
+def as_json(reports: Sequence[RobotReport], command: str, seed: int, sizes: Sizes) -> str:
+    """Return all figures as JSON; what is no finite number is null. `command` writes them."""
     robots: list[dict[str, object]] = []
     for one in reports:
         checks = {
@@ -138,6 +138,7 @@ def as_json(reports: Sequence[RobotReport], seed: int, sizes: Sizes) -> str:
         others = {"frame": one.frame or None, "radius": _number(one.radius), "notes": one.notes}
         robots.append(figures | others | {"checks": checks})
     data = {
+        "command": command,
         "seed": seed,
         "sizes": vars(sizes),
         "checks": {key: vars(check) for key, check in CHECKS.items()},

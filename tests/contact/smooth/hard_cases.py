@@ -1,4 +1,4 @@
-"""What the tests of hard cases share; `python -m tests.contact.smooth.hard_cases` prints them.
+"""What the tests of hard cases share; `python -m tests.contact.smooth.hard_cases` lists them.
 
 Each docstring is a row "case; what happens". The sphere has radius one unless said otherwise.
 """
@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sphshell_pin import Shell
+from sphshell_pin.benchmarks.measured import Measured, write
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.surfaces import jittered_grid
 from tests.contact.smooth.test_real_surfaces import faults, jump
@@ -84,8 +85,8 @@ def given(mesh, **options) -> Shell:
 FILES = ("rounds", "sheets", "meshes")
 
 
-def table() -> list[tuple[str, str]]:
-    """Case and what happens, of all tests of hard cases."""
+def table() -> list[tuple[str, str, str]]:
+    """Case, what is right, and whether it holds, of all tests of hard cases."""
     rows = []
     for name in FILES:
         module = import_module(f"tests.contact.smooth.test_hard_{name}")
@@ -93,9 +94,23 @@ def table() -> list[tuple[str, str]]:
         mine = [f for f in found if f.__module__ == module.__name__ and f.__name__[:5] == "test_"]
         for test in sorted(mine, key=lambda f: f.__code__.co_firstlineno):
             case, happens = (inspect.getdoc(test) or "").rstrip(".").split("; ")
-            rows.append((case, happens))
+            rows.append((case, happens, state(test)))
     return rows
 
 
+def state(test) -> str:
+    """Return "held", or why a test or one of its parameters is expected to fail."""
+    marks = list(getattr(test, "pytestmark", ()))
+    marks += [m for one in marks if one.name == "parametrize" for p in one.args[1]
+              for m in getattr(p, "marks", ())]  # fmt: skip
+    return next((f"open: {m.kwargs['reason']}" for m in marks if m.name == "xfail"), "held")
+
+
 if __name__ == "__main__":
-    print("\n".join(f"| {case} | {happens} |" for case, happens in table()))
+    rows = table()
+    print("\n".join(f"| {' | '.join(row)} |" for row in rows))
+    text = "Spheres of radius r. Each row is a test; an open one is expected to fail, and says why."
+    cases = Measured(
+        "Contacts of curved elements", text, table=[("case", "what is right", ""), *rows]
+    )
+    print(write("contact_cases", "python -m tests.contact.smooth.hard_cases", [cases]))
