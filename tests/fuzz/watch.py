@@ -17,8 +17,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from tests.fuzz.inputs import KINDS, TURNS, make_input
+from tests.fuzz.tables import prepare
+
 PATIENCE = 120.0  # [s] by the clock: a busy machine computes little, a file that waits nothing
-MEMORY = 2 << 30  # [B] on top of what the process has before its first file
+MEMORY = 1 << 30  # [B] on top of what the process has before its first file
 NEWS = 100  # files between two messages of the process that reads
 
 
@@ -46,18 +49,19 @@ class Report:
 
 @dataclass(frozen=True)
 class Task:
-    """The inputs first, first + step, ... below `last` of `seed`, until `until` [s since 1970].
+    """The inputs from `first` to below `last` of `seed`, until `until` [s since 1970].
 
-    `reader`, "module:function", takes the path of each; it may compute for `hang` [s].
+    Those of other `kinds` are left out. `reader`, "module:function", takes the path of each; it may
+    compute for `hang` [s].
     """
 
     seed: int
     first: int
     last: int
-    step: int
     until: float
-    reader: str = "tests.fuzz.readers:read"
-    hang: float = 20.0
+    kinds: tuple[str, ...] = tuple(KINDS)
+    reader: str = "tests.fuzz.inputs:read"
+    hang: float = 10.0
 
 
 def watch(
@@ -92,7 +96,7 @@ def watch(
             report.failures.append(failure)
             if failed(failure):
                 return
-            first = place.value + task.step
+            first = place.value + 1
 
 
 def _follow(
@@ -138,12 +142,12 @@ def _follow(
 
 
 def _computed(process: int) -> float:
-    """Return the processor time of a process [s]."""
+    """Return the processor time of a process, and of those that it started and that ended [s]."""
     try:
         fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     except OSError:
         return 0.0  # it has just ended
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def _work(task: Task, theirs: Any, place: Any, folder: str) -> None:
@@ -154,15 +158,12 @@ def _work(task: Task, theirs: Any, place: Any, folder: str) -> None:
     silent = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
         os.dup2(silent, stream)
-    from tests.fuzz.inputs import KINDS, TURNS, make_input
-    from tests.fuzz.tables import prepare
-
     module, _, name = task.reader.partition(":")
     read = getattr(importlib.import_module(module), name)
 
     prepare(home)
-    for kind in range(len(KINDS)):
-        make_input(task.seed, kind)  # corpora are made once
+    for kind in task.kinds:
+        KINDS[kind].corpus()  # made once
     space = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (space + MEMORY, space + MEMORY))
     counts: Counter[tuple[str, str]] = Counter()
@@ -172,7 +173,9 @@ def _work(task: Task, theirs: Any, place: Any, folder: str) -> None:
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
         theirs.send((what, (counts, slowest, peak)))
 
-    for k in range(task.first, task.last, task.step):
+    for k in range(task.first, task.last):
+        if TURNS[k % len(TURNS)] not in task.kinds:
+            continue
         if time.time() >= task.until:
             break
         place.value = k
