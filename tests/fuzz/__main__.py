@@ -48,11 +48,15 @@ def fuzz(options: argparse.Namespace) -> int:
 
     def failed(failure: Failure) -> bool:
         # The same fault at the same place is shown once.
-        where = [row.strip() for row in failure.details.splitlines() if "sphshell_pin" in row][-1:]
-        mark = f"{failure.why.partition(':')[0]} {where}"
+        rows = failure.details.splitlines()
+        own = ("/sphshell_pin/", "/robots/")
+        where = [row.strip() for row in rows if any(folder in row for folder in own)]
+        of_stack = rows[:1] and rows[0].startswith("Fatal")  # the innermost call is the first
+        mark = f"{failure.why.partition(':')[0]} {(where or ['?'])[0 if of_stack else -1]}"
         told[mark] += 1
+        path = keep(failure, options.out)
         if told[mark] == 1:
-            show(failure, options.out)
+            show(failure, path, rows[:9] if of_stack else rows[-6:])
         return not options.go_on
 
     kinds = tuple(options.kind or KINDS)
@@ -67,14 +71,20 @@ def fuzz(options: argparse.Namespace) -> int:
     return 1 if report.failures else 0
 
 
-def show(failure: Failure, out: Path) -> None:
+def keep(failure: Failure, out: Path) -> Path:
+    """Write the input that broke its reader into the folder `out`."""
     one = make_input(failure.seed, failure.k)
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{one.kind}-{failure.seed}-{failure.k}{one.suffix}"
     path.write_bytes(one.data)
-    print(f"{one.kind} {failure.seed}:{failure.k}: {failure.why}")
-    print(f"  kept as {path}; again: python -m tests.fuzz --repeat {failure.seed}:{failure.k}")
-    print("".join(f"    {row}\n" for row in failure.details.splitlines()[-6:]), flush=True)
+    return path
+
+
+def show(failure: Failure, path: Path, rows: list[str]) -> None:
+    again = f"{failure.seed}:{failure.k}"
+    print(f"{again}: {failure.why}")
+    print(f"  kept as {path}; again: python -m tests.fuzz --repeat {again}")
+    print("".join(f"    {row}\n" for row in rows), flush=True)
 
 
 def print_table(report: Report, seconds: float) -> None:
@@ -82,6 +92,8 @@ def print_table(report: Report, seconds: float) -> None:
     total = Counter[str]()
     for kind in KINDS:
         own = {name: report.counts[kind, name] for name in ("read", "refused", "broke")}
+        if not any(own.values()):
+            continue
         total.update(own)
         print(f"{kind:12}{sum(own.values()):9}{''.join(f'{n:9}' for n in own.values())}")
     files = sum(total.values())

@@ -21,8 +21,8 @@ from tests.fuzz.inputs import KINDS, TURNS, make_input
 from tests.fuzz.tables import prepare
 
 PATIENCE = 120.0  # [s] by the clock: a busy machine computes little, a file that waits nothing
+_OF_ALL = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
 MEMORY = 1 << 30  # [B] on top of what the process has before its first file
-NEWS = 100  # files between two messages of the process that reads
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Report:
     slowest: tuple[float, int] = (0.0, 0)
     """[s], and which input."""
     peak: int = 0
-    """[B] of memory, of the largest process."""
+    """[B] of memory, of the largest process, which may be one that a reader started."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,7 @@ def watch(
                 raise RuntimeError(f"the process that reads did not start: {why}\n{details}")
             failure = Failure(task.seed, place.value, why, details)
             report.failures.append(failure)
+            report.counts[TURNS[failure.k % len(TURNS)], "broke"] += 1
             if failed(failure):
                 return
             first = place.value + 1
@@ -121,12 +122,12 @@ def _follow(
                     if failed(value):
                         return None
                     continue
-                counts, slowest, peak = value
-                report.counts.update(counts)
-                report.slowest = max(report.slowest, slowest)
-                report.peak = max(report.peak, peak)
                 if what == "end":
                     return None
+                kind, outcome, took, peak = value
+                report.counts[kind, outcome] += 1
+                report.slowest = max(report.slowest, took)
+                report.peak = max(report.peak, peak)
         except EOFError:
             worker.join()
             code = worker.exitcode
@@ -166,13 +167,6 @@ def _work(task: Task, theirs: Any, place: Any, folder: str) -> None:
         KINDS[kind].corpus()  # made once
     space = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (space + MEMORY, space + MEMORY))
-    counts: Counter[tuple[str, str]] = Counter()
-    slowest = (0.0, 0)
-
-    def tell(what: str) -> None:
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-        theirs.send((what, (counts, slowest, peak)))
-
     for k in range(task.first, task.last):
         if TURNS[k % len(TURNS)] not in task.kinds:
             continue
@@ -189,9 +183,7 @@ def _work(task: Task, theirs: Any, place: Any, folder: str) -> None:
             outcome = "broke"
             why = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
             theirs.send(("failure", Failure(task.seed, k, why, traceback.format_exc())))
-        slowest = max(slowest, (time.monotonic() - start, k))
-        counts[TURNS[k % len(TURNS)], outcome] += 1
-        if sum(counts.values()) >= NEWS:
-            tell("news")
-            counts = Counter()
-    tell("end")
+        peak = 1024 * max(resource.getrusage(who).ru_maxrss for who in _OF_ALL)
+        took = time.monotonic() - start
+        theirs.send(("news", (TURNS[k % len(TURNS)], outcome, (took, k), peak)))
+    theirs.send(("end", None))
