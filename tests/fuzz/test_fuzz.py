@@ -74,7 +74,7 @@ def stumble(path: Path) -> str:
 def test_the_watch_notices_what_a_reader_must_not_do():
     report = Report()
     until = time.time() + 600.0
-    task = Task(1, 0, 7, until, reader="tests.fuzz.test_fuzz:stumble", hang=1.0)
+    task = Task(1, 0, 7, until, ("stl",), reader="tests.fuzz.test_fuzz:stumble", hang=1.0)
     watch(task, report, lambda failure: False)
     assert [(one.k, one.why.partition(":")[0]) for one in report.failures] == [
         (1, "KeyError"),
