@@ -80,6 +80,7 @@ def unpacked(data: bytes) -> dict[str, bytes]:
         return {name: archive.read(name) for name in archive.namelist()}
 
 
+@functools.cache
 def xacro_corpus() -> tuple[bytes, ...]:
     home = DATA / "xacro"
     parts = {"finger_description/package.xml", "finger_description/urdf/finger.xacro"}
@@ -89,17 +90,20 @@ def xacro_corpus() -> tuple[bytes, ...]:
     )
 
 
+@functools.cache
 def srdf_corpus() -> tuple[bytes, ...]:
     finger = (robots.URDF_FOLDER / "three_link_finger.urdf").read_bytes()
     return (pack({"robot.urdf": finger, "robot.srdf": POSES.encode()}),)
 
 
+@functools.cache
 def include_corpus() -> tuple[bytes, ...]:
     home = DATA / "mjcf"
     parts = {f"parts/{p.name}": p.read_bytes() for p in sorted((home / "parts").iterdir())}
     return (pack({"robot.xml": (home / "included.xml").read_bytes(), **parts}),)
 
 
+@functools.cache
 def package_corpus() -> tuple[bytes, ...]:
     home = DATA / "xacro" / "finger_description"
     robot = ROBOT.replace("MESH", "package://finger_description/meshes/cube.stl").encode()
@@ -147,6 +151,7 @@ def mesh_corpus() -> tuple[bytes, ...]:
 _BY_ROBOTS = (".stl", ".obj", ".ply", ".off")
 
 
+@functools.cache
 def law_corpus() -> tuple[bytes, ...]:
     law = 'type = "table", file = "law.csv"'
     start, stop = PRESS.index('type = "hertz"'), PRESS.index(' }\nfriction = { type = "bristle"')
