@@ -357,9 +357,13 @@ def damaged_xml(rng: random.Random, data: bytes) -> bytes:
         parent = rng.choice(parents or every)
         rng.choice(_XML_WAYS)(rng, parent, rng.choice(every))
     try:
-        return ET.tostring(root).replace(b" xmlns_=", b" xmlns=")
+        text = ET.tostring(root).replace(b" xmlns_=", b" xmlns=")
     except RecursionError:  # a link inside itself
         return b"<robot>" + b"<link>" * 3000
+    if rng.random() < 0.05:
+        encoding = rng.choice((b"utf-8", b"utf-16", b"latin-1", b"rot13", b"x"))
+        return b'<?xml version="1.0" encoding="' + encoding + b'"?>' + text
+    return text
 
 
 def _xml_drop(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
