@@ -18,7 +18,7 @@ from sphshell_pin import robots
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.run import simulate
 from tests.fuzz.meshes import SHAPES, WRITERS, Mesh, damaged_mesh
-from tests.fuzz.mutate import NUMBERS, alter, damage
+from tests.fuzz.mutate import LARGEST, NUMBERS, alter, damage
 from tests.fuzz.tables import (
     PRESS,
     damaged_journal,
@@ -194,10 +194,10 @@ def damaged_csv(rng: random.Random, data: bytes) -> bytes:
         elif way == 3:
             row[at] = rng.choice(rng.choice(rows))
         elif way == 4:
-            rows = [rows[0], *(rows[1:] * rng.choice((0, 2, 100)))]
+            rows = [rows[0], *map(list, rows[1:] * rng.choice((0, 2, 50)))][:1000]
         else:
             row[at] = rng.choice(NUMBERS)
-    return "\n".join(map(",".join, rows)).encode()
+    return "\n".join(map(",".join, rows)).encode()[:LARGEST]
 
 
 def damaged_json(rng: random.Random, data: bytes) -> bytes:

@@ -51,11 +51,6 @@ def read_result(path: Path) -> None:
     assert result.energy.exchanged >= 0.0 or np.isnan(result.energy.exchanged)
     replay = Replay(result)
     replay.advance(1e-2)
-    # Figures take most of the time: a few files are enough.
-    if zlib.crc32(path.read_bytes()) % 40 == 0:
-        result.plot("map")
-        result.plot("path")
-        result.plot()
 
 
 def read_scenario(path: Path) -> None:
