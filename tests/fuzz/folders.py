@@ -230,7 +230,7 @@ def damaged(
         return damage(rng, data, others)
     try:
         return structure(rng, data)
-    except (ValueError, SyntaxError, zipfile.BadZipFile, RecursionError):
+    except (ValueError, LookupError, SyntaxError, zipfile.BadZipFile, RecursionError):
         return damage(rng, data, others)  # it has been damaged before
 
 
