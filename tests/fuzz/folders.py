@@ -230,8 +230,8 @@ def damaged(
         return damage(rng, data, others)
     try:
         return structure(rng, data)
-    except (ValueError, LookupError, SyntaxError, zipfile.BadZipFile, RecursionError):
-        return damage(rng, data, others)  # it has been damaged before
+    except Exception:
+        return damage(rng, data, others)  # damaged before, so that nothing can be read
 
 
 def mesh_by(write: Callable[[Mesh], bytes]) -> Structure:
