@@ -60,15 +60,6 @@ DAE = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="
 <p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>
 <library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node>
 </visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
-MODEL_3MF = """<model unit="meter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
-<resources><object id="1" type="model"><mesh><vertices><vertex x="0" y="0" z="0"/>
-<vertex x="1" y="0" z="0"/><vertex x="0" y="1" z="0"/><vertex x="0" y="0" z="1"/></vertices>
-<triangles><triangle v1="0" v2="2" v3="1"/><triangle v1="0" v2="1" v3="3"/>
-<triangle v1="0" v2="3" v3="2"/><triangle v1="1" v2="2" v3="3"/></triangles></mesh></object>
-</resources><build><item objectid="1"/></build></model>"""
-RELATIONS = """<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
-<Relationship Target="/3D/3dmodel.model" Id="a"
-Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>"""
 MEASURED = b"""t [s],pairs.ball-plate.normal_force [N],q.root_joint.2 [m],q.root_joint.2.sigma [m]
 0.001,0.0,0.01249,1e-5\n0.002,0.5,0.01246,1e-5\n0.003,0.9,0.01241,1e-5\n0.004,,0.0124,2e-5
 """
@@ -135,14 +126,11 @@ def mesh_corpus() -> tuple[bytes, ...]:
         "buffers": [{"uri": uri, "byteLength": 102}],
     }
     files |= {".dae": DAE.encode(), ".gltf": json.dumps(gltf).encode()}
-    files[".3mf"] = pack(
-        {"3D/3dmodel.model": MODEL_3MF.encode(), "_rels/.rels": RELATIONS.encode()}
-    )
     made = []
     for suffix, data in files.items():
         for name, text in (("robot.urdf", ROBOT), ("robot.xml", MJCF)):
             robot = text.replace("MESH", f"mesh{suffix}")
-            if suffix in (".dae", ".3mf"):  # whose mass only further packages can tell
+            if suffix == ".dae":  # whose mass only a further package can tell
                 robot = robot.replace("<geom ", f"{INERTIAL}<geom ")
             made.append(pack({name: robot.encode(), f"mesh{suffix}": data}))
     return tuple(made)
@@ -241,9 +229,9 @@ def mesh_by(write: Callable[[Mesh], bytes]) -> Structure:
 
 STRUCTURES: dict[str, Structure] = {
     **{suffix: mesh_by(write) for suffix, write in WRITERS.values()},
-    **dict.fromkeys((".xml", ".urdf", ".xacro", ".srdf", ".dae", ".model", ".rels"), damaged_xml),
+    **dict.fromkeys((".xml", ".urdf", ".xacro", ".srdf", ".dae"), damaged_xml),
     **dict.fromkeys((".json", ".gltf"), damaged_json),
-    **dict.fromkeys((".zip", ".3mf"), damaged_folder),
+    ".zip": damaged_folder,
     ".npz": damaged_npz,
     ".toml": damaged_toml,
     ".journal": damaged_journal,

@@ -20,7 +20,7 @@ from typing import Any
 from tests.fuzz.inputs import KINDS, TURNS, make_input
 from tests.fuzz.tables import prepare
 
-PATIENCE = 120.0  # [s] by the clock: a busy machine computes little, a file that waits nothing
+PATIENCE = 600.0  # [s] by the clock: a busy machine computes little, a file that waits nothing
 _OF_ALL = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
 MEMORY = 1 << 30  # [B] on top of what the process has before its first file
 
