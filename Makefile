@@ -100,7 +100,7 @@ new-study: $(VENV)/.test ## what `new` writes for 14 robots and the parts of FOL
 parts: $(VENV)/.test ## what STL files of 300 generated parts cost against their CAD faces (COUNT=300 SEED=1)
 	$(BIN)/python -m tests.parts --count $(or $(COUNT),300) --seed $(or $(SEED),1)
 
-fuzz: $(VENV)/.test ## damaged files for every reader, until one breaks it (SECONDS=600 SEED=1)
+fuzz: $(VENV)/.test ## damaged files, folders of robots and results for every reader, until one breaks it (SECONDS=600 SEED=1)
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 	$(BIN)/python -m tests.fuzz.cad --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 

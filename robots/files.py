@@ -17,9 +17,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from sphshell_pin.dynamics.scene.mimic import Mimic
-from sphshell_pin.errors import SphshellError
+from sphshell_pin.errors import ShellFileError, SphshellError
 from sphshell_pin.robots.description import check_memory, check_size, parsed
 from sphshell_pin.robots.packages import Folders
+from sphshell_pin.shell.readers.ply import read_ply
 
 if TYPE_CHECKING:
     from sphshell_pin.robots.mjcf import Extras, Site
@@ -52,6 +53,9 @@ _REFUSED = {
     "this one as srdf",
     (".mjb",): "is a compiled MuJoCo model: give its MJCF (.xml)",
 }
+
+MESHES = (".stl", ".dae", ".obj", ".ply", ".off", ".gltf", ".glb")
+"""Formats of the meshes that a robot may name."""
 
 _NEXT = "robots are read from URDF (.urdf), xacro (.xacro) and MJCF (.xml) files"
 
@@ -267,9 +271,11 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
         for body in root.iter("body"):
             for geom in body.findall("geom"):
                 mesh = assets.get(geom.get("mesh"))
-                if mesh is None or os.path.isfile(mesh.get("file", "")):
+                if mesh is None:
                     continue
-                if _is_visual(geom) or description.folders.kept is not None:
+                if os.path.isfile(mesh.get("file", "")):
+                    _check_mesh(description, Path(mesh.get("file", "")))
+                elif _is_visual(geom) or description.folders.kept is not None:
                     missing[mesh.get("file", "")] = None
                     body.remove(geom)
                 else:
@@ -286,6 +292,7 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
             uri = mesh.get("filename", "")
             found = description.folders.find(uri)
             if found is not None:
+                _check_mesh(description, found)
                 mesh.set("filename", str(found.absolute()))
             elif visual:
                 missing[uri] = None
@@ -293,6 +300,23 @@ def _with_meshes(description: Description, *, visual: bool) -> tuple[ET.Element,
             else:
                 raise _mesh_fault(description, f"{uri} is not there")
     return root, list(missing)
+
+
+def _check_mesh(description: Description, path: Path) -> None:
+    """Raise RobotError for a mesh at which the reader that Pinocchio has may crash.
+
+    It knows 40 formats; those of robots have been tried, damaged .ply files alone made it crash.
+    """
+    reason, suffix = "", path.suffix.lower()
+    if suffix not in MESHES:
+        reason = f"{path}: not one of the formats {', '.join(MESHES)}"
+    elif suffix == ".ply":
+        try:
+            read_ply(path)
+        except ShellFileError as error:
+            reason = str(error)
+    if reason:
+        raise RobotError(f"{description.file}: a mesh cannot be loaded ({reason})")
 
 
 def _mesh_fault(description: Description, reason: str) -> RobotError:

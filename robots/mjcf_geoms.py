@@ -5,6 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -74,30 +75,34 @@ class Meshes:
 
         path, scale = self.files[name]
         why = f"the mass of body '{body}' would be that of mesh '{name}', "
+        kind = self._kinds[name]
+        if kind == "shell":
+            raise ValueError(f"{why}which is a shell: state its <inertial>")
         try:
             mesh = trimesh.load(path, force="mesh")
+            mesh.apply_scale(scale)
+            mesh.merge_vertices()
+            if kind == "convex":
+                mesh = mesh.convex_hull
+            if not mesh.is_watertight or not mesh.volume:
+                self.hulls.append(name)
+                mesh = _hull(mesh)
+            if kind == "legacy" and not mesh.is_convex:
+                self.exact.append(name)
+            volume, center = float(mesh.volume), np.asarray(mesh.center_mass)
+            sign = float(np.sign(volume))
+            moments = sign * np.asarray(mesh.moment_inertia)
         except Exception as error:  # of the readers of many formats, and of packages not there
             reason = " ".join(str(error).split()) or type(error).__name__
             raise ValueError(f"{why}which cannot be read ({reason}): state <inertial>") from None
-        mesh.apply_scale(scale)
-        mesh.merge_vertices()
-        kind = self._kinds[name]
-        if kind == "convex":
-            mesh = mesh.convex_hull
-        if kind == "shell":
-            raise ValueError(f"{why}which is a shell: state its <inertial>")
-        if not mesh.is_watertight or not mesh.volume:
-            self.hulls.append(name)
-            try:
-                mesh = mesh.convex_hull
-            except ValueError:  # a flat one
-                raise ValueError(f"{why}which has no volume: state its <inertial>") from None
-        if kind == "legacy" and not mesh.is_convex:
-            self.exact.append(name)
-        sign = float(np.sign(mesh.volume))
-        volume = sign * float(mesh.volume)
-        moments = sign * np.asarray(mesh.moment_inertia)
-        return volume, pin.Inertia(volume, np.asarray(mesh.center_mass), moments)
+        return sign * volume, pin.Inertia(sign * volume, center, moments)
+
+
+def _hull(mesh: Any) -> Any:
+    try:
+        return mesh.convex_hull
+    except ValueError:  # of a flat one
+        raise ValueError("it has no volume") from None
 
 
 def plain_place(

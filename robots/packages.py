@@ -104,7 +104,7 @@ def _stated_name(package_xml: Path) -> str | None:
     """Return the name that a package.xml states."""
     try:
         return (ET.parse(package_xml).findtext("name") or "").strip()
-    except (OSError, ET.ParseError, ValueError):
+    except (OSError, ET.ParseError, ValueError, LookupError):  # the last: an unknown encoding
         return None
 
 

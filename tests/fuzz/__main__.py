@@ -5,7 +5,7 @@
     python -m tests.fuzz --repeat 1:4711           one input again, with its traceback
 
 A reader may read a file or refuse it with the package's own error; anything else is a fault: a
-crash, more than 20 s or 2 GB for one file, any other exception. Input k of seed s is always the
+crash, more than 10 s or 1 GB for one file, any other exception. Input k of seed s is always the
 same. The files that broke a reader are kept in the folder --out.
 """
 
@@ -18,7 +18,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from tests.fuzz.inputs import KINDS, TURNS, make_input
+from tests.fuzz.inputs import KINDS, TURNS, make_input, read
+from tests.fuzz.tables import prepare
 from tests.fuzz.watch import Failure, Report, Task, watch
 
 
@@ -31,7 +32,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--files", type=int, help="as many files, however long it takes")
-    parser.add_argument("--kind", choices=KINDS, help="files of one kind alone")
+    parser.add_argument("--kind", choices=KINDS, nargs="+", help="files of these kinds alone")
     parser.add_argument("--go-on", action="store_true", help="do not stop at the first fault")
     parser.add_argument("--out", type=Path, default=Path("build/fuzz"), help="default: %(default)s")
     parser.add_argument("--repeat", metavar="SEED:K", help="read one input again, unwatched")
@@ -47,32 +48,43 @@ def fuzz(options: argparse.Namespace) -> int:
 
     def failed(failure: Failure) -> bool:
         # The same fault at the same place is shown once.
-        where = [row.strip() for row in failure.details.splitlines() if "sphshell_pin" in row][-1:]
-        mark = f"{failure.why.partition(':')[0]} {where}"
+        rows = failure.details.splitlines()
+        own = ("/sphshell_pin/", "/robots/")
+        where = [row.strip() for row in rows if any(folder in row for folder in own)]
+        of_stack = rows[:1] and rows[0].startswith("Fatal")  # the innermost call is the first
+        mark = f"{failure.why.partition(':')[0]} {(where or ['?'])[0 if of_stack else -1]}"
         told[mark] += 1
+        path = keep(failure, options.out)
         if told[mark] == 1:
-            show(failure, options.out)
+            show(failure, path, rows[:9] if of_stack else rows[-6:])
         return not options.go_on
 
-    first = TURNS.index(options.kind) if options.kind else 0
-    step = len(TURNS) if options.kind else 1
+    kinds = tuple(options.kind or KINDS)
     until = start + (1e9 if options.files else options.seconds)
-    last = first + options.files * step if options.files else sys.maxsize
-    watch(Task(options.seed, first, last, step, until), report, failed)
+    last = sys.maxsize
+    if options.files:
+        last = options.files * len(TURNS) // sum(turn in kinds for turn in TURNS)
+    watch(Task(options.seed, 0, last, until, kinds), report, failed)
     print_table(report, time.time() - start)
     for mark, count in told.most_common():
         print(f"{count} x {mark}")
     return 1 if report.failures else 0
 
 
-def show(failure: Failure, out: Path) -> None:
+def keep(failure: Failure, out: Path) -> Path:
+    """Write the input that broke its reader into the folder `out`."""
     one = make_input(failure.seed, failure.k)
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{one.kind}-{failure.seed}-{failure.k}{one.suffix}"
     path.write_bytes(one.data)
-    print(f"{one.kind} {failure.seed}:{failure.k}: {failure.why}")
-    print(f"  kept as {path}; again: python -m tests.fuzz --repeat {failure.seed}:{failure.k}")
-    print("".join(f"    {row}\n" for row in failure.details.splitlines()[-6:]), flush=True)
+    return path
+
+
+def show(failure: Failure, path: Path, rows: list[str]) -> None:
+    again = f"{failure.seed}:{failure.k}"
+    print(f"{again}: {failure.why}")
+    print(f"  kept as {path}; again: python -m tests.fuzz --repeat {again}")
+    print("".join(f"    {row}\n" for row in rows), flush=True)
 
 
 def print_table(report: Report, seconds: float) -> None:
@@ -80,6 +92,8 @@ def print_table(report: Report, seconds: float) -> None:
     total = Counter[str]()
     for kind in KINDS:
         own = {name: report.counts[kind, name] for name in ("read", "refused", "broke")}
+        if not any(own.values()):
+            continue
         total.update(own)
         print(f"{kind:12}{sum(own.values()):9}{''.join(f'{n:9}' for n in own.values())}")
     files = sum(total.values())
@@ -92,9 +106,6 @@ def print_table(report: Report, seconds: float) -> None:
 
 
 def repeat(seed: int, k: int) -> int:
-    from tests.fuzz.readers import read
-    from tests.fuzz.tables import prepare
-
     one = make_input(seed, k)
     with tempfile.TemporaryDirectory() as folder:
         prepare(Path(folder))

@@ -4,15 +4,33 @@ from __future__ import annotations
 
 import functools
 import random
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.fuzz import tables
-from tests.fuzz.meshes import SHAPES, WRITERS, damaged_mesh
-from tests.fuzz.mutate import damage
+from sphshell_pin.errors import SphshellError
+from tests.fuzz import folders, readers, tables
+from tests.fuzz.folders import STRUCTURES, Structure, damaged
+from tests.fuzz.meshes import SHAPES, WRITERS
 
 CORPUS = Path(__file__).parents[1] / "data" / "corpus"
+Corpus = Callable[[], tuple[bytes, ...]]
+Reader = Callable[[Path], None]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of input: the `suffix` of its file, undamaged ones, and what reads one.
+
+    `structure` changes more than bytes. `turns` is how often the kind comes in each round.
+    """
+
+    suffix: str
+    corpus: Corpus
+    structure: Structure
+    read: Reader
+    turns: int = 8
 
 
 @dataclass(frozen=True)
@@ -24,11 +42,6 @@ class Input:
     data: bytes
 
 
-def corpus_of(kind: str) -> tuple[bytes, ...]:
-    """Return the undamaged files of a kind."""
-    return _mesh_corpus(kind) if kind in WRITERS else _CORPORA[kind]()
-
-
 @functools.cache
 def _mesh_corpus(kind: str) -> tuple[bytes, ...]:
     suffix, write = WRITERS[kind]
@@ -37,50 +50,60 @@ def _mesh_corpus(kind: str) -> tuple[bytes, ...]:
     return (*own, *small)
 
 
-def _mesh(kind: str) -> Callable[[random.Random], bytes]:
-    write = WRITERS[kind][1]
-
-    def make(rng: random.Random) -> bytes:
-        if rng.random() < 0.5:
-            return damage(rng, rng.choice(_mesh_corpus(kind)), _mesh_corpus(kind))
-        return write(damaged_mesh(rng))
-
-    return make
+def _mesh(kind: str) -> Kind:
+    suffix, write = WRITERS[kind]
+    corpus = functools.partial(_mesh_corpus, kind)
+    return Kind(suffix, corpus, folders.mesh_by(write), readers.read_mesh)
 
 
-def _table(
-    kind: str, structure: Callable[[random.Random], bytes]
-) -> Callable[[random.Random], bytes]:
-    def make(rng: random.Random) -> bytes:
-        if rng.random() < 0.4:
-            return damage(rng, rng.choice(corpus_of(kind)), corpus_of(kind))
-        return structure(rng)
-
-    return make
+def _file(suffix: str, corpus: Corpus, read: Reader, turns: int = 8) -> Kind:
+    return Kind(suffix, corpus, STRUCTURES[suffix], read, turns)
 
 
-_CORPORA = {
-    "npz": tables.npz_corpus,
-    "toml": tables.toml_corpus,
-    "journal": tables.journal_corpus,
-    "urdf": tables.urdf_corpus,
-    "mjcf": tables.mjcf_corpus,
+def _folder(kind: str, corpus: Corpus, read: Reader, turns: int = 8) -> Kind:
+    """Return a kind whose files are archives of folders; `read` takes the folder."""
+    return Kind(f".{kind}.zip", corpus, folders.damaged_folder, readers.in_folder(read), turns)
+
+
+KINDS: dict[str, Kind] = {
+    **{kind: _mesh(kind) for kind in WRITERS},
+    # The reader with the most to check comes more often.
+    "npz": _file(".npz", tables.npz_corpus, readers.read_result, 24),
+    "toml": _file(".toml", tables.toml_corpus, readers.read_scenario, 16),
+    "journal": _file(".journal", tables.journal_corpus, readers.read_journal),
+    "urdf": _file(".urdf", tables.urdf_corpus, readers.read_robot),
+    "mjcf": _file(".xml", tables.mjcf_corpus, readers.read_robot),
+    "fit": _file(".csv", folders.fit_corpus, readers.read_measured),
+    "law": _folder("law", folders.law_corpus, readers.read_law),
+    "srdf": _folder("srdf", folders.srdf_corpus, readers.read_robot_in),
+    "includes": _folder("includes", folders.include_corpus, readers.read_robot_in),
+    "packages": _folder("packages", folders.package_corpus, readers.read_robot_in),
+    "meshes": _folder("meshes", folders.mesh_corpus, readers.read_robot_in),
+    "results": _folder("results", folders.results_corpus, readers.read_run),
+    # A process for each takes a second.
+    "xacro": _folder("xacro", folders.xacro_corpus, readers.read_robot_in, 1),
 }
-
-KINDS: dict[str, tuple[str, Callable[[random.Random], bytes]]] = {
-    **{kind: (suffix, _mesh(kind)) for kind, (suffix, _) in WRITERS.items()},
-    "npz": (".npz", _table("npz", tables.damaged_npz)),
-    "toml": (".toml", _table("toml", tables.damaged_toml)),
-    "journal": (".journal", _table("journal", tables.damaged_journal)),
-    "urdf": (".urdf", _table("urdf", tables.damaged_urdf)),
-    "mjcf": (".xml", _table("mjcf", tables.damaged_mjcf)),
-}
-"""By kind of file: the suffix, and what makes a damaged one."""
-TURNS = (*KINDS, "npz", "toml", "npz")  # the reader with the most to check comes more often
+TURNS = tuple(name for name, kind in KINDS.items() for _ in range(kind.turns))
+_READERS = {kind.suffix: kind.read for kind in KINDS.values()}
 
 
 def make_input(seed: int, k: int) -> Input:
     """Return input `k` of `seed`."""
-    kind = TURNS[k % len(TURNS)]
-    suffix, make = KINDS[kind]
-    return Input(kind, suffix, make(random.Random(f"{seed}/{k}")))
+    name = TURNS[k % len(TURNS)]
+    kind, rng = KINDS[name], random.Random(f"{seed}/{k}")
+    corpus = kind.corpus()
+    return Input(name, kind.suffix, damaged(rng, kind.structure, rng.choice(corpus), corpus))
+
+
+def read(path: Path) -> str:
+    """Read the file, by its suffixes, as a user would; return "read", or "refused" with an error.
+
+    Whatever else is raised is a fault of the package.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            _READERS["".join(path.suffixes)](path)
+    except SphshellError:
+        return "refused"
+    return "read"

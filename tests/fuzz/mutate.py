@@ -158,7 +158,7 @@ def alter(rng: random.Random, tree: Any) -> Any:
     """Return a copy of `tree`, dicts and lists of plain values, with some of its nodes changed."""
     tree = copy.deepcopy(tree)
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
-        places = list(_places(tree))
+        places = list(_places(tree)) if isinstance(tree, dict | list) else []
         if not places:
             return odd_value(rng)
         node, key = rng.choice(places)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
+import contextlib
+import tempfile
+import zipfile
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,29 +14,28 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin import robots
+from sphshell_pin.cli.export import with_scene
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.export.mcap import write_mcap
+from sphshell_pin.export.tables import write_tables
+from sphshell_pin.patches import TaxelGrid
+from sphshell_pin.patches.wear import save_wear, wear_maps
+from sphshell_pin.plot.compare import plot_compare
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.replay import Replay
+from sphshell_pin.study.compare import compare, measured, tables_of
+from sphshell_pin.study.fit import fit
 from sphshell_pin.study.robot_check.models import load_subject
 from sphshell_pin.study.sweep.journal import Journal
-from tests.fuzz.tables import HEAD, OUTCOMES
+from sphshell_pin.tables import csv_text
+from sphshell_pin.view.live.opening import player_of
+from sphshell_pin.view.recording import render_recording
+from tests.fuzz.folders import results_corpus, unpacked
+from tests.fuzz.tables import HEAD, OUTCOMES, prepare
+from tests.scenario.files import write
 
 
-def read(path: Path) -> str:
-    """Read the file, by its suffix, as a user would; return "read", or "refused" with an error.
-
-    Whatever else is raised is a fault of the package.
-    """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            _READERS.get(path.suffix, _read_mesh)(path)
-    except SphshellError:
-        return "refused"
-    return "read"
-
-
-def _read_mesh(path: Path) -> None:
+def read_mesh(path: Path) -> None:
     shell = sp.Shell.from_file(path, unit=None if path.suffix == ".shl" else "m")
     low, high = shell.box
     for center in (shell.vertices[0], 0.5 * (np.asarray(low) + np.asarray(high))):
@@ -41,7 +43,7 @@ def _read_mesh(path: Path) -> None:
             shell.contacts(center, 0.2 * shell.size, method)
 
 
-def _read_result(path: Path) -> None:
+def read_result(path: Path) -> None:
     result = sp.Result.load(path)
     result.contact_columns()
     if (by := result.sensitivities) is not None:
@@ -49,19 +51,14 @@ def _read_result(path: Path) -> None:
     assert result.energy.exchanged >= 0.0 or np.isnan(result.energy.exchanged)
     replay = Replay(result)
     replay.advance(1e-2)
-    # Figures take most of the time: a few files are enough.
-    if zlib.crc32(path.read_bytes()) % 40 == 0:
-        result.plot("map")
-        result.plot("path")
-        result.plot()
 
 
-def _read_scenario(path: Path) -> None:
+def read_scenario(path: Path) -> None:
     built = build(path)
     built.scene.contacts(built.q0, built.v0)
 
 
-def _read_journal(path: Path) -> None:
+def read_journal(path: Path) -> None:
     journal = Journal(path, HEAD, len(OUTCOMES))
     try:
         for number, outcome in journal.outcomes.items():
@@ -71,26 +68,123 @@ def _read_journal(path: Path) -> None:
         journal.close()
 
 
-def _read_robot(path: Path) -> None:
+def read_robot(path: Path) -> None:
+    # Without its meshes the robot may be read where it is refused with them.
+    with contextlib.suppress(SphshellError):
+        _use(load_subject(path).robot)
+    _use(robots.load_file(path))
+
+
+def _use(robot: robots.LoadedRobot) -> None:
+    scene = sp.Scene(robot.model, joints=sp.JointIngredients.from_model(robot.model))
+    pin.forwardKinematics(scene.model, scene.model.createData(), robot.q0)
+    robots.end_spheres(robot)
+
+
+def in_folder(read: Callable[[Path], None]) -> Callable[[Path], None]:
+    """Return what unpacks an archive, and reads the folder with `read`."""
+
+    def unpack_and_read(path: Path) -> None:
+        # Always another folder: what one package.xml states is kept by its path.
+        with tempfile.TemporaryDirectory(dir=path.parent) as place:
+            with zipfile.ZipFile(path) as archive:
+                archive.extractall(place)
+            prepare(Path(place))
+            read(Path(place))
+
+    return unpack_and_read
+
+
+def read_robot_in(home: Path) -> None:
+    """Read the robot of a folder, with its poses."""
+    srdf = home / "robot.srdf"
+    more = {"srdf": srdf, "pose": "closed"} if srdf.exists() else {}
+    _use(robots.load_file(next(home.glob("robot.[!s]*"), home / "robot.urdf"), [home], **more))
+
+
+def read_law(home: Path) -> None:
+    """Read a scenario with the table of a law."""
+    read_scenario(home / "law.toml")
+
+
+def read_measured(path: Path) -> None:
+    """Fit a parameter of a short run to measured data."""
+    scenario = write(path.parent, name="short.toml")
+    fit(scenario, path, ["contact.ball-plate.law.damping"], changes={"run.duration": "4e-3"})
+
+
+def read_run(home: Path) -> None:
+    """Look at the results in a folder in one of the ways that there are, or two."""
+    run = home / "run.npz"
+    number = zlib.crc32(run.read_bytes()) if run.exists() else 0
     fault = None
-    for load in (load_subject, robots.load_file):
+    for way in (LOOKS[0], LOOKS[number % len(LOOKS)]):
         try:
-            loaded = load(str(path))
+            way(home)
         except SphshellError as error:
-            fault = error  # the other one has to refuse it, or read it, as well
-            continue
-        robot = getattr(loaded, "robot", loaded)
-        scene = sp.Scene(robot.model, joints=sp.JointIngredients.from_model(robot.model))
-        pin.forwardKinematics(scene.model, scene.model.createData(), robot.q0)
-        robots.end_spheres(robot)
+            fault = error
     if fault is not None:
         raise fault
 
 
-_READERS = {
-    ".npz": _read_result,
-    ".toml": _read_scenario,
-    ".journal": _read_journal,
-    ".urdf": _read_robot,
-    ".xml": _read_robot,
-}
+def _replay(home: Path) -> None:
+    player = player_of(home)
+    player.advance(1e-2)
+    player.seek(0.02)
+    for kind in player.series:
+        kind.values(player.now)
+
+
+def _wear(home: Path) -> None:
+    replay = Replay(home / "run.npz")
+    maps = wear_maps(replay.result, 1e-9, replay.scene)
+    save_wear(maps, home)
+
+
+def _taxels(home: Path) -> None:
+    replay = Replay(home / "run.npz")
+    TaxelGrid("ball-plate", (8, 8)).images(replay.result, replay.scene).save(home / "taxels.npz")
+
+
+def _recording(home: Path) -> None:
+    replay = Replay(home / "run.npz")
+    page = render_recording(replay.result, replay.scene, replay.visual_model, title=replay.title)
+    assert page.startswith("<!")
+
+
+def _compare(home: Path) -> None:
+    (home / "whole.npz").write_bytes(unpacked(results_corpus()[0])["run.npz"])
+    runs = [measured(name, *with_scene(home / name)) for name in ("run.npz", "whole.npz")]
+    for pair in (runs, runs[::-1]):
+        comparison = compare(pair)
+        for table in tables_of(comparison).values():
+            csv_text(table)
+    plot_compare(comparison)
+
+
+def _save(home: Path) -> None:
+    """What was read can be saved, and read again."""
+    sp.Result.load(sp.Result.load(home / "run.npz").save(home / "again.npz"))
+
+
+def _export(to: str) -> Callable[[Path], None]:
+    def export(home: Path) -> None:
+        write_tables(home / to, *with_scene(home), format=to)
+
+    return export
+
+
+def _mcap(home: Path) -> None:
+    replay = Replay(home / "run.npz")
+    write_mcap(home / "run.mcap", replay.result, replay.scene)
+
+
+def _plot(kind: str) -> Callable[[Path], None]:
+    return lambda home: sp.Result.load(home / "run.npz").plot(kind)
+
+
+LOOKS = (
+    *(_replay, _mcap, _export("csv"), _export("parquet"), _compare, _recording, _taxels, _wear),
+    *(_save, *map(_plot, ("overview", "force", "energy", "sensors", "path", "map"))),
+)
+"""Everything that shows or exports the results in a folder."""

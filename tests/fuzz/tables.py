@@ -24,7 +24,7 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study.sweep.job import Outcome
 from sphshell_pin.study.sweep.journal import Journal
-from tests.fuzz.mutate import NUMBERS, alter, odd_value
+from tests.fuzz.mutate import NUMBERS, alter, damage, odd_value
 from tests.scenario.files import DROP, write
 
 PRESS = """
@@ -112,6 +112,14 @@ OUTCOMES = (
 )
 
 
+EXPRESSIONS = (
+    *("${9**9**9}", "${'x' * 10**10}", "${open('x').read()}", "${(lambda: 0)()}", "${", "${1 / 0}"),
+    *("$(arg x)", "$(find x)", "$(eval 10**9)", "$$", "robot.xml", "robot.xacro", "parts/limb.xml"),
+    *("package://finger_description/robot.urdf", "package://", "file://", "..", "\U0001f600"),
+)
+"""Texts of robots' descriptions: what xacro evaluates, and names of files."""
+
+
 def prepare(folder: Path) -> None:
     """Write the files that the scenarios need beside them."""
     (folder / "box.off").write_text(BOX)
@@ -119,24 +127,14 @@ def prepare(folder: Path) -> None:
     (folder / "finger.urdf").write_bytes(finger.read_bytes())
 
 
-@functools.cache
-def _run() -> dict[str, np.ndarray[Any, Any]]:
-    """Return the arrays of a short run's file, with derivatives of its rows."""
-    with tempfile.TemporaryDirectory() as home:
-        result, _ = simulate(build(write(Path(home)), {"run.record_dt": "5e-3"}))
-        nv, m = result.v.shape[1], len(result.contacts)
-        shapes = {"q": (len(result.t), nv), "v": (len(result.t), nv), "force_world": (m, 3)}
-        shapes |= {"normal_force": (m,), "depth": (m,)}
-        rows = {name: np.ones((*shape, 2)) for name, shape in shapes.items()}
-        by = Sensitivities(("v0.0", "v0.1"), **rows, result=None)
-        result = replace(result, sensitivity_rows=by)
-        with np.load(result.save(Path(home, "run.npz")), allow_pickle=False) as file:
-            arrays = dict(file)
-    header = json.loads(str(arrays["header"]))
-    header["origin"]["path"] = "drop.toml"
-    header["stats"] |= {"wall_time": 0.0, "real_time_factor": 0.0}  # of today
-    header["origin"]["scenario"] = "drop.toml"
-    return arrays | {"header": np.array(json.dumps(header))}
+def reproducible(path: Path) -> bytes:
+    """Return the file of a run without the folder and the clock of today."""
+    with np.load(path, allow_pickle=False) as file:
+        arrays = dict(file)
+    header = json.loads(str(arrays["header"]).replace(str(path.parent), "/home"))
+    header["stats"] |= {"wall_time": 0.0, "real_time_factor": 0.0}
+    arrays["header"] = np.array(json.dumps(header))
+    return pack({f"{name}.npy": _npy(array) for name, array in arrays.items()})
 
 
 def pack(members: dict[str, bytes]) -> bytes:
@@ -158,12 +156,22 @@ def _npy(array: Any, *, pickled: bool = False) -> bytes:
 
 @functools.cache
 def npz_corpus() -> tuple[bytes, ...]:
-    return (pack({f"{name}.npy": _npy(array) for name, array in _run().items()}),)
+    """Return the file of a short run, with derivatives of its rows."""
+    with tempfile.TemporaryDirectory() as home:
+        result, _ = simulate(build(write(Path(home)), {"run.record_dt": "5e-3"}))
+        nv, m = result.v.shape[1], len(result.contacts)
+        shapes = {"q": (len(result.t), nv), "v": (len(result.t), nv), "force_world": (m, 3)}
+        shapes |= {"normal_force": (m,), "depth": (m,)}
+        rows = {name: np.ones((*shape, 2)) for name, shape in shapes.items()}
+        by = Sensitivities(("v0.0", "v0.1"), **rows, result=None)
+        result = replace(result, sensitivity_rows=by)
+        return (reproducible(result.save(Path(home, "run.npz"))),)
 
 
-def damaged_npz(rng: random.Random) -> bytes:
-    """Return a result whose arrays or header were changed."""
-    arrays = dict(_run())
+def damaged_npz(rng: random.Random, data: bytes) -> bytes:
+    """Return a result whose arrays or header were changed; of files that it keeps, their bytes."""
+    with np.load(io.BytesIO(data), allow_pickle=False) as file:
+        arrays = dict(file)
     members: dict[str, bytes] = {}
     for _ in range(rng.choice((1, 1, 2, 3))):
         name = rng.choice([*arrays, "header", "header"]) if arrays else "header"
@@ -173,6 +181,8 @@ def damaged_npz(rng: random.Random) -> bytes:
                 arrays["header"] = np.array(json.dumps(alter(rng, header)))
             except (ValueError, RecursionError):
                 arrays["header"] = np.array("[" * 5000)
+        elif ".file." in name and rng.random() < 0.8:
+            arrays[name] = np.frombuffer(damage(rng, arrays[name].tobytes()), np.uint8)
         else:
             rng.choice(_ARRAY_WAYS)(rng, arrays, name)
     if rng.random() < 0.1:
@@ -256,9 +266,9 @@ def toml_corpus() -> tuple[bytes, ...]:
     return DROP.encode(), PRESS.encode()
 
 
-def damaged_toml(rng: random.Random) -> bytes:
+def damaged_toml(rng: random.Random, data: bytes) -> bytes:
     """Return a scenario some of whose keys and values were changed."""
-    tree = alter(rng, tomllib.loads(rng.choice(toml_corpus()).decode()))
+    tree = alter(rng, tomllib.loads(data.decode()))
     rows = [f"{_key(k)} = {_toml(v)}" for k, v in tree.items()] if isinstance(tree, dict) else []
     return "\n".join(rows or [_toml(tree)]).encode("utf-8", "surrogatepass")
 
@@ -307,11 +317,11 @@ def journal_corpus() -> tuple[bytes, ...]:
         return (path.read_bytes(),)
 
 
-def damaged_journal(rng: random.Random) -> bytes:
+def damaged_journal(rng: random.Random, data: bytes) -> bytes:
     """Return a journal some of whose values were changed, but not their checksums."""
     with tempfile.TemporaryDirectory() as home:
         path = Path(home) / "journal"
-        path.write_bytes(journal_corpus()[0])
+        path.write_bytes(data)
         journal = sqlite3.connect(path)
         table = rng.choice(("runs", "runs", "sweep"))
         names = [row[1] for row in journal.execute(f"PRAGMA table_info({table})")]
@@ -337,27 +347,23 @@ def mjcf_corpus() -> tuple[bytes, ...]:
     return tuple(data for data in every if b"<mesh" not in data and b"<include" not in data)
 
 
-def damaged_urdf(rng: random.Random) -> bytes:
-    """Return a robot some of whose elements, attributes and names were changed."""
-    return _damaged(rng, urdf_corpus())
-
-
-def damaged_mjcf(rng: random.Random) -> bytes:
-    """Return a robot as MuJoCo describes it, damaged in the same way."""
-    return _damaged(rng, mjcf_corpus())
-
-
-def _damaged(rng: random.Random, corpus: tuple[bytes, ...]) -> bytes:
-    root = ET.fromstring(rng.choice(corpus))
+def damaged_xml(rng: random.Random, data: bytes) -> bytes:
+    """Return XML some of whose elements, attributes, names and texts were changed."""
+    ET.register_namespace("xacro", "http://www.ros.org/wiki/xacro")
+    root = ET.fromstring(data.replace(b" xmlns=", b" xmlns_="))  # written with no prefixes
     for _ in range(rng.choice((1, 1, 2, 3))):
         parents = [one for one in root.iter() if len(one)]
         every = list(root.iter())
         parent = rng.choice(parents or every)
         rng.choice(_XML_WAYS)(rng, parent, rng.choice(every))
     try:
-        return ET.tostring(root)
+        text = ET.tostring(root).replace(b" xmlns_=", b" xmlns=")
     except RecursionError:  # a link inside itself
         return b"<robot>" + b"<link>" * 3000
+    if rng.random() < 0.05:
+        encoding = rng.choice((b"utf-8", b"utf-16", b"latin-1", b"rot13", b"x"))
+        return b'<?xml version="1.0" encoding="' + encoding + b'"?>' + text
+    return text
 
 
 def _xml_drop(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
@@ -382,12 +388,18 @@ def _xml_attribute(rng: random.Random, parent: ET.Element, other: ET.Element) ->
         other.attrib[name] = " ".join(words * rng.choice((1, 1, 2)))
     elif way == 2:
         other.attrib[name] = rng.choice(
-            ("", "base", "tip", "universe", "root_joint", "world", "floating", "x")
+            ("", "base", "tip", "universe", "root_joint", "world", "floating", "x", *EXPRESSIONS)
         )
     else:
         value = odd_value(rng)
         text = str(value) if not isinstance(value, list | dict) else "[]"
         other.attrib[name] = "".join(c for c in text if c >= " ")
+
+
+def _xml_text(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
+    words = (other.text or "").split() or [""]
+    words[rng.randrange(len(words))] = rng.choice((*NUMBERS, *EXPRESSIONS))
+    other.text = " ".join(words)
 
 
 def _xml_tag(rng: random.Random, parent: ET.Element, other: ET.Element) -> None:
@@ -412,5 +424,5 @@ def _xml_mesh(rng: random.Random, parent: ET.Element, other: ET.Element) -> None
 
 _XML_WAYS = (
     *(_xml_drop, _xml_copy, _xml_attribute, _xml_attribute, _xml_attribute, _xml_attribute),
-    *(_xml_tag, _xml_swap, _xml_kind, _xml_mesh),
+    *(_xml_tag, _xml_swap, _xml_kind, _xml_mesh, _xml_text),
 )

@@ -17,9 +17,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-PATIENCE = 120.0  # [s] by the clock: a busy machine computes little, a file that waits nothing
-MEMORY = 2 << 30  # [B] on top of what the process has before its first file
-NEWS = 100  # files between two messages of the process that reads
+from tests.fuzz.inputs import KINDS, TURNS, make_input
+from tests.fuzz.tables import prepare
+
+PATIENCE = 600.0  # [s] by the clock: a busy machine computes little, a file that waits nothing
+_OF_ALL = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+MEMORY = 1 << 30  # [B] on top of what the process has before its first file
 
 
 @dataclass(frozen=True)
@@ -41,23 +44,24 @@ class Report:
     slowest: tuple[float, int] = (0.0, 0)
     """[s], and which input."""
     peak: int = 0
-    """[B] of memory, of the largest process."""
+    """[B] of memory, of the largest process, which may be one that a reader started."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """The inputs first, first + step, ... below `last` of `seed`, until `until` [s since 1970].
+    """The inputs from `first` to below `last` of `seed`, until `until` [s since 1970].
 
-    `reader`, "module:function", takes the path of each; it may compute for `hang` [s].
+    Those of other `kinds` are left out. `reader`, "module:function", takes the path of each; it may
+    compute for `hang` [s].
     """
 
     seed: int
     first: int
     last: int
-    step: int
     until: float
-    reader: str = "tests.fuzz.readers:read"
-    hang: float = 20.0
+    kinds: tuple[str, ...] = tuple(KINDS)
+    reader: str = "tests.fuzz.inputs:read"
+    hang: float = 10.0
 
 
 def watch(
@@ -90,9 +94,10 @@ def watch(
                 raise RuntimeError(f"the process that reads did not start: {why}\n{details}")
             failure = Failure(task.seed, place.value, why, details)
             report.failures.append(failure)
+            report.counts[TURNS[failure.k % len(TURNS)], "broke"] += 1
             if failed(failure):
                 return
-            first = place.value + task.step
+            first = place.value + 1
 
 
 def _follow(
@@ -117,12 +122,12 @@ def _follow(
                     if failed(value):
                         return None
                     continue
-                counts, slowest, peak = value
-                report.counts.update(counts)
-                report.slowest = max(report.slowest, slowest)
-                report.peak = max(report.peak, peak)
                 if what == "end":
                     return None
+                kind, outcome, took, peak = value
+                report.counts[kind, outcome] += 1
+                report.slowest = max(report.slowest, took)
+                report.peak = max(report.peak, peak)
         except EOFError:
             worker.join()
             code = worker.exitcode
@@ -138,12 +143,12 @@ def _follow(
 
 
 def _computed(process: int) -> float:
-    """Return the processor time of a process [s]."""
+    """Return the processor time of a process, and of those that it started and that ended [s]."""
     try:
         fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     except OSError:
         return 0.0  # it has just ended
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def _work(task: Task, theirs: Any, place: Any, folder: str) -> None:
@@ -154,25 +159,17 @@ def _work(task: Task, theirs: Any, place: Any, folder: str) -> None:
     silent = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
         os.dup2(silent, stream)
-    from tests.fuzz.inputs import KINDS, TURNS, make_input
-    from tests.fuzz.tables import prepare
-
     module, _, name = task.reader.partition(":")
     read = getattr(importlib.import_module(module), name)
 
     prepare(home)
-    for kind in range(len(KINDS)):
-        make_input(task.seed, kind)  # corpora are made once
+    for kind in task.kinds:
+        KINDS[kind].corpus()  # made once
     space = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (space + MEMORY, space + MEMORY))
-    counts: Counter[tuple[str, str]] = Counter()
-    slowest = (0.0, 0)
-
-    def tell(what: str) -> None:
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-        theirs.send((what, (counts, slowest, peak)))
-
-    for k in range(task.first, task.last, task.step):
+    for k in range(task.first, task.last):
+        if TURNS[k % len(TURNS)] not in task.kinds:
+            continue
         if time.time() >= task.until:
             break
         place.value = k
@@ -186,9 +183,7 @@ def _work(task: Task, theirs: Any, place: Any, folder: str) -> None:
             outcome = "broke"
             why = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
             theirs.send(("failure", Failure(task.seed, k, why, traceback.format_exc())))
-        slowest = max(slowest, (time.monotonic() - start, k))
-        counts[TURNS[k % len(TURNS)], outcome] += 1
-        if sum(counts.values()) >= NEWS:
-            tell("news")
-            counts = Counter()
-    tell("end")
+        peak = 1024 * max(resource.getrusage(who).ru_maxrss for who in _OF_ALL)
+        took = time.monotonic() - start
+        theirs.send(("news", (TURNS[k % len(TURNS)], outcome, (took, k), peak)))
+    theirs.send(("end", None))

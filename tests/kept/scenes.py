@@ -35,12 +35,6 @@ file = "plate.obj"
 unit = "m"
 
 [[shell]]
-name = "valve"
-file = "valve_body.step"
-chord_error = 1e-3
-placement = { xyz = [0, 1, 0] }
-
-[[shell]]
 name = "below"
 primitive = { type = "box", size = [0.2, 0.2, 0.02] }
 placement = { xyz = [0, 0, -0.5] }
@@ -57,13 +51,6 @@ name = "tips"
 spheres = "collision"
 shell = "below"
 law = { type = "table", file = "law.csv" }
-
-[[contact]]
-name = "ball-valve"
-sphere = { frame = "ball/ball", radius = 0.012 }
-shell = "valve"
-method = "smooth"
-law = { type = "impact", stiffness = 1e6 }
 
 [[source]]
 name = "points"
@@ -90,6 +77,21 @@ wear = 1e-9
 
 [figures]
 own = "routine.py:figure"
+"""
+
+CAD = """
+[[shell]]
+name = "valve"
+file = "valve_body.step"
+chord_error = 1e-3
+placement = { xyz = [0, 1, 0] }
+
+[[contact]]
+name = "ball-valve"
+sphere = { frame = "ball/ball", radius = 0.012 }
+shell = "valve"
+method = "smooth"
+law = { type = "impact", stiffness = 1e6 }
 """
 
 ROUTINE = """
@@ -150,7 +152,7 @@ def write(home: Path) -> Path:
     )
     (home / "law.csv").write_text("depth,force\n0,0\n1e-3,10\n")
     (home / "routine.py").write_text(ROUTINE)
-    (home / "all.toml").write_text(SCENARIO)
+    (home / "all.toml").write_text(SCENARIO + CAD)
     return home / "all.toml"
 
 

@@ -1,0 +1,240 @@
+"""Inputs of several files, each folder packed into one zip archive; they are damaged apart."""
+
+from __future__ import annotations
+
+import functools
+import io
+import json
+import random
+import tempfile
+import zipfile
+from base64 import b64encode
+from collections.abc import Callable, Sequence
+from pathlib import Path, PurePath
+
+import numpy as np
+
+from sphshell_pin import robots
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.running.run import simulate
+from tests.fuzz.meshes import SHAPES, WRITERS, Mesh, damaged_mesh
+from tests.fuzz.mutate import LARGEST, NUMBERS, alter, damage
+from tests.fuzz.tables import (
+    PRESS,
+    damaged_journal,
+    damaged_npz,
+    damaged_toml,
+    damaged_xml,
+    pack,
+    reproducible,
+)
+from tests.kept import scenes
+
+DATA = Path(__file__).parents[1] / "data"
+Structure = Callable[[random.Random, bytes], bytes]
+
+ROBOT = """<robot name="arm"><link name="base"/>
+<link name="arm"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0"
+  ixz="0" iyz="0"/></inertial>
+  <visual><geometry><mesh filename="MESH" scale="0.1 0.1 0.2"/></geometry></visual>
+  <collision><geometry><mesh filename="MESH"/></geometry></collision></link>
+<joint name="elbow" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+MJCF = """<mujoco model="arm"><compiler angle="radian"/>
+<asset><mesh name="mesh" file="MESH" scale="0.1 0.1 0.2"/></asset>
+<worldbody><body name="arm"><joint name="elbow" axis="0 1 0"/><geom type="mesh" mesh="mesh"/></body>
+</worldbody></mujoco>"""
+INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+POSES = """<robot name="finger"><group name="all"><joint name="knuckle"/></group>
+<group_state name="closed" group="all"><joint name="knuckle" value="0.8"/>
+  <joint name="middle_joint" value="0.4"/></group_state>
+<group_state name="open" group="all"><joint name="knuckle" value="0"/></group_state></robot>"""
+DAE = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="12">0 0 0 1 0 0 0 1 0 0 0 1</float_array>
+<technique_common><accessor source="#a" count="4" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
+<p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node>
+</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+MEASURED = b"""t [s],pairs.ball-plate.normal_force [N],q.root_joint.2 [m],q.root_joint.2.sigma [m]
+0.001,0.0,0.01249,1e-5\n0.002,0.5,0.01246,1e-5\n0.003,0.9,0.01241,1e-5\n0.004,,0.0124,2e-5
+"""
+
+
+def unpacked(data: bytes) -> dict[str, bytes]:
+    """Return the files of an archive that `pack` made."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+@functools.cache
+def xacro_corpus() -> tuple[bytes, ...]:
+    home = DATA / "xacro"
+    parts = {"finger_description/package.xml", "finger_description/urdf/finger.xacro"}
+    more = {name: (home / name).read_bytes() for name in sorted(parts | {"lengths.yaml"})}
+    return tuple(
+        pack({"robot.xacro": p.read_bytes(), **more}) for p in sorted(home.glob("*.xacro"))
+    )
+
+
+@functools.cache
+def srdf_corpus() -> tuple[bytes, ...]:
+    finger = (robots.URDF_FOLDER / "three_link_finger.urdf").read_bytes()
+    return (pack({"robot.urdf": finger, "robot.srdf": POSES.encode()}),)
+
+
+@functools.cache
+def include_corpus() -> tuple[bytes, ...]:
+    home = DATA / "mjcf"
+    parts = {f"parts/{p.name}": p.read_bytes() for p in sorted((home / "parts").iterdir())}
+    return (pack({"robot.xml": (home / "included.xml").read_bytes(), **parts}),)
+
+
+@functools.cache
+def package_corpus() -> tuple[bytes, ...]:
+    home = DATA / "xacro" / "finger_description"
+    robot = ROBOT.replace("MESH", "package://finger_description/meshes/cube.stl").encode()
+    parts = {name: (home / name).read_bytes() for name in ("package.xml", "meshes/cube.stl")}
+    return (pack({"robot.urdf": robot, **parts}),)
+
+
+@functools.cache
+def mesh_corpus() -> tuple[bytes, ...]:
+    solid = SHAPES[-1]()
+    files = {suffix: write(solid) for suffix, write in WRITERS.values() if suffix in _BY_ROBOTS}
+    buffer = np.array(solid.vertices, "<f4").tobytes() + np.array(solid.faces, "<u2").tobytes()
+    uri = "data:application/octet-stream;base64," + b64encode(buffer).decode()
+    accessor = {"bufferView": 0, "componentType": 5126, "count": 5, "type": "VEC3"}
+    gltf = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {**accessor, "min": [0, 0, 0], "max": [1, 1, 1]},
+            {"bufferView": 1, "componentType": 5123, "count": 21, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 60},
+            {"buffer": 0, "byteOffset": 60, "byteLength": 42},
+        ],
+        "buffers": [{"uri": uri, "byteLength": 102}],
+    }
+    files |= {".dae": DAE.encode(), ".gltf": json.dumps(gltf).encode()}
+    made = []
+    for suffix, data in files.items():
+        for name, text in (("robot.urdf", ROBOT), ("robot.xml", MJCF)):
+            robot = text.replace("MESH", f"mesh{suffix}")
+            if suffix == ".dae":  # whose mass only a further package can tell
+                robot = robot.replace("<geom ", f"{INERTIAL}<geom ")
+            made.append(pack({name: robot.encode(), f"mesh{suffix}": data}))
+    return tuple(made)
+
+
+_BY_ROBOTS = (".stl", ".obj", ".ply", ".off")
+
+
+@functools.cache
+def law_corpus() -> tuple[bytes, ...]:
+    law = 'type = "table", file = "law.csv"'
+    start, stop = PRESS.index('type = "hertz"'), PRESS.index(' }\nfriction = { type = "bristle"')
+    scenario = PRESS[:start] + law + PRESS[stop:]
+    return (pack({"law.toml": scenario.encode(), "law.csv": b"depth,force\n0,0\n1e-3,10\n"}),)
+
+
+def fit_corpus() -> tuple[bytes, ...]:
+    return (MEASURED,)
+
+
+@functools.cache
+def results_corpus() -> tuple[bytes, ...]:
+    """Return the results of a run whose robots and surfaces came from files of all formats."""
+    with tempfile.TemporaryDirectory() as folder:
+        home = Path(folder)
+        scenes.write(home)
+        scenario = home / "own.toml"
+        scenario.write_text(scenes.SCENARIO)
+        changes = {"run.record": '["patch", "torque"]', "run.record_dt": "4e-3"}
+        result, _ = simulate(build(scenario, changes))
+        run = reproducible(result.save(home / "run.npz"))
+        return (pack({"run.npz": run, "summary.json": b'{"complete": true}'}),)
+
+
+def damaged_csv(rng: random.Random, data: bytes) -> bytes:
+    """Return a table of which cells, columns or rows were changed."""
+    rows = [row.split(",") for row in data.decode(errors="replace").split("\n")]
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        row, other = rng.choice(rows), rng.choice(rows)
+        at, to = rng.randrange(len(row)), rng.randrange(len(row))
+        way = rng.randrange(7)
+        if way == 0:
+            rows.insert(rng.randrange(len(rows)), list(other))
+        elif way == 1:
+            row[at], row[to] = row[to], row[at]
+        elif way == 2:
+            for one in rows:
+                one.insert(at, one[min(to, len(one) - 1)])
+        elif way == 3:
+            row[at] = rng.choice(rng.choice(rows))
+        elif way == 4:
+            rows = [rows[0], *map(list, rows[1:] * rng.choice((0, 2, 50)))][:1000]
+        else:
+            row[at] = rng.choice(NUMBERS)
+    return "\n".join(map(",".join, rows)).encode()[:LARGEST]
+
+
+def damaged_json(rng: random.Random, data: bytes) -> bytes:
+    """Return JSON some of whose values were changed."""
+    return json.dumps(alter(rng, json.loads(data))).encode()
+
+
+def damaged_folder(rng: random.Random, data: bytes) -> bytes:
+    """Return a folder of which a file or more are damaged, gone, or what another one is."""
+    files = unpacked(data)
+    for _ in range(rng.choice((1, 1, 1, 2))):
+        name = rng.choice(sorted(files))
+        way = rng.random()
+        if way < 0.9:
+            structure = STRUCTURES.get(PurePath(name).suffix)
+            files[name] = damaged(rng, structure, files[name], sorted(files.values()))
+        elif way < 0.95 and len(files) > 1:
+            del files[name]
+        else:
+            files[name] = files[rng.choice(sorted(files))]
+    return pack(files)
+
+
+def damaged(
+    rng: random.Random, structure: Structure | None, data: bytes, others: Sequence[bytes] = ()
+) -> bytes:
+    """Return `data` with its structure changed, or some of its bytes."""
+    # Of an archive with other bytes, all is refused at once.
+    if structure is None or (structure is not damaged_folder and rng.random() < 0.4):
+        return damage(rng, data, others)
+    try:
+        return structure(rng, data)
+    except Exception:
+        return damage(rng, data, others)  # damaged before, so that nothing can be read
+
+
+def mesh_by(write: Callable[[Mesh], bytes]) -> Structure:
+    """Return what makes a damaged surface, whatever the file was."""
+    return lambda rng, _: write(damaged_mesh(rng))
+
+
+STRUCTURES: dict[str, Structure] = {
+    **{suffix: mesh_by(write) for suffix, write in WRITERS.values()},
+    **dict.fromkeys((".xml", ".urdf", ".xacro", ".srdf", ".dae"), damaged_xml),
+    **dict.fromkeys((".json", ".gltf"), damaged_json),
+    ".zip": damaged_folder,
+    ".npz": damaged_npz,
+    ".toml": damaged_toml,
+    ".journal": damaged_journal,
+    ".csv": damaged_csv,
+}
+"""By suffix: what changes the structure of a file."""
