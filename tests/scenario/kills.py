@@ -275,6 +275,8 @@ def kill_at_random(trial: Trial, times: int) -> list[str]:
 def fill_disks(trial: Trial, sizes: int = 24) -> list[str]:
     """Run on file systems that are full after a while; return what was wrong."""
     place = trial.place
+    trial.begin()
+    keep = shutil.copytree(place, place.with_suffix(".keep"))
     wrong = []
     found: Counter[str] = Counter()
     begin_size, told = 0, ""
@@ -284,7 +286,7 @@ def fill_disks(trial: Trial, sizes: int = 24) -> list[str]:
             print("full disks: left out, for file systems cannot be mounted here")
             return wrong
         try:
-            trial.begin()
+            shutil.copytree(keep, place, dirs_exist_ok=True)
             used = shutil.disk_usage(place).used
             begin_size = begin_size or used
             room = used + n * begin_size // (sizes - 4)
