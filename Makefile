@@ -104,7 +104,7 @@ fuzz: $(VENV)/.test ## damaged files for every reader, until one breaks it (SECO
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 	$(BIN)/python -m tests.fuzz.cad --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 
-kills: $(VENV)/.test ## kill run, fit, render and sweep at any moment, fill disks: an hour
+kills: $(VENV)/.test ## kill run, fit, render and sweep at any moment, fill disks
 	$(BIN)/python -m tests.scenario.kills
 
 sweep-survival: $(VENV)/.test ## 500 runs five ways, workers killed and the sweep resumed: same bytes
