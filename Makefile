@@ -104,7 +104,7 @@ fuzz: $(VENV)/.test ## damaged files, folders of robots and results for every re
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 	$(BIN)/python -m tests.fuzz.cad --seconds $(or $(SECONDS),60) --seed $(or $(SEED),1)
 
-kills: $(VENV)/.test ## kill runs at every system call and at random times, fill disks: 15 minutes
+kills: $(VENV)/.test ## kill run, fit, render and sweep at any moment, fill disks
 	$(BIN)/python -m tests.scenario.kills
 
 sweep-survival: $(VENV)/.test ## 500 runs five ways, workers killed and the sweep resumed: same bytes

@@ -25,7 +25,11 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "docs" / "examples" / "cpp"
 PAGE = ROOT / "docs" / "cpp.md"
-BUILD = ROOT / "build"
+# .ci/sanitize sets a folder, and CXXFLAGS to which no kind of build adds any.
+BUILD = Path(os.environ.get("SPHSHELL_CPP_BUILD", ROOT / "build"))
+KIND = "" if "SPHSHELL_CPP_BUILD" in os.environ else "Release"
+# Its programs bring their own sanitizer; compilers need none.
+ENVIRONMENT = {name: text for name, text in os.environ.items() if name != "LD_PRELOAD"}
 PINOCCHIO = Path(pin.__file__).parents[4]  # the wheels' prefix, of which this is lib/python/...
 WITHOUT_PYTHON = "-DSPHSHELL_PIN_PYTHON=OFF", "-DCMAKE_DISABLE_FIND_PACKAGE_Python=ON"
 CACHE = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
@@ -39,7 +43,7 @@ def call(*command: object, cwd: Path = ROOT) -> str:
     done = subprocess.run(
         [shutil.which(str(command[0]), path=path) or str(command[0]), *map(str, command[1:])],
         cwd=cwd,
-        env={**os.environ, "PATH": path},
+        env={**ENVIRONMENT, "PATH": path},
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -55,7 +59,7 @@ def built() -> Path:
     BUILD.mkdir(parents=True, exist_ok=True)
     with (BUILD / "cpp.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process of the tests builds, the others wait
-        build("cpp", ROOT, PINOCCHIO, *WITHOUT_PYTHON, kind="Release")
+        build("cpp", ROOT, PINOCCHIO, *WITHOUT_PYTHON, kind=KIND)
         call("cmake", "--install", BUILD / "cpp", "--prefix", BUILD / "cpp-installed")
         both = f"{BUILD / 'cpp-installed'};{PINOCCHIO}"
         build("cpp-finger", EXAMPLE, both)
@@ -117,7 +121,7 @@ def test_the_example_comes_to_the_numbers_of_python(built):
     np.testing.assert_allclose([force, depth], [*contacts.normal_force, *contacts.depth], rtol=1e-8)
     # One without its argument says how it is called.
     alone = [built / "cpp-finger" / "finger_on_wall"]
-    usage = subprocess.run(alone, capture_output=True, text=True, check=False)
+    usage = subprocess.run(alone, capture_output=True, text=True, check=False, env=ENVIRONMENT)
     assert usage.returncode == 2
     assert "usage: finger_on_wall URDF" in usage.stderr
 
@@ -147,7 +151,9 @@ def test_contacts_are_those_of_python_to_the_bit(built):
     for place, size, how in zip(center.tolist(), radius.tolist(), method, strict=True):
         text.append(" ".join(map(repr, [*place, size])) + f" {how}")
     program, given = [built / "cpp-tests" / "contacts_of"], "\n".join(text)
-    done = subprocess.run(program, input=given, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        program, input=given, capture_output=True, text=True, check=True, env=ENVIRONMENT
+    )
 
     shell = sp.Shell(vertices, quads, clean=False)
     rows = []

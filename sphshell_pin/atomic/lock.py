@@ -25,13 +25,27 @@ def lock_file(path: Path, *, wait: bool = True) -> tuple[int, bool]:
     OSError
         The file cannot be opened.
     """
+    # No link of somebody else's in a shared folder may lead to the file.
+    flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+    return _lock(path, flags, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+
+
+def lock_folder(path: Path, *, alone: bool) -> tuple[int, bool]:
+    """Open the folder at `path` and lock it, like `lock_file`, alone or together with others.
+
+    A folder that is locked together cannot be locked alone: BlockingIOError. The other way round
+    it waits.
+    """
+    flags = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
+    return _lock(path, flags, fcntl.LOCK_EX | fcntl.LOCK_NB if alone else fcntl.LOCK_SH)
+
+
+def _lock(path: Path, flags: int, operation: int) -> tuple[int, bool]:
     while True:
-        # No link of somebody else's in a shared folder may lead to the file.
-        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
         descriptor = os.open(path, flags, 0o666)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-            # The holder before may have removed or renamed the file: then others lock a new one.
+            fcntl.flock(descriptor, operation)
+            # The holder before may have removed or renamed it: then others lock a new one.
             if _is_at(descriptor, path):
                 return descriptor, True
         except OSError as fault:

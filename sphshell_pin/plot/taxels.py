@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 COLORS = "inferno"
 LARGE = 320  # pixels of a film's longer side, at least
+MOST_FRAMES = 100_000
 SAMPLES = 32  # frames that the colors of a .gif are chosen from
 
 
@@ -53,15 +54,22 @@ def save_film(path: Path, images: TaxelImages, *, fps: float, speed: float) -> P
     `fps` frames a second, of which each shows `speed` / `fps` seconds of simulated time.
 
     Raises InvalidParameter unless the images are those of a grid, for another suffix, and for an
-    `fps` or `speed` that is not positive; MissingExtra without matplotlib, or for a .mp4 without
-    imageio-ffmpeg.
+    `fps` or `speed` that is not positive or makes more than MOST_FRAMES; MissingExtra without
+    matplotlib, or for a .mp4 without imageio-ffmpeg.
     """
     for name, value in (("fps", fps), ("speed", speed)):
         if not (np.isfinite(value) and value > 0.0):
             raise InvalidParameter(name, value, "must be positive")
     check_film(path, (LARGE, LARGE), fps)
     frames = _frames(images, fps, speed)
-    return write_film(path, frames, fps, list(frames[:: max(1, len(frames) // SAMPLES)]))
+    # Films of odd sizes are refused by some players.
+    times = 2 * (-(-LARGE // max(frames.shape[1:3])) // 2 + 1)
+
+    def enlarged(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        return np.asarray(frame.repeat(times, axis=0).repeat(times, axis=1))
+
+    samples = [enlarged(one) for one in frames[:: max(1, len(frames) // SAMPLES)]]
+    return write_film(path, map(enlarged, frames), fps, samples)
 
 
 def _grid(images: TaxelImages) -> NDArray[np.float64]:
@@ -76,16 +84,19 @@ def _grid(images: TaxelImages) -> NDArray[np.float64]:
 
 
 def _frames(images: TaxelImages, fps: float, speed: float) -> NDArray[np.uint8]:
-    """Return colors (frames, height, width, 3), latitude up."""
+    """Return colors (frames, rows, columns, 3) of the taxels, latitude up."""
     forces = _grid(images)
     try:
         from matplotlib import colormaps
     except ImportError as missing:
         raise MissingExtra("matplotlib", "view", "a film of taxels") from missing
-    wanted = np.arange(images.t[0], images.t[-1] + 1e-9, speed / fps)
+    with np.errstate(over="ignore", invalid="ignore"):  # of times that no run has
+        count = np.divide(images.t[-1] - images.t[0] + 1e-9, speed / fps)
+    if not 0.0 <= count < MOST_FRAMES:
+        why = f"gives {count:.2g} frames, of 1 to {MOST_FRAMES}, at {fps:g} frames a second"
+        raise InvalidParameter("speed", speed, why)
+    wanted = images.t[0] + np.arange(int(count) + 1) * (speed / fps)
     rows = np.minimum(np.searchsorted(images.t, wanted), len(images.t) - 1)
     share = forces[rows][:, ::-1] / (forces.max() or 1.0)
-    colors = (colormaps[COLORS](np.maximum(share, 0.0))[..., :3] * 255.0).astype(np.uint8)
-    # Films of odd sizes are refused by some players.
-    times = 2 * (-(-LARGE // max(forces.shape[1:])) // 2 + 1)
-    return np.asarray(colors.repeat(times, axis=1).repeat(times, axis=2))
+    colors = colormaps[COLORS](np.maximum(share, 0.0))[..., :3] * 255.0
+    return np.asarray(colors, np.uint8)

@@ -153,6 +153,8 @@ def _polygons(elements: object) -> tuple[Longs, Ints]:
         raise InvalidShell(f"elements must be an array or a list of lists, not {type(elements)}")
     if len(elements) == 0:
         raise InvalidShell("a surface needs at least one element; none given")
+    if np.ma.is_masked(elements):
+        raise InvalidShell("elements must not be masked: leave out those that are not wanted")
     rows = elements
     if not isinstance(rows, np.ndarray):
         if len({len(row) for row in rows if hasattr(row, "__len__")}) != 1:

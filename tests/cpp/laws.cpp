@@ -1,6 +1,7 @@
 #include <sphshell_pin/laws.hpp>
 
 #include <limits>
+#include <utility>
 
 #include "check.hpp"
 
@@ -46,6 +47,15 @@ void friction_is_that_of_the_formulas() {
   CHECK(FrictionLaw(mindlin).has_state());
 }
 
+void laws_that_were_moved_stay_laws() {
+  NormalLaw table = TableLaw{{0, 1e-3}, {0, 1}};
+  FrictionLaw coulomb = CoulombFriction{0.5, 0.4, 0.005, 0.05};
+  const NormalLaw normal = std::move(table);
+  const FrictionLaw friction = std::move(coulomb);
+  CHECK(table.force(1e-3) == normal.force(1e-3));
+  CHECK(coulomb.coefficient(1) == friction.coefficient(1));
+}
+
 void bad_numbers_are_refused() {
   using E = InvalidParameter;
   CHECK_THROWS(E, "stiffness = -1 must be positive [N/m^exponent]", NormalLaw(ImpactLaw{-1}));
@@ -83,5 +93,6 @@ void bad_numbers_are_refused() {
 int main() {
   forces_are_those_of_the_formulas();
   friction_is_that_of_the_formulas();
+  laws_that_were_moved_stay_laws();
   bad_numbers_are_refused();
 }

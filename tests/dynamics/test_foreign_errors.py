@@ -9,7 +9,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.cli.export import nanoseconds
-from sphshell_pin.errors import DataError, InvalidParameter, ResultError
+from sphshell_pin.errors import DataError, InvalidParameter, InvalidShell, ResultError
 from sphshell_pin.patches import ShellTaxels
 from sphshell_pin.study.fit import Experiment
 from sphshell_pin.study.fit.data import read_experiment
@@ -41,6 +41,8 @@ def test_arguments_are_named(tmp_path) -> None:
     }.items():
         with pytest.raises(InvalidParameter, match=said):
             use()
+    with pytest.raises(InvalidShell, match="elements must not be masked"):
+        sp.Shell(np.eye(3), np.ma.masked_equal([[0, 1, 2]], 2))
     pytest.importorskip("mcap")
     with pytest.raises(InvalidParameter, match="scene = 'wrong' must be a Scene"):
         result.to_mcap(path, scene="wrong")

@@ -21,18 +21,21 @@ from pathlib import Path
 from types import CodeType, FrameType
 
 STARTS = {"subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork"}
-STARTS |= {"pty.spawn", "os.forkpty", "socket.connect", "webbrowser.open"}
+STARTS |= {"pty.spawn", "os.forkpty", "socket.connect", "webbrowser.open", "pickle.find_class"}
+PACKAGE = f"{os.sep}sphshell_pin{os.sep}"
 
 
 class Watch:
     """What happens, by the name of the look that is going on."""
 
-    def __init__(self, allowed: list[Path]) -> None:
+    def __init__(self, code: list[Path], files: list[Path]) -> None:
+        """Code may come from the places `code`; files that are read, from `files`, too."""
         self.found: dict[str, list[str]] = {}
         self.look = ""
         self.browser = False
-        """Whether the programs of Playwright may be started."""
-        self._allowed = [os.path.realpath(one) + os.sep for one in allowed]
+        """Whether the program of Playwright may be started."""
+        self._code = tuple(os.path.realpath(one) + os.sep for one in code)
+        self._files = self._code + tuple(os.path.realpath(one) + os.sep for one in files)
 
     def __call__(self, event: str, arguments: tuple[object, ...]) -> None:
         """Hear of an event."""
@@ -40,38 +43,44 @@ class Watch:
             return
         if event == "open" and isinstance(arguments[0], str | bytes):
             path = os.fsdecode(arguments[0])
-            if not self._is_allowed(path):
+            if not _is_in(path, self._files):
                 self._tell(event, path)
         elif event == "exec" and isinstance(arguments[0], CodeType):
             self._check_code(event, arguments[0].co_filename)
         elif event == "compile":
             self._check_code(event, str(arguments[1]))
+        elif event == "ctypes.dlopen" and arguments[0]:
+            self._check_code(event, str(arguments[0]))
         elif event in STARTS:
             program = str(arguments[0])
-            if not (self.browser and self._is_allowed(program)):
+            if not (self.browser and "/playwright/" in program and _is_in(program, self._code)):
                 self._tell(event, program)
 
     def _check_code(self, event: str, file: str) -> None:
         if not file.startswith("<"):
-            if not self._is_allowed(file):
+            if not _is_in(file, self._code):
                 self._tell(event, file)
             return
         # Made of text: by whom? The libraries make classes in this way, xacro evaluates.
         frame: FrameType | None = sys._getframe(2)
+        makers = []
         while frame is not None:
-            maker = frame.f_code.co_filename
-            if not maker.startswith("<") and not self._is_allowed(maker):
-                self._tell(event, f"text, by {maker}")
-            if f"{os.sep}xacro{os.sep}" in maker:
-                self._tell(event, f"an expression, by {maker}")
+            makers.append(frame.f_code.co_filename)
             frame = frame.f_back
-
-    def _is_allowed(self, path: str) -> bool:
-        # realpath() opens nothing.
-        return (os.path.realpath(path) + os.sep).startswith(tuple(self._allowed))
+        makers = [one for one in makers if not one.startswith("<")]
+        for maker in makers:
+            if not _is_in(maker, self._code) or f"{os.sep}xacro{os.sep}" in maker:
+                self._tell(event, f"text, by {maker}")
+        if PACKAGE in makers[0]:
+            self._tell(event, f"text, by {makers[0]}")
 
     def _tell(self, event: str, what: str) -> None:
         self.found[self.look].append(f"{event}: {what}")
+
+
+def _is_in(path: str, places: tuple[str, ...]) -> bool:
+    # realpath() opens nothing.
+    return (os.path.realpath(path) + os.sep).startswith(places)
 
 
 def looks(scenario: str) -> dict[str, Callable[[], object]]:
@@ -80,6 +89,7 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
     from sphshell_pin.cli import main
     from sphshell_pin.patches import TaxelGrid
     from sphshell_pin.patches.wear import wear_maps
+    from sphshell_pin.plot import KINDS
     from sphshell_pin.scenario.running.replay import Replay
 
     def command(*words: str) -> Callable[[], None]:
@@ -131,9 +141,6 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
     }
 
 
-KINDS = ("overview", "force", "energy", "sensors", "path", "map")
-
-
 def look(repository: Path, out: Path, scenario: str) -> None:
     """Look at the results in every way."""
     import matplotlib.font_manager  # noqa: F401  # asks the system for its fonts, once
@@ -141,21 +148,12 @@ def look(repository: Path, out: Path, scenario: str) -> None:
     package = importlib.util.find_spec("sphshell_pin")
     assert package is not None
     assert package.origin is not None
-    places = [
-        Path.cwd(),
-        Path("run"),
-        Path(sys.prefix),
-        Path(sys.base_prefix),
-        Path(tempfile.gettempdir()),
-    ]
-    places += [
-        Path(package.origin).parent,
-        Path(__file__).parent,
-        *map(Path, site.getsitepackages()),
-    ]
-    places += [repository / one for one in ("robots", "scenarios", "build")]
-    places += [Path(one) for one in ("/dev", "/proc", "/sys", "/usr", "/lib", "/etc/mime.types")]
-    watch = Watch(places)
+    code = [Path(sys.prefix), Path(sys.base_prefix), *map(Path, site.getsitepackages())]
+    code += [Path(package.origin).parent, Path(__file__).parent]
+    code += [repository / one for one in ("robots", "build")]
+    files = [Path.cwd(), Path("run"), Path(tempfile.gettempdir()), repository / "scenarios"]
+    files += [Path(one) for one in ("/dev", "/proc", "/sys", "/usr", "/lib", "/etc/mime.types")]
+    watch = Watch(code, files)
     ways = looks(scenario)
     sys.addaudithook(watch)
     said: dict[str, str] = {}

@@ -1,5 +1,7 @@
 """Taxels: sums are exact, shares are those of Hertz's pressure, images move with the body."""
 
+import dataclasses
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -132,6 +134,10 @@ def test_films(tmp_path):
         assert opened.width * 4 == opened.height * 6
     with pytest.raises(InvalidParameter, match=r"\.gif or \.mp4"):
         images.save_film(tmp_path / "taxels.avi")
+    for t, speed in ((-1e308, 1.0), (np.nan, 1.0), (0.0, 1e-300)):
+        odd = dataclasses.replace(images, t=np.concatenate([[t], images.t[1:]]))
+        with pytest.raises(InvalidParameter, match=r"speed = .* frames, of 1 to 100000"):
+            odd.save_film(tmp_path / "taxels.gif", speed=speed)
 
 
 def test_mistakes(slid):

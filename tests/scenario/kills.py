@@ -1,9 +1,10 @@
-"""What `sphshell-pin run` leaves behind when it is killed, and when the disk is full.
+"""What commands leave behind when they are killed, and when the disk is full.
 
-`python -m tests.scenario.kills` runs the real command over the results of an earlier run and kills
-it: at every system call that touches the folder's files (with strace), and at random times. After
-each kill the folder must be whole, by the SHA-256 in its summary. Then it runs the command on small
-file systems in memory (where it may mount them). Returns 1 if anything else was found.
+`python -m tests.scenario.kills` runs each command of `COMMANDS` over its own earlier results and
+kills it: at every system call that touches the folder's files (with strace), and at random times.
+After each kill the folder must have all old files or all new ones, and those of others. Then it
+runs them on small file systems in memory (where it may mount them). Returns 1 if anything else was
+found.
 """
 
 from __future__ import annotations
@@ -20,59 +21,167 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from sphshell_pin.atomic import AtomicFolder
+from tests.scenario.operations import visible
 
-RUN = [
-    sys.executable, "-c", "from sphshell_pin.cli import main; main()", "run", "sphere_on_shell",
-    "--duration", "0.03", "--set",
-]  # fmt: skip
-STIFFNESS = ("1e5", "2e5")
+MAIN = [sys.executable, "-c", "from sphshell_pin.cli import main; main()"]
 CALLS = (
     "openat,write,pwrite64,writev,rename,renameat,renameat2,unlink,unlinkat,link,linkat,symlink,"
     "symlinkat,mkdir,mkdirat,rmdir,fsync,fdatasync,ftruncate,chmod,fchmod,fchmodat,chown,flock"
 )
-NOTES = "notes.txt"
+SCENE, STIFFNESS = "sphere_on_shell", "contact.ball-bowl.law.k"
 
 
-def command(place: Path, stiffness: str) -> list[str]:
-    """Return the command of one of two runs."""
-    key = f"contact.ball-bowl.law.k={stiffness}"
-    return [*RUN, key, "--out", str(place / "out")]
+def run_of(files: dict[str, bytes]) -> str:
+    """Return the stiffness of the run whose files these are, by the SHA-256 in its summary."""
+    summary = json.loads(files["summary.json"])
+    if not summary["complete"] or {*files} != {"summary.json", *summary["files"]}:
+        return f"not complete: {sorted(files)}"
+    for name, digest in summary["files"].items():
+        if f"sha256:{hashlib.sha256(files[name]).hexdigest()}" != digest:
+            return f"{name} is of another run"
+    return f"{summary['settings']['contact'][0]['law']['k']:.0e}".replace("+0", "")
 
 
-def run(place: Path, stiffness: str, *before: str) -> subprocess.CompletedProcess[str]:
-    """Run to the end, below the command `before`."""
-    return subprocess.run(
-        [*before, *command(place, stiffness)], capture_output=True, text=True, check=False
-    )
+@dataclass(frozen=True)
+class Command:
+    """A command that writes into the folder `out` below the current one."""
+
+    words: str
+    """What it is called with; {value} stands for one of two values."""
+    values: tuple[str, str]
+    last: str
+    """The file that says that the others are complete."""
+    journal: str = ""
+    """What it resumes from; it is removed once the command has done all."""
+    beside: str = ""
+    """The command whose results are in the same folder."""
+    browser: bool = False
+    """Whether a browser draws: strace and a full disk would meet that, too."""
+    whole: Callable[[dict[str, bytes]], str] | None = None
+    """Returns the value whose files these are. By default they have always the same bytes."""
 
 
-def state(place: Path) -> str:
-    """Return the stiffness of the run whose results are in the folder; else what is wrong."""
-    out = place / "out"
-    try:
-        names = {name for name in os.listdir(out) if not name.startswith(".")}
-        summary = json.loads((out / "summary.json").read_text())
-        if (out / NOTES).read_text() != "mine":
-            return f"{NOTES} is lost"
-        if not summary["complete"] or names != {NOTES, "summary.json", *summary["files"]}:
-            return f"not complete: {sorted(names)}"
-        for name, digest in summary["files"].items():
-            if f"sha256:{hashlib.sha256((out / name).read_bytes()).hexdigest()}" != digest:
-                return f"{name} is of another run"
-        return f"{summary['settings']['contact'][0]['law']['k']:.0e}".replace("+0", "")
-    except (OSError, ValueError, KeyError) as fault:
-        return f"{type(fault).__name__}: {fault}"
+COMMANDS = {
+    "run": Command(
+        f"run {SCENE} --duration 0.03 --set {STIFFNESS}={{value}} --out out",
+        ("1e5", "2e5"),
+        "summary.json",
+        beside="sweep",
+        whole=run_of,
+    ),
+    "fit": Command(
+        f"fit ../{{value}}.csv {SCENE} --param gravity.2 --out out", ("9.8", "9.7"), "fit.json"
+    ),
+    "render": Command(
+        "render ../run --to {value} --fps 400 --size 320x240 --out out",
+        ("0.02", "0.03"),
+        "frame_0001.png",
+        browser=True,
+    ),
+    "sweep": Command(
+        f"sweep {SCENE} --duration 0.01 --vary {STIFFNESS}=1e4:{{value}}:4 --workers 0 "
+        "--no-pictures --out out/sweep.parquet",
+        ("1e5", "2e5"),
+        "sweep.parquet",
+        journal="sweep.parquet.journal",
+        beside="run",
+    ),
+}
 
 
-def begin(place: Path) -> None:
-    """Put the results of a run and a file of the user's there."""
-    done = run(place, STIFFNESS[0])
-    assert done.returncode == 0, done.stderr
-    (place / "out" / NOTES).write_text("mine")
-    assert state(place) == STIFFNESS[0], state(place)
+def prepare(folder: Path) -> None:
+    """Write what the commands read: data of two falls, and a run to be drawn."""
+    for gravity in COMMANDS["fit"].values:
+        rows = [f"{k / 1000},{0.073 - float(gravity) * k**2 / 2e6:.6f}" for k in range(0, 41, 2)]
+        text = "\n".join(["t [s],q.root_joint.2 [m]", *rows])
+        (folder / f"{gravity}.csv").write_text(text)
+    words = COMMANDS["run"].words.format(value="1e5").replace("--out out", "--out run")
+    subprocess.run([*MAIN, *words.split()], cwd=folder, check=True, capture_output=True)
+
+
+class Trial:
+    """A command in a folder of its own, `place`, in which it has written already."""
+
+    def __init__(self, name: str, place: Path) -> None:
+        self.command, self.place, self.out = COMMANDS[name], place, place / "out"
+        self.values = self.command.values
+        self._others: dict[str, bytes] = {}
+        self._known: dict[str, dict[str, bytes]] = {}
+        place.mkdir(exist_ok=True)
+
+    def words(self, value: str) -> list[str]:
+        """Return the command with one of its values."""
+        return [*MAIN, *self.command.words.format(value=value).split()]
+
+    def run(self, value: str, before: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
+        """Run to the end, below the command `before`."""
+        words = [*before, *self.words(value)]
+        return subprocess.run(words, cwd=self.place, capture_output=True, text=True, check=False)
+
+    def begin(self) -> None:
+        """Put the results of others and those of the first value there."""
+        self.out.mkdir()
+        if self.command.beside:
+            done = Trial(self.command.beside, self.place).run(self.values[0])
+            assert done.returncode == 0, done.stderr
+        (self.out / "notes.txt").write_text("mine")
+        self._others = visible(self.out)
+        for value in reversed(self.values):
+            done = self.run(value)
+            assert done.returncode == 0, done.stderr
+            self._known[value] = self._files()
+            self.forget()
+        assert self.state() == self.values[0], self.state()
+
+    def forget(self) -> None:
+        """Remove what the command would resume from."""
+        if self.command.journal:
+            (self.out / self.command.journal).unlink(missing_ok=True)
+
+    def state(self) -> str:
+        """Return the value whose results are in the folder; else what is wrong."""
+        try:
+            found, files = visible(self.out), self._files()
+            for name, data in self._others.items():
+                if found.get(name) != data:
+                    return f"{name} of others is lost or changed"
+            if self.command.whole is not None:
+                return self.command.whole(files)
+            known = [value for value, whole in self._known.items() if whole == files]
+            return known[0] if known else f"not whole: {sorted(files)}"
+        except (OSError, ValueError, KeyError) as fault:
+            return f"{type(fault).__name__}: {fault}"
+
+    def ends(self) -> list[str]:
+        """Return what is wrong after a last run that nobody kills."""
+        done = self.run(self.values[1])
+        if done.returncode or os.listdir(self.place) != ["out"] or self.state() != self.values[1]:
+            return [f"the next one leaves {os.listdir(self.place)}: {self.state()} {done.stderr}"]
+        return []
+
+    def is_writing(self) -> bool:
+        """Whether the command has begun to write."""
+        return any(any(one.glob(".*writing")) for one in (self.place, self.out))
+
+    def clear(self) -> None:
+        """Clear away what a killed command left, to see the next one begin to write."""
+        with AtomicFolder(self.out, last=self.command.last, inner=["stopped"]):
+            for left in self.out.glob(".*.writing"):
+                left.unlink()
+
+    def _files(self) -> dict[str, bytes]:
+        """Return the command's own files."""
+        resumed = self.command.journal or "/"
+        return {
+            name: data
+            for name, data in visible(self.out).items()
+            if name not in self._others and not name.startswith(resumed)
+        }
 
 
 def calls_on(place: Path, log: Path) -> list[tuple[str, int]]:
@@ -92,13 +201,13 @@ def calls_on(place: Path, log: Path) -> list[tuple[str, int]]:
     return found
 
 
-def kill_at_every_call(place: Path) -> list[str]:
-    """Kill the run at each of its system calls on files; return what was wrong."""
-    log = place / ".strace"
-    keep = place.with_name(f"{place.name}-keep")
-    begin(place)
+def kill_at_every_call(trial: Trial) -> list[str]:
+    """Kill the command at each of its system calls on files; return what was wrong."""
+    place, value = trial.place, trial.values[1]
+    log, keep = place.with_suffix(".strace"), place.with_suffix(".keep")
+    trial.begin()
     shutil.copytree(place, keep)
-    traced = run(place, STIFFNESS[1], "strace", "-y", "-o", str(log), "-e", f"trace={CALLS}")
+    traced = trial.run(value, ["strace", "-y", "-o", str(log), "-e", f"trace={CALLS}"])
     assert traced.returncode == 0, traced.stderr
     calls = calls_on(place, log)
     print(f"{len(calls)} system calls: {dict(Counter(name for name, _ in calls))}", flush=True)
@@ -108,68 +217,66 @@ def kill_at_every_call(place: Path) -> list[str]:
         shutil.rmtree(place)
         shutil.copytree(keep, place)
         inject = f"inject={name}:signal=KILL:when={ordinal}"
-        done = run(
-            place, STIFFNESS[1], "strace", "-o", "/dev/null", "-e", f"trace={name}", "-e", inject
-        )
-        left = state(place)
+        done = trial.run(value, ["strace", "-o", "/dev/null", "-e", f"trace={name}", "-e", inject])
+        left = trial.state()
         found[f"exit code {done.returncode}, results of {left}"] += 1
-        if left not in STIFFNESS:
+        if left not in trial.values:
             wrong.append(f"{name} {ordinal}: {left}")
-    again = run(place, STIFFNESS[1])
-    if again.returncode or os.listdir(place) != ["out"] or state(place) != STIFFNESS[1]:
-        wrong.append(f"the next run leaves {os.listdir(place)}: {again.stderr}")
-    shutil.rmtree(keep)
     print(dict(found), flush=True)
-    return wrong
+    return wrong + trial.ends()
 
 
-def kill_at_random(place: Path, times: int) -> list[str]:
-    """Kill a chain of runs, each over what the one before left; return what was wrong.
+def kill_at_random(trial: Trial, times: int) -> list[str]:
+    """Kill a chain of commands, each over what the one before left; return what was wrong.
 
     Half of them at any time, half while the files are being written.
     """
-    begin(place)
+    trial.begin()
     rng = random.Random(1)
-    writing = place / ".out.writing"
     start, drawn = time.monotonic(), 0.0
-    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with subprocess.Popen(command(place, STIFFNESS[1]), **silent) as process:
+    silent = {
+        "stdout": subprocess.DEVNULL,
+        "stderr": subprocess.DEVNULL,
+        "cwd": trial.place,
+    }
+    with subprocess.Popen(trial.words(trial.values[1]), **silent) as process:
         while process.poll() is None:
-            drawn = drawn or (time.monotonic() if writing.exists() else 0.0)
+            drawn = drawn or (time.monotonic() if trial.is_writing() else 0.0)
             time.sleep(0.001)
     whole, drawn = time.monotonic() - start, time.monotonic() - drawn
+    trial.forget()
     found: Counter[str] = Counter()
     wrong = []
     for n in range(times):
-        before = state(place)
-        wanted = STIFFNESS[before == STIFFNESS[0]]
-        if n % 2:  # what is left is cleared away now, to see the new files appear
-            with AtomicFolder(place / "out", last="summary.json", inner=["stopped"]):
-                pass
-        with subprocess.Popen(command(place, wanted), **silent) as process:
+        before = trial.state()
+        wanted = trial.values[before == trial.values[0]]
+        if n % 2:
+            trial.clear()
+        with subprocess.Popen(trial.words(wanted), **silent) as process:
             wait = rng.uniform(0.0, whole)
             if n % 2:
-                while not writing.exists() and process.poll() is None:
+                while not trial.is_writing() and process.poll() is None:
                     time.sleep(0.001)
                 wait = rng.uniform(0.0, drawn)
             try:
                 process.wait(wait)
             except subprocess.TimeoutExpired:
                 process.kill()
-        left = state(place)
+        left = trial.state()
         found["old" if left == before else "new" if left == wanted else "wrong"] += 1
-        if process.returncode not in (0, -9) or left not in STIFFNESS:
+        if process.returncode not in (0, -9) or left not in trial.values:
             wrong.append(f"{n}, exit code {process.returncode}: {left}")
-    again = run(place, STIFFNESS[0])
-    if again.returncode or os.listdir(place) != ["out"] or state(place) != STIFFNESS[0]:
-        wrong.append(f"the next run leaves {os.listdir(place)}: {again.stderr}")
+        if left == wanted:
+            trial.forget()
     print(f"{times} SIGKILLs at random times leave {dict(found)}", flush=True)
-    return wrong
+    return wrong + trial.ends()
 
 
-def fill_disks(place: Path, sizes: int = 24) -> list[str]:
+def fill_disks(trial: Trial, sizes: int = 24) -> list[str]:
     """Run on file systems that are full after a while; return what was wrong."""
-    place.mkdir(exist_ok=True)
+    place = trial.place
+    trial.begin()
+    keep = shutil.copytree(place, place.with_suffix(".keep"))
     wrong = []
     found: Counter[str] = Counter()
     begin_size, told = 0, ""
@@ -179,15 +286,15 @@ def fill_disks(place: Path, sizes: int = 24) -> list[str]:
             print("full disks: left out, for file systems cannot be mounted here")
             return wrong
         try:
-            begin(place)
+            shutil.copytree(keep, place, dirs_exist_ok=True)
             used = shutil.disk_usage(place).used
             begin_size = begin_size or used
             room = used + n * begin_size // (sizes - 4)
             resize = f"remount,size={room}"
             subprocess.run(["mount", "-o", resize, str(place)], check=True)
-            done = run(place, STIFFNESS[1])
-            left = state(place)
-            expected = {0: STIFFNESS[1], 2: STIFFNESS[0]}.get(done.returncode, "?")
+            done = trial.run(trial.values[1])
+            left = trial.state()
+            expected = {0: trial.values[1], 2: trial.values[0]}.get(done.returncode, "?")
             found[f"exit code {done.returncode}"] += 1
             if left != expected or os.listdir(place) != ["out"]:
                 wrong.append(f"{room} bytes: {left}, {os.listdir(place)}: {done.stderr}")
@@ -203,19 +310,22 @@ def fill_disks(place: Path, sizes: int = 24) -> list[str]:
 def main() -> int:
     """Kill and fill; return 1 if anything but whole results was found."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--times", type=int, default=200, help="SIGKILLs at random times")
+    parser.add_argument("--times", type=int, default=75, help="SIGKILLs at random times, of each")
     parser.add_argument("--only", choices=["calls", "random", "full"])
+    parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
     chosen = parser.parse_args()
     wrong = []
-    with tempfile.TemporaryDirectory() as name:
-        if chosen.only in (None, "calls") and shutil.which("strace"):
-            (Path(name) / "a").mkdir()
-            wrong += kill_at_every_call(Path(name) / "a")
-        if chosen.only in (None, "random"):
-            (Path(name) / "b").mkdir()
-            wrong += kill_at_random(Path(name) / "b", chosen.times)
-        if chosen.only in (None, "full"):
-            wrong += fill_disks(Path(name) / "c")
+    with tempfile.TemporaryDirectory() as folder:
+        prepare(Path(folder))
+        for name in chosen.commands:
+            print(f"{name}:", flush=True)
+            traced = shutil.which("strace") and not COMMANDS[name].browser
+            if chosen.only in (None, "calls") and traced:
+                wrong += kill_at_every_call(Trial(name, Path(folder) / f"{name}-calls"))
+            if chosen.only in (None, "random"):
+                wrong += kill_at_random(Trial(name, Path(folder) / f"{name}-random"), chosen.times)
+            if chosen.only in (None, "full") and not COMMANDS[name].browser:
+                wrong += fill_disks(Trial(name, Path(folder) / f"{name}-full"))
     for one in wrong:
         print(f"wrong: {one}")
     print("failed" if wrong else "whole old or whole new each time")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import fcntl
 import os
 import signal
-import sqlite3
 import stat
+import threading
 import time
 
 import pytest
@@ -17,6 +18,8 @@ from sphshell_pin.atomic.exchange import exchange
 from sphshell_pin.errors import ResultError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running import run
+from sphshell_pin.study.sweep.job import Outcome
+from sphshell_pin.study.sweep.journal import Journal
 from tests.scenario.files import write
 from tests.test_cli import call
 
@@ -157,20 +160,49 @@ def test_a_folder_that_must_stay_gets_its_files_one_by_one(why, tmp_path, monkey
     assert os.listdir(tmp_path) == ["out"]
 
 
-def test_a_folder_with_a_sweep_in_it_stays(tmp_path):
+def test_a_folder_in_which_a_sweep_writes_stays(tmp_path, monkeypatch):
+    folder, path = tmp_path / "out", tmp_path / "out" / "sweep.parquet.journal"
+    put(folder, "old")
+    inode = folder.stat().st_ino
+    with contextlib.closing(Journal(path, {"scenario": "drop"}, 2)) as journal:
+        for number in range(2):
+            journal.add(Outcome(number, "done", "", {}, 0.0, "here"))
+            assert put(folder, "new")["a"] == "new"
+            assert folder.stat().st_ino == inode
+    assert put(folder, "newer")["a"] == "newer"
+    assert folder.stat().st_ino != inode
+    # Without locks it is unknown whether it still writes.
+    inode = folder.stat().st_ino
+    refuse_locks(monkeypatch)
+    assert put(folder, "newest")["a"] == "newest"
+    assert folder.stat().st_ino == inode
+    with contextlib.closing(Journal(path, {"scenario": "drop"}, 2)) as journal:
+        assert [*journal.outcomes] == [0, 1]
+    assert [one.name for one in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_sweep_begins_once_the_folder_is_exchanged(tmp_path, monkeypatch):
+    """Its journal is made in the new folder, not in the old one that is cleared away."""
     folder = tmp_path / "out"
     put(folder, "old")
-    journal = sqlite3.connect(folder / "sweep.parquet.journal")
-    journal.execute("CREATE TABLE runs (run INTEGER)")
-    inode = folder.stat().st_ino
-    with journal:
-        journal.execute("INSERT INTO runs VALUES (1)")
-        assert put(folder, "new")["a"] == "new"
-    with journal:
-        journal.execute("INSERT INTO runs VALUES (2)")
-    assert folder.stat().st_ino == inode
-    assert journal.execute("SELECT count(*) FROM runs").fetchone() == (2,)
-    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    begun = []
+
+    def begin():
+        with contextlib.closing(Journal(folder / "a.journal", {}, 1)) as journal:
+            journal.add(Outcome(0, "done", "", {}, 0.0, "here"))
+
+    def late(one, other):
+        begun.append(threading.Thread(target=begin))
+        begun[0].start()
+        begun[0].join(0.2)
+        assert begun[0].is_alive()
+        exchange(one, other)
+
+    monkeypatch.setattr("sphshell_pin.atomic.folder.exchange", late)
+    put(folder, "new")
+    begun[0].join()
+    with contextlib.closing(Journal(folder / "a.journal", {}, 1)) as journal:
+        assert [*journal.outcomes] == [0]
 
 
 def test_a_link_stays_a_link(tmp_path):
@@ -202,11 +234,15 @@ def test_a_file_keeps_its_rights(tmp_path):
     assert os.listdir(tmp_path) == ["file"]
 
 
-def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
+def refuse_locks(monkeypatch):
     def none(*_):
         raise OSError(errno.ENOLCK, "No locks available")
 
     monkeypatch.setattr(fcntl, "flock", none)
+
+
+def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
+    refuse_locks(monkeypatch)
     put(tmp_path / "out", "old")
     assert put(tmp_path / "out", "new") == {"a": "new", LAST: "new"}
     with atomic_file(tmp_path / "file") as file:

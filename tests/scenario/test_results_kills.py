@@ -33,7 +33,11 @@ from tests.scenario.operations import contents, counted, fill, interrupt, killed
 pytestmark = pytest.mark.slow
 
 MESH = Path(__file__).parents[1] / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
-OTHERS = {"notes.txt": b"mine", "stopped/run.npz": b"stopped early"}
+OTHERS = {
+    "notes.txt": b"mine",
+    "stopped/run.npz": b"stopped early",
+    "sweep.parquet.journal": b"of a sweep that has ended",
+}
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import os
 import re
 import tomllib
 import typing
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -168,9 +168,30 @@ def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> Found:
 
 def _validated(data: dict[str, Toml], path: str | PathLike[str]) -> Scenario:
     try:
-        return Scenario.model_validate(data)
+        scenario = Scenario.model_validate(data)
     except ValidationError as error:
         raise _explain(error, path, data) from None
+    for loc, value in _taken_for_numbers(data, scenario):
+        reason = f"must be a number, not {'a text' if isinstance(value, str) else 'true or false'}"
+        raise ScenarioError(path, _key_at(loc, data, ends=False), reason, value)
+    return scenario
+
+
+def _taken_for_numbers(
+    data: Toml, read: object, loc: tuple[int | str, ...] = ()
+) -> Iterator[tuple[tuple[int | str, ...], str | bool]]:
+    """Yield the texts and truth values of `data` that pydantic has `read` as numbers."""
+    if isinstance(data, Mapping) and isinstance(read, list):  # a table alone, of LISTS
+        data = [data]
+    if isinstance(data, Mapping):
+        for key, one in data.items():
+            found = read.get(key) if isinstance(read, Mapping) else getattr(read, key, None)
+            yield from _taken_for_numbers(one, found, (*loc, key))
+    elif isinstance(data, list) and isinstance(read, list | tuple):
+        for k, (one, found) in enumerate(zip(data, read, strict=False)):
+            yield from _taken_for_numbers(one, found, (*loc, k))
+    elif isinstance(data, str | bool) and type(read) in (int, float):
+        yield loc, data
 
 
 def item_key(table: str, items: Sequence[Toml], index: int) -> str:

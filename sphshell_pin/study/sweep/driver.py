@@ -256,7 +256,7 @@ def run_plan(
             kept = f"are done and kept in {journal.path}" if journal is not None else "were done"
             text = f"{len(outcomes)} of {len(plan.runs)} runs {kept}"
             raise KeyboardInterrupt(text) from None
-    table, curves = _write(plan, outcomes, out)
+        table, curves = _write(plan, outcomes, out)
     return SweepReport(
         table=table,
         out=out,

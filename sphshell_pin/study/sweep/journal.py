@@ -6,6 +6,7 @@ other columns, because SQLite does not detect bits that a disk changed.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sqlite3
@@ -13,7 +14,7 @@ import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from sphshell_pin.atomic.lock import lock_file
+from sphshell_pin.atomic.lock import lock_file, lock_folder
 from sphshell_pin.errors import ResultError, SweepError
 from sphshell_pin.study.sweep.job import DONE, FAILED, JsonObject, Outcome
 
@@ -60,17 +61,18 @@ class Journal:
         """The outcomes in the file by number of the run; the newest where there are several."""
         self.notes: list[str] = []
         """What is damaged, one sentence each."""
+        self._locks = contextlib.ExitStack()
         try:
-            self._lock, _ = lock_file(path, wait=False)
-        except BlockingIOError:
-            raise SweepError(f"{path}: another sweep is writing it; give another --out") from None
-        except OSError as fault:
-            raise self._broken(fault.strerror) from None
-        try:
+            # A run into this folder does not exchange it: SQLite needs its files where they are.
+            self._locks.callback(os.close, lock_folder(path.parent, alone=False)[0])
+            self._locks.callback(os.close, lock_file(path, wait=False)[0])
             self._file = sqlite3.connect(path)
-        except sqlite3.Error as fault:
-            os.close(self._lock)
-            raise self._broken(fault) from None
+        except BlockingIOError:
+            self._locks.close()
+            raise SweepError(f"{path}: another sweep is writing it; give another --out") from None
+        except (OSError, sqlite3.Error) as fault:
+            self._locks.close()
+            raise self._broken(getattr(fault, "strerror", fault)) from None
         try:
             self._begin(json.dumps({"format": FORMAT, **head}), runs)
         except sqlite3.OperationalError as fault:
@@ -106,19 +108,17 @@ class Journal:
 
     def close(self) -> None:
         """Let other processes write the journal; one without any run is removed."""
-        if self._lock < 0:
-            return
         try:
             # Not counted: a view in a damaged file may have no end.
             empty = self._file.execute("SELECT 1 FROM runs LIMIT 1").fetchone() is None
-        except (sqlite3.Error, UnicodeDecodeError):  # of a damaged file, even the error's text
+        # Of a damaged file, even the error's text; or it was closed before.
+        except (sqlite3.Error, UnicodeDecodeError):
             empty = False
         self._file.close()
         if empty:
             self.path.unlink(missing_ok=True)
         # Closed last: a close of any descriptor of the file would drop SQLite's own locks.
-        os.close(self._lock)
-        self._lock = -1
+        self._locks.close()
 
     def _begin(self, head: str, runs: int) -> None:
         self._file.execute("PRAGMA synchronous = FULL")

@@ -67,6 +67,9 @@ class SPHSHELL_PIN_API NormalLaw {
   NormalLaw(const HertzLaw& law);
   NormalLaw(const TableLaw& law);
   NormalLaw(const FoundationLaw& law);
+  // A move is a copy, as of a Shell.
+  NormalLaw(const NormalLaw&) = default;
+  NormalLaw& operator=(const NormalLaw&) = default;
 
   /// The force [N] at a depth [m], 0 where that is not positive.
   /// @param gap_rate [m/s], negative while closing
@@ -127,6 +130,9 @@ class SPHSHELL_PIN_API FrictionLaw {
   FrictionLaw(const CoulombFriction& law);
   FrictionLaw(const BristleFriction& law);
   FrictionLaw(const MindlinFriction& law);
+  // A move is a copy, as of a Shell.
+  FrictionLaw(const FrictionLaw&) = default;
+  FrictionLaw& operator=(const FrictionLaw&) = default;
 
   /// Whether contacts have a stretch for a state.
   bool has_state() const;
