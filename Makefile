@@ -10,7 +10,7 @@ OUT ?= results
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick lint format bench report robots hard-cases work-precision rollouts \
+.PHONY: help demo test quick studies lint format bench report robots hard-cases work-precision rollouts \
   real-surfaces new-study parts fuzz kills sweep-survival sampling-survival sanitize wheel notebooks docs docs-serve clean
 
 help:
@@ -56,11 +56,14 @@ demo: $(VENV)/.demo ## build into .venv and run fingertip_on_blade
 # A process that has finished takes over tests of another one. ARGS="-k blade": more arguments.
 PYTEST = $(BIN)/python -m pytest -n auto --dist worksteal $(ARGS)
 
-test: $(VENV)/.test ## build into .venv and run all tests, on all cores
+test: $(VENV)/.test ## build into .venv and run the tests, on all cores
 	$(PYTEST)
 
-quick: $(VENV)/.test ## the tests that are not slow and need no browser: three minutes
-	$(PYTEST) -m "not slow and not browser" --durations=10
+quick: $(VENV)/.test ## the tests that are not slow and need no browser
+	$(PYTEST) -m "not (slow or study or browser)" --durations=10
+
+studies: $(VENV)/.test ## the same laws over every robot, surface and start, which make test leaves out
+	$(PYTEST) -m study
 
 lint: $(VENV)/.test ## check style and types
 	$(BIN)/ruff check .

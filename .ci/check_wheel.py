@@ -128,7 +128,7 @@ def check_installed(folder: Path) -> list[str]:
     run(program, "list", folder=folder)
     run(program, "run", JOB, "--out", folder / "out", folder=folder)
     missing = [name for name in FILES if not (folder / "out" / name).is_file()]
-    quick = ["-m", "not slow and not browser", "-p", "no:cacheprovider"]
+    quick = ["-m", "not (slow or study or browser)", "-p", "no:cacheprovider"]
     run(*python, "-m", "pytest", *quick, *TESTS, folder=folder)
     return [f"the run wrote no {name}" for name in missing]
 

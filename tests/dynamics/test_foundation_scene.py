@@ -196,6 +196,7 @@ def test_energy_with_friction() -> None:
     ],
     ids=lambda one: type(one).__name__,
 )
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [COULOMB, BRISTLE], ids=["coulomb", "bristle"])
 def test_every_integrator_comes_to_rest(integrator, friction) -> None:
     """At the depth where the foundation carries the weight."""

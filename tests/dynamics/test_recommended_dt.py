@@ -111,6 +111,7 @@ def test_bristles_ring_or_decay(friction: sp.BristleFriction, time: float) -> No
     assert shortest(block(law, friction), q, [0.0] * 3) == pytest.approx(time, rel=1e-6)
 
 
+@pytest.mark.slow
 @laws
 def test_the_recommended_step_resolves_an_impact(law: str) -> None:
     one = (ELASTIC | DAMPED)[law]
@@ -147,3 +148,60 @@ def test_steps_that_are_short_enough_earn_no_warning() -> None:
             sp.Simulation(scene, integrator).run(q, v, 10 * dt)
         free = sp.Scene(models.slider())
         sp.Simulation(free, sp.SemiImplicitEuler(0.1)).run([0.0], np.ones(1), 1.0)
+
+
+def spring(time: float) -> sp.ImpactLaw:
+    """A spring that the mass touches for `time` [s]."""
+    return sp.ImpactLaw(MASS * (math.pi / time) ** 2, 1.0)
+
+
+@pytest.mark.parametrize(("dt", "below"), [(1e-4, 5e-5), (2e-4, 1e-4), (5e-4, 2e-4)])
+def test_a_thirtieth_is_rounded_down(dt: float, below: float) -> None:
+    for share, expected in ((1 + 1e-7, dt), (1 - 1e-7, below)):
+        scene = falling(spring(30 * dt * share))
+        assert scene.explain([RADIUS], [-SPEED]).recommended_dt == pytest.approx(expected)
+    assert any("recommended" in one for one in scene.explain([RADIUS], dt=1.01 * below).warnings)
+
+
+def test_the_shortest_of_pairs_and_joints_counts() -> None:
+    stop = sp.JointLimits(-1.0, 1.0, spring(0.03))
+    model = models.slider(0.0, MASS)
+    joints = sp.JointIngredients(limits={str(model.names[1]): stop})
+    scene = sp.Scene(model, joints=joints)
+    assert sp.Scene(models.slider()).explain().recommended_dt == 1e-3
+    for time, dt in ((0.3, 1e-3), (0.0151, 5e-4), (0.00301, 1e-4), (0.0061, 1e-4)):
+        scene.add_contact(sp.Sphere(RADIUS, "ball"), models.plate(), law=spring(time))
+        assert scene.explain([RADIUS], [-SPEED]).recommended_dt == pytest.approx(dt)
+
+
+def test_figures_of_a_spring() -> None:
+    rate = math.sqrt(1e5 / MASS)
+    one = falling(sp.ImpactLaw(1e5, 1.0), gravity=9.81).explain([RADIUS], [-SPEED]).pairs[0]
+    found = (one.effective_mass, one.contact_time, one.impact_depth, one.resting_depth)
+    assert found == pytest.approx((MASS, math.pi / rate, SPEED / rate, 9.81 / rate**2), rel=1e-9)
+    assert one.depth_limit_speed == pytest.approx(RADIUS * rate)
+
+
+@pytest.mark.parametrize(
+    ("gap", "v", "gravity", "speed"),
+    [
+        (0.02, 0.0, 9.81, math.sqrt(2 * 9.81 * 0.02)),
+        (0.02, 1.0, 9.81, 1.0),
+        (0.02, -1.0, 9.81, 1.0),
+        (-0.001, 0.0, 9.81, 0.1),
+        (0.02, 0.0, 0.0, 0.1),
+    ],
+)
+def test_speed_of_approach(gap: float, v: float, gravity: float, speed: float) -> None:
+    one = falling(ELASTIC["linear"], gravity=gravity).explain([RADIUS + gap], [v]).pairs[0]
+    assert (one.gap, one.approach_speed) == pytest.approx((gap, speed), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("side", "gaps"),
+    [("both", (0.01, 0.01)), ("outside", (0.01, -0.11)), ("inside", (-0.11, 0.01))],
+)
+def test_the_gap_is_on_the_side_of_the_shell(side: str, gaps: tuple[float, float]) -> None:
+    scene = models.on_plate(models.slider(), ELASTIC["linear"], shell=models.plate(side=side))
+    found = [scene.explain([z]).pairs[0].gap for z in (0.06, -0.06)]
+    assert found == pytest.approx(gaps)

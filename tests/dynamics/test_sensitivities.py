@@ -52,6 +52,7 @@ LAWS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_a_bounce_by_all_numbers_of_a_law(law: str) -> None:
     case = drop(LAWS[law], duration=0.05)
@@ -75,6 +76,7 @@ def test_an_oblique_bounce_by_everything(integrator: str) -> None:
 
 
 # Of a stretch that begins at the touch.
+@pytest.mark.slow
 @every_integrator
 def test_an_oblique_bounce_with_bristles(integrator: str) -> None:
     case = thrown(IMPACT, BRISTLE, INTEGRATORS[integrator])

@@ -1,4 +1,4 @@
-"""Each hard case keeps its bounds; the slow ones run with python -m tests.hard_cases alone."""
+"""Each hard case keeps its bounds; the slow ones are studies."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ import pytest
 
 from tests.hard_cases.__main__ import MODULES, collect, row
 from tests.hard_cases.verdict import Case
+from tests.studies import mostly_studies
 
 pytestmark = pytest.mark.slow
 
 CASES = collect()
+SOME = mostly_studies(CASES, lambda hard: not hard.slow)
 
 
-@pytest.mark.parametrize("hard", [c for c in CASES if not c.slow], ids=lambda hard: hard.name)
+@pytest.mark.parametrize("hard", SOME, ids=lambda hard: hard.name)
 def test_case(hard: Case) -> None:
     verdicts = hard.run()
     assert verdicts, "a case without a verdict says nothing"

@@ -9,6 +9,7 @@ from sphshell_pin.errors import InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, knobs_of, rebuild, shipped_scenarios
 from sphshell_pin.scenario.live.live_run import LiveRun
 from tests.scenario.files import DROP, write
+from tests.studies import mostly_studies
 
 STIFFNESS = "contact.ball-plate.law.stiffness"
 
@@ -97,7 +98,10 @@ def test_a_value_set_from_outside_widens_the_range(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize(
+    "name",
+    mostly_studies(shipped_scenarios(), {"fingertip_on_blade", "gear_contact"}.__contains__),
+)
 def test_shipped_knobs_hold_over_their_range(name):
     built = build(name)
     knobs = knobs_of(built)

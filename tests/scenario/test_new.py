@@ -27,6 +27,7 @@ from sphshell_pin.scenario import build, judge, knobs_of, rebuild, shipped_scena
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
 from tests.shell.surfaces import surface_file
+from tests.studies import mostly_studies
 
 SURFACES = next(iter(shipped_scenarios().values())).parent / "surfaces"
 BLADE, BOWL = SURFACES / "bladex_upper.stl", SURFACES / "bowl.shl"
@@ -84,12 +85,13 @@ CASES = [
     ("arm", "bowl", {"radius": 0.02}),
     ("arm", BLADE, {"radius": 0.003, "unit": "mm"}),
 ]
+FEW = [CASES[k] for k in (0, 3, 6, 7, 8)]
 # Robots that come with the package itself, or with the tests.
 AT_HAND = ("arm", "ball", "three_link_finger")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("robot", "surface", "options"), CASES)
+@pytest.mark.parametrize(("robot", "surface", "options"), mostly_studies(CASES, FEW.__contains__))
 def test_what_is_written_works(robot, surface, options, tmp_path):
     if robot not in AT_HAND:
         pytest.importorskip("example_robot_data")

@@ -33,6 +33,7 @@ from sphshell_pin.study.robot_check.postures import massless_joints, random_post
 from sphshell_pin.study.robot_check.probe_spheres import find_sphere
 from sphshell_pin.study.robot_check.setting import patch
 from sphshell_pin.testing.finding import Finding
+from tests.studies import mostly_studies
 
 ROOT = Path(__file__).parents[2]
 TINY = Sizes(1, 1, 4)
@@ -75,12 +76,12 @@ def passes(report: RobotReport) -> bool:
 
 @pytest.mark.slow
 @pytest.mark.robots
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("part", mostly_studies(range(8), lambda part: part == 0))
 def test_every_robot_passes(part: int) -> None:
     """With few postures; `make robots` takes more, and docs/robots.md has the verdicts."""
     pytest.importorskip("example_robot_data")
     assert len(robots.names()) > 70
-    for name in robots.names()[part::4]:
+    for name in robots.names()[part::8]:
         report = check_robot(name, sizes=TINY)
         if report.verdict == NOT_CHECKED:
             # The one reason there is on this machine.

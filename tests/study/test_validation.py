@@ -14,13 +14,14 @@ from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.study.report import PAGE
 from sphshell_pin.study.report.contents import Finding, Picture
 from sphshell_pin.study.validation import Outcome, cases, collect, make_validation
+from tests.studies import mostly_studies
 
 pytest.importorskip("matplotlib")
 DOCS = Path(__file__).parents[2] / "docs"
-CASES = [pytest.param(one, id=one.key, marks=[pytest.mark.slow] * one.slow) for one in collect()]
+CASES = mostly_studies(collect(), lambda one: not one.slow)
 
 
-@pytest.mark.parametrize("one", CASES)
+@pytest.mark.parametrize("one", CASES, ids=lambda one: one.key)
 def test_case(one):
     found = one.run()
     assert found.findings
