@@ -109,10 +109,13 @@ MOVES = np.array([0.1, 0.0, -0.05, 1.0, 2.0, 0.0])
 def test_derivatives_are_those_of_the_twin(friction) -> None:
     own, twin = (models.on_plate(models.ball(), law, friction) for law in (C_LAW, TWIN))
     assert_derivatives(own, BALL, MOVES)
-    numbers = ["ball-plate.law.k", "ball-plate.law.b"], [
-        "ball-plate.law.stiffness",
-        "ball-plate.law.dissipation",
-    ]
+    numbers = (
+        ["ball-plate.law.k", "ball-plate.law.b"],
+        [
+            "ball-plate.law.stiffness",
+            "ball-plate.law.dissipation",
+        ],
+    )
     found, exact = (
         scene.dynamics_derivatives(BALL, MOVES, np.zeros(6), parameters=names)
         for scene, names in zip((own, twin), numbers, strict=True)
@@ -213,21 +216,23 @@ def test_copies_and_pickles() -> None:
     assert again.normal_force(1e-3) == pytest.approx(TWIN.normal_force(1e-3))
 
 
-def test_functions_live_as_long_as_the_core_and_cycles_are_collected() -> None:
-    scene = models.on_plate(models.slider(), python_law())
-    core = python_law().core
-    gc.collect()
-    assert core.force(1e-3, 0.0) == pytest.approx(TWIN.normal_force(1e-3))
+def cycle() -> weakref.ref[object]:
+    """Return what tells whether a function lives whose law's scene it knows."""
 
     def knows_its_scene(depth, gap_rate, parameters):
         return 1e5 * depth * len(held)
 
     held = [models.on_plate(models.slider(), python_law(knows_its_scene, {}))]
     held[0].external_forces([0.049], [0.0])
-    alive = weakref.ref(knows_its_scene)
-    del held, knows_its_scene, scene
+    return weakref.ref(knows_its_scene)
+
+
+def test_functions_live_as_long_as_the_core_and_cycles_are_collected() -> None:
+    core = python_law().core
+    alive = cycle()
     gc.collect()
     assert alive() is None
+    assert core.force(1e-3, 0.0) == pytest.approx(TWIN.normal_force(1e-3))
 
 
 def test_a_scenario_names_a_function_which_looking_does_not_execute(tmp_path) -> None:
