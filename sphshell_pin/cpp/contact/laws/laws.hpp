@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <sstream>
 #include <stdexcept>
-#include <string>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -307,9 +307,10 @@ struct FunctionLaw {
   }
 
   [[noreturn]] static void fail(double value, const char* what, double depth, double gap_rate) {
-    throw Fault("the " + std::string(what) + " of a FunctionLaw is " + std::to_string(value) +
-                " at depth " + std::to_string(depth) + " m, gap rate " + std::to_string(gap_rate) +
-                " m/s: its function must return finite numbers");
+    std::ostringstream said;
+    said << "the " << what << " of a FunctionLaw is " << value << " at depth " << depth
+         << " m, gap rate " << gap_rate << " m/s: its function must return finite numbers";
+    throw Fault(said.str());
   }
 };
 
