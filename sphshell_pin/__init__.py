@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sphshell_pin.contact import CoulombFriction as CoulombFriction
     from sphshell_pin.contact import Feature as Feature
     from sphshell_pin.contact import FoundationLaw as FoundationLaw
+    from sphshell_pin.contact import FunctionLaw as FunctionLaw
     from sphshell_pin.contact import HertzLaw as HertzLaw
     from sphshell_pin.contact import HuntCrossleyLaw as HuntCrossleyLaw
     from sphshell_pin.contact import ImpactLaw as ImpactLaw
@@ -76,6 +77,7 @@ _HOME = {
     "Fit": "study.fit",
     "ForceTorqueSensor": "dynamics",
     "FoundationLaw": "contact",
+    "FunctionLaw": "contact",
     "GravityCompensation": "dynamics",
     "HertzLaw": "contact",
     "HuntCrossleyLaw": "contact",

@@ -84,6 +84,10 @@ class WeakLawWarning(UserWarning):
     """A law is so compliant that the sphere's center is expected to pass through the shell."""
 
 
+class SlowLawWarning(UserWarning):
+    """A law is a Python function, which is for trying: a compiled one is many times as fast."""
+
+
 class RobotWarning(UserWarning):
     """A robot's file states what is not modeled, or names a visual mesh that is missing."""
 

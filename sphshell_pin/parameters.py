@@ -13,7 +13,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from sphshell_pin.checks import check_finite, check_type
 from sphshell_pin.errors import InvalidParameter
@@ -114,7 +114,8 @@ def parameters_of(kind: object) -> dict[str, Parameter]:
     """Return the parameters of a dataclass or of one of its objects, by name; {} of others."""
     if not dataclasses.is_dataclass(kind):
         return {}
-    return {f.name: f.metadata[_KEY] for f in dataclasses.fields(kind) if _KEY in f.metadata}
+    found = {f.name: f.metadata[_KEY] for f in dataclasses.fields(kind) if _KEY in f.metadata}
+    return found | dict(kind.own_parameters) if isinstance(kind, Ingredient) else found
 
 
 @dataclass(frozen=True)
@@ -161,6 +162,15 @@ class Ingredient:
     def unit_of(self, name: str) -> str:
         """Return the unit of the parameter called `name`; "" for a pure number."""
         return parameters_of(self)[name].unit.format(self)
+
+    @property
+    def own_parameters(self) -> Mapping[str, Parameter]:
+        """Parameters that this object has besides those of its class."""
+        return {}
+
+    def changed(self, **values: object) -> Self:
+        """Return this with other values of parameters."""
+        return dataclasses.replace(self, **values)
 
     def numbers(self) -> list[float]:
         """Return the parameters in their order, as the compiled core takes them."""

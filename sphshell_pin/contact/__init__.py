@@ -4,6 +4,7 @@ from sphshell_pin.contact import (
     bristle,
     foundation,
     friction,
+    function_law,
     hertz_law,
     laws,
     materials,
@@ -12,6 +13,7 @@ from sphshell_pin.contact import (
 from sphshell_pin.contact.bristle import *  # noqa: F403
 from sphshell_pin.contact.foundation import *  # noqa: F403
 from sphshell_pin.contact.friction import *  # noqa: F403
+from sphshell_pin.contact.function_law import *  # noqa: F403
 from sphshell_pin.contact.hertz_law import *  # noqa: F403
 from sphshell_pin.contact.laws import *  # noqa: F403
 from sphshell_pin.contact.materials import *  # noqa: F403
@@ -33,6 +35,7 @@ __all__ = [
 __all__ += bristle.__all__
 __all__ += foundation.__all__
 __all__ += friction.__all__
+__all__ += function_law.__all__
 __all__ += hertz_law.__all__
 __all__ += laws.__all__
 __all__ += materials.__all__

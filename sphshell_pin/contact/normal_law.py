@@ -113,8 +113,8 @@ def check_law(law: object, shapeless: str = "") -> NormalLaw:
     is refused.
     """
     must = (
-        "must be a law of this package, for instance ImpactLaw(stiffness); a force-depth curve of "
-        "your own is TableLaw(depth, force), and docs/extending.md says how to add a law"
+        "must be a law of this package, for instance ImpactLaw(stiffness); a law of your own is "
+        "FunctionLaw(function), a force-depth curve TableLaw(depth, force): see docs/laws.md"
     )
     good = check_type("law", law, NormalLaw, must)
     if shapeless and good.needs_shape:

@@ -70,7 +70,9 @@ def changed(scene: Scene, column: str, by: float) -> Scene:
             x, y, z = np.asarray(whole.offset) + by * np.eye(3)["xyz".index(field)]
             whole = replace(whole, offset=(float(x), float(y), float(z)))
         else:
-            whole = replace(whole, **{field: getattr(whole, field) + by})
+            value = {field: getattr(whole, field) + by}
+            law = part in ("law", "friction")
+            whole = whole.changed(**value) if law else replace(whole, **value)
         new = replace(pair, **{part: whole})
     return scene.with_pairs(tuple(new if one is pair else one for one in scene.pairs))
 

@@ -1,3 +1,8 @@
+#include "bindings/interop.hpp"
+
+#include "bindings/callbacks.hpp"
+#include "bindings/own_errors.hpp"
+
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
@@ -12,10 +17,10 @@ using namespace sphshell;
 namespace {
 
 // A family whose member `law` holds one of its kinds.
-template <class Law>
-nb::class_<Law> bind_family(nb::module_& m, const char* name) {
+template <class Law, class... Extra>
+nb::class_<Law> bind_family(nb::module_& m, const char* name, const Extra&... extra) {
   using Family = Kinds<decltype(Law::law)>;
-  return nb::class_<Law>(m, name)
+  return nb::class_<Law>(m, name, extra...)
       .def(
           "__init__",
           [](Law* self, const std::string& kind, const Numbers& numbers) {
@@ -25,10 +30,35 @@ nb::class_<Law> bind_family(nb::module_& m, const char* name) {
       .def_static("kinds", &Family::names);
 }
 
+// A law of a user's functions; without one of energy that is the integral of the force.
+NormalLaw of_function(Numbers parameters, std::uintptr_t force, nb::object of_force,
+                      std::uintptr_t energy, nb::object of_energy) {
+  FunctionLaw law;
+  law.function = LawForce(force, std::move(of_force));
+  if (!of_energy.is_none()) law.potential = LawEnergy(energy, std::move(of_energy));
+  law.parameters = std::move(parameters);
+  return {std::move(law)};
+}
+
+void translate_fault(const std::exception_ptr& thrown, void*) {
+  try {
+    std::rethrow_exception(thrown);
+  } catch (const FunctionLaw::Fault& fault) {
+    const nb::object type = nb::module_::import_("sphshell_pin.errors").attr("SphshellError");
+    PyErr_SetString(type.ptr(), fault.what());
+  }
+}
+
+PyType_Slot law_slots[] = {
+    {Py_tp_traverse, reinterpret_cast<void*>(&traverse<NormalLaw, visit_law>)}, {0, nullptr}};
+
 }  // namespace
 
 void bind_contact(nb::module_& m) {
-  bind_family<NormalLaw>(m, "NormalLaw")
+  nb::register_exception_translator(translate_fault);
+  bind_family<NormalLaw>(m, "NormalLaw", nb::type_slots(law_slots))
+      .def_static("of_function", &of_function, nb::arg("parameters"), nb::arg("force"),
+                  nb::arg("of_force"), nb::arg("energy"), nb::arg("of_energy").none())
       .def_prop_ro("needs_rate", &NormalLaw::needs_rate)
       .def("force",
            [](const NormalLaw& law, double depth, double gap_rate) {

@@ -84,11 +84,6 @@ auto alone(Run& run) {
   return std::decay_t<decltype((run.simulation.*get)())>((run.simulation.*get)());
 }
 
-int visit_pair(const Pair& pair, visitproc visit, void* arg) {
-  if (const auto* source = pair.source.target<PythonSource>()) Py_VISIT(source->find().ptr());
-  return 0;
-}
-
 int visit_evaluations(const Evaluations& evaluations, visitproc visit, void* arg) {
   return evaluations.for_each_pairs(
       [&](const std::vector<Pair>& pairs) { return visit_sources(pairs, visit, arg); });

@@ -43,16 +43,31 @@ std::vector<double> doubles_of(nb::handle array) {
 
 }  // namespace
 
-PythonSource::~PythonSource() {
-  if (!find_.is_valid()) return;
+Routine::Routine(const Routine& other) {
   const AcquireGil gil;
-  find_.reset();
+  object_ = other.object_;
+}
+
+Routine::~Routine() {
+  if (!object_.is_valid()) return;
+  const AcquireGil gil;
+  object_.reset();
+}
+
+double call_law(nb::handle callable, const std::vector<double>& where) {
+  const AcquireGil gil;
+  const nb::object answer = gil.call(callable, [&] {
+    std::vector<PyObject*> numbers;
+    for (double x : where) numbers.push_back(PyFloat_FromDouble(x));
+    return pack(numbers);
+  });
+  return PyFloat_AsDouble(answer.ptr());
 }
 
 void PythonSource::operator()(const SE3& pose_i, const SE3& pose_j,
                               std::vector<Contact>& out) const {
   const AcquireGil gil;
-  const nb::object answer = gil.call(find_, [&] {
+  const nb::object answer = gil.call(object(), [&] {
     return pack({to_python(pose_i).release().ptr(), to_python(pose_j).release().ptr()});
   });
   const std::vector<double> points = doubles_of(answer[0]), normals = doubles_of(answer[1]),
@@ -83,9 +98,22 @@ void PythonController::torque(SceneData& scene, double t, const VectorX& q, cons
   tau = Eigen::Map<const VectorX>(torque.data(), static_cast<Eigen::Index>(torque.size()));
 }
 
+int visit_law(const NormalLaw& law, visitproc visit, void* arg) {
+  const auto* own = std::get_if<FunctionLaw>(&law.law);
+  if (!own) return 0;
+  if (const auto* force = own->function.target<LawForce>()) Py_VISIT(force->object().ptr());
+  if (const auto* energy = own->potential.target<LawEnergy>()) Py_VISIT(energy->object().ptr());
+  return 0;
+}
+
+int visit_pair(const Pair& pair, visitproc visit, void* arg) {
+  if (const auto* source = pair.source.target<PythonSource>()) Py_VISIT(source->object().ptr());
+  return visit_law(pair.law, visit, arg);
+}
+
 int visit_sources(const std::vector<Pair>& pairs, visitproc visit, void* arg) {
   for (const Pair& pair : pairs)
-    if (const auto* source = pair.source.target<PythonSource>()) Py_VISIT(source->find().ptr());
+    if (const int stop = visit_pair(pair, visit, arg)) return stop;
   return 0;
 }
 

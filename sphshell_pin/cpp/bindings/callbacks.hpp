@@ -6,6 +6,7 @@
 
 #include <nanobind/nanobind.h>
 
+#include <cstdint>
 #include <vector>
 
 #include "bindings/gil.hpp"
@@ -13,21 +14,47 @@
 
 namespace sphshell {
 
-// A contact source. The callable returns points, normals and depths as arrays of float64, checked
-// and made contiguous by its Python wrapper. Each copy has a reference of its own, as the garbage
+// A Python object that a routine needs. Each copy has a reference of its own, as the garbage
 // collector wants to count.
-class PythonSource {
+class Routine {
  public:
-  explicit PythonSource(nb::object find) : find_(std::move(find)) {}
-  PythonSource(const PythonSource&) = default;
-  PythonSource(PythonSource&&) = default;
-  ~PythonSource();
-  void operator()(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& out) const;
-  nb::handle find() const { return find_; }
+  explicit Routine(nb::object object) : object_(std::move(object)) {}
+  Routine(const Routine& other);
+  Routine(Routine&&) = default;
+  ~Routine();
+  nb::handle object() const { return object_; }
 
  private:
-  nb::object find_;
+  nb::object object_;
 };
+
+// A contact source. The callable returns points, normals and depths as arrays of float64, checked
+// and made contiguous by its Python wrapper.
+class PythonSource : public Routine {
+ public:
+  using Routine::Routine;
+  void operator()(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& out) const;
+};
+
+double call_law(nb::handle callable, const std::vector<double>& where);
+
+// A function of a law: the C function at an address, which `object` keeps alive, or without one
+// the callable itself, whose Python wrapper knows the parameters and returns a float.
+template <class... Where>
+class LawFunction : public Routine {
+ public:
+  LawFunction(std::uintptr_t address, nb::object object)
+      : Routine(std::move(object)), pointer_(reinterpret_cast<Pointer>(address)) {}
+  double operator()(Where... where, const double* parameters) const {
+    return pointer_ ? pointer_(where..., parameters) : call_law(object(), {where...});
+  }
+
+ private:
+  using Pointer = double (*)(Where..., const double*);
+  Pointer pointer_;
+};
+using LawForce = LawFunction<double, double>;
+using LawEnergy = LawFunction<double>;
 
 // A callable tau(t, q, v, contacts): vectors and rows of contacts come as memory, of which its
 // Python wrapper makes arrays; it returns an array of float64 (nv). One that reads sensors takes
@@ -47,6 +74,8 @@ class PythonController : public Controller {
   const std::vector<double>* readings_ = nullptr;  // of the run's sensors
 };
 
+int visit_law(const NormalLaw& law, visitproc visit, void* arg);
+int visit_pair(const Pair& pair, visitproc visit, void* arg);
 int visit_sources(const std::vector<Pair>& pairs, visitproc visit, void* arg);
 
 // tp_traverse of a bound T: its type, and what visit_parts(T, visit, arg) visits.

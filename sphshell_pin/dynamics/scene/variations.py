@@ -150,7 +150,7 @@ def _field(part: str, name: str) -> _Change:
         whole = getattr(pair, part)
         if not hasattr(whole, name):
             raise InvalidParameter(f"{part}.{name}", value, f"is not a number of {whole!r}")
-        changed = replace(whole, **{name: value})
+        changed = whole.changed(**{name: value})
         return replace(pair, law=changed) if part == "law" else replace(pair, friction=changed)
 
     return change

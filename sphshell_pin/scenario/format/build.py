@@ -15,6 +15,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 import sphshell_pin as sp
+from sphshell_pin.contact.function_law import FunctionFile
+from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.control.callables import check_callable
 from sphshell_pin.dynamics.control.controllers import (
     Callback,
@@ -181,16 +183,18 @@ def build_scenario(
         raise ScenarioError(path, "shell", "two shells share a name")
     for i, contact in enumerate(scenario.contact):
         key = item_key("contact", scenario.contact, i)
-        _add_contact(scene, contact, shells, assembly, path, key)
+        law = _build_law(contact.law, path, key, load)
+        _add_contact(scene, contact, law, shells, assembly, path, key)
     for i, source in enumerate(scenario.source):
         key = item_key("source", scenario.source, i)
         find = load(source.find, f"{key}.find")
+        law = _build_law(source.law, path, key, load)
         with blamed_on(path, key):
             scene.add_contact_source(
                 find,
                 source.frame_i,
                 source.frame_j,
-                source.law.made(path.parent),
+                law,
                 source.friction.made(path.parent),
                 name=source.name,
             )
@@ -292,9 +296,20 @@ def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell
         return shell if section.magnify == 1.0 else shell.transformed(scale=section.magnify)
 
 
+def _build_law(
+    stated: Ingredient, path: Path, key: str, load: Callable[[str, str], Function]
+) -> NormalLaw:
+    with blamed_on(path, key):
+        if isinstance(stated, FunctionFile):
+            return stated.loaded(lambda where, field: load(where, f"{key}.law.{field}"))
+        made: NormalLaw = stated.made(path.parent)
+        return made
+
+
 def _add_contact(
     scene: sp.Scene,
     contact: schema.ContactSection,
+    law: NormalLaw,
     shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],
     assembly: Assembly,
     path: Path,
@@ -316,7 +331,7 @@ def _add_contact(
         several = spheres_of(contact, assembly, carrier)
     with blamed_on(path, key), warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # Scene.explain reports it for every scenario
-        law, friction = contact.law.made(path.parent), contact.friction.made(path.parent)
+        friction = contact.friction.made(path.parent)
         if contact.sphere is not None:
             sphere = to_sphere(contact.sphere)
             scene.add_contact(

@@ -121,7 +121,8 @@ def keep(
             )
     laws = [law for one in scenario.contact for law in (one.law, one.friction)]
     laws += [law for other in scenario.source for law in (other.law, other.friction)]
-    tables = {name: kept(folder / name) for law in laws for name in law.files}
+    named = [name for law in laws for name in law.files if not name.endswith(".py")]  # no code
+    tables = {name: kept(folder / name) for name in named}
     contents = _Contents(robots=held, surfaces=surfaces, tables=tables)
     return Kept(contents.model_dump(mode="json"), arrays)
 

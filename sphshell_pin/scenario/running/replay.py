@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from os import PathLike
@@ -15,7 +16,7 @@ from sphshell_pin.dynamics.result.contact_patches import Patches
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
-from sphshell_pin.errors import InvalidParameter, ResultError, SphshellError
+from sphshell_pin.errors import InvalidParameter, ResultError, SlowLawWarning, SphshellError
 from sphshell_pin.scenario.format.build import Built, build_scenario
 from sphshell_pin.scenario.format.functions import load_function, unloaded
 from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, shipped_scenarios
@@ -69,7 +70,10 @@ class Replay:
     ) -> None:
         self.result = result if isinstance(result, Result) else Result.load(result)
         self._name = "the result" if isinstance(result, Result) else str(Path(result))
-        built = self._build(scenario, trust_code=trust_code)
+        with warnings.catch_warnings():
+            if not trust_code:  # what stands in for a law's function is one of Python
+                warnings.simplefilter("ignore", SlowLawWarning)
+            built = self._build(scenario, trust_code=trust_code)
         self.speed = 1.0
         """Seconds of simulated time that a recording of it shows in one second."""
         if built is not None:

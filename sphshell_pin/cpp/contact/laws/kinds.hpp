@@ -1,9 +1,10 @@
-// The kinds of a family, as the alternatives of a variant: they are made by name.
+// The kinds of a family, as the alternatives of a variant: those of numbers alone are made by name.
 #pragma once
 
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -21,8 +22,12 @@ struct Kinds<std::variant<Kind...>> {
 
   static std::variant<Kind...> make(const std::string& kind, const Numbers& numbers) {
     std::unique_ptr<std::variant<Kind...>> made;
-    ((kind == Kind::kind ? made = std::make_unique<std::variant<Kind...>>(Kind(numbers)) : made),
-     ...);
+    const auto try_one = [&](auto* one) {
+      using One = std::remove_pointer_t<decltype(one)>;
+      if constexpr (std::is_constructible_v<One, const Numbers&>)
+        if (kind == One::kind) made = std::make_unique<std::variant<Kind...>>(One(numbers));
+    };
+    (try_one(static_cast<Kind*>(nullptr)), ...);
     if (!made) throw std::invalid_argument("unknown kind '" + kind + "'");
     return std::move(*made);
   }

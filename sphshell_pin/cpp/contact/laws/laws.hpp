@@ -5,12 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
+#include <sstream>
+#include <stdexcept>
 #include <type_traits>
 #include <utility>
 #include <variant>
 
 #include <Eigen/Core>
 
+#include "contact/laws/gauss.hpp"
 #include "contact/laws/kinds.hpp"
 
 namespace sphshell {
@@ -239,9 +243,80 @@ struct FoundationLaw {
   }
 };
 
+// A user's function of depth and gap rate; its elastic part is that at rest. It is known by its
+// values alone: slopes are differences of fourth order over a ten-thousandth of where it is taken,
+// which agree with smooth functions to about 1e-11.
+struct FunctionLaw {
+  static constexpr const char* kind = "function";
+  static constexpr double kStep = 1e-4, kLeastRate = 1e-2;  // relative, [m/s]
+
+  // What returned a number that is not finite.
+  struct Fault : std::runtime_error {
+    using std::runtime_error::runtime_error;
+  };
+
+  std::function<double(double, double, const double*)> function;  // [N]
+  std::function<double(double, const double*)> potential;  // [J]; empty: the integral of the force
+  Numbers parameters;
+
+  bool needs_rate() const { return true; }
+
+  template <class S>
+  NormalForce<S> force(const S& depth, const S& gap_rate) const {
+    if constexpr (std::is_same_v<S, double>) {
+      const double elastic = at(depth, 0);
+      return push(gap_rate == 0 ? elastic : at(depth, gap_rate), elastic);
+    } else {
+      const double d = depth.value, rate = gap_rate.value;
+      const auto by_depth = [&](double r) {
+        return slope([&](double x) { return at(x, r); }, d, kStep * d);
+      };
+      const double by_rate = slope([&](double r) { return at(d, r); }, rate,
+                                   kStep * std::max(std::abs(rate), kLeastRate));
+      return push(S(at(d, rate), by_depth(rate) * depth.slope + by_rate * gap_rate.slope),
+                  S(at(d, 0), by_depth(0) * depth.slope));
+    }
+  }
+
+  // The integral goes over the root of the depth: Gauss's rule is exact for a sum of its powers,
+  // halves among them, up to the seventh.
+  double energy(double depth) const {
+    if (potential) return finite(potential(depth, parameters.data()), "energy", depth, 0);
+    const GaussRule rule = gauss_rule(8);
+    double sum = 0;
+    for (int i = 0; i < rule.size; ++i) {
+      const double s = rule.nodes[i];
+      sum += rule.weights[i] * 2 * s * at(depth * s * s, 0);
+    }
+    return sum * depth;
+  }
+
+ private:
+  double at(double depth, double gap_rate) const {
+    return finite(function(depth, gap_rate, parameters.data()), "force", depth, gap_rate);
+  }
+
+  template <class Function>
+  static double slope(const Function& f, double x, double h) {
+    return (8 * (f(x + h) - f(x - h)) - (f(x + 2 * h) - f(x - 2 * h))) / (12 * h);
+  }
+
+  static double finite(double value, const char* what, double depth, double gap_rate) {
+    if (!std::isfinite(value)) fail(value, what, depth, gap_rate);
+    return value;
+  }
+
+  [[noreturn]] static void fail(double value, const char* what, double depth, double gap_rate) {
+    std::ostringstream said;
+    said << "the " << what << " of a FunctionLaw is " << value << " at depth " << depth
+         << " m, gap rate " << gap_rate << " m/s: its function must return finite numbers";
+    throw Fault(said.str());
+  }
+};
+
 // One of the laws.
 struct NormalLaw {
-  std::variant<ImpactLaw, HuntCrossleyLaw, HertzLaw, TableLaw, FoundationLaw> law =
+  std::variant<ImpactLaw, HuntCrossleyLaw, HertzLaw, TableLaw, FoundationLaw, FunctionLaw> law =
       ImpactLaw({0, 1, 0, 1});
 
   bool needs_rate() const {
