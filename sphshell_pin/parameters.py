@@ -44,6 +44,8 @@ class Parameter:
     at_most: float | None = None
     log: bool | None = None
     """Whether a slider multiplies (else it adds); None: it follows from the range."""
+    former: str = ""
+    """A name that it had, and that still works with a warning."""
 
     @property
     def bounds(self) -> dict[str, float]:
@@ -90,6 +92,7 @@ def parameter(
     at_least: float | None = None,
     at_most: float | None = None,
     log: bool | None = None,
+    former: str = "",
     **more: object,
 ) -> Any:
     """Return the field of a dataclass that is a parameter.
@@ -97,17 +100,16 @@ def parameter(
     The bounds hold for numbers; `more` is what pydantic takes for the field in a file
     (`min_length`). A field that is not made by this function cannot be stated in a file.
     """
-    about = Parameter(unit, label, help, above, at_least, at_most, log)
+    about = Parameter(unit, label, help, above, at_least, at_most, log, former)
     # Pydantic reads the bounds and the description in a field's metadata.
     metadata = {_KEY: about, "description": help, **about.bounds, **more}
     return field(default=default, metadata=metadata)
 
 
-def same_parameter(kind: type, name: str, **changed: str) -> Any:
-    """Return the field of a dataclass that is the parameter `name` of `kind`, but for `changed`."""
+def same_parameter(kind: type, name: str) -> Any:
+    """Return the field of a dataclass that is the parameter `name` of `kind`."""
     (source,) = (one for one in dataclasses.fields(kind) if one.name == name)
-    about = dataclasses.replace(source.metadata[_KEY], **changed)
-    return field(default=source.default, metadata={**source.metadata, _KEY: about})
+    return field(default=source.default, metadata=source.metadata)
 
 
 def parameters_of(kind: object) -> dict[str, Parameter]:

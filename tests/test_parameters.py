@@ -108,8 +108,6 @@ VALUES = {
     "radii": [0.1, 0.2, 0.3],
     "young": 1e9,
     "poisson": 0.3,
-    "young_1": 1e9,
-    "poisson_1": 0.3,
     "young_2": 1e9,
     "poisson_2": 0.3,
     "modulus": 1e6,

@@ -200,7 +200,7 @@ def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
 def test_labels_units_and_limits_are_those_of_the_description(tmp_path):
     adams = 'law = { type = "adams", units = "in-lbf-s" }'
     hertz = (
-        'law = { type = "hertz", radius = 0.01, young_1 = 1e9, poisson_1 = 0.3, young_2 = 1e9, '
+        'law = { type = "hertz", radius = 0.01, young = 1e9, poisson = 0.3, young_2 = 1e9, '
         "poisson_2 = 0.3, restitution = 0.5, speed = 1 }"
     )
     law = next(line for line in DROP.splitlines() if line.startswith("law"))
@@ -208,7 +208,7 @@ def test_labels_units_and_limits_are_those_of_the_description(tmp_path):
         (adams, "k", "stiffness", "lbf/in^2.2", 1e6),
         (adams, "c", "damping", "lbf s/in", 100.0),
         (adams, "d", "full damping depth", "in", 1.0),
-        (hertz, "young_1", "Young's modulus 1", "Pa", 1e10),
+        (hertz, "young", "Young's modulus", "Pa", 1e10),
         (hertz, "restitution", "restitution", "", 1.0),
     ):
         path = write(tmp_path, DROP.replace(law, text) + knob(f"contact.ball-plate.law.{key}"))

@@ -18,7 +18,6 @@ from sphshell_pin.dynamics.scene.derivatives import (
     contact_force_derivatives,
     core_parameters,
     dynamics_derivatives,
-    parameter_columns,
 )
 from sphshell_pin.dynamics.scene.explain import Explanation, explain_scene
 from sphshell_pin.dynamics.scene.from_geometry import add_pairs
@@ -26,6 +25,7 @@ from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.scene.scene_parts import SceneParts
 from sphshell_pin.dynamics.scene.scene_state import SceneState
+from sphshell_pin.named_numbers import columns_of, names_of_pairs
 
 __all__ = ["ContactPair", "Scene", "SceneContacts", "SceneState"]
 
@@ -164,7 +164,7 @@ class Scene(SceneParts):
         nv = self._model.nv
         torques = np.zeros(nv) if tau is None else check_vector("tau", tau, nv, " [N m or N]")
         some = not isinstance(parameters, tuple) or parameters
-        columns = parameter_columns(self, parameters) if some else ()
+        columns = columns_of(parameters, names_of_pairs(self.pairs)) if some else ()
         start = None if state is None else state.start
         return Place(core, q, v, torques, columns, core_parameters(self, columns, start))
 

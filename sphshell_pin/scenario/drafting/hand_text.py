@@ -170,8 +170,8 @@ shell = {_toml(self.shell.name)}
 [contact.law]
 type = "hertz"
 radius = {radius!r}
-young_1 = {_toml(one.young)}
-poisson_1 = {one.poisson}
+young = {_toml(one.young)}
+poisson = {one.poisson}
 young_2 = {_toml(other.young)}
 poisson_2 = {other.poisson}
 restitution = {restitution_between(one, other)}

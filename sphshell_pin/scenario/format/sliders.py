@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args, get_origin
@@ -11,7 +10,7 @@ from pydantic import BaseModel
 
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
-from sphshell_pin.scenario.format.reading import Found, look_up
+from sphshell_pin.scenario.format.reading import Found, child_of, look_up, owner_of
 from sphshell_pin.scenario.format.schema import KnobSection, Scenario
 
 if TYPE_CHECKING:
@@ -117,9 +116,7 @@ def _range(
 
 def _choices(scenario: Scenario, found: Found) -> tuple[str, ...]:
     """Return the words that the value at a key may be, where its table lists them; else none."""
-    owner: object = scenario
-    for part in found.parts[:-1]:
-        owner = _child(owner, part)
+    owner = owner_of(scenario, found.parts[:-1])
     info = type(owner).model_fields.get(found.parts[-1]) if isinstance(owner, BaseModel) else None
     if info is None:
         return ()
@@ -180,7 +177,7 @@ def meaning(scenario: Scenario, found: Found) -> Parameter:
             unit = owner.unit_of(part) if isinstance(owner, Ingredient) else about.unit
             return replace(about, label=_named(prefix, _inside(label, inner), scenario), unit=unit)
         prefix.append(part)
-        owner = _child(owner, part)
+        owner = child_of(owner, part)
     *tables, last = found.parts
     return Parameter(label=f"{'.'.join(tables[1:])} {last.replace('_', ' ')}".strip())
 
@@ -190,14 +187,6 @@ def _description(owner: object, name: str) -> Parameter | None:
         info = type(owner).model_fields.get(name)
         return next((m for m in info.metadata if isinstance(m, Parameter)), None) if info else None
     return parameters_of(owner).get(name)
-
-
-def _child(owner: object, part: str) -> object:
-    if isinstance(owner, list):
-        names = [getattr(one, "label", None) or getattr(one, "name", None) for one in owner]
-        at = names.index(part) if part in names else int(part) if part.isdecimal() else None
-        return None if at is None else owner[at]
-    return owner.get(part) if isinstance(owner, Mapping) else getattr(owner, part, None)
 
 
 def _inside(label: str, inner: list[str]) -> str:
