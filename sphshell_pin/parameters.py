@@ -1,4 +1,4 @@
-"""One description of every ingredient: the fields of its dataclass say everything about it.
+"""One description of every component: the fields of its dataclass say everything about it.
 
 Laws, friction, integrators and controllers are frozen dataclasses whose fields are made by
 `parameter`. From these follow the checks, the tables of scenario files (pydantic reads the same
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from sphshell_pin.checks import check_finite, check_type
+from sphshell_pin.deprecation import former_names
 from sphshell_pin.errors import InvalidParameter
 
 if TYPE_CHECKING:
@@ -120,18 +121,18 @@ def parameters_of(kind: object) -> dict[str, Parameter]:
 
 
 @dataclass(frozen=True)
-class Ingredient:
+class Component:
     """Base of what a scene, a run or a file is composed of.
 
-    A direct subclass is a family (`class NormalLaw(Ingredient)`). A class that belongs to it gives
+    A direct subclass is a family (`class NormalLaw(Component)`). A class that belongs to it gives
     its type name in files, `class ImpactLaw(NormalLaw, kind="impact")`. Another way to state one
-    names the family that it belongs to, `class Hertz(Ingredient, kind="hertz", of=NormalLaw)`, and
+    names the family that it belongs to, `class Hertz(Component, kind="hertz", of=NormalLaw)`, and
     returns what it states by `made`; if its kind is taken, files state that kind in this way.
     """
 
     kind: ClassVar[str] = ""
     """Type name in files and in the compiled core."""
-    kinds: ClassVar[dict[str, type[Ingredient]]] = {}
+    kinds: ClassVar[dict[str, type[Component]]] = {}
     """What files may state of this family, by type name."""
     # Pydantic's settings for these dataclasses.
     __pydantic_config__: ClassVar[Mapping[str, object]] = {
@@ -140,10 +141,10 @@ class Ingredient:
         "arbitrary_types_allowed": True,
     }
 
-    def __init_subclass__(cls, *, kind: str = "", of: type[Ingredient] | None = None) -> None:
+    def __init_subclass__(cls, *, kind: str = "", of: type[Component] | None = None) -> None:
         """Register the class under its type name."""
         super().__init_subclass__()
-        if Ingredient in cls.__bases__ and of is None:
+        if Component in cls.__bases__ and of is None:
             cls.kinds = {}
         if kind:
             cls.kind = kind
@@ -182,7 +183,7 @@ class Ingredient:
         return {k: v for k, v in self.__dict__.items() if k != "core"}
 
 
-def table(kind: type[Ingredient]) -> str:
+def table(kind: type[Component]) -> str:
     """Return the parameters of a class as a table of the documentation (Markdown)."""
     lines = [f"| parameter of `{kind.__name__}` | unit | default | meaning |", "|---|---|---|---|"]
     about = parameters_of(kind)
@@ -194,7 +195,7 @@ def table(kind: type[Ingredient]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def table_row(kind: type[Ingredient]) -> str:
+def table_row(kind: type[Component]) -> str:
     """Return what a file may state of a class, as a row of the documentation (Markdown).
 
     Names of keys that must be given are bold.
@@ -221,3 +222,7 @@ def _shown(default: object) -> str:
         # In code: Markdown takes [m] behind brackets for a link.
         return f"`[{', '.join(f'{one:g}' for one in default)}]`"
     return f"{default:g}" if isinstance(default, int | float) else f'"{default}"'
+
+
+if not TYPE_CHECKING:
+    __getattr__ = former_names(__name__, {"Ingredient": "Component"})

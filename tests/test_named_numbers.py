@@ -12,7 +12,7 @@ from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import FormerName, InvalidParameter, NameNotFound, ScenarioError
 from sphshell_pin.parameters import parameters_of
-from sphshell_pin.scenario import build, knobs_of, rebuild
+from sphshell_pin.scenario import build, live_parameters, rebuild
 from sphshell_pin.study.fit.parameters import free_parameters
 from sphshell_pin.study.sweep.plan import plan_sweep
 from tests.scenario.files import DROP, write
@@ -84,7 +84,7 @@ def test_a_number_has_one_name(part, table, name, tmp_path):
     key = f"{head}.{name}"
     path = write(tmp_path, drop(part, table) + f'\n[[knob]]\nkey = "{key}"\nmin = -1\nmax = 1e10\n')
     built = build(path)
-    (knob,) = knobs_of(built)
+    (knob,) = live_parameters(built)
     assert knob.key == key
     where = name.split(".")
 

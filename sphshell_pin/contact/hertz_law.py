@@ -12,7 +12,7 @@ from sphshell_pin.contact.laws import HuntCrossleyLaw, ImpactLaw, dissipation_fo
 from sphshell_pin.contact.materials import Material, TwoMaterials, restitution_between
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient, parameter, same_parameter
+from sphshell_pin.parameters import Component, parameter, same_parameter
 
 __all__ = ["HertzLaw"]
 
@@ -152,7 +152,7 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
 
 
 @dataclass(frozen=True)
-class Hertz(TwoMaterials, Ingredient, kind="hertz", of=NormalLaw):
+class Hertz(TwoMaterials, Component, kind="hertz", of=NormalLaw):
     """Hertz's law as a scenario states it, see HertzLaw; with a radius see ImpactLaw.hertz."""
 
     restitution: float | None = same_parameter(HertzLaw, "restitution")

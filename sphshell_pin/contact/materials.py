@@ -124,7 +124,7 @@ class TwoMaterials:
             one, other = find_material(self.young), find_material(self.poisson)
             for name, value in self._of(one, other).items():
                 object.__setattr__(self, name, value)
-        super().__post_init__()  # type: ignore[misc]  # of Ingredient
+        super().__post_init__()  # type: ignore[misc]  # of Component
 
     def _of(self, one: Material, other: Material) -> dict[str, float]:
         """Return the parameters that follow from the materials."""

@@ -80,7 +80,7 @@ def _read_robot(path: Path) -> None:
             fault = error  # the other one has to refuse it, or read it, as well
             continue
         robot = getattr(loaded, "robot", loaded)
-        scene = sp.Scene(robot.model, joints=sp.JointIngredients.from_model(robot.model))
+        scene = sp.Scene(robot.model, joints=sp.JointComponents.from_model(robot.model))
         pin.forwardKinematics(scene.model, scene.model.createData(), robot.q0)
         robots.end_spheres(robot)
     if fault is not None:

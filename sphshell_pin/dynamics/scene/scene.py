@@ -37,7 +37,7 @@ class Scene(SceneParts):
 
     `lock` names joints to hold at their values in `q_lock` (nq of the given model, default
     neutral): they drop out of the scene's model and cost nothing. `joints` says what else acts in
-    the joints, for instance JointIngredients.from_model(model): by default nothing, as in
+    the joints, for instance JointComponents.from_model(model): by default nothing, as in
     Pinocchio. Joints that mimic others (pinocchio's mimic=True) move exactly so: nq and nv count
     independent coordinates. FrameNotFound and NameNotFound list what the model has.
     """

@@ -31,7 +31,7 @@ from sphshell_pin.errors import (
     SphshellError,
     UnitWarning,
 )
-from sphshell_pin.parameters import Ingredient, parameters_of
+from sphshell_pin.parameters import Component, parameters_of
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.scenario.format import schema
 from sphshell_pin.scenario.format.bodies import (
@@ -44,7 +44,7 @@ from sphshell_pin.scenario.format.bodies import (
     to_se3,
 )
 from sphshell_pin.scenario.format.functions import load_function
-from sphshell_pin.scenario.format.joint_tables import joint_ingredients
+from sphshell_pin.scenario.format.joint_tables import joint_components
 from sphshell_pin.scenario.format.reading import (
     change_scenario,
     find_scenario,
@@ -166,7 +166,7 @@ def build_scenario(
 
     with blamed_on(path, "robot"):
         q_lock = assembly.q0 if assembly.lock else None
-        joints = joint_ingredients(scenario, assembly, path)
+        joints = joint_components(scenario, assembly, path)
         scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock, joints=joints)
     shells = {
         section.name: (
@@ -335,7 +335,7 @@ def _add_contact(
             )
 
 
-def _build_sensors(stated: Sequence[Ingredient], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
+def _build_sensors(stated: Sequence[Component], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
     for i, one in enumerate(stated):
         with blamed_on(path, item_key("sensor", stated, i)):
             assert isinstance(one, Sensor)
@@ -346,7 +346,7 @@ def _build_sensors(stated: Sequence[Ingredient], scene: sp.Scene, path: Path) ->
 
 
 def _build_controller(
-    stated: Ingredient,
+    stated: Component,
     scene: sp.Scene,
     q0: Array,
     shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, get_args, get_origin
 from pydantic import BaseModel
 
 from sphshell_pin.errors import ScenarioError
-from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
+from sphshell_pin.parameters import Component, Parameter, parameters_of
 from sphshell_pin.scenario.format.reading import Found, child_of, look_up, owner_of
 from sphshell_pin.scenario.format.schema import KnobSection, Scenario
 
@@ -24,7 +24,7 @@ _FROM_THE_START = ("robot", "shell", "run")
 
 
 @dataclass(frozen=True)
-class Knob:
+class LiveParameter:
     """A number of a scenario with the range to turn it in, or a word with its choices."""
 
     key: str
@@ -43,7 +43,7 @@ class Knob:
     """The words that the value may be; none where it is a number."""
 
 
-def knobs_of(built: Built) -> tuple[Knob, ...]:
+def live_parameters(built: Built) -> tuple[LiveParameter, ...]:
     """Return the knobs of a built scenario, in the file's order, with the values they stand at.
 
     A range is widened where the value, changed by --set, lies outside.
@@ -134,13 +134,15 @@ def _check_choice(section: KnobSection, found: Found, path: Path, where: str) ->
             raise ScenarioError(path, f"{where}.{name}", "is for numbers, not for words", given)
 
 
-def _knob(section: KnobSection, scenario: Scenario, path: Path) -> Knob:
+def _knob(section: KnobSection, scenario: Scenario, path: Path) -> LiveParameter:
     at = look_up(scenario, section.key, path)
     choices = _choices(scenario, at)
     if choices:
         label = meaning(scenario, at).label if section.label is None else section.label
         restart = at.parts[0] in _FROM_THE_START
-        return Knob(section.key, label, "", 0.0, 0.0, False, str(at.value), restart, choices)
+        return LiveParameter(
+            section.key, label, "", 0.0, 0.0, False, str(at.value), restart, choices
+        )
     found = _found(section, scenario, path)
     value, about = float(found.value), meaning(scenario, found)
     low, high, log = _range(section, value, about)
@@ -150,7 +152,7 @@ def _knob(section: KnobSection, scenario: Scenario, path: Path) -> Knob:
     if high is None:
         high = value / DECADE if value < 0.0 else 1.0
     low, high = min(low, value), max(high, value)
-    return Knob(
+    return LiveParameter(
         key=section.key,
         label=about.label if section.label is None else section.label,
         unit=about.unit if section.unit is None else section.unit,
@@ -174,7 +176,7 @@ def meaning(scenario: Scenario, found: Found) -> Parameter:
         if about is not None:
             inner = found.parts[i + 1 :]
             label = about.label or part.replace("_", " ")
-            unit = owner.unit_of(part) if isinstance(owner, Ingredient) else about.unit
+            unit = owner.unit_of(part) if isinstance(owner, Component) else about.unit
             return replace(about, label=_named(prefix, _inside(label, inner), scenario), unit=unit)
         prefix.append(part)
         owner = child_of(owner, part)

@@ -22,7 +22,7 @@ from pydantic_core import CoreSchema, PydanticCustomError
 
 from sphshell_pin.errors import did_you_mean
 from sphshell_pin.named_numbers import present_name
-from sphshell_pin.parameters import Ingredient, parameters_of
+from sphshell_pin.parameters import Component, parameters_of
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -43,7 +43,7 @@ def refuse_unknown_keys(table: Mapping[str, object], valid: Sequence[str]) -> No
 class OneOf:
     """Annotation of a table that states one of a `family`; its key `type` says which."""
 
-    family: type[Ingredient]
+    family: type[Component]
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
@@ -74,7 +74,7 @@ def _check_kind(kinds: Sequence[str], value: object) -> object:
     raise PydanticCustomError("unknown_type", "{said}", {"said": said})
 
 
-def _without_type(kind: type[Ingredient], value: object) -> object:
+def _without_type(kind: type[Component], value: object) -> object:
     """Take the key `type` off a table; refuse keys that no file may state."""
     if not isinstance(value, dict):
         return value
@@ -90,7 +90,7 @@ def _without_type(kind: type[Ingredient], value: object) -> object:
     return table
 
 
-def _to_table(value: Ingredient, info: SerializationInfo) -> dict[str, object]:
+def _to_table(value: Component, info: SerializationInfo) -> dict[str, object]:
     """Return the table that states `value`, without defaults where these may be left out."""
     table: dict[str, object] = {"type": value.kind}
     for one in dataclasses.fields(value):
