@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from sphshell_pin.dynamics import ForceTorqueSensor as ForceTorqueSensor
     from sphshell_pin.dynamics import GravityCompensation as GravityCompensation
     from sphshell_pin.dynamics import Implicit as Implicit
+    from sphshell_pin.dynamics import JointComponents as JointComponents
     from sphshell_pin.dynamics import JointFriction as JointFriction
-    from sphshell_pin.dynamics import JointIngredients as JointIngredients
     from sphshell_pin.dynamics import JointLimits as JointLimits
     from sphshell_pin.dynamics import JointPD as JointPD
     from sphshell_pin.dynamics import JointTorqueSensor as JointTorqueSensor
@@ -86,7 +86,7 @@ _HOME = {
     "JointPD": "dynamics",
     "JointTorqueSensor": "dynamics",
     "JointLimits": "dynamics",
-    "JointIngredients": "dynamics",
+    "JointComponents": "dynamics",
     "JointFriction": "dynamics",
     "LinearlyImplicitEuler": "dynamics",
     "MindlinFriction": "contact",
@@ -129,6 +129,11 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(f"sphshell_pin.{_HOME[name]}"), name)
         globals()[name] = value
         return value
+    if name == "JointIngredients":
+        from sphshell_pin.deprecation import warn_former
+
+        warn_former(f"sphshell_pin.{name}", "it is called JointComponents")
+        return __getattr__("JointComponents")
     if name in _PARTS:
         return import_module(f"sphshell_pin.{name}")
     raise AttributeError(f"module 'sphshell_pin' has no attribute '{name}'")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 
 
@@ -20,6 +21,18 @@ def renamed(former: str, now: str) -> property:
         return getattr(self, now)
 
     return property(read, doc=f"Former name of `{now}`.")
+
+
+def former_names(module: str, names: Mapping[str, str]) -> Callable[[str], object]:
+    """Return the `__getattr__` of `module` for `names` that it had, with what they are called."""
+
+    def read(name: str) -> object:
+        if name not in names:
+            raise AttributeError(f"module '{module}' has no attribute '{name}'")
+        warn_former(f"{module}.{name}", f"it is called {names[name]}")
+        return getattr(sys.modules[module], names[name])
+
+    return read
 
 
 class FormerDict(Mapping[str, object]):

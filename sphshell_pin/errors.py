@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 # Longer lists of valid names are cut to the nearest ones, longer values in the middle.
 _MOST_NAMES = 20
 _LONGEST_VALUE = 200
+# Names of the second of two bodies: "young_2", "other_sphere".
+_SECOND = re.compile(r"_2\b|\bother_")
 
 
 class SphshellError(Exception):
@@ -76,6 +78,22 @@ class UnitMissing(InvalidParameter):
         )
 
 
+def did_you_mean(name: str, valid: Iterable[str]) -> str:
+    """Return "did you mean 'x'?" with the nearest of the `valid` names; "" if none is near.
+
+    For a name of the first body none of the second is offered, and the other way round.
+    """
+    second = bool(_SECOND.search(name))
+    near = difflib.get_close_matches(
+        name, [one for one in valid if bool(_SECOND.search(one)) == second], n=1
+    )
+    return f"did you mean '{near[0]}'?" if near else ""
+
+
+class FormerName(FutureWarning):
+    """A number is stated by a name that it had; the text says what it is called now."""
+
+
 class UnitWarning(UserWarning):
     """A shell is so much larger than its sphere or robot that its unit is probably wrong."""
 
@@ -125,7 +143,8 @@ class NameNotFound(SphshellError, LookupError):
         self.kind = kind
         self.name = name
         self.valid = tuple(valid)
-        has = f"{owner} has: {', '.join(self.valid) or 'none'}"
+        hint = did_you_mean(name, self.valid)
+        has = f"{owner} has: {', '.join(self.valid) or 'none'}{hint and f'; {hint}'}"
         if len(self.valid) > _MOST_NAMES:
             near = difflib.get_close_matches(name, self.valid, n=5, cutoff=0.0)
             has = f"the nearest are {', '.join(near)}; {owner} has {len(self.valid)}"

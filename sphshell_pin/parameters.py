@@ -1,4 +1,4 @@
-"""One description of every ingredient: the fields of its dataclass say everything about it.
+"""One description of every component: the fields of its dataclass say everything about it.
 
 Laws, friction, integrators and controllers are frozen dataclasses whose fields are made by
 `parameter`. From these follow the checks, the tables of scenario files (pydantic reads the same
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from sphshell_pin.checks import check_finite, check_type
+from sphshell_pin.deprecation import former_names
 from sphshell_pin.errors import InvalidParameter
 
 if TYPE_CHECKING:
@@ -44,6 +45,8 @@ class Parameter:
     at_most: float | None = None
     log: bool | None = None
     """Whether a slider multiplies (else it adds); None: it follows from the range."""
+    former: str = ""
+    """A name that it had, and that still works with a warning."""
 
     @property
     def bounds(self) -> dict[str, float]:
@@ -90,6 +93,7 @@ def parameter(
     at_least: float | None = None,
     at_most: float | None = None,
     log: bool | None = None,
+    former: str = "",
     **more: object,
 ) -> Any:
     """Return the field of a dataclass that is a parameter.
@@ -97,17 +101,16 @@ def parameter(
     The bounds hold for numbers; `more` is what pydantic takes for the field in a file
     (`min_length`). A field that is not made by this function cannot be stated in a file.
     """
-    about = Parameter(unit, label, help, above, at_least, at_most, log)
+    about = Parameter(unit, label, help, above, at_least, at_most, log, former)
     # Pydantic reads the bounds and the description in a field's metadata.
     metadata = {_KEY: about, "description": help, **about.bounds, **more}
     return field(default=default, metadata=metadata)
 
 
-def same_parameter(kind: type, name: str, **changed: str) -> Any:
-    """Return the field of a dataclass that is the parameter `name` of `kind`, but for `changed`."""
+def same_parameter(kind: type, name: str) -> Any:
+    """Return the field of a dataclass that is the parameter `name` of `kind`."""
     (source,) = (one for one in dataclasses.fields(kind) if one.name == name)
-    about = dataclasses.replace(source.metadata[_KEY], **changed)
-    return field(default=source.default, metadata={**source.metadata, _KEY: about})
+    return field(default=source.default, metadata=source.metadata)
 
 
 def parameters_of(kind: object) -> dict[str, Parameter]:
@@ -115,22 +118,22 @@ def parameters_of(kind: object) -> dict[str, Parameter]:
     if not dataclasses.is_dataclass(kind):
         return {}
     found = {f.name: f.metadata[_KEY] for f in dataclasses.fields(kind) if _KEY in f.metadata}
-    return found | dict(kind.own_parameters) if isinstance(kind, Ingredient) else found
+    return found | dict(kind.own_parameters) if isinstance(kind, Component) else found
 
 
 @dataclass(frozen=True)
-class Ingredient:
+class Component:
     """Base of what a scene, a run or a file is composed of.
 
-    A direct subclass is a family (`class NormalLaw(Ingredient)`). A class that belongs to it gives
+    A direct subclass is a family (`class NormalLaw(Component)`). A class that belongs to it gives
     its type name in files, `class ImpactLaw(NormalLaw, kind="impact")`. Another way to state one
-    names the family that it belongs to, `class Hertz(Ingredient, kind="hertz", of=NormalLaw)`, and
+    names the family that it belongs to, `class Hertz(Component, kind="hertz", of=NormalLaw)`, and
     returns what it states by `made`; if its kind is taken, files state that kind in this way.
     """
 
     kind: ClassVar[str] = ""
     """Type name in files and in the compiled core."""
-    kinds: ClassVar[dict[str, type[Ingredient]]] = {}
+    kinds: ClassVar[dict[str, type[Component]]] = {}
     """What files may state of this family, by type name."""
     # Pydantic's settings for these dataclasses.
     __pydantic_config__: ClassVar[Mapping[str, object]] = {
@@ -139,10 +142,10 @@ class Ingredient:
         "arbitrary_types_allowed": True,
     }
 
-    def __init_subclass__(cls, *, kind: str = "", of: type[Ingredient] | None = None) -> None:
+    def __init_subclass__(cls, *, kind: str = "", of: type[Component] | None = None) -> None:
         """Register the class under its type name."""
         super().__init_subclass__()
-        if Ingredient in cls.__bases__ and of is None:
+        if Component in cls.__bases__ and of is None:
             cls.kinds = {}
         if kind:
             cls.kind = kind
@@ -188,3 +191,7 @@ class Ingredient:
     def __getstate__(self) -> dict[str, object]:
         """Everything but the C++ binding, which is made again: what pickle and copy take."""
         return {k: v for k, v in self.__dict__.items() if k != "core"}
+
+
+if not TYPE_CHECKING:
+    __getattr__ = former_names(__name__, {"Ingredient": "Component"})

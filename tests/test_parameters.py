@@ -1,4 +1,4 @@
-"""One description of each ingredient: checks, files, C++ and documents follow from it."""
+"""One description of each component: checks, files, C++ and documents follow from it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sphshell_pin.dynamics.control.controllers import Controller
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient, parameter, parameters_of
+from sphshell_pin.parameters import Component, parameter, parameters_of
 from sphshell_pin.scenario.format import shape_tables as primitives
 from sphshell_pin.scenario.format.shape_tables import Primitive
 
@@ -30,7 +30,7 @@ FAMILIES = {
 }
 
 
-def concrete(family: type[Ingredient]) -> list[type[Ingredient]]:
+def concrete(family: type[Component]) -> list[type[Component]]:
     """Return the classes of a family without the other ways to state them."""
     own = [one for base in family.__subclasses__() for one in concrete(base)]
     return own + [family] * ("kind" in vars(family))
@@ -43,8 +43,8 @@ MARK = re.compile(r"^<!-- (parameters|kinds): (\w+) -->$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
-class Spring(Ingredient):
-    """An ingredient of every kind of bounds."""
+class Spring(Component):
+    """A component of every kind of bounds."""
 
     stiffness: float = parameter(above=0, unit="N/m^{0.exponent:g}", help="k")
     exponent: float = parameter(1.5, above=1, help="e")
@@ -113,8 +113,6 @@ VALUES = {
     "radii": [0.1, 0.2, 0.3],
     "young": 1e9,
     "poisson": 0.3,
-    "young_1": 1e9,
-    "poisson_1": 0.3,
     "young_2": 1e9,
     "poisson_2": 0.3,
     "modulus": 1e6,

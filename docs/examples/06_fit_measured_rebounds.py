@@ -48,8 +48,8 @@ shell = "glass"
 
 [contact.law]
 type = "hertz"
-young_1 = 3.8e11     # alumina [Pa]
-poisson_1 = 0.23
+young = 3.8e11     # alumina [Pa]
+poisson = 0.23
 young_2 = 7.0e10     # glass [Pa]
 poisson_2 = 0.25
 restitution = 0.98   # at every angle

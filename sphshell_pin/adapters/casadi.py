@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from sphshell_pin.adapters.evaluator import check_without_history
 from sphshell_pin.checks import check_names, check_type
 from sphshell_pin.dynamics import Scene, Simulation
-from sphshell_pin.dynamics.scene.variations import Variations, numbers_of
-from sphshell_pin.errors import MissingExtra, NameNotFound
+from sphshell_pin.dynamics.scene.variations import Variations
+from sphshell_pin.errors import MissingExtra
+from sphshell_pin.named_numbers import find_name, names_of_pairs
 
 try:
     import casadi
@@ -60,11 +61,9 @@ class _SceneFunction(casadi.Callback):
         check_without_history(scene, without_history)
         super().__init__()
         self.scene = scene
-        self.parameters = check_names("parameters", parameters)
-        valid = [name for name, shape in numbers_of(scene).items() if not shape]
-        for name in self.parameters:
-            if name not in valid:
-                raise NameNotFound("parameter of one number", name, "the scene", valid)
+        single = {n: one for n, one in names_of_pairs(scene.pairs).items() if one.shape == ()}
+        names = check_names("parameters", parameters)
+        self.parameters = tuple(find_name(n, single, "parameter of one number") for n in names)
         self._model = scene.model
         self._q0, _ = scene.check_state(scene.neutral if q0 is None else q0)
         self._inputs = ("q", "v", "tau", "p") if self.parameters else ("q", "v", "tau")

@@ -12,12 +12,12 @@ from sphshell_pin.checks import check_not_negative, check_type
 from sphshell_pin.contact.materials import find_material, friction_between
 from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient, Named, parameter
+from sphshell_pin.parameters import Component, Named, parameter
 
 __all__ = ["CoulombFriction", "Friction"]
 
 
-class Friction(Ingredient):
+class Friction(Component):
     """Base of the friction laws: `core`, the C++ binding, computes the forces."""
 
     @cached_property
@@ -96,7 +96,7 @@ class Coefficients(Friction):
 
 
 @dataclass(frozen=True)
-class NoFriction(Ingredient, kind="none", of=Friction):
+class NoFriction(Component, kind="none", of=Friction):
     """A frictionless contact."""
 
     def made(self, folder: Path = Path()) -> None:

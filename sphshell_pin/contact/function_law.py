@@ -16,7 +16,7 @@ from sphshell_pin import _core
 from sphshell_pin.checks import check_finite
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter, NotPicklable, SlowLawWarning
-from sphshell_pin.parameters import Ingredient, Parameter, parameter
+from sphshell_pin.parameters import Component, Parameter, parameter
 
 __all__ = ["FunctionLaw"]
 
@@ -141,7 +141,7 @@ class FunctionLaw(NormalLaw, kind="function"):
 
 
 @dataclass(frozen=True)
-class FunctionFile(Ingredient, kind="function", of=NormalLaw):
+class FunctionFile(Component, kind="function", of=NormalLaw):
     """A law of one's own as a scenario states it."""
 
     function: str = parameter(help='"file.py:name" of the force')
@@ -170,11 +170,11 @@ def _address(name: str, function: Any, count: int) -> int | None:
     if isinstance(getattr(function, "address", None), int):  # numba
         _check_signature(name, function.ctypes, count)
         return int(function.address)
-    if isinstance(function, ctypes._CFuncPtr):
+    if isinstance(function, ctypes._CFuncPtr):  # type: ignore[attr-defined]
         _check_signature(name, function, count)
         found = ctypes.cast(function, ctypes.c_void_p).value
     elif type(function).__module__ == "_cffi_backend":
-        import _cffi_backend  # of the pointer at hand
+        import _cffi_backend  # type: ignore[import-untyped, import-not-found, unused-ignore]
 
         found = int(_cffi_backend.FFI().cast("uintptr_t", function))
     elif isinstance(function, int) and not isinstance(function, bool):

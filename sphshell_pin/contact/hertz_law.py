@@ -12,7 +12,7 @@ from sphshell_pin.contact.laws import HuntCrossleyLaw, ImpactLaw, dissipation_fo
 from sphshell_pin.contact.materials import Material, TwoMaterials, restitution_between
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient, parameter, same_parameter
+from sphshell_pin.parameters import Component, parameter, same_parameter
 
 __all__ = ["HertzLaw"]
 
@@ -152,13 +152,9 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
 
 
 @dataclass(frozen=True)
-class Hertz(Ingredient, kind="hertz", of=NormalLaw):
+class Hertz(TwoMaterials, Component, kind="hertz", of=NormalLaw):
     """Hertz's law as a scenario states it, see HertzLaw; with a radius see ImpactLaw.hertz."""
 
-    young_1: float = same_parameter(HertzLaw, "young", label="Young's modulus 1")
-    poisson_1: float = same_parameter(HertzLaw, "poisson", label="Poisson's ratio 1")
-    young_2: float | None = same_parameter(HertzLaw, "young_2")
-    poisson_2: float | None = same_parameter(HertzLaw, "poisson_2")
     restitution: float | None = same_parameter(HertzLaw, "restitution")
     speed: float | None = same_parameter(HertzLaw, "speed")
     radius_2: float | None = parameter(
@@ -198,8 +194,8 @@ class Hertz(Ingredient, kind="hertz", of=NormalLaw):
 
     def _law(self) -> HertzLaw:
         return HertzLaw(
-            self.young_1,
-            self.poisson_1,
+            self.young,
+            self.poisson,
             self.young_2,
             self.poisson_2,
             self.restitution,

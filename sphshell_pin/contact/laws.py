@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from sphshell_pin.contact.normal_law import NormalLaw, bisect
-from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.parameters import Component, parameter
 from sphshell_pin.units import (
     adams_damping_to_si,
     adams_length_to_si,
@@ -181,7 +181,7 @@ class HuntCrossleyLaw(_PowerLaw, kind="hunt-crossley"):
 
 
 @dataclass(frozen=True)
-class AdamsImpact(Ingredient, kind="adams", of=NormalLaw):
+class AdamsImpact(Component, kind="adams", of=NormalLaw):
     """IMPACT as an ADAMS model states it; the defaults are ADAMS's own."""
 
     k: float = parameter(

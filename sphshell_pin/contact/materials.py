@@ -86,10 +86,18 @@ class TwoMaterials:
     """
 
     young: Named = parameter(
-        above=0, unit="Pa", label="Young's modulus", help="Young's modulus of the sphere"
+        above=0,
+        unit="Pa",
+        label="Young's modulus",
+        help="Young's modulus of the sphere",
+        former="young_1",
     )
     poisson: Named = parameter(
-        above=-1, at_most=0.5, label="Poisson's ratio", help="Poisson's ratio of the sphere"
+        above=-1,
+        at_most=0.5,
+        label="Poisson's ratio",
+        help="Poisson's ratio of the sphere",
+        former="poisson_1",
     )
     young_2: float | None = parameter(
         None,
@@ -116,7 +124,7 @@ class TwoMaterials:
             one, other = find_material(self.young), find_material(self.poisson)
             for name, value in self._of(one, other).items():
                 object.__setattr__(self, name, value)
-        super().__post_init__()  # type: ignore[misc]  # of Ingredient
+        super().__post_init__()  # type: ignore[misc]  # of Component
 
     def _of(self, one: Material, other: Material) -> dict[str, float]:
         """Return the parameters that follow from the materials."""

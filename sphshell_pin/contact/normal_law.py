@@ -11,13 +11,13 @@ import numpy as np
 from sphshell_pin import _core
 from sphshell_pin.checks import check_finite, check_type
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient
+from sphshell_pin.parameters import Component
 
 # Decay times that need as many steps as one period of an oscillation.
 DECAYS_PER_PERIOD = 20
 
 
-class NormalLaw(Ingredient):
+class NormalLaw(Component):
     """Base of the normal laws: `core`, the C++ binding, computes the forces.
 
     A law gives `kind`, its parameters, `text`, and `decay_time` if it has damping. What else is

@@ -11,7 +11,7 @@ from pathlib import Path
 from sphshell_pin.checks import check_vector
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.parameters import Component, parameter
 
 __all__ = ["TableLaw"]
 
@@ -93,7 +93,7 @@ class TableLaw(NormalLaw, kind="table"):
 
 
 @dataclass(frozen=True)
-class TableFile(Ingredient, kind="table", of=NormalLaw):
+class TableFile(Component, kind="table", of=NormalLaw):
     """A table law as a scenario states it."""
 
     file: str = parameter(help="csv file of depth [m] and force [N], relative to the scenario")

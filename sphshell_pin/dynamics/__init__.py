@@ -1,5 +1,8 @@
 """Scenes of contact pairs on a Pinocchio model, and their motion."""
 
+from typing import TYPE_CHECKING
+
+from sphshell_pin.deprecation import former_names
 from sphshell_pin.dynamics.control import controllers, impedance
 from sphshell_pin.dynamics.control.controllers import *  # noqa: F403
 from sphshell_pin.dynamics.control.impedance import *  # noqa: F403
@@ -17,8 +20,8 @@ from sphshell_pin.dynamics.scene.derivatives import (
     StepDerivatives,
 )
 from sphshell_pin.dynamics.scene.joint_components import (
+    JointComponents,
     JointFriction,
-    JointIngredients,
     JointLimits,
 )
 from sphshell_pin.dynamics.scene.scene import ContactPair, Scene, SceneContacts, SceneState
@@ -33,9 +36,9 @@ __all__ = [
     "DynamicsDerivatives",
     "EnergyAudit",
     "Event",
+    "JointComponents",
     "JointFigures",
     "JointFriction",
-    "JointIngredients",
     "JointLimits",
     "PairFigures",
     "Readings",
@@ -54,3 +57,6 @@ __all__ += controllers.__all__
 __all__ += impedance.__all__
 __all__ += integrators.__all__
 __all__ += sensors.__all__
+
+if not TYPE_CHECKING:
+    __getattr__ = former_names(__name__, {"JointIngredients": "JointComponents"})

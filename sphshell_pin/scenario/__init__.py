@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from sphshell_pin.deprecation import former_names
 from sphshell_pin.scenario.format.build import Built, build, explain_built, rebuild
 from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.schema import Scenario
-from sphshell_pin.scenario.format.sliders import Knob, knobs_of
+from sphshell_pin.scenario.format.sliders import LiveParameter, live_parameters
 from sphshell_pin.scenario.running.figures import Verdict, judge
 from sphshell_pin.scenario.running.run import RunReport, run_built, run_scenario
 
 __all__ = [
     "Built",
-    "Knob",
+    "LiveParameter",
     "RunReport",
     "Scenario",
     "Verdict",
@@ -19,10 +22,13 @@ __all__ = [
     "explain_built",
     "find_scenario",
     "judge",
-    "knobs_of",
+    "live_parameters",
     "read_scenario",
     "rebuild",
     "run_built",
     "run_scenario",
     "shipped_scenarios",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = former_names(__name__, {"Knob": "LiveParameter", "knobs_of": "live_parameters"})

@@ -35,7 +35,7 @@ def plate(bend: float = 0.0) -> sp.Shell:
     return sp.Shell(points, quads)
 
 
-def arm_on_moving_plate(joints: sp.JointIngredients | None = None) -> tuple[sp.Scene, np.ndarray]:
+def arm_on_moving_plate(joints: sp.JointComponents | None = None) -> tuple[sp.Scene, np.ndarray]:
     """Return an arm whose tip touches a plate that slides and turns, and a state."""
     model = pin.Model()
     parent = 0
@@ -80,7 +80,7 @@ def free_ball() -> tuple[sp.Scene, np.ndarray]:
     return pressed(scene, q, [0.2, -0.1, 0.05, 1.0, -2.0, 0.5])
 
 
-def ball_in_a_corner(joints: sp.JointIngredients | None = None) -> tuple[sp.Scene, np.ndarray]:
+def ball_in_a_corner(joints: sp.JointComponents | None = None) -> tuple[sp.Scene, np.ndarray]:
     """Return a ball on slides that presses into two walls, and a state."""
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "slides")
@@ -216,7 +216,7 @@ def test_forces_are_those_of_the_scene():
     np.testing.assert_array_equal(last.costs.costs["world"].residual.r, wanted)
 
 
-@pytest.mark.parametrize("joints", [None, sp.JointIngredients(damping={"slides": 7.0})])
+@pytest.mark.parametrize("joints", [None, sp.JointComponents(damping={"slides": 7.0})])
 def test_forces_of_several_pairs_and_of_joints(joints):
     """Each pair has its own force; the acceleration is ABA's with the scene's forces."""
     scene, x = ball_in_a_corner(joints)
@@ -242,7 +242,7 @@ def test_forces_of_several_pairs_and_of_joints(joints):
 
 
 def test_dry_friction_of_joints_is_refused_as_bristles_are():
-    dry = sp.JointIngredients(friction={"slide": sp.JointFriction(1.0)})
+    dry = sp.JointComponents(friction={"slide": sp.JointFriction(1.0)})
     scene, _ = arm_on_moving_plate(dry)
     with pytest.raises(InvalidParameter, match="dry friction in its joints"):
         dynamics(scene)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import warnings
 
 import numpy as np
@@ -38,6 +39,25 @@ def test_names_of_a_pair(former: str, now: str) -> None:
     with pytest.warns(DeprecationWarning, match=now) as caught:
         assert getattr(pair, former) == getattr(pair, now)
     assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize(
+    ("module", "former", "now"),
+    [
+        ("sphshell_pin", "JointIngredients", "JointComponents"),
+        ("sphshell_pin.dynamics", "JointIngredients", "JointComponents"),
+        ("sphshell_pin.parameters", "Ingredient", "Component"),
+        ("sphshell_pin.scenario", "Knob", "LiveParameter"),
+        ("sphshell_pin.scenario", "knobs_of", "live_parameters"),
+    ],
+)
+def test_names_of_a_module(module: str, former: str, now: str) -> None:
+    of = importlib.import_module(module)
+    with pytest.warns(DeprecationWarning, match=f"it is called {now}") as caught:
+        assert getattr(of, former) is getattr(of, now)
+    assert caught[0].filename == __file__
+    with pytest.raises(AttributeError, match="has no attribute 'Knobs'"):
+        of.Knobs  # noqa: B018
 
 
 def test_stats_were_a_dict() -> None:

@@ -182,7 +182,7 @@ def test_names_may_be_an_array_and_bytes_are_none() -> None:
     with pytest.raises(InvalidParameter, match="must be names"):
         scene.dynamics_derivatives(q, v, parameters=b"x")  # type: ignore[arg-type]
     with pytest.raises(InvalidParameter, match="must be names"):
-        Simulation(scene).run(q, v, 0.1, sensitivities=np.array(names))  # type: ignore[arg-type]
+        Simulation(scene).run(q, v, 0.1, sensitivities=b"x")  # type: ignore[arg-type]
     for name in ("v", "v0.3", "v0.", "q0.x"):
         with pytest.raises(NameNotFound, match=r"tip\.placement, q0, v0"):
             Simulation(scene).run(q, v, 0.1, sensitivities=[name])

@@ -225,7 +225,7 @@ def test_mimic_joints(name: str) -> None:
         assert_derivatives(scene, q, v)
 
 
-STOPS = sp.JointIngredients(
+STOPS = sp.JointComponents(
     limits={"two_joint": sp.JointLimits(-1.0, 1.5, sp.HuntCrossleyLaw(80.0, 1.3, 0.4))},
     damping={"one_joint": 0.2, "two_joint": 0.1},
     friction={"ball_joint": sp.JointFriction(0.5, stiffness=30.0, damping=0.4)},
@@ -233,7 +233,7 @@ STOPS = sp.JointIngredients(
 )
 
 
-def test_joint_ingredients() -> None:
+def test_joint_components() -> None:
     """In a stop, with damping, armature and dry friction; ARM_Q is 0.1 rad beyond the range."""
     scene, q, v = in_bowl(LAWS["impact"], COULOMB, joints=STOPS)
     assert scene.joint_forces(q, v)[1] < -1.0

@@ -133,7 +133,7 @@ def test_the_peak_of_a_damped_force_comes_before_that_of_the_depth(kind) -> None
 def test_the_peak_of_a_stop_lies_between_steps() -> None:
     """A mass on a joint runs into the end of its range: F = v sqrt(k m)."""
     stop = {"ball_joint": sp.JointLimits(-0.01, 0.01, sp.ImpactLaw(1e4, 1.0))}
-    scene = sp.Scene(models.slider(gravity=0.0), joints=sp.JointIngredients(limits=stop))
+    scene = sp.Scene(models.slider(gravity=0.0), joints=sp.JointComponents(limits=stop))
     result = sp.Simulation(scene, sp.Adaptive(1e-4)).run([0.0], [-0.6], 0.06)
     figures = result.stats.joints["ball_joint"]
     assert figures.peak_stop_force == pytest.approx(0.6 * np.sqrt(1e4), rel=1e-3)

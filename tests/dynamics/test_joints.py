@@ -16,8 +16,8 @@ from sphshell_pin import (
     HuntCrossleyLaw,
     ImpactLaw,
     Implicit,
+    JointComponents,
     JointFriction,
-    JointIngredients,
     JointLimits,
     JointPD,
     Result,
@@ -61,8 +61,8 @@ def residual(result: Result) -> float:
     return float(np.abs(result.energy.residual).max() / result.energy.exchanged)
 
 
-def stops(law: ImpactLaw | HuntCrossleyLaw, upper: float = 0.5) -> JointIngredients:
-    return JointIngredients(limits={"hinge": JointLimits(-1.0, upper, law)})
+def stops(law: ImpactLaw | HuntCrossleyLaw, upper: float = 0.5) -> JointComponents:
+    return JointComponents(limits={"hinge": JointLimits(-1.0, upper, law)})
 
 
 @pytest.mark.parametrize("integrator", [Adaptive(1e-9, 1e-11), Implicit(1e-9, 1e-11)])
@@ -85,7 +85,7 @@ def test_a_link_bounces_off_its_stop_as_the_closed_form(integrator: Adaptive | I
 
 def test_the_lower_stop_is_the_mirror_image() -> None:
     law = HuntCrossleyLaw(STIFFNESS, 1.5, 0.3)
-    joints = JointIngredients(limits={"hinge": JointLimits(-0.5, 0.5, law)})
+    joints = JointComponents(limits={"hinge": JointLimits(-0.5, 0.5, law)})
     up, down = (
         Simulation(Scene(link(), joints=joints), RungeKutta4(1e-3)).run([0.0], [v], 0.5)
         for v in (2.0, -2.0)
@@ -109,7 +109,7 @@ def test_fixed_steps_bounce_too() -> None:
 
 
 def test_damping_and_armature_decay_as_the_closed_form() -> None:
-    joints = JointIngredients(damping={"hinge": 0.3}, armature={"hinge": 0.05})
+    joints = JointComponents(damping={"hinge": 0.3}, armature={"hinge": 0.05})
     scene = Scene(link(), joints=joints)
     result = Simulation(scene, Adaptive(1e-11, 1e-13)).run([0.0], [1.0], 2.0)
     expected = np.exp(-0.3 / (INERTIA + 0.05) * result.t)
@@ -127,7 +127,7 @@ def test_dry_friction_holds_99_percent_for_a_minute_without_creep(
     model = slider()
     weight = 2.0 * 9.81
     friction = JointFriction(weight / 0.99)
-    scene = Scene(model, joints=JointIngredients(friction={joint_of(model): friction}))
+    scene = Scene(model, joints=JointComponents(friction={joint_of(model): friction}))
     result = Simulation(scene, integrator).run([1.0], None, 60.0, record_dt=1.0)
     # The load comes on at once, and the spring gives way by a part of a millimeter.
     assert result.q[1, 0] == pytest.approx(1.0, abs=2e-3)
@@ -138,7 +138,7 @@ def test_dry_friction_holds_99_percent_for_a_minute_without_creep(
 def test_dry_friction_slides_at_101_percent(integrator: Adaptive | Implicit) -> None:
     model = slider()
     weight = 2.0 * 9.81
-    joints = JointIngredients(friction={joint_of(model): JointFriction(weight / 1.01)})
+    joints = JointComponents(friction={joint_of(model): JointFriction(weight / 1.01)})
     result = Simulation(Scene(model, joints=joints), integrator).run([1.0], None, 1.0)
     # All of the limit acts once the spring has given way.
     acceleration = np.diff(result.v[-2:, 0]) / np.diff(result.t[-2:])
@@ -147,7 +147,7 @@ def test_dry_friction_slides_at_101_percent(integrator: Adaptive | Implicit) -> 
 
 
 def test_dry_friction_stops_a_swing_and_accounts_for_its_energy() -> None:
-    joints = JointIngredients(friction={"hinge": JointFriction(0.3)})
+    joints = JointComponents(friction={"hinge": JointFriction(0.3)})
     result = Simulation(Scene(link(9.81), joints=joints), Adaptive(1e-8, 1e-10)).run(
         [0.8], None, 6.0
     )
@@ -159,7 +159,7 @@ def test_dry_friction_stops_a_swing_and_accounts_for_its_energy() -> None:
 
 
 def test_torques_are_cut_at_the_effort_limit_and_the_result_says_when() -> None:
-    joints = JointIngredients(effort={"hinge": 5.0}, speed={"hinge": 3.0})
+    joints = JointComponents(effort={"hinge": 5.0}, speed={"hinge": 3.0})
     scene = Scene(link(), joints=joints)
     asked: list[float] = []
 
@@ -184,7 +184,7 @@ def test_events_of_limits_name_the_joint_that_met_them() -> None:
     model = pin.buildSampleModelManipulator()
     model.gravity.setZero()
     for name in list(model.names)[1:]:
-        joints = JointIngredients(effort={name: 1.0}, speed={name: 0.05})
+        joints = JointComponents(effort={name: 1.0}, speed={name: 0.05})
         column = model.joints[model.getJointId(name)].idx_v
         torque = np.where(np.arange(model.nv) == column, 1.5, 0.0)
         run = Simulation(Scene(model, joints=joints), RungeKutta4(1e-3))
@@ -194,7 +194,7 @@ def test_events_of_limits_name_the_joint_that_met_them() -> None:
 
 
 def test_efforts_may_differ_by_direction() -> None:
-    scene = Scene(link(), joints=JointIngredients(effort={"hinge": (-2.0, 5.0)}))
+    scene = Scene(link(), joints=JointComponents(effort={"hinge": (-2.0, 5.0)}))
     for asked, got in ((10.0, 5.0), (-10.0, -2.0), (1.0, 1.0)):
         result = Simulation(scene, RungeKutta4(1e-3)).run(
             [0.0], [0.0], 0.1, lambda *_, asked=asked: [asked], control_dt=0.1
@@ -205,7 +205,7 @@ def test_efforts_may_differ_by_direction() -> None:
 def test_a_controller_at_its_effort_limit_keeps_the_energy_residual() -> None:
     controller = JointPD(50.0, 5.0, [1.0])
     free = Simulation(Scene(link(9.81)), Adaptive(1e-8, 1e-10)).run([0.0], None, 1.0, controller)
-    joints = JointIngredients(effort={"hinge": 5.0})
+    joints = JointComponents(effort={"hinge": 5.0})
     cut = Simulation(Scene(link(9.81), joints=joints), Adaptive(1e-8, 1e-10)).run(
         [0.0], None, 1.0, controller
     )
@@ -216,7 +216,7 @@ def test_a_controller_at_its_effort_limit_keeps_the_energy_residual() -> None:
 
 def everything() -> Scene:
     model = link(9.81)
-    joints = JointIngredients(
+    joints = JointComponents(
         limits={"hinge": JointLimits(-0.2, 0.2, HuntCrossleyLaw(80.0, 1.3, 0.4))},
         damping={"hinge": 0.2},
         friction={"hinge": JointFriction(0.5, stiffness=30.0, damping=0.4)},
@@ -267,7 +267,7 @@ def test_your_own_loop_makes_the_same_motion() -> None:
 
 def test_springs_of_joints_and_bristles_of_contacts_live_side_by_side() -> None:
     """Contacts that come and go reorder the state that both share."""
-    dry = JointIngredients(
+    dry = JointComponents(
         friction={"one_joint": JointFriction(0.4), "two_joint": JointFriction(0.2)}
     )
     scene = Scene(models.arm(), joints=dry)
@@ -285,7 +285,7 @@ def test_springs_of_joints_and_bristles_of_contacts_live_side_by_side() -> None:
 
 
 def test_a_model_states_its_joints() -> None:
-    joints = JointIngredients.from_model(link())
+    joints = JointComponents.from_model(link())
     limits = joints.limits["hinge"]
     assert (limits.lower, limits.upper) == (-1.0, 1.2)
     assert joints.damping == {"hinge": 0.7}
@@ -295,20 +295,20 @@ def test_a_model_states_its_joints() -> None:
     # At its highest speed the joint goes 0.01 rad into the stop, or less if its motor is strong.
     energy = 0.5 * INERTIA * 3.0**2
     assert limits.law.depth_of(energy) <= 0.01 * (1 + 1e-9)
-    assert JointIngredients.from_model(link(), ["damping"]).kinds() == ("damping",)
+    assert JointComponents.from_model(link(), ["damping"]).kinds() == ("damping",)
     with pytest.raises(NameNotFound, match=r"'drag'.*damping"):
-        JointIngredients.from_model(link(), ["drag"])
+        JointComponents.from_model(link(), ["drag"])
 
 
 def test_zeros_and_missing_limits_are_not_stated() -> None:
     text = URDF.replace('effort="5" velocity="3"', 'effort="0" velocity="0"')
     text = text.replace('lower="-1" upper="1.2"', 'lower="0" upper="0"')
     text = text.replace('damping="0.7" friction="0.3"', 'damping="0" friction="0"')
-    assert not JointIngredients.from_model(pin.buildModelFromXML(text)).kinds()
+    assert not JointComponents.from_model(pin.buildModelFromXML(text)).kinds()
 
 
 def test_explain_lists_what_is_modelled_and_what_is_left_out() -> None:
-    text = str(Scene(link(), joints=JointIngredients.from_model(link(), ["damping"])).explain())
+    text = str(Scene(link(), joints=JointComponents.from_model(link(), ["damping"])).explain())
     modelled, absent = text.split("Not modeled:")
     assert "damping of 'hinge'" in modelled
     assert "position limits that the robot's file states, of 'hinge'" in absent
@@ -316,7 +316,7 @@ def test_explain_lists_what_is_modelled_and_what_is_left_out() -> None:
 
 
 def test_an_open_run_takes_over_new_numbers_of_joints() -> None:
-    scenes = [Scene(link(), joints=JointIngredients(damping={"hinge": c})) for c in (0.0, 2.0)]
+    scenes = [Scene(link(), joints=JointComponents(damping={"hinge": c})) for c in (0.0, 2.0)]
     run = OpenRun(Simulation(scenes[0], Adaptive(1e-8)), [0.0], [1.0], record_dt=0.01)
     run.advance(0.1)
     assert run.change(scenes[1])
@@ -354,18 +354,18 @@ def test_a_rollout_makes_the_same_runs() -> None:
         ({"friction": 1.0}, InvalidParameter, "friction.*must map joint names"),
     ],
 )
-def test_wrong_ingredients_are_refused(
+def test_wrong_components_are_refused(
     joints: dict[str, object], error: type[Exception], words: str
 ) -> None:
     with pytest.raises(error, match=words):
-        Scene(link(), joints=JointIngredients(**joints))  # type: ignore[arg-type]
+        Scene(link(), joints=JointComponents(**joints))  # type: ignore[arg-type]
 
 
 def test_ranges_belong_to_angles_and_lengths() -> None:
     model = models.ball()
     limits = JointLimits(-1.0, 1.0, ImpactLaw(1.0, 1.0))
     with pytest.raises(InvalidParameter, match="is a joint without a range"):
-        Scene(model, joints=JointIngredients(limits={joint_of(model): limits}))
+        Scene(model, joints=JointComponents(limits={joint_of(model): limits}))
     with pytest.raises(InvalidParameter, match="lower below upper"):
         JointLimits(1.0, 1.0, ImpactLaw(1.0, 1.0))
 

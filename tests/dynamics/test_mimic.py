@@ -13,7 +13,7 @@ from sphshell_pin import (
     CoulombFriction,
     HuntCrossleyLaw,
     Implicit,
-    JointIngredients,
+    JointComponents,
     JointPD,
     Scene,
     Shell,
@@ -201,9 +201,9 @@ def test_a_closing_grasp_keeps_its_energy(integrator: Adaptive | Implicit) -> No
         assert ours.isApprox(theirs, 1e-12)
 
 
-def test_joint_ingredients_act_on_the_joint_that_is_mimicked() -> None:
+def test_joint_components_act_on_the_joint_that_is_mimicked() -> None:
     model, _ = gripper()
-    joints = JointIngredients.from_model(model)
+    joints = JointComponents.from_model(model)
     assert set(joints.limits) == {"lift", "left_knuckle_joint"}
     scene = Scene(model, joints=joints)
     result = Simulation(scene, Adaptive(1e-7)).run(

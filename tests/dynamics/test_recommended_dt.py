@@ -166,7 +166,7 @@ def test_a_thirtieth_is_rounded_down(dt: float, below: float) -> None:
 def test_the_shortest_of_pairs_and_joints_counts() -> None:
     stop = sp.JointLimits(-1.0, 1.0, spring(0.03))
     model = models.slider(0.0, MASS)
-    joints = sp.JointIngredients(limits={str(model.names[1]): stop})
+    joints = sp.JointComponents(limits={str(model.names[1]): stop})
     scene = sp.Scene(model, joints=joints)
     assert sp.Scene(models.slider()).explain().recommended_dt == 1e-3
     for time, dt in ((0.3, 1e-3), (0.0151, 5e-4), (0.00301, 1e-4), (0.0061, 1e-4)):

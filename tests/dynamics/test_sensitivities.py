@@ -244,7 +244,7 @@ def test_a_joint_that_meets_its_stop() -> None:
     model = models.empty(0.0)
     models.add_body(model, "ball", pin.JointModelPZ())
     stop = sp.JointLimits(-0.1, 0.1, sp.HuntCrossleyLaw(2e5, 1.5, 0.3))
-    scene = sp.Scene(model, joints=sp.JointIngredients(limits={"ball_joint": stop}))
+    scene = sp.Scene(model, joints=sp.JointComponents(limits={"ball_joint": stop}))
     case = Case(scene, [0.0], [2.0], 0.15)
     result = case.check(["q0", "v0"])
     assert "stop" in [event.kind for event in result.events]

@@ -315,7 +315,7 @@ def test_what_a_joint_adds_is_transmitted():
     joint = "wheel_joint"
     scene = sp.Scene(
         model,
-        joints=sp.JointIngredients(
+        joints=sp.JointComponents(
             damping={joint: damping},
             friction={joint: sp.JointFriction(friction)},
             armature={joint: rotor},

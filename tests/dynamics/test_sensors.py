@@ -179,15 +179,15 @@ def test_sensors_vary_from_run_to_run():
         for name, log in alone.run([0.0], None, 0.05).sensors.items():
             assert np.array_equal(log.values, result.sensors[name].values)
             assert np.array_equal(log.t, result.sensors[name].t)
-    assert rollout.varied["sensors.wrist.seed"] == range(3)
+    assert rollout.varied["sensors.wrist.seed"] == list(range(3))
     table = rollout.to_dataframe()
     assert table["sensors.torque.delay"].tolist() == [0.0, 0.01, 0.02]
     assert table["sensors.wrist.seed"].tolist() == [0, 1, 2]
-    with pytest.raises(NameNotFound, match=r"no varied parameter 'sensors.wrist.frame'"):
+    with pytest.raises(NameNotFound, match=r"no parameter 'sensors.wrist.frame'"):
         simulation.rollout([0.0], None, 0.05, vary={"sensors.wrist.frame": ["a"]})
     with pytest.raises(InvalidParameter, match=r"of run 1'?.* = -1 cannot be taken: rate"):
         simulation.rollout([0.0], None, 0.05, vary={"sensors.wrist.rate": [1, -1]})
-    with pytest.raises(InvalidParameter, match="must be 2 numbers, one a run"):
+    with pytest.raises(InvalidParameter, match="must be 2 values, one a run"):
         simulation.rollout([[0.0], [1.0]], None, 0.05, vary={"sensors.wrist.seed": [1]})
 
 

@@ -135,7 +135,7 @@ def test_two_spheres(stepper: str) -> None:
 
 
 @every_stepper
-def test_joint_ingredients(stepper: str) -> None:
+def test_joint_components(stepper: str) -> None:
     scene, q, v = in_bowl(LAWS["impact"], COULOMB, joints=STOPS)
     assert_step(scene, STEPPERS[stepper], q, v)
 

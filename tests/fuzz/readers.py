@@ -76,7 +76,7 @@ def read_robot(path: Path) -> None:
 
 
 def _use(robot: robots.LoadedRobot) -> None:
-    scene = sp.Scene(robot.model, joints=sp.JointIngredients.from_model(robot.model))
+    scene = sp.Scene(robot.model, joints=sp.JointComponents.from_model(robot.model))
     pin.forwardKinematics(scene.model, scene.model.createData(), robot.q0)
     robots.end_spheres(robot)
 

@@ -61,7 +61,7 @@ name = "tip"
 sphere = { frame = "three_link_finger/tip", radius = 0.01, offset = [0.0, 0.0, 0.001] }
 shell = "box"
 method = "facets"
-law = { type = "hertz", radius = 1, young_1 = 1e6, poisson_1 = 0.4, young_2 = 1e9, poisson_2 = 0.3 }
+law = { type = "hertz", radius = 1, young = 1e6, poisson = 0.4, young_2 = 1e9, poisson_2 = 0.3 }
 friction = { type = "bristle", mu_static = 0.6, mu_dynamic = 0.5, stiffness = 1e4, damping = 3.0 }
 
 [[contact]]

@@ -157,14 +157,14 @@ def singular() -> Verdicts:
 
 @case("joint driven past its limit")
 def limits() -> Verdicts:
-    """Without joint ingredients it goes on, and that is said; with limits it comes to its stop."""
+    """Without joint components it goes on, and that is said; with limits it comes to its stop."""
     model = robots.load("three_link_finger").model
     q = np.array([0.2, 0.6, 0.4])
     gain, beyond = 0.5, np.array([0.2, -0.3, 0.4])
     bare = sp.Scene(model)
     said = any("limits" in line for line in bare.explain(q).not_modelled)
     yield at_most("joint limit", "explain", "says not modelled", float(not said), 0)
-    joints = sp.JointIngredients.from_model(model, ["limits"])
+    joints = sp.JointComponents.from_model(model, ["limits"])
     lower, stop = float(model.lowerPositionLimit[1]), joints.limits[model.names[2]].law
     # The springs of motor and stop, which is linear, in balance.
     stiffness = stop.normal_stiffness(1e-3)

@@ -33,7 +33,7 @@ def test_the_example_is_built(tmp_path):
         ('{ type = "impact", stiffness = 5 }', "ImpactLaw", "exponent", ImpactLaw(5.0).exponent),
         ('{ type = "hunt-crossley", stiffness = 5 }', "HuntCrossleyLaw", "stiffness", 5.0),
         (
-            '{ type = "hertz", radius = 0.012, young_1 = 2e11, poisson_1 = 0.3, '
+            '{ type = "hertz", radius = 0.012, young = 2e11, poisson = 0.3, '
             "young_2 = 2e11, poisson_2 = 0.3 }",
             "ImpactLaw",
             "stiffness",

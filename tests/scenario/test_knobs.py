@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin.errors import InvalidParameter, ScenarioError
-from sphshell_pin.scenario import build, knobs_of, rebuild, shipped_scenarios
+from sphshell_pin.scenario import build, live_parameters, rebuild, shipped_scenarios
 from sphshell_pin.scenario.live.live_run import LiveRun
 from tests.scenario.files import DROP, write
 from tests.studies import mostly_studies
@@ -21,7 +21,7 @@ def knob(key: str, more: str = "") -> str:
 
 def the_knob(folder, key, more=""):
     """Build the example with one knob and return that."""
-    (found,) = knobs_of(build(write(folder, DROP + knob(key, more))))
+    (found,) = live_parameters(build(write(folder, DROP + knob(key, more))))
     return found
 
 
@@ -64,7 +64,7 @@ def test_any_number_may_be_a_knob(key, more, unit, value, restart, tmp_path):
 
 
 def test_several_contacts_are_told_apart():
-    labels = [one.label for one in knobs_of(build("allegro_hand_object"))]
+    labels = [one.label for one in live_parameters(build("allegro_hand_object"))]
     assert len(set(labels)) == len(labels)
 
 
@@ -93,7 +93,7 @@ def test_a_wrong_knob_is_told_when_the_scenario_is_built(text, match, tmp_path):
 
 def test_a_value_set_from_outside_widens_the_range(tmp_path):
     path = write(tmp_path, DROP + knob(STIFFNESS, "min = 9e5\nmax = 2e6"))
-    (found,) = knobs_of(build(path, {STIFFNESS: "5e6"}))
+    (found,) = live_parameters(build(path, {STIFFNESS: "5e6"}))
     assert (found.low, found.value, found.high) == (9e5, 5e6, 5e6)
 
 
@@ -104,20 +104,20 @@ def test_a_value_set_from_outside_widens_the_range(tmp_path):
 )
 def test_shipped_knobs_hold_over_their_range(name):
     built = build(name)
-    knobs = knobs_of(built)
+    knobs = live_parameters(built)
     assert knobs
     for one in knobs:
         if one.choices:
             for word in one.choices:
                 (again,) = (
-                    k for k in knobs_of(rebuild(built, {one.key: word})) if k.key == one.key
+                    k for k in live_parameters(rebuild(built, {one.key: word})) if k.key == one.key
                 )
                 assert again.value == word
             continue
         assert one.low <= one.value <= one.high
         for value in (one.low, one.high):
             turned = rebuild(built, {one.key: repr(value)})
-            (again,) = (k for k in knobs_of(turned) if k.key == one.key)
+            (again,) = (k for k in live_parameters(turned) if k.key == one.key)
             assert again.value == pytest.approx(value, rel=1e-12)
 
 
@@ -191,7 +191,7 @@ KNOB = '\n[[knob]]\nkey = "contact.ball-plate.law.damping"\n'
 
 def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
     path = write(tmp_path, DROP + KNOB)
-    (knob,) = knobs_of(build(path, {"contact.ball-plate.law.damping": "0"}))
+    (knob,) = live_parameters(build(path, {"contact.ball-plate.law.damping": "0"}))
     assert (knob.value, knob.log) == (0.0, False)
     assert knob.low <= 0.0 < knob.high
     live = LiveRun(build(path))
@@ -204,7 +204,7 @@ def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
 def test_labels_units_and_limits_are_those_of_the_description(tmp_path):
     adams = 'law = { type = "adams", units = "in-lbf-s" }'
     hertz = (
-        'law = { type = "hertz", radius = 0.01, young_1 = 1e9, poisson_1 = 0.3, young_2 = 1e9, '
+        'law = { type = "hertz", radius = 0.01, young = 1e9, poisson = 0.3, young_2 = 1e9, '
         "poisson_2 = 0.3, restitution = 0.5, speed = 1 }"
     )
     law = next(line for line in DROP.splitlines() if line.startswith("law"))
@@ -212,11 +212,11 @@ def test_labels_units_and_limits_are_those_of_the_description(tmp_path):
         (adams, "k", "stiffness", "lbf/in^2.2", 1e6),
         (adams, "c", "damping", "lbf s/in", 100.0),
         (adams, "d", "full damping depth", "in", 1.0),
-        (hertz, "young_1", "Young's modulus 1", "Pa", 1e10),
+        (hertz, "young", "Young's modulus", "Pa", 1e10),
         (hertz, "restitution", "restitution", "", 1.0),
     ):
         path = write(tmp_path, DROP.replace(law, text) + knob(f"contact.ball-plate.law.{key}"))
-        (found,) = knobs_of(build(path))
+        (found,) = live_parameters(build(path))
         assert (found.label, found.unit, found.high) == (label, unit, high)
 
 
@@ -225,7 +225,7 @@ WITH_METHOD = DROP.replace('shell = "plate"\n', 'shell = "plate"\nmethod = "smoo
 
 
 def test_a_word_of_a_choice_may_be_a_knob(tmp_path):
-    (found,) = knobs_of(build(write(tmp_path, WITH_METHOD + knob(METHOD))))
+    (found,) = live_parameters(build(write(tmp_path, WITH_METHOD + knob(METHOD))))
     assert (found.value, found.choices) == ("smooth", ("facets", "smooth", "elements"))
     assert (found.label, found.unit, found.restart) == ("method", "", False)
 

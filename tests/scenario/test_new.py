@@ -23,7 +23,7 @@ from sphshell_pin.errors import (
     SphshellError,
     UnitMissing,
 )
-from sphshell_pin.scenario import build, judge, knobs_of, rebuild, shipped_scenarios
+from sphshell_pin.scenario import build, judge, live_parameters, rebuild, shipped_scenarios
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
 from tests.shell.surfaces import surface_file
@@ -254,7 +254,7 @@ def test_the_ball_comes_back_as_high_as_its_material_says(tmp_path):
 
 def test_its_knobs_turn(tmp_path):
     built = new_scenario("ball", "plane", out=tmp_path / "a.toml").built
-    knobs = knobs_of(built)
+    knobs = live_parameters(built)
     assert len(knobs) >= 4
     for knob in knobs:
         for value in (knob.low, knob.high):

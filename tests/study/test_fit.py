@@ -144,14 +144,14 @@ def test_what_no_column_feels_is_said(bounce):
 
 def test_two_that_act_as_one_are_named_together(bounce, tmp_path):
     """Hertz's law has both moduli in 1/E* = (1 - nu^2) (1 / E1 + 1 / E2) alone."""
-    law = '{ type = "hertz", young_1 = 1e6, poisson_1 = 0.4, young_2 = 2e6, poisson_2 = 0.4 }'
+    law = '{ type = "hertz", young = 1e6, poisson = 0.4, young_2 = 2e6, poisson_2 = 0.4 }'
     path = tmp_path / "two.toml"
     path.write_text(
         SCENARIO.replace('{ type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }', law)
     )
     t = np.linspace(0.0, 0.1, 101)
     data = {"t [s]": t, **noisy(columns_of(path, t, [FORCE]), 0.01)}
-    keys = ["contact.tip.law.young_1", "contact.tip.law.young_2"]
+    keys = ["contact.tip.law.young", "contact.tip.law.young_2"]
     found = sp.fit(path, data, keys)
     assert not found.determined
     assert found.remarks[0].startswith(f"the data do not determine {keys[0]} and {keys[1]} sep")

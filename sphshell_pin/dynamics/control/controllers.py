@@ -24,7 +24,7 @@ from sphshell_pin.dynamics.scene.models import find_joint, set_joint
 from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.dynamics.sensing.sensor_log import Readings
 from sphshell_pin.errors import InvalidParameter, SphshellError, add_origin
-from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.parameters import Component, parameter
 from sphshell_pin.shell import Shell
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ Callback = Callable[..., ArrayLike]
 ShellPlace = tuple[Shell, str, pin.SE3]
 
 
-class Controller(Ingredient):
+class Controller(Component):
     """Base of the controllers: joint torques, bound to a scene when a run begins.
 
     `joints` names the driven joints; by default all but free-flyers (a floating base or object has
@@ -123,7 +123,7 @@ class Controller(Ingredient):
 
 
 @dataclass(frozen=True)
-class NoController(Ingredient, kind="none", of=Controller):
+class NoController(Component, kind="none", of=Controller):
     """No joint torques."""
 
     def made(self, folder: Path = Path()) -> None:
@@ -131,7 +131,7 @@ class NoController(Ingredient, kind="none", of=Controller):
 
 
 @dataclass(frozen=True)
-class PythonFunction(Ingredient, kind="python", of=Controller):
+class PythonFunction(Component, kind="python", of=Controller):
     """The user's own tau(t, q, v, contacts)."""
 
     function: str = parameter(help='"file.py:function"')

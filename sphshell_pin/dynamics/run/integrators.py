@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.parameters import Component, parameter
 
 __all__ = [
     "Adaptive",
@@ -15,7 +15,7 @@ __all__ = [
 ]
 
 
-class Integrator(Ingredient):
+class Integrator(Component):
     """Base of the integrators: `kind` is their name in files and in the compiled core."""
 
     @property

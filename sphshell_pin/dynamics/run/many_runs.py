@@ -23,7 +23,6 @@ from sphshell_pin.dynamics.run.rollout import Plan, Rollout
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.variations import Variations, check_names_of, has_length
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
-from sphshell_pin.dynamics.sensing.varied_sensors import VariedSensors
 from sphshell_pin.errors import InvalidParameter, RolloutInterrupted, SphshellError
 from sphshell_pin.shell.options import thread_count
 
@@ -68,8 +67,7 @@ def roll_out(
     settings = {0.0: settings_of(scene, 0.0)}
     controllers = _one_each(controller, len(starts))
     _check_controllers(scene, integrator, controllers, control_dt, starts, sensors)
-    variations = Variations(scene, VariedSensors.others(vary), len(starts))
-    varied_sensors = VariedSensors(sensors, scene, vary, len(starts))
+    variations = Variations(scene, vary, len(starts), sensors.sensors)
     plan = Plan(starts, [None] * len(starts), variations, {}, t0)
 
     def add(run: int) -> None:
@@ -80,11 +78,13 @@ def roll_out(
             settings[hold] = settings_of(varied, hold)
         # The rollout warns of a weak law when a sphere has gone through.
         pairs = core_pairs(varied, q0, v0, warn=False)
-        core.add(pairs, joints, bound, q0, v0, settings[hold], varied_sensors.core(run))
+        measuring = variations.sensors(run)
+        read = sensors if measuring is sensors.sensors else SensorSet(measuring, scene)
+        core.add(pairs, joints, bound, q0, v0, settings[hold], read.core)
 
     def rollout() -> Rollout:
         wall_time = time.perf_counter() - began
-        return Rollout(scene, integrator, core, plan, workers, wall_time, varied_sensors)
+        return Rollout(scene, integrator, core, plan, workers, wall_time, sensors)
 
     workers = max(min(workers, len(starts)), 1)
     joints = scene.joints.to_core(scene.model)

@@ -20,7 +20,7 @@ from sphshell_pin.dynamics.run.advance import deep_start, result_of, why_ended
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.scene.variations import Variations
-from sphshell_pin.dynamics.sensing.varied_sensors import VariedSensors
+from sphshell_pin.dynamics.sensing.sensors import SensorSet
 from sphshell_pin.errors import (
     Interrupted,
     MissingExtra,
@@ -82,12 +82,12 @@ class Rollout(Summarized, Sequence[Result]):
         plan: Plan,
         threads: int,
         wall_time: float,
-        sensors: VariedSensors,
+        sensors: SensorSet,
     ) -> None:
         self._integrator, self._core, self._plan = integrator, core, plan
-        self._sensors = sensors.base
+        self._sensors = sensors
         self.threads, self.wall_time = threads, wall_time
-        self.varied = {**plan.variations.columns, **sensors.columns}
+        self.varied = plan.variations.columns
         self.failures = dict(plan.failures)
         count = len(plan.starts)
         self.t = np.full(count, plan.t0)

@@ -12,8 +12,15 @@ from numpy.typing import NDArray
 
 from sphshell_pin.checks import read_only
 from sphshell_pin.dynamics.control.callables import reads_sensors
-from sphshell_pin.dynamics.scene.derivatives import core_parameters, parameter_columns
+from sphshell_pin.dynamics.scene.derivatives import core_parameters
 from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.named_numbers import (
+    START,
+    columns_of,
+    every_column,
+    names_of_pairs,
+    names_of_start,
+)
 from sphshell_pin.summary import Fact, Summarized, names
 
 if TYPE_CHECKING:
@@ -23,7 +30,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_START = ("q0", "v0")
 # The share of its size by which a row is moved where a figure is differenced.
 _STEP = 1e-6
 
@@ -148,18 +154,17 @@ class Asked:
 
     def __init__(self, scene: Scene, names: object, controller: object) -> None:
         names = (names,) if isinstance(names, str) else names
-        if not isinstance(names, list | tuple):
-            raise InvalidParameter(
-                "sensitivities", names, "must be names, as ('PAIR.law.stiffness', 'v0')"
-            )
-        self._scene, self._names, self._controller = scene, tuple(names), controller
-        starts = [column for name in names for column in self._columns_of_start(name)]
-        for one in starts:
-            if starts.count(one) > 1:
-                raise InvalidParameter("sensitivities", one, "must not be named twice")
-        self._by_start = [any(column.startswith(f"{one}.") for column in starts) for one in _START]
-        others = [name for name in names if not self._columns_of_start(name)]
-        self._columns = parameter_columns(scene, others, _START)
+        known = {**names_of_pairs(scene.pairs), **names_of_start(scene.model.nv)}
+        self._scene, self._controller = scene, controller
+        self.columns = columns_of(names, known, "sensitivities")
+        """Names of all columns."""
+        numbers = every_column(known)
+        self._columns = [one for one in self.columns if numbers[one][0].path[0] not in START]
+        self._starts = {
+            half: tuple(half + end for end in known[half].ends or ())
+            for half in START
+            if any(numbers[one][0] is known[half] for one in self.columns)
+        }
         if callable(controller) and reads_sensors(controller):
             must = (
                 "cannot be differentiated, as it reads sensors, which have a memory: take one that "
@@ -168,26 +173,13 @@ class Asked:
             raise InvalidParameter("controller", controller, must)
 
     def __bool__(self) -> bool:
-        return bool(self._columns) or any(self._by_start)
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of all columns."""
-        return tuple(column for name in self._names for column in self._columns_of(name))
-
-    def _columns_of(self, name: str) -> tuple[str, ...]:
-        return self._columns_of_start(name) or parameter_columns(self._scene, [name])
-
-    def _columns_of_start(self, name: object) -> tuple[str, ...]:
-        """Return the columns of a name of the start, as "v0" or "v0.3"; none of another name."""
-        every = [f"{one}.{k}" for one in _START for k in range(self._scene.model.nv)]
-        return tuple(column for column in every if name in (column, column.split(".")[0]))
+        return bool(self.columns)
 
     def begin(self, core: _core.Simulation) -> None:
         """Let a compiled run, which has not begun, follow its derivatives."""
         start = np.array(core.q), np.array(core.v)
         parameters = core_parameters(self._scene, self._columns, start)
-        core.differentiate(parameters, *self._by_start)
+        core.differentiate(parameters, *(half in self._starts for half in START))
 
     def check(self, core: _core.Simulation) -> None:
         """Raise InvalidParameter if the controller was seen to have a memory."""
@@ -204,9 +196,7 @@ class Asked:
         record = core.take_sensitivities()
         nv, columns = self._scene.model.nv, self.columns
         # The core has the parameters first, then all columns of the start.
-        asked = [name for name, is_asked in zip(_START, self._by_start, strict=True) if is_asked]
-        starts = [column for name in asked for column in self._columns_of_start(name)]
-        recorded = [*self._columns, *starts]
+        recorded = [*self._columns, *(one for half in self._starts.values() for one in half)]
         order = [recorded.index(column) for column in columns]
 
         def rows(name: str, *shape: int) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,8 +13,8 @@ from numpy.typing import NDArray
 from sphshell_pin import _core
 from sphshell_pin.dynamics.scene.explain import explain_pairs, relaxation_time
 from sphshell_pin.dynamics.scene.scene_contacts import Rows, SceneContacts
-from sphshell_pin.dynamics.scene.variations import Variations, numbers_of
-from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.errors import InvalidParameter
+from sphshell_pin.named_numbers import NamedNumber, every_column, names_of_pairs, with_value
 from sphshell_pin.summary import Summarized
 
 if TYPE_CHECKING:
@@ -22,11 +23,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_PARTS = ("law", "friction", "sphere", "other_sphere", "placement")
-_AXES = ("x", "y", "z")
-_TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
 # Of Parameter in C++.
 _FIELD, _RADIUS, _BALL, _OFFSET, _PLACEMENT = range(5)
+_PLACES = {
+    ("placement",): _PLACEMENT,
+    ("sphere", "offset"): _OFFSET,
+    # The ball's center is the origin of what stands for the shell's frame.
+    ("other_sphere", "offset"): _PLACEMENT,
+}
 # Steps of central differences, and of one-sided ones at a bound, relative to the number; a law is a
 # smooth function of its numbers, at a contact that is held.
 _STEP, _STEP_AT_BOUND = 1e-5, 1e-7
@@ -98,7 +102,7 @@ class ContactForceDerivatives(Summarized):
     ) -> ContactForceDerivatives:
         """Build from the core's matrices: by q, v, bristles and parameters, side by side."""
         contacts = SceneContacts.from_rows(rows)
-        force = force.reshape(-1, 3, normal.shape[1])
+        force = force.reshape(normal.shape[0], 3, normal.shape[1])
         first = normal.shape[1] - len(columns)
         return cls(
             contacts=contacts,
@@ -114,30 +118,6 @@ class ContactForceDerivatives(Summarized):
         )
 
 
-def parameter_columns(scene: Scene, names: object, others: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the columns that the parameters called `names` have, in their order.
-
-    Names are those of Simulation.rollout's `vary` for single numbers, and "PAIR.placement" (six
-    columns). One column of several can be named, too: "PAIR.sphere.offset.z".
-
-    Raises InvalidParameter for what are no names and for one given twice, NameNotFound for another:
-    it lists `others`, which the caller knows, too.
-    """
-    if isinstance(names, str | bytes) or not isinstance(names, Iterable):
-        raise InvalidParameter("parameters", names, "must be names, as ['PAIR.law.stiffness']")
-    columns_of = _columns_of(scene)
-    valid = set(columns_of) | {one for columns in columns_of.values() for one in columns}
-    found: list[str] = []
-    for name in names:
-        if not isinstance(name, str) or name not in valid:
-            raise NameNotFound("parameter", str(name), "the scene", [*columns_of, *others])
-        for column in columns_of.get(name, (name,)):
-            if column in found:
-                raise InvalidParameter("parameters", column, "must not be named twice")
-            found.append(column)
-    return tuple(found)
-
-
 def core_parameters(
     scene: Scene, columns: Iterable[str], start: tuple[Array, Array] | None
 ) -> list[_core.Parameter]:
@@ -146,42 +126,25 @@ def core_parameters(
     `start`: q (nq,), v (nv,) of the run or state that is differentiated, from which bristles take
     how fast an impact is; None where they do not.
     """
-    return [_core_parameter(scene, column, start) for column in columns]
-
-
-def _columns_of(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return the columns of each name."""
-    out: dict[str, tuple[str, ...]] = {}
-    for name, shape in numbers_of(scene).items():
-        out[name] = tuple(f"{name}.{axis}" for axis in _AXES) if shape else (name,)
-    for pair in scene.pairs:
-        if pair.shell is not None:
-            name = f"{pair.name}.placement"
-            out[name] = tuple(f"{name}.{one}" for one in _TWIST)
-    return out
+    numbers = every_column(names_of_pairs(scene.pairs))
+    return [_core_parameter(scene, *numbers[column], start) for column in columns]
 
 
 def _core_parameter(
-    scene: Scene, column: str, start: tuple[Array, Array] | None
+    scene: Scene, number: NamedNumber, place: int, start: tuple[Array, Array] | None
 ) -> _core.Parameter:
-    pair, what = _place_of(scene, column)
-    if what[0] == "placement":
-        return _core.Parameter(pair, _PLACEMENT, _TWIST.index(what[1]))
-    if what[1] == "offset":
-        axis = _AXES.index(what[2])
-        # The ball's center is the origin of what stands for the shell's frame.
-        return _core.Parameter(pair, _OFFSET if what[0] == "sphere" else _PLACEMENT, axis)
-    kind = _FIELD
-    if what[0] in ("sphere", "other_sphere"):
-        kind = _RADIUS if what[0] == "sphere" else _BALL
-    value = getattr(getattr(scene.pairs[pair], what[0]), what[1])
+    if number.path in _PLACES:
+        return _core.Parameter(number.at, _PLACES[number.path], place)
+    pair = scene.pairs[number.at]
+    value = functools.reduce(getattr, number.path, pair)
+    assert isinstance(value, float)
+    kind = {"sphere": _RADIUS, "other_sphere": _BALL}.get(number.path[0], _FIELD)
 
-    def changed(number: float) -> _core.Pair | None:
+    def changed(value: float) -> _core.Pair | None:
         try:
-            pairs = Variations(scene, {column: [number]}, 1).pairs(0)
+            return _core_pair(scene, with_value(pair, number.path, value), number.at, start)
         except InvalidParameter:
             return None
-        return _core_pair(scene, pairs, pair, start)
 
     step = _STEP * (abs(value) or 1.0)
     less, more = changed(value - step), changed(value + step)
@@ -195,26 +158,16 @@ def _core_parameter(
             less, more = changed(value - 2 * step), here
     if less is None or more is None:
         must = "cannot be differentiated: neither a larger nor a smaller value is allowed"
-        raise InvalidParameter(column, value, must)
-    return _core.Parameter(pair, kind, 0, less, more, step, abs(value) or 1.0)
-
-
-def _place_of(scene: Scene, column: str) -> tuple[int, list[str]]:
-    """Return the number of a column's pair, whose name may have dots, and the words behind it."""
-    found: dict[int, list[str]] = {}
-    for k, pair in enumerate(scene.pairs):
-        words = column.removeprefix(f"{pair.name}.").split(".")
-        if column.startswith(f"{pair.name}.") and words[0] in _PARTS:
-            found[k] = words
-    return min(found.items(), key=lambda one: len(one[1]))
+        raise InvalidParameter(".".join((pair.name, *number.path)), value, must)
+    return _core.Parameter(number.at, kind, 0, less, more, step, abs(value) or 1.0)
 
 
 def _core_pair(
-    scene: Scene, pairs: tuple[ContactPair, ...], at: int, start: tuple[Array, Array] | None
+    scene: Scene, pair: ContactPair, at: int, start: tuple[Array, Array] | None
 ) -> _core.Pair:
-    core = pairs[at].to_core()
-    friction = pairs[at].friction
-    if start is not None and friction is not None and friction.has_state:
+    core = pair.to_core()
+    if start is not None and pair.friction is not None and pair.friction.has_state:
+        pairs = (*scene.pairs[:at], pair, *scene.pairs[at + 1 :])
         figures = explain_pairs(scene.with_pairs(pairs), *start)
-        core.relaxation = relaxation_time(pairs[at], figures[at])
+        core.relaxation = relaxation_time(pair, figures[at])
     return core

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sphshell_pin.checks import check_moved_mass
 from sphshell_pin.contact.laws import HuntCrossleyLaw
-from sphshell_pin.dynamics.scene.joint_components import WHICH, JointIngredients
+from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
 from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
 from sphshell_pin.dynamics.scene.sources import checked_source
 
@@ -199,7 +199,7 @@ def _joints_stated(scene: Scene) -> list[str]:
     """List what the model states of its joints and the scene leaves out."""
     # In ABA the model's armature acts anyhow.
     kinds = [one for one in WHICH if one != "armature"]
-    stated = JointIngredients.from_model(scene.model, kinds, _ANY_LAW)
+    stated = JointComponents.from_model(scene.model, kinds, _ANY_LAW)
     out = []
     for kind in stated.kinds():
         modelled = getattr(scene.joints, kind)
@@ -331,7 +331,7 @@ def _explain_pair(
         times.append(pair.friction.slip_time(slip_mass, load, _disc(pair, max(depth, -gap))))
     return PairExplanation(
         name=pair.name,
-        modelled=_ingredients(pair),
+        modelled=_components(pair),
         gap=gap,
         effective_mass=mass,
         approach_speed=speed,
@@ -363,7 +363,7 @@ def _point_jacobian(scene: Scene, data: pin.Data, joint: int, point: Array) -> A
     return moved
 
 
-def _ingredients(pair: ContactPair) -> tuple[str, ...]:
+def _components(pair: ContactPair) -> tuple[str, ...]:
     lines = []
     if pair.sphere is not None and pair.shell is not None:
         shell = pair.shell

@@ -30,7 +30,7 @@ T = TypeVar("T")
 Numbers = float | Sequence[float]
 
 WHICH = ("limits", "damping", "friction", "armature", "effort", "speed")
-"""What `JointIngredients.from_model` takes from a model."""
+"""What `JointComponents.from_model` takes from a model."""
 
 # No limit is stated by infinity, or by the largest float.
 _NO_LIMIT = 1e300
@@ -100,7 +100,7 @@ class JointFriction:
 
 
 @dataclass(frozen=True)
-class JointIngredients:
+class JointComponents:
     """What a scene models in its joints, by joint name; nothing where a joint is not named.
 
     `limits`: stops; `damping` [N m s/rad or N s/m]: viscous; `friction`: dry; `armature` [kg m^2 or
@@ -130,7 +130,7 @@ class JointIngredients:
     @classmethod
     def from_model(
         cls, model: pin.Model, which: Iterable[str] = WHICH, law: NormalLaw | None = None
-    ) -> JointIngredients:
+    ) -> JointComponents:
         """Return what `model` states, of `which` kinds (default: all of WHICH).
 
         Pinocchio reads URDF's `<limit>` and `<dynamics>`, MJCF's range, damping, frictionloss,
@@ -143,7 +143,7 @@ class JointIngredients:
         wanted = tuple(which)
         for one in wanted:
             if one not in WHICH:
-                raise NameNotFound("kind", one, "JointIngredients.from_model", WHICH)
+                raise NameNotFound("kind", one, "JointComponents.from_model", WHICH)
         found: dict[str, dict[str, object]] = {one: {} for one in WHICH}
         inertia = joint_inertia(model) if "limits" in wanted and law is None else None
         for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
@@ -184,7 +184,7 @@ class JointIngredients:
                     found["limits"][name] = JointLimits(_short(ends[0]), _short(ends[1]), given)
         return cls(**{one: found[one] for one in wanted})  # type: ignore[arg-type]  # each its own
 
-    def replaced(self, joint: str, **changes: object) -> JointIngredients:
+    def replaced(self, joint: str, **changes: object) -> JointComponents:
         """Return these with other values of one joint; None takes one away.
 
         replaced("elbow", friction=JointFriction(0.2), speed=None)
@@ -202,7 +202,7 @@ class JointIngredients:
         """Those of WHICH that some joint has."""
         return tuple(one for one in WHICH if getattr(self, one))
 
-    def without(self, joints: Iterable[str]) -> JointIngredients:
+    def without(self, joints: Iterable[str]) -> JointComponents:
         """Return these without what they say of `joints`."""
         left_out = set(joints)
         parts = {
@@ -214,7 +214,7 @@ class JointIngredients:
         """Return the joint of each stop, in the order in which the compiled core numbers them."""
         return tuple(name for name, *_ in self._stops(model))
 
-    def alike(self, other: JointIngredients, model: pin.Model) -> bool:
+    def alike(self, other: JointComponents, model: pin.Model) -> bool:
         """Whether both model the same in the same joints of `model`, if with other numbers."""
         same = all(list(getattr(self, one)) == list(getattr(other, one)) for one in WHICH)
         return same and self.stopped_joints(model) == other.stopped_joints(model)
@@ -355,18 +355,18 @@ def joint_inertia(model: pin.Model) -> Array:
     return np.maximum(np.diag(pin.crba(model, data, pin.neutral(model))), 1e-12)
 
 
-def check_joints(joints: object, model: pin.Model, lock: Iterable[str]) -> JointIngredients:
+def check_joints(joints: object, model: pin.Model, lock: Iterable[str]) -> JointComponents:
     """Return `joints` (None: nothing) for a scene of `model` in which `lock` are held.
 
-    NameNotFound and InvalidParameter as of JointIngredients.to_core.
+    NameNotFound and InvalidParameter as of JointComponents.to_core.
     """
     if joints is None:
-        return JointIngredients()
+        return JointComponents()
     given = check_type(
         "joints",
         joints,
-        JointIngredients,
-        "must be JointIngredients: JointIngredients.from_model(model)",
+        JointComponents,
+        "must be JointComponents: JointComponents.from_model(model)",
     )
     kept = given.without(lock)
     kept.to_core(model)

@@ -16,7 +16,6 @@ from sphshell_pin.dynamics.scene.derivatives import (
     DynamicsDerivatives,
     StepDerivatives,
     core_parameters,
-    parameter_columns,
 )
 from sphshell_pin.dynamics.scene.explain import Explanation, explain_scene
 from sphshell_pin.dynamics.scene.from_geometry import add_pairs
@@ -24,6 +23,7 @@ from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene_contacts import SceneContacts
 from sphshell_pin.dynamics.scene.scene_parts import SceneParts
 from sphshell_pin.dynamics.scene.scene_state import SceneState
+from sphshell_pin.named_numbers import columns_of, names_of_pairs
 
 __all__ = ["ContactPair", "Scene", "SceneContacts", "SceneState"]
 
@@ -35,7 +35,7 @@ class Scene(SceneParts):
 
     `lock` names joints to hold at their values in `q_lock` (nq of the given model, default
     neutral): they drop out of the scene's model and cost nothing. `joints` says what else acts in
-    the joints, for instance JointIngredients.from_model(model): by default nothing, as in
+    the joints, for instance JointComponents.from_model(model): by default nothing, as in
     Pinocchio. Joints that mimic others (pinocchio's mimic=True) move exactly so: nq and nv count
     independent coordinates. FrameNotFound and NameNotFound list what the model has.
     """
@@ -176,7 +176,7 @@ class Scene(SceneParts):
         """Return the columns of the `parameters`, and each as the core takes it."""
         if isinstance(parameters, tuple) and not parameters:
             return (), []
-        columns = parameter_columns(self, parameters)
+        columns = columns_of(parameters, names_of_pairs(self.pairs))
         return columns, core_parameters(self, columns, None if state is None else state.start)
 
     def contacts(

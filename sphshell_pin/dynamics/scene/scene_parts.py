@@ -23,7 +23,7 @@ from sphshell_pin.checks import (
 from sphshell_pin.contact import Friction, ImpactLaw, Method, NormalLaw, Sphere
 from sphshell_pin.contact.friction import check_friction
 from sphshell_pin.contact.normal_law import check_law
-from sphshell_pin.dynamics.scene.joint_components import JointIngredients, check_joints
+from sphshell_pin.dynamics.scene.joint_components import JointComponents, check_joints
 from sphshell_pin.dynamics.scene.models import (
     check_model,
     find_frame,
@@ -69,7 +69,7 @@ class SceneParts(Summarized):
         model: pin.Model,
         lock: Iterable[str] = (),
         q_lock: ArrayLike | None = None,
-        joints: JointIngredients | None = None,
+        joints: JointComponents | None = None,
     ) -> None:
         if not isinstance(model, pin.Model):
             raise InvalidParameter("model", type(model).__name__, "must be a pinocchio.Model")
@@ -143,7 +143,7 @@ class SceneParts(Summarized):
         return self._pairs
 
     @property
-    def joints(self) -> JointIngredients:
+    def joints(self) -> JointComponents:
         """What is modelled in the joints, without the locked ones."""
         return self._joints
 

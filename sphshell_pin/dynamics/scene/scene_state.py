@@ -32,7 +32,7 @@ class SceneState(Summarized):
             state.advance(q, v, dt)
 
     This loop makes the motion of `Simulation(scene, SemiImplicitEuler(dt))`; where the scene has
-    joint ingredients, add `scene.joint_forces(q, v, state=state)` to tau. `copy` gives a second
+    joint components, add `scene.joint_forces(q, v, state=state)` to tau. `copy` gives a second
     state, to try a step. A state is for one user at a time (else Busy), and cannot be pickled.
     """
 

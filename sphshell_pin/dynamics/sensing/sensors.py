@@ -20,7 +20,7 @@ from sphshell_pin.dynamics.scene.scene_contacts import Columns
 from sphshell_pin.dynamics.sensing.sensor_log import Readings, SensorLog, split_logs
 from sphshell_pin.dynamics.sensing.subtree_inertia import beyond, frames_beyond
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.parameters import Component, parameter
 
 __all__ = ["ContactSwitch", "ForceTorqueSensor", "JointTorqueSensor"]
 
@@ -28,7 +28,7 @@ _FASTEST = 1e6  # [Hz]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sensor(Ingredient):
+class Sensor(Component):
     """Base of the sensors of a simulation.
 
     The reading k is taken at the start of the run plus k / `rate` and arrives `delay` later.

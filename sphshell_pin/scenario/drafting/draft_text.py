@@ -88,8 +88,8 @@ shell = {shell.name}
 [contact.law]
 type = "hertz"
 radius = {tip.radius} # of the ball; less where it lies in a hollow
-young_1 = {plan.contact.material.young} # [Pa] {plan.contact.material.name}, a typical value
-poisson_1 = {plan.contact.material.poisson}
+young = {plan.contact.material.young} # [Pa] {plan.contact.material.name}, a typical value
+poisson = {plan.contact.material.poisson}
 young_2 = {plan.contact.against.young} # [Pa] {plan.contact.against.name}, a typical value
 poisson_2 = {plan.contact.against.poisson}
 restitution = {plan.contact.restitution} # speed of rebound, as a part
@@ -244,7 +244,7 @@ def _parameters(plan: Plan, pairs: Sequence[str]) -> dict[str, dict[str, float]]
     for pair in pairs:
         at = f"contact.{pair}"
         found |= {
-            f"{at}.law.young_1": {},
+            f"{at}.law.young": {},
             f"{at}.law.restitution": {"min": 0.05, "max": 1.0},
             f"{at}.friction.mu_static": {"min": contact.mu_dynamic, "max": 1.5},
             f"{at}.friction.mu_dynamic": {"min": 0.0, "max": contact.mu_static},

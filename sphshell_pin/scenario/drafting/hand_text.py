@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.contact.materials import Material, friction_between, restitution_between
-from sphshell_pin.dynamics.scene.joint_components import JointIngredients
+from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.part import Part, part_file
 from sphshell_pin.scenario.drafting.plan import bearable, hertz_stiffness
@@ -98,7 +98,7 @@ class HandDraft:
         """Return what may act in the joints: what the file states, then without what brakes."""
         free = [kind for kind in kinds if kind not in _BRAKES]
         pushes = float(np.abs(self.hand.torques(self.grasp)).max())
-        dry = JointIngredients.from_model(self.hand.model, ["friction"]).friction.values()
+        dry = JointComponents.from_model(self.hand.model, ["friction"]).friction.values()
         stuck = any(one.torque > pushes for one in dry)
         return [free] if stuck or free == kinds else [kinds, free]
 
@@ -170,8 +170,8 @@ shell = {_toml(self.shell.name)}
 [contact.law]
 type = "hertz"
 radius = {radius!r}
-young_1 = {_toml(one.young)}
-poisson_1 = {one.poisson}
+young = {_toml(one.young)}
+poisson = {one.poisson}
 young_2 = {_toml(other.young)}
 poisson_2 = {other.poisson}
 restitution = {restitution_between(one, other)}

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from sphshell_pin.contact.materials import Material, find_material
-from sphshell_pin.dynamics.scene.joint_components import JointIngredients
+from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
@@ -198,7 +198,7 @@ def _press(
 
 def stated_kinds(model: pin.Model, lock: Sequence[str]) -> list[str]:
     """Return what the model states of the joints that move, as `[robot] joints` lists it."""
-    return list(JointIngredients.from_model(model).without(lock).kinds())
+    return list(JointComponents.from_model(model).without(lock).kinds())
 
 
 def _first_working(

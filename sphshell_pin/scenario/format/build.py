@@ -33,7 +33,7 @@ from sphshell_pin.errors import (
     SphshellError,
     UnitWarning,
 )
-from sphshell_pin.parameters import Ingredient, parameters_of
+from sphshell_pin.parameters import Component, parameters_of
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.scenario.format import schema
 from sphshell_pin.scenario.format.bodies import (
@@ -46,7 +46,7 @@ from sphshell_pin.scenario.format.bodies import (
     to_se3,
 )
 from sphshell_pin.scenario.format.functions import load_function
-from sphshell_pin.scenario.format.joint_tables import joint_ingredients
+from sphshell_pin.scenario.format.joint_tables import joint_components
 from sphshell_pin.scenario.format.reading import (
     change_scenario,
     find_scenario,
@@ -168,7 +168,7 @@ def build_scenario(
 
     with blamed_on(path, "robot"):
         q_lock = assembly.q0 if assembly.lock else None
-        joints = joint_ingredients(scenario, assembly, path)
+        joints = joint_components(scenario, assembly, path)
         scene = sp.Scene(assembly.model, lock=assembly.lock, q_lock=q_lock, joints=joints)
     shells = {
         section.name: (
@@ -297,7 +297,7 @@ def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell
 
 
 def _build_law(
-    stated: Ingredient, path: Path, key: str, load: Callable[[str, str], Function]
+    stated: Component, path: Path, key: str, load: Callable[[str, str], Function]
 ) -> NormalLaw:
     with blamed_on(path, key):
         if isinstance(stated, FunctionFile):
@@ -350,7 +350,7 @@ def _add_contact(
             )
 
 
-def _build_sensors(stated: Sequence[Ingredient], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
+def _build_sensors(stated: Sequence[Component], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
     for i, one in enumerate(stated):
         with blamed_on(path, item_key("sensor", stated, i)):
             assert isinstance(one, Sensor)
@@ -361,7 +361,7 @@ def _build_sensors(stated: Sequence[Ingredient], scene: sp.Scene, path: Path) ->
 
 
 def _build_controller(
-    stated: Ingredient,
+    stated: Component,
     scene: sp.Scene,
     q0: Array,
     shells: Mapping[str, tuple[sp.Shell, schema.ShellSection]],

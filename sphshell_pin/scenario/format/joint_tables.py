@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.scene.joint_components import (
+    JointComponents,
     JointFriction,
-    JointIngredients,
     JointLimits,
 )
 from sphshell_pin.dynamics.scene.models import find_joint
@@ -22,20 +22,18 @@ if TYPE_CHECKING:
     import pinocchio as pin
 
 
-def joint_ingredients(
-    scenario: Scenario, assembly: Assembly, path: Path
-) -> JointIngredients | None:
-    """Return the ingredients of all joints of `assembly`; None where none is asked for.
+def joint_components(scenario: Scenario, assembly: Assembly, path: Path) -> JointComponents | None:
+    """Return the components of all joints of `assembly`; None where none is asked for.
 
     Raises ScenarioError for a joint that does not exist, or that cannot have what its table says.
     """
     if not scenario.joint and not any(robot.joints for robot in scenario.robot):
         return None
-    joints = JointIngredients()
+    joints = JointComponents()
     for robot, loaded, prefix in zip(
         scenario.robot, assembly.loaded, assembly.prefixes, strict=True
     ):
-        own = JointIngredients.from_model(loaded.model, robot.joints)
+        own = JointComponents.from_model(loaded.model, robot.joints)
         for kind in own.kinds():
             for name, value in getattr(own, kind).items():
                 joints = joints.replaced(prefix + name, **{kind: value})
@@ -47,8 +45,8 @@ def joint_ingredients(
 
 
 def _with(
-    joints: JointIngredients, section: JointSection, model: pin.Model, folder: Path
-) -> JointIngredients:
+    joints: JointComponents, section: JointSection, model: pin.Model, folder: Path
+) -> JointComponents:
     changes: dict[str, object] = {
         kind: value
         for kind in ("damping", "armature", "effort", "speed")
@@ -64,12 +62,12 @@ def _with(
 
 
 def _limits(
-    joints: JointIngredients, section: JointSection, model: pin.Model, folder: Path
+    joints: JointComponents, section: JointSection, model: pin.Model, folder: Path
 ) -> JointLimits:
     name = section.name
     stated = joints.limits.get(name)
     if stated is None:
-        stated = JointIngredients.from_model(model, ["limits"]).limits.get(name)
+        stated = JointComponents.from_model(model, ["limits"]).limits.get(name)
     law: NormalLaw | None = None if stated is None else stated.law
     if section.stop is not None:
         law = section.stop.made(folder)

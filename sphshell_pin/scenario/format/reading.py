@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
+import functools
 import importlib
 import os
 import re
@@ -17,7 +17,8 @@ from pydantic import BaseModel, ValidationError
 
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.sensing.sensors import Sensor
-from sphshell_pin.errors import NameNotFound, ScenarioError
+from sphshell_pin.errors import NameNotFound, ScenarioError, did_you_mean
+from sphshell_pin.named_numbers import present_name
 from sphshell_pin.parameters import parameters_of
 from sphshell_pin.scenario.format.schema import LISTS, STEPPING, RunSection, Scenario
 
@@ -154,16 +155,31 @@ def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> Found:
     data = scenario.model_dump()
     node, last, trail = _descend(data, key, path)
     numbers = [str(i) for i in range(len(node))] if isinstance(node, list) else []
+    if not numbers:
+        last = present_name(owner_of(scenario, trail), last)
     if last not in (numbers or node):
         named = [_item_name(item) for item in node if isinstance(item, dict)] if numbers else node
         known = [one for one in named if one] or numbers
-        near = difflib.get_close_matches(last, known, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise ScenarioError(
-            path, key, f"the scenario has no '{last}' there; {hint}there are: {_listed(known)}"
-        )
+        hint = did_you_mean(last, known)
+        reason = f"the scenario has no '{last}' there; {hint}{hint and ' '}there are: "
+        raise ScenarioError(path, key, reason + _listed(known))
     value = node[int(last)] if isinstance(node, list) else node[last]
     return Found(value, ".".join([*trail, last]), [*trail, last])
+
+
+def owner_of(scenario: Scenario, parts: Iterable[str]) -> object:
+    """Return the table or object of `scenario` at the names `parts`; None if there is none."""
+    whole: object = scenario
+    return functools.reduce(child_of, parts, whole)
+
+
+def child_of(owner: object, part: str) -> object:
+    """Return what `owner`, a table, list or object, has under a name; None if it has not."""
+    if isinstance(owner, list):
+        names = [getattr(one, "label", None) or getattr(one, "name", None) for one in owner]
+        at = names.index(part) if part in names else int(part) if part.isdecimal() else None
+        return None if at is None else owner[at]
+    return owner.get(part) if isinstance(owner, Mapping) else getattr(owner, part, None)
 
 
 def _validated(data: dict[str, Toml], path: str | PathLike[str]) -> Scenario:
@@ -228,7 +244,7 @@ def _change(
 
     `data` is what the file of `scenario` gives.
     """
-    node, rest, _ = _descend(data, key, path)
+    node, rest, trail = _descend(data, key, path)
     whole, _, index = key.rpartition(".")
     if index.isdecimal() and not isinstance(node, list):
         # One number of a list that stands at its default.
@@ -249,7 +265,7 @@ def _change(
         node = node.setdefault(table, {})
         if not isinstance(node, dict):
             raise ScenarioError(path, key, f"'{table}' holds no further keys", value)
-    node[last] = value
+    node[last if tables else present_name(owner_of(scenario, trail), last)] = value
 
 
 def _descend(

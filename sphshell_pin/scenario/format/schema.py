@@ -26,7 +26,7 @@ from sphshell_pin.dynamics.control import controllers
 from sphshell_pin.dynamics.control.controllers import NoController
 from sphshell_pin.dynamics.run.integrators import Adaptive, Integrator, SemiImplicitEuler
 from sphshell_pin.dynamics.sensing import sensors
-from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
+from sphshell_pin.parameters import Component, Parameter, parameters_of
 from sphshell_pin.scenario.format.shape_tables import Primitive
 from sphshell_pin.scenario.format.typed_tables import OneOf, Positive, Vector3, refuse_unknown_keys
 
@@ -143,12 +143,12 @@ class ShellSection(Section):
         return self
 
 
-Law = Annotated[Ingredient, OneOf(NormalLaw)]
-Friction = Annotated[Ingredient, OneOf(FrictionLaw)]
+Law = Annotated[Component, OneOf(NormalLaw)]
+Friction = Annotated[Component, OneOf(FrictionLaw)]
 
 
 class JointSection(Section):
-    """What acts in one joint, in place of what the robot's file states: see JointIngredients."""
+    """What acts in one joint, in place of what the robot's file states: see JointComponents."""
 
     name: str
     lower: Annotated[float | None, Parameter("rad or m", "lower end")] = None
@@ -221,10 +221,10 @@ class SourceSection(Section):
     friction: Friction = NoFriction()
 
 
-Controller = Annotated[Ingredient, OneOf(controllers.Controller)]
+Controller = Annotated[Component, OneOf(controllers.Controller)]
 
 
-Sensor = Annotated[Ingredient, OneOf(sensors.Sensor)]
+Sensor = Annotated[Component, OneOf(sensors.Sensor)]
 
 
 def _bounds(about: Parameter) -> object:

@@ -8,7 +8,7 @@ from typing import TypedDict, Unpack
 import coal
 import numpy as np
 
-from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.parameters import Component, parameter
 from sphshell_pin.scenario.format.typed_tables import Lengths3
 from sphshell_pin.shell import Shell
 
@@ -23,7 +23,7 @@ class ShellOptions(TypedDict):
     name: str
 
 
-class Primitive(Ingredient):
+class Primitive(Component):
     """Base of the shapes that a scenario states by their sizes; centered, axes along z."""
 
     def shell(self, **options: Unpack[ShellOptions]) -> Shell:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args, get_origin
@@ -10,8 +9,8 @@ from typing import TYPE_CHECKING, Literal, get_args, get_origin
 from pydantic import BaseModel
 
 from sphshell_pin.errors import ScenarioError
-from sphshell_pin.parameters import Ingredient, Parameter, parameters_of
-from sphshell_pin.scenario.format.reading import Found, look_up
+from sphshell_pin.parameters import Component, Parameter, parameters_of
+from sphshell_pin.scenario.format.reading import Found, child_of, look_up, owner_of
 from sphshell_pin.scenario.format.schema import KnobSection, Scenario
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ _FROM_THE_START = ("robot", "shell", "run")
 
 
 @dataclass(frozen=True)
-class Knob:
+class LiveParameter:
     """A number of a scenario with the range to turn it in, or a word with its choices."""
 
     key: str
@@ -44,7 +43,7 @@ class Knob:
     """The words that the value may be; none where it is a number."""
 
 
-def knobs_of(built: Built) -> tuple[Knob, ...]:
+def live_parameters(built: Built) -> tuple[LiveParameter, ...]:
     """Return the knobs of a built scenario, in the file's order, with the values they stand at.
 
     A range is widened where the value, changed by --set, lies outside.
@@ -117,9 +116,7 @@ def _range(
 
 def _choices(scenario: Scenario, found: Found) -> tuple[str, ...]:
     """Return the words that the value at a key may be, where its table lists them; else none."""
-    owner: object = scenario
-    for part in found.parts[:-1]:
-        owner = _child(owner, part)
+    owner = owner_of(scenario, found.parts[:-1])
     info = type(owner).model_fields.get(found.parts[-1]) if isinstance(owner, BaseModel) else None
     if info is None:
         return ()
@@ -137,13 +134,15 @@ def _check_choice(section: KnobSection, found: Found, path: Path, where: str) ->
             raise ScenarioError(path, f"{where}.{name}", "is for numbers, not for words", given)
 
 
-def _knob(section: KnobSection, scenario: Scenario, path: Path) -> Knob:
+def _knob(section: KnobSection, scenario: Scenario, path: Path) -> LiveParameter:
     at = look_up(scenario, section.key, path)
     choices = _choices(scenario, at)
     if choices:
         label = meaning(scenario, at).label if section.label is None else section.label
         restart = at.parts[0] in _FROM_THE_START
-        return Knob(section.key, label, "", 0.0, 0.0, False, str(at.value), restart, choices)
+        return LiveParameter(
+            section.key, label, "", 0.0, 0.0, False, str(at.value), restart, choices
+        )
     found = _found(section, scenario, path)
     value, about = float(found.value), meaning(scenario, found)
     low, high, log = _range(section, value, about)
@@ -153,7 +152,7 @@ def _knob(section: KnobSection, scenario: Scenario, path: Path) -> Knob:
     if high is None:
         high = value / DECADE if value < 0.0 else 1.0
     low, high = min(low, value), max(high, value)
-    return Knob(
+    return LiveParameter(
         key=section.key,
         label=about.label if section.label is None else section.label,
         unit=about.unit if section.unit is None else section.unit,
@@ -177,10 +176,10 @@ def meaning(scenario: Scenario, found: Found) -> Parameter:
         if about is not None:
             inner = found.parts[i + 1 :]
             label = about.label or part.replace("_", " ")
-            unit = owner.unit_of(part) if isinstance(owner, Ingredient) else about.unit
+            unit = owner.unit_of(part) if isinstance(owner, Component) else about.unit
             return replace(about, label=_named(prefix, _inside(label, inner), scenario), unit=unit)
         prefix.append(part)
-        owner = _child(owner, part)
+        owner = child_of(owner, part)
     *tables, last = found.parts
     return Parameter(label=f"{'.'.join(tables[1:])} {last.replace('_', ' ')}".strip())
 
@@ -190,14 +189,6 @@ def _description(owner: object, name: str) -> Parameter | None:
         info = type(owner).model_fields.get(name)
         return next((m for m in info.metadata if isinstance(m, Parameter)), None) if info else None
     return parameters_of(owner).get(name)
-
-
-def _child(owner: object, part: str) -> object:
-    if isinstance(owner, list):
-        names = [getattr(one, "label", None) or getattr(one, "name", None) for one in owner]
-        at = names.index(part) if part in names else int(part) if part.isdecimal() else None
-        return None if at is None else owner[at]
-    return owner.get(part) if isinstance(owner, Mapping) else getattr(owner, part, None)
 
 
 def _inside(label: str, inner: list[str]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 import operator
 from collections.abc import Mapping, Sequence
@@ -21,7 +20,9 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from sphshell_pin.parameters import Ingredient, parameters_of
+from sphshell_pin.errors import did_you_mean
+from sphshell_pin.named_numbers import present_name
+from sphshell_pin.parameters import Component, parameters_of
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -32,9 +33,8 @@ def refuse_unknown_keys(table: Mapping[str, object], valid: Sequence[str]) -> No
     """Raise an error of pydantic that lists the valid keys of a table."""
     for key, value in table.items():
         if key not in valid:
-            near = difflib.get_close_matches(str(key), valid, n=1)
-            hint = f"did you mean '{near[0]}'? " if near else ""
-            said = f"unknown key; {hint}valid keys: {', '.join(valid) or 'none'}"
+            hint = did_you_mean(str(key), valid)
+            said = f"unknown key; {hint}{hint and ' '}valid keys: {', '.join(valid) or 'none'}"
             context = {"said": said, "key": key, "value": value}
             raise PydanticCustomError("unknown_key", "{said}", context)
 
@@ -43,7 +43,7 @@ def refuse_unknown_keys(table: Mapping[str, object], valid: Sequence[str]) -> No
 class OneOf:
     """Annotation of a table that states one of a `family`; its key `type` says which."""
 
-    family: type[Ingredient]
+    family: type[Component]
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
@@ -74,16 +74,23 @@ def _check_kind(kinds: Sequence[str], value: object) -> object:
     raise PydanticCustomError("unknown_type", "{said}", {"said": said})
 
 
-def _without_type(kind: type[Ingredient], value: object) -> object:
+def _without_type(kind: type[Component], value: object) -> object:
     """Take the key `type` off a table; refuse keys that no file may state."""
-    if not isinstance(value, Mapping):
+    if not isinstance(value, dict):
         return value
+    # In the table itself, where errors look for the place of a key.
+    for key in list(value):
+        now = present_name(kind, key)
+        if now in value and now != key:
+            said = f"'{key}' is a former name of '{now}', which is given as well: leave '{key}' out"
+            raise PydanticCustomError("given_twice", "{said}", {"said": said})
+        value[now] = value.pop(key)
     table = {k: v for k, v in value.items() if k != "type"}
     refuse_unknown_keys(table, list(parameters_of(kind)))
     return table
 
 
-def _to_table(value: Ingredient, info: SerializationInfo) -> dict[str, object]:
+def _to_table(value: Component, info: SerializationInfo) -> dict[str, object]:
     """Return the table that states `value`, without defaults where these may be left out."""
     table: dict[str, object] = {"type": value.kind}
     for one in dataclasses.fields(value):

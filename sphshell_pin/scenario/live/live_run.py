@@ -21,7 +21,7 @@ from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.scenario.format.build import Built, rebuild
 from sphshell_pin.scenario.format.reading import look_up
-from sphshell_pin.scenario.format.sliders import Knob, knobs_of
+from sphshell_pin.scenario.format.sliders import LiveParameter, live_parameters
 from sphshell_pin.scenario.live.drag import Drag, Dragged, movable_bodies
 from sphshell_pin.scenario.live.joint_targets import Target, aimed, check_aim, targets_of
 from sphshell_pin.scenario.running.player import Rows
@@ -60,7 +60,7 @@ class LiveRun:
         self.title = built.scenario.title or built.name
         self.start = 0.0
         self._user = _core.OneUser("LiveRun")
-        self._knobs = knobs_of(built)
+        self._knobs = live_parameters(built)
         self._aims: dict[str, float] = {}
         self._targets: tuple[Target, ...] | None = None
         self._patches = "patch" in built.scenario.run.record
@@ -133,7 +133,7 @@ class LiveRun:
         return self._fault or self._run.ended
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def knobs(self) -> tuple[LiveParameter, ...]:
         """The parameters of the scenario with a slider, with their present values."""
         return self._knobs
 

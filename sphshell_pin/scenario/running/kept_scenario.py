@@ -21,7 +21,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from sphshell_pin.atomic import atomic_file
 from sphshell_pin.dynamics.result.result_parts import Kept
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.parameters import Ingredient
+from sphshell_pin.parameters import Component
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.robots.kept_robot import ALONE, load_kept, meshes_of, text_of, without_references
 from sphshell_pin.scenario.format.bodies import origin
@@ -160,7 +160,7 @@ def restore(scenario: Scenario, kept: Kept) -> Restored:
         surfaces[one.name] = shell_of(arrays, name=one.name, **about)
     tables = {name: _place(kept, digest, ".csv") for name, digest in contents.tables.items()}
 
-    def at_hand(law: Ingredient, friction: Ingredient) -> dict[str, Ingredient]:
+    def at_hand(law: Component, friction: Component) -> dict[str, Component]:
         return {"law": _at_hand(law, tables), "friction": _at_hand(friction, tables)}
 
     sections = {
@@ -170,7 +170,7 @@ def restore(scenario: Scenario, kept: Kept) -> Restored:
     return Restored(scenario.model_copy(update=sections), robots, surfaces)
 
 
-def _at_hand(stated: Ingredient, places: Mapping[str, Path | None]) -> Ingredient:
+def _at_hand(stated: Component, places: Mapping[str, Path | None]) -> Component:
     """Return a law that names files at hand."""
     changed = {}
     for one in fields(stated):

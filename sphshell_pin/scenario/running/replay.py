@@ -21,7 +21,7 @@ from sphshell_pin.scenario.format.build import Built, build_scenario
 from sphshell_pin.scenario.format.functions import load_function, unloaded
 from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.schema import Scenario
-from sphshell_pin.scenario.format.sliders import Knob
+from sphshell_pin.scenario.format.sliders import LiveParameter
 from sphshell_pin.scenario.running.kept_scenario import restore
 from sphshell_pin.scenario.running.player import Rows
 from sphshell_pin.scenario.running.series import (
@@ -98,7 +98,7 @@ class Replay:
         self._exchanged = self.result.energy.exchanged_until
         self._time, self._row, self._given = self.start, 0, 0
 
-    knobs: tuple[Knob, ...] = ()
+    knobs: tuple[LiveParameter, ...] = ()
     bodies: tuple[str, ...] = ()
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sphshell_pin.errors import InvalidParameter
-from sphshell_pin.parameters import Ingredient, parameter
+from sphshell_pin.parameters import Component, parameter
 from sphshell_pin.study.sweep.job import need
 
 FloatArray = NDArray[np.float64]
@@ -21,7 +21,7 @@ _CALL = re.compile(r"\s*(\w+)\s*\(([^()]*)\)\s*")
 
 
 @dataclass(frozen=True)
-class Distribution(Ingredient):
+class Distribution(Component):
     """A distribution of one number; its kinds are `Normal`, `Uniform` and `LogNormal`."""
 
     def quantile(self, share: FloatArray) -> FloatArray:

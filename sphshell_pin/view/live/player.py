@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import pinocchio as pin
 
     from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
-    from sphshell_pin.scenario.format.sliders import Knob
+    from sphshell_pin.scenario.format.sliders import LiveParameter
     from sphshell_pin.scenario.live.drag import Dragged
     from sphshell_pin.scenario.live.joint_targets import Target
     from sphshell_pin.scenario.running.player import Rows
@@ -64,7 +64,7 @@ class Player(Protocol):
         """Energy that changed form since the start [J]."""
 
     @property
-    def knobs(self) -> tuple[Knob, ...]:
+    def knobs(self) -> tuple[LiveParameter, ...]:
         """The parameters with sliders, with their present values."""
 
     @property

@@ -1,0 +1,209 @@
+"""A number has one name: in files, --set, sliders, sweeps, fits, `vary` and derivatives."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import pytest
+
+import sphshell_pin as sp
+from sphshell_pin.contact import Friction, NormalLaw
+from sphshell_pin.dynamics.sensing.sensors import Sensor
+from sphshell_pin.errors import FormerName, InvalidParameter, NameNotFound, ScenarioError
+from sphshell_pin.parameters import parameters_of
+from sphshell_pin.scenario import build, live_parameters, rebuild
+from sphshell_pin.study.fit.parameters import free_parameters
+from sphshell_pin.study.sweep.plan import plan_sweep
+from tests.scenario.files import DROP, write
+
+LAW = next(line for line in DROP.splitlines() if line.startswith("law"))
+HERTZ = {"young": 1e9, "poisson": 0.3, "young_2": 2e9, "poisson_2": 0.4}
+RESTITUTION = {"restitution": 0.5, "speed": 1.0}
+# All numbers of each law, friction and sensor that a file may state; Hertz's damping excludes that
+# of a loss tangent. What only states another law (adams, table) has numbers of its own.
+STATED = {
+    "law": [
+        {"type": "impact", "stiffness": 1e6, "exponent": 1.5, "damping": 2.0}
+        | {"full_damping_depth": 2e-4},
+        {"type": "foundation", "modulus": 1e7, "thickness": 1e-3, "dissipation": 0.1},
+        {"type": "hunt-crossley", "stiffness": 1e6, "exponent": 1.5, "dissipation": 0.2},
+        {"type": "hertz", **HERTZ, **RESTITUTION},
+        {"type": "hertz", **HERTZ, "loss_tangent": 0.1, "frequency": 10.0},
+    ],
+    "friction": [
+        {"type": "coulomb", "mu_static": 0.4, "mu_dynamic": 0.2}
+        | {"v_static": 0.1, "v_dynamic": 0.2},
+        {"type": "bristle", "mu_static": 0.4, "mu_dynamic": 0.2, "stiffness": 1e4}
+        | {"damping": 3.0, "v_stribeck": 0.02},
+        {"type": "mindlin", "mu_static": 0.4, "mu_dynamic": 0.2, **HERTZ}
+        | {"v_stribeck": 0.02, "damping_time": 1e-3, "rolling": 0.1, "rolling_speed": 1e-2},
+    ],
+    "sensor": [
+        {"type": "force-torque", "name": "one", "frame": "root_joint", "rate": 500.0}
+        | {"delay": 1e-3, "cutoff": 50.0, "seed": 1, "force_range": 9.0, "torque_range": 8.0}
+        | {"force_noise": 0.1, "torque_noise": 0.2},
+        {"type": "contact-switch", "name": "one", "contact": "ball-plate", "rate": 500.0}
+        | {"delay": 1e-3, "threshold": 0.4, "release": 0.2},
+    ],
+}
+KEYS = [
+    pytest.param(part, table, name, id=f"{part}-{table['type']}-{name}")
+    for part, tables in STATED.items()
+    for table in tables
+    for name, value in table.items()
+    if not isinstance(value, str)
+]
+KEYS += [
+    pytest.param("sphere", {}, "radius", id="sphere-radius"),
+    pytest.param("sphere", {}, "offset.2", id="sphere-offset"),
+]
+
+
+def drop(part: str, table: dict[str, object]) -> str:
+    """Return the scenario of a drop with the law, friction or sensor of `table`."""
+    lines = [f"{key} = {json.dumps(value)}" for key, value in table.items()]
+    if part == "sensor":
+        return DROP + "\n[[sensor]]\n" + "\n".join(lines) + "\n"
+    stated = f"{part} = {{ {', '.join(lines)} }}"
+    if part == "sphere":
+        return DROP.replace("radius = 0.012", "radius = 0.012, offset = [0, 0, 1e-4]")
+    return DROP.replace(LAW, stated if part == "law" else f"{LAW}\n{stated}")
+
+
+def inner(whole: object, path: list[str]) -> object:
+    """Return what is at the end of a path of fields and numbers of an object."""
+    for one in path:
+        whole = whole[int(one)] if one.isdecimal() else getattr(whole, one)  # type: ignore[index]
+    return whole
+
+
+@pytest.mark.parametrize(("part", "table", "name"), KEYS)
+def test_a_number_has_one_name(part, table, name, tmp_path):
+    head = "sensor.one" if part == "sensor" else f"contact.ball-plate.{part}"
+    key = f"{head}.{name}"
+    path = write(tmp_path, drop(part, table) + f'\n[[knob]]\nkey = "{key}"\nmin = -1\nmax = 1e10\n')
+    built = build(path)
+    (knob,) = live_parameters(built)
+    assert knob.key == key
+    where = name.split(".")
+
+    def value_in(scene: sp.Scene, sensors: tuple[Sensor, ...]) -> object:
+        return inner(sensors[0] if part == "sensor" else getattr(scene.pairs[0], part), where)
+
+    before = value_in(built.scene, built.simulation.sensors)
+    assert before == knob.value == table.get(name, before)
+    after = before * 0.875 if name != "seed" else 3
+    set_ = rebuild(built, {key: repr(after)})
+    assert value_in(set_.scene, set_.simulation.sensors) == after
+    assert [axis.key for axis in plan_sweep(path, {key: [after]}).axes] == [key]
+    if name != "seed":
+        (free,) = free_parameters([key], built.scenario, path)
+        assert (free.key, free.start) == (key, before)
+    whole, values = key, [after]
+    if name == "offset.2":
+        whole, values = f"{head}.offset", [[0.0, 0.0, after]]
+    rollout = built.simulation.rollout(built.q0, None, 1e-4, vary={whole: values})
+    in_scene = whole.removeprefix("contact.").replace("sensor.", "sensors.")
+    assert list(rollout.varied) == [in_scene]
+    run = rollout[0]
+    if part == "sensor":
+        return
+    assert inner(getattr(run.scene.pairs[0], part), where) == pytest.approx(after)
+    column = f"{in_scene}.z" if name == "offset.2" else in_scene
+    for one in (key, column):
+        state = (built.q0, built.v0)
+        assert built.scene.dynamics_derivatives(*state, parameters=[one]).parameters == (column,)
+        run = built.simulation.run(*state, 1e-4, sensitivities=[one])
+        assert run.sensitivities.parameters == (column,)
+
+
+@pytest.mark.parametrize(
+    ("family", "part"), [(NormalLaw, "law"), (Friction, "friction"), (Sensor, "sensor")]
+)
+def test_the_numbers_of_all_kinds_are_tried(family, part):
+    for kind, stating in family.kinds.items():
+        numbers = {
+            one.name
+            for one in dataclasses.fields(stating)
+            if one.name in parameters_of(stating)
+            and "float" in one.type + "float" * (one.type == "Named")
+        }
+        tried = {name for table in STATED[part] if table["type"] == kind for name in table}
+        if tried:
+            # The radius of a ball on a plane makes another law of Hertz's.
+            assert numbers - {"radius", "radius_2"} <= tried
+        else:
+            assert kind in ("adams", "table", "none", "joint-torque")
+
+
+def test_former_names_work_and_warn(tmp_path):
+    now = drop("law", {"type": "hertz", **HERTZ})
+    path = write(tmp_path, now.replace("young =", "young_1 =").replace("poisson =", "poisson_1 ="))
+    key, former = "contact.ball-plate.law.young", "contact.ball-plate.law.young_1"
+    warns = pytest.warns(FormerName, match="'young_1' is deprecated: it is called 'young'")
+    with warns:
+        built = build(path)
+    assert built.scene.pairs[0].law == sp.HertzLaw(**HERTZ)
+    with warns:
+        assert rebuild(built, {former: "3e9"}).scene.pairs[0].law.young == 3e9
+    with warns:
+        assert free_parameters([former], built.scenario, path)[0].key == key
+    with warns, pytest.raises(InvalidParameter, match="given twice"):
+        plan_sweep(path, {key: [1e9], former: [1e9]})
+    names = pytest.warns(FormerName, match=r"law\.young_1' is deprecated.*'ball-plate\.law\.young'")
+    with names:
+        found = built.scene.dynamics_derivatives(built.q0, parameters=["ball-plate.law.young_1"])
+    assert found.parameters == ("ball-plate.law.young",)
+    with names:
+        rollout = built.simulation.rollout(built.q0, None, 0.0, vary={former: [3e9]})
+    assert rollout.varied == {"ball-plate.law.young": [3e9]}
+    with names, pytest.raises(InvalidParameter, match=r"must not vary .* twice"):
+        built.simulation.rollout(built.q0, vary={former: [1.0], "ball-plate.law.young": [1.0]})
+
+
+def test_a_file_may_not_state_a_number_twice(tmp_path):
+    stated = drop("law", {"type": "hertz", **HERTZ, "young_1": 1e9})
+    with (
+        pytest.raises(ScenarioError, match=r"law: 'young_1' is a former name of 'young', which is"),
+        pytest.warns(FormerName),
+    ):
+        build(write(tmp_path, stated))
+
+
+def test_the_place_of_a_wrong_value_is_told_by_its_present_name(tmp_path):
+    stated = drop("law", {"type": "hertz", "young_1": -1.0, "poisson": 0.3})
+    with (
+        pytest.raises(ScenarioError, match=r"contact\.ball-plate\.law\.young: "),
+        pytest.warns(FormerName),
+    ):
+        build(write(tmp_path, stated))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "hint"),
+    [
+        ("law.yuong", "law.young"),
+        ("law.yuong_2", "law.young_2"),
+        ("sphere.radios", "sphere.radius"),
+    ],
+)
+def test_the_nearest_name_of_the_same_body_is_suggested(wrong, hint, tmp_path):
+    path = write(tmp_path, drop("law", {"type": "hertz", **HERTZ}))
+    built = build(path)
+    said = f"did you mean '(ball-plate.)?({hint}|{hint.split('.')[1]})'"
+    with pytest.raises(ScenarioError, match=said):
+        free_parameters([f"contact.ball-plate.{wrong}"], built.scenario, path)
+    with pytest.raises(ScenarioError, match=said):
+        rebuild(built, {f"contact.ball-plate.{wrong}": "1"})
+    with pytest.raises(NameNotFound, match=said):
+        built.scene.dynamics_derivatives(built.q0, parameters=[f"ball-plate.{wrong}"])
+    with pytest.raises(NameNotFound, match=said):
+        built.simulation.rollout(built.q0, vary={f"ball-plate.{wrong}": [1.0]})
+
+
+@pytest.mark.parametrize("name", ["ball-plate.law.", "ball-plate.", "", "contact."])
+def test_a_name_that_ends_early_is_none(name, tmp_path):
+    built = build(write(tmp_path))
+    with pytest.raises(NameNotFound, match="no parameter"):
+        built.scene.dynamics_derivatives(built.q0, parameters=[name])
