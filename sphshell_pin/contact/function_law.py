@@ -84,8 +84,8 @@ class FunctionLaw(NormalLaw, kind="function"):
             raise AttributeError(f"{type(self).__name__} has no attribute '{name}'") from None
 
     def __hash__(self) -> int:
-        """Return the hash of the functions and of the numbers."""
-        return hash((self.function, self._energy, tuple(self.parameters.items())))
+        """Return the hash of the numbers; function pointers of ctypes have none."""
+        return hash(tuple(self.parameters.items()))
 
     @property
     def own_parameters(self) -> Mapping[str, Parameter]:
