@@ -130,6 +130,8 @@ def test_a_run_warns_in_the_words_of_the_explanation() -> None:
     q, v = [RADIUS], [-SPEED]
     dt = 50 * scene.explain(q, v).recommended_dt
     (sentence,) = (one for one in scene.explain(q, v, dt=dt).warnings if "recommended" in one)
+    shortest_time = scene.explain(q, v).pairs[0].shortest_time
+    assert f"would get {shortest_time / dt:.2g} steps" in sentence
     with pytest.warns(SetupWarning) as caught:
         sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(q, v, 10 * dt)
     assert [str(one.message) for one in caught] == [sentence]
