@@ -93,6 +93,8 @@ def test_slow_slip_of_coulomb_friction_decays_under_the_load() -> None:
     damping = load * friction.coefficient(slow) / slow
     found = shortest(block(law, friction), [0.0, 0.0, RADIUS - law.depth_at(load)], [0.0] * 3)
     assert found == pytest.approx(20 * MASS / damping, rel=1e-4)
+    pressed = [0.0, 0.0, RADIUS - law.depth_at(2 * load)]
+    assert shortest(block(law, friction), pressed, [0.0] * 3) == pytest.approx(found / 2, rel=1e-4)
     # A ball rolls: 2/7 of its mass resist a slip.
     ball = models.on_plate(models.ball(mass=MASS), law, friction)
     q = models.free_q([0.0, 0.0, RADIUS - law.depth_at(load)])
