@@ -77,12 +77,13 @@ def test_without_damping_it_is_the_contact_time(law: str) -> None:
     assert shortest(scene, [RADIUS], [-SPEED]) == pytest.approx(contact_time, rel=2e-3)
 
 
-def test_under_load_it_is_half_an_oscillation() -> None:
+@pytest.mark.parametrize(("pressed", "gravity"), [(5e-3, 9.81), (0.0, 2500.0)])
+def test_under_load_it_is_half_an_oscillation(pressed: float, gravity: float) -> None:
     law = sp.ImpactLaw(1e8, 2.0)
-    depth = 5e-3  # pressed there, far deeper than an impact at 0.1 m/s
-    scene = falling(law, gravity=9.81)
+    depth = 5e-3  # where it is pressed or comes to rest, far deeper than an impact at 0.1 m/s
+    scene = falling(law, gravity=gravity)
     half = math.pi * math.sqrt(MASS / (2 * 1e8 * depth))
-    assert shortest(scene, [RADIUS - depth], [0.0]) == pytest.approx(half, rel=1e-6)
+    assert shortest(scene, [RADIUS - pressed], [0.0]) == pytest.approx(half, rel=1e-6)
 
 
 def test_slow_slip_of_coulomb_friction_decays_under_the_load() -> None:
@@ -92,6 +93,8 @@ def test_slow_slip_of_coulomb_friction_decays_under_the_load() -> None:
     damping = load * friction.coefficient(slow) / slow
     found = shortest(block(law, friction), [0.0, 0.0, RADIUS - law.depth_at(load)], [0.0] * 3)
     assert found == pytest.approx(20 * MASS / damping, rel=1e-4)
+    pressed = [0.0, 0.0, RADIUS - law.depth_at(2 * load)]
+    assert shortest(block(law, friction), pressed, [0.0] * 3) == pytest.approx(found / 2, rel=1e-4)
     # A ball rolls: 2/7 of its mass resist a slip.
     ball = models.on_plate(models.ball(mass=MASS), law, friction)
     q = models.free_q([0.0, 0.0, RADIUS - law.depth_at(load)])
