@@ -5,7 +5,9 @@ from __future__ import annotations
 import copy
 import ctypes
 import math
+import sys
 import warnings
+from _ctypes import CFuncPtr
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -170,13 +172,12 @@ def _address(name: str, function: Any, count: int) -> int | None:
     if isinstance(getattr(function, "address", None), int):  # numba
         _check_signature(name, function.ctypes, count)
         return int(function.address)
-    if isinstance(function, ctypes._CFuncPtr):  # type: ignore[attr-defined]
+    if isinstance(function, CFuncPtr):
         _check_signature(name, function, count)
         found = ctypes.cast(function, ctypes.c_void_p).value
     elif type(function).__module__ == "_cffi_backend":
-        import _cffi_backend  # type: ignore[import-untyped, import-not-found, unused-ignore]
-
-        found = int(_cffi_backend.FFI().cast("uintptr_t", function))
+        ffi = sys.modules["_cffi_backend"].FFI()
+        found = int(ffi.cast("uintptr_t", function))
     elif isinstance(function, int) and not isinstance(function, bool):
         found = function
     elif callable(function):
