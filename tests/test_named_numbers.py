@@ -21,7 +21,7 @@ LAW = next(line for line in DROP.splitlines() if line.startswith("law"))
 HERTZ = {"young": 1e9, "poisson": 0.3, "young_2": 2e9, "poisson_2": 0.4}
 RESTITUTION = {"restitution": 0.5, "speed": 1.0}
 # All numbers of each law, friction and sensor that a file may state; Hertz's damping excludes that
-# of a loss tangent. What only states another law (adams, table) has numbers of its own.
+# of a loss tangent. What only states another law (adams, table, function) has numbers of its own.
 STATED = {
     "law": [
         {"type": "impact", "stiffness": 1e6, "exponent": 1.5, "damping": 2.0}
@@ -134,7 +134,7 @@ def test_the_numbers_of_all_kinds_are_tried(family, part):
             # The radius of a ball on a plane makes another law of Hertz's.
             assert numbers - {"radius", "radius_2"} <= tried
         else:
-            assert kind in ("adams", "table", "none", "joint-torque")
+            assert kind in ("adams", "table", "function", "none", "joint-torque")
 
 
 def test_former_names_work_and_warn(tmp_path):
