@@ -297,7 +297,7 @@ def test_a_law_too_weak_is_told_once() -> None:
         ({"tip.sphere.offset": [0.0, 0.0, 0.0]}, InvalidParameter, "(3, 3)"),
         ({"tip.placement": [np.eye(4)] * 3}, InvalidParameter, "pinocchio.SE3"),
         ({"tip.law": 3}, InvalidParameter, "list of 3 values"),
-        ({"tip.law": [3, 3, 3]}, InvalidParameter, "is TableLaw(depth, force)"),
+        ({"tip.law": [3, 3, 3]}, InvalidParameter, "is FunctionLaw(function)"),
         ({"tip.law": {1: 2, 3: 4, 5: 6}}, InvalidParameter, "list of 3 values"),
         ({"tip.law.stiffness": np.array(1e5)}, InvalidParameter, "(3,)"),
         ({"tip.law.stiffness": [10**400] * 3}, InvalidParameter, "3 numbers"),
