@@ -29,6 +29,9 @@ _RATE = 1e-6  # over which the damping at rest is a difference [m/s]
 class FunctionLaw(NormalLaw, kind="function"):
     """A law of one's own.
 
+    Slopes are differences of fourth order: they agree with a smooth force's to 1e-9. A number that
+    is not finite raises SphshellError; exceptions of a Python function pass.
+
     Parameters
     ----------
     function : its force [N], `double force(double depth, double gap_rate, const double*
@@ -39,11 +42,8 @@ class FunctionLaw(NormalLaw, kind="function"):
     energy : of the elastic part, that is of the force at rest [J], `double energy(double depth,
         const double* parameters)`; by default its integral by Gauss's rule, exact for sums of
         depth^(k/2), k <= 14, and the better the smoother the force is
-    parameters : numbers by name, in the order in which the functions get them. They are attributes
-        of the law, and are varied, fitted and differentiated as those of other laws
-
-    Slopes are differences of fourth order: they agree with a smooth force's to 1e-9. A number that
-    is not finite raises SphshellError; exceptions of a Python function pass.
+    parameters : numbers by name, in the order in which the functions get them; attributes of the
+        law, varied, fitted and differentiated as those of other laws
 
     Raises
     ------

@@ -16,6 +16,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 import sphshell_pin as sp
+from sphshell_pin.dynamics.result.result_parts import Origin
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
 from sphshell_pin.export import mcap as exporting
 from tests.export.runs import finger_run, linkless_run, turntable_run
@@ -322,7 +323,7 @@ def test_the_file_says_where_it_comes_from(finger, tmp_path):
     assert about["start [ns]"] == str(START)
     assert about["integrator"] == "RungeKutta4"
     settings = {"run": {"dt": 1e-4}, "sensor": [{"name": "fingertip", "frame": "tip"}]}
-    origin = sp.dynamics.result.Origin("some/finger.toml", settings)
+    origin = Origin("some/finger.toml", settings)
     path = tmp_path / "finger.mcap"
     exporting.write_mcap(path, replace(result, origin=origin), command="sphshell-pin export x")
     read = Read(path)

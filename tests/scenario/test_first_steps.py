@@ -117,7 +117,7 @@ def test_ctrl_c_while_a_library_loads_is_an_interruption(cause, monkeypatch):
             error.__context__ = None if cause is KeyboardInterrupt else ring
             raise ring from error
 
-    monkeypatch.setattr("sphshell_pin.scenario.format.build", load)
+    monkeypatch.setattr("sphshell_pin.scenario.build", load)
     code, output = told("explain", "sphere_on_shell")
     assert (code, "interrupted" in output) == (
         (130, True) if cause is KeyboardInterrupt else (2, False)

@@ -175,7 +175,7 @@ def test_what_the_file_states_of_the_joints_is_modelled(tmp_path):
         made = new_scenario(tmp_path / "arm.urdf", out=tmp_path / "a.toml", force=True)
         assert made.built.scenario.robot[0].joints == kinds
         left_out = friction > 0.1
-        assert any("of the joints' friction is left out" in w for w in made.why) == (left_out)
+        assert any("the friction that the robot's file" in w for w in made.why) == left_out
         assert ("without friction" in made.text) == left_out
         result, _ = simulate(made.built)
         force = made.built.scenario.controller.normal_force

@@ -20,7 +20,7 @@ from sphshell_pin.atomic import AtomicFolder, write_whole
 from sphshell_pin.errors import Interrupted, ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, run_built
-from sphshell_pin.scenario.drafting.draft_text import new
+from sphshell_pin.scenario.drafting import new
 from sphshell_pin.scenario.running import run
 from sphshell_pin.shell.converting import convert
 from sphshell_pin.study.report import making
