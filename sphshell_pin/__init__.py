@@ -8,11 +8,15 @@ from __future__ import annotations
 from sphshell_pin._interrupts import interrupts_delayed
 
 # isort: split
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 with interrupts_delayed():
     from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
+    from sphshell_pin.deprecation import FormerModules
+
+sys.meta_path.append(FormerModules())
 
 if TYPE_CHECKING:
     from sphshell_pin.contact import MATERIALS as MATERIALS

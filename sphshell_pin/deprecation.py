@@ -6,6 +6,10 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
 
 
 def warn_former(former: str, now: str, *, stacklevel: int = 3) -> None:
@@ -61,3 +65,36 @@ class FormerDict(Mapping[str, object]):
 
     def _names(self) -> list[str]:
         return [one.name for one in fields(self)] if is_dataclass(self) else []
+
+
+MOVED = {
+    "dynamics.advance": "dynamics.run.advance",
+    "dynamics.explain": "dynamics.scene.explain",
+    "dynamics.open_run": "dynamics.run.open_run",
+    "dynamics.simulation": "dynamics.run.simulation",
+    "scenario.new": "scenario.drafting.new",
+    "scenario.reading": "scenario.format.reading",
+    "scenario.replay": "scenario.running.replay",
+    "scenario.run": "scenario.running.run",
+}
+"""Modules of the documentation of 0.2.0 that have moved: former place and present one."""
+
+
+class FormerModules(MetaPathFinder, Loader):
+    """Finds a module by the place where it was, with a warning."""
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        """Return the spec of a module that has moved; None for any other."""
+        moved = name.removeprefix("sphshell_pin.") in MOVED
+        return ModuleSpec(name, self) if moved and name.startswith("sphshell_pin.") else None
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        """Return a module whose names are those of the module at its present place."""
+        now = f"sphshell_pin.{MOVED[spec.name.removeprefix('sphshell_pin.')]}"
+        warn_former(spec.name, f"it is {now}")
+        module = ModuleType(spec.name, f"Former name of {now}.")
+        module.__dict__.update(vars(import_module(now)), __name__=spec.name, __file__=None)
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Do nothing: the module has been executed at its present place."""

@@ -49,16 +49,16 @@ def draw_patches(
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     seen = np.flatnonzero(patches.normals @ normal > 0.0)
+    if not len(seen):
+        return
     peak = peak_pressure(patches)
     kept: list[int] = []
-    extent = float(np.ptp(patches.points[seen], axis=0).max(initial=0.0))
+    extent = float(np.ptp(patches.points[seen], axis=0).max())
     for k in seen.tolist():
         near = patches.points[kept] - patches.points[k]
         apart = max(1.5 * float(patches.half_axes[k, 0]), extent / MOST)
         if not kept or float((near**2).sum(axis=1).min()) > apart**2:
             kept.append(k)
-    if not kept:
-        return
     kept = [kept[k] for k in np.unique(np.linspace(0, len(kept) - 1, MOST).astype(int))]
     ellipses = []
     for k in kept:
