@@ -128,7 +128,7 @@ class Component:
     A direct subclass is a family (`class NormalLaw(Component)`). A class that belongs to it gives
     its type name in files, `class ImpactLaw(NormalLaw, kind="impact")`. Another way to state one
     names the family that it belongs to, `class Hertz(Component, kind="hertz", of=NormalLaw)`, and
-    returns what it states by `made`; if its kind is taken, files state that kind in this way.
+    returns what it states by `_build`; if its kind is taken, files state that kind in this way.
     """
 
     kind: ClassVar[str] = ""
@@ -175,7 +175,7 @@ class Component:
         """Return this with other values of parameters."""
         return dataclasses.replace(self, **values)
 
-    def numbers(self) -> list[float]:
+    def _numbers(self) -> list[float]:
         """Return the parameters in their order, as the compiled core takes them."""
         return [float(getattr(self, name)) for name in parameters_of(self)]
 
@@ -184,13 +184,13 @@ class Component:
         """Files that this names, as it names them: relative to the scenario."""
         return ()
 
-    def made(self, folder: Path = Path()) -> Any:
+    def _build(self, folder: Path = Path()) -> Any:
         """Return what this states; `folder` is where its files are. By default itself."""
         return self
 
     def __getstate__(self) -> dict[str, object]:
         """Everything but the C++ binding, which is made again: what pickle and copy take."""
-        return {k: v for k, v in self.__dict__.items() if k != "core"}
+        return {k: v for k, v in self.__dict__.items() if k != "_binding"}
 
 
 if not TYPE_CHECKING:

@@ -77,7 +77,7 @@ def test_units_may_depend_on_other_values():
     assert spring.stiffness.hex() == (2.0).hex()
     assert spring.unit_of("stiffness") == "N/m^1.5"
     assert parameters_of(spring)["stiffness"].general_unit == "N/m^exponent"
-    assert Spring(2, share=1, twist=True).numbers() == [2.0, 1.5, 0.0, 1.0, 1.0]
+    assert Spring(2, share=1, twist=True)._numbers() == [2.0, 1.5, 0.0, 1.0, 1.0]
 
 
 def test_pydantic_reads_the_same_description():

@@ -104,12 +104,12 @@ class ContactDynamics(crocoddyl.DifferentialActionModelAbstract):
     def calcDiff(self, data: _DynamicsData, x: Array, u: Array | None = None) -> None:
         """Compute the derivatives of what `calc` has computed last."""
         q, v = x[: self._nq], x[self._nq :]
-        slopes = data.by_state, data.by_tau, data.forces_by_state
+        derivatives = data.by_state, data.by_tau, data.forces_by_state
         if u is None:
-            data.evaluator.calc_diff(q, v, data.no_torque, *slopes)
+            data.evaluator.calc_diff(q, v, data.no_torque, *derivatives)
             self.costs.calcDiff(data.costs, x)
             return
-        data.evaluator.calc_diff(q, v, u if self._full else data.tau, *slopes)
+        data.evaluator.calc_diff(q, v, u if self._full else data.tau, *derivatives)
         if not self._full:
             self.actuation.calcDiff(data.actuation, x, u)
             data.Fx[:] = data.by_state + data.by_tau @ data.actuation.dtau_dx
@@ -178,8 +178,8 @@ class ContactStep(crocoddyl.ActionModelAbstract):
             data.last.calc_diff(q, v, data.no_torque, *data.last_slopes, data.forces_by_state)
             self.costs.calcDiff(data.costs, x)
             return
-        slopes = data.by_state, data.by_tau, data.forces_by_state
-        data.evaluator.calc_diff(q, v, u if self._full else data.tau, *slopes)
+        derivatives = data.by_state, data.by_tau, data.forces_by_state
+        data.evaluator.calc_diff(q, v, u if self._full else data.tau, *derivatives)
         if not self._full:
             self.actuation.calcDiff(data.actuation, x, u)
             data.Fx[:] = data.by_state + data.by_tau @ data.actuation.dtau_dx
@@ -339,7 +339,7 @@ class FrameResidual(crocoddyl.ResidualModelAbstract):
         self.frame = frame
         self._joint, self._placement = scene.frame_in_joint(frame)
         self._nq = scene.model.nq
-        self._scene = scene.core
+        self._scene = scene._binding
         self.reference = reference
 
     @property

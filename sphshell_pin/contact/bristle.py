@@ -12,8 +12,6 @@ from sphshell_pin.contact.normal_law import DECAYS_PER_PERIOD
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import parameter
 
-__all__ = ["BristleFriction", "MindlinFriction"]
-
 # Bristles stick below this part of Stribeck's speed: almost nothing moves.
 STICKING_SHARE = 0.01
 # As many as the compiled core knows.
@@ -207,7 +205,7 @@ class MindlinFriction(TwoMaterials, Coefficients, kind="mindlin"):
         """True: the disc of contact depends on it."""
         return True
 
-    def numbers(self) -> list[float]:
+    def _numbers(self) -> list[float]:
         """Return the parameters as the compiled core takes them, moduli for the materials."""
         names = ["v_stribeck", "damping_time", "torsional", "rolling", "rolling_speed", "rings"]
         more = [float(getattr(self, name)) for name in names]

@@ -14,8 +14,6 @@ from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.parameters import Component, parameter, same_parameter
 
-__all__ = ["HertzLaw"]
-
 
 @dataclass(frozen=True)
 class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
@@ -116,18 +114,18 @@ class HertzLaw(TwoMaterials, NormalLaw, kind="hertz"):
             return ImpactLaw(stiffness, 1.5)
         return HuntCrossleyLaw.with_restitution(stiffness, 1.5, self.restitution, self.speed)
 
-    def numbers(self) -> list[float]:
+    def _numbers(self) -> list[float]:
         """Return E*, b, tau and the fixed scale, or 0, as the compiled core takes them."""
         scale = 0.0 if self.radius is None else 4 / 3 * math.sqrt(self.radius)
         return [self.modulus, self.dissipation, self.relaxation_time, scale]
 
     @property
-    def alone(self) -> _core.NormalLaw:
+    def _shapeless_binding(self) -> _core.NormalLaw:
         """The C++ binding; InvalidParameter without `radius`: the gap is not known."""
         if self.needs_shape:
             must = "must be given where nothing is touched: take law.on_plane(radius)"
             raise InvalidParameter("radius", None, must)
-        return self.core
+        return self._binding
 
     @property
     def text(self) -> str:
@@ -182,7 +180,7 @@ class Hertz(TwoMaterials, Component, kind="hertz", of=NormalLaw):
         if self.radius is None and self.radius_2 is not None:
             raise InvalidParameter("radius_2", self.radius_2, "must be given with radius, or left")
 
-    def made(self, folder: Path = Path()) -> NormalLaw:
+    def _build(self, folder: Path = Path()) -> NormalLaw:
         """Return the law; with a radius a constant one, of Hunt and Crossley with a restitution."""
         law = self._law()
         if self.radius is None:

@@ -73,10 +73,10 @@ def write_folder(
     folder = Path(folder)
     try:
         with AtomicFolder(folder, last=every[0]) as place:
-            desk = place.desk()
+            staging = place.staging()
             for name, content in files.items():
-                (desk / name).write_bytes(content)
-            place.replace(desk, every)
+                (staging / name).write_bytes(content)
+            place.replace(staging, every)
     except FolderInUse as busy:
         raise ResultError(folder, f"{busy}: wait until it ends, or give another folder") from None
     except OSError as error:

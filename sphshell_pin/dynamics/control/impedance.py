@@ -147,7 +147,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         shell, frame, placement = find_shell(self.shell)
         return replace(self, shell=shell, shell_frame=frame, placement=placement)
 
-    def to_core(self, scene: Scene, q0: Array) -> _core.Controller:
+    def _bind(self, scene: Scene, q0: Array) -> _core.Controller:
         """Build the C++ controller: resample the path, project it, find the frames."""
         model = scene.model
         frame_index = find_frame(model, self.frame)
@@ -219,7 +219,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
         curve = Curve.through(points, shell, spline=self.spline)
         return curve, Timing.along(curve, self.lead_in, self.speed, self.acceleration, self.jerk)
 
-    def doubts(self, scene: Scene, q0: Array) -> list[str]:
+    def _setup_warnings(self, scene: Scene, q0: Array) -> list[str]:
         """Say where the path is off the shell or jumps on it, and bends that take the speed."""
         said: list[str] = []
         curve = self._motion()[0]
@@ -264,7 +264,7 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
                 )
         return said
 
-    def doubts_after(self, result: Result) -> list[str]:
+    def _result_warnings(self, result: Result) -> list[str]:
         """Say so if a controller that presses has touched nothing, or never came to its path."""
         scene, said = result.scene, list[str]()
         if scene is None or len(result.t) == 0:

@@ -97,7 +97,7 @@ class Result(Summarized):
         return None if rows is None else replace(rows, result=self)
 
     @classmethod
-    def from_blocks(
+    def _from_blocks(
         cls,
         blocks: list[Columns],
         pairs: tuple[str, ...],

@@ -170,7 +170,7 @@ class Simulation(Summarized):
                 "has no fixed step to differentiate: take SemiImplicitEuler(dt), RungeKutta4(dt) "
                 "or LinearlyImplicitEuler(dt)",
             )
-        return self.scene.step_derivatives(self.integrator.kind, dt, q, v, tau, parameters, state)
+        return self.scene._step_derivatives(self.integrator.kind, dt, q, v, tau, parameters, state)
 
     def rollout(
         self,

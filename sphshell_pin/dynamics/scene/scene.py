@@ -118,7 +118,7 @@ class Scene(SceneParts):
         `parameters` and `state` as in `dynamics_derivatives`; what is approximate is said in
         `contact_derivatives`.
         """
-        columns, core = self.core_parameters(parameters, state)
+        columns, core = self._bind_parameters(parameters, state)
         found = self._at(state).contact_force_derivatives(q, v, core)
         return ContactForceDerivatives.from_core(*found, self._model.nv, columns)
 
@@ -148,11 +148,11 @@ class Scene(SceneParts):
         Raises NameNotFound for a parameter that the scene does not have, InvalidParameter for
         wrong sizes.
         """
-        columns, core = self.core_parameters(parameters, state)
+        columns, core = self._bind_parameters(parameters, state)
         found = self._at(state).dynamics_derivatives(q, v, tau, core)
         return DynamicsDerivatives(*found, columns)
 
-    def step_derivatives(
+    def _step_derivatives(
         self,
         integrator: str,
         dt: float,
@@ -166,11 +166,11 @@ class Scene(SceneParts):
 
         See Simulation.step_derivatives.
         """
-        columns, core = self.core_parameters(parameters, state)
+        columns, core = self._bind_parameters(parameters, state)
         found = self._at(state).step_derivatives(integrator, dt, q, v, tau, core)
         return StepDerivatives(*found, columns)
 
-    def core_parameters(
+    def _bind_parameters(
         self, parameters: Collection[str], state: SceneState | None = None
     ) -> tuple[tuple[str, ...], list[_core.Parameter]]:
         """Return the columns of the `parameters`, and each as the core takes it."""
@@ -190,7 +190,7 @@ class Scene(SceneParts):
 
     def _at(self, state: SceneState | None) -> _core.Scene | _core.SceneState:
         if state is None:
-            return self.core
+            return self._binding
         check_type("state", state, SceneState, "must be a SceneState: scene.state(q, v)")
         return state.core_of(self)
 

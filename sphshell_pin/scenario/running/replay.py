@@ -98,7 +98,7 @@ class Replay:
         self._exchanged = self.result.energy.exchanged_until
         self._time, self._row, self._given = self.start, 0, 0
 
-    knobs: tuple[LiveParameter, ...] = ()
+    parameters: tuple[LiveParameter, ...] = ()
     bodies: tuple[str, ...] = ()
 
     @property

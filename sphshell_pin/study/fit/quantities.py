@@ -33,7 +33,7 @@ class Quantity:
     unit: str
     at: Callable[[Result, Array], Array]
     """Its values (n,) in a result at the times (n,) [s]; nan before the first one."""
-    slopes: Callable[[Result, Array], Array] | None = None
+    derivatives: Callable[[Result, Array], Array] | None = None
     """Its derivatives (n, p) by what the result has sensitivities of; None: by differences only."""
 
 

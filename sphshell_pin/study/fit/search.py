@@ -31,7 +31,8 @@ _SMALL_ERROR, _MOST_HALVINGS = 0.01, 8
 _STAGES = (0.125, 0.25, 0.5)
 # A value feels the parameters if its slope is so large a part of the largest.
 _FELT = 1e-3
-# Slopes of fewer values may agree by chance: such columns are judged with others of their name.
+# Derivatives of fewer values may agree by chance: such columns are judged with others of their
+# name.
 _FEW = 10
 # How far the first step may go in x.
 _FIRST_STEP = 0.5
@@ -112,7 +113,7 @@ class Search:
 
     def report(self, scenario: str, level: float) -> Fit:
         """Return the fit at the values found."""
-        jacobian, error, still = self._final_slopes()
+        jacobian, error, still = self._final_derivatives()
         groups, called = self._groups()
         dof = len(self.measured) - len(self.free)
         factor = student_factor(dof, level)
@@ -212,8 +213,8 @@ class Search:
 
         Values before these are taken, too: the parameters do nothing to them.
         """
-        slopes = self._slopes(self.x)
-        felt = np.linalg.norm(slopes, axis=1)
+        derivatives = self._derivatives(self.x)
+        felt = np.linalg.norm(derivatives, axis=1)
         use = np.zeros(len(felt))
         for trial in self.runs.trials:
             parts = [part for part in self.parts if part.trial is trial]
@@ -235,7 +236,7 @@ class Search:
         found = optimize.least_squares(
             lambda x: use * self._residuals(start + x),
             np.zeros(len(start)),
-            jac=lambda x: -self._slopes(start + x, use),
+            jac=lambda x: -self._derivatives(start + x, use),
             bounds=(self.low - start, self.high - start),
             method="trf",
             x_scale=_FIRST_STEP,
@@ -262,13 +263,15 @@ class Search:
         self._misfit = float(np.sqrt(np.mean(residuals**2)))
         return np.asarray(residuals)
 
-    def _slopes(self, x: Array, use: Array | float = 1.0) -> Array:
+    def _derivatives(self, x: Array, use: Array | float = 1.0) -> Array:
         """Return the derivatives (N, p) of the weighted predicted values, each times `use`."""
-        slopes = self.runs.slopes(x, self.low, self.high, forward_step(self.runs.tolerance))
-        return np.asarray(slopes * (use / self.sigma)[:, None])
+        derivatives = self.runs.derivatives(
+            x, self.low, self.high, forward_step(self.runs.tolerance)
+        )
+        return np.asarray(derivatives * (use / self.sigma)[:, None])
 
-    def _final_slopes(self) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return the weighted slopes (N, p) at the solution, their error, and which x do nothing.
+    def _final_derivatives(self) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return the weighted derivatives (N, p) at the solution, their error, which x do nothing.
 
         The error is by how much differences over one step and over twice the step differ, and a
         column's step is halved as long as that makes it less. An error of truncation is a third of
@@ -277,7 +280,7 @@ class Search:
         column's slope is longer than twice that does nothing; of any other, an error that is as
         long as the slope leaves open what it does.
         """
-        slopes, errors, still = [], [], []
+        derivatives, errors, still = [], [], []
         values = self.runs.predict(self.x)
         assert values is not None
         rounding = self.runs.tolerance * np.abs(values) / self.sigma
@@ -294,13 +297,13 @@ class Search:
                 if not np.linalg.norm(less) < np.linalg.norm(error):
                     break
                 near, error = nearer, less
-            slopes.append(near)
+            derivatives.append(near)
             least = rounding / step
             errors.append(np.maximum(np.abs(error), least))
             # Of each column: one of large values would hide what another feels.
             lengths = [np.linalg.norm([near[one.at], least[one.at]], axis=1) for one in self.parts]
             still.append(all(length <= 2.0 * noise for length, noise in lengths))
-        return np.column_stack(slopes), np.column_stack(errors), np.array(still)
+        return np.column_stack(derivatives), np.column_stack(errors), np.array(still)
 
     def _slope(self, k: int, step: float) -> Array:
         return self.runs.slope(self.x, k, self.low, self.high, step, central=True) / self.sigma
