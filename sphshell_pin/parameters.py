@@ -107,10 +107,13 @@ def parameter(
     return field(default=default, metadata=metadata)
 
 
-def same_parameter(kind: type, name: str) -> Any:
-    """Return the field of a dataclass that is the parameter `name` of `kind`."""
+def same_parameter(kind: type, name: str, default: object = None) -> Any:
+    """Return the field of a dataclass that is the parameter `name` of `kind`.
+
+    `default` takes the place of its default, unless it is None.
+    """
     (source,) = (one for one in dataclasses.fields(kind) if one.name == name)
-    return field(default=source.default, metadata=source.metadata)
+    return field(default=source.default if default is None else default, metadata=source.metadata)
 
 
 def parameters_of(kind: object) -> dict[str, Parameter]:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sphshell_pin.errors import MissingExtra
+from sphshell_pin.errors import import_extra
 from sphshell_pin.study.fit.data import Column
 from sphshell_pin.study.fit.parameters import Free
 from sphshell_pin.study.fit.remarks import remarks_on
@@ -227,7 +225,7 @@ class Search:
 
     def _minimize(self, use: Array | float = 1.0) -> None:
         """Make the residuals least, each times `use`."""
-        optimize = _scipy_optimize()
+        optimize = import_extra("scipy.optimize", "fit", "a fit")
         tolerance = self.runs.tolerance
         # A value at its bound would hold the search there.
         inner = np.clip(self.x, self.low + _inset(self.low), self.high - _inset(self.high))
@@ -400,10 +398,3 @@ def _fitted(one: Free, x: float, span: tuple[float, float], *, held: bool) -> Fi
     determined = from_zero and not (low <= one.low and high >= one.high)
     low, high = max(low, one.low), min(high, one.high)
     return Fitted(one.name, one.unit, one.start, value, low, high, determined)
-
-
-def _scipy_optimize() -> ModuleType:
-    try:
-        return import_module("scipy.optimize")
-    except ImportError:
-        raise MissingExtra("scipy", "fit", "a fit") from None
