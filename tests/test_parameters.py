@@ -32,8 +32,9 @@ FAMILIES = {
 
 def concrete(family: type[Component]) -> list[type[Component]]:
     """Return the classes of a family without the other ways to state them."""
-    own = [one for base in family.__subclasses__() for one in concrete(base)]
-    return own + [family] * ("kind" in vars(family))
+    if "kind" in vars(family):
+        return [family]
+    return [one for base in family.__subclasses__() for one in concrete(base)]
 
 
 KINDS = [kind for family in FAMILIES.values() for kind in family.kinds.values()]

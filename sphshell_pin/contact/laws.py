@@ -120,7 +120,14 @@ class ImpactLaw(_PowerLaw, kind="impact"):
         # By its name in files: the module of Hertz imports this one.
         hertz = cast("type[Hertz]", NormalLaw.kinds["hertz"])
         stated = hertz(
-            young_1, poisson_1, young_2, poisson_2, restitution, speed, radius_2, radius=radius
+            young_1,
+            poisson_1,
+            young_2,
+            poisson_2,
+            restitution,
+            speed,
+            radius=radius,
+            radius_2=radius_2,
         )
         return cast(ImpactLaw | HuntCrossleyLaw, stated._build())
 
