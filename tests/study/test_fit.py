@@ -20,7 +20,7 @@ from sphshell_pin.study.fit import runs
 from sphshell_pin.study.fit.data import read_experiment
 from sphshell_pin.study.fit.parameters import free_parameters
 from sphshell_pin.study.fit.quantities import quantities_of, row_step
-from sphshell_pin.study.fit.runs import Runs, ready
+from sphshell_pin.study.fit.runs import Runs, Trial
 from sphshell_pin.study.fit.statistics import serial_of, spread_of
 
 STIFFNESS, DISSIPATION, FRICTION = TRUTH
@@ -363,7 +363,7 @@ def test_slopes_by_sensitivities_are_those_of_differences(bounce, monkeypatch):
     fixed.write_text(SCENARIO.replace("rtol = 1e-7", 'dt = 5e-5\nintegrator = "runge-kutta-4"'))
     data = sp.Experiment({"t [s]": t, **columns_of(fixed, t, names)})
     built = build(fixed)
-    trial = ready(built, read_experiment(data, 1, quantities_of(built), 0.25))
+    trial = Trial(built, read_experiment(data, 1, quantities_of(built), 0.25))
     free = free_parameters(list(TRUTH), built.scenario, fixed)
     x = np.array([one.to_x(one.start * 1.01) for one in free])
     ends = np.full(3, np.inf)

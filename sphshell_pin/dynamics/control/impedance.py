@@ -169,10 +169,11 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
             at = shell_pose.actInv(data.oMf[frame_index].act(np.asarray(self.offset)))
             if float((at - curve.points[0]) @ curve.normals[0]) < 0:
                 curve = replace(curve, normals=-curve.normals)
+        offset = pin.SE3(np.eye(3), np.array(self.offset, dtype=float))
         return _core.CartesianImpedance(
             num_joints=model.njoints,
             joint=int(frame.parentJoint),
-            frame=(frame.placement * self._moved_point()).homogeneous,
+            frame=(frame.placement * offset).homogeneous,
             path_joint=int(carrier.parentJoint),
             path_placement=(carrier.placement * placement).homogeneous,
             path=core_path(curve, timing),
@@ -187,9 +188,6 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
             actuated=self.actuated(model),
             decoupled=self.decoupled,
         )
-
-    def _moved_point(self) -> pin.SE3:
-        return pin.SE3(np.eye(3), np.array(self.offset, dtype=float))
 
     def _shell_place(self, scene: Scene) -> tuple[str, pin.SE3]:
         """Return the frame that carries the path, and where the path's own frame is in it."""

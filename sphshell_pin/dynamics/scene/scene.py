@@ -14,7 +14,6 @@ from sphshell_pin.contact import Friction, NormalLaw
 from sphshell_pin.dynamics.scene.derivatives import (
     ContactForceDerivatives,
     DynamicsDerivatives,
-    StepDerivatives,
     core_parameters,
 )
 from sphshell_pin.dynamics.scene.explain import Explanation, explain_scene
@@ -151,24 +150,6 @@ class Scene(SceneParts):
         columns, core = self._bind_parameters(parameters, state)
         found = self._at(state).dynamics_derivatives(q, v, tau, core)
         return DynamicsDerivatives(*found, columns)
-
-    def _step_derivatives(
-        self,
-        integrator: str,
-        dt: float,
-        q: ArrayLike,
-        v: ArrayLike | None,
-        tau: ArrayLike | None,
-        parameters: Collection[str],
-        state: SceneState | None,
-    ) -> StepDerivatives:
-        """Return the derivatives of a step `dt` [s] of the integrator of that kind.
-
-        See Simulation.step_derivatives.
-        """
-        columns, core = self._bind_parameters(parameters, state)
-        found = self._at(state).step_derivatives(integrator, dt, q, v, tau, core)
-        return StepDerivatives(*found, columns)
 
     def _bind_parameters(
         self, parameters: Collection[str], state: SceneState | None = None

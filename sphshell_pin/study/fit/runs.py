@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +38,15 @@ COST_OF_SENSITIVITIES = 8
 
 @dataclass(frozen=True)
 class Trial:
-    """An experiment ready to run: its scenario as `built`, its data, the time between rows [s]."""
+    """An experiment ready to run: its scenario as `built`, and its data."""
 
     built: Built
     data: Measured
-    row_step: float
+
+    @cached_property
+    def row_step(self) -> float:
+        """Time between rows [s]."""
+        return row_step(self.data.t)
 
     @property
     def size(self) -> int:
@@ -250,8 +255,3 @@ def _quiet(sensor: Sensor) -> Sensor:
     """Return a sensor without noise: the data have their own."""
     noise = [one.name for one in fields(sensor) if one.name.endswith("noise")]
     return replace(sensor, **dict.fromkeys(noise, 0.0)) if noise else sensor  # type: ignore[arg-type]
-
-
-def ready(built: Built, data: Measured) -> Trial:
-    """Return the experiment with the rows that its data need."""
-    return Trial(built, data, row_step(data.t))

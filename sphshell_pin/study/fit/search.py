@@ -52,6 +52,10 @@ class _Part:
     def t(self) -> Array:
         return self.trial.data.t[self.column.rows]
 
+    @property
+    def has_sigma(self) -> bool:
+        return self.column.sigma is not None
+
 
 class Search:
     """The search for the values at which the weighted residuals are least."""
@@ -76,9 +80,10 @@ class Search:
                 begin = end
         self.measured = np.concatenate([part.column.values for part in self.parts])
         self.given = np.concatenate(
-            [np.full(part.at.stop - part.at.start, self._has_sigma(part)) for part in self.parts]
+            [np.full(len(part.column.values), part.has_sigma) for part in self.parts]
         )
-        self.sigma = self._first_sigma()
+        means = [np.full_like(one.column.values, one.column.values.mean()) for one in self.parts]
+        self.sigma = self._pooled(self.measured - np.concatenate(means), 1.0)
 
     def run(self) -> None:
         """Search; weights that are not given are estimated from the residuals, and it goes on."""
@@ -100,7 +105,7 @@ class Search:
 
     def _settle(self) -> None:
         """Go to the least residuals from where the search is, with weights that fit them."""
-        names = {part.name for part in self.parts if not self._has_sigma(part)}
+        names = {part.name for part in self.parts if not part.has_sigma}
         # The weight of all data together changes nothing.
         rounds = _MOST_ROUNDS if len(names) > 1 or (names and self.given.any()) else 1
         for _ in range(rounds):
@@ -310,20 +315,6 @@ class Search:
         if self._progress is not None:
             self._progress(count, self._misfit)
 
-    def _has_sigma(self, part: _Part) -> bool:
-        return part.column.sigma is not None
-
-    def _first_sigma(self) -> Array:
-        """Return the given deviations; else the root of the mean square of what is measured."""
-        return self._pooled(self.measured - self._centers(), 1.0)
-
-    def _centers(self) -> Array:
-        """Return for each value the mean of its column."""
-        out = np.zeros(len(self.measured))
-        for part in self.parts:
-            out[part.at] = self.measured[part.at].mean()
-        return out
-
     def _estimated_sigma(self) -> Array:
         values = self.runs.predict(self.x)
         assert values is not None
@@ -357,7 +348,7 @@ class Search:
                 part.column.values,
                 values[part.at],
                 self.sigma[part.at],
-                self._has_sigma(part),
+                part.has_sigma,
             )
             for part in self.parts
         )
