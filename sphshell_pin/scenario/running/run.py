@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.atomic import AtomicFolder, FolderInUse
+from sphshell_pin.deprecation import renamed
 from sphshell_pin.dynamics.control.controllers import Controller
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
@@ -75,6 +76,7 @@ class RunReport:
     """Differences of the contacts from those on the exact CAD faces, if that was asked for."""
     warnings: tuple[str, ...] = ()
     """What in the run shows that the scenario is probably a mistake; one sentence each."""
+    doubts = renamed("doubts", "warnings")
 
 
 def run_scenario(
